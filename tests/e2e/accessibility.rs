@@ -99,10 +99,10 @@ fn dashboards_follow_accessibility_rules() {
     let mut found = Vec::new();
     let member = sign_in(&browser, &server, InvitedUser::member("Ada", &team));
     for path in [
-        "/desk",
-        &format!("/desk/submissions/{submission}"),
-        "/desk/questions",
-        "/desk/access",
+        "/dashboard",
+        &format!("/dashboard/submissions/{submission}"),
+        "/dashboard/questions",
+        "/dashboard/access",
         "/account",
     ] {
         found.extend(check_page(&member, &server, &axe, path));

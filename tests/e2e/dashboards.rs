@@ -80,7 +80,7 @@ fn dashboards_suffice_to_join_upload_and_start_a_day() {
         &server,
         InvitedUser::member("Ada", team.as_str().expect("an id is text")),
     );
-    ada.go_to(&format!("{}/desk", server.url));
+    ada.go_to(&format!("{}/dashboard", server.url));
     // A file that is no bundle is refused on the page, which is not reloaded.
     drop_file(&ada, "agent.zip", b"no archive at all");
     ada.wait_for(".refused");
@@ -116,14 +116,14 @@ fn dashboards_suffice_to_join_upload_and_start_a_day() {
     // The page follows the day until it is finished.
     grace.wait_until("document.body.textContent.includes('finished')");
 
-    ada.go_to(&format!("{}/desk", server.url));
+    ada.go_to(&format!("{}/dashboard", server.url));
     ada.wait_until("[...document.querySelectorAll('a')].some(link => link.pathname.startsWith('/evaluations/'))");
     for page in [&ada, &grace] {
         let errors = page.console_errors();
         // The browser logs the refused upload as an error, too.
         let unexpected = errors
             .iter()
-            .filter(|error| !error.contains("/desk/upload"));
+            .filter(|error| !error.contains("/dashboard/upload"));
         assert_eq!(unexpected.count(), 0, "{errors:?}");
     }
 }

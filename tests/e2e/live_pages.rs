@@ -84,7 +84,7 @@ fn board_and_evaluation_pages_follow_day_without_reload() {
     let _ = board.evaluate("document.querySelector('.board th.team a').focus()");
     // Screen readers announce the change.
     board.wait_until(
-        "document.querySelector('[data-live-said]').textContent.includes('The board has changed')",
+        "document.querySelector('[data-live-status]').textContent.includes('The board has changed')",
     );
     board.wait_until("document.querySelectorAll('.board th.team').length == 2");
     assert!(was_not_reloaded(&board));

@@ -181,7 +181,8 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
         View::PHONE.without_scripts(),
         &format!("{}{path}", server.url),
     );
-    let path_data = still.evaluate("document.querySelector('.still .way.puck').getAttribute('d')");
+    let path_data =
+        still.evaluate("document.querySelector('.still .trajectory.puck').getAttribute('d')");
     let points = path_data
         .as_str()
         .map_or(0, |path| path.matches(['M', 'L']).count());

@@ -1,7 +1,8 @@
-// Extras of the dashboards: a progress bar for uploads, drag and drop, and live states of a validation run. Without
-// JavaScript everything works with forms and reloading.
+// Script of the dashboards, the signed-in pages of teams and organisers: a progress bar for uploads, drag and drop, and sections
+// that update while work is in progress. Without JavaScript all of it works with forms and reloading.
 
-const EVERY_MS = 3000;
+// Interval between two reloads of a page that shows a validation run or evaluations in progress.
+const RELOAD_INTERVAL_MS = 3000;
 
 function showStatus(form, text) {
   let line = form.querySelector("[role=status]");
@@ -20,9 +21,9 @@ function addProgressBar(form) {
   return progress;
 }
 
-// The error on the page of the response.
-function refusal(text) {
-  const page = new DOMParser().parseFromString(text, "text/html");
+// The error message in the HTML of a response; null if the page has none.
+function findRefusal(html) {
+  const page = new DOMParser().parseFromString(html, "text/html");
   return page.querySelector("[role=alert]") ?? page.querySelector("main section p");
 }
 
@@ -65,7 +66,7 @@ function upload(form, event) {
     }
     done();
     showStatus(form, "Upload failed.");
-    showRefusal(form, refusal(request.responseText), request.status);
+    showRefusal(form, findRefusal(request.responseText), request.status);
   });
   request.addEventListener("error", () => {
     done();
@@ -81,7 +82,7 @@ function acceptDrops(form) {
   hint.className = "note";
   hint.textContent = "Or drop the bundle here.";
   input.after(hint);
-  const highlight = (isOver) => form.classList.toggle("over", isOver);
+  const highlight = (isOver) => form.classList.toggle("drag-over", isOver);
   form.addEventListener("dragover", (event) => {
     event.preventDefault();
     highlight(true);
@@ -99,10 +100,11 @@ function acceptDrops(form) {
   });
 }
 
-// Replaces sections with a changing state by their current content. Open or focused sections are left alone.
-async function follow() {
-  if (!document.querySelector("[data-moving]")) return;
-  const isBusy = document.hidden || document.querySelector("[data-live] details[open]");
+// Replaces each changed section by its current content while the page marks work in progress. Nothing is replaced while a fold is
+// open; a section with the focus stays as it is.
+async function reloadSections() {
+  if (!document.querySelector("[data-in-progress]")) return;
+  const isBusy = document.hidden || document.querySelector("[data-live-section] details[open]");
   if (!isBusy) {
     try {
       const address = new URL(location.href);
@@ -110,8 +112,8 @@ async function follow() {
       const response = await fetch(address, { headers: { accept: "text/html" } });
       if (response.ok && !response.redirected) {
         const page = new DOMParser().parseFromString(await response.text(), "text/html");
-        for (const old of document.querySelectorAll("[data-live]")) {
-          const fresh = page.querySelector(`[data-live="${old.dataset.live}"]`);
+        for (const old of document.querySelectorAll("[data-live-section]")) {
+          const fresh = page.querySelector(`[data-live-section="${old.dataset.liveSection}"]`);
           const hasFocus = old.contains(document.activeElement);
           if (fresh && !hasFocus && fresh.innerHTML !== old.innerHTML) {
             old.replaceWith(document.importNode(fresh, true));
@@ -122,11 +124,11 @@ async function follow() {
       // The server is not reachable at the moment: the next attempt follows.
     }
   }
-  setTimeout(follow, EVERY_MS);
+  setTimeout(reloadSections, RELOAD_INTERVAL_MS);
 }
 
 for (const form of document.querySelectorAll("form[data-upload]")) {
   form.addEventListener("submit", (event) => upload(form, event));
   acceptDrops(form);
 }
-setTimeout(follow, EVERY_MS);
+setTimeout(reloadSections, RELOAD_INTERVAL_MS);

@@ -1,10 +1,13 @@
+//! Actions of an agent (joint commands for one control step of 20 ms) and the interpolation between them.
+
 use crate::env::JOINTS;
 use serde::{Serialize, Serializer};
 
-/// The evaluator refuses numbers of a larger magnitude.
-const LARGEST_NUMBER: f64 = 1e4;
+/// The evaluator refuses actions with a number of a larger magnitude.
+const MAX_MAGNITUDE: f64 = 1e4;
 
-/// Meaning of an agent's actions (protocol, "Actions").
+/// What the numbers of an action are, and how the evaluator interpolates between them. Each variant begins with its code in the
+/// protocol (`docs/protocol.md`, "Actions").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interpolation {
     /// 1: position, reached along a line.
@@ -75,19 +78,20 @@ impl Action {
                 "the action {self:.60?} does not fit the interpolation {interpolation:?}"
             ));
         }
-        let is_refused = |number: &f64| !number.is_finite() || number.abs() > LARGEST_NUMBER;
+        let is_refused = |number: &f64| !number.is_finite() || number.abs() > MAX_MAGNITUDE;
         let (index, number) = self
             .numbers()
             .iter()
             .enumerate()
             .find(|(_, n)| is_refused(n))?;
         Some(format!(
-            "expected numbers within ±{LARGEST_NUMBER} in an action, got {number} for joint {} in row {}",
+            "expected numbers within ±{MAX_MAGNITUDE} in an action, got {number} for joint {} in row {}",
             index % JOINTS + 1,
             index / JOINTS + 1
         ))
     }
 
+    /// All numbers, row by row; each row has one number per joint.
     fn numbers(&self) -> &[f64] {
         match self {
             Self::Position(numbers) => numbers,

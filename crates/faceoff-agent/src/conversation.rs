@@ -1,3 +1,6 @@
+//! The loop of an agent: it reads the evaluator's messages (`hello`, `reset`, `step`, `end`, `bye`), one JSON object per line, and
+//! writes the answers `ready` and `act`.
+
 use crate::{
     action::{Action, Interpolation},
     env::Env,
@@ -18,36 +21,36 @@ pub type Failure = Box<dyn Error + Send + Sync>;
 
 /// A policy: everything between an observation and an action.
 pub trait Agent {
-    /// Called before each episode, and before each rally of a game. At most 10 s.
+    /// Called before each episode, and before each rally of a game. It may take at most 10 s.
     fn reset(&mut self);
 
-    /// The action for an observation. An answer costs points from 20 ms on.
+    /// The action for an observation. Episodes with answers that take 20 ms or longer can get penalty points.
     ///
     /// # Errors
     /// Any error is logged and ends the program, which is an agent fault.
     fn act(&mut self, observation: &Observation) -> Result<Action, Failure>;
 }
 
-/// What the agent sends in `ready`.
+/// The agent's description, which it sends in `ready`, the answer to `hello`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct AgentInfo {
     /// Name of the program.
     pub name: &'static str,
     /// Version of the program.
     pub version: &'static str,
-    /// Meaning of its actions.
+    /// What the numbers of its actions are.
     pub interpolation: Interpolation,
 }
 
-/// The task of a session.
+/// The task of a session (one run of the agent's program).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Task {
-    /// Score against a swinging opponent.
+    /// Score a goal against an opponent that swings its mallet.
     Hit,
     /// Stop an incoming puck.
     Defend,
-    /// Free the puck from the rim.
+    /// Move the puck from the rim into a good hitting position.
     Prepare,
     /// Play a whole game.
     Tournament,
@@ -94,6 +97,7 @@ enum Answer {
     },
 }
 
+/// `ready` as the answer to `hello` or to `reset`.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 enum Ready {
@@ -145,15 +149,15 @@ pub enum ConversationError {
     Io(#[from] io::Error),
 }
 
-/// Runs the agent that `make_agent` creates over standard input and output, until `bye` or the end of the input. An
-/// error goes to standard error, which is the agent's log, and to the evaluator.
+/// Creates the agent with `make_agent` and runs it over standard input and output, until `bye` or the end of the input. An
+/// error is written to standard error, which is the agent's log, and sent to the evaluator.
 pub fn run<A: Agent>(info: AgentInfo, make_agent: impl FnOnce(&Hello) -> A) -> ExitCode {
     let mut output = io::stdout().lock();
     let Err(error) = serve(info, make_agent, io::stdin().lock(), &mut output) else {
         return ExitCode::SUCCESS;
     };
     let message = error_chain(&error);
-    // If the log or the evaluator is gone, the error cannot be reported anywhere else.
+    // Errors of these writes are ignored: there is no other place to report them.
     let _logged = writeln!(io::stderr(), "error: {message}");
     let _sent = write_answer(&mut output, &Answer::Error { error: message });
     ExitCode::FAILURE
@@ -220,6 +224,7 @@ fn write_answer(output: &mut impl Write, answer: &Answer) -> io::Result<()> {
     output.flush()
 }
 
+/// The error's message, followed by those of its causes.
 fn error_chain(error: &dyn Error) -> String {
     let mut message = error.to_string();
     let mut cause = error.source();

@@ -1,3 +1,5 @@
+//! The field `env` of `hello`: constants of table, puck, mallet and robot.
+
 use serde::Deserialize;
 
 /// Number of driven joints.
@@ -29,7 +31,7 @@ pub struct TableInfo {
     pub goal_width: f64,
 }
 
-/// A disc's radius in metres.
+/// A disc (puck or mallet).
 #[derive(Debug, Clone, Deserialize)]
 pub struct RadiusInfo {
     /// Radius in metres.
@@ -45,7 +47,7 @@ pub struct RobotInfo {
     pub joint_pos_limit: [[f64; JOINTS]; 2],
     /// Lower and upper joint velocity limits, radians per second; constraints are tested at 95 % of them.
     pub joint_vel_limit: [[f64; JOINTS]; 2],
-    /// `table_from_robot` as row-major 4×4, one per robot, the agent's own first.
+    /// Homogeneous transforms from a robot's base frame to the table's frame, one per robot, the agent's own first.
     pub base_frame: Vec<BaseFrame>,
 }
 
@@ -57,7 +59,7 @@ impl RobotInfo {
     }
 }
 
-/// A homogeneous transform: 16 numbers in a row, or four rows of four.
+/// A homogeneous transform (4×4), written as 16 numbers or as four rows.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
 pub enum BaseFrame {

@@ -1,4 +1,4 @@
-//! The agent's side of the protocol, for agents in Rust: messages, answers and their loop.
+//! The agent's side of the protocol, for agents in Rust: the evaluator's messages, the agent's answers and the loop between them.
 //!
 //! An agent implements [`Agent`] and calls [`run`] in its `main`. `faceoff new --lang rust` copies this crate into
 //! the new project, so it depends on no other crate of Faceoff. It has no policy, no kinematics and no clock.
@@ -6,6 +6,7 @@
 //! ```no_run
 //! use faceoff_agent::{Action, Agent, AgentInfo, Failure, Interpolation, Observation, run};
 //!
+//! /// Holds the joint positions of the first observation, in rad.
 //! struct Hold(Option<[f64; 7]>);
 //!
 //! impl Agent for Hold {

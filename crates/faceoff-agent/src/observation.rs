@@ -1,5 +1,12 @@
+//! The observation in a `step` message: puck, own joints and, if there is one, the opponent's mallet.
+
 use crate::env::JOINTS;
 use serde::Deserialize;
+
+/// Length of an observation without an opponent on the table: 6 numbers of the puck, positions and velocities of 7 joints.
+const LEN_ALONE: usize = 20;
+/// Length of an observation with an opponent on the table, whose x, y, z come last.
+const LEN_WITH_OPPONENT: usize = 23;
 
 /// Observation of a control step in the robot's base frame: 20 numbers, 23 with an opponent on the table.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -28,7 +35,7 @@ impl Observation {
     /// x, y, z of the opponent's mallet, m; `None` without an opponent on the table.
     #[must_use]
     pub fn opponent(&self) -> Option<[f64; 3]> {
-        (self.0.len() == 23).then(|| self.numbers(20))
+        (self.0.len() == LEN_WITH_OPPONENT).then(|| self.numbers(LEN_ALONE))
     }
 
     /// All numbers, in the protocol's order.
@@ -37,8 +44,8 @@ impl Observation {
         &self.0
     }
 
-    fn numbers<const N: usize>(&self, from: usize) -> [f64; N] {
-        std::array::from_fn(|i| self.0[from + i])
+    fn numbers<const N: usize>(&self, start: usize) -> [f64; N] {
+        std::array::from_fn(|i| self.0[start + i])
     }
 }
 
@@ -47,7 +54,7 @@ impl TryFrom<Vec<f64>> for Observation {
 
     fn try_from(numbers: Vec<f64>) -> Result<Self, WrongLength> {
         match numbers.len() {
-            20 | 23 => Ok(Self(numbers)),
+            LEN_ALONE | LEN_WITH_OPPONENT => Ok(Self(numbers)),
             length => Err(WrongLength(length)),
         }
     }

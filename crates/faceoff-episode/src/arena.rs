@@ -1,27 +1,32 @@
+//! The settings that all episodes of an evaluation, or all rallies of a game, have in common. From them an [`Arena`] creates the
+//! simulations.
+
 use faceoff_sim::{Bounds, Episode, Game, GameSetup, PerturbationSettings, Plant};
 use faceoff_types::{Factors, Interpolation, Profile, Ruleset, Seed, Task};
 
-/// Common settings of all episodes of an evaluation or all rallies of a game: rules, perturbations, the season's plant and
-/// the seed from which the seeds of episodes and rallies are derived.
+/// Rules, perturbations, the season's plant (the true robot, which deviates from the nominal one that agents know) and the seed
+/// from which the seeds of episodes and rallies are derived.
 #[derive(Debug, Clone)]
 pub struct Arena {
     bounds: Bounds,
+    /// The active kinds of perturbations.
     factors: Factors,
-    settings: PerturbationSettings,
+    /// The magnitudes of the perturbations.
+    magnitudes: PerturbationSettings,
     plant: Plant,
     seed: Seed,
 }
 
 impl Arena {
-    /// An arena with the current ruleset and its magnitudes.
+    /// An arena with the current ruleset and its magnitudes of perturbations.
     #[must_use]
     pub fn new(profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
         let magnitudes = PerturbationSettings::default();
         Self::with_ruleset(Ruleset::CURRENT, profile, &magnitudes, seed, mismatch_seed)
     }
 
-    /// An arena with a ruleset, and magnitudes for the factors of the profile. Drawing the plant takes milliseconds, so use an
-    /// arena for many episodes.
+    /// An arena with a ruleset, and with magnitudes for the perturbations of the profile. It draws the plant from `mismatch_seed`,
+    /// which takes milliseconds, so use one arena for many episodes.
     #[must_use]
     pub fn with_ruleset(
         ruleset: Ruleset,
@@ -35,12 +40,12 @@ impl Arena {
             bounds: Bounds::of(ruleset),
             plant: Plant::for_factors(factors, magnitudes, mismatch_seed),
             factors,
-            settings: magnitudes.clone(),
+            magnitudes: magnitudes.clone(),
             seed,
         }
     }
 
-    /// Replaces the ruleset's bounds on the simulated world.
+    /// Replaces the ruleset's bounds on the simulated motion, beyond which a simulation counts as diverged.
     #[must_use]
     pub fn with_bounds(self, bounds: Bounds) -> Self {
         Self { bounds, ..self }
@@ -58,7 +63,7 @@ impl Arena {
             task,
             interpolation,
             self.factors,
-            &self.settings,
+            &self.magnitudes,
             &self.plant,
             self.seed(task, index),
         )
@@ -71,7 +76,7 @@ impl Arena {
         Game::new(GameSetup {
             interpolation,
             factors: self.factors,
-            settings: self.settings.clone(),
+            settings: self.magnitudes.clone(),
             plant: self.plant.clone(),
             seed: self.seed,
         })

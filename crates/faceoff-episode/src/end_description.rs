@@ -1,4 +1,4 @@
-//! Descriptions of the ends of episodes.
+//! Descriptions of the ends of episodes, in words for the agent's team.
 
 use faceoff_sim::{
     episode::task::{PLAYABLE_Y_M, TASK_RULES},
@@ -6,9 +6,9 @@ use faceoff_sim::{
 };
 use faceoff_types::{AgentFaultKind, EpisodeEnd, Task};
 
-/// What happened and what would have been a success, in one sentence without a full stop.
+/// Describes in one sentence, without a full stop, how the episode ended and what would have been a success.
 ///
-/// `puck` is its last true state in the table frame: x, y (m), yaw (rad), and their rates (m/s, rad/s). `steps` is the number
+/// `puck` is the puck's last true state in the table frame: x, y (m), yaw (rad), and their rates (m/s, rad/s). `steps` is the number
 /// of control steps, and `fault` the agent fault that ended the episode, if any.
 #[must_use]
 pub fn describe_end(
@@ -66,7 +66,7 @@ pub fn describe_end(
 }
 
 fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
-    let goal = TABLE.goal_width_m / 2.0;
+    let goal_half_width = TABLE.goal_width_m / 2.0;
     let y_text = rounded(y);
     if speed > TASK_RULES.lost_speed_m_s {
         return format!(
@@ -74,9 +74,9 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
             TASK_RULES.lost_speed_m_s
         );
     }
-    if x > TABLE.half_length_m() && y.abs() < goal {
-        let slow = task == Task::Hit && speed < TASK_RULES.hit_min_goal_speed_m_s;
-        let verdict = match (task, slow) {
+    if x > TABLE.half_length_m() && y.abs() < goal_half_width {
+        let is_too_slow = task == Task::Hit && speed < TASK_RULES.hit_min_goal_speed_m_s;
+        let verdict = match (task, is_too_slow) {
             (Task::Hit, false) => "goal",
             (Task::Hit, true) => "no goal, since it was too slow",
             _ => "puck left through the opponent's goal",
@@ -84,11 +84,11 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
         return format!(
             "{verdict}: puck passed the line x = {} m at y = {y_text} m, inside ±{} m, with {} m/s",
             rule_value(TABLE.half_length_m()),
-            rule_value(goal),
+            rule_value(goal_half_width),
             rounded(speed)
         );
     }
-    if x < -TABLE.half_length_m() && y.abs() < goal {
+    if x < -TABLE.half_length_m() && y.abs() < goal_half_width {
         return format!(
             "own goal: puck passed x = {} m at y = {y_text} m",
             rule_value(-TABLE.half_length_m())
@@ -98,8 +98,8 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
         return format!(
             "puck left the table beside the goal: x = {} m, y = {} m, outside ±{} m",
             rounded(x),
-            relative_to(y, goal.copysign(y)),
-            rule_value(goal)
+            relative_to(y, goal_half_width.copysign(y)),
+            rule_value(goal_half_width)
         );
     }
     format!(
@@ -108,19 +108,20 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
     )
 }
 
-/// The puck's position compared with the success region (`defend`, `prepare`), and other conditions that are not met.
+/// The puck's position compared with the success region of `defend` and `prepare`, followed by the other conditions of a success
+/// that are not met.
 fn position_text(task: Task, x: f64, y: f64, vx: f64) -> String {
     let [from, to] = TASK_RULES.success_x_m;
-    let inside = |within: bool| if within { "inside" } else { "outside" };
-    let nearest = if (x - from).abs() < (x - to).abs() {
+    let place = |is_inside: bool| if is_inside { "inside" } else { "outside" };
+    let nearest_bound = if (x - from).abs() < (x - to).abs() {
         from
     } else {
         to
     };
     let mut text = format!(
         "x = {} m, {} {} … {}",
-        relative_to(x, nearest),
-        inside(from < x && x <= to),
+        relative_to(x, nearest_bound),
+        place(from < x && x <= to),
         rule_value(from),
         rule_value(to)
     );

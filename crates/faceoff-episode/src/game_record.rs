@@ -1,10 +1,11 @@
-//! Inputs of a game, and its recording. In pairs, the first side comes first.
+//! Inputs of a game between two agents, the *sides*, and the rows of its recording. A game is a sequence of rallies; a *rally* lasts
+//! from a serve to a goal, a foul or another end. In pairs, the first side comes first.
 
 use crate::record::{AnswerTiming, NullSink, RecordError};
 use faceoff_sim::{ConstraintValues, GameState, Impact, RallyEnd};
 use faceoff_types::{AgentFault, AgentFaultKind, Interpolation, Side};
 
-/// A fault of a side, without its position in the game.
+/// A fault of a side's agent, without its position in the game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideFault {
     pub kind: AgentFaultKind,
@@ -12,23 +13,23 @@ pub struct SideFault {
     pub line: Option<String>,
 }
 
-/// The result of a side's getting ready for a rally. Times are in seconds, without those of the opponent. The start-up time
-/// is present if the agent had to be started.
+/// How a side got ready for a rally: its agent is started if it is not running, and must answer `reset`. Times are in seconds and
+/// do not include the opponent's. The start-up time is present if the agent had to be started.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RallyEntry {
     Ready {
         startup_s: Option<f64>,
-        /// Interpolation of its actions.
+        /// Interpolation of the agent's actions.
         interpolation: Interpolation,
         reset_s: f64,
     },
-    /// The agent did not start, so its arm holds.
+    /// The agent did not start, so the side's arm holds its position.
     StartFailed {
         /// Time until the failure.
         startup_s: f64,
         fault: SideFault,
     },
-    /// The agent did not answer `reset` correctly, so its arm holds.
+    /// The agent did not answer `reset` correctly, so the side's arm holds its position.
     ResetFailed {
         startup_s: Option<f64>,
         /// Interpolation stated by the agent.
@@ -40,7 +41,7 @@ pub enum RallyEntry {
 }
 
 impl RallyEntry {
-    /// Total time, in seconds.
+    /// Total time for start-up and reset, in seconds.
     #[must_use]
     pub fn time_s(&self) -> f64 {
         match self {
@@ -71,30 +72,31 @@ impl RallyEntry {
 pub enum Response<'a> {
     /// An answer, possibly late.
     Answer {
-        /// Row-major, finite, with the length of the interpolation.
+        /// Row-major, finite, with the length that the interpolation requires.
         action: &'a [f64],
         /// Times of the answer.
         timing: AnswerTiming,
     },
-    /// No valid answer: its arm holds until the end of the rally.
+    /// No valid answer: the side's arm holds its position until the end of the rally.
     Fault {
         fault: SideFault,
         /// Times until the fault.
         timing: AnswerTiming,
     },
-    /// No answer was due, since its arm holds after an earlier fault in this rally.
+    /// No answer was expected, since the side's arm holds its position after an earlier fault in this rally.
     Held,
 }
 
-/// The effect of a response in a control step.
+/// The effect of a response on the side's arm in a control step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
+    /// The arm is commanded by the action.
     InTime,
     /// The answer was late: the arm holds its previous position.
     Late,
     /// There was no valid answer: the arm holds its previous position.
     Fault,
-    /// No answer was due: the arm holds its previous position.
+    /// No answer was expected: the arm holds its previous position.
     Held,
 }
 
@@ -119,7 +121,7 @@ pub struct RallyStart<'a> {
     pub rally: u32,
     /// Control steps of the game before the rally.
     pub game_step: u32,
-    /// The side on which the puck lies.
+    /// The side in whose half the puck lies at the start.
     pub serves: Side,
     /// How the sides got ready.
     pub entries: &'a [RallyEntry; 2],
@@ -134,9 +136,9 @@ pub struct SideStep<'a> {
     pub effect: Effect,
     /// The action of its answer, even if late.
     pub action: Option<&'a [f64]>,
-    /// Times of the response, if an answer was due.
+    /// Times of the response, if an answer was expected.
     pub timing: Option<AnswerTiming>,
-    /// Constraint values of its robot after the step; violated if above 0.
+    /// Constraint values of its robot after the step; a constraint is violated if its value is above 0.
     pub constraints: ConstraintValues,
 }
 
@@ -151,7 +153,7 @@ pub struct GameStepRow<'a> {
     pub sides: [SideStep<'a>; 2],
     /// The true state after the step.
     pub state: &'a GameState,
-    /// Had tracking lost the puck after the step, for both sides?
+    /// Had the (simulated) puck tracking lost the puck after the step? This affects both sides.
     pub puck_lost: bool,
     /// Contacts of the puck that began in the step.
     pub impacts: &'a [Impact],
@@ -181,7 +183,7 @@ impl RallyEnding {
 
     /// The side that scored or committed the foul.
     #[must_use]
-    pub fn by(self) -> Option<Side> {
+    pub fn responsible_side(self) -> Option<Side> {
         match self {
             Self::Table(RallyEnd::Goal { by } | RallyEnd::Foul { by }) => Some(Side::BOTH[by]),
             _ => None,
@@ -210,7 +212,7 @@ pub trait GameSink {
     /// # Errors
     /// If the recording could not be written.
     fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError>;
-    /// The observations of both sides before the step, even if a side has no answer due.
+    /// The observations of both sides before the step, even of a side from which no answer is expected.
     fn observe(&mut self, observations: [&[f64]; 2]);
     /// The step after the observations.
     ///

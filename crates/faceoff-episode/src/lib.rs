@@ -1,5 +1,6 @@
-//! Runs episodes and games from answers, which may come from a process, a recording or a function. The effects of answers
-//! and the content of recordings are decided here, and only here.
+//! Runs *episodes* (one attempt of one agent at a task) and *games* (two agents against each other). The caller provides the agents'
+//! answers, from a process, a recording or a function. The effects of answers and the content of recordings are decided in this crate
+//! only.
 //!
 //! This crate starts no process, opens no file and reads no clock.
 

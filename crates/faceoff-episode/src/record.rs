@@ -1,4 +1,4 @@
-//! Recording of episodes.
+//! Rows of the recording of an episode, and the trait of their receivers.
 
 use faceoff_sim::{ConstraintValues, EpisodeState, Impact};
 use faceoff_types::{EpisodeOutcome, Interpolation, Seed};
@@ -9,9 +9,9 @@ pub struct AnswerTiming {
     /// Computation time in seconds: wall time from the first attempt to write the observation to the last byte of the answer,
     /// minus host interference.
     pub computation_time_s: f64,
-    /// Part of the wall time due to host interference, in seconds.
+    /// Part of the wall time due to host interference (other load on the machine), in seconds.
     pub host_time_s: f64,
-    /// CPU time of the agent's process tree in that time, in seconds, if the host reports it.
+    /// CPU time of the agent's process tree during the wall time, in seconds, if the host reports it.
     pub cpu_time_s: Option<f64>,
 }
 
@@ -22,7 +22,7 @@ pub struct EpisodeStart<'a> {
     pub episode: u32,
     /// The episode's own seed.
     pub seed: Seed,
-    /// `None` if the agent failed before it stated one.
+    /// The interpolation of the agent's actions; `None` if the agent failed before it stated one.
     pub interpolation: Option<Interpolation>,
     /// The true initial state.
     pub state: &'a EpisodeState,
@@ -39,11 +39,11 @@ pub struct StepRow<'a> {
     pub timing: AnswerTiming,
     /// The true state after the step.
     pub state: &'a EpisodeState,
-    /// Constraint values after the step; violated if above 0.
+    /// Constraint values after the step; a constraint is violated if its value is above 0.
     pub constraints: ConstraintValues,
     /// The observation after the step.
     pub next_observation: &'a [f64],
-    /// Had tracking lost the puck after the step? Then the observation repeats an earlier pose.
+    /// Had the (simulated) puck tracking lost the puck after the step? Then the observation repeats an earlier pose.
     pub puck_lost: bool,
     /// Contacts of the puck that began in the step.
     pub impacts: &'a [Impact],
@@ -53,19 +53,20 @@ pub struct StepRow<'a> {
 #[derive(Debug, thiserror::Error)]
 #[error("{what}: {source}")]
 pub struct RecordError {
+    /// What could not be written, e.g. a file's name.
     pub what: String,
     pub source: Box<dyn std::error::Error + Send + Sync>,
 }
 
 /// Receives the start, the steps and the end of episodes, e.g. to record them.
 pub trait StepSink {
-    /// Starts an episode. A previous one without an end is discarded, since it is repeated.
+    /// Starts an episode. If the previous episode has not ended, its recording is discarded, since the caller repeats it.
     fn begin(&mut self, start: EpisodeStart<'_>);
     /// The observation for the agent, before the step.
     fn observe(&mut self, observation: &[f64]);
     /// The step after the observation.
     fn step(&mut self, row: &StepRow<'_>);
-    /// Ends the episode. `host_noise_reruns` is the number of discarded tries before this one.
+    /// Ends the episode. `host_noise_reruns` is the number of earlier tries that were discarded because of host interference.
     ///
     /// # Errors
     /// If the recording could not be written.

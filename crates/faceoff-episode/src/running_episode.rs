@@ -1,3 +1,5 @@
+//! An *episode*: one attempt of an agent at a task, control step by control step.
+
 use crate::{
     arena::Arena,
     record::{AnswerTiming, EpisodeStart, StepRow, StepSink},
@@ -34,14 +36,14 @@ use faceoff_types::{
 /// # Ok::<(), faceoff_episode::NonFiniteObservation>(())
 /// ```
 ///
-/// The sink receives the start of the episode and each step. The caller reports its end to the sink: a try that does not
-/// count is started again instead.
+/// The sink receives the start of the episode and each step. The caller reports the end to the sink, unless the try does not count
+/// and is repeated.
 #[derive(Debug)]
 pub struct RunningEpisode<S> {
     task: Task,
     episode: u32,
     max_steps: u32,
-    world: Episode,
+    simulation: Episode,
     times: TimeSum,
     end: Option<EpisodeEnd>,
     /// The fault, if the last answer made the world diverge.
@@ -54,7 +56,7 @@ pub struct RunningEpisode<S> {
 pub struct Question<'a> {
     /// The control step, from 0.
     pub step: u32,
-    /// 23 numbers with an opponent on the table, 20 without (PROTOCOL); finite.
+    /// 23 finite numbers with an opponent on the table, 20 without.
     pub observation: &'a [f64],
 }
 
@@ -70,8 +72,8 @@ pub struct NonFiniteObservation {
 }
 
 impl<S: StepSink> RunningEpisode<S> {
-    /// Starts an episode. Without an interpolation from the agent, only its fault can follow; the initial state, which is the
-    /// same for all agents, is recorded nevertheless.
+    /// Starts an episode. `interpolation` is `None` if the agent failed before it stated one; then only its fault can follow. The
+    /// initial state, which is the same for all agents, is recorded nevertheless.
     pub fn begin(
         arena: &Arena,
         task: Task,
@@ -79,18 +81,19 @@ impl<S: StepSink> RunningEpisode<S> {
         interpolation: Option<Interpolation>,
         mut sink: S,
     ) -> Self {
-        let world = arena.episode(task, episode, interpolation.unwrap_or(Interpolation::Cubic));
+        let simulation =
+            arena.episode(task, episode, interpolation.unwrap_or(Interpolation::Cubic));
         sink.begin(EpisodeStart {
             episode,
             seed: arena.seed(task, episode),
             interpolation,
-            state: &world.state(),
+            state: &simulation.state(),
         });
         Self {
             task,
             episode,
             max_steps: EPISODE_STEPS,
-            world,
+            simulation,
             times: TimeSum::default(),
             end: None,
             diverged: None,
@@ -107,9 +110,9 @@ impl<S: StepSink> RunningEpisode<S> {
     /// The next observation for the agent.
     ///
     /// # Errors
-    /// If the simulator failed, which is neither an end nor an agent fault.
+    /// If the simulator failed, which is neither an end of the episode nor an agent fault.
     pub fn question(&self) -> Result<Question<'_>, NonFiniteObservation> {
-        let (step, observation) = (self.world.steps(), self.world.observation());
+        let (step, observation) = (self.simulation.steps(), self.simulation.observation());
         // Later observations are finite, since a diverging world ends the episode.
         if step == 0 && !are_finite(observation) {
             return Err(NonFiniteObservation {
@@ -132,23 +135,23 @@ impl<S: StepSink> RunningEpisode<S> {
         timing: AnswerTiming,
     ) -> Result<Option<EpisodeOutcome>, AgentFaultKind> {
         debug_assert_eq!(self.end, None, "the episode has ended");
-        let step = self.world.steps();
-        self.sink.observe(self.world.observation());
-        let outcome = self.world.step(action);
+        let step = self.simulation.steps();
+        self.sink.observe(self.simulation.observation());
+        let outcome = self.simulation.step(action);
         self.times.add(timing.computation_time_s);
         self.sink.step(&StepRow {
             step,
             action,
             timing,
-            state: &self.world.state(),
+            state: &self.simulation.state(),
             constraints: outcome.constraints,
-            next_observation: self.world.observation(),
-            puck_lost: self.world.is_puck_lost(),
-            impacts: self.world.world().impacts(),
+            next_observation: self.simulation.observation(),
+            puck_lost: self.simulation.is_puck_lost(),
+            impacts: self.simulation.world().impacts(),
         });
-        let detail = match self.world.divergence() {
+        let detail = match self.simulation.divergence() {
             Some(divergence) => Some(divergence.cause.to_string()),
-            None if !are_finite(self.world.observation()) => {
+            None if !are_finite(self.simulation.observation()) => {
                 Some("an observation is not finite".to_owned())
             }
             None => None,
@@ -196,16 +199,16 @@ impl<S: StepSink> RunningEpisode<S> {
             (None, None) => self.steps() == 0,
             (None, Some(_)) => false,
         };
-        // Divergence is detected here, so the fault must agree with it.
+        // Divergence is known from the simulation, so the fault must agree with it.
         let agrees = match &self.diverged {
             Some(diverged) => fault.fault == *diverged,
             None => self.end.is_none() && !matches!(fault.fault, AgentFaultKind::Diverged { .. }),
         };
-        let possible = agrees && agent_task == AgentTask::Qualifying(self.task) && is_consistent;
-        possible.then(|| self.outcome(EpisodeEnd::AgentFault, Some(fault)))
+        let is_possible = agrees && agent_task == AgentTask::Qualifying(self.task) && is_consistent;
+        is_possible.then(|| self.outcome(EpisodeEnd::AgentFault, Some(fault)))
     }
 
-    /// The step of a fault: the one whose answer is due, or whose action made the world diverge.
+    /// The step of a fault: the one that waits for its answer, or the one whose action made the world diverge.
     fn faulty_step(&self) -> u32 {
         self.steps() - u32::from(self.diverged.is_some())
     }
@@ -221,7 +224,7 @@ impl<S: StepSink> RunningEpisode<S> {
     }
 
     pub fn steps(&self) -> u32 {
-        self.world.steps()
+        self.simulation.steps()
     }
 
     /// The sink of the episode.
@@ -235,8 +238,8 @@ impl<S: StepSink> RunningEpisode<S> {
             episode: self.episode,
             steps: self.steps(),
             end,
-            success: fault.is_none() && self.world.success(),
-            violations: self.world.violations(),
+            success: fault.is_none() && self.simulation.success(),
+            violations: self.simulation.violations(),
             computation_time: self.times.summary(),
             fault,
         }

@@ -1,3 +1,6 @@
+//! A *game* between two agents, the *sides*, control step by control step. It is a sequence of rallies; a *rally* lasts from a serve
+//! to a goal, a foul or another end.
+
 use crate::{
     arena::Arena,
     game_record::{
@@ -54,6 +57,7 @@ pub struct RunningGame<S> {
     sides: [RunningSide; 2],
     /// The current rally; `None` between rallies.
     rally: Option<CurrentRally>,
+    /// Number of rallies started so far.
     rallies: u32,
     end: Option<GameEnd>,
     sink: S,
@@ -68,7 +72,7 @@ struct CurrentRally {
 /// The outcome of a finished game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FinishedGame<S> {
-    /// The data for scoring, except for the individual times.
+    /// The data for scoring, except for the times of the individual answers.
     pub outcome: GameOutcome,
     /// Computation times of each side's answers, in order of play, in seconds.
     pub answer_times_s: [Vec<f64>; 2],
@@ -107,7 +111,7 @@ impl<S: GameSink> RunningGame<S> {
         self.rally.map_or(0, |rally| rally.steps)
     }
 
-    /// Is a rally under way?
+    /// Is the game in a rally (not between rallies)?
     pub const fn is_in_rally(&self) -> bool {
         self.rally.is_some()
     }
@@ -227,7 +231,7 @@ impl<S: GameSink> RunningGame<S> {
         self.end_if_over(played.rally_end.map(RallyEnding::Table))
     }
 
-    /// Applies a side's response; its effect.
+    /// Applies a side's response, and returns its effect.
     fn apply_response(
         &mut self,
         side: usize,
@@ -262,7 +266,7 @@ impl<S: GameSink> RunningGame<S> {
             .sides
             .iter_mut()
             .zip(divergence.by)
-            .filter(|(side_state, named)| *named && side_state.fault().is_none())
+            .filter(|(side_state, is_cause)| *is_cause && side_state.fault().is_none())
         {
             let kind = AgentFaultKind::Diverged {
                 detail: divergence.cause.to_string(),
@@ -272,7 +276,7 @@ impl<S: GameSink> RunningGame<S> {
         }
     }
 
-    /// Ends the rally if it is over, and the game if it is over.
+    /// Ends the game if a side has forfeited or all steps are played. Ends the rally if the game ends or if it has an `ending`.
     fn end_if_over(&mut self, ending: Option<RallyEnding>) -> Result<(), RecordError> {
         let [first, second] = &self.sides;
         let causes = [
@@ -280,7 +284,9 @@ impl<S: GameSink> RunningGame<S> {
             second.forfeit_cause(&self.limits),
         ];
         self.end = match causes {
-            [Some(a), Some(b)] => Some(GameEnd::BothForfeit { causes: [a, b] }),
+            [Some(first), Some(second)] => Some(GameEnd::BothForfeit {
+                causes: [first, second],
+            }),
             [Some(cause), None] => Some(GameEnd::Forfeit {
                 by: Side::First,
                 cause,
@@ -291,8 +297,8 @@ impl<S: GameSink> RunningGame<S> {
             }),
             [None, None] => (self.game.steps() >= self.planned_steps).then_some(GameEnd::Played),
         };
-        let over = self.end.as_ref().map(|_| RallyEnding::GameOver);
-        let (Some(ending), Some(rally)) = (ending.or(over), self.rally) else {
+        let game_over = self.end.as_ref().map(|_| RallyEnding::GameOver);
+        let (Some(ending), Some(rally)) = (ending.or(game_over), self.rally) else {
             return Ok(());
         };
         self.rally = None;

@@ -1,3 +1,6 @@
+//! One *side* (agent and robot) of a running game. A game is divided into *windows* of equal length, which scoring treats like
+//! episodes.
+
 use crate::{
     game_record::{RallyEntry, SideFault},
     record::AnswerTiming,
@@ -13,17 +16,20 @@ use faceoff_types::{
 #[derive(Debug, Clone)]
 pub(crate) struct RunningSide {
     side: Side,
-    /// The fault in this rally, since which its arm holds.
+    /// The fault in this rally; after it the side's arm holds its position.
     fault: Option<AgentFault>,
-    /// Must its agent be started before the next rally?
+    /// Must the side's agent be started before the next rally?
     needs_start: bool,
+    /// The current window.
     window: GameWindow,
     window_times: TimeSum,
+    /// The windows before the current one.
     windows: Vec<GameWindow>,
     faults: Vec<GameFault>,
     late_answers: u32,
     /// Computation times of all answers, in order, in seconds.
     answer_times_s: Vec<f64>,
+    /// Total time for start-ups, resets and answers, in seconds.
     time_used_s: f64,
 }
 
@@ -114,7 +120,7 @@ impl RunningSide {
         });
     }
 
-    /// The allowance that the side has exceeded, if any.
+    /// Why the side forfeits the game: the limit that it has exceeded, if any.
     pub fn forfeit_cause(&self, limits: &GameLimits) -> Option<ForfeitCause> {
         let (count, allowed) = (self.fault_count(), limits.max_faults);
         if count > allowed {

@@ -1,3 +1,5 @@
+//! Mean and maximum of the computation times of an agent's answers.
+
 use faceoff_types::ComputationTime;
 
 /// Sum, maximum and number of computation times.

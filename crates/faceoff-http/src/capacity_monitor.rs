@@ -1,4 +1,5 @@
-//! Logs a warning for each evaluation day that will not finish before its deadline.
+//! Logs a warning for each evaluation day that will not finish before its deadline. An evaluation day is all evaluations
+//! of one *cutoff*, the moment at which each team's active submission is fixed.
 
 use faceoff_api::views::capacity::{DayLoad, Fit};
 use faceoff_service::{config::Capacity, views::capacity};
@@ -7,10 +8,10 @@ use faceoff_types::{Clock, StageDay, StageName};
 use std::{collections::BTreeSet, time::Duration};
 use tokio::sync::broadcast::error::RecvError;
 
-/// Between two checks without a cutoff. The forecast is in hours, so a minute is often enough.
-const INTERVAL: Duration = Duration::from_secs(60);
+/// Time until the next check if no cutoff comes first. The forecast is in hours, so once a minute is often enough.
+const CHECK_INTERVAL: Duration = Duration::from_secs(60);
 
-/// An evaluation day that does not fit into its time, judged by the recent duration of such episodes.
+/// An evaluation day that will not finish before its deadline, according to the recent durations of its tasks' episodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CapacityWarning {
     pub stage: StageName,
@@ -24,7 +25,7 @@ pub struct CapacityMonitor {
     store: Store,
     clock: Clock,
     capacity: Capacity,
-    /// Days of the last check that did not fit, with whether their cutoff has passed.
+    /// Days that did not fit at the last check, with whether their cutoff had passed.
     overfull: BTreeSet<(StageDay, bool)>,
 }
 
@@ -40,14 +41,14 @@ impl CapacityMonitor {
         }
     }
 
-    /// The days that do not fit now, but did at the last check, or whose cutoff has passed since. Days without a measured
-    /// duration are not among them.
+    /// A warning for each day that does not fit, unless the last check warned of it in the same phase (before or after its
+    /// cutoff). Days whose episodes have no measured duration yet give no warning.
     ///
     /// # Errors
     /// If the database cannot be read.
     pub async fn check(&mut self) -> Result<Vec<CapacityWarning>, StoreError> {
         let now = self.clock.now();
-        let (mut new, mut overfull) = (Vec::new(), BTreeSet::new());
+        let (mut warnings, mut overfull) = (Vec::new(), BTreeSet::new());
         for stage in self.store.stages().await? {
             let forecast = capacity::forecast(&self.store, &self.capacity, stage.id, now);
             let overfull_days = forecast.await?.days.into_iter();
@@ -59,7 +60,7 @@ impl CapacityMonitor {
                 let key = (day, load.is_under_way);
                 overfull.insert(key);
                 if !self.overfull.contains(&key) {
-                    new.push(CapacityWarning {
+                    warnings.push(CapacityWarning {
                         stage: stage.name.clone(),
                         load,
                     });
@@ -67,7 +68,7 @@ impl CapacityMonitor {
             }
         }
         self.overfull = overfull;
-        Ok(new)
+        Ok(warnings)
     }
 
     /// Logs a line for each day that does not fit any more. Checks at each cutoff and every minute, until `shutdown` completes.
@@ -85,7 +86,7 @@ impl CapacityMonitor {
                     tracing::debug!(%error, "cannot read the capacity forecast; trying again");
                 }
             }
-            let timer = tokio::time::sleep(INTERVAL);
+            let timer = tokio::time::sleep(CHECK_INTERVAL);
             tokio::pin!(timer);
             loop {
                 tokio::select! {

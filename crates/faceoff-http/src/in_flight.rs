@@ -1,4 +1,5 @@
-//! Limits the requests in flight. Under overload requests are refused at once, and those that only read are refused first.
+//! Limits the number of requests in flight, which are those that the server is answering. Under overload it refuses requests
+//! at once, and refuses requests that only read first.
 
 use axum::{
     extract::{Request, State},
@@ -16,12 +17,12 @@ use std::{
 };
 use tokio::sync::Semaphore;
 
-/// With fewer requests in flight none is refused for its waiting time: their number is then not the cause.
-const MIN_CROWD: usize = 64;
-/// A request that waits longer than this for the other ready ones would be answered late, and would delay more of them.
+/// With fewer requests in flight, no request is refused because of its wait: so few requests do not cause a long wait.
+const MIN_CROWDED_REQUESTS: usize = 64;
+/// Longest time that a reading request may wait until the async runtime continues it. After a longer wait it is refused.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
-/// Requests that are being answered.
+/// Counts the requests in flight, with one permit for each.
 #[derive(Debug, Clone)]
 pub(crate) struct InFlight {
     app: Arc<AppState>,
@@ -38,9 +39,10 @@ impl InFlight {
 
     fn is_crowded(&self) -> bool {
         let limit = self.app.config.limits.requests;
-        limit.saturating_sub(self.permits.available_permits()) >= MIN_CROWD
+        limit.saturating_sub(self.permits.available_permits()) >= MIN_CROWDED_REQUESTS
     }
 
+    /// The response to a refused request. `cause` is its label in the metrics.
     fn refuse(&self, cause: &'static str) -> Response {
         self.app.config.metrics.web().record_refusal(cause);
         Problem::new(
@@ -51,13 +53,13 @@ impl InFlight {
     }
 }
 
-/// Answers `Busy` when the limit is reached. Requests that only read are also refused when too many others are ready.
+/// Answers `Busy` when the limit is reached. Requests that only read also get `Busy` after a wait longer than [`MAX_WAIT`].
 pub(crate) async fn limit(
     State(in_flight): State<InFlight>,
     request: Request,
     next: Next,
 ) -> Response {
-    // A busy server is alive.
+    // The liveness probe is always answered: a busy server is alive.
     if request.uri().path() == LIVE_PATH {
         return next.run(request).await;
     }
@@ -65,10 +67,10 @@ pub(crate) async fn limit(
         return in_flight.refuse("in_flight");
     };
     if request.method().is_safe() {
-        // All other ready requests run before this one continues, so the elapsed time is the delay that they cause.
-        let started = Instant::now();
+        // The runtime polls all other ready tasks before this one continues, so the elapsed time is the delay that they cause.
+        let yielded_at = Instant::now();
         tokio::task::yield_now().await;
-        if started.elapsed() > MAX_WAIT && in_flight.is_crowded() {
+        if yielded_at.elapsed() > MAX_WAIT && in_flight.is_crowded() {
             return in_flight.refuse("late");
         }
     }

@@ -53,10 +53,12 @@ pub(crate) fn wrap(site: Router, app: &Arc<AppState>) -> Router {
         .layer(middleware::map_request(drop_foreign_request_id))
 }
 
-/// Smaller responses gain nothing. Responses with a secret are smaller too, so their compressed length reveals nothing of it.
+/// Smaller responses are not compressed, because they would gain nothing. This includes all responses with a secret, whose
+/// compressed length could reveal it.
 const MIN_COMPRESSED_BYTES: u64 = 2048;
 
-/// Not archives, which are compressed already; not event streams, which must not be buffered; not byte ranges of files.
+/// Whether the response is text or JSON. Other responses stay as they are: archives are compressed already, event streams must
+/// not be buffered, and byte ranges refer to the uncompressed file.
 fn is_compressible(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
     let media_type = headers.get(header::CONTENT_TYPE);
     let media_type = media_type.and_then(|value| value.to_str().ok());
@@ -74,8 +76,8 @@ fn is_compressible(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extension
     essence.is_some_and(|essence| media_types.contains(&essence.trim()))
 }
 
-/// Answers 304 to a client that already has the current page of a board. The condition is removed from the request, so the
-/// cached page (`answer_cache.rs`) serves clients with and without one.
+/// Answers 304 to a client that already has the current page of a board (the ranking of a stage). The condition
+/// (`If-None-Match`) is removed from the request, so one cached page serves clients with and without a condition.
 async fn revalidate(mut request: Request, next: Next) -> Response {
     if !answer_cache::is_board_page(request.uri().path()) {
         return next.run(request).await;
@@ -96,7 +98,7 @@ async fn revalidate(mut request: Request, next: Next) -> Response {
     }
 }
 
-/// Answers visitors from the cache.
+/// Answers requests that have a cache key (`answer_cache.rs`) from the cache of recent responses.
 async fn serve_cached(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
     let second = app.config.clock.now().as_second();
     match answer_cache::cache_key(&request, &app.store, second) {

@@ -15,8 +15,8 @@ pub(crate) struct Peer {
 }
 
 impl Peer {
-    /// The address of the client: the peer, or the one that a trusted proxy forwards for. `None` if the request comes from the
-    /// proxy's own host, or if the proxy names no client.
+    /// The address of the client: the peer's, or the one for which a trusted proxy forwards the request. `None` if a trusted
+    /// proxy names no client: the header is absent, or lists only trusted proxies.
     pub(crate) fn client_address(&self, headers: &HeaderMap) -> Option<IpAddr> {
         let is_trusted_proxy =
             |address: &IpAddr| self.trusted_proxies.contains(&address.to_canonical());
@@ -39,7 +39,7 @@ impl Peer {
             match address(entry) {
                 Some(address) if is_trusted_proxy(&address) => {}
                 Some(address) => return Some(address),
-                // The proxy forwards for a client that it does not name: such clients share the proxy's address.
+                // The entry is no address. All clients with such an entry are counted under the proxy's address.
                 None => return Some(self.address),
             }
         }
@@ -70,40 +70,40 @@ mod tests {
 
     #[test]
     fn only_trusted_proxies_are_believed() {
-        let found = |address: &str| Some(address.to_owned());
-        assert_eq!(client_address("192.0.2.1", &[]), found("192.0.2.1"));
+        let expected = |address: &str| Some(address.to_owned());
+        assert_eq!(client_address("192.0.2.1", &[]), expected("192.0.2.1"));
         assert_eq!(
             client_address("192.0.2.1", &["192.0.2.7"]),
-            found("192.0.2.1")
+            expected("192.0.2.1")
         );
         assert_eq!(client_address("127.0.0.1", &[]), None);
         assert_eq!(
             client_address("::ffff:127.0.0.1", &["192.0.2.7"]),
-            found("192.0.2.7")
+            expected("192.0.2.7")
         );
         // 192.0.2.7 comes from the client, and is not believed.
         assert_eq!(
             client_address("127.0.0.1", &["192.0.2.7, 192.0.2.8"]),
-            found("192.0.2.8")
+            expected("192.0.2.8")
         );
         assert_eq!(
             client_address("127.0.0.1", &["192.0.2.7", "192.0.2.8"]),
-            found("192.0.2.8")
+            expected("192.0.2.8")
         );
         // Two trusted proxies, one behind the other.
         assert_eq!(
             client_address("127.0.0.1", &["192.0.2.8, 10.0.0.9"]),
-            found("192.0.2.8")
+            expected("192.0.2.8")
         );
         // An entry that is no address ends the search.
         assert_eq!(
             client_address("127.0.0.1", &["192.0.2.8, unknown"]),
-            found("127.0.0.1")
+            expected("127.0.0.1")
         );
         // Entries of the client need not be valid text.
         assert_eq!(
             client_address("127.0.0.1", &["\u{ff}, 192.0.2.8"]),
-            found("192.0.2.8")
+            expected("192.0.2.8")
         );
     }
 }

@@ -17,12 +17,13 @@ use faceoff_service::{
 };
 use std::time::Duration;
 
-/// Public, except for the metrics: they show how full the disks are, and so how much teams upload.
+/// The probes on the public address. The metrics need an organiser's token: they show how full the disks are, and so how much
+/// teams upload.
 pub(crate) fn router(timeout: Duration) -> Router<App> {
     with_probes(Router::new().route("/metrics", get(metrics)), timeout)
 }
 
-/// For an address that only the operators reach: all of it without a token.
+/// The probes on an address that only the operators reach. None needs a token.
 pub(crate) fn unauthenticated_router(timeout: Duration) -> Router<App> {
     with_probes(
         Router::new().route("/metrics", get(unauthenticated_metrics)),
@@ -70,7 +71,9 @@ async fn gauges(app: &AppState) -> Result<GaugeValues, Problem> {
             out_of_space: gauges.out_of_space,
             paused: gauges.paused || free_space.is_short(),
             oldest_wait_s: gauges.waiting_since.map_or(0.0, seconds_since),
-            expected_s: completed_at.map_or(f64::NAN, |at| at.duration_since(now).as_secs_f64()),
+            expected_s: completed_at.map_or(f64::NAN, |completed_at| {
+                completed_at.duration_since(now).as_secs_f64()
+            }),
         },
         open_evaluations: gauges.open_evaluations,
         slots: app.config.capacity.slots,

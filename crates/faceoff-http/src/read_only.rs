@@ -1,4 +1,4 @@
-//! Refuses changes of an archived season.
+//! Refuses changes on a server that shows an archived season, which is an imported copy of a finished one.
 
 use axum::{
     extract::{Request, State},

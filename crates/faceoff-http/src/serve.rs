@@ -1,8 +1,8 @@
 //! Accepts connections, limits their number and duration, and closes them at shutdown.
 //!
-//! A client costs a descriptor and some memory before its first byte is parsed. So the time to send a request is
+//! A client costs a file descriptor and some memory before its first byte is parsed. So the time to send a request is
 //! limited, responses must be read at a minimum rate, and each address has a maximum number of connections. The
-//! remaining descriptors are for the evaluator.
+//! remaining descriptors are for the evaluator, the part of this process that runs agents.
 
 mod connection_quota;
 mod min_rate_stream;
@@ -37,11 +37,11 @@ use tokio::{
 };
 use tower::Layer as _;
 
-/// After an error of the listener itself, usually because no descriptor is left. Connections wait meanwhile.
+/// Pause after an error of the listener itself, usually because no file descriptor is left. New connections wait meanwhile.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
-/// How much of a response may wait unsent in the system's buffer. Without a bound the buffer grows to megabytes, and
+/// How much of a response may wait unsent in the kernel's send buffer. Without a bound the buffer grows to megabytes, and
 /// is refilled only when a third of it is free: a slow but steady reader would look like one that reads nothing.
-const UNSENT_BYTES: u32 = 128 << 10;
+const MAX_UNSENT_BYTES: u32 = 128 << 10;
 /// How often the log repeats that all connections are in use, or that none can be accepted.
 const LOG_INTERVAL: Duration = Duration::from_secs(60);
 
@@ -79,13 +79,13 @@ impl Default for ConnectionLimits {
     }
 }
 
-/// Answers requests until `until` completes, and then finishes those in flight. An error of a connection ends that
-/// connection; after an error of the listener it tries again.
+/// Answers requests until `shutdown_signal` completes, and then finishes the requests in flight. An error of a connection
+/// ends that connection; after an error of the listener, the function tries again.
 pub async fn serve(
     listener: TcpListener,
     router: Router,
     limits: ConnectionLimits,
-    until: impl Future<Output = ()> + Send + 'static,
+    shutdown_signal: impl Future<Output = ()> + Send + 'static,
 ) {
     let mut acceptor = Acceptor {
         listener,
@@ -100,32 +100,32 @@ pub async fn serve(
     http.timer(TokioTimer::new())
         .header_read_timeout(limits.head_timeout);
     let graceful = GracefulShutdown::new();
-    // Event streams have no end of their own: without this signal, shutdown would wait for the end of each game.
+    // Event streams end only with their game or after an hour: without this extension, shutdown would wait for them.
     let (shutdown_sender, shutdown) = Shutdown::new();
     let router = router.layer(Extension(shutdown));
-    let mut until = pin!(until);
+    let mut shutdown_signal = pin!(shutdown_signal);
     loop {
-        let (stream, from, permit) = tokio::select! {
-            () = &mut until => break,
+        let (stream, client, permit) = tokio::select! {
+            () = &mut shutdown_signal => break,
             accepted = acceptor.accept() => accepted,
         };
-        let Some(address_permit) = quota.acquire(from.ip()) else {
+        let Some(address_permit) = quota.acquire(client.ip()) else {
             refuse(stream, &limit_response);
             continue;
         };
-        if let Err(error) = SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES) {
-            tracing::debug!(%from, %error, "cannot bound the send buffer; a slow client may be dropped too early");
+        if let Err(error) = SockRef::from(&stream).set_tcp_notsent_lowat(MAX_UNSENT_BYTES) {
+            tracing::debug!(from = %client, %error, "cannot bound the send buffer; a slow client may be dropped too early");
         }
         let stream = MinRateStream::new(stream, limits.min_read_rate, reset);
         let peer = Peer {
-            address: from.ip(),
+            address: client.ip(),
             trusted_proxies: Arc::clone(&proxies),
         };
         let service = TowerToHyperService::new(Extension(peer).layer(router.clone()));
         let connection = graceful.watch(http.serve_connection(TokioIo::new(stream), service));
         tokio::spawn(async move {
             if let Err(error) = connection.await {
-                tracing::debug!(%from, %error, "a connection failed");
+                tracing::debug!(from = %client, %error, "a connection failed");
             }
             drop((address_permit, permit));
         });
@@ -141,7 +141,7 @@ struct Acceptor {
     permits: Arc<Semaphore>,
     /// When the log last said that all connections are in use.
     full_logged_at: Option<Instant>,
-    /// When the log last said that none can be accepted. `None` once one is accepted again.
+    /// When the log last said that no connection can be accepted. `None` once one is accepted again.
     failure_logged_at: Option<Instant>,
 }
 
@@ -159,9 +159,9 @@ impl Acceptor {
                 return std::future::pending().await;
             };
             match self.listener.accept().await {
-                Ok((stream, from)) => {
+                Ok((stream, client)) => {
                     self.failure_logged_at = None;
-                    return (stream, from, permit);
+                    return (stream, client, permit);
                 }
                 Err(error) if is_peer_gone(&error) => {}
                 Err(error) => {
@@ -176,12 +176,12 @@ impl Acceptor {
     }
 }
 
-/// May a message of that time be logged again?
+/// Whether a message that was last logged at `logged_at` may be logged again.
 fn is_log_due(logged_at: Option<Instant>) -> bool {
     logged_at.is_none_or(|logged_at| logged_at.elapsed() > LOG_INTERVAL)
 }
 
-/// Did the client go away before it was accepted?
+/// Whether the error says only that the client disconnected before it was accepted.
 fn is_peer_gone(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -192,9 +192,9 @@ fn is_peer_gone(error: &io::Error) -> bool {
     )
 }
 
-/// Closes with a reset: unread data must not stay in the system's buffers for minutes.
+/// Makes closing reset the connection: data that the client does not read must not stay in the kernel's buffers for minutes.
 fn reset(stream: &TcpStream) {
-    // If that fails, the data stays there for a while, which does no harm.
+    // If this fails, the data stays there for a while, which does no harm.
     let _ = stream.set_zero_linger();
 }
 
@@ -208,7 +208,7 @@ fn limit_response(per_address: usize) -> Vec<u8> {
     problem.as_http1()
 }
 
-/// Sends the response if that needs no waiting, and closes the connection.
+/// Sends the response if the kernel accepts it at once, and closes the connection.
 fn refuse(stream: TcpStream, response: &[u8]) {
     if let Ok(mut stream) = stream.into_std() {
         let _ = stream.write_all(response);

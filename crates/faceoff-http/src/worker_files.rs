@@ -1,6 +1,7 @@
-//! File transfer of remote workers: they download the bundles of a job, and upload its recordings. The grant of a job
-//! (`Grant`) gives access to these files only, and only while the worker holds the lease. This is not part of the API:
-//! both sides are this program.
+//! File transfer of remote workers, which are processes on other machines that run jobs. A worker downloads the bundles
+//! (uploaded agents) of its job, and uploads the job's recordings. The grant of a job (`Grant`) gives access to these files
+//! only, and only while the worker holds the job's lease: the right to run it for a time. These routes are not part of the
+//! API: both sides are this program.
 
 use axum::{
     Router,
@@ -36,7 +37,7 @@ impl FromRequestParts<App> for LeaseHolder {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        let forbidden = |why| Problem::new(ProblemKind::Forbidden, why);
+        let forbidden = |reason| Problem::new(ProblemKind::Forbidden, reason);
         let sent = parts.headers.get(header::AUTHORIZATION);
         let sent = sent.and_then(|value| value.to_str().ok()?.strip_prefix("Grant "));
         let grant = sent.and_then(|text| Grant::open(text, &app.config.link_key.grant_key()));
@@ -48,10 +49,10 @@ impl FromRequestParts<App> for LeaseHolder {
     }
 }
 
-/// The lease must be held by a worker that has started the job and is not banned. A worker that merely received the job
-/// reads and writes nothing.
+/// Checks that the lease is held by a worker that has started the job and is not banned. A worker that has received the job
+/// but not started it may read and write nothing.
 async fn check_holder(store: &Store, grant: &Grant) -> Result<(), Problem> {
-    let forbidden = |why: &str| Err(Problem::new(ProblemKind::Forbidden, why));
+    let forbidden = |reason: &str| Err(Problem::new(ProblemKind::Forbidden, reason));
     let Some(holder) = store.lease_holder(grant.job_id, grant.nonce).await? else {
         return forbidden("this worker no longer holds the lease of the job");
     };

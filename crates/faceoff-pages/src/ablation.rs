@@ -1,11 +1,11 @@
-//! `/submissions/{id}/ablation`: the effect of each perturbation on an agent, as a chart and as a table, and the episodes with
-//! another outcome.
+//! `/submissions/{id}/ablation`: the effect of each *perturbation*, a disturbance of the simulation such as sensor noise, on an agent: as
+//! a chart, as a table, and as the episodes with another outcome. A *profile* is a set of perturbations.
 
 pub(super) mod pair;
 
 use super::{
     assets,
-    chart::{Bars, LabelledRate},
+    chart::{LabelledRate, RateChart},
     figures,
     frame::{Frame, PageProblem, render},
 };
@@ -42,17 +42,22 @@ struct Row {
     difference: Option<Difference>,
 }
 
+/// Difference of the success rate to the profile `ideal`.
 struct Difference {
+    /// In percentage points.
     points: String,
+    /// Episodes solved only in the ideal simulator.
     lost: u32,
+    /// Episodes solved only with the profile.
     gained: u32,
-    p: String,
+    p_value: String,
     is_significant: bool,
 }
 
-struct Group {
+/// Results of a task.
+struct TaskResults {
     task: Task,
-    chart: Bars,
+    chart: RateChart,
     rows: Vec<Row>,
 }
 
@@ -64,7 +69,7 @@ struct Page {
     agent: Option<String>,
     episodes_per_task: u32,
     status: AblationStatus,
-    groups: Vec<Group>,
+    task_results: Vec<TaskResults>,
     style: &'static str,
     id: SubmissionId,
     outcome_changes: Vec<OutcomeChanges>,
@@ -90,11 +95,11 @@ pub(super) async fn page(
     };
     let team = team::find(&app, submission.team).await?;
     let season = SeasonHead::load(&app).await?;
-    let groups = match &view.status {
+    let task_results = match &view.status {
         AblationStatus::Finished { tasks, .. } => {
-            let groups = tasks.iter();
-            groups
-                .map(|(task, effects)| Group::new(*task, effects))
+            let results = tasks.iter();
+            results
+                .map(|(task, effects)| TaskResults::new(*task, effects))
                 .collect()
         }
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
@@ -112,11 +117,11 @@ pub(super) async fn page(
         agent: submission.agent_name,
         episodes_per_task: view.episodes_per_task,
         status: view.status,
-        groups,
+        task_results,
     })
 }
 
-impl Group {
+impl TaskResults {
     fn new(task: Task, effects: &[ProfileEffect]) -> Self {
         let rates: Vec<LabelledRate> = effects
             .iter()
@@ -129,7 +134,7 @@ impl Group {
             .collect();
         Self {
             task,
-            chart: Bars::new(task.as_str(), &rates),
+            chart: RateChart::new(task.as_str(), &rates),
             rows: effects.iter().map(Row::new).collect(),
         }
     }
@@ -151,7 +156,7 @@ impl Row {
                 points: figures::signed(100.0 * effect.difference),
                 lost: effect.lost,
                 gained: effect.gained,
-                p: figures::p_value(effect.p_value),
+                p_value: figures::p_value(effect.p_value),
                 is_significant: effect.p_value <= SIGNIFICANCE,
             }),
         }

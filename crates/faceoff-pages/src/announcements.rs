@@ -27,8 +27,8 @@ struct Page {
 }
 
 impl Page {
-    fn timestamp(&self, at: &Timestamp) -> String {
-        utc_minute(*at)
+    fn timestamp(&self, instant: &Timestamp) -> String {
+        utc_minute(*instant)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The section of the organisers' reference agents on the pages of the boards.
+//! The section of *baselines* on the pages of the boards: reference agents of the organisers, which are evaluated but not ranked.
 
 use super::figures::{self, Rate};
 use faceoff_api::views::{baseline::BaselineRow, board::BoardView};
@@ -6,6 +6,7 @@ use faceoff_types::{EvaluationId, Task, Tier};
 use jiff::civil::Date;
 
 pub(super) struct Baseline {
+    /// Rank that the agent would have among the teams.
     pub(super) would_rank: u32,
     pub(super) team: String,
     pub(super) agent: Option<String>,

@@ -1,4 +1,5 @@
-//! The boards: `/` in tiers as in the paper's qualifying table, `/tasks/{task}` by task.
+//! The boards, the rankings of a stage: `/` over all tasks, `/tasks/{task}` by one task. Teams are grouped by *tier*, a safety class that
+//! follows from penalty points: deployable, improvable or non-deployable.
 
 mod address;
 mod day_progress;
@@ -26,7 +27,7 @@ use faceoff_service::{
 };
 use faceoff_types::Task;
 use heading::Heading;
-use rows::{Context, Group, OverallRow, TaskRow, common_setting};
+use rows::{Context, Group, OverallRow, TaskRow, common_conditions};
 use sort::Sort;
 
 /// Interval at which `live.js` reloads the progress of running evaluations.
@@ -39,10 +40,13 @@ struct OverallPage {
     heading: Heading,
     days: Days,
     sort: Sort,
+    /// BLAKE3 hash of the season's secret, from which all episodes are drawn.
     commitment: String,
-    setting: Option<String>,
+    /// Profile, episodes and rules of all rows; `None` if rows differ.
+    conditions: Option<String>,
     /// The earlier day to which changes are relative.
-    since: Option<jiff::civil::Date>,
+    comparison_day: Option<jiff::civil::Date>,
+    /// Are teams statistically tied?
     has_ties: bool,
     groups: Vec<Group<OverallRow>>,
     baselines: Vec<Baseline>,
@@ -88,8 +92,8 @@ pub(super) async fn overall(
         heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
         days: Days::new(&board, &timeline, &address),
         commitment: season.commitment,
-        setting: common_setting(&board.rows),
-        since: timeline.before.as_ref().map(|before| before.day),
+        conditions: common_conditions(&board.rows),
+        comparison_day: timeline.before.as_ref().map(|earlier| earlier.day),
         has_ties: context.has_ties(),
         groups: context.groups(|row| OverallRow::new(row, &context, &board.weights)),
         baselines: baselines::rows(&board),
@@ -108,9 +112,11 @@ struct TaskPage {
     days: Days,
     sort: Sort,
     title: &'static str,
+    /// Aim of the task in one sentence.
     aim: &'static str,
-    setting: Option<String>,
-    since: Option<jiff::civil::Date>,
+    /// Profile, episodes and rules of all rows; `None` if rows differ.
+    conditions: Option<String>,
+    comparison_day: Option<jiff::civil::Date>,
     has_ties: bool,
     groups: Vec<Group<TaskRow>>,
     baselines: Vec<Baseline>,
@@ -163,8 +169,8 @@ pub(super) async fn by_task(
         days: Days::new(&board, &timeline, &address),
         title,
         aim,
-        setting: common_setting(&board.rows),
-        since: timeline.before.as_ref().map(|before| before.day),
+        conditions: common_conditions(&board.rows),
+        comparison_day: timeline.before.as_ref().map(|earlier| earlier.day),
         has_ties: context.has_ties(),
         groups: context.groups(|row| TaskRow::new(row, &row.tasks[&task], &context)),
         baselines: baselines::rows(&board),

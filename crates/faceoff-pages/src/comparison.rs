@@ -1,4 +1,5 @@
-//! `/evaluations/{a}/compare/{b}`: two evaluations on the same episodes.
+//! `/evaluations/{a}/compare/{b}`: the evaluations of two teams on the same episodes, with a test whether their difference is more than
+//! chance.
 
 pub(super) mod pair;
 
@@ -46,8 +47,10 @@ impl Difference {
     }
 }
 
+/// Results of both teams in a task.
 struct Row {
     task: String,
+    /// Number of episodes that both teams solved; in the next fields only the first, only the second, or neither.
     both: u32,
     only_a: u32,
     only_b: u32,

@@ -3,6 +3,7 @@
 use flate2::read::GzDecoder;
 use std::{io::Read as _, sync::OnceLock};
 
+/// A gzip-compressed text and, once it was needed, its decompressed form.
 #[derive(Debug)]
 pub(crate) struct CompressedText {
     gzip: &'static [u8],

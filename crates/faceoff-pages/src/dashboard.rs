@@ -1,4 +1,4 @@
-//! `/desk`: the team dashboard: submissions, questions, members and tokens.
+//! `/dashboard`: the team dashboard, the signed-in pages of a team: submissions, questions, members and tokens.
 
 pub(super) mod access;
 mod evaluations;
@@ -9,33 +9,55 @@ mod upload;
 
 use axum::{
     Router,
-    routing::{get, post},
+    extract::OriginalUri,
+    response::Redirect,
+    routing::{any, get, post},
 };
 use faceoff_service::app::App;
+
+/// Prefix of all paths of the dashboard.
+const BASE_PATH: &str = "/dashboard";
+
+/// The prefix in older versions.
+const OLD_BASE_PATH: &str = "/desk";
 
 /// All pages of the dashboard except the upload, which has its own timeouts.
 pub(super) fn router() -> Router<App> {
     Router::new()
-        .route("/desk", get(overview::page))
-        .route("/desk/submissions/{id}", get(submission::page))
+        .route("/dashboard", get(overview::page))
+        .route("/dashboard/submissions/{id}", get(submission::page))
         .route(
-            "/desk/submissions/{id}/activate",
+            "/dashboard/submissions/{id}/activate",
             post(submission::activate),
         )
         .route(
-            "/desk/submissions/{id}/withdraw",
+            "/dashboard/submissions/{id}/withdraw",
             post(submission::withdraw),
         )
         .route(
-            "/desk/submissions/{id}/describe",
+            "/dashboard/submissions/{id}/describe",
             post(submission::describe),
         )
-        .route("/desk/terms", post(overview::accept_terms))
-        .route("/desk/questions", get(questions::page).post(questions::ask))
-        .merge(access::router("/desk"))
+        .route("/dashboard/terms", post(overview::accept_terms))
+        .route(
+            "/dashboard/questions",
+            get(questions::page).post(questions::ask),
+        )
+        .merge(access::router(BASE_PATH))
+        .route(OLD_BASE_PATH, any(redirect_old_path))
+        .route("/desk/{*rest}", any(redirect_old_path))
 }
 
 /// The upload of a bundle.
 pub(super) fn uploads() -> Router<App> {
-    Router::new().route("/desk/upload", post(upload::submit))
+    Router::new().route("/dashboard/upload", post(upload::submit))
+}
+
+/// Redirects from the paths of older versions. The query is kept, and so are the method and the body of a form.
+async fn redirect_old_path(OriginalUri(uri): OriginalUri) -> Redirect {
+    let path_and_query = uri.path_and_query().map_or("", |path| path.as_str());
+    let rest = path_and_query
+        .strip_prefix(OLD_BASE_PATH)
+        .unwrap_or_default();
+    Redirect::permanent(&format!("{BASE_PATH}{rest}"))
 }

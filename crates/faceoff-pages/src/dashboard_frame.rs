@@ -18,9 +18,9 @@ pub(super) struct Tab {
 
 /// Path and name of each page of the team dashboard.
 const TEAM_TABS: [(&str, &str); 3] = [
-    ("/desk", "Submissions"),
-    ("/desk/questions", "Questions"),
-    ("/desk/access", "Members and tokens"),
+    ("/dashboard", "Submissions"),
+    ("/dashboard/questions", "Questions"),
+    ("/dashboard/access", "Members and tokens"),
 ];
 
 /// Path and name of each page of the organiser dashboard.
@@ -140,7 +140,7 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ("day-voided", "The whole evaluation day was voided."),
     ("cancelled", "Cancelled. The evaluation can be repeated."),
     ("rerun", "Queued again on the same episodes."),
-    ("extra-turn", "The extra evaluation is queued."),
+    ("extra-evaluation", "The extra evaluation is queued."),
     ("disqualified", "The team was disqualified."),
     ("reinstated", "The team is evaluated and ranked again."),
     (
@@ -179,7 +179,7 @@ impl DashboardHeader {
                     Some(_) => "team token".to_owned(),
                     None => "administrator of the host".to_owned(),
                 },
-                |person| person.name.to_string(),
+                |user| user.name.to_string(),
             ),
             tabs: tabs.iter().map(tab).collect(),
             notice: NoticeText::from(notice),

@@ -24,7 +24,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
 };
 use library::{Group, LIBRARY, Page};
-use reference::{Part, Reference, Schema, Tokens};
+use reference::{Reference, Schema, TokenRequirement, TypePart};
 use search::{Index, MAX_RESULTS, SearchResult};
 use serde::Deserialize;
 use serde_json::Value;
@@ -32,8 +32,9 @@ use std::sync::{Arc, OnceLock};
 
 /// Browsers revalidate each page by its ETag, since the frame of a page shows problems of the server.
 const CACHE_CONTROL: &str = "public, no-cache";
+/// Longest search query, in characters.
 const MAX_QUERY_CHARS: usize = 200;
-/// Pages for newcomers with a description, in reading order.
+/// Pages for newcomers in reading order, each with its topic.
 const NEWCOMERS: [(&str, &str); 4] = [
     ("start", "An agent on the board within an hour"),
     ("rules", "What counts and what costs points"),
@@ -72,7 +73,7 @@ pub(super) fn router(api: Arc<Value>) -> Router<App> {
     });
     Router::new()
         .route("/docs", get(contents))
-        .route("/docs/search", get(find))
+        .route("/docs/search", get(search_page))
         .route("/docs/images/{*name}", get(images::image))
         .route(reference::PATH, get(api_reference))
         .route("/docs/api-reference/schemas", get(schemas))
@@ -86,7 +87,8 @@ pub(super) fn router(api: Arc<Value>) -> Router<App> {
 #[template(path = "docs/contents.html")]
 struct ContentsPage {
     frame: Frame,
-    question: String,
+    /// Text in the search field, which every page of the documentation has; empty except on the page of the results.
+    search_query: String,
     newcomers: Vec<(&'static Page, &'static str)>,
     groups: &'static [Group],
 }
@@ -97,9 +99,9 @@ async fn contents(State(app): State<App>, conditions: Conditions) -> Result<Resp
         &conditions,
         &ContentsPage {
             frame: frame(&app),
-            question: String::new(),
+            search_query: String::new(),
             newcomers: newcomers
-                .filter_map(|(name, why)| Some((library::page(name)?, *why)))
+                .filter_map(|(name, topic)| Some((library::page(name)?, *topic)))
                 .collect(),
             groups: &LIBRARY,
         },
@@ -110,7 +112,7 @@ async fn contents(State(app): State<App>, conditions: Conditions) -> Result<Resp
 #[template(path = "docs/document.html")]
 struct DocumentPage {
     frame: Frame,
-    question: String,
+    search_query: String,
     page: &'static Page,
 }
 
@@ -128,7 +130,7 @@ async fn document(
         &conditions,
         &DocumentPage {
             frame: frame(&app),
-            question: String::new(),
+            search_query: String::new(),
             page,
         },
     )
@@ -138,7 +140,7 @@ async fn document(
 #[template(path = "docs/reference.html")]
 struct ReferencePage<'a> {
     frame: Frame,
-    question: String,
+    search_query: String,
     reference: &'a Reference,
 }
 
@@ -151,7 +153,7 @@ async fn api_reference(
         &conditions,
         &ReferencePage {
             frame: frame(&app),
-            question: String::new(),
+            search_query: String::new(),
             reference: documentation.reference(),
         },
     )
@@ -161,7 +163,7 @@ async fn api_reference(
 #[template(path = "docs/operations.html")]
 struct OperationsPage<'a> {
     frame: Frame,
-    question: String,
+    search_query: String,
     group: &'a reference::Group,
 }
 
@@ -182,7 +184,7 @@ async fn operations(
         &conditions,
         &OperationsPage {
             frame: frame(&app),
-            question: String::new(),
+            search_query: String::new(),
             group,
         },
     )
@@ -192,7 +194,7 @@ async fn operations(
 #[template(path = "docs/schemas.html")]
 struct SchemasPage<'a> {
     frame: Frame,
-    question: String,
+    search_query: String,
     schemas: &'a [Schema],
 }
 
@@ -205,7 +207,7 @@ async fn schemas(
         &conditions,
         &SchemasPage {
             frame: frame(&app),
-            question: String::new(),
+            search_query: String::new(),
             schemas: &documentation.reference().schemas,
         },
     )
@@ -215,7 +217,7 @@ async fn schemas(
 #[template(path = "docs/schema.html")]
 struct SchemaPage<'a> {
     frame: Frame,
-    question: String,
+    search_query: String,
     schema: &'a Schema,
 }
 
@@ -236,7 +238,7 @@ async fn schema(
         &conditions,
         &SchemaPage {
             frame: frame(&app),
-            question: String::new(),
+            search_query: String::new(),
             schema,
         },
     )
@@ -252,30 +254,31 @@ struct SearchQuery {
 #[template(path = "docs/search.html")]
 struct SearchPage {
     frame: Frame,
-    question: String,
+    search_query: String,
     results: Vec<SearchResult>,
+    /// Number of results, including those that are not shown.
     count: usize,
 }
 
-async fn find(
+async fn search_page(
     State(app): State<App>,
     Extension(documentation): Extension<Arc<Documentation>>,
     query: Result<QueryParams<SearchQuery>, Problem>,
     conditions: Conditions,
 ) -> Result<Response, PageProblem> {
-    let QueryParams(SearchQuery { q: question }) = query?;
-    let chars = question.chars().count();
+    let QueryParams(SearchQuery { q: search_query }) = query?;
+    let chars = search_query.chars().count();
     if chars > MAX_QUERY_CHARS {
         let detail = format!("q: expected at most {MAX_QUERY_CHARS} characters, got {chars}");
         return Err(Problem::new(ProblemKind::InvalidRequest, detail).into());
     }
-    let question = question.trim().to_owned();
-    let (results, count) = documentation.index().search(&question);
+    let search_query = search_query.trim().to_owned();
+    let (results, count) = documentation.index().search(&search_query);
     respond(
         &conditions,
         &SearchPage {
             frame: frame(&app),
-            question,
+            search_query,
             results,
             count,
         },

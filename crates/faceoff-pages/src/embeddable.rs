@@ -1,3 +1,5 @@
-/// Response extension: other sites may embed this page in a frame.
+//! A mark on responses that other sites may embed.
+
+/// Response extension: other sites may embed this page in a frame. Without it the server forbids that with a header.
 #[derive(Debug, Clone, Copy)]
 pub struct Embeddable;

@@ -1,4 +1,4 @@
-//! Outcomes and violations of episodes as text.
+//! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
 use faceoff_replay::{Group, ViolationSummary};
 use faceoff_types::EpisodeEnd;
@@ -24,22 +24,26 @@ pub(super) const fn group_label(group: Group) -> &'static str {
 }
 
 /// A violation with its size and duration.
-pub(super) fn describe_violation(broken: &ViolationSummary) -> String {
-    let excess = match broken.group {
-        Group::Ee | Group::Link => excess_text(1e3 * broken.worst, 1, "mm"),
-        Group::JointPos => excess_text(broken.worst, 4, "rad"),
-        Group::JointVel => excess_text(broken.worst, 3, "rad/s"),
+pub(super) fn describe_violation(violation: &ViolationSummary) -> String {
+    let excess = match violation.group {
+        Group::Ee | Group::Link => excess_text(1e3 * violation.worst, 1, "mm"),
+        Group::JointPos => excess_text(violation.worst, 4, "rad"),
+        Group::JointVel => excess_text(violation.worst, 3, "rad/s"),
     };
-    let joint = match broken.joint {
+    let joint = match violation.joint {
         Some(joint) => format!(" of joint {joint}"),
         None => String::new(),
     };
     format!(
         "{}{joint}: by {excess}, from step {}, for {} {}",
-        group_label(broken.group),
-        broken.from,
-        broken.samples,
-        if broken.samples == 1 { "step" } else { "steps" }
+        group_label(violation.group),
+        violation.from,
+        violation.samples,
+        if violation.samples == 1 {
+            "step"
+        } else {
+            "steps"
+        }
     )
 }
 

@@ -1,4 +1,5 @@
-//! `/evaluations/{id}/episodes`: outcomes of all episodes, their start positions and violations.
+//! `/evaluations/{id}/episodes`: the episodes of an evaluation, which are single attempts at a task: their outcomes, start positions and
+//! violations.
 
 mod maps;
 mod rows;
@@ -25,7 +26,8 @@ use jiff::civil::Date;
 use maps::{StartMap, ViolationMap};
 use rows::Row;
 
-const PER_PAGE: usize = 100;
+/// Rows of the table per page.
+const ROWS_PER_PAGE: usize = 100;
 
 /// An option of a select box.
 struct SelectOption {
@@ -45,9 +47,11 @@ struct Page {
     /// Number of episodes of the evaluation.
     total: usize,
     /// Number of episodes that match the filter.
-    found: usize,
+    matching: usize,
+    /// Number of matching episodes without success.
     failed: usize,
-    sees_observed: bool,
+    /// May the viewer see observations and answer times of the agent?
+    can_see_observations: bool,
     has_filter: bool,
     tasks: Vec<SelectOption>,
     outcomes: Vec<SelectOption>,
@@ -92,19 +96,19 @@ pub(super) async fn page(
         .iter()
         .filter(|line| chosen.task.is_none_or(|task| task == line.task))
         .collect();
-    let found: Vec<_> = task_episodes
+    let matching: Vec<_> = task_episodes
         .iter()
         .copied()
         .filter(|line| chosen.matches(line))
         .collect();
-    let pages = found.len().div_ceil(PER_PAGE).max(1);
-    let number = usize::try_from(query.page.unwrap_or(1)).unwrap_or(usize::MAX);
-    let number = number.clamp(1, pages);
-    let first = (number - 1) * PER_PAGE;
-    let rows: Vec<Row> = found
+    let pages = matching.len().div_ceil(ROWS_PER_PAGE).max(1);
+    let page = usize::try_from(query.page.unwrap_or(1)).unwrap_or(usize::MAX);
+    let page = page.clamp(1, pages);
+    let first = (page - 1) * ROWS_PER_PAGE;
+    let rows: Vec<Row> = matching
         .iter()
         .skip(first)
-        .take(PER_PAGE)
+        .take(ROWS_PER_PAGE)
         .map(|line| Row::new(id, line))
         .collect();
     let other_page = |number: usize| {
@@ -147,9 +151,9 @@ pub(super) async fn page(
         team: team.name.to_string(),
         day: clips.evaluation.stage_day.date,
         total: view.episodes.len(),
-        found: found.len(),
-        failed: found.iter().filter(|line| !line.success).count(),
-        sees_observed: clips.can_see_observations,
+        matching: matching.len(),
+        failed: matching.iter().filter(|line| !line.success).count(),
+        can_see_observations: clips.can_see_observations,
         has_filter: query
             != EpisodesQuery {
                 page: query.page,
@@ -172,13 +176,13 @@ pub(super) async fn page(
             .into(),
         table: TableOutline::new(),
         start_maps: tasks
-            .filter_map(|task| StartMap::new(task, &found))
+            .filter_map(|task| StartMap::new(task, &matching))
             .collect(),
-        violations: ViolationMap::new(&found),
+        violations: ViolationMap::new(&matching),
         from: if rows.is_empty() { 0 } else { first + 1 },
         to: first + rows.len(),
         rows,
-        previous_page: (number > 1).then(|| other_page(number - 1)),
-        next_page: (number < pages).then(|| other_page(number + 1)),
+        previous_page: (page > 1).then(|| other_page(page - 1)),
+        next_page: (page < pages).then(|| other_page(page + 1)),
     })
 }

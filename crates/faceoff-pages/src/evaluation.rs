@@ -1,10 +1,10 @@
-//! `/evaluations/{id}`: the public page of an evaluation. Log, faults and dataset are visible to the team only, through the API
-//! and the dashboard.
+//! `/evaluations/{id}`: the public page of an evaluation, one team's run of all tasks on a day. Log, faults and dataset are visible to
+//! the team only, through the API and the dashboard.
 
 mod slow_answers;
 
 use super::{
-    chart::{Strip, TimeBin, TimeSummary},
+    chart::{AnswerTimeChart, TimeBin, TimeSummary},
     figures,
     frame::{Frame, PageProblem, render},
 };
@@ -49,6 +49,7 @@ struct TaskFigures {
     tier_name: &'static str,
     tier_title: &'static str,
     tier_symbol: &'static str,
+    /// Probability that other episodes of the same kind would give another tier.
     tier_change: String,
     details: Option<TaskDetails>,
 }
@@ -96,7 +97,7 @@ impl ViolationFigures {
             (violations.joint_pos, JOINT_POS_POINTS),
             (violations.joint_vel, JOINT_VEL_POINTS),
         ];
-        let motion = motion.map(|(count, each)| (count, f64::from(count) * each));
+        let motion = motion.map(|(count, points)| (count, f64::from(count) * points));
         // The cost of a late answer depends on its time, so the points of late answers are the remainder.
         let motion_points: f64 = motion.iter().map(|(_, points)| points).sum();
         let late = (result.penalty_points - motion_points).max(0.0);
@@ -136,6 +137,7 @@ struct FinalResult {
     tier_symbol: &'static str,
     tier_bounds: String,
     tier_change: String,
+    /// Number of bootstrap resamples behind `tier_change`.
     resamples: u32,
     ruleset: String,
     seed: Option<String>,
@@ -143,12 +145,12 @@ struct FinalResult {
     dataset_blake3: Option<String>,
     finished_at: Timestamp,
     tasks: Vec<TaskFigures>,
-    /// Evaluations on the same episodes.
-    others: Vec<OtherEvaluation>,
+    /// Evaluations of other teams on the same episodes.
+    comparable: Vec<OtherEvaluation>,
     timing: Option<TimingFigures>,
     /// Chart of answer times; once the day is released.
-    answer_times: Option<Strip>,
-    slow: SlowAnswers,
+    answer_times: Option<AnswerTimeChart>,
+    slow_answers: SlowAnswers,
 }
 
 /// Another team's evaluation on the same episodes.
@@ -158,17 +160,20 @@ struct OtherEvaluation {
     score: String,
 }
 
-/// Noise floor and host interference, formatted.
+/// Formatted delays caused by the server: the *noise floor*, which every answer has, and *host interference*, single delays by other load
+/// on the machine.
 struct TimingFigures {
     before: RoundTripFigures,
     during: RoundTripFigures,
-    /// `None` if no delay was measured.
+    /// Longest delay by host interference; `None` if none was measured.
     longest_stall_ms: Option<String>,
+    /// Episodes repeated because of host interference.
     host_noise_reruns: u32,
+    /// Restarts after a platform fault.
     platform_retries: u32,
 }
 
-/// Round trips to the calibration agent, in milliseconds.
+/// Round trips to the calibration agent, a test agent that answers at once; in milliseconds.
 struct RoundTripFigures {
     count: u32,
     p50_ms: String,
@@ -216,7 +221,8 @@ struct Page {
     dataset_removed: Option<RulingView>,
     progress: Option<Progress>,
     queue: Option<QueueView>,
-    next: String,
+    /// What happens next, as a sentence.
+    next_step: String,
     result: Option<FinalResult>,
 }
 
@@ -245,7 +251,7 @@ pub(super) async fn page(
     let ablation = ablation::exists(&app, submission.id).await?;
     let season = SeasonHead::load(&app).await?;
     let scored_at = view.status.finished_at();
-    let frozen = scored_at.and_then(|at| visibility.hiding_freeze(view.stage, at));
+    let frozen = scored_at.and_then(|scored_at| visibility.hiding_freeze(view.stage, scored_at));
     let clips = Clips::find(&app, &visibility, id).await.ok();
     let distributions = match &clips {
         Some(clips) => clips.computation_times().await?,
@@ -260,14 +266,14 @@ pub(super) async fn page(
             ..
         } => {
             let summary = evaluation::summary(&view, &app).await?;
-            let others = match view.released_at {
-                Some(_) => others(&app, &visibility, &view, result.seed).await?,
+            let comparable = match view.released_at {
+                Some(_) => comparable_evaluations(&app, &visibility, &view, result.seed).await?,
                 None => Vec::new(),
             };
             Some(FinalResult {
                 dataset_blake3: dataset_blake3.clone(),
-                others,
-                slow: SlowAnswers::load(&app, &view, result).await?,
+                comparable,
+                slow_answers: SlowAnswers::load(&app, &view, result).await?,
                 answer_times: answer_times(result, &distributions),
                 ..FinalResult::new(result, *finished_at, &summary)
             })
@@ -297,7 +303,7 @@ pub(super) async fn page(
         dataset_removed: view.dataset_removed.clone(),
         progress: (!view.status.is_final()).then_some(view.progress),
         queue: view.queue,
-        next: view.next.clone(),
+        next_step: view.next.clone(),
         result: final_result,
     })
 }
@@ -332,7 +338,7 @@ const fn state_text(view: &EvaluationView) -> &'static str {
 }
 
 /// Finished evaluations on the same episodes, best score first.
-async fn others(
+async fn comparable_evaluations(
     app: &App,
     visibility: &Visibility,
     evaluation: &EvaluationView,
@@ -350,10 +356,10 @@ async fn others(
         date: evaluation.day,
     };
     let same_day = evaluation::day_evaluations(app, visibility, day).await?;
-    let mut others = Vec::new();
+    let mut found = Vec::new();
     let is_shown = |view: &EvaluationView| {
         let scored_at = view.status.finished_at();
-        scored_at.is_none_or(|at| visibility.hiding_freeze(view.stage, at).is_none())
+        scored_at.is_none_or(|scored_at| visibility.hiding_freeze(view.stage, scored_at).is_none())
     };
     let shown = same_day.into_iter().filter(same_episodes).filter(is_shown);
     for view in shown {
@@ -364,11 +370,13 @@ async fn others(
         } = view.status
             && result.seed == seed
         {
-            others.push((result.score, view.team_name, view.id));
+            found.push((result.score, view.team_name, view.id));
         }
     }
-    others.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.2.cmp(&b.2)));
-    Ok(others
+    found.sort_by(|(a_score, _, a_id), (b_score, _, b_id)| {
+        b_score.total_cmp(a_score).then_with(|| a_id.cmp(b_id))
+    });
+    Ok(found
         .into_iter()
         .map(|(score, team, evaluation)| OtherEvaluation {
             team: team.to_string(),
@@ -382,7 +390,7 @@ async fn others(
 type Distributions = BTreeMap<Task, Vec<TimeBinView>>;
 
 /// Answer times of all tasks, if they are public.
-fn answer_times(result: &ResultView, distributions: &Distributions) -> Option<Strip> {
+fn answer_times(result: &ResultView, distributions: &Distributions) -> Option<AnswerTimeChart> {
     let tasks = result.tasks.iter();
     let summaries: Vec<TimeSummary> = tasks
         .filter_map(|(task, result)| {
@@ -399,11 +407,11 @@ fn answer_times(result: &ResultView, distributions: &Distributions) -> Option<St
             })
         })
         .collect();
-    let floor = result.timing.as_ref().map(|timing| {
+    let noise_floor = result.timing.as_ref().map(|timing| {
         let trips = timing.during_s;
         [1e3 * trips.p50, 1e3 * trips.p99]
     });
-    (!summaries.is_empty()).then(|| Strip::new(&summaries, floor))
+    (!summaries.is_empty()).then(|| AnswerTimeChart::new(&summaries, noise_floor))
 }
 
 fn time_bins(bins: &[TimeBinView]) -> Vec<TimeBin> {
@@ -441,8 +449,8 @@ impl FinalResult {
                 .map(|(task, result)| TaskFigures::new(*task, result, summary))
                 .collect(),
             dataset_blake3: None,
-            others: Vec::new(),
-            slow: SlowAnswers::default(),
+            comparable: Vec::new(),
+            slow_answers: SlowAnswers::default(),
             timing: result.timing.as_ref().map(TimingFigures::new),
             answer_times: None,
         }

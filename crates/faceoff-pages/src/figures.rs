@@ -16,7 +16,7 @@ pub(super) struct Rate {
     /// Start and width of the interval and position of the rate, in percent of the bar.
     pub(super) bar_from: String,
     pub(super) bar_width: String,
-    pub(super) bar_at: String,
+    pub(super) bar_rate: String,
 }
 
 impl Rate {
@@ -43,7 +43,7 @@ impl Rate {
             high: one_decimal(high),
             bar_from: one_decimal(low),
             bar_width: one_decimal(high - low),
-            bar_at: one_decimal(percent),
+            bar_rate: one_decimal(percent),
         }
     }
 }
@@ -71,8 +71,8 @@ pub(super) fn score_interval(
 }
 
 /// Time in UTC, to the minute.
-pub(super) fn utc_minute(at: Timestamp) -> String {
-    at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+pub(super) fn utc_minute(instant: Timestamp) -> String {
+    instant.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 /// A non-negative value with two significant digits.
@@ -149,9 +149,9 @@ pub(super) fn count_with_share(count: u32, episodes: u32) -> String {
 }
 
 /// A share in percent, without decimals.
-pub(super) fn percent(some: usize, all: usize) -> String {
+pub(super) fn percent(part: usize, whole: usize) -> String {
     let count = |count: usize| u32::try_from(count).map_or(f64::INFINITY, f64::from);
-    format!("{:.0} %", 100.0 * count(some) / count(all.max(1)))
+    format!("{:.0} %", 100.0 * count(part) / count(whole.max(1)))
 }
 
 /// Symbol beside the name of a tier: colour alone must not carry the meaning.

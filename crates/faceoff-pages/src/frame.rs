@@ -1,3 +1,5 @@
+//! The frame of every page (header, navigation and footer), and the rendering of pages and of problems.
+
 use super::assets;
 use askama::Template;
 use axum::{
@@ -90,7 +92,7 @@ impl Frame {
     }
 }
 
-/// Renders a page with an ETag; `layers.rs` answers 304 if the client has this version.
+/// Renders a page with an ETag; a layer of the server answers 304 if the client has this version.
 pub(super) fn render_with_etag(page: &impl Template) -> Result<Response, PageProblem> {
     let html = page
         .render()

@@ -1,4 +1,4 @@
-//! `/games/{id}`: a game: live view, result, course, analysis and replay.
+//! `/games/{id}`: a game of a tournament between the agents of two teams: live view, result, course, analysis and replay.
 
 mod analysis;
 mod live;
@@ -35,10 +35,11 @@ struct Statistic {
     sides: [String; 2],
 }
 
-/// Addresses of the clips for the script.
+/// Addresses of the game's clips (recordings of motion and observations), of which the script loads one chunk after another.
 struct ReplayChunks {
     motion: String,
     observed: Option<String>,
+    /// Control steps of the game, plus one.
     samples: u32,
 }
 
@@ -46,7 +47,8 @@ struct ReplayChunks {
 struct GameResult {
     score: [u32; 2],
     winner: Option<String>,
-    because: String,
+    /// Why the winner won, or why it is a draw.
+    reason: String,
     duration_min: String,
     statistics: Vec<Statistic>,
 }
@@ -75,9 +77,10 @@ struct Page {
     /// Does the game belong to a round? Test games may have a team from outside the tournament.
     is_round_game: bool,
     state: String,
-    /// The team whose leaving took the game out of the standings.
+    /// The team whose departure excluded the game from the standings.
     withdrawn_team: Option<String>,
-    next: String,
+    /// What happens next, as a sentence.
+    next_step: String,
     /// Is the game queued or running?
     is_open: bool,
     live: Option<LiveGame>,
@@ -160,7 +163,7 @@ pub(super) async fn page(
         purpose: purpose_text(&view.purpose),
         state: state_text(&view.status, is_hidden),
         withdrawn_team: view.excluded_by.map(|team| team.to_string()),
-        next: view.next,
+        next_step: view.next,
         is_open: matches!(view.status, GameStatus::Queued | GameStatus::Running { .. }),
         has_result: matches!(view.status, GameStatus::Played { .. }),
         teams,
@@ -211,7 +214,9 @@ impl GameResult {
     fn new(result: &GameResultView) -> Self {
         let statistic = |name, sides: [String; 2]| Statistic { name, sides };
         let counts = |name, sides: [u32; 2]| statistic(name, sides.map(|count| count.to_string()));
-        let milliseconds = |of: [f64; 2]| of.map(|s| format!("{} ms", figures::milliseconds(s)));
+        let milliseconds = |seconds: [f64; 2]| {
+            seconds.map(|seconds| format!("{} ms", figures::milliseconds(seconds)))
+        };
         let times = &result.computation_time_s;
         let statistics = vec![
             counts("Goals on the table", result.goals),
@@ -238,7 +243,7 @@ impl GameResult {
         Self {
             score: result.score,
             winner: result.winner.as_ref().map(ToString::to_string),
-            because: result.because.clone(),
+            reason: result.because.clone(),
             duration_min: figures::one_decimal(f64::from(result.steps) * CONTROL_STEP_S / 60.0),
             statistics,
         }
@@ -258,7 +263,7 @@ fn purpose_text(purpose: &PurposeView) -> String {
             } else {
                 ""
             };
-            format!("Round {round}, matchday {matchday}, meeting {meeting}{half}")
+            format!("Round {round}, matchday {matchday}, pairing {meeting}{half}")
         }
         PurposeView::Test { .. } => "Test game; it does not count".to_owned(),
         PurposeView::Friendly { .. } => "Friendly game; it does not count".to_owned(),

@@ -8,14 +8,16 @@ use faceoff_types::{GameId, RoundNumber, TeamId, TeamName};
 pub(super) struct GameRow {
     pub(super) id: GameId,
     pub(super) round: RoundNumber,
+    /// Number of the matchday in the round; a team has one opponent per matchday.
     pub(super) matchday: u32,
-    pub(super) is_second_half: bool,
+    /// Is it the second game of a mirrored pair, two games with the same seed and swapped sides?
+    pub(super) is_second_of_pair: bool,
     pub(super) teams: [TeamName; 2],
     pub(super) team_ids: [TeamId; 2],
     pub(super) state: GameState,
     /// The result, or the state of the game.
     pub(super) summary: String,
-    /// The team whose leaving took the game out of the standings.
+    /// The team whose departure excluded the game from the standings.
     pub(super) withdrawn_team: Option<TeamName>,
 }
 
@@ -56,7 +58,7 @@ impl GameRow {
             id: view.id,
             round,
             matchday,
-            is_second_half: second_half,
+            is_second_of_pair: second_half,
             state: game_state(&view.status, &teams, is_hidden),
             summary: summary(&view.status, is_hidden),
             withdrawn_team: view.excluded_by.clone(),

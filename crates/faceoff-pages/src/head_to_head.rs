@@ -78,7 +78,8 @@ struct Page {
     statistics: Vec<Statistic>,
     games: Vec<GameRow>,
     game_statistics: Vec<GameStatistics>,
-    has_halves: bool,
+    /// Does each pairing play a mirrored pair of games?
+    has_mirrored_pairs: bool,
     /// Are rounds omitted whose pairings would reveal hidden results?
     has_hidden_rounds: bool,
 }
@@ -93,8 +94,8 @@ pub(super) async fn page(
     let viewer = viewer?;
     let season = SeasonHead::load(&app).await?;
     let state = TournamentState::find(&app, tournament).await?;
-    let is_in = |team: &TeamId| state.entrants.iter().any(|entrant| entrant.team == *team);
-    if teams[0] == teams[1] || !teams.iter().all(is_in) {
+    let is_entered = |team: &TeamId| state.entrants.iter().any(|entrant| entrant.team == *team);
+    if teams[0] == teams[1] || !teams.iter().all(is_entered) {
         let detail = "expected two different teams of the tournament, got the same team twice or a team that is not in it";
         return Err(Problem::new(ProblemKind::NotFound, detail).into());
     }
@@ -140,7 +141,7 @@ pub(super) async fn page(
             .map(|(row, result)| GameStatistics::new(row, result, teams[0]))
             .collect(),
         games: found.iter().map(|(row, _)| row.clone()).collect(),
-        has_halves: rules.mirrored,
+        has_mirrored_pairs: rules.mirrored,
         names,
         has_hidden_rounds,
         spoilers,

@@ -1,4 +1,4 @@
-//! `/help`: runtimes, machine and limits of agents on this server.
+//! `/help`: what agents find on this server: *runtimes* (language environments), the machine, and limits.
 
 use super::frame::{Frame, PageProblem, render};
 use askama::Template;

@@ -1,4 +1,4 @@
-//! `/join/CODE`: accepting an invitation.
+//! `/join/CODE`: accepting an invitation. The code is the secret of the link.
 
 use super::{
     frame::{Frame, PageProblem, render},
@@ -32,17 +32,20 @@ enum Offer {
     Member(String),
     Founder,
     /// A new password for an existing user.
-    Return,
+    PasswordReset,
     /// The registration of the named team is waiting for approval.
-    Waiting(String),
+    PendingRegistration(String),
     /// The registration of the named team was refused, with the reason.
-    Refused(String, String),
+    RefusedRegistration(String, String),
 }
 
 impl Offer {
     /// Can the offer be accepted?
     const fn is_open(&self) -> bool {
-        !matches!(self, Self::Waiting(_) | Self::Refused(..))
+        !matches!(
+            self,
+            Self::PendingRegistration(_) | Self::RefusedRegistration(..)
+        )
     }
 }
 
@@ -120,15 +123,17 @@ async fn page_with(
                 Offer::Member(team.map(|name| name.to_string()).unwrap_or_default())
             }
             InvitationRole::Founder => Offer::Founder,
-            InvitationRole::PasswordReset(_) => Offer::Return,
+            InvitationRole::PasswordReset(_) => Offer::PasswordReset,
         },
-        CodeStatus::Pending(registration) => Offer::Waiting(registration.team_name.to_string()),
+        CodeStatus::Pending(registration) => {
+            Offer::PendingRegistration(registration.team_name.to_string())
+        }
         CodeStatus::Refused(registration) => {
             let reason = match registration.state {
                 RegistrationState::Refused { reason, .. } => reason,
                 RegistrationState::Pending | RegistrationState::Approved { .. } => String::new(),
             };
-            Offer::Refused(registration.team_name.to_string(), reason)
+            Offer::RefusedRegistration(registration.team_name.to_string(), reason)
         }
     };
     let terms = app.store.terms().await.map_err(Problem::from)?;

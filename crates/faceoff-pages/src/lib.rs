@@ -64,8 +64,9 @@ use faceoff_service::{app::App, extract::MAX_JSON_BYTES, timeouts};
 use serde_json::Value;
 use std::{sync::Arc, time::Duration};
 
-/// All pages and their assets. `api` is the API's OpenAPI document, which the documentation shows.
-pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
+/// All pages and their assets. `time_limit` is the longest time of a request; `api` is the API's
+/// OpenAPI document, which the documentation shows.
+pub fn router(time_limit: Duration, api: Arc<Value>) -> Router<App> {
     Router::new()
         .route("/", get(board::overall))
         .route("/tasks/{task}", get(board::by_task))
@@ -122,7 +123,10 @@ pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/robots.txt", get(robots::robots))
         .merge(docs::router(api))
         .merge(assets::router())
-        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
+        .layer(middleware::from_fn_with_state(
+            time_limit,
+            timeouts::time_out,
+        ))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         // Uploads have no fixed timeout: the receiver checks their least data rate.
         .merge(dashboard::uploads())

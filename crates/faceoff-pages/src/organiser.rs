@@ -1,4 +1,4 @@
-//! `/organiser`: the organiser dashboard.
+//! `/organiser`: the organiser dashboard, the pages with which organisers run a season.
 
 mod attention;
 mod day;
@@ -20,7 +20,7 @@ use axum::{
 };
 use faceoff_service::app::App;
 
-/// All pages of the dashboard.
+/// All pages of the dashboard, and its old log address.
 pub(super) fn router() -> Router<App> {
     Router::new()
         .route("/organiser", get(attention::page))

@@ -45,8 +45,8 @@ impl IntoResponse for AuthRejection {
     }
 }
 
-/// Paths to which the sign-in page may redirect, with everything below them.
-const RETURN_PATHS: [&str; 4] = ["/desk", "/organiser", "/account", "/log"];
+/// Paths to which the sign-in page may redirect, with everything below them. `/desk` and `/log` are addresses of older versions.
+const RETURN_PATHS: [&str; 5] = ["/dashboard", "/desk", "/organiser", "/account", "/log"];
 
 /// Paths to which the form of `/spoilers` may redirect.
 pub(super) const SPOILER_RETURN_PATHS: [&str; 2] = ["/tournaments", "/games"];
@@ -76,7 +76,7 @@ fn target_after_sign_in(parts: &Parts) -> String {
     let dashboard = RETURN_PATHS
         .iter()
         .find(|prefix| path.starts_with(**prefix));
-    dashboard.map_or("/desk", |path| *path).to_owned()
+    dashboard.map_or("/dashboard", |path| *path).to_owned()
 }
 
 impl FromRequestParts<App> for PageUser {
@@ -115,7 +115,7 @@ impl FromRequestParts<App> for PageOrganiser {
             Ok(organiser) => Ok(Self { caller, organiser }),
             Err(_) => Err(AuthRejection::Problem(Problem::new(
                 ProblemKind::Forbidden,
-                "this page is for organisers; the dashboard of your team is at /desk",
+                "this page is for organisers; the dashboard of your team is at /dashboard",
             ))),
         }
     }
@@ -128,8 +128,8 @@ mod tests {
     #[test]
     fn return_paths_never_leave_this_server() {
         for own in [
-            "/desk",
-            "/desk/access",
+            "/dashboard",
+            "/dashboard/access",
             "/organiser/day?stage=1&day=2026-03-01",
         ] {
             assert_eq!(return_path(own), Some(own));
@@ -138,10 +138,10 @@ mod tests {
             "",
             "/",
             "//evil.example",
-            "/desk.evil.example",
-            "https://evil.example/desk",
-            "/desk/\\evil",
-            "/desk\r\nSet-Cookie: a=b",
+            "/dashboard.evil.example",
+            "https://evil.example/dashboard",
+            "/dashboard/\\evil",
+            "/dashboard\r\nSet-Cookie: a=b",
             "/organiserx",
         ] {
             assert_eq!(return_path(foreign), None, "{foreign:?}");

@@ -33,7 +33,8 @@ struct Page {
     divisions: Vec<DivisionName>,
     form: Form,
     error: Option<String>,
-    done: Option<NewRegistrationView>,
+    /// The registration that the form has just made, with its link.
+    registered: Option<NewRegistrationView>,
 }
 
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -51,7 +52,7 @@ async fn page_with(
     app: &App,
     form: Form,
     error: Option<String>,
-    done: Option<NewRegistrationView>,
+    registered: Option<NewRegistrationView>,
 ) -> Result<Response, PageProblem> {
     let season = app.store.season().await.map_err(Problem::from)?;
     let terms = app.store.terms().await.map_err(Problem::from)?;
@@ -63,7 +64,7 @@ async fn page_with(
         divisions: app.store.divisions().await.map_err(Problem::from)?,
         form,
         error,
-        done,
+        registered,
     })
 }
 
@@ -93,8 +94,8 @@ pub(super) async fn submit(
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
     match register_team(&app, &form).await {
-        Ok(done) => {
-            let page = page_with(&app, Form::default(), None, Some(done)).await?;
+        Ok(registered) => {
+            let page = page_with(&app, Form::default(), None, Some(registered)).await?;
             Ok((StatusCode::CREATED, page).into_response())
         }
         Err(problem) if problem.kind().status().is_client_error() => {

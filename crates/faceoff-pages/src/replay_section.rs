@@ -1,4 +1,5 @@
-//! A replay on a page: a still picture, and the addresses of the clips for the script.
+//! A replay on a page: a still picture, and the addresses from which the script loads the *clips*, the recorded motion and observations
+//! of an episode.
 
 use super::table_drawing::{self, Dot, TableOutline};
 use faceoff_replay::{
@@ -15,7 +16,9 @@ pub(super) struct ReplaySection {
     pub(super) name: String,
     /// Base name of saved pictures and files.
     pub(super) title: String,
-    pub(super) why: String,
+    /// Why the episode ended.
+    pub(super) end_reason: String,
+    /// Control steps of the episode.
     pub(super) steps: u32,
     pub(super) still: Still,
     /// Address of the clip of the motion.
@@ -35,7 +38,7 @@ impl ReplaySection {
             id: "replay",
             name,
             title,
-            why: episode.line.why.clone(),
+            end_reason: episode.line.why.clone(),
             steps: episode.line.steps,
             still: Still::new(&episode.motion, episode.observed.as_ref()),
             motion: format!("{api}/motion"),
@@ -67,8 +70,9 @@ impl Still {
         let [puck, mallet] = [motion.puck_positions(), motion.mallet_positions(0)];
         let contacts = motion.header.contacts.iter();
         let contacts: Vec<[f64; 2]> = contacts.map(|contact| [contact.x, contact.y]).collect();
-        let millimetres = |m: f64| (m * 1e4).round() / 10.0;
-        let dot = |place: Option<&[f64; 2]>| Dot::at(place.copied().unwrap_or_default());
+        // To a tenth of a millimetre.
+        let millimetres = |metres: f64| (metres * 1e4).round() / 10.0;
+        let dot = |position: Option<&[f64; 2]>| Dot::at(position.copied().unwrap_or_default());
         Self {
             table: TableOutline::new(),
             start: dot(puck.first()),

@@ -9,7 +9,7 @@ Disallow: /api/
 Disallow: /account
 Disallow: /docs/search
 Disallow: /join
-Disallow: /desk
+Disallow: /dashboard
 Disallow: /organiser
 Disallow: /sign-in
 Allow: /

@@ -1,5 +1,5 @@
-//! `/season`: stages, evaluation days and seeds. It has everything to verify the seeds: the commitment, the secret once it is
-//! public, and the derivation.
+//! `/season`: stages, evaluation days and seeds. All seeds derive from one secret. The page has everything to verify them: the
+//! *commitment* (the hash of the secret, public from the start), the secret once it is public, and the derivation.
 
 use super::frame::{Frame, PageProblem, render};
 use askama::Template;
@@ -24,8 +24,8 @@ struct Page {
 }
 
 impl Page {
-    fn local_time(&self, stage: &StageView, at: &Timestamp) -> String {
-        let local = at.to_zoned(stage.zone.time_zone());
+    fn local_time(&self, stage: &StageView, instant: &Timestamp) -> String {
+        let local = instant.to_zoned(stage.zone.time_zone());
         format!("{} {}", local.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
     }
 
@@ -34,13 +34,13 @@ impl Page {
         stage.map_or_else(|| id.to_string(), |stage| stage.name.to_string())
     }
 
-    /// Load of coming days with the name of the stage; organisers only.
-    fn loads(&self) -> Vec<(&str, &DayLoad)> {
+    /// For each coming evaluation day: the name of its stage, and an estimate of when its evaluations end; organisers only.
+    fn capacity_forecasts(&self) -> Vec<(&str, &DayLoad)> {
         let stages = self.season.stages.iter();
         stages
             .flat_map(|stage| {
-                let loads = stage.capacity.iter().flatten();
-                loads.map(|load| (stage.name.as_str(), load))
+                let forecasts = stage.capacity.iter().flatten();
+                forecasts.map(|forecast| (stage.name.as_str(), forecast))
             })
             .collect()
     }
@@ -66,7 +66,7 @@ pub(super) async fn page(
     State(app): State<App>,
 ) -> Result<Response, PageProblem> {
     let season = season::build(&app, viewer?).await?;
-    let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
+    let utc_second = |instant: Timestamp| instant.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
     let tournaments = app.store.tournaments().await.map_err(Problem::from)?;
     render(&Page {
         tournaments: tournaments
@@ -74,8 +74,8 @@ pub(super) async fn page(
             .map(|tournament| (tournament.id, tournament.name))
             .collect(),
         frame: Frame::for_app(&app, season.name.clone(), "/season"),
-        opened: instant(season.created_at),
-        closed: season.closed_at.map(instant),
+        opened: utc_second(season.created_at),
+        closed: season.closed_at.map(utc_second),
         season,
     })
 }

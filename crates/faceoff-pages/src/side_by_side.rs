@@ -1,4 +1,4 @@
-//! Two synchronised replays.
+//! Two synchronised replays beside each other, of two teams or with two sets of perturbations.
 
 use super::{episode_text::describe_violation, replay_section::ReplaySection};
 use faceoff_replay::model::CONTROL_STEP_S;
@@ -8,7 +8,7 @@ use faceoff_service::views::clip_file::Episode;
 pub(super) struct Side {
     /// The team or the profile.
     pub(super) name: String,
-    /// Page of this replay alone.
+    /// Path of the page of this replay alone, if it has one.
     pub(super) path: Option<String>,
     pub(super) success: bool,
     pub(super) duration_s: String,

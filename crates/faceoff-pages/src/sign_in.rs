@@ -26,13 +26,14 @@ struct Page {
     name: String,
     error: Option<String>,
     /// Path to return to; empty: the account.
-    next: String,
+    return_path: String,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Form {
     name: String,
     password: String,
+    /// Path to return to.
     #[serde(default)]
     next: String,
 }
@@ -40,25 +41,26 @@ pub(super) struct Form {
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct NextQuery {
+    /// Path to return to.
     next: String,
 }
 
-fn valid_next(next: &str) -> String {
-    return_path(next).unwrap_or_default().to_owned()
+fn valid_return_path(path: &str) -> String {
+    return_path(path).unwrap_or_default().to_owned()
 }
 
 async fn page_with(
     app: &App,
     name: String,
     error: Option<String>,
-    next: String,
+    return_path: String,
 ) -> Result<Response, PageProblem> {
     let season = SeasonHead::load(app).await?.name;
     render(&Page {
         frame: Frame::for_app(app, season, "/sign-in"),
         name,
         error,
-        next,
+        return_path,
     })
 }
 
@@ -66,7 +68,7 @@ pub(super) async fn page(
     State(app): State<App>,
     Query(NextQuery { next }): Query<NextQuery>,
 ) -> Result<Response, PageProblem> {
-    page_with(&app, String::new(), None, valid_next(&next)).await
+    page_with(&app, String::new(), None, valid_return_path(&next)).await
 }
 
 /// Signs in and redirects to the requested page or the account; shows an error on the same page.
@@ -76,8 +78,8 @@ pub(super) async fn submit(
 ) -> Result<Response, PageProblem> {
     match sign_in(&app, &form.name, form.password).await {
         Ok((_, secret)) => {
-            let next = return_path(&form.next).unwrap_or(ACCOUNT);
-            redirect_with_session(&app, secret.as_str(), next)
+            let target = return_path(&form.next).unwrap_or(ACCOUNT);
+            redirect_with_session(&app, secret.as_str(), target)
         }
         Err(problem)
             if matches!(
@@ -87,8 +89,8 @@ pub(super) async fn submit(
         {
             let status = problem.kind().status();
             let error = Some(problem.detail().to_owned());
-            let next = valid_next(&form.next);
-            let page = page_with(&app, form.name, error, next).await?;
+            let return_path = valid_return_path(&form.next);
+            let page = page_with(&app, form.name, error, return_path).await?;
             Ok((status, page).into_response())
         }
         Err(problem) => Err(problem.into()),

@@ -1,5 +1,5 @@
-//! Hiding results of games: visitors choose it with a form that posts to `/spoilers`, and a cookie stores the choice. It works
-//! without an account.
+//! Hiding results of games from visitors who want to watch a replay first. Visitors choose it with a form that posts to `/spoilers`;
+//! a cookie stores the choice, so that it works without an account.
 
 use super::{
     frame::PageProblem,
@@ -17,8 +17,11 @@ use std::convert::Infallible;
 
 /// Path of the form.
 pub const SPOILERS_PATH: &str = "/spoilers";
+/// Name of the cookie.
 const COOKIE: &str = "spoilers";
+/// Value of the cookie that hides results.
 const HIDDEN: &str = "hidden";
+/// Lifetime of the cookie: a year, in seconds.
 const MAX_AGE_S: u32 = 365 * 24 * 3600;
 /// Query value that shows the result of a game all the same.
 const SHOW_RESULT: &str = "result";
@@ -76,6 +79,7 @@ impl FromRequestParts<App> for Spoilers {
 #[derive(Deserialize)]
 pub(super) struct Choice {
     results: Results,
+    /// Path to return to.
     next: String,
 }
 
@@ -98,7 +102,7 @@ pub(super) async fn choose(
     let secure = session::secure_attribute(&app.config);
     let cookie = format!("{COOKIE}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={age}{secure}");
     let cookie = HeaderValue::try_from(cookie).map_err(Problem::internal)?;
-    let next = return_path_below(&SPOILER_RETURN_PATHS, &next).unwrap_or("/tournaments");
+    let target = return_path_below(&SPOILER_RETURN_PATHS, &next).unwrap_or("/tournaments");
     let cookie = AppendHeaders([(header::SET_COOKIE, cookie)]);
-    Ok((cookie, Redirect::to(next)).into_response())
+    Ok((cookie, Redirect::to(target)).into_response())
 }

@@ -1,4 +1,4 @@
-//! A row of a list of submissions.
+//! A row of a list of submissions: an uploaded agent with its state, and the actions that are possible.
 
 use super::{dashboard_frame, figures::utc_minute};
 use faceoff_api::views::submission::{SubmissionStatus, SubmissionView};
@@ -7,17 +7,22 @@ use faceoff_types::SubmissionId;
 pub(super) struct SubmissionRow {
     pub(super) id: SubmissionId,
     pub(super) name: String,
+    /// File name and size of the bundle.
     pub(super) file: String,
     pub(super) uploaded_at: String,
     pub(super) state: &'static str,
     /// CSS class of the state.
     pub(super) class: &'static str,
+    /// Why it is invalid or was not validated.
     pub(super) reason: Option<String>,
     pub(super) queue_position: Option<String>,
-    pub(super) next: String,
+    /// What the team can do next, as a sentence.
+    pub(super) next_step: String,
+    /// Is it the submission that is evaluated at the next cutoff?
     pub(super) is_active: bool,
     pub(super) can_activate: bool,
     pub(super) can_withdraw: bool,
+    /// Can the bundle be downloaded?
     pub(super) has_bundle: bool,
 }
 
@@ -58,7 +63,7 @@ impl From<&SubmissionView> for SubmissionRow {
             class,
             reason,
             queue_position,
-            next: view.next.clone(),
+            next_step: view.next.clone(),
             is_active: view.active,
             can_activate: is_valid && !is_deleted && !view.active,
             can_withdraw: is_valid && !is_deleted && !is_withdrawn,

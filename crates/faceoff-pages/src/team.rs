@@ -3,7 +3,7 @@
 mod days;
 
 use super::{
-    chart::Panel,
+    chart::DayChart,
     frame::{Frame, PageProblem, render},
     submission_row::SubmissionRow,
 };
@@ -33,14 +33,14 @@ struct Page {
     team: TeamView,
     stage: String,
     /// The other stages: name and query.
-    others: Vec<(String, String)>,
+    other_stages: Vec<(String, String)>,
     /// Are the scores hidden from the viewer?
     is_hidden: bool,
     frozen: Option<RulingView>,
     /// Tournaments of the team.
     tournaments: Vec<(TournamentId, StageName)>,
     latest: Option<LatestResult>,
-    panels: Vec<Panel>,
+    day_charts: Vec<DayChart>,
     /// The newest first.
     days: Vec<DayResult>,
     violations: Vec<TaskViolations>,
@@ -96,21 +96,23 @@ pub(super) async fn page(
         true => Some(submission::team_submissions(&app, id).await?),
         false => None,
     };
-    let others = stage::all(&app).await?;
-    let others = others.into_iter().filter(|of| of.id != stage.id);
+    let other_stages = stage::all(&app).await?;
+    let other_stages = other_stages
+        .into_iter()
+        .filter(|other| other.id != stage.id);
     render(&Page {
         tournaments: entered_tournaments(&app, id).await?,
         frame: Frame::for_app(&app, season.name, ""),
         stage: stage.name.to_string(),
-        others: others
-            .map(|of| (of.name.to_string(), format!("?stage={}", of.id)))
+        other_stages: other_stages
+            .map(|other| (other.name.to_string(), format!("?stage={}", other.id)))
             .collect(),
         is_hidden: visibility.is_hidden(stage.id),
         latest: history
             .rows
             .last()
             .map(|row| LatestResult::new(row, &variation.tier_bounds)),
-        panels: days::panels(&history.rows, &variation),
+        day_charts: days::charts(&history.rows, &variation),
         violations: days::violations(&history.rows),
         days: history
             .rows

@@ -34,6 +34,7 @@ use schedule::Round;
 use standings::Standings;
 use std::collections::BTreeMap;
 
+/// The section of the ratings.
 enum RatingsSection {
     Tables(Vec<RatingTable>),
     /// Why there are no ratings.
@@ -61,20 +62,20 @@ struct Page {
     /// The newest first.
     rounds: Vec<Round>,
     ratings: RatingsSection,
-    certainty: Option<Certainty>,
+    champion_shares: Option<ChampionShares>,
     entrants: Vec<Entrant>,
 }
 
-/// How often each team became champion in repetitions of the schedule.
-struct Certainty {
+/// How often each team became champion when the whole schedule was repeated with other seeds.
+struct ChampionShares {
     summary: String,
-    /// Team, first places, percent, interval.
+    /// Team, number of first places, their share in percent, 95 % interval of the share.
     champions: Vec<(TeamName, u32, String, String)>,
 }
 
 impl Page {
     /// The next step, without the reason of a pause if results are hidden: it is free text.
-    fn next(&self) -> &str {
+    fn next_step(&self) -> &str {
         match self.spoilers.hides_results() && self.view.head.paused.is_some() {
             true => "The tournament is paused; no games start.",
             false => &self.view.head.next,
@@ -130,8 +131,9 @@ pub(super) async fn page(
         false => ratings_section(&app, &view).await?,
     };
     let unplayed = view.entrants.iter().filter(|entrant| {
-        let is_in = |table: &Standings| table.rows.iter().any(|row| row.team_id == entrant.team);
-        !is_hidden && entrant.departure.is_none() && !standings.iter().any(is_in)
+        let is_listed =
+            |table: &Standings| table.rows.iter().any(|row| row.team_id == entrant.team);
+        !is_hidden && entrant.departure.is_none() && !standings.iter().any(is_listed)
     });
     let page = Page {
         frame: Frame::for_app(&app, season.name, format!("/tournaments/{id}")),
@@ -154,9 +156,9 @@ pub(super) async fn page(
             .map(|round| Round::new(&view, round, &games, &spoilers))
             .collect(),
         ratings,
-        certainty: match is_hidden {
+        champion_shares: match is_hidden {
             true => None,
-            false => Certainty::new(&*champion_shares(&app, id).await?),
+            false => ChampionShares::new(&*champion_shares(&app, id).await?),
         },
         entrants: entrants::entrants(&app, &view, &spoilers).await?,
         standings,
@@ -203,11 +205,11 @@ fn cross_tables(
             TableScope::Group(_) => round_games(RoundNumber::FIRST),
             TableScope::Final => round_games(RoundNumber::SECOND),
         };
-        let placed = table.standings.iter().map(|standing| {
+        let ranked = table.standings.iter().map(|standing| {
             let id = state.team(&standing.team)?;
             Ok((id, standing.team.clone()))
         });
-        let mut teams = placed.collect::<Result<Vec<(TeamId, TeamName)>, Problem>>()?;
+        let mut teams = ranked.collect::<Result<Vec<(TeamId, TeamName)>, Problem>>()?;
         add_unranked(&mut teams, table.scope, &own);
         if is_hidden {
             teams.sort_by(|(_, a), (_, b)| a.cmp(b));
@@ -237,8 +239,8 @@ fn pairs(id: TournamentId, games: &[&GameRow]) -> Vec<(String, String)> {
 }
 
 /// Appends teams that have a game but no rank yet.
-fn add_unranked(teams: &mut Vec<(TeamId, TeamName)>, of: TableScope, games: &[&GameRow]) {
-    if matches!(of, TableScope::Group(_)) {
+fn add_unranked(teams: &mut Vec<(TeamId, TeamName)>, scope: TableScope, games: &[&GameRow]) {
+    if matches!(scope, TableScope::Group(_)) {
         return;
     }
     let mut others = Vec::new();
@@ -254,7 +256,7 @@ fn add_unranked(teams: &mut Vec<(TeamId, TeamName)>, of: TableScope, games: &[&G
     teams.extend(others);
 }
 
-impl Certainty {
+impl ChampionShares {
     fn new(view: &ChampionSharesView) -> Option<Self> {
         if view.replays == 0 {
             return None;

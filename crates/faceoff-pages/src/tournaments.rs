@@ -28,7 +28,7 @@ struct Page {
 
 impl Page {
     /// The next step of a tournament, without the reason of a pause if results are hidden: it is free text.
-    fn next<'a>(&self, row: &'a Row) -> &'a str {
+    fn next_step<'a>(&self, row: &'a Row) -> &'a str {
         match self.spoilers.hides_results() && row.head.paused.is_some() {
             true => "The tournament is paused; no games start.",
             false => &row.head.next,

@@ -1,4 +1,5 @@
-//! Positions of violations on the table, with a mark per group of constraints.
+//! Positions of violations of safety limits on the table, with its own mark for each group of limits: end effector, elbow and wrist, joint
+//! positions, joint velocities.
 
 use super::{
     episode_text::group_label,
@@ -20,19 +21,19 @@ impl ViolationMarks {
     /// Marks of each group with violations.
     pub(super) fn by_group(positions: impl Fn(Group) -> Vec<Position>) -> Vec<Self> {
         let groups = Group::ALL.into_iter().filter_map(|group| {
-            let at = positions(group);
+            let found = positions(group);
             let (class, draw): (_, fn(&[Position]) -> String) = match group {
                 Group::Ee => ("ee", table_drawing::crosses),
                 Group::Link => ("link", table_drawing::squares),
                 Group::JointPos => ("joint-pos", table_drawing::dots),
                 Group::JointVel => ("joint-vel", table_drawing::triangles),
             };
-            (!at.is_empty()).then(|| Self {
+            (!found.is_empty()).then(|| Self {
                 label: group_label(group),
                 class,
-                marks: draw(&at),
+                marks: draw(&found),
                 symbol: draw(&[[0.0; 2]]),
-                count: at.len(),
+                count: found.len(),
             })
         });
         groups.collect()

@@ -233,7 +233,10 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
             chunk.breaks.push(RallyEndEvent {
                 sample: chunk.last,
                 what: rally_end_kind(row.ending),
-                by: row.ending.by().map(|side| u32::from(side == Side::Second)),
+                by: row
+                    .ending
+                    .responsible_side()
+                    .map(|side| u32::from(side == Side::Second)),
                 score: row.score,
             });
         }

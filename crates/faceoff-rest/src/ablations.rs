@@ -1,4 +1,5 @@
-//! Ablations: a submission evaluated under each perturbation alone. Organisers start them; they never count.
+//! Ablations: evaluations of a submission in the ideal simulator, with each perturbation (such as noise) alone, and with all
+//! of them. Each of these conditions is a *profile*. Organisers start ablations; they never count.
 
 use super::{
     clip_response::send,
@@ -51,8 +52,8 @@ pub(crate) async fn ablation(
 
 /// Returns the motion of table and robots in an episode of a submission's newest ablation, as a binary clip. Public.
 ///
-/// Clips exist for episodes whose outcome differs from the ideal simulator's, in both. `docs/replay.md` describes the
-/// format.
+/// A perturbed profile has clips of the episodes whose outcome differs from the ideal simulator's; the profile `ideal` has
+/// clips of the same episodes for comparison. `docs/replay.md` describes the format.
 #[utoipa::path(
     get, path = "/submissions/{id}/ablation/{profile}/{task}/{episode}/motion", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
@@ -112,20 +113,20 @@ async fn send_episode(
     app: &App,
     clips: &AblationClips,
     key: Key,
-    what: &str,
+    tag_prefix: &str,
     path: AblationPath,
     conditions: &Conditions,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
     let file = clips.profile(app, path.profile).await?;
     let tag = ETag::new(
-        what,
+        tag_prefix,
         &[&file.key, path.task.as_str(), &path.episode.to_string()],
     );
     send(&tag, conditions, headers, file.clip(key)).await
 }
 
-/// Starts an ablation: all tasks in all profiles, on episodes of their own.
+/// Starts an ablation: all tasks in all profiles, on episodes that no evaluation uses.
 ///
 /// Its jobs run when no job that counts is pending.
 #[utoipa::path(
@@ -143,9 +144,9 @@ pub(crate) async fn order_ablation(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
-    OptionalJson(wanted): OptionalJson<NewAblation>,
+    OptionalJson(request): OptionalJson<NewAblation>,
 ) -> Result<impl IntoResponse, Problem> {
-    let episodes = wanted.episodes_per_task.unwrap_or(DEFAULT_EPISODES);
+    let episodes = request.episodes_per_task.unwrap_or(DEFAULT_EPISODES);
     let plan = RunPlan {
         episodes_per_task: checked_episodes(episodes)?,
         ..stage::current(&app).await?.plan()

@@ -1,4 +1,4 @@
-//! Announcements, and questions of teams.
+//! Announcements of the organisers, and questions of teams with the organisers' answers.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};
@@ -56,8 +56,8 @@ pub(crate) async fn list_questions(
     page: Page<QuestionId>,
     State(app): State<App>,
 ) -> Result<Paged<QuestionView>, Problem> {
-    let shown = announcements::questions(&app, caller.0.as_ref()).await?;
-    page.select(shown, |question| question.id)
+    let visible = announcements::questions(&app, caller.0.as_ref()).await?;
+    page.select(visible, |question| question.id)
 }
 
 /// Asks the organisers a question. Other teams see it only with a public answer, and never the asking team.

@@ -1,4 +1,4 @@
-//! Boards, overall and by task, and their history day by day; as JSON or CSV.
+//! Boards, which rank the teams of a stage, overall and by task; and their history day by day. As JSON or CSV.
 
 use super::{board_csv, document::TagHeader};
 use axum::{
@@ -90,7 +90,7 @@ pub(crate) async fn board_history(
     query.stage = Some(stage.id);
     let format = choose_format(query.format, &headers);
     let tag = tag(&app, change, viewer, format, &("history", &query))?;
-    let Some(mut response) = conditions.not_modified(&tag) else {
+    let Some(mut not_modified) = conditions.not_modified(&tag) else {
         let history = history::query(&app, &visibility, query).await?;
         return Ok(build_response(
             &tag,
@@ -99,8 +99,8 @@ pub(crate) async fn board_history(
             board_csv::history_table,
         ));
     };
-    require_revalidation(response.headers_mut());
-    Ok(response)
+    require_revalidation(not_modified.headers_mut());
+    Ok(not_modified)
 }
 
 async fn respond(
@@ -114,20 +114,21 @@ async fn respond(
     let change = app.store.newest_change().await?;
     let visibility = Visibility::load(app, viewer).await?;
     let stage = board::requested_stage(app, &visibility, (query.stage, query.live)).await?;
-    // The open stage changes by the clock, without a change of the season, so the tag contains the stage.
+    // Which stage is open depends on the time, not only on changes of the season, so the tag contains the stage.
     query.stage = Some(stage.id);
     let format = choose_format(query.format, headers);
     let tag = tag(app, change, viewer, format, &(task, &query))?;
-    let Some(mut response) = conditions.not_modified(&tag) else {
+    let Some(mut not_modified) = conditions.not_modified(&tag) else {
         let board = board::query(app, &visibility, query, task).await?;
         return Ok(build_response(&tag, format, &board, board_csv::board_table));
     };
-    require_revalidation(response.headers_mut());
-    Ok(response)
+    require_revalidation(not_modified.headers_mut());
+    Ok(not_modified)
 }
 
-/// Tag of a request, the viewer and the newest change of the season. The change is read before everything else, so a
-/// change in between gives another tag next time, even if the response already includes it.
+/// The tag (`ETag`) of a response. It is made of the request, the viewer, and the number of the newest change of the season.
+/// That number is read before everything else: a change made while the response is built then gives the next response
+/// another tag, even if this response already includes the change.
 fn tag(
     app: &App,
     change: i64,
@@ -135,7 +136,7 @@ fn tag(
     format: BoardFormat,
     request: &impl Serialize,
 ) -> Result<ETag, Problem> {
-    // Boards are the same for all other viewers.
+    // All viewers other than organisers get the same board.
     let is_organiser = viewer == Viewer::Organiser;
     let key = (change, is_organiser, format, request);
     let key = serde_json::to_string(&key).map_err(Problem::internal)?;

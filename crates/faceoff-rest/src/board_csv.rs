@@ -1,11 +1,11 @@
-//! Boards and their history as CSV: one line per row, with the results of all tasks.
+//! Boards (the rankings of a stage) and their history as CSV: one line per team, with its results in all tasks.
 
 use faceoff_api::views::{board::BoardView, history::HistoryView, task::TaskView};
 use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::Task;
 use std::collections::BTreeMap;
 
-/// Columns of each task, prefixed with its name.
+/// Columns of each task; the table prefixes them with the task's name.
 const TASK_COLUMNS: [&str; 16] = [
     "episodes",
     "successes",
@@ -25,7 +25,7 @@ const TASK_COLUMNS: [&str; 16] = [
     "computation_time_max_s",
 ];
 
-/// A table with these columns and those of all tasks.
+/// An empty table with `columns`, followed by [`TASK_COLUMNS`] of each task.
 fn table_with_tasks(columns: &[&str]) -> Table {
     let mut all: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in Task::ALL {
@@ -35,6 +35,7 @@ fn table_with_tasks(columns: &[&str]) -> Table {
     Table::new(&names)
 }
 
+/// The values of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
 fn task_fields(tasks: &BTreeMap<Task, TaskView>) -> impl Iterator<Item = String> + '_ {
     let fields = |task| match tasks.get(&task) {
         None => vec![String::new(); TASK_COLUMNS.len()],
@@ -64,7 +65,7 @@ fn task_fields(tasks: &BTreeMap<Task, TaskView>) -> impl Iterator<Item = String>
     Task::ALL.into_iter().flat_map(fields)
 }
 
-/// The common fields of ranked rows and baselines, which have the same names in both types.
+/// The fields that ranked rows and baselines (unranked agents of the organisers) have in common, from the column `tier` on.
 macro_rules! common_fields {
     ($row:expr, $division:expr) => {{
         let row = $row;

@@ -1,4 +1,4 @@
-//! Freezing and unfreezing boards.
+//! Freezing and unfreezing a stage's boards: frozen boards show no results after the moment of the freeze.
 
 use axum::{Json, extract::State};
 use faceoff_api::{requests::Reason, views::stage::StageView};

@@ -1,4 +1,4 @@
-//! Bundles of submissions: downloading and deleting them.
+//! Bundles, the files that teams upload as submissions: downloading and deleting them.
 
 use super::{
     document::{Binary, FileHeaders},
@@ -41,19 +41,19 @@ pub(crate) async fn download_bundle(
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Response, Problem> {
-    let submission = downloadable(&caller, &app, id).await?;
+    let submission = find_downloadable(&caller, &app, id).await?;
     let bundle = &submission.bundle;
-    let stored_as = bundle.key.rsplit('/').next().unwrap_or_default();
-    let format = stored_as.split_once('.').map_or("bundle", |(_, end)| end);
+    let stored_name = bundle.key.rsplit('/').next().unwrap_or_default();
+    let extension = stored_name.split_once('.').map_or("bundle", |(_, end)| end);
     let file = Download {
         key: &bundle.key,
         blake3: Some(&bundle.blake3),
         media_type: "application/octet-stream",
-        name: &format!("faceoff-submission-{id}.{format}"),
+        name: &format!("faceoff-submission-{id}.{extension}"),
     };
     match download(&app, &conditions, file).await {
         Err(StoreError::NotFound(_)) => {
-            // It may have been removed meanwhile.
+            // The bundle may have been removed meanwhile. Otherwise the file is lost.
             check_stored(&app.store.submission(id).await?)?;
             Err(Problem::internal(format_args!("{} is lost", file.key)))
         }
@@ -79,15 +79,19 @@ pub(crate) async fn link_bundle(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
-    OptionalJson(wanted): OptionalJson<NewLink>,
+    OptionalJson(request): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
-    downloadable(&caller, &app, id).await?;
+    find_downloadable(&caller, &app, id).await?;
     let path = format!("{}/bundle", paths::submission(id));
-    links::link(&app, &caller, &path, wanted).await
+    links::link(&app, &caller, &path, request).await
 }
 
 /// A submission whose bundle the caller may download now.
-async fn downloadable(caller: &Caller, app: &App, id: SubmissionId) -> Result<Submission, Problem> {
+async fn find_downloadable(
+    caller: &Caller,
+    app: &App,
+    id: SubmissionId,
+) -> Result<Submission, Problem> {
     let found = app.store.submission(id).await;
     let submission = caller.visible("submission", found, |submission| submission.team)?;
     // Organisers can download evidence as long as the file exists, even after a deletion.
@@ -124,11 +128,11 @@ pub(crate) async fn delete_submission(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
-    OptionalJson(wanted): OptionalJson<DeleteSubmission>,
+    OptionalJson(request): OptionalJson<DeleteSubmission>,
 ) -> Result<Json<SubmissionView>, Problem> {
     let found = app.store.submission(id).await;
     caller.visible("submission", found, |submission| submission.team)?;
-    let reason = match (caller.is_organiser(), wanted.reason.as_deref()) {
+    let reason = match (caller.is_organiser(), request.reason.as_deref()) {
         (true, reason) => {
             let reason = checked_reason(reason.unwrap_or_default())?;
             format!("by an organiser: {reason}")
@@ -145,7 +149,7 @@ pub(crate) async fn delete_submission(
         submission.bundle.bytes,
         submission.created_at.strftime("%Y-%m-%d at %H:%M UTC")
     );
-    Problem::check_confirmed(wanted.confirm.as_deref(), name, &effect)?;
+    Problem::check_confirmed(request.confirm.as_deref(), name, &effect)?;
     let deleted = app
         .store
         .delete_submission(caller.actor(), id, &reason, now)

@@ -1,4 +1,4 @@
-//! Capacity forecasts of stages.
+//! Capacity forecasts: whether the evaluations of a stage's days will finish before their deadlines.
 
 use axum::{Json, extract::State};
 use faceoff_api::views::capacity::CapacityView;

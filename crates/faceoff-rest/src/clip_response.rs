@@ -1,4 +1,5 @@
-//! Responses with a clip: compressed if the client accepts gzip, 304 if it already has the clip.
+//! Responses with a clip, which is the data of one episode, or of a part of a game, for the replay viewer. The response is
+//! compressed if the client accepts gzip, and 304 if the client already has the clip.
 
 use super::downloads::set_private_caching;
 use axum::{
@@ -13,7 +14,7 @@ use faceoff_service::{
 use flate2::read::GzDecoder;
 use std::io::Read;
 
-/// Sends the clip, unless the client already has the one with this tag.
+/// Sends the clip, unless the client already has the one with this tag. `clip` is gzip-compressed, and awaited only if needed.
 pub(super) async fn send(
     tag: &ETag,
     conditions: &Conditions,
@@ -35,15 +36,15 @@ pub(super) async fn send(
             .map_err(Problem::internal)?;
         Body::from(bytes).into_response()
     };
-    let sent = response.headers_mut();
-    sent.insert(header::ETAG, tag.header());
-    sent.insert(
+    let response_headers = response.headers_mut();
+    response_headers.insert(header::ETAG, tag.header());
+    response_headers.insert(
         header::CONTENT_TYPE,
         HeaderValue::from_static("application/octet-stream"),
     );
-    set_private_caching(sent);
+    set_private_caching(response_headers);
     let request_headers = HeaderValue::from_static("authorization, cookie, accept-encoding");
-    sent.insert(header::VARY, request_headers);
+    response_headers.insert(header::VARY, request_headers);
     Ok(response)
 }
 

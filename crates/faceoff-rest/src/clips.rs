@@ -1,4 +1,4 @@
-//! Episodes of evaluations, and their clips for replays.
+//! Episodes of evaluations, and their clips: the data of one episode for the replay viewer.
 
 use super::{
     clip_response::send,
@@ -130,14 +130,14 @@ pub(crate) async fn observed(
 async fn send_episode(
     clips: &Clips,
     key: Key,
-    what: &str,
+    tag_prefix: &str,
     path: EpisodePath,
     conditions: &Conditions,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
     let EpisodePath { task, episode, .. } = path;
     let tag = ETag::new(
-        what,
+        tag_prefix,
         &[&clips.file.key, task.as_str(), &episode.to_string()],
     );
     send(&tag, conditions, headers, clips.clip(key)).await

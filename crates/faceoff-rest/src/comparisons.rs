@@ -1,4 +1,4 @@
-//! Paired comparisons of evaluations.
+//! Paired comparisons of two evaluations, which ran on the same episodes.
 
 use axum::{Json, extract::State};
 use faceoff_api::{requests::ComparisonQuery, views::comparison::ComparisonView};

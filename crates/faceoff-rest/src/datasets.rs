@@ -1,4 +1,5 @@
-//! Stored datasets: download, links, and violations without a download.
+//! Datasets, the recordings of evaluations: downloading and publishing them, links to them, and their list of violated
+//! constraints.
 
 use super::{
     document::{Binary, FileHeaders, TagHeader},
@@ -68,7 +69,7 @@ pub(crate) async fn dataset(
     };
     match download(&app, &conditions, file).await {
         Err(StoreError::NotFound(_)) => {
-            // It may have been removed meanwhile. Otherwise the file is lost.
+            // The dataset may have been removed meanwhile. Otherwise the file is lost.
             if proposals::dataset(viewer, &app, id).await?.is_none() {
                 find_released(viewer, &app, id).await?;
             }
@@ -98,11 +99,11 @@ pub(crate) async fn link_dataset(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
-    OptionalJson(wanted): OptionalJson<NewLink>,
+    OptionalJson(request): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
     find_dataset(Viewer::new(&caller), &app, id).await?;
     let path = format!("{}/dataset", paths::evaluation(id));
-    links::link(&app, &caller, &path, wanted).await
+    links::link(&app, &caller, &path, request).await
 }
 
 /// Returns the violated constraints and the slow answers by episode: the dataset's `violations.json`. Needs access to
@@ -141,8 +142,8 @@ pub(crate) async fn violations(
     Ok(response)
 }
 
-/// Publishes a finished evaluation of the calling team and its dataset, before its stage does. Everyone can then read
-/// them without a token. This cannot be undone.
+/// Publishes a finished evaluation of the calling team and its dataset, before the stage publishes them. Everyone can then
+/// read both without a token. This cannot be undone.
 #[utoipa::path(
     post, path = "/evaluations/{id}/publish", tag = "team", security(("team" = [])),
     params(("id" = EvaluationId, Path)),
@@ -206,7 +207,7 @@ async fn find_released(
     let visibility = Visibility::load(app, viewer).await?;
     let evaluation = visibility.readable(app.store.evaluation(id).await)?;
     visibility.check_not_blind(evaluation.stage_day.stage)?;
-    let why_not = match &evaluation.state {
+    let no_dataset_reason = match &evaluation.state {
         EvaluationState::Finished {
             dataset,
             dataset_blake3,
@@ -244,5 +245,5 @@ async fn find_released(
         }
         EvaluationState::Cancelled { .. } => "the evaluation was cancelled and has no dataset",
     };
-    Err(Problem::new(ProblemKind::Conflict, why_not))
+    Err(Problem::new(ProblemKind::Conflict, no_dataset_reason))
 }

@@ -16,7 +16,7 @@ struct DeprecatedRoute {
     handler: fn() -> MethodRouter<App>,
 }
 
-const ROUTES: [DeprecatedRoute; 4] = [
+const DEPRECATED_ROUTES: [DeprecatedRoute; 4] = [
     DeprecatedRoute {
         old_path: "/stages/{id}/days/{day}/extra-turn",
         new_path: "/stages/{id}/days/{day}/extra-evaluation",
@@ -43,16 +43,18 @@ const ROUTES: [DeprecatedRoute; 4] = [
     },
 ];
 
-/// The old paths; [`describe`] adds them to the document.
+/// Serves the old paths. They are not in the OpenAPI document until [`describe`] adds them.
 pub(crate) fn router() -> OpenApiRouter<App> {
-    ROUTES.iter().fold(OpenApiRouter::new(), |router, route| {
-        router.route(route.old_path, (route.handler)())
-    })
+    DEPRECATED_ROUTES
+        .iter()
+        .fold(OpenApiRouter::new(), |router, route| {
+            router.route(route.old_path, (route.handler)())
+        })
 }
 
-/// Adds a deprecated operation for each old path to the document of the new ones.
+/// Adds a deprecated operation for each old path to the OpenAPI document.
 pub(crate) fn describe(document: &mut OpenApi) {
-    for route in ROUTES {
+    for route in DEPRECATED_ROUTES {
         let new_path = format!("{API_BASE}{}", route.new_path);
         let mut item = document.paths.paths[&new_path].clone();
         for operation in [&mut item.get, &mut item.post].into_iter().flatten() {

@@ -1,4 +1,4 @@
-//! The OpenAPI document: everything besides routes and types.
+//! The OpenAPI document: everything that is not derived from the routes and types.
 
 mod deprecated_fields;
 mod files;
@@ -26,6 +26,7 @@ use utoipa::{
                        Every GET resource also supports HEAD: the same headers without a body.",
         license(name = "MIT OR Apache-2.0")
     ),
+    // The tag of an operation says which token it needs.
     components(schemas(ProblemBody)),
     modifiers(&SecuritySchemes),
     tags(

@@ -1,4 +1,4 @@
-//! File downloads: whole files, ranges and metadata.
+//! Downloads of stored files (artifacts): whole files, byte ranges, and headers only.
 
 use axum::{
     body::Body,
@@ -18,6 +18,7 @@ pub(super) const CONTENT_BLAKE3: HeaderName = HeaderName::from_static("x-content
 /// An artifact to send, with its metadata.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Download<'a> {
+    /// Key of the artifact in the store.
     pub(super) key: &'a str,
     /// BLAKE3 hash of the file, if it is known.
     pub(super) blake3: Option<&'a str>,
@@ -45,19 +46,19 @@ pub(super) async fn download(
         set_private_caching(response.headers_mut());
         return Ok(response);
     }
-    let (status, sent) = match conditions.byte_range(&tag, bytes) {
+    let (status, range) = match conditions.byte_range(&tag, bytes) {
         ByteRange::Full => (StatusCode::OK, 0..bytes),
-        ByteRange::Partial(range) => (StatusCode::PARTIAL_CONTENT, range),
+        ByteRange::Partial(part) => (StatusCode::PARTIAL_CONTENT, part),
         ByteRange::Unsatisfiable => return range_not_satisfiable(bytes),
     };
     let body = match status {
         _ if !conditions.is_get() => Body::empty(),
         StatusCode::OK => Body::from_stream(artifacts.read(key).await?.1),
-        _ => Body::from_stream(artifacts.read_range(key, sent.clone()).await?),
+        _ => Body::from_stream(artifacts.read_range(key, range.clone()).await?),
     };
     let mut response = (status, body).into_response();
     let headers = response.headers_mut();
-    headers.insert(header::CONTENT_LENGTH, (sent.end - sent.start).into());
+    headers.insert(header::CONTENT_LENGTH, (range.end - range.start).into());
     headers.insert(
         header::CONTENT_TYPE,
         HeaderValue::from_static(file.media_type),
@@ -70,8 +71,8 @@ pub(super) async fn download(
         headers.insert(CONTENT_BLAKE3, header_value(blake3)?);
     }
     if status == StatusCode::PARTIAL_CONTENT {
-        let range = format!("bytes {}-{}/{bytes}", sent.start, sent.end - 1);
-        headers.insert(header::CONTENT_RANGE, header_value(&range)?);
+        let content_range = format!("bytes {}-{}/{bytes}", range.start, range.end - 1);
+        headers.insert(header::CONTENT_RANGE, header_value(&content_range)?);
     }
     set_private_caching(headers);
     Ok(response)

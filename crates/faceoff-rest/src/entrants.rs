@@ -1,4 +1,4 @@
-//! Entrants of a tournament: entering and leaving.
+//! Entrants, the teams of a tournament: entering them, withdrawing and disqualifying them.
 
 use axum::{Json, extract::State};
 use faceoff_api::{
@@ -41,13 +41,13 @@ pub(crate) async fn enter_teams(
         ));
     }
     let state = TournamentState::unscored(&app, id).await?;
-    let new = entrants::find_by_names(&app, "teams", &teams).await?;
-    entrants::check_count(state.entrants.len() + new.len())?;
+    let new_entrants = entrants::find_by_names(&app, "teams", &teams).await?;
+    entrants::check_count(state.entrants.len() + new_entrants.len())?;
     let now = app.config.clock.now();
     app.store
-        .add_entrants(organiser.actor(), id, &new, now)
+        .add_entrants(organiser.actor(), id, &new_entrants, now)
         .await?;
-    tracing::info!(tournament = %id, teams = new.len(), "teams entered");
+    tracing::info!(tournament = %id, teams = new_entrants.len(), "teams entered");
     tournament::find(&app, id).await.map(Json)
 }
 
@@ -125,24 +125,24 @@ pub(crate) async fn withdraw_team(
     leave(&app, caller.actor(), id, &request).await
 }
 
-/// Refuses a departure that is not confirmed, with its effects.
+/// Refuses a departure that is not confirmed with the team's name; the problem describes its effects.
 fn check_confirmed(
     state: &TournamentState,
-    leaving: &DepartureRequest,
+    departure: &DepartureRequest,
     confirm: Option<&str>,
 ) -> Result<(), Problem> {
     let entrants = &mut state.entrants.iter();
-    let Some(entrant) = entrants.find(|entrant| entrant.team == leaving.team) else {
+    let Some(entrant) = entrants.find(|entrant| entrant.team == departure.team) else {
         return Err(Problem::new(
             ProblemKind::Conflict,
-            format!("{} is not in the tournament", state.name(leaving.team)?),
+            format!("{} is not in the tournament", state.name(departure.team)?),
         ));
     };
-    let own = state
+    let team_games = state
         .games
         .iter()
-        .filter(|game| game.teams.contains(&leaving.team));
-    let open = own.filter(|game| {
+        .filter(|game| game.teams.contains(&departure.team));
+    let open_games = team_games.filter(|game| {
         !matches!(
             game.state,
             GameState::Played(_) | GameState::Cancelled { .. }
@@ -156,20 +156,20 @@ fn check_confirmed(
         );
         return Problem::check_confirmed(confirm, entrant.name.as_str(), &effect);
     }
-    let outcome = match leaving.kind {
+    let outcome = match departure.kind {
         DepartureKind::Withdrawn => "be withdrawn",
         DepartureKind::Disqualified => "be disqualified, and rank below all others",
     };
-    let earlier = match leaving.from_round {
+    let earlier_rounds = match departure.from_round {
         Some(round) => format!(", and of all rounds from {round} on"),
         None => String::new(),
     };
     let effect = format!(
         "{} would {outcome} for good; {} of its games, and its unfinished test and friendly games, would be cancelled; its games of \
-         the running or next round{earlier} would not count; the reason {:?} would be public",
+         the running or next round{earlier_rounds} would not count; the reason {:?} would be public",
         entrant.name,
-        open.count(),
-        leaving.reason
+        open_games.count(),
+        departure.reason
     );
     Problem::check_confirmed(confirm, entrant.name.as_str(), &effect)
 }
@@ -178,12 +178,14 @@ async fn leave(
     app: &App,
     actor: Actor,
     id: TournamentId,
-    leaving: &DepartureRequest,
+    departure: &DepartureRequest,
 ) -> Result<Json<TournamentView>, Problem> {
     let now = app.config.clock.now();
-    app.store.leave_tournament(actor, id, leaving, now).await?;
+    app.store
+        .leave_tournament(actor, id, departure, now)
+        .await?;
     tracing::info!(
-        tournament = %id, team = %leaving.team, left_as = ?leaving.kind, reason = leaving.reason, "team left"
+        tournament = %id, team = %departure.team, left_as = ?departure.kind, reason = departure.reason, "team left"
     );
     tournament::find(app, id).await.map(Json)
 }

@@ -1,3 +1,5 @@
+//! Checks the number of episodes per task that a request asks for.
+
 use faceoff_service::problem::Problem;
 use faceoff_types::MAX_EPISODES_PER_TASK;
 

@@ -1,4 +1,5 @@
-//! Starting evaluation days.
+//! Starting evaluation days. A day is all evaluations of one cutoff, the moment at which each team's active submission is
+//! fixed.
 
 use axum::{Json, extract::State};
 use faceoff_api::{requests::StartDay, views::day::DayView};
@@ -22,8 +23,8 @@ use faceoff_service::{
 pub(crate) async fn start_day(
     organiser: Organiser,
     State(app): State<App>,
-    OptionalJson(wanted): OptionalJson<StartDay>,
+    OptionalJson(request): OptionalJson<StartDay>,
 ) -> Result<Json<DayView>, Problem> {
-    let started = evaluations::start_day(&app, organiser.actor(), wanted.stage);
+    let started = evaluations::start_day(&app, organiser.actor(), request.stage);
     started.await.map(Json)
 }

@@ -1,4 +1,4 @@
-//! Evaluations: listing, cancelling and rerunning them.
+//! Evaluations, each the run of all tasks with one team's submission on one day: listing, cancelling and rerunning them.
 
 use crate::paging::{ListQuery, Page, PageQuery, Paged};
 use axum::{
@@ -26,7 +26,7 @@ use utoipa::IntoParams;
 #[derive(Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
-pub(crate) struct DayQuery {
+pub(crate) struct EvaluationsQuery {
     /// An evaluation day, e.g. 2026-11-21. Default: today for organisers, all days for a team.
     day: Option<Date>,
 }
@@ -34,13 +34,13 @@ pub(crate) struct DayQuery {
 /// Lists evaluations: for organisers all of a day, for a team its own.
 #[utoipa::path(
     get, path = "/evaluations", tag = "team", security(("team" = []), ("organiser" = [])),
-    params(DayQuery, PageQuery), responses((status = 200, body = Vec<EvaluationView>))
+    params(EvaluationsQuery, PageQuery), responses((status = 200, body = Vec<EvaluationView>))
 )]
 pub(crate) async fn list_evaluations(
     caller: Caller,
     mut page: Page<EvaluationId>,
     State(app): State<App>,
-    ListQuery(query): ListQuery<DayQuery>,
+    ListQuery(query): ListQuery<EvaluationsQuery>,
 ) -> Result<Paged<EvaluationView>, Problem> {
     let visibility = Visibility::load(&app, Viewer::new(&caller)).await?;
     let filter = match (caller.team(), query.day) {

@@ -1,4 +1,5 @@
-//! A reader of the event stream: which events it gets next, and when. Its only state is its position in the log.
+//! A reader of the event stream, which is one connection of a client. It decides which events of the log the client gets
+//! next, and when. A client that reconnects continues at the id of its last event.
 
 use axum::response::sse::Event;
 use faceoff_notify::{Audience, Notice, NoticeFilter, Page};
@@ -16,13 +17,13 @@ use tokio::{
 
 /// Minimum time between two reads of the log; events in between are sent together.
 const BATCH_INTERVAL: Duration = Duration::from_millis(200);
-/// Time between two reads without a notification: another process may write, and tokens expire.
+/// Time until the log is read even without a notification: another process may write to it, and tokens expire.
 const POLL_INTERVAL: Duration = Duration::from_secs(5);
 /// Longest connection; a client that reconnects loses no event.
 const MAX_DURATION: Duration = Duration::from_secs(3600);
-/// A reader that is further behind gets a reset: reloading everything is less work for both sides.
+/// A client that is more events behind gets a `reset`: reloading everything is less work for both sides.
 const MAX_BACKLOG: i64 = 5000;
-/// After so many events that do not match the reader's filter, only the id is sent: a reconnect then skips them.
+/// After so many events that do not match the client's filter, the id of the last one is sent, so that a reconnect skips them.
 const MAX_SKIPPED: i64 = 1000;
 
 /// The client of a stream, and its filter.
@@ -31,6 +32,7 @@ pub(crate) struct Subscription {
     pub(crate) reader: Audience,
     /// The token of the request; the stream ends when it becomes invalid.
     pub(crate) token: Option<TokenId>,
+    /// Which events the client wants.
     pub(crate) about: NoticeFilter,
 }
 
@@ -39,45 +41,47 @@ pub(crate) struct EventReader {
     app: App,
     subscription: Subscription,
     changes: broadcast::Receiver<Change>,
-    /// Name of the initial event.
-    initial: Option<&'static str>,
-    /// Id of the last event that was read.
-    read: i64,
+    /// Name of the first message of the stream (`now` or `reset`), until it is sent.
+    first_message: Option<&'static str>,
+    /// Id of the last event that was read from the log.
+    last_read: i64,
     /// Id that was sent last.
-    sent: i64,
-    not_before: Instant,
-    until: Instant,
+    last_sent: i64,
+    /// Earliest time of the next read of the log.
+    next_read_at: Instant,
+    /// When the stream ends.
+    ends_at: Instant,
     shutdown: Option<Shutdown>,
     _permit: OwnedSemaphorePermit,
 }
 
 impl EventReader {
-    /// A reader that begins after the event with id `from`, or now.
+    /// A reader that begins after the event with id `last_received`, or, without one, after the newest event.
     pub(crate) async fn open(
         app: App,
         subscription: Subscription,
-        from: Option<i64>,
+        last_received: Option<i64>,
         shutdown: Option<Shutdown>,
         permit: OwnedSemaphorePermit,
     ) -> Result<Self, Problem> {
         // Subscribed before the log is read, so that no event is missed.
         let changes = app.store.events();
         let newest = app.store.newest_event().await?;
-        let (read, initial) = match from {
+        let (start, first_message) = match last_received {
             None => (newest, Some("now")),
-            Some(from) if from > newest || newest - from > MAX_BACKLOG => (newest, Some("reset")),
-            Some(from) => (from, None),
+            Some(id) if id > newest || newest - id > MAX_BACKLOG => (newest, Some("reset")),
+            Some(id) => (id, None),
         };
         let now = Instant::now();
         Ok(Self {
             app,
             subscription,
             changes,
-            initial,
-            read,
-            sent: read,
-            not_before: now,
-            until: now + MAX_DURATION,
+            first_message,
+            last_read: start,
+            last_sent: start,
+            next_read_at: now,
+            ends_at: now + MAX_DURATION,
             shutdown,
             _permit: permit,
         })
@@ -86,10 +90,10 @@ impl EventReader {
     /// The next events, as soon as there are any; `None` at the end of the stream.
     pub(crate) async fn next(&mut self) -> Option<Vec<Event>> {
         let mut shutdown = self.shutdown.clone();
-        let until = self.until;
+        let ends_at = self.ends_at;
         let batch = tokio::select! {
             () = Shutdown::wait(shutdown.as_mut()) => return None,
-            () = sleep_until(until) => return None,
+            () = sleep_until(ends_at) => return None,
             batch = self.next_batch() => batch,
         };
         match batch {
@@ -103,15 +107,15 @@ impl EventReader {
     }
 
     async fn next_batch(&mut self) -> Result<Option<Vec<Event>>, Problem> {
-        if let Some(name) = self.initial.take() {
-            let data = serde_json::json!({ "id": self.read });
-            let event = Event::default().event(name).id(self.read.to_string());
+        if let Some(name) = self.first_message.take() {
+            let data = serde_json::json!({ "id": self.last_read });
+            let event = Event::default().event(name).id(self.last_read.to_string());
             let event = event.json_data(data).map_err(Problem::internal)?;
             return Ok(Some(vec![event]));
         }
         loop {
-            sleep_until(self.not_before).await;
-            let page = self.app.feed.after(self.read).await?;
+            sleep_until(self.next_read_at).await;
+            let page = self.app.feed.after(self.last_read).await?;
             // Checked after the log is read: a token that was revoked meanwhile gets no further event.
             if !self.is_token_valid().await? {
                 return Ok(None);
@@ -120,10 +124,10 @@ impl EventReader {
                 self.wait().await;
                 continue;
             };
-            let events = self.matching(&page)?;
-            self.read = page.until;
-            // Also without matching events: a client must not make the server read the log at full speed.
-            self.not_before = Instant::now() + BATCH_INTERVAL;
+            let events = self.matching_events(&page)?;
+            self.last_read = page.until;
+            // The pause applies also without matching events: a client must not make the server read the log at full speed.
+            self.next_read_at = Instant::now() + BATCH_INTERVAL;
             if !events.is_empty() {
                 return Ok(Some(events));
             }
@@ -143,7 +147,7 @@ impl EventReader {
     }
 
     /// The events of a page that match the subscription, in order.
-    fn matching(&mut self, page: &Page) -> Result<Vec<Event>, Problem> {
+    fn matching_events(&mut self, page: &Page) -> Result<Vec<Event>, Problem> {
         let matches = |notice: &&Notice| {
             self.subscription.about.matches(notice)
                 && notice.is_visible_to(self.subscription.reader, &page.stages)
@@ -151,12 +155,12 @@ impl EventReader {
         let notices: Vec<&Notice> = page.notices.iter().filter(matches).collect();
         let mut events = Vec::with_capacity(notices.len());
         for notice in notices {
-            self.sent = notice.id;
+            self.last_sent = notice.id;
             let event = Event::default().event("change").id(notice.id.to_string());
             events.push(event.json_data(notice.json()).map_err(Problem::internal)?);
         }
-        if events.is_empty() && page.until - self.sent >= MAX_SKIPPED {
-            self.sent = page.until;
+        if events.is_empty() && page.until - self.last_sent >= MAX_SKIPPED {
+            self.last_sent = page.until;
             // Without data browsers dispatch no event, but remember the id.
             events.push(Event::default().id(page.until.to_string()));
         }
@@ -165,7 +169,7 @@ impl EventReader {
 
     /// Waits until there may be new events.
     async fn wait(&mut self) {
-        self.not_before = Instant::now() + BATCH_INTERVAL;
+        self.next_read_at = Instant::now() + BATCH_INTERVAL;
         let poll = sleep(POLL_INTERVAL);
         tokio::pin!(poll);
         loop {

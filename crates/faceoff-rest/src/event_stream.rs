@@ -1,4 +1,4 @@
-//! The event stream (server-sent events).
+//! The event stream: changes of the season as server-sent events.
 
 use super::sse::{LAST_EVENT_ID, sse_response};
 use crate::event_reader::{EventReader, Subscription};
@@ -50,7 +50,7 @@ pub(crate) async fn follow_events(
             .map_err(|error| Problem::invalid("about", error))?,
         None => NoticeFilter::default(),
     };
-    let from = headers
+    let last_received = headers
         .get(LAST_EVENT_ID)
         .map(|value| parse_id(value.to_str().unwrap_or_default()))
         .transpose()?;
@@ -70,7 +70,7 @@ pub(crate) async fn follow_events(
         about,
     };
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
-    let reader = EventReader::open(app, subscription, from, shutdown, permit).await?;
+    let reader = EventReader::open(app, subscription, last_received, shutdown, permit).await?;
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))

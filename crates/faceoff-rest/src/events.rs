@@ -1,4 +1,4 @@
-//! The event log, for organisers.
+//! The event log of all changes, for organisers.
 
 use axum::{Json, extract::State};
 use faceoff_api::{requests::EventsQuery, views::event::EventsView};

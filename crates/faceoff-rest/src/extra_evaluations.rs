@@ -1,4 +1,5 @@
-//! Evaluations outside the schedule: missed days, and extra evaluations of one team.
+//! Evaluations outside the schedule: missed evaluation days, and extra evaluations of one team. The *cutoff* of a day is the
+//! moment at which each team's active submission is fixed.
 
 use axum::{
     Json,
@@ -49,7 +50,7 @@ pub(crate) async fn start_missed_day(
 /// Grants a team one more evaluation for a day whose cutoff has passed, with its currently active submission.
 ///
 /// Before the day's release it runs on the day's episodes. After the release, when these are public, it runs on
-/// episodes of its own; its board row says so, and it cannot be compared episode by episode.
+/// other episodes; its board row says so, and it cannot be compared episode by episode.
 #[utoipa::path(
     post, path = "/stages/{id}/days/{day}/extra-evaluation", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path), ("day" = Date, Path, example = "2026-03-01")), request_body = NewExtraEvaluation,
@@ -64,15 +65,15 @@ pub(crate) async fn start_missed_day(
 pub(crate) async fn grant_extra_evaluation(
     organiser: Organiser,
     State(app): State<App>,
-    day: PathParams<String, 2>,
-    Body(wanted): Body<NewExtraEvaluation>,
+    path: PathParams<String, 2>,
+    Body(request): Body<NewExtraEvaluation>,
 ) -> Result<impl IntoResponse, Problem> {
-    let PathParams([stage, day]) = day;
+    let PathParams([stage, day]) = path;
     let stage_day: StageDay = format!("{stage}/{day}")
         .parse()
         .map_err(|_| Problem::not_found("day"))?;
     let view =
-        evaluations::grant_extra_evaluation(&app, organiser.actor(), stage_day, &wanted).await?;
+        evaluations::grant_extra_evaluation(&app, organiser.actor(), stage_day, &request).await?;
     let location = [(header::LOCATION, paths::evaluation(view.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

@@ -1,5 +1,5 @@
-//! Test games against the organisers' baseline, and friendly games between two teams. They are played before and between
-//! rounds, and do not count.
+//! Test games against the organisers' baseline (a submission that serves as opponent), and friendly games between two teams.
+//! They are played before and between the rounds of a tournament, and do not count.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{
@@ -25,8 +25,8 @@ use faceoff_service::{
 use faceoff_store::{Game, StoreError};
 use faceoff_types::{GameId, TeamId, TournamentId};
 
-/// Queues test games of active submissions against the baseline: for a team its own, within its daily quota; for
-/// organisers those of any entrants, without a quota.
+/// Queues test games of active submissions against the baseline. A team can request them for its own submission, within its
+/// daily quota; organisers for any entrants, without a quota.
 #[utoipa::path(
     post, path = "/tournaments/{id}/test-games", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = TournamentId, Path)),
@@ -43,23 +43,23 @@ pub(crate) async fn order_test_games(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
-    OptionalJson(wanted): OptionalJson<NewTestGames>,
+    OptionalJson(request): OptionalJson<NewTestGames>,
 ) -> Result<(StatusCode, Json<TestGamesView>), Problem> {
     let state = TournamentState::unscored(&app, id).await?;
     let requested_by = caller.team().map(|team| team.id);
     let baseline = baseline_team(&app, &state).await?;
-    let teams = match (requested_by, wanted.teams) {
+    let teams = match (requested_by, request.teams) {
         (None, None) => {
             let entrants = state.entrants.iter();
-            let tested = entrants
+            let opponents = entrants
                 .filter(|entrant| entrant.departure.is_none() && Some(entrant.team) != baseline);
-            tested.map(|entrant| entrant.team).collect()
+            opponents.map(|entrant| entrant.team).collect()
         }
         (None, Some(names)) => entrants::find_by_names(&app, "teams", &names).await?,
-        (Some(own), None) => vec![own],
-        (Some(own), Some(names)) => {
+        (Some(own_team), None) => vec![own_team],
+        (Some(own_team), Some(names)) => {
             let teams = entrants::find_by_names(&app, "teams", &names).await?;
-            if teams != [own] {
+            if teams != [own_team] {
                 return Err(Problem::new(
                     ProblemKind::Forbidden,
                     "teams: a team can request test games only for itself; leave it out",
@@ -68,10 +68,10 @@ pub(crate) async fn order_test_games(
             teams
         }
     };
-    if let Some(own) = teams.iter().find(|team| Some(**team) == baseline) {
+    if let Some(team) = teams.iter().find(|team| Some(**team) == baseline) {
         let detail = format!(
             "{}: the baseline is a submission of this team, and a team cannot play against itself",
-            state.name(*own)?
+            state.name(*team)?
         );
         return Err(Problem::new(ProblemKind::Conflict, detail));
     }
@@ -110,7 +110,7 @@ pub(crate) async fn order_test_games(
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// The team of the baseline.
+/// The team whose submission is the tournament's baseline.
 async fn baseline_team(app: &App, state: &TournamentState) -> Result<Option<TeamId>, Problem> {
     Ok(match state.tournament.baseline {
         Some(submission) => Some(app.store.submission(submission).await?.team),
@@ -118,7 +118,7 @@ async fn baseline_team(app: &App, state: &TournamentState) -> Result<Option<Team
     })
 }
 
-/// Queues a friendly game of the calling team's active submission, which plays at home, against another team's.
+/// Queues a friendly game of the calling team's active submission, which plays on the home side, against another team's.
 #[utoipa::path(
     post, path = "/tournaments/{id}/friendly-games", tag = "team", security(("team" = [])),
     params(("id" = TournamentId, Path)), request_body = NewFriendlyGame,
@@ -138,8 +138,8 @@ pub(crate) async fn order_friendly_game(
 ) -> Result<impl IntoResponse, Problem> {
     let state = TournamentState::unscored(&app, id).await?;
     let opponent = entrants::find_by_names(&app, "opponent", &[opponent]).await?[0];
-    let own = caller.team.id;
-    if opponent == own {
+    let own_team = caller.team.id;
+    if opponent == own_team {
         return Err(Problem::invalid(
             "opponent",
             "expected another team, got your own; name an opponent",
@@ -148,11 +148,11 @@ pub(crate) async fn order_friendly_game(
     let now = app.config.clock.now();
     let game: Game = app
         .store
-        .request_friendly_game(caller.actor(), id, own, opponent, now)
+        .request_friendly_game(caller.actor(), id, own_team, opponent, now)
         .await
         .map_err(|error| Problem::with_quota_reset(error, now))?;
     tracing::info!(tournament = %id, game = %game.id, team = %caller.team.name, "friendly game queued");
-    let view = game::view(&state, Viewer::Team(own), &game)?;
+    let view = game::view(&state, Viewer::Team(own_team), &game)?;
     let location = [(header::LOCATION, paths::game(game.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

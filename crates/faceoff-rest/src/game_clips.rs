@@ -1,4 +1,5 @@
-//! Clips of games for replays, 500 control steps each.
+//! Clips of games: data for the replay viewer, 500 control steps of the game each. A clip is identified by its number
+//! (`chunk`), from 0.
 
 use super::{
     clip_response::send,

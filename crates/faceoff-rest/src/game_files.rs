@@ -1,4 +1,4 @@
-//! Files of games: recordings of one side and of both sides, links to them, and logs.
+//! Files of games: recordings of one side and of both sides, links to them, and logs. Side 1 plays at home, side 2 away.
 
 use super::{
     document::{Binary, FileHeaders},
@@ -95,12 +95,12 @@ pub(crate) async fn link_side(
     caller: Caller,
     State(app): State<App>,
     PathParams(path): PathParams<String, 2>,
-    OptionalJson(wanted): OptionalJson<NewLink>,
+    OptionalJson(request): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
     let (id, side) = parse_side(&path)?;
     StoredRecording::find(&app, Viewer::new(&caller), id, GameFile::Side(side)).await?;
     let path = format!("{}/sides/{}", paths::game(id), side.number());
-    links::link(&app, &caller, &path, wanted).await
+    links::link(&app, &caller, &path, request).await
 }
 
 /// Creates a link that downloads the recording of both sides without a token for a limited time. For callers who may
@@ -122,11 +122,11 @@ pub(crate) async fn link_recording(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<GameId>,
-    OptionalJson(wanted): OptionalJson<NewLink>,
+    OptionalJson(request): OptionalJson<NewLink>,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
     StoredRecording::find(&app, Viewer::new(&caller), id, GameFile::BothSides).await?;
     let path = format!("{}/recording", paths::game(id));
-    links::link(&app, &caller, &path, wanted).await
+    links::link(&app, &caller, &path, request).await
 }
 
 /// Returns the faults and the last part of the standard error of a side's agent, from the attempt that counts. For its
@@ -187,7 +187,7 @@ pub(super) fn parse_side([id, side]: &[String; 2]) -> Result<(GameId, Side), Pro
 
 fn stored_recording(game: &Game) -> Result<&GameRecording, Problem> {
     match &game.state {
-        GameState::Played(row) => row.recording.as_ref().ok_or_else(|| {
+        GameState::Played(result) => result.recording.as_ref().ok_or_else(|| {
             Problem::new(
                 ProblemKind::Conflict,
                 "replays of the schedule are not recorded; the game that counts has a recording",
@@ -198,7 +198,7 @@ fn stored_recording(game: &Game) -> Result<&GameRecording, Problem> {
 }
 
 fn no_result(game: &Game) -> Problem {
-    let why = match &game.state {
+    let reason = match &game.state {
         GameState::Queued | GameState::Running { .. } => {
             "it has not ended; poll it until its state is “played”"
         }
@@ -211,11 +211,11 @@ fn no_result(game: &Game) -> Problem {
     };
     Problem::new(
         ProblemKind::Conflict,
-        format!("the game has no result: {why}"),
+        format!("the game has no result: {reason}"),
     )
 }
 
-/// A file of a game.
+/// Which recording of a game is requested.
 #[derive(Debug, Clone, Copy)]
 enum GameFile {
     BothSides,
@@ -226,6 +226,7 @@ enum GameFile {
 #[derive(Debug)]
 struct StoredRecording {
     game: GameId,
+    /// Artifact key of the file.
     key: String,
     blake3: String,
     /// File name for the client.
@@ -248,18 +249,18 @@ impl StoredRecording {
             return Err(visibility.denial(&game, &what));
         }
         let files = stored_recording(&game)?;
-        let (name, blake3) = match file {
+        let (file_name, blake3) = match file {
             GameFile::BothSides => ("game.zip".to_owned(), &files.game_blake3),
             GameFile::Side(side) => {
-                let name = format!("side-{}.zip", side.number());
-                (name, &files.side_blake3[side.index()])
+                let file_name = format!("side-{}.zip", side.number());
+                (file_name, &files.side_blake3[side.index()])
             }
         };
-        let key = format!("{}/{name}", files.key);
+        let key = format!("{}/{file_name}", files.key);
         archive_contents::check_included(app, &key, "recording").await?;
         Ok(Self {
             game: id,
-            name: download_name(&state, &game, &name)?,
+            name: download_name(&state, &game, &file_name)?,
             key,
             blake3: blake3.clone(),
         })

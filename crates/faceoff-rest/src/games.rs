@@ -1,4 +1,4 @@
-//! Games: listing, cancelling, voiding and rerunning them.
+//! Games of two submissions in a tournament: listing, cancelling, voiding and rerunning them.
 
 use crate::paging::{ListQuery, Page, PageQuery, Paged};
 use axum::{Json, extract::State};

@@ -1,4 +1,4 @@
-//! Invitations, and accepting them.
+//! Invitations, links with which a person becomes a user: creating, listing, revoking and accepting them.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};

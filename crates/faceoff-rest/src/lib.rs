@@ -1,5 +1,5 @@
-//! The REST API: routes, parsing of requests, and the OpenAPI document. One file per resource. The types of responses are
-//! in [`faceoff_api::views`]; [`faceoff_service::views`] builds them.
+//! The REST API: routes, parsing of requests, and the OpenAPI document. One file per resource. The types of responses,
+//! called views, are in [`faceoff_api::views`]; [`faceoff_service::views`] builds them.
 
 mod ablations;
 mod announcements;
@@ -82,11 +82,11 @@ pub fn router(timeout: Duration) -> (Router<App>, Arc<Value>) {
         .merge(deprecated_routes::router())
         .layer(middleware::from_fn_with_state(timeout, timeouts::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
-    // An upload may take long as long as it progresses; `upload` itself limits size and pauses.
+    // An upload may take any time as long as it progresses; `upload` itself limits its size and its pauses.
     let uploads = OpenApiRouter::new()
         .routes(routes!(upload::create_submission))
         .layer(DefaultBodyLimit::disable());
-    // The time to make an archive is not known in advance, either.
+    // Archives have no time limit, because the time to make one is not known in advance.
     let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));
     let (router, mut document) = OpenApiRouter::new()
         .nest(API_BASE, resources.merge(uploads).merge(archives))

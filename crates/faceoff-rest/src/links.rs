@@ -1,9 +1,9 @@
 //! Signed links, which download one file without a token for a limited time.
 //!
-//! Permissions are checked when a link is used, as for its creator: it is valid as long as the creator's token is, and
-//! gives the access that the creator has then. The signature includes the hash of that token, so rotating the token
-//! invalidates its links. It is keyed with a secret of the server that is in no backup, so a copy of the database alone
-//! cannot forge links.
+//! Permissions are checked when a link is used, as for its creator: the link is valid as long as the creator's token is, and
+//! gives the access that the creator has at that time. The signature includes the hash of the token, so rotating the token
+//! invalidates its links. The signature's key is a secret of the server that is in no backup, so a copy of the database
+//! alone is not enough to forge links.
 
 use axum::{
     Json,
@@ -27,18 +27,18 @@ use utoipa::IntoParams;
 /// Default validity of a link.
 const DEFAULT_VALIDITY_S: u32 = 60 * 60;
 const MAX_VALIDITY_S: u32 = 7 * 24 * 60 * 60;
-/// Derivation context of the key; used for nothing else.
+/// Derivation context of the signature's key; used for nothing else. Its date belongs to the text and must not change.
 const CONTEXT: &str = "faceoff 2026-11-23 links that download a file";
 
 /// Query parameters of a signed link.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct LinkQuery {
-    /// Of a signed link: when it expires, in seconds since 1970.
+    /// When the signed link expires, in seconds since 1970. Only in signed links.
     expires: Option<i64>,
-    /// Of a signed link: id of its creator's token.
+    /// Id of the token of the signed link's creator. Only in signed links.
     by: Option<TokenId>,
-    /// Of a signed link: the signature, 64 hexadecimal digits.
+    /// Signature of the link, 64 hexadecimal digits. Only in signed links.
     signature: Option<String>,
 }
 
@@ -54,17 +54,17 @@ where
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
         let QueryParams(query) = QueryParams::from_request_parts(parts, app).await?;
-        let (expires, by, signature) = match query {
+        let (expires_s, creator_token, signature) = match query {
             LinkQuery {
                 expires: None,
                 by: None,
                 signature: None,
             } => return E::from_request_parts(parts, app).await.map(Self),
             LinkQuery {
-                expires: Some(expires),
-                by: Some(by),
+                expires: Some(expires_s),
+                by: Some(creator_token),
                 signature: Some(signature),
-            } => (expires, by, signature),
+            } => (expires_s, creator_token, signature),
             _ => {
                 return Err(Problem::new(
                     ProblemKind::InvalidRequest,
@@ -77,7 +77,7 @@ where
             Ok(uri) => uri.path(),
             Err(never) => match *never {},
         };
-        let creator = verify(app, path, expires, by, &signature).await?;
+        let creator = verify(app, path, expires_s, creator_token, &signature).await?;
         Ok(Self(creator.into()))
     }
 }
@@ -90,35 +90,38 @@ pub(crate) async fn link(
     app: &AppState,
     caller: &Caller,
     path: &str,
-    wanted: NewLink,
+    request: NewLink,
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
-    let validity_s = wanted.expires_in_s.unwrap_or(DEFAULT_VALIDITY_S);
+    let validity_s = request.expires_in_s.unwrap_or(DEFAULT_VALIDITY_S);
     if !(1..=MAX_VALIDITY_S).contains(&validity_s) {
         let detail = format!("expected 1 to {MAX_VALIDITY_S} seconds (7 days), got {validity_s}");
         return Err(Problem::invalid("expires_in_s", detail));
     }
-    let until = app.config.clock.now().as_second() + i64::from(validity_s);
-    let expires_at = Timestamp::from_second(until).map_err(Problem::internal)?;
-    let by = caller.token.id;
-    let signature = sign(app, &app.store.token_hash(by).await?, path, until, by);
-    let base = app.config.public_url.as_deref().unwrap_or_default();
-    let url = format!("{base}{path}?expires={until}&by={by}&signature={signature}");
+    let expires_s = app.config.clock.now().as_second() + i64::from(validity_s);
+    let expires_at = Timestamp::from_second(expires_s).map_err(Problem::internal)?;
+    let creator_token = caller.token.id;
+    let token_hash = app.store.token_hash(creator_token).await?;
+    let signature = sign(app, &token_hash, path, expires_s, creator_token);
+    let base_url = app.config.public_url.as_deref().unwrap_or_default();
+    let url =
+        format!("{base_url}{path}?expires={expires_s}&by={creator_token}&signature={signature}");
     tracing::info!(path, %expires_at, actor = %caller.actor(), "download link created");
     Ok((StatusCode::CREATED, Json(LinkView { url, expires_at })))
 }
 
+/// The signature of a link to `path` that expires at `expires_s`, in seconds since 1970.
 fn sign(
     app: &AppState,
     token_hash: &[u8; 32],
     path: &str,
-    until: i64,
-    by: TokenId,
+    expires_s: i64,
+    creator_token: TokenId,
 ) -> blake3::Hash {
     let key = blake3::derive_key(CONTEXT, app.config.link_key.bytes());
     blake3::Hasher::new_keyed(&key)
         .update(token_hash)
-        .update(&until.to_le_bytes())
-        .update(by.as_uuid().as_bytes())
+        .update(&expires_s.to_le_bytes())
+        .update(creator_token.as_uuid().as_bytes())
         .update(path.as_bytes())
         .finalize()
 }
@@ -127,8 +130,8 @@ fn sign(
 async fn verify(
     app: &AppState,
     path: &str,
-    until: i64,
-    by: TokenId,
+    expires_s: i64,
+    creator_token: TokenId,
     signature: &str,
 ) -> Result<Caller, Problem> {
     let invalid = || {
@@ -138,27 +141,27 @@ async fn verify(
              ask for a new one",
         )
     };
-    let token_hash = match app.store.token_hash(by).await {
+    let token_hash = match app.store.token_hash(creator_token).await {
         Ok(hash) => hash,
         Err(StoreError::NotFound(_)) => return Err(invalid()),
         Err(error) => return Err(error.into()),
     };
     let signature = blake3::Hash::from_hex(signature).map_err(|_| invalid())?;
     // `blake3::Hash` compares in constant time.
-    if signature != sign(app, &token_hash, path, until, by) {
+    if signature != sign(app, &token_hash, path, expires_s, creator_token) {
         return Err(invalid());
     }
     let now = app.config.clock.now();
-    if now.duration_since(Timestamp::UNIX_EPOCH) >= SignedDuration::from_secs(until) {
-        let at = Timestamp::from_second(until).map_err(|_| invalid())?;
-        let shown = at.strftime("%Y-%m-%d %H:%M:%S UTC");
+    if now.duration_since(Timestamp::UNIX_EPOCH) >= SignedDuration::from_secs(expires_s) {
+        let expired_at = Timestamp::from_second(expires_s).map_err(|_| invalid())?;
+        let time = expired_at.strftime("%Y-%m-%d %H:%M:%S UTC");
         return Err(Problem::new(
             ProblemKind::LinkExpired,
-            format!("the link expired at {shown}; ask the person who gave it to you for a new one"),
+            format!("the link expired at {time}; ask the person who gave it to you for a new one"),
         )
-        .with("expired_at", at.to_string()));
+        .with("expired_at", expired_at.to_string()));
     }
-    match app.store.verify_token_id(by, now).await? {
+    match app.store.verify_token_id(creator_token, now).await? {
         Ok(VerifiedToken { token, principal }) => {
             app.check_rate(token.id)?;
             let creator = Caller { token, principal };

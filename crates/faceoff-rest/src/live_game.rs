@@ -1,4 +1,4 @@
-//! The stream of a live game (server-sent events).
+//! The stream of a live game: positions, goals and fouls as server-sent events while it is played.
 
 use super::sse::{LAST_EVENT_ID, sse_response};
 use crate::live_reader::{LiveReader, parse_cursor};
@@ -17,13 +17,13 @@ use std::sync::Arc;
 
 /// Streams a live game (server-sent events).
 ///
-/// The first event is `snapshot`, the current state. Then follow all `happening` events in chronological order, and
-/// `position` at most ten times a second; of these only the newest is sent. `waiting` is sent while the game waits for
-/// a slot. At the end `over` is sent, and the stream ends.
+/// The first event is `snapshot`, the current state. Then follow all `happening` events (goals, fouls and the like) in
+/// chronological order, and `position` (of puck and robots) at most ten times a second, always the newest. While the game
+/// waits to be run, `waiting` is sent once. At the end `over` is sent, and the stream ends.
 ///
-/// The id of a happening is `ATTEMPT.NUMBER`. A client that reconnects with the header `Last-Event-ID` gets a snapshot
-/// and all happenings since then; after a new attempt, all of its happenings. A stream ends after at most an hour, and
-/// when the server shuts down.
+/// The id of a `happening` is `ATTEMPT.NUMBER`; a game that is run again has a new attempt. A client that reconnects with
+/// the header `Last-Event-ID` gets a snapshot and all happenings since that id; if a new attempt has begun, all happenings
+/// of it. A stream ends after at most an hour, and when the server shuts down.
 #[utoipa::path(
     get, path = "/games/{id}/live", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(

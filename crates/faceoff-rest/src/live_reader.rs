@@ -1,4 +1,5 @@
-//! A reader of a live game's stream: which events it gets next, and when.
+//! A reader of a live game's stream, which is one connection of a client. It decides which events the client gets next, and
+//! when. A game that is run again has a new *attempt*; *live data* is what the running attempt reports to this process.
 
 use axum::response::sse::Event;
 use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
@@ -16,7 +17,7 @@ use tokio::{
     time::{Instant, sleep, sleep_until},
 };
 
-/// Minimum time between two batches of a running game, and so between two positions.
+/// Minimum time between two batches of events, and so between two `position` events.
 const BATCH_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two checks whether the game has started or was cancelled.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);
@@ -27,25 +28,29 @@ const MAX_DURATION: Duration = Duration::from_secs(3600);
 pub(crate) struct LiveReader {
     app: App,
     game: GameId,
+    /// The game's live data; `None` while there is none.
     subscription: Option<LiveSubscription>,
+    /// The attempt and number of the last game event that the client has.
     cursor: Option<LiveCursor>,
     /// The attempt whose snapshot was sent.
     sent_attempt: Option<u32>,
-    /// The step of the position that was sent last.
+    /// The control step of the position that was sent last.
     sent_step: Option<u32>,
     /// Whether `waiting` was sent since the last snapshot.
-    sent_waiting: bool,
+    is_waiting_sent: bool,
+    /// Whether `over` was sent, which ends the stream.
     is_over: bool,
     /// Earliest time of the next batch.
-    not_before: Instant,
-    until: Instant,
+    next_batch_at: Instant,
+    /// When the stream ends, even if the game has not.
+    ends_at: Instant,
     shutdown: Option<Shutdown>,
     _permit: OwnedSemaphorePermit,
 }
 
 /// State of a game in the database.
 enum StoredState {
-    /// Pending or running; the running attempt.
+    /// Pending or running. The number of the running attempt.
     Open(Option<u32>),
     Over(LiveEndState),
 }
@@ -66,10 +71,10 @@ impl LiveReader {
             cursor,
             sent_attempt: None,
             sent_step: None,
-            sent_waiting: false,
+            is_waiting_sent: false,
             is_over: false,
-            not_before: now,
-            until: now + MAX_DURATION,
+            next_batch_at: now,
+            ends_at: now + MAX_DURATION,
             shutdown,
             _permit: permit,
         }
@@ -81,13 +86,13 @@ impl LiveReader {
             return None;
         }
         let mut shutdown = self.shutdown.clone();
-        let until = self.until;
+        let ends_at = self.ends_at;
         let batch = tokio::select! {
             () = Shutdown::wait(shutdown.as_mut()) => return None,
-            () = sleep_until(until) => return None,
+            () = sleep_until(ends_at) => return None,
             batch = self.next_batch() => batch,
         };
-        self.not_before = Instant::now() + BATCH_INTERVAL;
+        self.next_batch_at = Instant::now() + BATCH_INTERVAL;
         match batch {
             Ok(events) => Some(events),
             Err(problem) => {
@@ -99,7 +104,7 @@ impl LiveReader {
     }
 
     async fn next_batch(&mut self) -> Result<Vec<Event>, Problem> {
-        sleep_until(self.not_before).await;
+        sleep_until(self.next_batch_at).await;
         loop {
             if self.subscription.is_none() {
                 self.subscription = self.app.store.live_games().subscribe(self.game);
@@ -113,7 +118,7 @@ impl LiveReader {
                         (self.running_events(update)?, true)
                     }
                 }
-                None => (self.without_live_data().await?, false),
+                None => (self.events_without_live_data().await?, false),
             };
             if !events.is_empty() {
                 return Ok(events);
@@ -132,7 +137,7 @@ impl LiveReader {
                             self.subscription = None;
                         }
                     }
-                    // The subscription does not report what organisers do with a game that has ended.
+                    // The subscription does not report decisions about an ended game, such as a rerun.
                     () = sleep(POLL_INTERVAL) => {}
                 }
             }
@@ -153,7 +158,7 @@ impl LiveReader {
         Ok(events)
     }
 
-    /// Adds the attempt's snapshot, unless it was sent, and all game events since.
+    /// Adds the attempt's snapshot, unless it was sent, and all game events that the client does not have.
     fn push_game_events(
         &mut self,
         update: &LiveUpdate,
@@ -163,7 +168,7 @@ impl LiveReader {
         if self.sent_attempt != Some(attempt) {
             self.sent_attempt = Some(attempt);
             self.sent_step = update.state.position.map(|position| position.step);
-            self.sent_waiting = false;
+            self.is_waiting_sent = false;
             events.push(event("snapshot", &update.state)?);
         }
         for (game_event, number) in update.events.iter().zip(update.start.events + 1..) {
@@ -181,58 +186,60 @@ impl LiveReader {
         match self.stored_state().await? {
             StoredState::Over(state) => {
                 self.push_game_events(&update, &mut events)?;
-                events.push(self.end(state)?);
+                events.push(self.over_event(state)?);
             }
             // The attempt has ended, and its result is being stored.
             StoredState::Open(Some(running)) if running == attempt && has_ended => {
                 self.push_game_events(&update, &mut events)?;
-                events.push(self.end(LiveEndState::Played)?);
+                events.push(self.over_event(LiveEndState::Played)?);
             }
             StoredState::Open(_) => {
-                // An attempt without a result whose beginning was not sent is skipped.
+                // The attempt ended without a result. It is skipped if the client has not seen its beginning.
                 if self.sent_attempt == Some(attempt) {
                     self.push_game_events(&update, &mut events)?;
                 }
-                events.extend(self.waiting()?);
+                events.extend(self.waiting_event()?);
             }
         }
         Ok(events)
     }
 
+    /// Whether the last event of the attempt, sent or not, is the end of the game.
     fn has_ended(&mut self, update: &LiveUpdate) -> bool {
-        let last = match update.events.last() {
-            Some(last) => Some(last.clone()),
+        let last_event = match update.events.last() {
+            Some(event) => Some(event.clone()),
             None => self
                 .subscription
                 .as_mut()
                 .and_then(|subscription| subscription.read_since(None).events.pop()),
         };
-        last.is_some_and(|last| matches!(last.event, GameEvent::Ended { .. }))
+        last_event.is_some_and(|last| matches!(last.event, GameEvent::Ended { .. }))
     }
 
     /// Events of a game without live data: no slot reports it to this process, or its data was dropped.
-    async fn without_live_data(&mut self) -> Result<Vec<Event>, Problem> {
+    async fn events_without_live_data(&mut self) -> Result<Vec<Event>, Problem> {
         let StoredState::Over(state) = self.stored_state().await? else {
-            return Ok(self.waiting()?.into_iter().collect());
+            return Ok(self.waiting_event()?.into_iter().collect());
         };
         let mut events = Vec::new();
         if let Some(snapshot) = self.final_snapshot().await? {
             events.push(event("snapshot", &snapshot)?);
         }
-        events.push(self.end(state)?);
+        events.push(self.over_event(state)?);
         Ok(events)
     }
 
-    /// The event that the game waits for a slot, once.
-    fn waiting(&mut self) -> Result<Option<Event>, Problem> {
-        if self.sent_waiting {
+    /// The event `waiting`, unless it was sent: the game waits until a worker has a free slot for it.
+    fn waiting_event(&mut self) -> Result<Option<Event>, Problem> {
+        if self.is_waiting_sent {
             return Ok(None);
         }
-        self.sent_waiting = true;
+        self.is_waiting_sent = true;
         event("waiting", &LiveWait { game: self.game }).map(Some)
     }
 
-    fn end(&mut self, state: LiveEndState) -> Result<Event, Problem> {
+    /// The event `over`, after which the stream ends.
+    fn over_event(&mut self, state: LiveEndState) -> Result<Event, Problem> {
         self.is_over = true;
         let game = self.game;
         event("over", &LiveEnd { game, state })
@@ -255,14 +262,14 @@ impl LiveReader {
 
     /// Snapshot of the end of a game without live data; `None` without a result.
     async fn final_snapshot(&self) -> Result<Option<LiveGame>, Problem> {
-        let GameState::Played(row) = self.app.store.game(self.game).await?.state else {
+        let GameState::Played(result) = self.app.store.game(self.game).await?.state else {
             return Ok(None);
         };
         let score: faceoff_scoring::tournament::GameScore =
-            serde_json::from_value(row.score).map_err(Problem::internal)?;
+            serde_json::from_value(result.score).map_err(Problem::internal)?;
         Ok(Some(LiveGame {
             game: self.game,
-            attempt: row.attempt,
+            attempt: result.attempt,
             steps: score.steps,
             score: score.sides.each_ref().map(|side| side.score),
             fouls: score.sides.each_ref().map(|side| side.fouls),
@@ -281,7 +288,7 @@ fn numbered_event(game_event: &LiveEvent, attempt: u32, number: u32) -> Result<E
     Ok(event("happening", game_event)?.id(format!("{attempt}.{number}")))
 }
 
-/// Parses an event id as [`numbered`] writes it.
+/// Parses an event id as [`numbered_event`] writes it.
 ///
 /// # Errors
 /// `InvalidRequest`.

@@ -1,5 +1,5 @@
-//! Paging of lists. A page is identified by the row before it, so rows that are added meanwhile shift nothing: a client
-//! that reads all pages gets every row that existed at the beginning exactly once.
+//! Paging of lists. A page is identified by the row before it, so rows that are added meanwhile do not shift the pages: a
+//! client that reads all pages gets every row that existed at the beginning exactly once.
 
 use axum::{
     Json,
@@ -34,8 +34,8 @@ pub(crate) struct PageQuery {
 pub(crate) struct Page<I> {
     pub(crate) limit: u32,
     pub(crate) after: Option<I>,
-    /// Path of the list with its other query parameters.
-    list: String,
+    /// Path and query of the list without `after`; it ends with `?` or `&`.
+    list_uri: String,
 }
 
 impl<S, I> FromRequestParts<S> for Page<I>
@@ -62,17 +62,21 @@ where
             let detail = format!("after: {error}; use the header Link of the previous page");
             Problem::new(ProblemKind::InvalidRequest, detail)
         })?;
-        let others = uri.query().unwrap_or_default().split('&');
-        let others = others.filter(|param| !param.is_empty() && !param.starts_with("after="));
-        let list = others.fold(format!("{}?", uri.path()), |list, param| {
-            format!("{list}{param}&")
+        let params = uri.query().unwrap_or_default().split('&');
+        let kept = params.filter(|param| !param.is_empty() && !param.starts_with("after="));
+        let list_uri = kept.fold(format!("{}?", uri.path()), |list_uri, param| {
+            format!("{list_uri}{param}&")
         });
-        Ok(Self { limit, after, list })
+        Ok(Self {
+            limit,
+            after,
+            list_uri,
+        })
     }
 }
 
 impl<I: Display + PartialEq> Page<I> {
-    /// The page of a short list that is read completely.
+    /// The requested page of `rows`, all rows of a list that is short enough to be read completely.
     ///
     /// # Errors
     /// `InvalidRequest` if `after` is not in the list.
@@ -91,18 +95,19 @@ impl<I: Display + PartialEq> Page<I> {
         Ok(self.page(rows, id))
     }
 
-    /// The page with these rows; one row more than `limit` shows that there is a next page.
+    /// The page with these rows. If there is one row more than `limit`, it is dropped, and the page links to a next one.
     pub(crate) fn page<T>(&self, mut rows: Vec<T>, id: impl Fn(&T) -> I) -> Paged<T> {
         let has_more = rows.len() > self.limit as usize;
         rows.truncate(self.limit as usize);
         let last = rows.last().filter(|_| has_more);
-        let next = last.map(|row| format!("<{}after={}>; rel=\"next\"", self.list, id(row)));
-        Paged { rows, next }
+        let next_link =
+            last.map(|row| format!("<{}after={}>; rel=\"next\"", self.list_uri, id(row)));
+        Paged { rows, next_link }
     }
 
     /// Adds a query parameter to the link of the next page, for a list whose default depends on the time.
     pub(crate) fn with_parameter(mut self, name: &str, value: impl Display) -> Self {
-        self.list.push_str(&format!("{name}={value}&"));
+        self.list_uri.push_str(&format!("{name}={value}&"));
         self
     }
 
@@ -119,7 +124,8 @@ impl<I: Display + PartialEq> Page<I> {
 #[derive(Debug)]
 pub(crate) struct Paged<T> {
     rows: Vec<T>,
-    next: Option<String>,
+    /// Value of the header `Link`; `None` on the last page.
+    next_link: Option<String>,
 }
 
 impl<T> Paged<T> {
@@ -127,7 +133,7 @@ impl<T> Paged<T> {
     pub(crate) fn map<V>(self, view: impl FnMut(T) -> V) -> Paged<V> {
         Paged {
             rows: self.rows.into_iter().map(view).collect(),
-            next: self.next,
+            next_link: self.next_link,
         }
     }
 
@@ -138,7 +144,7 @@ impl<T> Paged<T> {
     ) -> Result<Paged<V>, Problem> {
         Ok(Paged {
             rows: views(self.rows).await?,
-            next: self.next,
+            next_link: self.next_link,
         })
     }
 }
@@ -147,8 +153,9 @@ impl<T: Serialize> IntoResponse for Paged<T> {
     fn into_response(self) -> Response {
         let mut response = Json(&self.rows).into_response();
         // The link consists of parts of the request's URI, so it is always valid in a header.
-        if let Some(next) = self.next.and_then(|next| HeaderValue::try_from(next).ok()) {
-            response.headers_mut().insert(header::LINK, next);
+        let next_link = self.next_link.map(HeaderValue::try_from);
+        if let Some(Ok(next_link)) = next_link {
+            response.headers_mut().insert(header::LINK, next_link);
         }
         response
     }

@@ -1,4 +1,5 @@
-//! Trials and proposed re-evaluations: started, applied or dropped by organisers, and visible only to them.
+//! Trials, which never count, and proposed re-evaluations, which count once an organiser applies them. Only organisers see
+//! them.
 
 use super::stored_dataset::StoredDataset;
 use crate::paging::{Page, PageQuery, Paged};
@@ -50,7 +51,8 @@ pub(crate) async fn proposal(
     proposal::find(&app, id).await.map(Json)
 }
 
-/// Starts a trial: evaluates all active submissions, or one submission, by the stage's rules on episodes of its own.
+/// Starts a trial: evaluates all active submissions, or one submission, by the stage's rules on episodes that no evaluation
+/// day uses.
 ///
 /// It never counts, and its jobs run behind all jobs that count.
 #[utoipa::path(
@@ -80,8 +82,8 @@ pub(crate) async fn start_trial(
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Proposes a re-evaluation: repeats one evaluation, a whole day, or a day by the stage's newest rules. Nothing changes
-/// until it is applied.
+/// Proposes a re-evaluation: repeats one evaluation, a whole day, or a day by the stage's newest rules. Boards do not change
+/// until the proposal is applied.
 #[utoipa::path(
     post, path = "/stages/{id}/proposals", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)), request_body = NewProposal,
@@ -96,11 +98,11 @@ pub(crate) async fn propose(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
-    Body(wanted): Body<NewProposal>,
+    Body(request): Body<NewProposal>,
 ) -> Result<(StatusCode, Json<ProposalView>), Problem> {
-    let reason = checked_reason(&wanted.reason)?;
+    let reason = checked_reason(&request.reason)?;
     let stage_day = |date| StageDay { stage: id, date };
-    let reevaluation = match (wanted.evaluation, wanted.day, wanted.new_rules) {
+    let reevaluation = match (request.evaluation, request.day, request.new_rules) {
         (Some(evaluation), None, false) => {
             if app.store.evaluation(evaluation).await?.stage_day.stage != id {
                 return Err(Problem::not_found("evaluation in this stage"));
@@ -149,7 +151,7 @@ pub(crate) async fn apply_proposal(
     if let (Some(day), ProposalStateView::Played, Some(outcome)) =
         (view.day, view.state, &view.outcome)
     {
-        let ranks = outcome
+        let rank_changes = outcome
             .changes
             .iter()
             .filter(|change| change.old.map(|old| old.rank) != change.new.map(|new| new.rank));
@@ -158,7 +160,7 @@ pub(crate) async fn apply_proposal(
              rank; the reason {:?} would be public",
             view.evaluations.len(),
             outcome.changes.len(),
-            ranks.count(),
+            rank_changes.count(),
             view.reason
         );
         Problem::check_confirmed(confirm.as_deref(), &day.to_string(), &effect)?;
@@ -200,11 +202,11 @@ pub(crate) async fn drop_proposal(
     proposal::find(&app, id).await.map(Json)
 }
 
-/// The dataset of an evaluation of a trial or a proposal that is not applied. `None` for other evaluations, and unless
-/// the viewer is an organiser.
+/// The dataset of an evaluation of a trial or of a proposal that is not applied. `None` for other evaluations, and for
+/// viewers other than organisers.
 ///
 /// # Errors
-/// `Gone` once it is dropped; `Conflict` if it has no dataset.
+/// `Gone` if the proposal was dropped; `Conflict` if the evaluation has no dataset.
 pub(super) async fn dataset(
     viewer: Viewer,
     app: &App,
@@ -213,19 +215,19 @@ pub(super) async fn dataset(
     if viewer != Viewer::Organiser {
         return Ok(None);
     }
-    let (proposal, draft) = match app.store.proposed_evaluation(id).await {
+    let (proposal, evaluation) = match app.store.proposed_evaluation(id).await {
         Ok(found) => found,
         Err(StoreError::NotFound(_)) => return Ok(None),
         Err(error) => return Err(error.into()),
     };
     match proposal.outcome {
-        // It is an ordinary evaluation now.
+        // An evaluation of an applied proposal is an ordinary one.
         Some(ProposalOutcome::Applied(_)) => return Ok(None),
-        Some(ProposalOutcome::Dropped(at)) => {
+        Some(ProposalOutcome::Dropped(dropped_at)) => {
             return Err(Problem::new(
                 ProblemKind::Gone,
                 format!(
-                    "the proposal {} was dropped at {at}, and its datasets removed; GET /api/v1/proposals/{} still returns its \
+                    "the proposal {} was dropped at {dropped_at}, and its datasets removed; GET /api/v1/proposals/{} still returns its \
                      results",
                     proposal.id, proposal.id
                 ),
@@ -233,7 +235,7 @@ pub(super) async fn dataset(
         }
         None => {}
     }
-    let why_not = match draft.state {
+    let no_dataset_reason = match evaluation.state {
         EvaluationState::Finished {
             dataset,
             dataset_blake3,
@@ -247,7 +249,7 @@ pub(super) async fn dataset(
                 }
             };
             return Ok(Some(StoredDataset {
-                team: draft.team,
+                team: evaluation.team,
                 day,
                 dataset,
                 blake3: dataset_blake3,
@@ -268,7 +270,7 @@ pub(super) async fn dataset(
     Err(Problem::new(
         ProblemKind::Conflict,
         format!(
-            "the evaluation {id} of GET /api/v1/proposals/{} {why_not}",
+            "the evaluation {id} of GET /api/v1/proposals/{} {no_dataset_reason}",
             proposal.id
         ),
     ))

@@ -1,4 +1,4 @@
-//! Ratings and head-to-head records of a tournament.
+//! Ratings of a tournament's submissions, which estimate their strength, and head-to-head records of its teams.
 
 use axum::{Json, extract::State};
 use faceoff_scoring::tournament::{HeadToHead, rating::Ratings};

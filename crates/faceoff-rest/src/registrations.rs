@@ -1,4 +1,4 @@
-//! Registrations of teams.
+//! Registrations: requests of new teams to take part, which organisers approve or refuse.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};

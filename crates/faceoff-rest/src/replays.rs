@@ -1,4 +1,5 @@
-//! Replays of a tournament's schedule, to estimate how certain its champion is.
+//! Replays of a tournament's schedule: all its games are played again with other seeds. How often each team then becomes
+//! champion shows how certain the champion is.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{requests::NewReplays, views::champion_shares::ChampionSharesView};

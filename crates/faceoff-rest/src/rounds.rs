@@ -1,4 +1,4 @@
-//! Rounds of a tournament.
+//! Rounds of a tournament: starting the next one.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::views::tournament::RoundView;

@@ -1,5 +1,5 @@
-//! Organisers' decisions about results, teams and the queue. Each takes effect at once and has a public reason. One that
-//! cannot be undone needs a confirmation with the name of the affected resource.
+//! Rulings: organisers' decisions about results, teams and the queue. Each takes effect at once and has a public reason. A
+//! ruling that cannot be undone needs a confirmation with the name of the affected resource.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
@@ -52,10 +52,10 @@ pub(crate) async fn void_evaluation(
 pub(crate) async fn void_day(
     organiser: Organiser,
     State(app): State<App>,
-    day: PathParams<String, 2>,
+    path: PathParams<String, 2>,
     Body(decision): Body<Decision>,
 ) -> Result<Json<DayView>, Problem> {
-    let PathParams([stage, day]) = day;
+    let PathParams([stage, day]) = path;
     let stage_day: StageDay = format!("{stage}/{day}")
         .parse()
         .map_err(|_| Problem::not_found("day"))?;
@@ -63,11 +63,11 @@ pub(crate) async fn void_day(
     voided.await.map(Json)
 }
 
-/// Pauses the queue: no job starts, running ones continue. Evaluation days still start, and wait. `GET /season` shows
-/// the pause.
+/// Pauses the queue: no job starts, running jobs continue. Evaluation days still start, but their jobs wait. `GET /season`
+/// shows the pause.
 #[utoipa::path(
     post, path = "/queue/pause", tag = "organiser", security(("organiser" = [])), request_body = Reason,
-            responses((status = 204), (status = 409, description = "the queue is already paused"), (status = 422))
+    responses((status = 204), (status = 409, description = "the queue is already paused"), (status = 422))
 )]
 pub(crate) async fn pause_queue(
     organiser: Organiser,
@@ -81,7 +81,7 @@ pub(crate) async fn pause_queue(
 /// Resumes a paused queue.
 #[utoipa::path(
     post, path = "/queue/resume", tag = "organiser", security(("organiser" = [])),
-    responses((status = 204),         (status = 409, description = "the queue is not paused"))
+    responses((status = 204), (status = 409, description = "the queue is not paused"))
 )]
 pub(crate) async fn resume_queue(
     organiser: Organiser,

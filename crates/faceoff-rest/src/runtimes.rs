@@ -1,4 +1,4 @@
-//! Runtimes and resource limits of agents.
+//! Runtimes, the environments in which agents run, and the resource limits of agents.
 
 use axum::{Json, extract::State};
 use faceoff_api::views::runtimes::RuntimesView;

@@ -1,4 +1,5 @@
-//! The season.
+//! The season: its public data, its settings, and its end. A commitment (hash) to the season's secret is public from the
+//! start; all seeds follow from the secret, which becomes public when the season closes.
 
 use axum::{Json, extract::State};
 use faceoff_api::{

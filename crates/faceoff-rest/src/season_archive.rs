@@ -1,4 +1,4 @@
-//! Download of the season archive.
+//! Download of the season archive, a file with the data of the whole season.
 
 use super::document::Binary;
 use crate::archive::{self, archive_busy};

@@ -1,4 +1,5 @@
-//! After a stage has closed: its final day, and the sign-off of its result.
+//! What organisers do after a stage has closed: they start its final evaluation day, and sign off its result, which makes
+//! the result final.
 
 use axum::{Json, extract::State};
 use faceoff_api::{
@@ -14,7 +15,7 @@ use faceoff_service::{
 };
 use faceoff_types::StageId;
 
-/// Starts a stage's final day: each team's active submission is evaluated on episodes of its own.
+/// Starts a stage's final day: each team's active submission is evaluated on episodes that no other day uses.
 ///
 /// Possible once, after the stage has closed, and only if its standings are `final`.
 #[utoipa::path(
@@ -53,6 +54,6 @@ pub(crate) async fn finalise_stage(
     PathParam(id): PathParam<StageId>,
     OptionalJson(Confirmation { confirm }): OptionalJson<Confirmation>,
 ) -> Result<Json<StageView>, Problem> {
-    let signed = stage_results::finalise_stage(&app, organiser.actor(), id, confirm.as_deref());
-    signed.await.map(Json)
+    let signed_off = stage_results::finalise_stage(&app, organiser.actor(), id, confirm.as_deref());
+    signed_off.await.map(Json)
 }

@@ -12,15 +12,15 @@ use std::{convert::Infallible, time::Duration};
 
 /// Request header of a client that reconnects: id of the last received event.
 pub(super) const LAST_EVENT_ID: &str = "last-event-id";
-/// Proxies close connections that are silent for a minute.
-const KEEP_ALIVE: Duration = Duration::from_secs(15);
+/// Time between two messages that keep a silent connection open. Proxies close connections that are silent for a minute.
+const KEEP_ALIVE_INTERVAL: Duration = Duration::from_secs(15);
 
-/// A streaming response that ends with the batches.
+/// A streaming response with the events of all batches. It ends when `batches` ends.
 pub(super) fn sse_response(
     batches: impl Stream<Item = Vec<Event>> + Send + 'static,
 ) -> impl IntoResponse {
     let events = batches.flat_map(stream::iter).map(Ok::<_, Infallible>);
-    let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
+    let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE_INTERVAL));
     // Keeps proxies from buffering the stream.
     let unbuffered = [(HeaderName::from_static("x-accel-buffering"), "no")];
     (AppendHeaders(unbuffered), events)

@@ -1,4 +1,5 @@
-//! Stages of the season.
+//! Stages, the periods of a season with rules and boards of their own: listing, creating and changing them. When the rules
+//! of an open stage change, a new *revision* begins.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{

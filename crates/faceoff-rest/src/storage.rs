@@ -37,10 +37,10 @@ pub(crate) async fn team_storage(
 ) -> Result<Json<StorageView>, Problem> {
     let team = app.store.team(id).await;
     caller.visible("team", team, |team| team.id)?;
-    let counted = if caller.is_organiser() {
+    let scope = if caller.is_organiser() {
         StorageScope::All
     } else {
         StorageScope::Released
     };
-    storage::find(&app, id, counted).await.map(Json)
+    storage::find(&app, id, scope).await.map(Json)
 }

@@ -1,3 +1,5 @@
+//! Where the dataset of an evaluation, which is its recording, is stored.
+
 use faceoff_types::TeamId;
 use jiff::civil::Date;
 

@@ -108,7 +108,7 @@ pub(crate) async fn change_team(
     changed.await.map(Json)
 }
 
-/// Retires a team on its own wish: it can neither upload nor be evaluated; its results stay.
+/// Retires a team at its own request: it can neither upload nor be evaluated; its results stay.
 #[utoipa::path(
     post, path = "/teams/{id}/retire", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TeamId, Path)), request_body = Confirmation,

@@ -1,4 +1,4 @@
-//! Terms of participation.
+//! Terms of participation: publishing and accepting them.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{

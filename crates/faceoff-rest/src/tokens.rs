@@ -1,4 +1,4 @@
-//! API tokens.
+//! API tokens, and the sessions of browsers, which are tokens in a cookie.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State, http::StatusCode};

@@ -66,7 +66,7 @@ pub(crate) async fn open_tournament(
     State(app): State<App>,
     Body(new): Body<NewTournament>,
 ) -> Result<impl IntoResponse, Problem> {
-    let name = name(&new.name)?;
+    let name = parse_name(&new.name)?;
     let rules = changed_rules(&app, &TournamentRules::default(), new.rules).await?;
     let settings = changed_settings(&TournamentSettings::default(), new.settings)?;
     let stage = match (&new.stage, &new.teams) {
@@ -127,7 +127,7 @@ pub(crate) async fn change_tournament(
         None => None,
     };
     let tournament_change = faceoff_store::TournamentChange {
-        name: change.name.as_deref().map(name).transpose()?,
+        name: change.name.as_deref().map(parse_name).transpose()?,
         rules,
         settings,
         baseline: change.baseline,
@@ -223,7 +223,8 @@ pub(crate) async fn close_tournament(
     tournament::find(&app, id).await.map(Json)
 }
 
-fn name(text: &str) -> Result<StageName, Problem> {
+/// Parses a tournament's name. The rules for names are those of stages.
+fn parse_name(text: &str) -> Result<StageName, Problem> {
     text.parse()
         .map_err(|error| Problem::invalid("name", error))
 }
@@ -236,15 +237,15 @@ async fn find_stage(app: &App, text: &str) -> Result<Stage, Problem> {
     let stages = app.store.stages().await?;
     let names: Vec<String> = stages.iter().map(|stage| stage.name.to_string()).collect();
     let name = text.to_lowercase();
-    let mut found = stages.into_iter();
-    let found = found.find(|stage| stage.name.as_str().to_lowercase() == name);
+    let mut stages = stages.into_iter();
+    let found = stages.find(|stage| stage.name.as_str().to_lowercase() == name);
     found.ok_or_else(|| {
         let detail = format!("expected one of {}, got {text:?}", names.join(", "));
         Problem::invalid("stage", detail)
     })
 }
 
-/// `current` with the fields of a JSON merge patch.
+/// `current`, changed by the fields of a JSON merge patch (RFC 7396). `name` is the field of the request, for errors.
 fn apply_patch<T: Serialize + DeserializeOwned>(
     name: &str,
     current: &T,

@@ -1,4 +1,4 @@
-//! Uploading submissions.
+//! Uploading submissions. The uploaded file is the *bundle*: an archive with the agent, or a container image.
 
 use super::document::Binary;
 use axum::{
@@ -28,7 +28,7 @@ pub(crate) struct UploadQuery {
     file_name: Option<String>,
 }
 
-/// Alternative to the query parameter, for clients that cannot set a query.
+/// Header with the bundle's file name, for clients that cannot set a query.
 const FILE_NAME: HeaderName = HeaderName::from_static("x-file-name");
 
 /// Accepted media types of bundles; the header may also be left out.
@@ -87,9 +87,9 @@ pub(crate) async fn create_submission(
         .file_name
         .or_else(|| Some(headers.get(FILE_NAME)?.to_str().ok()?.to_owned()))
         .unwrap_or_default();
-    let announced = headers.get(header::CONTENT_LENGTH);
+    let content_length = headers.get(header::CONTENT_LENGTH);
     let incoming = IncomingBundle {
-        bytes: announced.and_then(|value| value.to_str().ok()?.parse().ok()),
+        bytes: content_length.and_then(|value| value.to_str().ok()?.parse().ok()),
         claimed_name,
         body,
     };

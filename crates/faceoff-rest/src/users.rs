@@ -80,11 +80,11 @@ pub(crate) async fn set_password(
         ));
     }
     let now = app.config.clock.now();
-    let known = app.store.password_hash_of(user.name.as_str()).await?;
-    if known.is_some() {
-        let old = new.old.unwrap_or_default();
-        let matches = app.passwords.verify(known, old, now).await?;
-        if matches != Some(id) {
+    let stored_hash = app.store.password_hash_of(user.name.as_str()).await?;
+    if stored_hash.is_some() {
+        let old_password = new.old.unwrap_or_default();
+        let verified_user = app.passwords.verify(stored_hash, old_password, now).await?;
+        if verified_user != Some(id) {
             return Err(Problem::new(
                 ProblemKind::Forbidden,
                 "old: expected the current password, got another one; nothing was changed",

@@ -1,4 +1,5 @@
-//! Webhooks: addresses of a team, or of the organisers, to which events are delivered.
+//! Webhooks: URLs of a team, or of the organisers, to which the server delivers events. A webhook is *dead* once its
+//! deliveries have failed for too long.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
@@ -18,9 +19,9 @@ use faceoff_store::{NewWebhook, Principal, StoreError, Webhook, WebhookChange};
 use faceoff_types::WebhookId;
 use serde_json::json;
 
-/// Longest name of a webhook.
-const NAME_CHARS: usize = 80;
-/// Deliveries in a list.
+/// Longest name of a webhook, in characters.
+const MAX_NAME_CHARS: usize = 80;
+/// Deliveries that a list shows at most.
 const MAX_DELIVERIES: u32 = 200;
 
 /// Whether the caller may see a webhook: organisers all, others their team's.
@@ -36,7 +37,7 @@ async fn find(app: &App, caller: &Caller, id: WebhookId) -> Result<Webhook, Prob
     }
 }
 
-/// A leaked team token must not create webhooks that outlive it.
+/// Refuses a team's token: if it leaked, webhooks created with it would outlive it.
 fn check_not_team_token(caller: &Caller) -> Result<(), Problem> {
     match caller.principal {
         Principal::Host | Principal::Organiser(_) | Principal::Member(..) => Ok(()),
@@ -60,9 +61,10 @@ fn checked_url(app: &App, url: &str) -> Result<String, Problem> {
         .map_err(|detail| Problem::invalid("url", detail))
 }
 
-fn checked_about(about: &[String]) -> Result<Vec<String>, Problem> {
-    let about = NoticeFilter::parse(about).map_err(|error| Problem::invalid("about", error))?;
-    Ok(about.to_words())
+/// Checks the filter of a webhook, and returns its words in their normal form.
+fn checked_filter(about: &[String]) -> Result<Vec<String>, Problem> {
+    let filter = NoticeFilter::parse(about).map_err(|error| Problem::invalid("about", error))?;
+    Ok(filter.to_words())
 }
 
 /// Lists the webhooks of the caller's team, oldest first; organisers see all.
@@ -104,9 +106,9 @@ pub(crate) async fn create_webhook(
     let secret = WebhookSecret::generate().map_err(Problem::internal)?;
     let new = NewWebhook {
         team: caller.team().map(|team| team.id),
-        name: text::single_line("name", &new.name, NAME_CHARS)?,
+        name: text::single_line("name", &new.name, MAX_NAME_CHARS)?,
         url: checked_url(&app, &new.url)?,
-        about: checked_about(&new.about)?,
+        about: checked_filter(&new.about)?,
         secret: secret.bytes(),
     };
     let now = app.config.clock.now();
@@ -154,7 +156,7 @@ pub(crate) async fn change_webhook(
     let before = find_changeable(&app, &caller, id).await?;
     let name = changes.name.as_deref();
     let url = changes.url.as_deref();
-    // Only the team may redirect its webhook: its receiver trusts the secret.
+    // Only the team may change the URL of its webhook: another receiver would get messages signed with the team's secret.
     if url.is_some() && before.team != caller.team().map(|team| team.id) {
         return Err(Problem::new(
             ProblemKind::Forbidden,
@@ -164,10 +166,10 @@ pub(crate) async fn change_webhook(
     }
     let change = WebhookChange {
         name: name
-            .map(|name| text::single_line("name", name, NAME_CHARS))
+            .map(|name| text::single_line("name", name, MAX_NAME_CHARS))
             .transpose()?,
         url: url.map(|url| checked_url(&app, url)).transpose()?,
-        about: changes.about.as_deref().map(checked_about).transpose()?,
+        about: changes.about.as_deref().map(checked_filter).transpose()?,
         enable: changes.state.is_some(),
     };
     let now = app.config.clock.now();

@@ -1,4 +1,4 @@
-//! Remote workers.
+//! Remote workers, which are processes on other machines that run jobs: listing, banning and readmitting them.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{requests::Reason, views::workers::WorkersView};

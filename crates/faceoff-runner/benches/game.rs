@@ -53,9 +53,9 @@ fn main() {
     });
     let agent = InstantAgent::new();
     let isolation = Isolation::Sandboxed {
-        given_up: Vec::new(),
+        disabled_layers: Vec::new(),
     };
-    let cpus = affinity::allowed().unwrap();
+    let cpus = affinity::allowed_cpus().unwrap();
     let env = environment(isolation);
     // Separate CPUs for both agents and this thread, if there are three.
     let env_of = |agent: usize| AgentEnvironment {

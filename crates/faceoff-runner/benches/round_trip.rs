@@ -29,6 +29,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+/// An arbitrary step number of two digits.
+const STEP: u32 = 17;
+
+/// An observation of arbitrary numbers with all digits.
 fn observation() -> Vec<f64> {
     (0..23)
         .map(|i| (f64::from(i) * 0.7).sin() * 1.234_567)
@@ -49,14 +53,14 @@ fn main() {
                 .configure_from_args()
                 .measurement_time(Duration::from_secs(5))
                 .warm_up_time(Duration::from_secs(1));
-            round_trips(&mut criterion);
-            let cpus = affinity::allowed().unwrap();
-            medians("one CPU", cpus[0], cpus[0]);
-            if let [here, there, ..] = cpus[..] {
-                medians("a CPU each", here, there);
+            bench_round_trips(&mut criterion);
+            let cpus = affinity::allowed_cpus().unwrap();
+            print_medians("one CPU", cpus[0], cpus[0]);
+            if let [evaluator_cpu, agent_cpu, ..] = cpus[..] {
+                print_medians("separate CPUs", evaluator_cpu, agent_cpu);
             }
             affinity::pin_current_thread(&cpus).unwrap();
-            steps(&mut criterion);
+            bench_control_steps(&mut criterion);
             criterion.final_summary();
         }
     }
@@ -80,10 +84,10 @@ fn echo() {
     }
 }
 
-fn round_trips(criterion: &mut Criterion) {
+fn bench_round_trips(criterion: &mut Criterion) {
     let observation = observation();
     let mut question = Vec::new();
-    Message::step(17, &observation).write_line(&mut question);
+    Message::step(STEP, &observation).write_line(&mut question);
     let mut group = criterion.benchmark_group("round trip");
     {
         let mut bare = BarePipe::new(&question);
@@ -96,13 +100,13 @@ fn round_trips(criterion: &mut Criterion) {
         (
             "protocol, sandboxed",
             environment(Isolation::Sandboxed {
-                given_up: Vec::new(),
+                disabled_layers: Vec::new(),
             }),
         ),
         ("protocol, no sandbox", environment(Isolation::None)),
     ] {
         let mut session = Session::start(&agent.bundle, &env, Task::Hit.into())
-            .map_err(|(trouble, _)| trouble)
+            .map_err(|(error, _)| error)
             .unwrap();
         session.reset(0).unwrap();
         let mut step = 0;
@@ -122,33 +126,33 @@ fn round_trips(criterion: &mut Criterion) {
         charged.sort_by(f64::total_cmp);
         println!(
             "{name}: charged computation time p50 {:.1} us, p99 {:.1} us, max {:.1} us",
-            1e6 * charged[2500],
-            1e6 * charged[4950],
-            1e6 * charged[4999]
+            1e6 * charged[charged.len() / 2],
+            1e6 * charged[charged.len() * 99 / 100],
+            1e6 * charged[charged.len() - 1]
         );
         session.finish().unwrap();
     }
     group.finish();
 }
 
-/// Alternates both kinds of round trip, so that other load affects both in the same way. Both use the same CPUs,
-/// because waking another CPU costs more than all the rest.
-fn medians(placement: &str, here: usize, there: usize) {
+/// Prints the median of both kinds of round trip. They alternate, so that other load affects both in the same way. Both use
+/// the same CPUs, because waking another CPU costs more than all the rest.
+fn print_medians(placement: &str, evaluator_cpu: usize, agent_cpu: usize) {
     const ROUNDS: usize = 200;
     const PER_ROUND: usize = 100;
     let observation = observation();
     let mut question = Vec::new();
-    Message::step(17, &observation).write_line(&mut question);
-    pin(there);
+    Message::step(STEP, &observation).write_line(&mut question);
+    pin(agent_cpu);
     let mut bare = BarePipe::new(&question);
-    pin(here);
+    pin(evaluator_cpu);
     let agent = InstantAgent::new();
     let mut env = environment(Isolation::Sandboxed {
-        given_up: Vec::new(),
+        disabled_layers: Vec::new(),
     });
-    env.agent_cpus = vec![there];
+    env.agent_cpus = vec![agent_cpu];
     let mut session = Session::start(&agent.bundle, &env, Task::Hit.into())
-        .map_err(|(trouble, _)| trouble)
+        .map_err(|(error, _)| error)
         .unwrap();
     session.reset(0).unwrap();
     let (mut bare_s, mut protocol_s) = (Vec::new(), Vec::new());
@@ -192,7 +196,8 @@ struct BarePipe {
 
 impl BarePipe {
     fn new(question: &[u8]) -> Self {
-        let answer_len = format!("{{\"type\":\"act\",\"step\":17,\"action\":{ACTION}}}\n").len();
+        let answer_len =
+            format!("{{\"type\":\"act\",\"step\":{STEP},\"action\":{ACTION}}}\n").len();
         println!(
             "question {} bytes, answer {answer_len} bytes",
             question.len()
@@ -229,7 +234,8 @@ impl Drop for BarePipe {
     }
 }
 
-fn steps(criterion: &mut Criterion) {
+/// Measures a control step of the simulator alone, and a shard without and with recording.
+fn bench_control_steps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("control step");
     group.sample_size(20);
     let seed = Seed::from_number(1);
@@ -257,7 +263,7 @@ fn steps(criterion: &mut Criterion) {
     // warm-up.
     let agent = InstantAgent::new();
     let env = environment(Isolation::Sandboxed {
-        given_up: Vec::new(),
+        disabled_layers: Vec::new(),
     });
     let out = tempfile::tempdir().unwrap();
     let spec = ShardSpec {
@@ -306,12 +312,12 @@ fn cpu_time_s() -> f64 {
 
 /// Runs a shard without recording; returns the number of steps.
 fn play_unrecorded(agent: &InstantAgent, env: &AgentEnvironment, spec: &ShardSpec) -> u32 {
-    let mut nowhere = NullSink;
+    let mut sink = NullSink;
     let report = play_shard(
         spec,
         &agent.bundle,
         env,
-        &mut nowhere,
+        &mut sink,
         &mut NullObserver,
         &KernelCounters,
     );

@@ -1,5 +1,5 @@
-//! Time budgets over many answers (RULES, "Real time is the rule"): with only a limit per answer, an agent could
-//! occupy a slot for days.
+//! Time budgets over many answers (`docs/rules.md`, "Real time is the rule"). With only a limit per answer, an agent could occupy a
+//! worker's slot for days.
 
 use faceoff_sim::model::CONTROL_STEP_S;
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};

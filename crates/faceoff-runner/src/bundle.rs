@@ -1,4 +1,5 @@
-//! A team's bundle: unpacks an archive without trusting any byte of it, or opens a developer's folder in place.
+//! A *bundle*: an agent's program with its manifest `agent.toml`, as a team submits it. It is an archive, whose bytes are not trusted, a
+//! container image, or a developer's folder, which is opened in place.
 
 mod budget;
 mod entry;
@@ -30,6 +31,7 @@ use tree::Tree;
 /// Name of the manifest: a folder that contains it is a bundle.
 const MANIFEST_NAME: &str = "agent.toml";
 
+/// An unpacked bundle.
 #[derive(Debug, Clone)]
 pub struct Bundle {
     /// The folder that contains `agent.toml`.
@@ -40,7 +42,7 @@ pub struct Bundle {
     pub image: Option<Image>,
 }
 
-/// Unpacks an archive into the folder `into`, which is created and must be empty.
+/// Unpacks an archive into the folder `target_dir`, which is created and must be empty.
 ///
 /// The first bytes determine the format: `.tar.gz`, `.tar.zst` or `.zip`. A tar, plain or compressed, without
 /// `agent.toml` may be a container image, as written by `docker save` or in an OCI layout. It becomes the image's root.
@@ -52,10 +54,10 @@ pub struct Bundle {
 /// They count everything that an archive consists of: headers, long names, padding, directories and successive streams
 /// as well as the files. For an image they apply to its layers as packed and, separately, to the content of the
 /// layers. Layers take at most twice [`BundleLimits::unpacked_bytes`] of the disk. `cancelled` is called for every
-/// piece.
+/// piece that is read; if it returns `true`, the unpacking stops.
 ///
 /// The directory of a `.zip` is checked before anything is written: numbers, names, kinds and stated sizes. Folders are
-/// created when something is put into them, or at the end. After an error `into` contains a part of the archive, which
+/// created when something is put into them, or at the end. After an error `target_dir` contains a part of the archive, which
 /// the caller removes.
 ///
 /// # Errors
@@ -66,26 +68,26 @@ pub struct Bundle {
 /// [`BundleError::Cancelled`] if `cancelled` returned `true`.
 pub fn unpack(
     archive: &Path,
-    into: &Path,
+    target_dir: &Path,
     limits: &BundleLimits,
     cancelled: &dyn Fn() -> bool,
 ) -> Result<Bundle, BundleError> {
     let now = Instant::now;
     let budget = Budget::new(limits, &now, cancelled);
-    budget.own_failure_or(unpack_within(archive, into, &budget))
+    budget.prefer_own_failure(unpack_within(archive, target_dir, &budget))
 }
 
 fn unpack_within<'a>(
     archive: &Path,
-    into: &Path,
+    target_dir: &Path,
     budget: &'a Budget<'a>,
 ) -> Result<Bundle, BundleError> {
     let limits = budget.limits();
     let mut file = File::open(archive)?;
-    let packed = file.metadata()?.len();
-    if packed > limits.packed_bytes {
+    let packed_bytes = file.metadata()?.len();
+    if packed_bytes > limits.packed_bytes {
         return Err(BundleError::Invalid(format!(
-            "the archive has {packed} bytes; at most {} are allowed",
+            "the archive has {packed_bytes} bytes; at most {} are allowed",
             limits.packed_bytes
         )));
     }
@@ -95,7 +97,7 @@ fn unpack_within<'a>(
         .read_to_end(&mut head)?;
     file.seek(SeekFrom::Start(0))?;
 
-    let mut tree = Tree::new(into, budget)?;
+    let mut tree = Tree::new(target_dir, budget)?;
     if head.starts_with(&[0xff, 0xfe]) {
         return Err(BundleError::Invalid(
             "the bundle is text in UTF-16, as PowerShell's `>` writes it: have the program write the file itself \
@@ -103,15 +105,15 @@ fn unpack_within<'a>(
                 .to_owned(),
         ));
     }
-    let read = read_into(
+    let read = read_archive(
         &mut tree,
         file,
-        packed,
+        packed_bytes,
         ArchiveFormat::detect(&head),
         budget,
     );
     let format = budget
-        .own_failure_or(read)
+        .prefer_own_failure(read)
         .map_err(|error| tree.explain_refusal(error))?;
     match (tree.bundle_root(MANIFEST_NAME), format) {
         (Some(_), ArchiveFormat::Tar) => Err(BundleError::Invalid(
@@ -120,7 +122,7 @@ fn unpack_within<'a>(
         )),
         (Some(root), _) => {
             tree.finish(&root)?;
-            open_dir(&into.join(root))
+            open_dir(&target_dir.join(root))
         }
         (None, ArchiveFormat::Zip) => Err(tree.explain_refusal(no_manifest())),
         (None, _) => {
@@ -136,17 +138,20 @@ fn unpack_within<'a>(
     }
 }
 
-/// Reads the archive `file` of `packed` bytes into `tree`.
-fn read_into<'a>(
+/// Reads the archive `file`, which has `packed_bytes`, into `tree`.
+fn read_archive<'a>(
     tree: &mut Tree<'a>,
     file: File,
-    packed: u64,
+    packed_bytes: u64,
     format: Option<ArchiveFormat>,
     budget: &'a Budget<'a>,
 ) -> Result<ArchiveFormat, BundleError> {
-    let buffered = 64 << 10;
-    let watched = |file: File| {
-        BufReader::with_capacity(buffered, CancellableReader::new(file.into_file(), budget))
+    const BUFFER_BYTES: usize = 64 << 10;
+    let cancellable = |file: File| {
+        BufReader::with_capacity(
+            BUFFER_BYTES,
+            CancellableReader::new(file.into_file(), budget),
+        )
     };
     let format = format.ok_or_else(|| {
         BundleError::Invalid(
@@ -158,19 +163,21 @@ fn read_into<'a>(
     match format {
         ArchiveFormat::TarGz => {
             let streams: MultiStreamReader<'_, _, flate2::bufread::GzDecoder<_>> =
-                MultiStreamReader::new(watched(file), budget).map_err(BundleError::on_read(""))?;
+                MultiStreamReader::new(cancellable(file), budget)
+                    .map_err(BundleError::from_read_error(""))?;
             tar_archive::unpack(streams, tree, budget)?;
         }
         ArchiveFormat::TarZst => {
             let streams: MultiStreamReader<'_, _, zstd::Decoder<'static, _>> =
-                MultiStreamReader::new(watched(file), budget).map_err(BundleError::on_read(""))?;
+                MultiStreamReader::new(cancellable(file), budget)
+                    .map_err(BundleError::from_read_error(""))?;
             tar_archive::unpack(streams, tree, budget)?;
         }
         ArchiveFormat::Zip => {
-            let file = BufReader::with_capacity(buffered, file.into_file());
-            zip_archive::unpack(file, packed, tree, budget)?;
+            let file = BufReader::with_capacity(BUFFER_BYTES, file.into_file());
+            zip_archive::unpack(file, packed_bytes, tree, budget)?;
         }
-        ArchiveFormat::Tar => tar_archive::unpack(watched(file), tree, budget)?,
+        ArchiveFormat::Tar => tar_archive::unpack(cancellable(file), tree, budget)?,
     }
     Ok(format)
 }

@@ -1,6 +1,6 @@
-//! The slot's noise floor: round trips to a calibration agent. It is a thread of the service on the agent's CPUs,
-//! which answers at once, with messages as long as those of a step. While the agent runs, it waits in a read and uses
-//! no CPU time.
+//! The *noise floor* of a worker's slot: the time of a round trip (question and answer) with an agent that computes nothing. This
+//! calibration agent is a thread of the service on the agent's CPUs, which answers at once, with messages as long as those of a step.
+//! While the real agent runs, the thread waits in a read and uses no CPU time.
 
 use crate::fault::PlatformFault;
 use faceoff_sandbox::affinity::pin_current_thread;
@@ -16,8 +16,8 @@ use std::{
 /// Round trips before the first episode.
 const ROUND_TRIPS_BEFORE: u32 = 200;
 /// Round trips after each episode.
-const ROUND_TRIPS_BETWEEN: u32 = 10;
-/// Length of an answer with two times seven numbers of full precision.
+const ROUND_TRIPS_BETWEEN_EPISODES: u32 = 10;
+/// Length of an answer with 2 × 7 numbers of full precision.
 const ANSWER_BYTES: usize = 320;
 
 /// The calibration agent; its thread ends on drop.
@@ -38,15 +38,15 @@ impl CalibrationAgent {
     /// When the host has no socket or thread left.
     pub fn start(agent_cpus: &[usize]) -> Result<Self, PlatformFault> {
         let failed = || PlatformFault::io("starting the calibration agent");
-        // Two pairs, as an agent has.
+        // Two socket pairs, for questions and answers, as an agent has.
         let (questions, to_agent) = UnixStream::pair().map_err(failed())?;
         let (from_agent, answers) = UnixStream::pair().map_err(failed())?;
         let mut question = Vec::new();
         Message::step(0, &[-std::f64::consts::FRAC_1_PI; 23]).write_line(&mut question);
-        let (cpus, length) = (agent_cpus.to_vec(), question.len());
+        let (cpus, question_bytes) = (agent_cpus.to_vec(), question.len());
         let agent = thread::Builder::new()
             .name("calibration".to_owned())
-            .spawn(move || answer(&cpus, length, questions, answers))
+            .spawn(move || answer(&cpus, question_bytes, questions, answers))
             .map_err(failed())?;
         Ok(Self {
             question,
@@ -66,15 +66,15 @@ impl CalibrationAgent {
             return Ok(());
         };
         for _ in 0..count {
-            // As for an agent: from the first attempt to write to the last byte read.
-            let asked = Instant::now();
+            // Measured as for an agent: from the first attempt to write to the last byte read.
+            let asked_at = Instant::now();
             to_agent
                 .write_all(&self.question)
                 .map_err(PlatformFault::io("writing to the calibration agent"))?;
             self.from_agent
                 .read_exact(&mut self.answer)
                 .map_err(PlatformFault::io("reading from the calibration agent"))?;
-            times_s.push(asked.elapsed().as_secs_f64());
+            times_s.push(asked_at.elapsed().as_secs_f64());
         }
         Ok(())
     }
@@ -95,8 +95,8 @@ impl Drop for CalibrationAgent {
 #[derive(Debug)]
 pub(crate) struct Calibration {
     agent: CalibrationAgent,
-    before_s: Vec<f64>,
-    during_s: Vec<f64>,
+    times_before_s: Vec<f64>,
+    times_between_s: Vec<f64>,
 }
 
 impl Calibration {
@@ -107,14 +107,15 @@ impl Calibration {
         agent.measure(ROUND_TRIPS_BEFORE, &mut before_s)?;
         Ok(Self {
             agent,
-            before_s,
-            during_s: Vec::new(),
+            times_before_s: before_s,
+            times_between_s: Vec::new(),
         })
     }
 
-    /// Measures between two of them.
-    pub fn between_episodes(&mut self) -> Result<(), PlatformFault> {
-        self.agent.measure(ROUND_TRIPS_BETWEEN, &mut self.during_s)
+    /// Measures between two episodes or rallies.
+    pub fn measure_between_episodes(&mut self) -> Result<(), PlatformFault> {
+        self.agent
+            .measure(ROUND_TRIPS_BETWEEN_EPISODES, &mut self.times_between_s)
     }
 
     pub fn finish(
@@ -124,8 +125,8 @@ impl Calibration {
         platform_retries: u32,
     ) -> SlotTiming {
         SlotTiming {
-            before_s: summarise(&mut self.before_s),
-            during_s: summarise(&mut self.during_s),
+            before_s: summarise(&mut self.times_before_s),
+            during_s: summarise(&mut self.times_between_s),
             longest_stall_s,
             host_noise_reruns,
             platform_retries,
@@ -134,11 +135,16 @@ impl Calibration {
 }
 
 /// Answers until the question channel is closed.
-fn answer(cpus: &[usize], length: usize, mut questions: UnixStream, mut answers: UnixStream) {
+fn answer(
+    cpus: &[usize],
+    question_bytes: usize,
+    mut questions: UnixStream,
+    mut answers: UnixStream,
+) {
     if let Err(error) = pin_current_thread(cpus) {
         tracing::warn!(%error, "the calibration agent cannot be pinned to the agent's CPUs");
     }
-    let mut question = vec![0; length];
+    let mut question = vec![0; question_bytes];
     let answer = [b'0'; ANSWER_BYTES];
     while questions.read_exact(&mut question).is_ok() {
         if answers.write_all(&answer).is_err() {
@@ -169,14 +175,14 @@ mod tests {
     #[test]
     fn percentiles_are_nearest_ranks() {
         let mut hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
-        let trips = |count, p50, p99, max| RoundTrips {
+        let round_trips = |count, p50, p99, max| RoundTrips {
             count,
             p50,
             p99,
             max,
         };
-        assert_eq!(summarise(&mut hundred), trips(100, 50.0, 99.0, 100.0));
-        assert_eq!(summarise(&mut [0.5]), trips(1, 0.5, 0.5, 0.5));
+        assert_eq!(summarise(&mut hundred), round_trips(100, 50.0, 99.0, 100.0));
+        assert_eq!(summarise(&mut [0.5]), round_trips(1, 0.5, 0.5, 0.5));
         assert_eq!(summarise(&mut []), RoundTrips::default());
     }
 

@@ -1,13 +1,16 @@
+//! The settings under which agents run on this host: limits, isolation, runtimes and CPUs.
+
 use crate::supervisor::Supervision;
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_types::{IMAGE_RUNTIME, TimeLimits};
 use std::collections::BTreeMap;
 
-/// Environment of agents on this host.
+/// The environment of agents on this host.
 #[derive(Debug, Clone)]
 pub struct AgentEnvironment {
     /// Resource limits of an agent's process tree.
     pub limits: Limits,
+    /// Time limits of an agent's answers.
     pub time: TimeLimits,
     pub isolation: Isolation,
     /// The runtimes that `agent.toml` may name.
@@ -26,11 +29,14 @@ impl AgentEnvironment {
         self.isolation.enforces(Layer::CgroupCpu)
     }
 
-    /// May agents of these two run on the same CPU?
-    pub(crate) fn share_cpus([a, b]: [&Self; 2]) -> bool {
-        a.agent_cpus.is_empty()
-            || b.agent_cpus.is_empty()
-            || a.agent_cpus.iter().any(|cpu| b.agent_cpus.contains(cpu))
+    /// May agents of these two environments run on the same CPU?
+    pub(crate) fn share_cpus([first, second]: [&Self; 2]) -> bool {
+        first.agent_cpus.is_empty()
+            || second.agent_cpus.is_empty()
+            || first
+                .agent_cpus
+                .iter()
+                .any(|cpu| second.agent_cpus.contains(cpu))
     }
 
     /// Can agents be container images on this host? They need the sandbox's namespaces.

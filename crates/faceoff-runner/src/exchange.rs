@@ -1,5 +1,5 @@
-//! The agent's process and single exchanges with it: sends a line, waits for the answer until its limit, and
-//! classifies failures as agent fault or platform fault. The session interprets the lines.
+//! The agent's process and single exchanges with it: this module sends a question (a line of the protocol), waits for the answer until
+//! its limit, and classifies failures as agent fault or platform fault. [`Session`](crate::Session) interprets the lines.
 
 use crate::{
     bundle::Bundle,
@@ -28,6 +28,7 @@ use std::{
 /// interpreted agent.
 const SPIN_TIME: Duration = Duration::from_micros(100);
 
+/// A running agent, and its current exchange.
 #[derive(Debug)]
 pub(crate) struct Exchange<'w> {
     process: AgentProcess,
@@ -35,12 +36,13 @@ pub(crate) struct Exchange<'w> {
     monitor: &'w dyn InterferenceMonitor,
     /// The CPUs of the calling thread, if the agent may use none of them.
     evaluator_cpus: Option<Vec<usize>>,
-    /// The last answer took less than [`SPIN_TIME`].
+    /// Did the last answer take less than [`SPIN_TIME`]?
     is_quick: bool,
     /// The counters before a recent question.
     baseline: Option<Arc<Baseline>>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
+    /// CPU time of the agent at its questions and answers.
     cpu: CpuUsage,
     /// Time to exit after the agent has closed its output, so that its exit status can be reported.
     exit_grace: Duration,
@@ -74,7 +76,7 @@ impl Answer {
 }
 
 impl PendingQuestion {
-    /// Adds time in which the evaluator could not check for the answer, because it handled another agent.
+    /// Adds time in which the evaluator could not check for the answer, because it was busy with the other agent of a game.
     pub fn add_absence(&mut self, absence: Duration) {
         self.wait.add_absence(absence);
     }
@@ -109,7 +111,7 @@ impl<'w> Exchange<'w> {
             SpawnError::Agent(fault) => fault.into(),
             SpawnError::Platform(error) => SessionError::from(error),
         })?;
-        let evaluator_cpus = affinity::allowed().ok().filter(|cpus| {
+        let evaluator_cpus = affinity::allowed_cpus().ok().filter(|cpus| {
             !env.agent_cpus.is_empty() && cpus.iter().all(|cpu| !env.agent_cpus.contains(cpu))
         });
         Ok(Self {
@@ -133,23 +135,27 @@ impl<'w> Exchange<'w> {
         limit_s: f64,
     ) -> Result<PendingQuestion, SessionError> {
         message.write_line(&mut self.line);
-        let baseline = self.baseline(phase);
+        let baseline = self.read_baseline(phase);
         // From here on all time counts as the agent's, because the following calls use resources that it can affect.
-        let asked = Instant::now();
+        let asked_at = Instant::now();
         let limit = TimeLimits::duration(limit_s);
-        let _busy = self.supervised.busy(self.latest_end(asked, limit));
-        let sent = self.write_question(asked, phase);
+        let _busy = self.supervised.busy(self.latest_end(asked_at, limit));
+        let sent = self.write_question(asked_at, phase);
         let question = sent.map(|early_cpu_time| PendingQuestion {
             phase,
             limit_s,
-            wait: AnswerWait::begin(Some(baseline), asked, Instant::now(), limit),
+            wait: AnswerWait::begin(Some(baseline), asked_at, Instant::now(), limit),
             early_cpu_time,
         });
-        self.prefer_kill_reason(question, phase, limit_s, asked)
+        self.prefer_kill_reason(question, phase, limit_s, asked_at)
     }
 
     /// Sends the line; returns the agent's CPU time since its last answer.
-    fn write_question(&mut self, asked: Instant, phase: Phase) -> Result<Duration, SessionError> {
+    fn write_question(
+        &mut self,
+        asked_at: Instant,
+        phase: Phase,
+    ) -> Result<Duration, SessionError> {
         self.process.thaw();
         // During start-up any output counts as the answer, because the agent runs before `hello` is sent.
         if phase != Phase::StartUp && self.process.has_pending_output()? {
@@ -157,7 +163,7 @@ impl<'w> Exchange<'w> {
         }
         let early_cpu_time = self
             .cpu
-            .record_question(asked, || self.process.cpu_time_s());
+            .record_question(asked_at, || self.process.cpu_time_s());
         match self.process.send_line(&self.line) {
             Ok(()) => Ok(early_cpu_time),
             Err(WriteError::Closed) => Err(self.closed_error()),
@@ -166,8 +172,8 @@ impl<'w> Exchange<'w> {
     }
 
     /// The latest possible end of a wait, after all extensions of its limit.
-    fn latest_end(&self, asked: Instant, limit: Duration) -> Instant {
-        asked + limit * (1 + MAX_EXTENSION) + self.exit_grace
+    fn latest_end(&self, asked_at: Instant, limit: Duration) -> Instant {
+        asked_at + limit * (1 + MAX_EXTENSION) + self.exit_grace
     }
 
     /// Replaces the result if the supervisor killed the agent: other errors only follow from the agent's death.
@@ -176,7 +182,7 @@ impl<'w> Exchange<'w> {
         result: Result<T, SessionError>,
         phase: Phase,
         limit_s: f64,
-        asked: Instant,
+        asked_at: Instant,
     ) -> Result<T, SessionError> {
         match self.supervised.kill_reason() {
             None => result,
@@ -184,7 +190,7 @@ impl<'w> Exchange<'w> {
             Some(KillReason::Stalled) => Err(SessionError::TimedOut {
                 fault: AgentFaultKind::TimedOut { phase, limit_s },
                 wait: Box::new(WaitBreakdown {
-                    wall: asked.elapsed(),
+                    wall: asked_at.elapsed(),
                     host_interference: Duration::ZERO,
                     early_cpu_time: Duration::ZERO,
                     cpu_time_s: None,
@@ -195,13 +201,13 @@ impl<'w> Exchange<'w> {
 
     /// The counters before a question, at most [`BASELINE_MAX_AGE`] old: reading them for each question to a quick
     /// agent would cost more than the answer. They are kernel files, so no agent can block the read.
-    fn baseline(&mut self, phase: Phase) -> Arc<Baseline> {
+    fn read_baseline(&mut self, phase: Phase) -> Arc<Baseline> {
         if phase != Phase::Step {
             self.process.track_threads();
             self.baseline = None;
         }
         match &self.baseline {
-            Some(baseline) if baseline.at.elapsed() < BASELINE_MAX_AGE => Arc::clone(baseline),
+            Some(baseline) if baseline.read_at.elapsed() < BASELINE_MAX_AGE => Arc::clone(baseline),
             _ => {
                 let baseline = self.process.read_baseline(self.evaluator_cpus.as_deref());
                 Arc::clone(self.baseline.insert(Arc::new(baseline)))
@@ -219,39 +225,41 @@ impl<'w> Exchange<'w> {
         self.process.can_freeze()
     }
 
-    /// Waits for the answer until `until`, which may have passed, or until its limit has passed. `None` if the answer
+    /// Waits for the answer until `deadline`, which may have passed, or until its limit has passed. `None` if the answer
     /// is still pending.
     pub fn poll(
         &mut self,
         question: &mut PendingQuestion,
-        until: Instant,
+        deadline: Instant,
     ) -> Result<Option<Answer>, SessionError> {
-        let (phase, limit_s, asked) = (question.phase, question.limit_s, question.wait.asked);
-        let latest_end = self.latest_end(asked, TimeLimits::duration(limit_s));
+        let (phase, limit_s, asked_at) = (question.phase, question.limit_s, question.wait.asked_at);
+        let latest_end = self.latest_end(asked_at, TimeLimits::duration(limit_s));
         let _busy = self.supervised.busy(latest_end);
-        let result = self.await_answer(question, until);
-        self.prefer_kill_reason(result, phase, limit_s, asked)
+        let result = self.read_answer(question, deadline);
+        self.prefer_kill_reason(result, phase, limit_s, asked_at)
     }
 
-    fn await_answer(
+    fn read_answer(
         &mut self,
         question: &mut PendingQuestion,
-        until: Instant,
+        deadline: Instant,
     ) -> Result<Option<Answer>, SessionError> {
         if self.evaluator_cpus.is_some() && self.is_quick {
             self.process
-                .spin_until(until.min(question.wait.asked + SPIN_TIME))?;
+                .spin_until(deadline.min(question.wait.asked_at + SPIN_TIME))?;
         }
         loop {
-            let stop = until.min(question.wait.wake);
-            match self.process.read_line(MAX_LINE_BYTES, stop)? {
+            let next_wake = deadline.min(question.wait.wake_at);
+            match self.process.read_line(MAX_LINE_BYTES, next_wake)? {
                 // The question is not sent completely, so this line cannot be its answer.
                 ReadLine::Line { bytes, .. }
                     if question.phase != Phase::StartUp && !self.process.is_all_sent() =>
                 {
                     return Err(unsolicited_line(question.phase, &bytes));
                 }
-                ReadLine::Line { bytes, at } => return Ok(Some(self.answer(question, bytes, at))),
+                ReadLine::Line { bytes, received_at } => {
+                    return Ok(Some(self.finish_answer(question, bytes, received_at)));
+                }
                 ReadLine::TooLong { head } => return Err(too_long(&head)),
                 ReadLine::Closed => return Err(self.closed_error()),
                 ReadLine::TimedOut => {
@@ -259,7 +267,7 @@ impl<'w> Exchange<'w> {
                     self.check_wait(question)?;
                 }
             }
-            if until <= stop {
+            if deadline <= next_wake {
                 return Ok(None);
             }
         }
@@ -268,17 +276,17 @@ impl<'w> Exchange<'w> {
     /// Waits for the answer.
     pub fn wait(&mut self, question: &mut PendingQuestion) -> Result<Answer, SessionError> {
         loop {
-            let until = Instant::now() + TimeLimits::MAX_WAIT;
-            if let Some(answer) = self.poll(question, until)? {
+            let deadline = Instant::now() + TimeLimits::MAX_WAIT;
+            if let Some(answer) = self.poll(question, deadline)? {
                 return Ok(answer);
             }
         }
     }
 
-    /// Waits until [`Self::poll`] has something to do for one of several agents, or until `until`.
+    /// Waits until [`Self::poll`] has something to do for one of several agents, or until `deadline`.
     pub fn wait_for_any(
         exchanges: &[(&Self, &PendingQuestion)],
-        until: Instant,
+        deadline: Instant,
     ) -> Result<(), PlatformFault> {
         let _busy: Vec<BusyGuard> = exchanges
             .iter()
@@ -286,17 +294,17 @@ impl<'w> Exchange<'w> {
                 let limit = TimeLimits::duration(question.limit_s);
                 exchange
                     .supervised
-                    .busy(exchange.latest_end(question.wait.asked, limit))
+                    .busy(exchange.latest_end(question.wait.asked_at, limit))
             })
             .collect();
         let processes: Vec<&AgentProcess> = exchanges
             .iter()
             .map(|(exchange, _)| &exchange.process)
             .collect();
-        let until = exchanges
-            .iter()
-            .fold(until, |until, (_, question)| until.min(question.wait.wake));
-        Ok(AgentProcess::wait_for_any(&processes, until)?)
+        let deadline = exchanges.iter().fold(deadline, |earliest, (_, question)| {
+            earliest.min(question.wait.wake_at)
+        });
+        Ok(AgentProcess::wait_for_any(&processes, deadline)?)
     }
 
     /// Sends a message that has no answer, without blocking. Bytes that do not fit into the agent's input cost it time
@@ -310,10 +318,15 @@ impl<'w> Exchange<'w> {
         }
     }
 
-    fn answer(&mut self, question: &PendingQuestion, bytes: Vec<u8>, at: Instant) -> Answer {
-        let used_s = self.process.cpu_time_s();
-        let wait = self.wait_breakdown(question, at, used_s, AnswerState::Received);
-        self.cpu.record_answer(at, used_s);
+    fn finish_answer(
+        &mut self,
+        question: &PendingQuestion,
+        bytes: Vec<u8>,
+        received_at: Instant,
+    ) -> Answer {
+        let cpu_time_s = self.process.cpu_time_s();
+        let wait = self.wait_breakdown(question, received_at, cpu_time_s, AnswerState::Received);
+        self.cpu.record_answer(received_at, cpu_time_s);
         self.is_quick = wait.wall < SPIN_TIME;
         Answer { bytes, wait }
     }
@@ -322,8 +335,8 @@ impl<'w> Exchange<'w> {
     fn check_wait(&mut self, question: &mut PendingQuestion) -> Result<(), SessionError> {
         let now = Instant::now();
         if now >= question.wait.deadline {
-            let used_s = self.process.cpu_time_s();
-            let wait = self.wait_breakdown(question, now, used_s, AnswerState::Pending);
+            let cpu_time_s = self.process.cpu_time_s();
+            let wait = self.wait_breakdown(question, now, cpu_time_s, AnswerState::Pending);
             let fault = AgentFaultKind::TimedOut {
                 phase: question.phase,
                 limit_s: question.limit_s,
@@ -337,7 +350,7 @@ impl<'w> Exchange<'w> {
             };
         }
         let wait = &mut question.wait;
-        if now >= wait.wake {
+        if now >= wait.wake_at {
             if wait.is_first_sample() {
                 // Includes the threads that it has started since the question.
                 self.process.track_threads();
@@ -349,20 +362,20 @@ impl<'w> Exchange<'w> {
         Ok(())
     }
 
-    /// Breakdown of the wait until `now`. `used_s`: the agent's CPU time so far.
+    /// Breakdown of the wait until `now`. `cpu_time_s`: the agent's CPU time so far.
     fn wait_breakdown(
         &self,
         question: &PendingQuestion,
         now: Instant,
-        used_s: Option<f64>,
+        cpu_time_s: Option<f64>,
         answer: AnswerState,
     ) -> WaitBreakdown {
-        let ran_s = self.cpu.since_question_s(used_s);
+        let run_time_s = self.cpu.since_question_s(cpu_time_s);
         WaitBreakdown {
-            wall: now.saturating_duration_since(question.wait.asked),
-            host_interference: self.host_interference(&question.wait, now, ran_s, answer),
+            wall: now.saturating_duration_since(question.wait.asked_at),
+            host_interference: self.host_interference(&question.wait, now, run_time_s, answer),
             early_cpu_time: question.early_cpu_time,
-            cpu_time_s: self.cpu.since_answer_s(used_s),
+            cpu_time_s: self.cpu.since_answer_s(cpu_time_s),
         }
     }
 
@@ -370,14 +383,14 @@ impl<'w> Exchange<'w> {
         &self,
         wait: &AnswerWait,
         now: Instant,
-        ran_s: Option<f64>,
+        run_time_s: Option<f64>,
         answer: AnswerState,
     ) -> Duration {
         if !wait.is_late(now) {
             return Duration::ZERO;
         }
         let interference = self.process.interference_since(
-            wait.asked,
+            wait.asked_at,
             wait.samples(),
             wait.baseline_cpus(),
             answer,
@@ -387,7 +400,7 @@ impl<'w> Exchange<'w> {
             now,
             run_delay: interference.map(|interference| interference.run_delay),
             stolen: interference.map_or(Duration::ZERO, |interference| interference.stolen),
-            agent_run_time: ran_s.map(TimeLimits::duration),
+            agent_run_time: run_time_s.map(TimeLimits::duration),
             evaluator_run_delay: evaluator
                 .map(|(cpus, before)| self.process.caller_counters(cpus).run_delay_since(before)),
         };
@@ -431,7 +444,7 @@ fn find_runtime(bundle: &Bundle, env: &AgentEnvironment) -> Result<Runtime, Stri
     if let Some(image) = &bundle.image {
         if !env.isolation.enforces(Layer::Namespaces) {
             return Err(
-                "the agent is a container image, which runs in the sandbox only: its namespaces are given up here"
+                "the agent is a container image, which runs in the sandbox only, and the layer namespaces is disabled here"
                     .to_owned(),
             );
         }

@@ -1,3 +1,6 @@
+//! Failures of a session with an agent. An *agent fault* is a violation of the protocol or of a limit; a *platform fault* is any other
+//! failure, for which the agent is not blamed.
+
 use crate::wait_breakdown::WaitBreakdown;
 use faceoff_dataset::RecordingError;
 use faceoff_episode::{NonFiniteObservation, RecordError};
@@ -77,7 +80,7 @@ pub enum PlatformFault {
     /// Host interference repeatedly prevented an agent's answer, in a run that needs a verdict on the agent.
     #[error("host interference prevented the agent's answer ({0})")]
     HostBusy(WaitBreakdown),
-    /// The observer asked to stop.
+    /// The observer of the run cancelled it.
     #[error("cancelled")]
     Cancelled,
 }

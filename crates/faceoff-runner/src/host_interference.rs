@@ -1,5 +1,6 @@
-//! Host interference in the time of an answer: as much as the kernel's counters prove, and only for late answers.
-//! Before an answer is late, only a baseline is read, which costs a few microseconds.
+//! *Host interference* in the time of an answer: the part in which the agent was ready to run, but the host let others run. It is as much
+//! as the kernel's counters prove, and is determined for late answers only. Before an answer is late, only a baseline (the counters
+//! before the question) is read, which costs a few microseconds.
 
 use faceoff_sandbox::{Baseline, CallerCounters, CpuReading, CpuSamples};
 use std::{
@@ -7,8 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// After this time an answer is late, and the counters are sampled. Half of the lowest limit that costs points, and
-/// the maximum lag of the kernel's counters: so what they count later happened within the wait.
+/// After this time an answer is late, and the counters are sampled. It is half of the shortest time that costs points. It is also the
+/// maximum lag of the kernel's counters, so that everything that a sample counts happened after the question.
 pub(crate) const LATE_AFTER: Duration = Duration::from_millis(10);
 /// Interval at which the evaluator wakes while an answer is late, so that its own lateness can be measured.
 pub(crate) const SAMPLE_INTERVAL: Duration = Duration::from_millis(5);
@@ -23,9 +24,9 @@ pub(crate) const MAX_EXTENSION: u32 = 4;
 
 /// Determines host interference from the counters; tests use other implementations.
 pub trait InterferenceMonitor: std::fmt::Debug + Sync {
-    /// Host interference between `asked` and `now`. `proven`: the interference that the kernel's counters prove; `None`
+    /// Host interference between `asked_at` and `now`. `proven`: the interference that the kernel's counters prove; `None`
     /// if there are no counters.
-    fn interference(&self, asked: Instant, now: Instant, proven: Option<Duration>) -> Duration;
+    fn interference(&self, asked_at: Instant, now: Instant, proven: Option<Duration>) -> Duration;
 }
 
 /// Exactly the interference that the kernel's counters prove.
@@ -42,18 +43,18 @@ impl InterferenceMonitor for KernelCounters {
 #[derive(Debug, Clone)]
 pub(crate) struct AnswerWait {
     /// Start of the counted time.
-    pub asked: Instant,
+    pub asked_at: Instant,
     limit: Duration,
     /// The counters before the question, at most [`BASELINE_MAX_AGE`] older.
     baseline: Option<Arc<Baseline>>,
     /// Delay of the evaluator while it wrote the question.
     write_delay: Duration,
-    /// `Some` if the answer is late: the samples since then, if the host has counters.
-    late: Option<Option<CpuSamples>>,
+    /// Set once the answer is late. The inner value is `None` if the host has no counters.
+    late_samples: Option<Option<CpuSamples>>,
     /// Time that the evaluator spent on another agent since the last check that found no answer.
     absence: Duration,
     /// Next wake-up of the evaluator.
-    pub wake: Instant,
+    pub wake_at: Instant,
     /// End of the limit, including extensions.
     pub deadline: Instant,
 }
@@ -73,43 +74,43 @@ pub(crate) struct WaitCounters {
 }
 
 impl AnswerWait {
-    /// Starts a wait whose limit runs from `asked`. `written`: time at which the non-blocking write of the question
+    /// Starts a wait whose limit runs from `asked_at`. `written_at` is the time at which the non-blocking write of the question
     /// returned.
     pub fn begin(
         baseline: Option<Arc<Baseline>>,
-        asked: Instant,
-        written: Instant,
+        asked_at: Instant,
+        written_at: Instant,
         limit: Duration,
     ) -> Self {
-        let deadline = asked + limit;
+        let deadline = asked_at + limit;
         Self {
-            asked,
+            asked_at,
             limit,
             baseline,
-            write_delay: lateness(asked, written),
-            late: None,
+            write_delay: lateness(asked_at, written_at),
+            late_samples: None,
             absence: Duration::ZERO,
-            wake: (asked + LATE_AFTER).min(deadline),
+            wake_at: (asked_at + LATE_AFTER).min(deadline),
             deadline,
         }
     }
 
     /// Is the answer late, so that host interference is determined, or did the evaluator wake late?
     pub fn is_late(&self, now: Instant) -> bool {
-        self.late.is_some() || now > self.wake + NORMAL_LATENESS
+        self.late_samples.is_some() || now > self.wake_at + NORMAL_LATENESS
     }
 
     /// Is the next sample the first since the question?
     pub fn is_first_sample(&self) -> bool {
-        self.late.is_none()
+        self.late_samples.is_none()
     }
 
     /// Adds a sample of the counters of a late answer.
     pub fn add_sample(&mut self, reading: Option<CpuReading>) {
-        match (&mut self.late, reading) {
+        match (&mut self.late_samples, reading) {
             (None, reading) => {
-                let begin = |now| CpuSamples::begin(now, self.baseline_cpus(), self.asked);
-                self.late = Some(reading.map(begin));
+                let begin = |now| CpuSamples::begin(now, self.baseline_cpus(), self.asked_at);
+                self.late_samples = Some(reading.map(begin));
             }
             (Some(Some(samples)), Some(reading)) => samples.add(reading),
             (Some(_), _) => {}
@@ -128,7 +129,7 @@ impl AnswerWait {
 
     /// Samples of the counters since the answer is late.
     pub fn samples(&self) -> Option<&CpuSamples> {
-        self.late.as_ref()?.as_ref()
+        self.late_samples.as_ref()?.as_ref()
     }
 
     /// Adds time in which the evaluator could not check for an answer.
@@ -143,7 +144,7 @@ impl AnswerWait {
 
     /// Schedules the next wake-up, after a check without an answer.
     pub fn schedule_wake(&mut self, now: Instant) {
-        self.wake = (now + SAMPLE_INTERVAL).min(self.deadline);
+        self.wake_at = (now + SAMPLE_INTERVAL).min(self.deadline);
     }
 
     /// Host interference in the wait until now.
@@ -159,25 +160,25 @@ impl AnswerWait {
             agent_run_time,
             evaluator_run_delay,
         } = counters;
-        let wall = now.saturating_duration_since(self.asked);
+        let wall = now.saturating_duration_since(self.asked_at);
         // An answer that was available when the evaluator woke late may have arrived at any time since the scheduled
         // wake-up. A question whose writing was delayed may have arrived late. The agent is not charged for these
         // delays as far as the evaluator was runnable and could not run, on CPUs that the agent cannot use. All other
         // delays of the evaluator's calls count, since the agent may have caused them.
         let evaluator_delay = match (run_delay, evaluator_run_delay) {
-            (Some(_), Some(delay)) => delay.min(self.write_delay + lateness(self.wake, now)),
+            (Some(_), Some(delay)) => delay.min(self.write_delay + lateness(self.wake_at, now)),
             _ => Duration::ZERO,
         };
         let ran = agent_run_time.map_or(wall, |ran| ran.min(wall.saturating_sub(stolen)));
         let proven = run_delay
             .map(|run_delay| run_delay + evaluator_delay)
-            // Upper bound in any case: while the agent ran, it was not delayed.
+            // While the agent ran, it was not delayed.
             .map(|proven| proven.min(wall.saturating_sub(ran)));
         // The evaluator's time with another agent is never charged to this one, whether or not they share CPUs. But
         // while this agent ran, it had not answered yet.
         let max_absence = wall.saturating_sub(agent_run_time.unwrap_or_default());
         monitor
-            .interference(self.asked, now, proven)
+            .interference(self.asked_at, now, proven)
             .max(self.absence.min(max_absence))
             .min(wall)
     }
@@ -185,24 +186,24 @@ impl AnswerWait {
     /// Called when the limit has passed: extends it by the host interference, or returns the cause of the timeout.
     pub fn extend(&mut self, now: Instant, interference: Duration) -> Extension {
         let agent_time = now
-            .saturating_duration_since(self.asked)
+            .saturating_duration_since(self.asked_at)
             .saturating_sub(interference);
         if agent_time >= self.limit {
             return Extension::AgentTimeout;
         }
-        let last = self.asked + self.limit * (1 + MAX_EXTENSION);
-        if now >= last {
+        let latest_end = self.asked_at + self.limit * (1 + MAX_EXTENSION);
+        if now >= latest_end {
             return Extension::HostTimeout;
         }
-        self.deadline = (now + (self.limit - agent_time)).min(last);
+        self.deadline = (now + (self.limit - agent_time)).min(latest_end);
         self.schedule_wake(now);
         Extension::Extended
     }
 }
 
 /// Lateness of the evaluator; zero if it is within the normal range.
-fn lateness(due: Instant, now: Instant) -> Duration {
-    let late = now.saturating_duration_since(due);
+fn lateness(due_at: Instant, now: Instant) -> Duration {
+    let late = now.saturating_duration_since(due_at);
     if late > NORMAL_LATENESS {
         late
     } else {
@@ -224,27 +225,33 @@ pub(crate) enum Extension {
 mod tests {
     use super::*;
 
+    /// `MS(5)` is 5 milliseconds.
     const MS: fn(u64) -> Duration = Duration::from_millis;
 
-    /// An evaluator that was only delayed by its run queue, if its CPUs are separate (`apart`).
-    fn counters(now: Instant, others_ms: u64, agent_ms: u64, apart: bool) -> WaitCounters {
+    /// The counters of a wait. The evaluator's run delay is long if it has separate CPUs, and unknown otherwise.
+    fn counters(
+        now: Instant,
+        others_ms: u64,
+        agent_ms: u64,
+        has_separate_cpus: bool,
+    ) -> WaitCounters {
         WaitCounters {
             now,
             run_delay: Some(MS(others_ms)),
             stolen: Duration::ZERO,
             agent_run_time: Some(MS(agent_ms)),
-            evaluator_run_delay: apart.then_some(MS(1000)),
+            evaluator_run_delay: has_separate_cpus.then_some(MS(1000)),
         }
     }
 
     #[test]
     fn agents_run_time_is_never_host_interference() {
-        let asked = Instant::now();
-        let wait = AnswerWait::begin(None, asked, asked, MS(1000));
+        let asked_at = Instant::now();
+        let wait = AnswerWait::begin(None, asked_at, asked_at, MS(1000));
         let interference = |others, agent| {
             wait.interference(
                 &KernelCounters,
-                counters(asked + MS(10), others, agent, false),
+                counters(asked_at + MS(10), others, agent, false),
             )
         };
         assert_eq!(interference(4, 1), MS(4));
@@ -252,24 +259,24 @@ mod tests {
         assert_eq!(interference(9, 30), MS(0), "several threads");
         let unknown = WaitCounters {
             agent_run_time: None,
-            ..counters(asked + MS(10), 9, 0, true)
+            ..counters(asked_at + MS(10), 9, 0, true)
         };
         assert_eq!(wait.interference(&KernelCounters, unknown), MS(0));
         let stolen = WaitCounters {
             stolen: MS(9),
-            ..counters(asked + MS(10), 9, 5, false)
+            ..counters(asked_at + MS(10), 9, 5, false)
         };
         assert_eq!(
             wait.interference(&KernelCounters, stolen),
             MS(9),
             "steal time is not run time, even if a kernel counts it"
         );
-        let nothing = WaitCounters {
+        let without_counters = WaitCounters {
             run_delay: None,
-            ..counters(asked + MS(80), 0, 0, true)
+            ..counters(asked_at + MS(80), 0, 0, true)
         };
         assert_eq!(
-            wait.interference(&KernelCounters, nothing),
+            wait.interference(&KernelCounters, without_counters),
             MS(0),
             "no interference without a cgroup"
         );
@@ -277,10 +284,13 @@ mod tests {
 
     #[test]
     fn late_wake_on_separate_cpus_is_host_interference() {
-        let asked = Instant::now();
-        let mut wait = AnswerWait::begin(None, asked, asked, MS(1000));
-        let interference = |wait: &AnswerWait, at, apart| {
-            wait.interference(&KernelCounters, counters(asked + MS(at), 0, 1, apart))
+        let asked_at = Instant::now();
+        let mut wait = AnswerWait::begin(None, asked_at, asked_at, MS(1000));
+        let interference = |wait: &AnswerWait, waited_ms, has_separate_cpus| {
+            wait.interference(
+                &KernelCounters,
+                counters(asked_at + MS(waited_ms), 0, 1, has_separate_cpus),
+            )
         };
         assert_eq!(interference(&wait, 9, true), MS(0));
         assert_eq!(interference(&wait, 11, true), MS(0), "normal lateness");
@@ -290,58 +300,72 @@ mod tests {
             MS(0),
             "the agent may have caused it"
         );
-        // It found no answer at 12 ms: only a later delay made the answer later.
-        wait.schedule_wake(asked + MS(12));
+        // The evaluator found no answer at 12 ms, so only its later delay counts.
+        wait.schedule_wake(asked_at + MS(12));
         assert_eq!(interference(&wait, 60, true), MS(43));
     }
 
     #[test]
     fn delayed_write_on_separate_cpus_is_host_interference() {
-        let asked = Instant::now();
-        let interference = |written, at, apart| {
-            let mut wait = AnswerWait::begin(None, asked, asked + MS(written), MS(1000));
+        let asked_at = Instant::now();
+        let interference = |written_at, waited_ms, has_separate_cpus| {
+            let mut wait = AnswerWait::begin(None, asked_at, asked_at + MS(written_at), MS(1000));
             // The first check finds no answer.
-            wait.schedule_wake(asked + MS(written));
-            wait.interference(&KernelCounters, counters(asked + MS(at), 0, 1, apart))
+            wait.schedule_wake(asked_at + MS(written_at));
+            wait.interference(
+                &KernelCounters,
+                counters(asked_at + MS(waited_ms), 0, 1, has_separate_cpus),
+            )
         };
         assert_eq!(interference(40, 42, true), MS(40));
         assert_eq!(interference(40, 42, false), MS(0), "the agent may have run");
         assert_eq!(interference(1, 12, true), MS(6), "normal lateness");
-        assert_eq!(interference(40, 41, true), MS(40), "without its run time");
+        assert_eq!(
+            interference(40, 41, true),
+            MS(40),
+            "without the agent's run time"
+        );
     }
 
     #[test]
     fn evaluator_delay_is_capped_by_its_run_delay() {
-        let asked = Instant::now();
-        let wait = AnswerWait::begin(None, asked, asked + MS(5000), MS(1000));
-        let interference = |own| {
+        let asked_at = Instant::now();
+        let wait = AnswerWait::begin(None, asked_at, asked_at + MS(5000), MS(1000));
+        let interference = |run_delay_ms| {
             let counters = WaitCounters {
-                evaluator_run_delay: Some(MS(own)),
-                ..counters(asked + MS(5001), 0, 1, true)
+                evaluator_run_delay: Some(MS(run_delay_ms)),
+                ..counters(asked_at + MS(5001), 0, 1, true)
             };
             wait.interference(&KernelCounters, counters)
         };
-        assert_eq!(interference(0), MS(0), "something else delayed its call");
+        assert_eq!(
+            interference(0),
+            MS(0),
+            "something else delayed the evaluator's call"
+        );
         assert_eq!(interference(30), MS(30));
     }
 
     #[test]
     fn absence_of_the_evaluator_is_not_charged() {
-        let asked = Instant::now();
-        let mut wait = AnswerWait::begin(None, asked, asked, MS(1000));
-        let interference = |wait: &AnswerWait, at, ran| {
-            wait.interference(&KernelCounters, counters(asked + MS(at), 0, ran, false))
+        let asked_at = Instant::now();
+        let mut wait = AnswerWait::begin(None, asked_at, asked_at, MS(1000));
+        let interference = |wait: &AnswerWait, waited_ms, ran| {
+            wait.interference(
+                &KernelCounters,
+                counters(asked_at + MS(waited_ms), 0, ran, false),
+            )
         };
         wait.add_absence(MS(500));
         assert_eq!(
             interference(&wait, 510, 1),
             MS(500),
-            "its answer may have waited all the time"
+            "the answer may have waited all the time"
         );
         assert_eq!(
             interference(&wait, 510, 300),
             MS(210),
-            "without its run time"
+            "without the agent's run time"
         );
         assert_eq!(
             interference(&wait, 400, 1),
@@ -358,17 +382,23 @@ mod tests {
 
     #[test]
     fn limit_is_extended_by_interference_up_to_a_maximum() {
-        let asked = Instant::now();
-        let at = |ms| asked + MS(ms);
-        let mut wait = AnswerWait::begin(None, asked, asked, MS(1000));
-        assert_eq!((wait.wake, wait.deadline), (at(10), at(1000)));
-        assert_eq!(wait.extend(at(1000), MS(0)), Extension::AgentTimeout);
-        assert_eq!(wait.extend(at(1000), MS(300)), Extension::Extended);
-        assert_eq!((wait.wake, wait.deadline), (at(1005), at(1300)));
-        assert_eq!(wait.extend(at(1300), MS(300)), Extension::AgentTimeout);
-        assert_eq!(wait.extend(at(4900), MS(4800)), Extension::Extended);
-        assert_eq!(wait.deadline, at(5000));
-        assert_eq!(wait.extend(at(5000), MS(4001)), Extension::HostTimeout);
-        assert_eq!(wait.extend(at(5000), MS(4000)), Extension::AgentTimeout);
+        let asked_at = Instant::now();
+        let instant = |ms| asked_at + MS(ms);
+        let mut wait = AnswerWait::begin(None, asked_at, asked_at, MS(1000));
+        assert_eq!((wait.wake_at, wait.deadline), (instant(10), instant(1000)));
+        assert_eq!(wait.extend(instant(1000), MS(0)), Extension::AgentTimeout);
+        assert_eq!(wait.extend(instant(1000), MS(300)), Extension::Extended);
+        assert_eq!(
+            (wait.wake_at, wait.deadline),
+            (instant(1005), instant(1300))
+        );
+        assert_eq!(wait.extend(instant(1300), MS(300)), Extension::AgentTimeout);
+        assert_eq!(wait.extend(instant(4900), MS(4800)), Extension::Extended);
+        assert_eq!(wait.deadline, instant(5000));
+        assert_eq!(wait.extend(instant(5000), MS(4001)), Extension::HostTimeout);
+        assert_eq!(
+            wait.extend(instant(5000), MS(4000)),
+            Extension::AgentTimeout
+        );
     }
 }

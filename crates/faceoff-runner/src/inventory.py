@@ -1,3 +1,4 @@
+# Prints the version and the packages of this Python as one line of JSON.
 import importlib.metadata, json, os, platform
 packages = {}
 for found in importlib.metadata.distributions():

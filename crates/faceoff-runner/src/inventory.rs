@@ -1,4 +1,4 @@
-//! Inventory of the runtimes: each one reports its content from inside the agents' sandbox.
+//! Inventory of the *runtimes* (language environments that agents can use): each one reports its content from inside the agents' sandbox.
 
 use crate::config::AgentEnvironment;
 use faceoff_sandbox::{AgentProcess, Isolation, ReadLine, Runtime, SpawnSpec};
@@ -13,9 +13,9 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// Far more than an interpreter takes to start and to list a few hundred packages.
+/// Time limit of one runtime: far more than an interpreter takes to start and to list a few hundred packages.
 const TIMEOUT: Duration = Duration::from_secs(60);
-/// Enough for about ten thousand packages.
+/// Maximum length of the answer: enough for about ten thousand packages.
 const MAX_LINE_BYTES: usize = 1 << 20;
 /// Dynamic loaders, which print the version of the C library in a runtime without an interpreter.
 const LOADERS: [&str; 2] = ["/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1"];
@@ -26,7 +26,7 @@ const SCRIPT: &str = include_str!("inventory.py");
 /// does not answer is [`RuntimeContent::Failed`], with the reason. Container images come last, if they are supported.
 #[must_use]
 pub fn take_inventory(env: &AgentEnvironment) -> Vec<RuntimeInventory> {
-    let ask = |(name, runtime): (&String, &Runtime)| RuntimeInventory {
+    let describe = |(name, runtime): (&String, &Runtime)| RuntimeInventory {
         name: name.clone(),
         content: inspect(env, runtime).unwrap_or_else(|reason| RuntimeContent::Failed { reason }),
     };
@@ -34,7 +34,7 @@ pub fn take_inventory(env: &AgentEnvironment) -> Vec<RuntimeInventory> {
         name: IMAGE_RUNTIME.to_owned(),
         content: RuntimeContent::Image,
     });
-    env.runtimes.iter().map(ask).chain(image).collect()
+    env.runtimes.iter().map(describe).chain(image).collect()
 }
 
 /// The content of one runtime, or the reason why it is unknown.
@@ -112,8 +112,8 @@ fn first_line(
         return Ok(String::from_utf8_lossy(&bytes).into_owned());
     }
     let log = process.stderr_tail();
-    let last = log.lines().last().unwrap_or("it printed nothing");
-    Err(format!("{} gave no answer: {last}", command[0]))
+    let last_line = log.lines().last().unwrap_or("it printed nothing");
+    Err(format!("{} gave no answer: {last_line}", command[0]))
 }
 
 /// An empty folder that an agent running as another user can enter.

@@ -1,5 +1,5 @@
-//! Runs one agent over one shard of an evaluation, or two agents through a game: bundle → sandboxed
-//! process ⇄ JSON lines ⇄ simulator → recording and report.
+//! Runs one agent over a *shard* (a range of episodes of an evaluation), or two agents through a game: bundle → sandboxed process ⇄
+//! JSON lines ⇄ simulator → recording and report.
 //!
 //! Agent faults and platform faults never mix. An agent fault is an
 //! [`AgentFault`](faceoff_types::AgentFault) inside a successful report. A platform fault is a

@@ -1,3 +1,5 @@
+//! The log of an agent, as its team reads it: the end of its standard error, with its faults.
+
 use faceoff_types::escape_unprintable;
 
 /// The end of the standard error of an agent's successive processes, with control characters escaped.

@@ -1,3 +1,5 @@
+//! Runs the episodes of one task with one agent, and repeats an episode that *host interference* (other load on the machine) ended.
+
 use crate::{
     budget::{EpisodeBudget, ResetBudget},
     bundle::Bundle,
@@ -27,7 +29,7 @@ pub(crate) struct Player<'a> {
     reruns: Reruns,
     /// Longest host interference in one answer, in seconds.
     longest_stall_s: f64,
-    /// The wait that ended the last episode by a timeout.
+    /// The wait whose timeout ended the last episode.
     wait: Option<WaitBreakdown>,
     on_host_interference: OnHostInterference,
 }
@@ -35,13 +37,13 @@ pub(crate) struct Player<'a> {
 /// Handling of an episode that host interference ends in all allowed tries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OnHostInterference {
-    /// The last try counts (RULES).
+    /// The last try counts, as the rules say.
     KeepLastTry,
-    /// It is a platform fault: the whole run must be repeated later.
+    /// It is a platform fault, after which the whole run is repeated later.
     PlatformFault,
 }
 
-/// Counts tries that were dropped and repeated because of host interference.
+/// Counts *reruns*: tries that were dropped and repeated because of host interference.
 struct Reruns {
     count: u32,
     /// Maximum in total.
@@ -93,7 +95,7 @@ struct StartUpFault {
     stderr: String,
 }
 
-/// A running episode with any recorder.
+/// A running episode with a sink of any type.
 type DynEpisode<'a> = RunningEpisode<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
@@ -163,10 +165,10 @@ impl<'a> Player<'a> {
                 Blame::AgentTimeout(wait) | Blame::Host(wait) => Some(wait),
             };
             if let Blame::Host(wait) = blame {
-                let used = &mut self.reruns;
-                if reruns < used.per_episode && used.count < used.limit {
+                let reruns_used = &mut self.reruns;
+                if reruns < reruns_used.per_episode && reruns_used.count < reruns_used.limit {
                     reruns += 1;
-                    used.count += 1;
+                    reruns_used.count += 1;
                     tracing::warn!(
                         task = %self.task,
                         episode,
@@ -260,6 +262,7 @@ impl<'a> Player<'a> {
         self.log.into_text()
     }
 
+    /// Starts the agent; the inner error is an agent fault.
     fn start(&self) -> Result<Result<Session<'a>, StartUpFault>, PlatformFault> {
         let started =
             Session::start_monitored(self.bundle, self.env, self.task.into(), self.monitor);
@@ -290,10 +293,10 @@ impl<'a> Player<'a> {
             .map_err(|error| (Phase::Step, error))
     }
 
-    /// Announces an episode. The time until the answer, less host interference, counts even without an answer.
+    /// Announces an episode. The time until the answer, without host interference, counts towards the budget, even if no answer comes.
     fn reset(&mut self, session: &mut Session<'_>, episode: u32) -> Result<(), SessionError> {
         self.resets.check()?;
-        let asked = Instant::now();
+        let asked_at = Instant::now();
         let timing = session.reset(episode);
         self.resets.spend(match &timing {
             Ok(timing) => timing.computation_time_s,
@@ -301,7 +304,7 @@ impl<'a> Player<'a> {
                 SessionError::TimedOut { wait, .. } | SessionError::HostInterference { wait, .. },
             ) => wait.charged().as_secs_f64(),
             Err(SessionError::Agent { .. } | SessionError::Platform(_)) => {
-                asked.elapsed().as_secs_f64()
+                asked_at.elapsed().as_secs_f64()
             }
         });
         timing?;

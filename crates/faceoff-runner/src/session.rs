@@ -1,3 +1,5 @@
+//! A *session*: one run of an agent's process and the protocol with it, from `hello` to `bye`.
+
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
@@ -108,7 +110,7 @@ impl<'w> Session<'w> {
         self.wait()
     }
 
-    /// The last action: row-major, of the agreed interpolation's length.
+    /// The last action, row-major, with the length that the interpolation requires.
     #[must_use]
     pub fn action(&self) -> &[f64] {
         &self.action
@@ -142,7 +144,7 @@ impl<'w> Session<'w> {
         Ok(())
     }
 
-    /// Adds time in which the evaluator was busy elsewhere and did not check for the pending answer. The agent is not
+    /// Adds time in which the evaluator was busy with another agent and did not check for the pending answer. The agent is not
     /// charged for it if its answer is available at the next check.
     pub fn add_absence(&mut self, absence: Duration) {
         if let Some(pending) = &mut self.pending {
@@ -167,29 +169,29 @@ impl<'w> Session<'w> {
         self.pending.is_some()
     }
 
-    /// Waits until one of the agents with a pending answer has written output or reached its limit, or until `until`.
+    /// Waits until one of the agents with a pending answer has written output or reached its limit, or until `deadline`.
     /// [`Self::poll`] with an expired deadline then returns the result, if any.
     ///
     /// # Errors
     /// Platform faults only.
-    pub fn wait_for_any(sessions: &[&Self], until: Instant) -> Result<(), PlatformFault> {
-        let due: Vec<_> = sessions
+    pub fn wait_for_any(sessions: &[&Self], deadline: Instant) -> Result<(), PlatformFault> {
+        let pending: Vec<_> = sessions
             .iter()
             .filter_map(|session| Some((&session.exchange, &session.pending.as_ref()?.sent)))
             .collect();
-        Exchange::wait_for_any(&due, until)
+        Exchange::wait_for_any(&pending, deadline)
     }
 
-    /// Waits for the pending answer until `until`, which may have passed, and takes it; an action is then in
+    /// Waits for the pending answer until `deadline`, which may have passed, and takes it; an action is then in
     /// [`Self::action`]. `None` if the answer has not arrived, or none is pending.
     ///
     /// # Errors
     /// An agent fault, e.g. a timeout, or a platform fault.
-    pub fn poll(&mut self, until: Instant) -> Result<Option<AnswerTiming>, SessionError> {
+    pub fn poll(&mut self, deadline: Instant) -> Result<Option<AnswerTiming>, SessionError> {
         let Some(PendingAnswer { question, mut sent }) = self.pending.take() else {
             return Ok(None);
         };
-        match self.exchange.poll(&mut sent, until)? {
+        match self.exchange.poll(&mut sent, deadline)? {
             Some(answer) => self.parse_answer(question, &answer).map(Some),
             None => {
                 self.pending = Some(PendingAnswer { question, sent });

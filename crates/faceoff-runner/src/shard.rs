@@ -1,3 +1,5 @@
+//! Runs a *shard*: a range of episodes of one task, played by one agent.
+
 use crate::{
     bundle::Bundle,
     calibration::Calibration,
@@ -130,7 +132,7 @@ fn play(
         let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, sink, &|| {
             observer.cancelled()
         })?;
-        calibration.between_episodes()?;
+        calibration.measure_between_episodes()?;
         observer.on_episode_end(&outcome);
         faults += u32::from(outcome.fault.is_some());
         outcomes.push(outcome);

@@ -1,4 +1,5 @@
-//! A watchdog thread that kills agents whose evaluator makes no progress: the last defence, against unknown causes.
+//! The supervisor: a watchdog thread that kills an agent if its *evaluator* (the thread that asks it questions) makes no progress. It
+//! is the last defence, against unknown causes.
 //!
 //! The evaluator's own deadlines work as long as its thread runs. If one of its calls ever blocks on something that
 //! an agent holds, no deadline of that thread can end the call, but the death of the agent does. The same thread
@@ -17,8 +18,8 @@ use std::{
 
 /// Interval of the checks; a cancelled job ends within it.
 const CHECK_INTERVAL: Duration = Duration::from_millis(250);
-/// A check after a longer pause proves nothing about evaluators: the host, or this process, was stopped.
-const LATE_CHECK: Duration = Duration::from_secs(1);
+/// After a longer pause between two checks, the second one proves nothing about evaluators: the host, or this process, was stopped.
+const MAX_CHECK_PAUSE: Duration = Duration::from_secs(1);
 /// Time without progress that an evaluator may take beyond the sum of its job's limits.
 const SLACK: Duration = Duration::from_secs(10);
 /// A thread that is still blocked this long after the agent's death is stuck: something else blocks it.
@@ -79,22 +80,24 @@ pub(crate) struct SupervisedAgent(Arc<Agent>);
 struct Agent {
     killer: Killer,
     supervision: Supervision,
+    /// Name of the evaluator's thread.
     thread: String,
     /// Deadline of the evaluator's current call, in nanoseconds since [`EPOCH`]; 0 if there is none.
-    due_ns: AtomicU64,
+    deadline_ns: AtomicU64,
     /// 0, or 1 + the [`KillReason`].
     kill_reason: AtomicU8,
-    killed_ns: AtomicU64,
+    killed_at_ns: AtomicU64,
     /// The deadline that had passed at the last check, or 0.
     overdue_ns: AtomicU64,
 }
 
+/// Origin of the times in [`Agent`].
 static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
 static SUPERVISOR: LazyLock<Supervisor> = LazyLock::new(Supervisor::start);
 
-fn nanoseconds(at: Instant) -> u64 {
-    let since = at.saturating_duration_since(*EPOCH).as_nanos();
-    u64::try_from(since).unwrap_or(u64::MAX).max(1)
+fn ns_since_epoch(instant: Instant) -> u64 {
+    let elapsed_ns = instant.saturating_duration_since(*EPOCH).as_nanos();
+    u64::try_from(elapsed_ns).unwrap_or(u64::MAX).max(1)
 }
 
 impl SupervisedAgent {
@@ -103,22 +106,22 @@ impl SupervisedAgent {
             killer,
             supervision: supervision.clone(),
             thread: thread::current().name().unwrap_or("unnamed").to_owned(),
-            due_ns: AtomicU64::new(0),
+            deadline_ns: AtomicU64::new(0),
             kill_reason: AtomicU8::new(0),
-            killed_ns: AtomicU64::new(0),
+            killed_at_ns: AtomicU64::new(0),
             overdue_ns: AtomicU64::new(0),
         });
         let supervisor = &*SUPERVISOR;
         supervisor.agents().push(Arc::downgrade(&agent));
-        supervisor.more.notify_one();
+        supervisor.agent_added.notify_one();
         Self(agent)
     }
 
-    /// Marks the calling thread as busy with the agent until the guard is dropped. By its own limits it is busy until
-    /// `until` at most.
-    pub(crate) fn busy(&self, until: Instant) -> BusyGuard {
-        let due = nanoseconds(until + self.0.supervision.slack);
-        self.0.due_ns.store(due, Ordering::Relaxed);
+    /// Marks the calling thread as busy with the agent until the guard is dropped. `deadline` is the latest end by the thread's own
+    /// limits.
+    pub(crate) fn busy(&self, deadline: Instant) -> BusyGuard {
+        let deadline_ns = ns_since_epoch(deadline + self.0.supervision.slack);
+        self.0.deadline_ns.store(deadline_ns, Ordering::Relaxed);
         BusyGuard(Arc::clone(&self.0))
     }
 
@@ -134,7 +137,7 @@ pub(crate) struct BusyGuard(Arc<Agent>);
 
 impl Drop for BusyGuard {
     fn drop(&mut self) {
-        self.0.due_ns.store(0, Ordering::Relaxed);
+        self.0.deadline_ns.store(0, Ordering::Relaxed);
     }
 }
 
@@ -147,16 +150,17 @@ impl Agent {
         }
     }
 
-    /// `in_time`: the last check was recent enough.
-    fn check(&self, now: Instant, in_time: bool) {
-        let due_ns = self.due_ns.load(Ordering::Relaxed);
-        if due_ns == 0 || self.kill_reason().is_some() {
+    /// Kills the agent if its job is cancelled or its evaluator is overdue. `is_recent_check`: the last check was recent enough for a
+    /// verdict.
+    fn check(&self, now: Instant, is_recent_check: bool) {
+        let deadline_ns = self.deadline_ns.load(Ordering::Relaxed);
+        if deadline_ns == 0 || self.kill_reason().is_some() {
             return;
         }
-        let is_overdue = in_time && nanoseconds(now) > due_ns;
+        let is_overdue = is_recent_check && ns_since_epoch(now) > deadline_ns;
         // Two overdue checks in a row are required: a stopped host may have delayed the evaluator before the first.
-        let overdue_now = if is_overdue { due_ns } else { 0 };
-        let was_overdue = self.overdue_ns.swap(overdue_now, Ordering::Relaxed) == due_ns;
+        let overdue_now = if is_overdue { deadline_ns } else { 0 };
+        let was_overdue = self.overdue_ns.swap(overdue_now, Ordering::Relaxed) == deadline_ns;
         let reason = if (self.supervision.cancelled)() {
             KillReason::Cancelled
         } else if is_overdue && was_overdue {
@@ -168,16 +172,18 @@ impl Agent {
         } else {
             return;
         };
-        self.killed_ns.store(nanoseconds(now), Ordering::Relaxed);
+        self.killed_at_ns
+            .store(ns_since_epoch(now), Ordering::Relaxed);
         // Stored before the kill: the evaluator continues after the kill and reads the reason.
         self.kill_reason.store(1 + reason as u8, Ordering::Release);
         self.killer.kill();
     }
 
     fn is_stuck(&self, now: Instant) -> bool {
-        let dead_for = nanoseconds(now).saturating_sub(self.killed_ns.load(Ordering::Relaxed));
+        let dead_for =
+            ns_since_epoch(now).saturating_sub(self.killed_at_ns.load(Ordering::Relaxed));
         self.kill_reason().is_some()
-            && self.due_ns.load(Ordering::Relaxed) != 0
+            && self.deadline_ns.load(Ordering::Relaxed) != 0
             && u128::from(dead_for) > STUCK_AFTER_DEATH.as_nanos()
     }
 }
@@ -196,7 +202,7 @@ pub fn stuck_threads() -> Vec<String> {
 
 struct Supervisor {
     agents: Mutex<Vec<Weak<Agent>>>,
-    more: Condvar,
+    agent_added: Condvar,
 }
 
 impl Supervisor {
@@ -210,7 +216,7 @@ impl Supervisor {
         }
         Self {
             agents: Mutex::default(),
-            more: Condvar::new(),
+            agent_added: Condvar::new(),
         }
     }
 
@@ -228,17 +234,17 @@ impl Supervisor {
             agents.retain(|agent| agent.strong_count() > 0);
             while agents.is_empty() {
                 agents = self
-                    .more
+                    .agent_added
                     .wait(agents)
                     .unwrap_or_else(PoisonError::into_inner);
             }
             let all = agents.clone();
             drop(agents);
             let now = Instant::now();
-            let in_time = now.saturating_duration_since(last_check) < LATE_CHECK;
+            let is_recent_check = now.saturating_duration_since(last_check) < MAX_CHECK_PAUSE;
             last_check = now;
             for agent in all.iter().filter_map(Weak::upgrade) {
-                agent.check(now, in_time);
+                agent.check(now, is_recent_check);
             }
             thread::sleep(CHECK_INTERVAL);
         }

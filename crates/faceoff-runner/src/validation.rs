@@ -1,3 +1,5 @@
+//! The *validation run* of a submission: a few episodes of each task, which show whether the agent starts, answers and keeps real time.
+
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
@@ -15,7 +17,7 @@ use faceoff_types::{AgentFault, EpisodeOutcome, Profile, Task, ValidationTiming}
 use faceoff_wire::job::ValidationSpec;
 use std::fmt;
 
-/// Minimum number of control steps per task in a validation run (RULES).
+/// Minimum number of control steps per task in a validation run.
 pub const VALIDATION_STEPS: u32 = 250;
 
 /// Result of a validation run.
@@ -38,7 +40,7 @@ pub enum ValidationFailure {
         /// The wait for the missing answer, if that was the fault.
         wait: Option<WaitBreakdown>,
     },
-    /// It answers, but not in real time.
+    /// The agent answers, but not in real time.
     TooSlow {
         timing: ValidationTiming,
         /// Limit of the mean, in seconds.
@@ -89,9 +91,10 @@ impl fmt::Display for ValidationFailure {
 /// [`VALIDATION_STEPS`] control steps of the task are played. Ends with the first failure. The spec's seed determines
 /// the episodes and their number, so that an agent cannot distinguish this run from an evaluation.
 ///
-/// # Errors Platform faults only; an agent fault is in the report. [`PlatformFault::Cancelled`] if `cancelled`, which
-/// is called before each step, returned `true`. [`PlatformFault::HostBusy`] if host interference ended an episode in
-/// all allowed tries: that is no verdict.
+/// # Errors
+/// Platform faults only; an agent fault is in the report. [`PlatformFault::Cancelled`] if `cancelled`, which is called before each
+/// step, returned `true`. [`PlatformFault::HostBusy`] if host interference ended an episode in all allowed tries; then there is no
+/// verdict on the agent.
 pub fn validate(
     spec: &ValidationSpec,
     bundle: &Bundle,
@@ -129,7 +132,7 @@ pub fn validate_monitored(
         );
         let mut answers = Answers::default();
         let mut outcomes = Vec::new();
-        while answers.answered.len() < plan.steps as usize {
+        while answers.timings.len() < plan.steps as usize {
             let episode = plan.first_episode + outcomes.len() as u32;
             let outcome = player.play(episode, EPISODE_STEPS, &mut answers, cancelled)?;
             let has_fault = outcome.fault.is_some();
@@ -182,17 +185,18 @@ struct TaskPlan {
 impl TaskPlan {
     /// Episodes begin at a multiple of this, as in a shard, because the protocol sends the episode number to the agent.
     const SHARD_EPISODES: u32 = 50;
+    /// Number of shards from which the first episode is chosen.
     const SHARDS: u32 = 20;
 
     fn new(spec: &ValidationSpec, task: Task) -> Self {
         let derived = spec.seed.derive("smoke", task.as_str().as_bytes());
         let [a, b, c, d, e, f, g, h, ..] = *derived.as_bytes();
         let shard = u32::from_le_bytes([a, b, c, d]) % Self::SHARDS;
-        let more = u32::from_le_bytes([e, f, g, h]) % VALIDATION_STEPS;
+        let extra_steps = u32::from_le_bytes([e, f, g, h]) % VALIDATION_STEPS;
         Self {
             first_episode: shard * Self::SHARD_EPISODES,
             episodes: Self::SHARD_EPISODES,
-            steps: VALIDATION_STEPS + more,
+            steps: VALIDATION_STEPS + extra_steps,
         }
     }
 }
@@ -200,26 +204,30 @@ impl TaskPlan {
 /// The answers of all episodes; if an episode is run again, only its last try counts.
 #[derive(Default)]
 struct Answers {
-    answered: Vec<AnswerTiming>,
+    timings: Vec<AnswerTiming>,
     /// Number of answers in completed episodes.
-    ended: usize,
+    completed: usize,
 }
 
 impl Answers {
-    fn mean_s(&self, of: impl Fn(&AnswerTiming) -> f64) -> f64 {
-        self.answered.iter().map(of).sum::<f64>() / self.answered.len().max(1) as f64
+    fn mean_s(&self, quantity: impl Fn(&AnswerTiming) -> f64) -> f64 {
+        self.timings.iter().map(quantity).sum::<f64>() / self.timings.len().max(1) as f64
     }
 
     /// Mean host interference and mean CPU time of the agent per answer, in seconds; the latter is `None` if the host
     /// does not report it.
     fn mean_host_and_cpu_s(&self) -> (f64, Option<f64>) {
-        let has_cpu_times = self.answered.iter().all(|one| one.cpu_time_s.is_some());
-        let cpu_s = has_cpu_times.then(|| self.mean_s(|one| one.cpu_time_s.unwrap_or_default()));
-        (self.mean_s(|one| one.host_time_s), cpu_s)
+        let has_cpu_times = self
+            .timings
+            .iter()
+            .all(|timing| timing.cpu_time_s.is_some());
+        let cpu_s =
+            has_cpu_times.then(|| self.mean_s(|timing| timing.cpu_time_s.unwrap_or_default()));
+        (self.mean_s(|timing| timing.host_time_s), cpu_s)
     }
 
     fn summary(&self, task: Task, outcomes: &[EpisodeOutcome]) -> ValidationTiming {
-        let times = self.answered.iter().map(|one| one.computation_time_s);
+        let times = self.timings.iter().map(|timing| timing.computation_time_s);
         let mut times_s: Vec<f64> = times.collect();
         times_s.sort_unstable_by(f64::total_cmp);
         let rank = (times_s.len() * 99).div_ceil(100);
@@ -230,8 +238,8 @@ impl Answers {
         ValidationTiming {
             task,
             steps: times_s.len() as u32,
-            mean_s: self.mean_s(|one| one.computation_time_s),
-            p99_s: rank.checked_sub(1).map_or(0.0, |at| times_s[at]),
+            mean_s: self.mean_s(|timing| timing.computation_time_s),
+            p99_s: rank.checked_sub(1).map_or(0.0, |index| times_s[index]),
             max_s: times_s.last().copied().unwrap_or_default(),
             points_per_episode: points / outcomes.len().max(1) as f64,
         }
@@ -240,17 +248,17 @@ impl Answers {
 
 impl StepSink for Answers {
     fn begin(&mut self, _: EpisodeStart<'_>) {
-        self.answered.truncate(self.ended);
+        self.timings.truncate(self.completed);
     }
 
     fn observe(&mut self, _: &[f64]) {}
 
     fn step(&mut self, row: &StepRow<'_>) {
-        self.answered.push(row.timing);
+        self.timings.push(row.timing);
     }
 
     fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
-        self.ended = self.answered.len();
+        self.completed = self.timings.len();
         Ok(())
     }
 }

@@ -1,3 +1,5 @@
+//! The wait for an agent's answer, divided into the agent's time and *host interference* (other load on the machine).
+
 use std::{fmt, time::Duration};
 
 /// Breakdown of the wait for an answer.

@@ -1,3 +1,5 @@
+//! The field `env` of the message `hello`: the simulator's constants, as an agent gets them.
+
 use faceoff_sim::{EPISODE_STEPS, EnvInfo, env_info, env_info_for};
 use faceoff_types::{AgentTask, GAME_WINDOWS, RULESET, Task, WINDOW_STEPS};
 use faceoff_wire::{

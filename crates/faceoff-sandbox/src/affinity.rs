@@ -1,4 +1,5 @@
-//! CPU affinity and priority of threads. They change how even the timing is, never the results.
+//! CPU affinity (the set of CPUs on which a thread may run) and priority of threads. They affect how even the measured times are, not
+//! the results.
 
 use rustix::{
     process::{getpriority_process, setpriority_process},
@@ -11,7 +12,7 @@ use std::io;
 ///
 /// # Errors
 /// When the kernel does not report them.
-pub fn allowed() -> io::Result<Vec<usize>> {
+pub fn allowed_cpus() -> io::Result<Vec<usize>> {
     Ok(cpu_numbers(&sched_getaffinity(None)?))
 }
 
@@ -49,12 +50,12 @@ pub fn reset_to_process() {
     }
 }
 
-/// Raise of the nice value on CPUs without agents. Beside a simulator that is never idle, the thread gets a
-/// third of a CPU. A simulator's time costs no points, and with a smaller share each time slice of a request
-/// would wait ten milliseconds or more.
+/// Increase of the nice value on CPUs without agents. Beside a simulator that is never idle, the thread gets a third of a CPU. This
+/// slows the simulator down, which costs no agent points. With a smaller share, each time slice of a request would wait ten
+/// milliseconds or more.
 const NICE_BESIDE_SIMULATORS: i32 = 3;
-/// Raise of the nice value on CPUs where agents may run. The thread gets a tenth of a CPU, which is enough for a
-/// server to answer and to renew its leases.
+/// Increase of the nice value on CPUs where agents may run. The thread gets a tenth of a CPU, which is enough for a server to answer
+/// requests and for a worker to renew the leases of its jobs.
 const NICE_BESIDE_AGENTS: i32 = 10;
 
 /// Pins the calling thread, and the threads that it starts from now on, to these CPUs, which no agent uses, and
@@ -86,7 +87,7 @@ pub fn niceness() -> io::Result<i32> {
 /// cannot be sent to another thread.
 #[derive(Debug)]
 pub struct AffinityGuard {
-    before: Option<CpuSet>,
+    previous_affinity: Option<CpuSet>,
     /// Makes the guard `!Send`: the thread that created it must drop it.
     _this_thread: std::marker::PhantomData<*const ()>,
 }
@@ -97,7 +98,7 @@ impl AffinityGuard {
     #[must_use]
     pub fn avoid(cpus: &[usize]) -> Self {
         Self {
-            before: avoid_cpus(cpus),
+            previous_affinity: avoid_cpus(cpus),
             _this_thread: std::marker::PhantomData,
         }
     }
@@ -105,8 +106,8 @@ impl AffinityGuard {
 
 impl Drop for AffinityGuard {
     fn drop(&mut self) {
-        if let Some(before) = &self.before
-            && let Err(error) = sched_setaffinity(None, before)
+        if let Some(previous_affinity) = &self.previous_affinity
+            && let Err(error) = sched_setaffinity(None, previous_affinity)
         {
             tracing::warn!(%error, "a thread cannot be unpinned");
         }
@@ -118,16 +119,16 @@ fn avoid_cpus(cpus: &[usize]) -> Option<CpuSet> {
     if cpus.is_empty() {
         return None;
     }
-    let before = sched_getaffinity(None).ok()?;
-    let mut rest = before;
+    let previous_affinity = sched_getaffinity(None).ok()?;
+    let mut remaining = previous_affinity;
     for cpu in representable(cpus) {
-        rest.unset(cpu);
+        remaining.unset(cpu);
     }
-    if rest.count() == 0 {
+    if remaining.count() == 0 {
         return None;
     }
-    match sched_setaffinity(None, &rest) {
-        Ok(()) => Some(before),
+    match sched_setaffinity(None, &remaining) {
+        Ok(()) => Some(previous_affinity),
         Err(error) => {
             tracing::warn!(%error, ?cpus, "a thread cannot be kept off the agent's CPUs");
             None
@@ -149,7 +150,7 @@ fn representable(cpus: &[usize]) -> impl Iterator<Item = usize> {
     cpus.iter().copied().filter(|&cpu| cpu < CpuSet::MAX_CPU)
 }
 
-/// `0-1,4` for the cpuset controller.
+/// Sorted CPU numbers, e.g. `0,1,4`, in the format of the cpuset controller of cgroups.
 pub(crate) fn cpu_list(cpus: &[usize]) -> String {
     let mut sorted = cpus.to_vec();
     sorted.sort_unstable();
@@ -167,19 +168,19 @@ mod tests {
 
     #[test]
     fn affinity_guard_restores_the_affinity() {
-        let all = allowed().unwrap();
+        let all = allowed_cpus().unwrap();
         let (first, rest) = all.split_first().unwrap();
         {
             let _guard = AffinityGuard::avoid(&[*first]);
-            let remaining = allowed().unwrap();
+            let remaining = allowed_cpus().unwrap();
             // With only one CPU the affinity stays.
             assert_eq!(remaining, if rest.is_empty() { &all[..] } else { rest });
         }
-        assert_eq!(allowed().unwrap(), all);
+        assert_eq!(allowed_cpus().unwrap(), all);
         pin_current_thread(&[*first, usize::MAX]).unwrap();
-        assert_eq!(allowed().unwrap(), [*first]);
+        assert_eq!(allowed_cpus().unwrap(), [*first]);
         pin_current_thread(&[]).unwrap();
-        assert_eq!(allowed().unwrap(), [*first]);
+        assert_eq!(allowed_cpus().unwrap(), [*first]);
         assert!(pin_current_thread(&[usize::MAX]).is_err());
     }
 }

@@ -10,11 +10,12 @@ use rustix::{fs, process, thread};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 const RANGE_START: u32 = 0x7000_0000;
-/// Ids per service process: its pid (22 bits) and these 6 bits fill the range.
-const SLOTS: u32 = 64;
-/// Fallback in a container that maps few ids.
+/// Number of user ids per service process. The pid (22 bits) and the index among these ids (6 bits) fill the range.
+const IDS_PER_SERVICE: u32 = 64;
+const PID_MASK: u32 = (1 << 22) - 1;
+/// The kernel's id for unmapped users; the fallback in a container that maps few ids.
 const OVERFLOW_ID: u32 = 65_534;
-static NEXT_SLOT: AtomicU32 = AtomicU32::new(0);
+static NEXT_INDEX: AtomicU32 = AtomicU32::new(0);
 
 /// The host user of one agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,21 +30,21 @@ impl AgentUser {
         if !process::geteuid().is_root() {
             return Ok(None);
         }
-        let slot = NEXT_SLOT.fetch_add(1, Ordering::Relaxed) % SLOTS;
-        let pid = std::process::id() & 0x003f_ffff;
-        let own = RANGE_START + pid * SLOTS + slot;
+        let index = NEXT_INDEX.fetch_add(1, Ordering::Relaxed) % IDS_PER_SERVICE;
+        let pid = std::process::id() & PID_MASK;
+        let own_id = RANGE_START + pid * IDS_PER_SERVICE + index;
         let maps = [
             read_map("/proc/self/uid_map")?,
             read_map("/proc/self/gid_map")?,
         ];
-        [own, OVERFLOW_ID]
+        [own_id, OVERFLOW_ID]
             .into_iter()
             .find(|&id| maps.iter().all(|map| is_mapped(map, id)))
             .map(|id| Some(Self { id }))
             .ok_or_else(|| SandboxError::Unavailable {
                 layer: Layer::Namespaces,
                 reason: format!(
-                    "the service runs as root of a user namespace that maps neither id {own} nor {OVERFLOW_ID}, \
+                    "the service runs as root of a user namespace that maps neither id {own_id} nor {OVERFLOW_ID}, \
                      so its agents would be root too; run it as an ordinary user, or map more ids"
                 ),
             })

@@ -1,4 +1,4 @@
-//! Finds bubblewrap and builds its command line.
+//! Finds bubblewrap (`bwrap`), the program that starts an agent in namespaces of its own, and builds its command line.
 
 use crate::{
     Layer, SandboxError, SpawnSpec,
@@ -18,11 +18,11 @@ use std::{
     sync::OnceLock,
 };
 
-const CANDIDATES: [&str; 3] = ["/usr/bin/bwrap", "/usr/local/bin/bwrap", "/bin/bwrap"];
-pub(crate) const CURE_INSTALL: &str = "apt-get install bubblewrap";
+const PROGRAM_CANDIDATES: [&str; 3] = ["/usr/bin/bwrap", "/usr/local/bin/bwrap", "/bin/bwrap"];
+pub(crate) const INSTALL_COMMAND: &str = "apt-get install bubblewrap";
 
-/// User and group id inside the sandbox, without any meaning.
-const INNER_ID: &str = "1000";
+/// User and group id inside the sandbox; the number is arbitrary.
+const ID_IN_SANDBOX: &str = "1000";
 const PASSWD: &str = "agent:x:1000:1000:agent:/tmp:/bin/sh\n";
 const GROUP: &str = "agent:x:1000:\n";
 
@@ -50,10 +50,9 @@ const HIDDEN_FILES: [&str; 17] = [
     "/proc/swaps",
 ];
 
-/// Counters of the host that ordinary libraries read. Agents see a snapshot from before the first agent, because
-/// the live counters also count what agents do (the number of started processes, say). They list only the agent's
-/// CPUs.
-const FROZEN_FILES: [&str; 5] = [
+/// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because
+/// the live counters would show what other agents do (e.g. the number of started processes). The snapshots list only the agent's CPUs.
+const SNAPSHOT_FILES: [&str; 5] = [
     "/proc/stat",
     "/proc/cpuinfo",
     "/proc/meminfo",
@@ -67,7 +66,7 @@ pub(crate) struct Bubblewrap {
     pub program: PathBuf,
     /// Version line, e.g. `bubblewrap 0.8.0`.
     pub version: String,
-    /// It can forbid nested user namespaces, in addition to the seccomp filter.
+    /// Can this version forbid nested user namespaces (in addition to the seccomp filter, which forbids them, too)?
     disables_user_namespaces: bool,
 }
 
@@ -78,18 +77,18 @@ impl Bubblewrap {
         if let Some(found) = FOUND.get() {
             return Ok(found);
         }
-        let program = CANDIDATES
+        let program = PROGRAM_CANDIDATES
             .iter()
             .map(Path::new)
             .find(|path| path.is_file())
             .ok_or_else(|| SandboxError::Unavailable {
                 layer: Layer::Namespaces,
                 reason: format!(
-                    "bubblewrap is not installed ({}); install it: {CURE_INSTALL}",
-                    CANDIDATES.join(", ")
+                    "bubblewrap is not installed ({}); install it: {INSTALL_COMMAND}",
+                    PROGRAM_CANDIDATES.join(", ")
                 ),
             })?;
-        let ask = |option: &str| {
+        let output_of = |option: &str| {
             Command::new(program)
                 .arg(option)
                 .env_clear()
@@ -98,7 +97,7 @@ impl Bubblewrap {
                 .map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
                 .context(format_args!("cannot run {}", program.display()))
         };
-        let help = ask("--help")?;
+        let help = output_of("--help")?;
         for option in [
             "--add-seccomp-fd",
             "--size ",
@@ -118,14 +117,14 @@ impl Bubblewrap {
         }
         Ok(FOUND.get_or_init(|| Self {
             program: program.to_path_buf(),
-            version: ask("--version")
+            version: output_of("--version")
                 .map(|text| text.trim().to_owned())
                 .unwrap_or_default(),
             disables_user_namespaces: help.contains("--disable-userns"),
         }))
     }
 
-    /// The command line for `spec`, with the descriptors and mounts that the child needs. `private_mounts`:
+    /// The command line for `spec`, with the file descriptors and mounts that the child needs. `private_mounts` must be `true` if
     /// bubblewrap runs as a user that may be unable to reach the files by path.
     pub(crate) fn command(
         &self,
@@ -136,7 +135,7 @@ impl Bubblewrap {
     ) -> Result<Invocation, SandboxError> {
         let mut line = CommandLine {
             args: Vec::new(),
-            inherit: Vec::new(),
+            inherited_fds: Vec::new(),
             mounts: private_mounts.then(PrivateMounts::default),
         };
         line.args([
@@ -149,9 +148,9 @@ impl Bubblewrap {
         line.args([
             "--unshare-cgroup",
             "--uid",
-            INNER_ID,
+            ID_IN_SANDBOX,
             "--gid",
-            INNER_ID,
+            ID_IN_SANDBOX,
             "--hostname",
             "agent",
         ]);
@@ -180,7 +179,7 @@ impl Bubblewrap {
         line.args(["--proc", "/proc", "--dev", "/dev"]);
         line.hide_counters();
         let cpus = CpuView::new(&spec.cpus, &spec.limits);
-        line.freeze_counters(&cpus)?;
+        line.show_counter_snapshots(&cpus)?;
         // An image's root is read-only, so the folder for the CPU lists must be a new file system.
         if root.is_some() {
             line.args(["--perms", "0755", "--size", "65536", "--tmpfs", "/sys"]);
@@ -227,7 +226,7 @@ impl Bubblewrap {
         command.args(line.args).env_clear().current_dir("/");
         Ok(Invocation {
             command,
-            inherit: line.inherit,
+            inherited_fds: line.inherited_fds,
             mounts: line.mounts,
         })
     }
@@ -237,7 +236,7 @@ impl Bubblewrap {
 #[derive(Debug)]
 pub(crate) struct Invocation {
     pub command: Command,
-    pub inherit: Vec<OwnedFd>,
+    pub inherited_fds: Vec<OwnedFd>,
     pub mounts: Option<PrivateMounts>,
 }
 
@@ -260,7 +259,7 @@ pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)>
 
 struct CommandLine {
     args: Vec<OsString>,
-    inherit: Vec<OwnedFd>,
+    inherited_fds: Vec<OwnedFd>,
     mounts: Option<PrivateMounts>,
 }
 
@@ -269,30 +268,35 @@ impl CommandLine {
         self.args.extend(args.into_iter().map(OsString::from));
     }
 
+    /// Adds an option whose value is a file descriptor, which the child inherits.
     fn fd(&mut self, option: &str, fd: OwnedFd) {
         self.args.push(option.into());
         self.args.push(fd.as_raw_fd().to_string().into());
-        self.inherit.push(fd);
+        self.inherited_fds.push(fd);
     }
 
     /// Covers files that show the whole host or other agents, and that no agent needs.
     fn hide_counters(&mut self) {
-        for folder in HIDDEN_FOLDERS.into_iter().filter(|path| is_there(path)) {
+        for folder in HIDDEN_FOLDERS
+            .into_iter()
+            .filter(|path| is_in_sandbox(path))
+        {
             let cover = ["--perms", "0555", "--size", "4096", "--tmpfs", folder];
             self.args(cover.into_iter().chain(["--remount-ro", folder]));
         }
-        for file in HIDDEN_FILES.into_iter().filter(|path| is_there(path)) {
+        for file in HIDDEN_FILES.into_iter().filter(|path| is_in_sandbox(path)) {
             self.args(["--ro-bind", "/dev/null", file]);
         }
     }
 
-    fn freeze_counters(&mut self, cpus: &CpuView) -> Result<(), SandboxError> {
-        static FROZEN: OnceLock<Vec<(&str, Vec<u8>)>> = OnceLock::new();
-        let frozen = FROZEN.get_or_init(|| {
+    /// Mounts the snapshots over the host's counters.
+    fn show_counter_snapshots(&mut self, cpus: &CpuView) -> Result<(), SandboxError> {
+        static SNAPSHOTS: OnceLock<Vec<(&str, Vec<u8>)>> = OnceLock::new();
+        let snapshots = SNAPSHOTS.get_or_init(|| {
             let read = |path| Some((path, fs::read(path).ok()?));
-            FROZEN_FILES.into_iter().filter_map(read).collect()
+            SNAPSHOT_FILES.into_iter().filter_map(read).collect()
         });
-        for (path, content) in frozen {
+        for (path, content) in snapshots {
             self.cover(path, &cpus.filter_file(path, content))?;
         }
         Ok(())
@@ -307,6 +311,7 @@ impl CommandLine {
         Ok(())
     }
 
+    /// Creates a new file with `content`.
     fn file(&mut self, inside: &str, content: &[u8]) -> Result<(), SandboxError> {
         let fd = memory_file(content)?;
         self.args(["--perms", "0444"]);
@@ -357,7 +362,8 @@ fn check_mount_points(root: &Path) -> Result<(), SandboxError> {
     Ok(())
 }
 
-fn is_there(path: &str) -> bool {
+/// Does the sandbox have this path? It has the host's `/proc`; `/dev` is bubblewrap's own.
+fn is_in_sandbox(path: &str) -> bool {
     path.starts_with("/dev/") || Path::new(path).exists()
 }
 

@@ -1,11 +1,10 @@
 //! Run delay of the calling thread (the evaluator): how long it was runnable and did not run.
 //!
-//! Of all delays between question and answer, an agent on other CPUs cannot cause this one, with one exception:
-//! the thread that reads an agent's log runs on the evaluator's CPUs, as long as the agent writes. Its run time is
-//! subtracted.
+//! An agent on other CPUs cannot cause this delay between question and answer, with one exception: the thread that reads the agent's
+//! log runs on the evaluator's CPUs, as long as the agent writes. The run time of that thread is subtracted.
 
 use crate::{
-    cpu_counters::{Ticks, parse_ticks, ticks},
+    cpu_counters::{Ticks, parse_ticks, ticks_to_duration},
     sched_stat::SchedStat,
 };
 use std::{cell::RefCell, fs::File, time::Duration};
@@ -14,29 +13,29 @@ use std::{cell::RefCell, fs::File, time::Duration};
 /// meaning.
 #[derive(Debug, Clone, Default)]
 pub struct CallerCounters {
-    waited: Duration,
+    wait_time: Duration,
     /// Run time of the thread that reads the agent's log.
-    log_reader_ran: Duration,
+    log_reader_run_time: Duration,
     /// Counters of the CPUs that the calling thread may use.
     ticks: Vec<Ticks>,
 }
 
 thread_local! {
     /// `None` if the kernel has no such counters.
-    static SCHEDULE: RefCell<Option<File>> =
+    static SCHEDSTAT_FILE: RefCell<Option<File>> =
         RefCell::new(File::open("/proc/thread-self/schedstat").ok());
 }
 
 impl CallerCounters {
-    /// Reads the counters now. `stat` is the content of `/proc/stat`, just read by the caller, because that costs more
-    /// than all the rest. `cpus` are those that the thread may use.
-    pub(crate) fn read(stat: &str, cpus: &[usize], log_reader_ran: Duration) -> Self {
+    /// Reads the counters now. `stat` is the content of `/proc/stat`, just read by the caller, because reading it costs more than
+    /// all the rest. `cpus` are the CPUs that the thread may use.
+    pub(crate) fn read(stat: &str, cpus: &[usize], log_reader_run_time: Duration) -> Self {
         Self {
-            waited: SCHEDULE
+            wait_time: SCHEDSTAT_FILE
                 .with_borrow(|file| file.as_ref().and_then(SchedStat::read))
                 .unwrap_or_default()
-                .waited,
-            log_reader_ran,
+                .wait_time,
+            log_reader_run_time,
             ticks: parse_ticks(stat, cpus).unwrap_or_default(),
         }
     }
@@ -47,11 +46,13 @@ impl CallerCounters {
     pub fn run_delay_since(&self, before: &Self) -> Duration {
         let each = std::iter::zip(&before.ticks, &self.ticks);
         let stolen = each.map(|(before, now)| now.stolen.saturating_sub(before.stolen));
-        let log_reader_ran = self.log_reader_ran.saturating_sub(before.log_reader_ran);
-        self.waited
-            .saturating_sub(before.waited)
-            .saturating_sub(log_reader_ran)
-            + ticks(stolen.min().unwrap_or_default())
+        let log_reader_run_time = self
+            .log_reader_run_time
+            .saturating_sub(before.log_reader_run_time);
+        self.wait_time
+            .saturating_sub(before.wait_time)
+            .saturating_sub(log_reader_run_time)
+            + ticks_to_duration(stolen.min().unwrap_or_default())
     }
 }
 
@@ -66,8 +67,8 @@ mod tests {
 
     #[test]
     fn run_delay_behind_another_thread_is_counted() {
-        let cpu = affinity::allowed().unwrap()[0];
-        let over = AtomicBool::new(false);
+        let cpu = affinity::allowed_cpus().unwrap()[0];
+        let is_done = AtomicBool::new(false);
         thread::scope(|scope| {
             let pinned = scope.spawn(|| {
                 affinity::pin_current_thread(&[cpu]).unwrap();
@@ -75,11 +76,11 @@ mod tests {
                 let before = read();
                 // The other thread never sleeps and uses the same CPU.
                 while read().run_delay_since(&before) < Duration::from_millis(20) {}
-                over.store(true, Ordering::Relaxed);
+                is_done.store(true, Ordering::Relaxed);
             });
             scope.spawn(|| {
                 affinity::pin_current_thread(&[cpu]).unwrap();
-                while !over.load(Ordering::Relaxed) {
+                while !is_done.load(Ordering::Relaxed) {
                     std::hint::spin_loop();
                 }
             });
@@ -89,27 +90,30 @@ mod tests {
 
     #[test]
     fn run_time_of_the_log_reader_is_subtracted() {
-        let at = |waited_ms, ran_ms| CallerCounters {
-            waited: Duration::from_millis(waited_ms),
-            log_reader_ran: Duration::from_millis(ran_ms),
+        let counters = |waited_ms, ran_ms| CallerCounters {
+            wait_time: Duration::from_millis(waited_ms),
+            log_reader_run_time: Duration::from_millis(ran_ms),
             ticks: Vec::new(),
         };
         assert_eq!(
-            at(50, 0).run_delay_since(&at(10, 0)),
+            counters(50, 0).run_delay_since(&counters(10, 0)),
             Duration::from_millis(40)
         );
         assert_eq!(
-            at(50, 35).run_delay_since(&at(10, 5)),
+            counters(50, 35).run_delay_since(&counters(10, 5)),
             Duration::from_millis(10)
         );
-        assert_eq!(at(50, 95).run_delay_since(&at(10, 5)), Duration::ZERO);
+        assert_eq!(
+            counters(50, 95).run_delay_since(&counters(10, 5)),
+            Duration::ZERO
+        );
     }
 
     #[test]
     fn steal_time_counts_only_if_all_cpus_have_it() {
-        let stolen = |each: &[u64]| CallerCounters {
-            waited: Duration::ZERO,
-            log_reader_ran: Duration::ZERO,
+        let with_steal_ticks = |each: &[u64]| CallerCounters {
+            wait_time: Duration::ZERO,
+            log_reader_run_time: Duration::ZERO,
             ticks: each
                 .iter()
                 .map(|stolen| Ticks {
@@ -118,11 +122,14 @@ mod tests {
                 })
                 .collect(),
         };
-        let before = stolen(&[1, 5]);
+        let before = with_steal_ticks(&[1, 5]);
         assert_eq!(
-            stolen(&[4, 7]).run_delay_since(&before),
+            with_steal_ticks(&[4, 7]).run_delay_since(&before),
             Duration::from_millis(20)
         );
-        assert_eq!(stolen(&[4, 5]).run_delay_since(&before), Duration::ZERO);
+        assert_eq!(
+            with_steal_ticks(&[4, 5]).run_delay_since(&before),
+            Duration::ZERO
+        );
     }
 }

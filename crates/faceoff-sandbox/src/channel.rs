@@ -1,4 +1,5 @@
-//! The channel between service and agent: questions, answers, and the agent's log.
+//! The channel between service and agent: questions (lines to its standard input), answers (lines from its standard output), and its
+//! log (standard error).
 //!
 //! All three are stream sockets, never pipes. A pipe has a single lock, held by the thread that is inside a call
 //! on it. An agent can stay inside a call as long as it likes: in a `splice` from an empty socket, or in a `write`
@@ -26,9 +27,10 @@ use std::{
 };
 
 /// Buffer size for questions: no question is longer, and an `end` followed by a `reset` fits as well.
-const QUESTION_BYTES: usize = 64 << 10;
-/// Buffer size for unread log. One read may take all of it, and an agent may have written it byte by byte.
-const LOG_BYTES: usize = 16 << 10;
+const QUESTION_BUFFER_BYTES: usize = 64 << 10;
+/// Buffer size for the unread part of the log. One read may take all of it, and an agent may have written it byte by byte, which
+/// makes the read slow.
+const LOG_BUFFER_BYTES: usize = 16 << 10;
 
 /// The service's ends and the agent's ends.
 pub(crate) struct Channel {
@@ -43,23 +45,24 @@ pub(crate) struct Channel {
 impl Channel {
     pub(crate) fn new() -> Result<Self, SandboxError> {
         const ACTION: &str = "cannot make a channel to the agent";
-        let (stdin, input) = sockets().context(ACTION)?;
-        let (output, stdout) = sockets().context(ACTION)?;
-        let (log, stderr) = sockets().context(ACTION)?;
-        set_socket_send_buffer_size(&input, 2 * QUESTION_BYTES).context(ACTION)?;
+        let (stdin, input) = socket_pair().context(ACTION)?;
+        let (output, stdout) = socket_pair().context(ACTION)?;
+        let (log, stderr) = socket_pair().context(ACTION)?;
+        set_socket_send_buffer_size(&input, 2 * QUESTION_BUFFER_BYTES).context(ACTION)?;
         let size = socket_send_buffer_size(&input).context(ACTION)?;
-        if size < QUESTION_BYTES {
-            let reason = format!("it holds {size} bytes, {QUESTION_BYTES} are needed");
+        if size < QUESTION_BUFFER_BYTES {
+            let reason =
+                format!("the socket holds {size} bytes, {QUESTION_BUFFER_BYTES} are needed");
             return Err(SandboxError::other(ACTION, reason));
         }
-        set_socket_send_buffer_size(&stderr, LOG_BYTES).context(ACTION)?;
+        set_socket_send_buffer_size(&stderr, LOG_BUFFER_BYTES).context(ACTION)?;
         // Without this, bytes that an agent writes to its standard input would stay unread in the socket. The other
         // two sockets stay open in both directions: programs that poll their output for a hang-up would see one.
         shutdown(&input, Shutdown::Read).context(ACTION)?;
         for end in [&output, &log] {
             fd_passing::disable(end.as_fd());
         }
-        let output_name = name(&stdout).context(ACTION)?;
+        let output_name = socket_name(&stdout).context(ACTION)?;
         Ok(Self {
             lines: LineSocket::new(input, output),
             log,
@@ -69,7 +72,7 @@ impl Channel {
     }
 }
 
-fn sockets() -> io::Result<(OwnedFd, OwnedFd)> {
+fn socket_pair() -> io::Result<(OwnedFd, OwnedFd)> {
     Ok(socketpair(
         AddressFamily::UNIX,
         SocketType::STREAM,
@@ -78,7 +81,8 @@ fn sockets() -> io::Result<(OwnedFd, OwnedFd)> {
     )?)
 }
 
-fn name(socket: impl AsFd) -> io::Result<String> {
+/// The name of a socket in `/proc/*/fd`.
+fn socket_name(socket: impl AsFd) -> io::Result<String> {
     Ok(format!("socket:[{}]", fstat(socket)?.st_ino))
 }
 
@@ -98,7 +102,7 @@ mod tests {
             ..
         } = Channel::new().unwrap();
         assert!(output_name.starts_with("socket:["));
-        let question: Vec<u8> = (0..16 * QUESTION_BYTES)
+        let question: Vec<u8> = (0..16 * QUESTION_BUFFER_BYTES)
             .map(|i| b'a' + (i % 23) as u8)
             .collect();
         lines.send(&question).unwrap().unwrap();
@@ -136,7 +140,7 @@ mod tests {
     #[test]
     fn standard_input_cannot_be_written_to() {
         let Channel { agent_fds, .. } = Channel::new().unwrap();
-        // Rust's programs ignore the signal that comes with it.
+        // Rust programs ignore the signal SIGPIPE, which the kernel sends as well.
         assert_eq!(write(&agent_fds[0], b"x"), Err(Errno::PIPE));
     }
 }

@@ -1,4 +1,4 @@
-//! Set-up of the child between fork and exec.
+//! Set-up of the child process between fork and exec: cgroup, CPUs, mounts, limits, user and filters.
 
 use crate::{Limits, agent_user::AgentUser, private_mounts::PrivateMounts, seccomp::Filters};
 use rustix::{
@@ -19,13 +19,15 @@ use std::{
 pub(crate) struct ChildSetup {
     /// `cgroup.procs` files to enter by writing `0`.
     pub cgroup_procs: Vec<OwnedFd>,
+    /// CPUs on which the agent may run.
     pub cpus: Option<CpuSet>,
     pub rlimits: Vec<(Resource, Rlimit)>,
     /// Files made reachable for `user`, mounted while the child is still root.
     pub mounts: Option<PrivateMounts>,
+    /// The user that the child becomes.
     pub user: Option<AgentUser>,
-    /// Descriptors that survive the exec.
-    pub inherit: Vec<OwnedFd>,
+    /// File descriptors that stay open after the exec.
+    pub inherited_fds: Vec<OwnedFd>,
     /// Filters that the child installs itself; used without bubblewrap.
     pub filters: Option<Filters>,
     /// Makes the agent the first victim of the OOM killer when the host runs out of memory.
@@ -41,7 +43,7 @@ enum Step {
     MakeMounts,
     SetRlimits,
     BecomeUser,
-    Inherit,
+    PassDescriptors,
     DieWithParent,
     InstallFilters,
 }
@@ -54,7 +56,7 @@ impl Step {
         Self::MakeMounts,
         Self::SetRlimits,
         Self::BecomeUser,
-        Self::Inherit,
+        Self::PassDescriptors,
         Self::DieWithParent,
         Self::InstallFilters,
     ];
@@ -72,7 +74,7 @@ impl Step {
             }
             Self::SetRlimits => "cannot set the agent's resource limits",
             Self::BecomeUser => "cannot become the agent's user",
-            Self::Inherit => "cannot pass a descriptor to bubblewrap",
+            Self::PassDescriptors => "cannot pass a descriptor to bubblewrap",
             Self::DieWithParent => "cannot tie the agent to the service",
             Self::InstallFilters => "cannot install the seccomp filter",
         }
@@ -133,6 +135,7 @@ impl ChildSetup {
                 OFlags::WRONLY | OFlags::CLOEXEC,
                 Mode::empty(),
             );
+            // The highest score, killed first, is 1000.
             let _ = file.and_then(|file| write(&file, b"800"));
         }
         if let Some(mounts) = &mut self.mounts {
@@ -147,10 +150,10 @@ impl ChildSetup {
             user.switch_to()
                 .map_err(|error| (Step::BecomeUser, error))?;
         }
-        for fd in &self.inherit {
-            fcntl_setfd(fd, FdFlags::empty()).map_err(|error| (Step::Inherit, error))?;
+        for fd in &self.inherited_fds {
+            fcntl_setfd(fd, FdFlags::empty()).map_err(|error| (Step::PassDescriptors, error))?;
         }
-        // After the change of user, which clears the signal. If the service died before this call, no signal
+        // This must follow the change of user, which would clear the signal. If the service died before this call, no signal
         // comes; the parent is then another process.
         process::set_parent_process_death_signal(Some(Signal::KILL))
             .map_err(|error| (Step::DieWithParent, error))?;
@@ -170,13 +173,13 @@ impl ChildSetup {
 /// Agents must not inherit descriptors that the service was started with or that a library opened without
 /// `CLOEXEC`.
 fn close_rest_on_exec() -> Result<(), Errno> {
-    const FIRST: libc::c_uint = 3;
+    const FIRST_FD: libc::c_uint = 3;
     #[expect(unsafe_code, reason = "rustix has no close_range")]
     // SAFETY: takes three numbers; it marks descriptors and closes none, so no open descriptor becomes invalid.
     let result = unsafe {
         libc::syscall(
             libc::SYS_close_range,
-            FIRST,
+            FIRST_FD,
             libc::c_uint::MAX,
             libc::CLOSE_RANGE_CLOEXEC,
         )
@@ -197,9 +200,12 @@ fn errno_of(error: &seccompiler::Error) -> Errno {
     }
 }
 
-/// The resource limits of an agent, each capped at the service's own hard limit.
-pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)> {
+/// The resource limits of an agent, each capped at the service's own hard limit. `has_own_user`: no other process runs as the
+/// agent's user.
+pub(crate) fn rlimits(limits: &Limits, has_own_user: bool) -> Vec<(Resource, Rlimit)> {
+    /// Memory that cannot be swapped; the usual default.
     const LOCKED_BYTES: u64 = 8 << 20;
+    /// The usual default.
     const STACK_BYTES: u64 = 8 << 20;
     /// Queued signals. Each timer of `timer_create` holds one, so this bounds the timers that can expire at one
     /// instant.
@@ -217,7 +223,7 @@ pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)
         (Resource::Nice, 0),
         (Resource::Rtprio, 0),
     ];
-    if own_user {
+    if has_own_user {
         // The kernel counts this limit per user, so it is useful only if each agent has its own user. It is a
         // little above the cgroup's limit, which must be reached first because it is counted and reported.
         wanted.push((Resource::Nproc, u64::from(limits.pids) + 8));

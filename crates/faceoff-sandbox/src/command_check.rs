@@ -7,8 +7,8 @@ use rustix::{
 };
 use std::{collections::BTreeMap, path::Path};
 
-/// Far below the kernel's limits (128 KiB and 2 MiB), so that bubblewrap's longer command line never exceeds
-/// them.
+/// Limits of a single argument or variable and of all together, far below the kernel's (128 KiB and 2 MiB), so that bubblewrap's
+/// longer command line never exceeds those.
 const MAX_WORD_BYTES: usize = 32 << 10;
 const MAX_TOTAL_BYTES: usize = 256 << 10;
 
@@ -43,15 +43,15 @@ pub(crate) fn check_command(
              {MAX_TOTAL_BYTES} in all"
         ));
     }
-    let in_bundle = match program.strip_prefix("/agent/") {
+    let path_in_bundle = match program.strip_prefix("/agent/") {
         Some(rest) => rest.trim_start_matches('/'),
         None if program.starts_with('/') || !program.contains('/') => return Ok(()),
         None => program.as_str(),
     };
-    if climbs_out(in_bundle) {
+    if climbs_out(path_in_bundle) {
         return refuse(format!("`{program}` leads out of the bundle"));
     }
-    let found = match stat_beneath(bundle_dir, in_bundle) {
+    let found = match stat_beneath(bundle_dir, path_in_bundle) {
         Ok(found) => found,
         Err(Errno::NOENT | Errno::NOTDIR | Errno::NAMETOOLONG) => {
             return refuse(format!("`{program}` is not in the bundle"));
@@ -132,7 +132,7 @@ mod tests {
         symlink("..", bundle.join("up")).unwrap();
         symlink(host.path(), bundle.join("host")).unwrap();
         symlink("../secret", bundle.join("link")).unwrap();
-        for place in [
+        for path_prefix in [
             "../",
             "./../",
             "bin/../../",
@@ -145,11 +145,11 @@ mod tests {
             "/agent/host/",
         ] {
             let messages = ["secret", "missing", "secret/x"].map(|name| {
-                let message = check(&bundle, &format!("{place}{name}"));
+                let message = check(&bundle, &format!("{path_prefix}{name}"));
                 message.map(|message| message.replace(name, "NAME"))
             });
-            assert_eq!(messages[0], messages[1], "{place}");
-            assert_eq!(messages[0], messages[2], "{place}");
+            assert_eq!(messages[0], messages[1], "{path_prefix}");
+            assert_eq!(messages[0], messages[2], "{path_prefix}");
         }
         let absolute = host.path().join("secret").display().to_string();
         for program in [&*absolute, "/etc/shadow", "//agent/../etc/shadow", "./link"] {

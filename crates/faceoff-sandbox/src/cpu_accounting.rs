@@ -1,6 +1,6 @@
-//! Accounting of other run time on an agent's CPUs, by the kernel's own counters, which no agent can manipulate.
-//! The interrupts of an agent's timers, its threads and its page faults are never included: the kernel counts them
-//! as the agent's own time, or not at all.
+//! Measures *host interference*: the time in which an agent was ready to run, but other processes ran on its CPUs. It uses the
+//! kernel's own counters, which no agent can manipulate. The interrupts of an agent's timers, its threads and its page faults are never
+//! included: the kernel counts them as the agent's own time, or not at all.
 //!
 //! Cgroup version 1 counts per CPU and in nanoseconds, both for all processes and for the agent. Version 2 counts
 //! only the agent's own time. The total then comes from `/proc/stat`, in ticks of 10 ms. Rounding of ticks is always
@@ -21,13 +21,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Maximum lag of the counters: the kernel charges a running thread at its next tick, at least 100 times a second.
-const LAG: Duration = Duration::from_millis(10);
+/// Maximum lag of the counters behind the true run time: the kernel charges a running thread at its next tick, at least 100 times a second.
+const MAX_COUNTER_LAG: Duration = Duration::from_millis(10);
 
-/// Counters read right before a question. Reading them takes a few microseconds.
+/// Counters read right before a question (a message to the agent that expects an answer). Reading them takes a few microseconds.
 #[derive(Debug, Clone)]
 pub struct Baseline {
-    pub at: Instant,
+    /// When the counters were read.
+    pub read_at: Instant,
     /// Counters of the agent's CPUs, without the states of its threads. `None` without a cgroup, or if the kernel
     /// counts in ticks only.
     pub cpus: Option<CpuReading>,
@@ -40,13 +41,15 @@ pub struct Baseline {
 pub(crate) struct CpuAccounting {
     /// The CPUs that the agent may use.
     pub cpus: Vec<usize>,
-    pub run_time: RunTime,
+    /// The counters of run time.
+    pub run_time: RunTimeFiles,
     /// The agent's `cpu.stat`, for the time in which its own quota throttled it.
     pub throttled: Option<File>,
 }
 
+/// The open files with the counters of run time.
 #[derive(Debug)]
-pub(crate) enum RunTime {
+pub(crate) enum RunTimeFiles {
     /// `cpuacct.usage_percpu` of all processes and of the agent.
     PerCpu { all: File, agent: File },
     /// The agent's `cpu.stat`.
@@ -77,19 +80,20 @@ pub struct CpuSamples {
     first: CpuReading,
     /// `None` if there is only one sample.
     last: Option<CpuReading>,
+    /// Waits of the agent's threads, as the samples show them.
     ledger: WaitLedger,
 }
 
 impl CpuSamples {
-    /// Starts with the first sample. `asked`: time of the question, after the `baseline` was read.
+    /// Starts with the first sample. `asked_at` is the time of the question, shortly after the `baseline` was read.
     #[must_use]
-    pub fn begin(first: CpuReading, baseline: Option<&CpuReading>, asked: Instant) -> Self {
+    pub fn begin(first: CpuReading, baseline: Option<&CpuReading>, asked_at: Instant) -> Self {
         let mut ledger = WaitLedger::default();
         if let (Some(now), Some(baseline)) = (&first.waits, baseline)
             && let Some(earlier) = &baseline.waits
         {
-            let stolen =
-                stolen_time(baseline, &first).min(first.at.saturating_duration_since(asked));
+            let stolen = stolen_time(baseline, &first)
+                .min(first.read_at.saturating_duration_since(asked_at));
             ledger.begin(earlier, now, stolen);
         }
         Self {
@@ -115,38 +119,38 @@ impl CpuAccounting {
         self.read(ReadOrder::AgentFirst, threads)
     }
 
-    /// Reads the counters that take only a few microseconds, as the start of a span: of tracked threads only. `None` if
-    /// the host has none, or counts in ticks only.
+    /// Reads those counters that take only a few microseconds, as the start of a span; of threads, only the tracked ones. `None` if
+    /// the host has no such counters, or counts in ticks only.
     pub(crate) fn read_baseline(&self, threads: &TrackedThreads, stat: &str) -> Option<CpuReading> {
-        let RunTime::PerCpu { all, .. } = &self.run_time else {
+        let RunTimeFiles::PerCpu { all, .. } = &self.run_time else {
             return None;
         };
         Some(CpuReading {
-            agent: self.agent_run_time()?,
-            clocks: Duration::ZERO,
-            all: sum_of_cpus(&read_text(all)?, &self.cpus)?,
+            agent_run_time: self.agent_run_time()?,
+            agent_clock_time: Duration::ZERO,
+            total_run_time: sum_of_cpus(&read_text(all)?, &self.cpus)?,
             throttled: self.throttled(),
             ticks: parse_ticks(stat, &self.cpus)?,
             waits: Some(threads.read_counters()?),
-            at: Instant::now(),
+            read_at: Instant::now(),
         })
     }
 
-    /// Host interference since the question (`asked`): the longest run delay that the samples or the baseline prove,
+    /// Host interference since the question (`asked_at`): the longest run delay that the samples or the baseline prove,
     /// and the steal time since the earlier of them.
     pub(crate) fn interference_since(
         &self,
-        asked: Instant,
+        asked_at: Instant,
         samples: Option<&CpuSamples>,
         baseline: Option<&CpuReading>,
         threads: &TrackedThreads,
         answer: AnswerState,
     ) -> Option<HostInterference> {
         let now = self.read(ReadOrder::OthersFirst, threads)?;
-        let none = WaitLedger::default();
+        let empty_ledger = WaitLedger::default();
         let estimator = InterferenceEstimator {
-            precise: matches!(self.run_time, RunTime::PerCpu { .. }),
-            ledger: samples.map_or(&none, |samples| &samples.ledger),
+            is_precise: matches!(self.run_time, RunTimeFiles::PerCpu { .. }),
+            ledger: samples.map_or(&empty_ledger, |samples| &samples.ledger),
             answer,
         };
         let first = samples.map(|samples| &samples.first);
@@ -158,16 +162,20 @@ impl CpuAccounting {
         // The kernel may charge other processes after the baseline for time that they ran before it, and their time
         // between the baseline and the question did not delay the answer. Both are subtracted.
         let since_baseline = baseline.map(|baseline| {
-            let age = asked.saturating_duration_since(baseline.at);
+            let baseline_age = asked_at.saturating_duration_since(baseline.read_at);
             let ran = estimator
                 .others_time(baseline, &now)
-                .saturating_sub(LAG + age);
-            ran.max(estimator.run_delay(baseline, &now).saturating_sub(age))
+                .saturating_sub(MAX_COUNTER_LAG + baseline_age);
+            ran.max(
+                estimator
+                    .run_delay(baseline, &now)
+                    .saturating_sub(baseline_age),
+            )
         });
         // The baseline is the earlier reading, so it covers the longer span.
-        let from = baseline.or(first);
-        let max_interference = from
-            .map(|from| upper_bound(from, &now, estimator.precise))
+        let earliest = baseline.or(first);
+        let max_interference = earliest
+            .map(|earliest| upper_bound(earliest, &now, estimator.is_precise))
             .unwrap_or_default();
         let observed_wait = match &now.waits {
             Some(now) => estimator
@@ -181,31 +189,33 @@ impl CpuAccounting {
                 .max(since_baseline)
                 .unwrap_or_default()
                 .max(observed_wait),
-            stolen: from.map(|from| stolen_time(from, &now)).unwrap_or_default(),
+            stolen: earliest
+                .map(|earliest| stolen_time(earliest, &now))
+                .unwrap_or_default(),
         })
     }
 
     fn read(&self, order: ReadOrder, threads: &TrackedThreads) -> Option<CpuReading> {
-        let mut at = Instant::now();
-        let mut agent = Duration::ZERO;
+        let mut read_at = Instant::now();
+        let mut agent_run_time = Duration::ZERO;
         if order == ReadOrder::AgentFirst {
-            agent = self.agent_run_time()?;
+            agent_run_time = self.agent_run_time()?;
         }
-        let all = match &self.run_time {
-            RunTime::PerCpu { all, .. } => sum_of_cpus(&read_text(all)?, &self.cpus)?,
-            RunTime::Whole { .. } => Duration::ZERO,
+        let total_run_time = match &self.run_time {
+            RunTimeFiles::PerCpu { all, .. } => sum_of_cpus(&read_text(all)?, &self.cpus)?,
+            RunTimeFiles::Whole { .. } => Duration::ZERO,
         };
         let ticks = parse_ticks(&fs::read_to_string("/proc/stat").ok()?, &self.cpus)?;
         if order == ReadOrder::OthersFirst {
-            agent = self.agent_run_time()?;
+            agent_run_time = self.agent_run_time()?;
         } else {
-            at = Instant::now();
+            read_at = Instant::now();
         }
         Some(CpuReading {
-            at,
-            agent,
-            clocks: cpu_clock::total_run_time(threads.processes()),
-            all,
+            read_at,
+            agent_run_time,
+            agent_clock_time: cpu_clock::total_run_time(threads.processes()),
+            total_run_time,
             throttled: self.throttled(),
             ticks,
             waits: threads.sample(),
@@ -221,8 +231,8 @@ impl CpuAccounting {
     /// Run time of the agent on its CPUs.
     fn agent_run_time(&self) -> Option<Duration> {
         match &self.run_time {
-            RunTime::PerCpu { agent, .. } => sum_of_cpus(&read_text(agent)?, &self.cpus),
-            RunTime::Whole { agent } => parse_usage(&read_text(agent)?),
+            RunTimeFiles::PerCpu { agent, .. } => sum_of_cpus(&read_text(agent)?, &self.cpus),
+            RunTimeFiles::Whole { agent } => parse_usage(&read_text(agent)?),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! CPU time by the processes' own clocks: for a tree without a cgroup, and where the cgroup's counter lags behind.
+//! CPU time of a process tree by its processes' own clocks. It is used without a cgroup, and where the cgroup's counter lags behind.
 
 use rustix::process::Pid;
 use std::{cell::RefCell, collections::BTreeMap, fs, time::Duration};
@@ -8,34 +8,34 @@ use std::{cell::RefCell, collections::BTreeMap, fs, time::Duration};
 #[derive(Debug)]
 pub(crate) struct TreeClock {
     root: Pid,
-    seen: RefCell<BTreeMap<i32, u64>>,
+    time_ns_by_pid: RefCell<BTreeMap<i32, u64>>,
 }
 
 impl TreeClock {
     pub(crate) const fn new(root: Pid) -> Self {
         Self {
             root,
-            seen: RefCell::new(BTreeMap::new()),
+            time_ns_by_pid: RefCell::new(BTreeMap::new()),
         }
     }
 
-    /// Seconds so far; `None` if the host does not report it.
+    /// CPU time so far, in seconds; `None` if the host does not report it.
     pub(crate) fn cpu_time_s(&self) -> Option<f64> {
-        let mut seen = self.seen.borrow_mut();
-        let mut open = vec![self.root.as_raw_nonzero().get()];
-        while let Some(pid) = open.pop() {
+        let mut time_ns_by_pid = self.time_ns_by_pid.borrow_mut();
+        let mut pending_pids = vec![self.root.as_raw_nonzero().get()];
+        while let Some(pid) = pending_pids.pop() {
             if let Some(now) = process_clock_ns(pid) {
-                let known = seen.entry(pid).or_default();
-                *known = now.max(*known);
+                let recorded = time_ns_by_pid.entry(pid).or_default();
+                *recorded = now.max(*recorded);
             }
-            open.extend(children(pid));
+            pending_pids.extend(children(pid));
         }
-        let sum: u64 = seen.values().sum();
-        (!seen.is_empty()).then_some(sum as f64 * 1e-9)
+        let sum: u64 = time_ns_by_pid.values().sum();
+        (!time_ns_by_pid.is_empty()).then_some(sum as f64 * 1e-9)
     }
 }
 
-/// CPU time of the living processes among these up to now, including the time slices that run at this moment.
+/// Total CPU time of those of the processes that are alive, including their current time slices.
 pub(crate) fn total_run_time(processes: &[Pid]) -> Duration {
     let each = processes
         .iter()

@@ -1,8 +1,8 @@
-//! Parsers of the kernel's run time counters.
+//! Parsers of the kernel's counters of CPU time.
 
 use std::{fs::File, os::unix::fs::FileExt, time::Duration};
 
-/// 1 / `USER_HZ`, the same on every architecture that the seccomp filter supports.
+/// Unit of the counters in `/proc/stat`: 1 / `USER_HZ`, the same on every architecture that the seccomp filter supports.
 const TICK: Duration = Duration::from_millis(10);
 
 /// Counters of one CPU since the host's start, in ticks.
@@ -16,7 +16,7 @@ pub(crate) struct Ticks {
     pub stolen: u64,
 }
 
-pub(crate) fn ticks(count: u64) -> Duration {
+pub(crate) fn ticks_to_duration(count: u64) -> Duration {
     TICK * u32::try_from(count).unwrap_or(u32::MAX)
 }
 
@@ -40,7 +40,7 @@ pub(crate) fn sum_of_cpus(text: &str, cpus: &[usize]) -> Option<Duration> {
 
 /// The counters of `cpus` in `/proc/stat`.
 pub(crate) fn parse_ticks(stat: &str, cpus: &[usize]) -> Option<Vec<Ticks>> {
-    let one = |cpu: &usize| {
+    let ticks_of = |cpu: &usize| {
         let name = format!("cpu{cpu} ");
         let line = stat.lines().find_map(|line| line.strip_prefix(&name))?;
         let numbers: Vec<u64> = line
@@ -56,22 +56,23 @@ pub(crate) fn parse_ticks(stat: &str, cpus: &[usize]) -> Option<Vec<Ticks>> {
             stolen,
         })
     };
-    cpus.iter().map(one).collect()
+    cpus.iter().map(ticks_of).collect()
 }
 
 /// Throttled time in `cpu.stat` of either cgroup version.
 pub(crate) fn parse_throttled(stat: &str) -> Option<Duration> {
-    keyed(stat, "throttled_usec")
+    number_of_key(stat, "throttled_usec")
         .map(Duration::from_micros)
-        .or_else(|| keyed(stat, "throttled_time").map(Duration::from_nanos))
+        .or_else(|| number_of_key(stat, "throttled_time").map(Duration::from_nanos))
 }
 
 /// Run time of a whole cgroup in `cpu.stat` of cgroup version 2.
 pub(crate) fn parse_usage(stat: &str) -> Option<Duration> {
-    keyed(stat, "usage_usec").map(Duration::from_micros)
+    number_of_key(stat, "usage_usec").map(Duration::from_micros)
 }
 
-fn keyed(text: &str, key: &str) -> Option<u64> {
+/// The number after `key` at the start of a line.
+fn number_of_key(text: &str, key: &str) -> Option<u64> {
     text.lines()
         .find_map(|line| line.strip_prefix(key)?.trim().parse().ok())
 }

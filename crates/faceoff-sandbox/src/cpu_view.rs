@@ -1,7 +1,7 @@
 //! The CPUs that an agent sees: exactly those that it may run on, in every interface.
 //!
-//! Libraries count CPUs in `/sys`, in `/proc`, by affinity or by a variable, and start a thread for each. If
-//! these disagree, threads wait for each other on one CPU, or try to bind to forbidden CPUs and fail.
+//! Libraries count CPUs in `/sys`, in `/proc`, by affinity or by an environment variable, and start a thread for each. If these
+//! counts disagree, threads wait for each other on one CPU, or try to bind to forbidden CPUs and fail.
 
 use crate::{
     Limits,

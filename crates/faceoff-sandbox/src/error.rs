@@ -1,3 +1,5 @@
+//! Errors of the sandbox: platform faults, and failures to start an agent or to write to it.
+
 use crate::Layer;
 use faceoff_types::AgentFaultKind;
 use std::{fmt, io};

@@ -31,7 +31,7 @@ pub(crate) struct ExitReport<'a> {
 const EXEC_FAILED: &str = "bwrap: execvp ";
 
 impl ExitReport<'_> {
-    /// Classifies the end; the verdict on the agent follows elsewhere.
+    /// Classifies the end; whether the agent is at fault for its task is decided by the caller.
     pub(crate) fn cause(&self) -> ExitCause {
         match self.sandboxed_exit {
             Some(Some(code)) => self.classify_exit_code(code),
@@ -120,6 +120,7 @@ impl ExitReport<'_> {
 mod tests {
     use super::*;
 
+    /// `status` is a raw wait status: the exit code times 256, or the number of the signal.
     fn cause(
         sandboxed_exit: Option<Option<i32>>,
         status: i32,
@@ -142,7 +143,7 @@ mod tests {
     fn failed_exec_is_agent_fault_and_failed_mount_is_not() {
         let agent = cause(
             Some(None),
-            256,
+            1 << 8,
             None,
             "bwrap: execvp ./x: No such file or directory\n",
         );
@@ -154,7 +155,7 @@ mod tests {
         );
         let platform = cause(
             Some(None),
-            256,
+            1 << 8,
             None,
             "bwrap: Can't mount proc on /newroot/proc: Operation not permitted\n",
         );

@@ -1,4 +1,4 @@
-//! Refuses descriptors that an agent sends along with its output. The service has no use for them, and closing one
+//! Refuses file descriptors that an agent sends through the socket of its output. The service has no use for them, and closing one
 //! could take long.
 
 use std::os::fd::{AsRawFd, BorrowedFd};
@@ -13,7 +13,7 @@ pub(crate) fn disable(socket: BorrowedFd<'_>) {
     let size = size_of_val(&off) as libc::socklen_t;
     #[expect(unsafe_code, reason = "rustix does not know the option")]
     // SAFETY: the kernel reads the number at this address, and keeps no reference.
-    let set = unsafe {
+    let result = unsafe {
         libc::setsockopt(
             socket.as_raw_fd(),
             libc::SOL_SOCKET,
@@ -22,7 +22,7 @@ pub(crate) fn disable(socket: BorrowedFd<'_>) {
             size,
         )
     };
-    if set != 0 {
+    if result != 0 {
         tracing::debug!("this kernel cannot refuse descriptors sent by agents");
     }
 }
@@ -59,7 +59,7 @@ mod tests {
             &mut passed,
             SendFlags::empty(),
         );
-        // An older kernel takes it.
+        // An older kernel accepts the descriptor.
         assert!(matches!(sent, Err(Errno::PERM) | Ok(1)), "{sent:?}");
     }
 }

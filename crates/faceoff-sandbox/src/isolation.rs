@@ -1,3 +1,5 @@
+//! The layers of isolation between an agent and the host, and which of them to apply.
+
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -52,10 +54,10 @@ impl fmt::Display for Layer {
 /// Which isolation to apply.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Isolation {
-    /// All layers except those given up.
+    /// All layers except the disabled ones.
     Sandboxed {
-        /// Layers that the organiser has disabled. Empty: all layers are enforced.
-        given_up: Vec<Layer>,
+        /// Layers that the organiser has disabled (`given_up` in the configuration). Empty: all layers are enforced.
+        disabled_layers: Vec<Layer>,
     },
     /// A developer's own agent: no namespaces, no seccomp, no cgroup, no resource limits, and the caller's
     /// environment. Its process group, deadlines, line caps and reaping remain.
@@ -66,7 +68,7 @@ impl Isolation {
     /// Is `layer` to be enforced?
     pub fn enforces(&self, layer: Layer) -> bool {
         match self {
-            Self::Sandboxed { given_up } => !given_up.contains(&layer),
+            Self::Sandboxed { disabled_layers } => !disabled_layers.contains(&layer),
             Self::None => false,
         }
     }

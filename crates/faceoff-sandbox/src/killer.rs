@@ -1,3 +1,5 @@
+//! A handle with which any thread can kill an agent.
+
 use crate::cgroup;
 use rustix::process::{Signal, pidfd_send_signal};
 use std::{os::fd::OwnedFd, path::PathBuf};
@@ -6,7 +8,7 @@ use std::{os::fd::OwnedFd, path::PathBuf};
 /// the [`crate::AgentProcess`] still reaps the tree.
 #[derive(Debug)]
 pub struct Killer {
-    /// The sandbox's first process, whose end terminates all others in it, and the service's child.
+    /// Pidfds of the sandbox's first process, whose end terminates all others in it, and of the service's child.
     pub(crate) processes: Vec<OwnedFd>,
     pub(crate) cgroups: Vec<PathBuf>,
 }

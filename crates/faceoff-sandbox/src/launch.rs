@@ -27,7 +27,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Limit for bubblewrap's set-up of a sandbox; beyond it, the host has failed.
+/// Time limit for bubblewrap's set-up of a sandbox. Exceeding it is a platform fault.
 const SET_UP_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// A running process tree, and the service's ends of its channel.
@@ -50,13 +50,13 @@ pub(crate) struct Launch {
 }
 
 impl Launch {
-    /// Creates the cgroup, the filters and the command line.
+    /// Creates the channel, the cgroup, the filters and the command line.
     pub(crate) fn new(spec: &SpawnSpec) -> Result<Self, SandboxError> {
         if spec.runtime.root().is_some() && !spec.isolation.enforces(Layer::Namespaces) {
             return Err(SandboxError::Unavailable {
                 layer: Layer::Namespaces,
-                reason: "it is given up, and the agent is a container image, whose files are a root of their own, \
-                      which this layer alone can give; keep the layer"
+                reason: "the layer is disabled, and the agent is a container image, whose files become its root folder, \
+                      which only this layer can do; enable the layer"
                     .to_owned(),
             });
         }
@@ -93,7 +93,7 @@ impl Launch {
             let (status, writer) = StatusPipe::new().context("cannot make a pipe")?;
             let invocation =
                 Bubblewrap::find()?.command(spec, writer, filters.as_ref(), user.is_some())?;
-            setup.inherit = invocation.inherit;
+            setup.inherited_fds = invocation.inherited_fds;
             setup.mounts = invocation.mounts;
             let command = invocation.command;
             return Ok(Self {
@@ -169,9 +169,10 @@ impl Launch {
             Ok(child) => child,
             Err(source) => return Err(start_failure(report, source, is_sandboxed, spec)),
         };
-        const WATCH: &str = "cannot watch the agent";
-        let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH)?;
-        let mut stderr = StderrTail::drain(log, spec.limits.stderr_tail_bytes).context(WATCH)?;
+        const WATCH_ACTION: &str = "cannot watch the agent";
+        let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH_ACTION)?;
+        let mut stderr =
+            StderrTail::drain(log, spec.limits.stderr_tail_bytes).context(WATCH_ACTION)?;
         if let Some(status) = &mut tree.status {
             match status.wait_for_child(Instant::now() + SET_UP_TIMEOUT)? {
                 Some(init) => tree.watch_init(init),
@@ -222,9 +223,9 @@ fn check_reachable(bundle_dir: &Path) -> Result<(), SandboxError> {
             return Err(SandboxError::Unavailable {
                 layer: Layer::Namespaces,
                 reason: format!(
-                    "it is given up, so an agent of this root service, which is another user, would have to \
+                    "the layer is disabled, so an agent of this root service, which is another user, would have to \
                      reach its bundle through {}, which is closed to others; run the service as an ordinary \
-                     user, or keep the layer",
+                     user, or enable the layer",
                     folder.display()
                 ),
             });
@@ -234,13 +235,14 @@ fn check_reachable(bundle_dir: &Path) -> Result<(), SandboxError> {
 }
 
 fn scratch_folder(user: Option<AgentUser>) -> Result<tempfile::TempDir, SandboxError> {
-    const MAKE: &str = "cannot make a scratch folder";
+    const MAKE_ACTION: &str = "cannot make a scratch folder";
     let folder = tempfile::Builder::new()
         .prefix(&Owner::this_process().name_prefix(SCRATCH_PREFIX))
         .tempdir()
-        .context(MAKE)?;
+        .context(MAKE_ACTION)?;
     if let Some(user) = user {
-        std::os::unix::fs::chown(folder.path(), Some(user.id), Some(user.id)).context(MAKE)?;
+        std::os::unix::fs::chown(folder.path(), Some(user.id), Some(user.id))
+            .context(MAKE_ACTION)?;
     }
     Ok(folder)
 }

@@ -53,7 +53,7 @@ pub use faceoff_types::ResourceLimits as Limits;
 pub use isolation::{Isolation, Layer};
 pub use killer::Killer;
 pub use line_socket::ReadLine;
-pub use memory_image::{MEMORY, MemoryImage, MemoryImageError};
+pub use memory_image::{MEMORY_FOLDER, MemoryImage, MemoryImageError};
 pub use probe::{HostFeature, probe_host};
 pub use process::{AgentProcess, Usage};
 pub use runtime::{Runtime, RuntimeFiles};

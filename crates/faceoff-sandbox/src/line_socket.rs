@@ -1,4 +1,5 @@
-//! Lines to and from the agent: capped, with deadlines, answers timestamped right after their last byte.
+//! Lines to and from the agent. Lines have a maximum length, reads have deadlines, and an answer's time is taken right after its last
+//! byte.
 //!
 //! A write never blocks, so that all waiting time is measured. Bytes that do not fit into the agent's input
 //! buffer are kept and sent while the service waits for the answer.
@@ -28,16 +29,16 @@ pub enum ReadLine {
         /// Without the newline.
         bytes: Vec<u8>,
         /// Time at which its last byte had been read.
-        at: Instant,
+        received_at: Instant,
     },
-    /// The line exceeds the cap. The stream is out of step: end the agent.
+    /// The line exceeds the maximum length. The caller must end the agent, since the rest of the line would be read as the next one.
     TooLong {
         /// The first bytes of the line, at most 1 KiB.
         head: Vec<u8>,
     },
     /// The deadline has passed; the received part of the line is kept.
     TimedOut,
-    /// End of output; `diagnose_end()` returns the exit status.
+    /// End of output; [`AgentProcess::diagnose_end`](crate::AgentProcess::diagnose_end) returns the reason.
     Closed,
 }
 
@@ -50,12 +51,12 @@ pub(crate) struct Closed;
 pub(crate) struct LineSocket {
     input: OwnedFd,
     /// The agent's input has been shut down.
-    is_shut: bool,
+    is_input_ended: bool,
     /// Bytes that did not fit into the socket yet.
     unsent: Vec<u8>,
     output: OwnedFd,
     /// Buffer of one read.
-    chunk: Box<[u8]>,
+    read_buffer: Box<[u8]>,
     /// From `start` on: bytes that have been read and not returned yet.
     buffer: Vec<u8>,
     start: usize,
@@ -68,10 +69,10 @@ impl LineSocket {
     pub(crate) fn new(input: OwnedFd, output: OwnedFd) -> Self {
         Self {
             input,
-            is_shut: false,
+            is_input_ended: false,
             unsent: Vec::new(),
             output,
-            chunk: vec![0; READ_BYTES].into(),
+            read_buffer: vec![0; READ_BYTES].into(),
             buffer: Vec::with_capacity(2 * READ_BYTES),
             start: 0,
             searched: 0,
@@ -82,7 +83,7 @@ impl LineSocket {
     /// Ends the agent's standard input. The socket stays open until the agent is dead, because closing it may take
     /// long.
     pub(crate) fn end_input(&mut self) {
-        self.is_shut = true;
+        self.is_input_ended = true;
         self.unsent.clear();
         if let Err(error) = shutdown(&self.input, Shutdown::Write) {
             tracing::debug!(%error, "an agent's input is ended already");
@@ -111,7 +112,7 @@ impl LineSocket {
 
     /// Writes until the socket is full; returns the number of written bytes.
     fn write(&self, bytes: &[u8]) -> io::Result<Result<usize, Closed>> {
-        if self.is_shut {
+        if self.is_input_ended {
             return Ok(Err(Closed));
         }
         let mut sent = 0;
@@ -144,21 +145,21 @@ impl LineSocket {
             if let Some(outcome) = self.take_line(max_bytes) {
                 return Ok(outcome);
             }
-            let ready = if may_be_ready {
+            let is_ready = if may_be_ready {
                 true
             } else if self.is_all_sent() {
                 wait_for(self.output.as_fd(), PollFlags::IN, deadline)?
             } else {
-                wait_for_any(&mut self.awaited(), deadline)?
+                wait_for_any(&mut self.poll_fds(), deadline)?
             };
             may_be_ready = false;
-            if !ready {
+            if !is_ready {
                 return Ok(ReadLine::TimedOut);
             }
             if !self.fill()? {
                 return Ok(ReadLine::Closed);
             }
-            // Return a complete line before sending the rest of the question: it cannot be the answer to it.
+            // Return a complete line before sending the rest of the question: the line cannot be the answer to it.
             if self.has_line() {
                 continue;
             }
@@ -172,19 +173,19 @@ impl LineSocket {
         }
     }
 
-    /// Busy-polls for output until `until`: waking up from sleep takes longer than many answers.
-    pub(crate) fn spin_until(&mut self, until: Instant) -> io::Result<()> {
+    /// Busy-polls for output until `deadline`: waking up from sleep takes longer than many answers.
+    pub(crate) fn spin_until(&mut self, deadline: Instant) -> io::Result<()> {
         while self.is_all_sent() && !self.has_line() {
-            // The time bounds the loop, too, if an agent writes without end.
-            if !self.fill()? || self.last_read_at >= until {
+            // The deadline also ends the loop if an agent writes without end.
+            if !self.fill()? || self.last_read_at >= deadline {
                 break;
             }
         }
         Ok(())
     }
 
-    /// The poll conditions: output, and space for unsent bytes.
-    pub(crate) fn awaited(&self) -> Vec<PollFd<'_>> {
+    /// The events to wait for: output and, if bytes are unsent, space for them.
+    pub(crate) fn poll_fds(&self) -> Vec<PollFd<'_>> {
         let writable = (!self.is_all_sent()).then(|| PollFd::new(&self.input, PollFlags::OUT));
         std::iter::once(PollFd::new(&self.output, PollFlags::IN))
             .chain(writable)
@@ -217,7 +218,7 @@ impl LineSocket {
         self.skip_to(end + 1);
         Some(ReadLine::Line {
             bytes,
-            at: self.last_read_at,
+            received_at: self.last_read_at,
         })
     }
 
@@ -237,12 +238,12 @@ impl LineSocket {
             self.searched -= self.start;
             self.start = 0;
         }
-        let result = recv(&self.output, &mut self.chunk[..], RecvFlags::DONTWAIT);
+        let result = recv(&self.output, &mut self.read_buffer[..], RecvFlags::DONTWAIT);
         self.last_read_at = Instant::now();
         match result {
             Ok((count, _)) => {
                 // Bounded: `take_line` refuses a line before the buffer holds more than the cap and one read.
-                self.buffer.extend_from_slice(&self.chunk[..count]);
+                self.buffer.extend_from_slice(&self.read_buffer[..count]);
                 Ok(count > 0)
             }
             // The agent closed its end without reading all its input.
@@ -293,17 +294,17 @@ mod tests {
 
     #[test]
     fn spinning_ends_with_line_deadline_or_end_of_output() {
-        let far = || Instant::now() + Duration::from_secs(3600);
+        let distant_deadline = || Instant::now() + Duration::from_secs(3600);
         let (mut lines, mut agent) = line_socket();
         agent.write_all(b"here\n").unwrap();
-        lines.spin_until(far()).unwrap();
+        lines.spin_until(distant_deadline()).unwrap();
         let line = lines.read_line(100, Instant::now()).unwrap();
         assert!(matches!(line, ReadLine::Line { bytes, .. } if bytes == b"here"));
         lines.spin_until(Instant::now()).unwrap();
         assert!(!lines.has_line());
         drop(agent);
-        lines.spin_until(far()).unwrap();
-        let end = lines.read_line(100, far()).unwrap();
+        lines.spin_until(distant_deadline()).unwrap();
+        let end = lines.read_line(100, distant_deadline()).unwrap();
         assert!(matches!(end, ReadLine::Closed));
     }
 

@@ -17,16 +17,17 @@ use std::{
 };
 
 /// A file system in memory that every Linux host has.
-pub const MEMORY: &str = "/dev/shm";
+pub const MEMORY_FOLDER: &str = "/dev/shm";
 /// Prefix of the image folders.
 pub(crate) const IMAGE_PREFIX: &str = "faceoff-runtime-";
-/// Minimum memory of a file.
+/// Memory is allocated in pages of this size.
 const PAGE_BYTES: u64 = 4096;
 
-/// The copy; removed on drop.
+/// A copy of the runtimes' files in memory; removed on drop.
 #[derive(Debug)]
 pub struct MemoryImage {
     folder: tempfile::TempDir,
+    /// Size in bytes.
     pub bytes: u64,
 }
 
@@ -37,7 +38,9 @@ pub enum MemoryImageError {
     #[error("the runtimes' files are larger than {limit_bytes} bytes")]
     TooLarge { limit_bytes: u64 },
     /// The host has too little free memory.
-    #[error("the runtimes' files have {bytes} bytes, and {MEMORY} has {free_bytes} bytes free")]
+    #[error(
+        "the runtimes' files have {bytes} bytes, and {MEMORY_FOLDER} has {free_bytes} bytes free"
+    )]
     NotEnoughMemory { bytes: u64, free_bytes: u64 },
     /// The files could not be read or written.
     #[error(transparent)]
@@ -56,7 +59,7 @@ impl MemoryImage {
         let bytes = Self::size(runtimes, limit_bytes)?;
         let folder = tempfile::Builder::new()
             .prefix(&Owner::this_process().name_prefix(IMAGE_PREFIX))
-            .tempdir_in(MEMORY)
+            .tempdir_in(MEMORY_FOLDER)
             .context("cannot make a folder in memory")?;
         for path in paths(runtimes) {
             let target = path_in_image(folder.path(), &path);
@@ -87,7 +90,7 @@ impl MemoryImage {
         }
         let StatVfs {
             f_bavail, f_frsize, ..
-        } = statvfs(MEMORY).context(format_args!("cannot look at {MEMORY}"))?;
+        } = statvfs(MEMORY_FOLDER).context(format_args!("cannot look at {MEMORY_FOLDER}"))?;
         let free_bytes = f_bavail.saturating_mul(f_frsize);
         if bytes > limit_bytes {
             Err(MemoryImageError::TooLarge { limit_bytes })
@@ -127,33 +130,33 @@ fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Result<()> {
     Ok(())
 }
 
-fn copy(from: &Path, to: &Path) -> io::Result<()> {
-    let Some(meta) = readable(fs::symlink_metadata(from))? else {
+fn copy(source: &Path, target: &Path) -> io::Result<()> {
+    let Some(meta) = readable(fs::symlink_metadata(source))? else {
         return Ok(());
     };
     if meta.is_symlink() {
-        return symlink(fs::read_link(from)?, to);
+        return symlink(fs::read_link(source)?, target);
     }
     if meta.is_file() {
-        return readable(fs::copy(from, to)).map(drop);
+        return readable(fs::copy(source, target)).map(drop);
     }
     if !meta.is_dir() {
         return Ok(());
     }
-    fs::create_dir_all(to)?;
-    for entry in readable(fs::read_dir(from))?.into_iter().flatten() {
+    fs::create_dir_all(target)?;
+    for entry in readable(fs::read_dir(source))?.into_iter().flatten() {
         let entry = entry?;
-        copy(&entry.path(), &to.join(entry.file_name()))?;
+        copy(&entry.path(), &target.join(entry.file_name()))?;
     }
     fs::set_permissions(
-        to,
+        target,
         fs::Permissions::from_mode(meta.permissions().mode() | 0o700),
     )
 }
 
 /// `None` for missing and unreadable files: agents cannot read them either.
-fn readable<T>(found: io::Result<T>) -> io::Result<Option<T>> {
-    match found {
+fn readable<T>(result: io::Result<T>) -> io::Result<Option<T>> {
+    match result {
         Err(error)
             if matches!(
                 error.kind(),
@@ -162,7 +165,7 @@ fn readable<T>(found: io::Result<T>) -> io::Result<Option<T>> {
         {
             Ok(None)
         }
-        found => found.map(Some),
+        result => result.map(Some),
     }
 }
 
@@ -173,14 +176,14 @@ mod tests {
     #[test]
     fn memory_image_copies_files_and_is_removed_on_drop() {
         let host = tempfile::tempdir().unwrap();
-        let at = |name: &str| host.path().join(name);
-        fs::create_dir_all(at("lib/inner")).unwrap();
-        fs::write(at("lib/inner/file"), "content").unwrap();
-        fs::set_permissions(at("lib/inner/file"), fs::Permissions::from_mode(0o755)).unwrap();
-        symlink("inner/file", at("lib/link")).unwrap();
-        fs::write(at("program"), vec![1; 5000]).unwrap();
+        let path_of = |name: &str| host.path().join(name);
+        fs::create_dir_all(path_of("lib/inner")).unwrap();
+        fs::write(path_of("lib/inner/file"), "content").unwrap();
+        fs::set_permissions(path_of("lib/inner/file"), fs::Permissions::from_mode(0o755)).unwrap();
+        symlink("inner/file", path_of("lib/link")).unwrap();
+        fs::write(path_of("program"), vec![1; 5000]).unwrap();
         let runtime = |paths: &[&str]| Runtime {
-            read_only_paths: paths.iter().map(|path| at(path)).collect(),
+            read_only_paths: paths.iter().map(|path| path_of(path)).collect(),
             path: String::new(),
             files: RuntimeFiles::Host,
         };
@@ -199,18 +202,18 @@ mod tests {
         assert!((12_000..100_000).contains(&image.bytes), "{}", image.bytes);
         let folder = image.folder().to_owned();
         assert_eq!(runtimes["two"].files, RuntimeFiles::Copy(folder.clone()));
-        let copied = |name: &str| path_in_image(&folder, &at(name));
-        assert_eq!(fs::read_to_string(copied("lib/link")).unwrap(), "content");
+        let copy_of = |name: &str| path_in_image(&folder, &path_of(name));
+        assert_eq!(fs::read_to_string(copy_of("lib/link")).unwrap(), "content");
         assert_eq!(
-            fs::read_link(copied("lib/link")).unwrap(),
+            fs::read_link(copy_of("lib/link")).unwrap(),
             Path::new("inner/file")
         );
-        let mode = fs::metadata(copied("lib/inner/file"))
+        let mode = fs::metadata(copy_of("lib/inner/file"))
             .unwrap()
             .permissions()
             .mode();
         assert_eq!(mode & 0o777, 0o755);
-        assert_eq!(fs::metadata(copied("program")).unwrap().len(), 5000);
+        assert_eq!(fs::metadata(copy_of("program")).unwrap().len(), 5000);
         drop(image);
         assert!(!folder.exists());
     }

@@ -1,4 +1,5 @@
-//! Owner of resources that outlive a process (cgroups, folders), encoded in their names.
+//! The owner of resources that outlive a process (cgroups, folders): the service process that created them. It is part of their
+//! names.
 
 use std::fs;
 
@@ -7,7 +8,8 @@ use std::fs;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Owner {
     pid: u32,
-    start: u64,
+    /// Start time in clock ticks since boot.
+    start_ticks: u64,
     namespace: u64,
 }
 
@@ -16,7 +18,7 @@ impl Owner {
         let pid = std::process::id();
         Self {
             pid,
-            start: start_time(pid).unwrap_or(0),
+            start_ticks: start_ticks_of(pid).unwrap_or(0),
             namespace: pid_namespace(),
         }
     }
@@ -26,22 +28,25 @@ impl Owner {
         let mut parts = name.strip_prefix(prefix)?.split('-');
         Some(Self {
             pid: parts.next()?.parse().ok()?,
-            start: parts.next()?.parse().ok()?,
+            start_ticks: parts.next()?.parse().ok()?,
             namespace: parts.next()?.parse().ok()?,
         })
     }
 
     /// The prefix of a name that [`Self::parse`] reads.
     pub(crate) fn name_prefix(self, prefix: &str) -> String {
-        format!("{prefix}{}-{}-{}-", self.pid, self.start, self.namespace)
+        format!(
+            "{prefix}{}-{}-{}-",
+            self.pid, self.start_ticks, self.namespace
+        )
     }
 
-    /// Is it certainly dead? Services in other containers, or on a host where `/proc` is hidden, count as alive,
+    /// Is this service certainly dead? Services in other containers, or on a host where `/proc` is hidden, count as alive,
     /// because their state is unknown.
     pub(crate) fn is_dead(self) -> bool {
         let this = Self::this_process();
-        let is_known = this.start != 0 && this.namespace == self.namespace;
-        is_known && start_time(self.pid) != Some(self.start)
+        let is_known = this.start_ticks != 0 && this.namespace == self.namespace;
+        is_known && start_ticks_of(self.pid) != Some(self.start_ticks)
     }
 }
 
@@ -57,7 +62,7 @@ fn pid_namespace() -> u64 {
 }
 
 /// Start time of process `pid`, in clock ticks since boot; `None` if it does not exist or is dead.
-fn start_time(pid: u32) -> Option<u64> {
+fn start_ticks_of(pid: u32) -> Option<u64> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     // The command's name, in parentheses, may contain anything; the fields after it are plain. The state is the
     // first of them, the start time the 20th.
@@ -79,7 +84,7 @@ mod tests {
         assert!(!this.is_dead());
         assert!(
             Owner {
-                start: this.start + 1,
+                start_ticks: this.start_ticks + 1,
                 ..this
             }
             .is_dead()
@@ -98,7 +103,7 @@ mod tests {
         let this = Owner::this_process();
         assert!(
             !Owner {
-                start: this.start + 1,
+                start_ticks: this.start_ticks + 1,
                 namespace: this.namespace + 1,
                 ..this
             }

@@ -21,8 +21,8 @@ use std::{
     path::Path,
 };
 
-/// A folder that every host has. It is covered in the private namespace only, so the host keeps its own.
-const FOLDER: &CStr = c"/tmp";
+/// The folder over which the mounts' file system is mounted. Every host has it, and only the private namespace sees the change.
+const MOUNT_FOLDER: &CStr = c"/tmp";
 
 /// The bind mounts for one agent's bubblewrap.
 #[derive(Debug, Default)]
@@ -59,13 +59,13 @@ impl PrivateMounts {
         Ok(mount_point.into())
     }
 
-    /// Makes all mounts. Called between fork and exec, as root: system calls only.
+    /// Makes all mounts. It is called between fork and exec, as root, and makes system calls only.
     pub(crate) fn mount_all(&mut self) -> Result<(), Errno> {
         #[expect(
             unsafe_code,
-            reason = "rustix marks all unsharing unsafe for the sake of shared descriptors"
+            reason = "rustix marks all unsharing unsafe, since some flags affect shared file descriptors"
         )]
-        // SAFETY: the flag leaves the table of descriptors alone; this process has one thread.
+        // SAFETY: NEWNS does not affect the table of file descriptors, and this process has one thread.
         unsafe {
             unshare_unsafe(UnshareFlags::NEWNS)?;
         }
@@ -75,20 +75,30 @@ impl PrivateMounts {
             MountPropagationFlags::DOWNSTREAM | MountPropagationFlags::REC,
         )?;
         // Detach all sources before the folder is covered, since some may be inside it.
-        let take = OpenTreeFlags::OPEN_TREE_CLONE
+        let clone_flags = OpenTreeFlags::OPEN_TREE_CLONE
             | OpenTreeFlags::OPEN_TREE_CLOEXEC
             | OpenTreeFlags::AT_RECURSIVE;
         for source in &mut self.sources {
-            source.tree = Some(open_tree(CWD, &source.path, take)?);
+            source.tree = Some(open_tree(CWD, &source.path, clone_flags)?);
         }
         let flags = MountFlags::NOSUID | MountFlags::NODEV;
-        mount(c"tmpfs", FOLDER, c"tmpfs", flags, c"mode=0755,size=64k")?;
+        mount(
+            c"tmpfs",
+            MOUNT_FOLDER,
+            c"tmpfs",
+            flags,
+            c"mode=0755,size=64k",
+        )?;
         for source in &mut self.sources {
             if source.is_folder {
                 mkdir(&source.mount_point, Mode::from_raw_mode(0o755))?;
             } else {
-                let make = OFlags::CREATE | OFlags::WRONLY | OFlags::CLOEXEC;
-                drop(open(&source.mount_point, make, Mode::from_raw_mode(0o644))?);
+                let create_flags = OFlags::CREATE | OFlags::WRONLY | OFlags::CLOEXEC;
+                drop(open(
+                    &source.mount_point,
+                    create_flags,
+                    Mode::from_raw_mode(0o644),
+                )?);
             }
             if let Some(tree) = source.tree.take() {
                 move_mount(

@@ -13,9 +13,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Limit of a probe on a loaded host.
+/// Time limit of a probe; only a failing host reaches it.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// Recognisable in `/proc/self/limits`.
+/// An unusual limit, by which the probe recognises in `/proc/self/limits` that limits are applied.
 const PROBE_OPEN_FILES: u32 = 61;
 
 /// Result of probing one layer.
@@ -27,7 +27,7 @@ pub struct HostFeature {
     pub available: bool,
     /// The found feature, or the error.
     pub found: String,
-    /// How to provide the layer, as a command if possible; `None` if it is available.
+    /// The fix: how to provide the layer, as a command if possible; `None` if it is available.
     pub cure: Option<String>,
 }
 
@@ -38,15 +38,15 @@ pub fn probe_host() -> Vec<HostFeature> {
 
 fn probe(layer: Layer) -> HostFeature {
     let result = match layer {
-        Layer::Namespaces => namespaces(),
-        Layer::Seccomp => probe_file(layer, "/proc/self/status", |text| {
+        Layer::Namespaces => probe_namespaces(),
+        Layer::Seccomp => probe_by_file(layer, "/proc/self/status", |text| {
             let mode = field(text, "Seccomp:")?;
             (mode == "2").then(|| "a filter was installed and is active".to_owned())
         }),
-        Layer::CgroupMemory => cgroup(layer, "memory"),
-        Layer::CgroupPids => cgroup(layer, "pids"),
-        Layer::CgroupCpu => cgroup(layer, "cpu"),
-        Layer::Rlimits => probe_file(layer, "/proc/self/limits", |text| {
+        Layer::CgroupMemory => probe_cgroup(layer, "memory"),
+        Layer::CgroupPids => probe_cgroup(layer, "pids"),
+        Layer::CgroupCpu => probe_cgroup(layer, "cpu"),
+        Layer::Rlimits => probe_by_file(layer, "/proc/self/limits", |text| {
             let value = field(text, "Max open files")?;
             (value == PROBE_OPEN_FILES.to_string()).then(|| "limits hold across exec".to_owned())
         }),
@@ -61,7 +61,7 @@ fn probe(layer: Layer) -> HostFeature {
         Err(error) => HostFeature {
             layer,
             available: false,
-            cure: Some(cure(layer, &error)),
+            cure: Some(fix_for(layer, &error)),
             found: error,
         },
     }
@@ -73,10 +73,10 @@ fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
         .find_map(|line| line.strip_prefix(name)?.split_whitespace().next())
 }
 
-fn namespaces() -> Result<String, String> {
+fn probe_namespaces() -> Result<String, String> {
     let bubblewrap = Bubblewrap::find().map_err(|error| error.to_string())?;
     // Inside, the process is number one, has no capabilities, and sees only its own network.
-    let status = run(Layer::Namespaces, "/proc/self/status")?;
+    let status = run_cat(Layer::Namespaces, "/proc/self/status")?;
     if field(&status, "Pid:") != Some("1") || field(&status, "CapBnd:") != Some("0000000000000000")
     {
         return Err(format!(
@@ -84,7 +84,7 @@ fn namespaces() -> Result<String, String> {
             bubblewrap.version
         ));
     }
-    let interfaces = run(Layer::Namespaces, "/proc/net/dev")?;
+    let interfaces = run_cat(Layer::Namespaces, "/proc/net/dev")?;
     if interfaces
         .lines()
         .skip(2)
@@ -106,8 +106,8 @@ fn namespaces() -> Result<String, String> {
     ))
 }
 
-fn cgroup(layer: Layer, controller: &str) -> Result<String, String> {
-    let own = |text: &str| {
+fn probe_cgroup(layer: Layer, controller: &str) -> Result<String, String> {
+    let find_cgroup = |text: &str| {
         text.lines().find_map(|line| {
             let mut parts = line.splitn(3, ':');
             let (_, names, path) = (parts.next()?, parts.next()?, parts.next()?);
@@ -120,25 +120,26 @@ fn cgroup(layer: Layer, controller: &str) -> Result<String, String> {
             path.contains("/agent-").then(|| {
                 format!(
                     "cgroup {version}, limits accepted{}",
-                    freezer(layer, version, text)
+                    freezer_note(layer, version, text)
                 )
             })
         })
     };
-    probe_file(layer, "/proc/self/cgroup", own)
+    probe_by_file(layer, "/proc/self/cgroup", find_cgroup)
 }
 
-/// The freezer is no layer; it is reported with the CPU layer, because without it a game needs CPUs for each side.
-fn freezer(layer: Layer, version: &str, own_cgroups: &str) -> &'static str {
-    let is_frozen_here = |line: &str| {
+/// A note on the freezer, with which the evaluator stops one side of a game while the other one computes. It is no layer, so it is
+/// reported with the CPU layer: without a freezer a game needs CPUs for each side.
+fn freezer_note(layer: Layer, version: &str, own_cgroups: &str) -> &'static str {
+    let is_agent_in_freezer = |line: &str| {
         let mut parts = line.splitn(3, ':').skip(1);
-        let named = parts
+        let is_freezer = parts
             .next()
             .is_some_and(|names| names.split(',').any(|name| name == "freezer"));
-        named && parts.next().is_some_and(|path| path.contains("/agent-"))
+        is_freezer && parts.next().is_some_and(|path| path.contains("/agent-"))
     };
     match layer {
-        Layer::CgroupCpu if version == "v2" || own_cgroups.lines().any(is_frozen_here) => {
+        Layer::CgroupCpu if version == "v2" || own_cgroups.lines().any(is_agent_in_freezer) => {
             "; agents can be frozen"
         }
         Layer::CgroupCpu => {
@@ -148,27 +149,28 @@ fn freezer(layer: Layer, version: &str, own_cgroups: &str) -> &'static str {
     }
 }
 
-fn probe_file(
+/// Applies `layer` alone to a process that prints `file`, and lets `evaluate` look for the effect in the text.
+fn probe_by_file(
     layer: Layer,
     file: &str,
     evaluate: impl Fn(&str) -> Option<String>,
 ) -> Result<String, String> {
-    let text = run(layer, file)?;
+    let text = run_cat(layer, file)?;
     evaluate(&text)
         .ok_or_else(|| format!("it was applied without an error, but {file} does not show it"))
 }
 
 /// Starts `cat file` with only `layer` enabled, and returns its output.
-fn run(layer: Layer, file: &str) -> Result<String, String> {
+fn run_cat(layer: Layer, file: &str) -> Result<String, String> {
     let cat = ["/usr/bin/cat", "/bin/cat"]
         .into_iter()
         .find(|path| Path::new(path).is_file());
     let cat = cat.ok_or("the probe needs /usr/bin/cat")?;
-    let (_private, bundle) =
-        bundle(layer).map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
+    let (_private, bundle) = make_bundle(layer)
+        .map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
     let mut runtime = Runtime::native();
     runtime.read_only_paths.push(cat.into());
-    let given_up = Layer::ALL
+    let disabled_layers = Layer::ALL
         .into_iter()
         .filter(|other| *other != layer)
         .collect();
@@ -181,7 +183,7 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
             open_files: PROBE_OPEN_FILES,
             ..Limits::default()
         },
-        isolation: Isolation::Sandboxed { given_up },
+        isolation: Isolation::Sandboxed { disabled_layers },
         cpus: Vec::new(),
     };
     let mut agent = AgentProcess::spawn(&spec).map_err(|error| match error {
@@ -216,7 +218,7 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
 
 /// An empty bundle. With namespaces it is, like real bundles, in a folder that only the service may enter. The other
 /// layers are probed without namespaces, so their bundle must be reachable.
-fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
+fn make_bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
     let outer = tempfile::Builder::new()
         .prefix("faceoff-probe-")
         .tempdir()?;
@@ -232,13 +234,14 @@ fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
     Ok((outer, bundle))
 }
 
-fn cure(layer: Layer, error: &str) -> String {
+/// How to provide a layer.
+fn fix_for(layer: Layer, error: &str) -> String {
     match layer {
-        Layer::Namespaces => cure_namespaces(error),
+        Layer::Namespaces => fix_namespaces(error),
         Layer::Seccomp => {
             "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014)".into()
         }
-        Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu => cure_cgroups(),
+        Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu => fix_cgroups(),
         Layer::Rlimits => {
             format!(
                 "raise the service's own hard limits, e.g. ulimit -Hn {}",
@@ -249,24 +252,25 @@ fn cure(layer: Layer, error: &str) -> String {
 }
 
 /// systemd can delegate cgroups of version 2 to an ordinary user; version 1 needs root.
-fn cure_cgroups() -> String {
-    const CONTAINER: &str = "in Docker: docker run --privileged --cgroupns=private";
+fn fix_cgroups() -> String {
+    const DOCKER_HINT: &str = "in Docker: docker run --privileged --cgroupns=private";
     if Path::new("/sys/fs/cgroup/cgroup.controllers").exists() {
         format!(
             "run the service as root, or as a systemd service whose unit says [Service] Delegate=yes; from a \
-             shell: systemd-run --user --scope -p Delegate=yes faceoff serve; {CONTAINER}"
+             shell: systemd-run --user --scope -p Delegate=yes faceoff serve; {DOCKER_HINT}"
         )
     } else {
         format!(
             "run the service as root, or let root give it a cgroup: for c in memory pids cpu cpuacct freezer; do mkdir \
              -p /sys/fs/cgroup/$c/agents; chown -R USER /sys/fs/cgroup/$c/agents; echo PID > \
-             /sys/fs/cgroup/$c/agents/cgroup.procs; done; {CONTAINER}"
+             /sys/fs/cgroup/$c/agents/cgroup.procs; done; {DOCKER_HINT}"
         )
     }
 }
 
 /// The usual settings that prevent an ordinary user from creating namespaces, in the order in which they take effect.
-fn cure_namespaces(error: &str) -> String {
+fn fix_namespaces(error: &str) -> String {
+    /// File of a setting, the value that blocks namespaces, and the command that changes it.
     const SWITCHES: [(&str, &str, &str); 3] = [
         (
             "/proc/sys/kernel/unprivileged_userns_clone",
@@ -285,17 +289,17 @@ fn cure_namespaces(error: &str) -> String {
         ),
     ];
     if Bubblewrap::find().is_err() {
-        return bubblewrap::CURE_INSTALL.into();
+        return bubblewrap::INSTALL_COMMAND.into();
     }
-    // Then the namespaces were created, and only the last step was refused.
+    // With this error the namespaces were created, and only the mount of /proc was refused.
     if error.contains("mount proc") {
         return "provide a /proc without masked files, so that agents can mount their own; in Docker: docker run \
                 --security-opt systempaths=unconfined"
             .into();
     }
-    let switch = SWITCHES
-        .iter()
-        .find(|(file, bad, _)| fs::read_to_string(file).is_ok_and(|value| value.trim() == *bad));
+    let switch = SWITCHES.iter().find(|(file, blocking_value, _)| {
+        fs::read_to_string(file).is_ok_and(|value| value.trim() == *blocking_value)
+    });
     match switch {
         Some((.., command)) => (*command).to_owned(),
         None => "allow user namespaces; in Docker: docker run --security-opt seccomp=docker/seccomp.json --security-opt \

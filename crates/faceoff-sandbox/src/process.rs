@@ -1,3 +1,5 @@
+//! A running agent: questions and answers, measurements of its CPUs, and its end.
+
 use crate::{
     AnswerState, Baseline, CallerCounters, CpuReading, CpuSamples, HostInterference, Isolation,
     Killer, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
@@ -23,7 +25,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Wait for the exit status once a channel is closed.
+/// How long to wait for the exit status once a channel is closed.
 const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// A running agent. Dropping it kills and reaps the whole tree and removes its cgroup and scratch folder.
@@ -60,7 +62,7 @@ impl AgentProcess {
     ///
     /// # Errors
     /// [`SpawnError::Agent`] if the bundle's command cannot be started, [`SpawnError::Platform`] if the
-    /// host lacks a layer that is not given up, or the sandbox cannot be set up.
+    /// host lacks a layer that is not disabled, or the sandbox cannot be set up.
     pub fn spawn(spec: &SpawnSpec) -> Result<Self, SpawnError> {
         static SWEEP: Once = Once::new();
         if matches!(spec.isolation, Isolation::Sandboxed { .. }) {
@@ -102,11 +104,11 @@ impl AgentProcess {
     /// # Errors
     /// [`WriteError::Closed`] is an agent fault, the others are platform faults.
     pub fn send_line(&mut self, line: &[u8]) -> Result<(), WriteError> {
-        // Taken before the call: on a shared CPU the agent may run, and even answer, before it returns.
-        let at = Instant::now();
+        // The time is taken before the call: on a shared CPU the agent may run, and even answer, before it returns.
+        let sent_at = Instant::now();
         match self.lines.send(line) {
             Ok(Ok(())) => {
-                self.output_poll = PollInterval::start(at);
+                self.output_poll = PollInterval::start(sent_at);
                 Ok(())
             }
             Ok(Err(Closed)) => {
@@ -162,12 +164,12 @@ impl AgentProcess {
         deadline: Instant,
     ) -> Result<ReadLine, SandboxError> {
         let answer = loop {
-            let until = self.next_poll_or_deadline(deadline);
+            let next_wake = self.next_poll_or_deadline(deadline);
             let answer = self
                 .lines
-                .read_line(max_bytes, until)
+                .read_line(max_bytes, next_wake)
                 .context("cannot read from the agent")?;
-            if !matches!(answer, ReadLine::TimedOut) || until == deadline {
+            if !matches!(answer, ReadLine::TimedOut) || next_wake == deadline {
                 break answer;
             }
             if self.output_is_abandoned()? {
@@ -181,14 +183,14 @@ impl AgentProcess {
         Ok(answer)
     }
 
-    /// Busy-polls until `until` for the agent's next line, which [`Self::read_line`] then returns. Use it only on a CPU
+    /// Busy-polls until `deadline` for the agent's next line, which [`Self::read_line`] then returns. Use it only on a CPU
     /// that the agent cannot use.
     ///
     /// # Errors
     /// When the socket itself failed.
-    pub fn spin_until(&mut self, until: Instant) -> Result<(), SandboxError> {
+    pub fn spin_until(&mut self, deadline: Instant) -> Result<(), SandboxError> {
         self.lines
-            .spin_until(until)
+            .spin_until(deadline)
             .context("cannot read from the agent")
     }
 
@@ -202,27 +204,28 @@ impl AgentProcess {
         if agents.iter().any(|agent| agent.lines.has_line()) {
             return Ok(());
         }
-        let until = agents
+        let next_wake = agents
             .iter()
-            .fold(deadline, |until, agent| agent.next_poll_or_deadline(until));
-        let mut awaited: Vec<PollFd<'_>> = agents
+            .fold(deadline, |wake, agent| agent.next_poll_or_deadline(wake));
+        let mut poll_fds: Vec<PollFd<'_>> = agents
             .iter()
-            .flat_map(|agent| agent.lines.awaited())
+            .flat_map(|agent| agent.lines.poll_fds())
             .collect();
-        wait_for_any(&mut awaited, until).context("cannot wait for the agents' output")?;
+        wait_for_any(&mut poll_fds, next_wake).context("cannot wait for the agents' output")?;
         Ok(())
     }
 
-    /// Without a sandbox the kernel reports a closed output at once, so no checks are needed.
+    /// The next check whether the agent has closed its output, or `deadline` if it is earlier. Without a sandbox the kernel reports a
+    /// closed output at once, so no checks are needed.
     fn next_poll_or_deadline(&self, deadline: Instant) -> Instant {
         if self.tree.is_sandboxed() {
-            deadline.min(self.output_poll.due)
+            deadline.min(self.output_poll.next_check_at)
         } else {
             deadline
         }
     }
 
-    /// Is there unread output already (an answer before the question)?
+    /// Is there unread output? Before a question, this is an answer that no question asked for.
     ///
     /// # Errors
     /// When the socket cannot be queried.
@@ -252,8 +255,8 @@ impl AgentProcess {
         self.stderr.text()
     }
 
-    /// CPU time of the whole tree so far, in seconds: by its cgroup, or without one by the clocks of its processes,
-    /// which miss the time that a process used right before its end. `None` if the host does not report it.
+    /// CPU time of the whole tree so far, in seconds: by its cgroup or, without a cgroup, by the clocks of its processes, which
+    /// miss the time that a process used right before its end. `None` if the host does not report it.
     pub fn cpu_time_s(&self) -> Option<f64> {
         self.tree.cpu_time_s()
     }
@@ -287,7 +290,7 @@ impl AgentProcess {
             String::new()
         };
         Baseline {
-            at: Instant::now(),
+            read_at: Instant::now(),
             cpus: accounting.and_then(|accounting| accounting.read_baseline(&self.threads, &stat)),
             caller: caller_cpus
                 .map(|cpus| CallerCounters::read(&stat, cpus, self.stderr.reader_run_time())),
@@ -304,7 +307,7 @@ impl AgentProcess {
     /// its CPUs ran processes outside of its cgroup, or the hypervisor had stopped them.
     ///
     /// It is measured since the first of `samples`, and since the `baseline` that was read before the question
-    /// (`asked`). Without either it is zero; `None` if the host has no such counters. A thread's wait counts only if
+    /// (`asked_at`). Without either it is zero; `None` if the host has no such counters. A thread's wait counts only if
     /// the thread then ran, unless the answer is still pending.
     ///
     /// The result never exceeds what the kernel's counters prove. Cgroup version 1 counts in nanoseconds, version 2 in
@@ -312,7 +315,7 @@ impl AgentProcess {
     /// long after the question, and the lag and the age of the baseline are subtracted.
     pub fn interference_since(
         &self,
-        asked: Instant,
+        asked_at: Instant,
         samples: Option<&CpuSamples>,
         baseline: Option<&CpuReading>,
         answer: AnswerState,
@@ -321,7 +324,7 @@ impl AgentProcess {
         if samples.is_none() && baseline.is_none() {
             return Some(HostInterference::default());
         }
-        accounting.interference_since(asked, samples, baseline, &self.threads, answer)
+        accounting.interference_since(asked_at, samples, baseline, &self.threads, answer)
     }
 
     /// Ends the agent's input, waits up to `grace` for its exit, then kills the tree; always reaps it.

@@ -1,4 +1,4 @@
-//! The processes of one agent: waiting for their end, killing and cleaning up.
+//! The process tree of one agent: waiting for its end, killing and cleaning up.
 
 use crate::{
     Killer, cgroup::AgentCgroup, cpu_clock::TreeClock, line_socket::wait_for,
@@ -15,25 +15,27 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Wait for a killed process to disappear; then an error is logged.
+/// How long to wait for a killed process to disappear; then an error is logged.
 const KILL_TIMEOUT: Duration = Duration::from_secs(60);
-/// Wait for bubblewrap to exit after its sandbox has ended.
+/// How long to wait for bubblewrap to exit after its sandbox has ended.
 const BUBBLEWRAP_EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The child, its descendants, and the resources that contain them.
 #[derive(Debug)]
 pub(crate) struct ProcessTree {
     child: Child,
+    /// CPU time, for trees without a cgroup.
     clock: TreeClock,
-    /// Pidfd of the child: readable when the child has ended.
-    child_end: OwnedFd,
+    /// Pidfd (file descriptor of a process) of the child: readable when the child has ended.
+    child_pidfd: OwnedFd,
     /// Pidfd of the sandbox's first process, whose end terminates all others in the sandbox.
     sandbox_init: Option<OwnedFd>,
     pub(crate) status: Option<StatusPipe>,
     pub(crate) cgroup: Option<AgentCgroup>,
     /// The scratch folder on the host, for agents without a mount namespace.
     scratch: Option<tempfile::TempDir>,
-    ended: Option<ExitStatus>,
+    /// Set when the child has been reaped.
+    exit_status: Option<ExitStatus>,
 }
 
 impl ProcessTree {
@@ -44,15 +46,15 @@ impl ProcessTree {
         scratch: Option<tempfile::TempDir>,
     ) -> io::Result<Self> {
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
-            Ok(child_end) => Ok(Self {
+            Ok(child_pidfd) => Ok(Self {
                 clock: TreeClock::new(Pid::from_child(&child)),
                 child,
-                child_end,
+                child_pidfd,
                 sandbox_init: None,
                 status,
                 cgroup,
                 scratch,
-                ended: None,
+                exit_status: None,
             }),
             Err(error) => {
                 let _ = child.kill();
@@ -101,22 +103,24 @@ impl ProcessTree {
 
     /// Has the child been reaped?
     pub(crate) fn has_ended(&self) -> bool {
-        self.ended.is_some()
+        self.exit_status.is_some()
     }
 
     /// Waits for the child's end, kills the rest of its process group, and reaps the child.
     pub(crate) fn wait(&mut self, deadline: Instant) -> io::Result<Option<ExitStatus>> {
-        if self.ended.is_none() && wait_for(self.child_end.as_fd(), PollFlags::IN, deadline)? {
+        if self.exit_status.is_none()
+            && wait_for(self.child_pidfd.as_fd(), PollFlags::IN, deadline)?
+        {
             // The child is not reaped yet, so its pid and its process group id cannot have been reused.
             self.kill_relatives();
-            self.ended = Some(self.child.wait()?);
+            self.exit_status = Some(self.child.wait()?);
         }
-        Ok(self.ended)
+        Ok(self.exit_status)
     }
 
     /// Kills every process of the tree and reaps the child.
     pub(crate) fn kill(&mut self) {
-        if self.ended.is_some() {
+        if self.exit_status.is_some() {
             return;
         }
         // Kill the sandbox's first process before bubblewrap, which then reaps it. In the other order the orphan would
@@ -151,7 +155,7 @@ impl ProcessTree {
 
     /// A handle that kills the tree from other threads.
     pub(crate) fn killer(&self) -> io::Result<Killer> {
-        let processes = self.sandbox_init.iter().chain([&self.child_end]);
+        let processes = self.sandbox_init.iter().chain([&self.child_pidfd]);
         let cgroups = self.cgroup.as_ref().map(|cgroup| cgroup.leaves().to_vec());
         Ok(Killer {
             processes: processes
@@ -167,17 +171,17 @@ impl ProcessTree {
         if self.is_sandboxed() {
             return;
         }
-        let ends: Vec<_> = relatives(self.pid())
+        let pidfds: Vec<_> = relatives(self.pid())
             .into_iter()
             .filter_map(|pid| pidfd_open(pid, PidfdFlags::empty()).ok())
             .collect();
         let _ = kill_process_group(self.pid(), Signal::KILL);
-        for end in &ends {
-            let _ = pidfd_send_signal(end, Signal::KILL);
+        for pidfd in &pidfds {
+            let _ = pidfd_send_signal(pidfd, Signal::KILL);
         }
         let deadline = Instant::now() + KILL_TIMEOUT;
-        for end in &ends {
-            if !matches!(wait_for(end.as_fd(), PollFlags::IN, deadline), Ok(true)) {
+        for pidfd in &pidfds {
+            if !matches!(wait_for(pidfd.as_fd(), PollFlags::IN, deadline), Ok(true)) {
                 tracing::error!(
                     agent = self.child.id(),
                     "a child of an agent did not end after SIGKILL"
@@ -233,7 +237,7 @@ fn relatives(root: Pid) -> Vec<Pid> {
     while let Some(&parent) = found.get(next) {
         let children = all
             .iter()
-            .filter(|(_, its_parent, _)| *its_parent == parent)
+            .filter(|(_, parent_of_pid, _)| *parent_of_pid == parent)
             .map(|(pid, ..)| *pid);
         let new: Vec<_> = children.filter(|pid| !found.contains(pid)).collect();
         found.extend(new);

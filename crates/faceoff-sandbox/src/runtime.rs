@@ -1,3 +1,5 @@
+//! A *runtime*: the host files that agents of one kind see (e.g. a Python with its libraries), and their `PATH`.
+
 use crate::{SandboxError, error::IoContext};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -67,7 +69,7 @@ impl Runtime {
     /// Runtime of self-contained binaries: the host's shared libraries and nothing else.
     pub fn native() -> Self {
         Self {
-            read_only_paths: existing(&LIBRARY_PATHS),
+            read_only_paths: existing_paths(&LIBRARY_PATHS),
             path: "/usr/bin:/bin".into(),
             files: RuntimeFiles::Host,
         }
@@ -87,8 +89,8 @@ impl Runtime {
     /// When `interpreter` does not start or does not print its library paths.
     pub fn python3_at(interpreter: &Path) -> Result<Self, SandboxError> {
         let python = PythonLayout::ask(interpreter)?;
-        let mut paths = existing(&LIBRARY_PATHS);
-        paths.extend(existing(&SCRIPT_HELPERS));
+        let mut paths = existing_paths(&LIBRARY_PATHS);
+        paths.extend(existing_paths(&SCRIPT_HELPERS));
         let folder = interpreter
             .parent()
             .unwrap_or(Path::new("/usr/bin"))
@@ -226,20 +228,22 @@ impl PythonLayout {
     }
 }
 
+/// Does this prefix also contain files that are not Python's?
 fn is_shared_prefix(prefix: &Path) -> bool {
     ["/", "/usr", "/usr/local"]
         .iter()
         .any(|shared| prefix == Path::new(shared))
 }
 
-fn existing(paths: &[&str]) -> Vec<PathBuf> {
+/// Those of `paths` that exist, and the targets of their links.
+fn existing_paths(paths: &[&str]) -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = Vec::new();
     for path in paths {
         let path = PathBuf::from(path);
         // `/bin` matters only if it is a link; a real folder of programs is not shown.
-        let wanted =
+        let is_shown =
             path != Path::new("/bin") || fs::symlink_metadata(&path).is_ok_and(|m| m.is_symlink());
-        if wanted && path.exists() {
+        if is_shown && path.exists() {
             for link in link_chain(&path) {
                 push_new(&mut found, link);
             }

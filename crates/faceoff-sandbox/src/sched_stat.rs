@@ -1,13 +1,15 @@
+//! The kernel's scheduling counters of a thread: how long it ran, and how long it waited for a CPU.
+
 use std::{fs::File, os::unix::fs::FileExt, time::Duration};
 
 /// The kernel's scheduling counters of one thread (`schedstat`).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct SchedStat {
-    pub ran: Duration,
+    pub run_time: Duration,
     /// Time on the run queue, up to its last time slice.
-    pub waited: Duration,
+    pub wait_time: Duration,
     /// Number of time slices.
-    pub slices: u64,
+    pub time_slices: u64,
 }
 
 impl SchedStat {
@@ -23,9 +25,9 @@ impl SchedStat {
         let mut numbers = text.split_ascii_whitespace().map(str::parse);
         let mut next = || numbers.next()?.ok();
         Some(Self {
-            ran: Duration::from_nanos(next()?),
-            waited: Duration::from_nanos(next()?),
-            slices: next()?,
+            run_time: Duration::from_nanos(next()?),
+            wait_time: Duration::from_nanos(next()?),
+            time_slices: next()?,
         })
     }
 }

@@ -86,7 +86,7 @@ const REFUSED: &[i64] = &[
 ];
 
 #[cfg(target_arch = "x86_64")]
-const REFUSED_HERE: &[i64] = &[
+const REFUSED_ON_THIS_ARCH: &[i64] = &[
     libc::SYS_iopl,
     libc::SYS_ioperm,
     libc::SYS_modify_ldt,
@@ -96,32 +96,32 @@ const REFUSED_HERE: &[i64] = &[
     libc::SYS__sysctl,
 ];
 #[cfg(not(target_arch = "x86_64"))]
-const REFUSED_HERE: &[i64] = &[];
+const REFUSED_ON_THIS_ARCH: &[i64] = &[];
 
 /// Answered as by a kernel that lacks them (`ENOSYS`).
 const ABSENT: &[i64] = &[
-    // locks on a shared file are visible to all agents; for locks by `fcntl` see below
+    // locks on a shared file are visible to all agents; for locks by `fcntl` see `UNKNOWN_REQUESTS`
     libc::SYS_flock,
     // reports other agents' accesses to a file
     libc::SYS_inotify_init1,
     // show which pages of a file are in memory, and so what other agents have read
     libc::SYS_mincore,
     CACHESTAT,
-    // its slots are counted for the whole host, and every agent can read the count
+    // slots for asynchronous I/O are counted for the whole host, and every agent can read the count
     libc::SYS_io_setup,
 ];
 
 #[cfg(target_arch = "x86_64")]
-const ABSENT_HERE: &[i64] = &[libc::SYS_inotify_init];
+const ABSENT_ON_THIS_ARCH: &[i64] = &[libc::SYS_inotify_init];
 #[cfg(not(target_arch = "x86_64"))]
-const ABSENT_HERE: &[i64] = &[];
+const ABSENT_ON_THIS_ARCH: &[i64] = &[];
 
-/// The same number on all architectures.
+/// The number of the system call `cachestat`, the same on all architectures.
 const CACHESTAT: i64 = 451;
 
 /// Advice about files: succeeds without effect. The real calls would load a shared file into memory, or drop it.
 const IGNORED: &[i64] = &[libc::SYS_fadvise64, libc::SYS_readahead];
-/// The same for a mapping.
+/// Advice about mapped files that succeeds without effect, for the same reason.
 const IGNORED_ADVICE: [libc::c_int; 3] = [libc::MADV_WILLNEED, libc::MADV_COLD, libc::MADV_PAGEOUT];
 
 /// Requests of `fcntl` that are answered as if the kernel did not know them (`EINVAL`).
@@ -168,10 +168,10 @@ pub(crate) struct Filters(Vec<BpfProgram>);
 type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
 impl Filters {
-    /// `keep_affinity`: also refuses to change the CPU affinity, for hosts where no cpuset confines the agent.
-    pub(crate) fn build(keep_affinity: bool) -> Result<Self, SandboxError> {
-        let mut rules = any_arguments(&[REFUSED, REFUSED_HERE]);
-        if keep_affinity {
+    /// `refuse_affinity_changes`: also refuses to change the CPU affinity, for hosts where no cpuset confines the agent.
+    pub(crate) fn build(refuse_affinity_changes: bool) -> Result<Self, SandboxError> {
+        let mut rules = any_arguments(&[REFUSED, REFUSED_ON_THIS_ARCH]);
+        if refuse_affinity_changes {
             rules.insert(libc::SYS_sched_setaffinity, Vec::new());
         }
         rules.insert(libc::SYS_clone, namespace_rules()?);
@@ -180,7 +180,7 @@ impl Filters {
         let not_unix = vec![rule([argument(0, SeccompCmpOp::Ne, libc::AF_UNIX)])?];
         rules.insert(libc::SYS_socket, not_unix.clone());
         rules.insert(libc::SYS_socketpair, not_unix);
-        // Pushing input into a terminal.
+        // These requests push input into a terminal.
         let terminal = [libc::TIOCSTI, libc::TIOCLINUX].map(|request| request as libc::c_int);
         rules.insert(libc::SYS_ioctl, one_of(1, &terminal)?);
         // The kernel counts pages of pipes per user, and agents of an unprivileged service share one user.
@@ -203,17 +203,17 @@ impl Filters {
         unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
         // Collapsing pages of a file changes its state in memory for other agents.
         unknown_requests.insert(libc::SYS_madvise, one_of(2, &[libc::MADV_COLLAPSE])?);
-        // Its flags can read only what is in memory, or keep a read out of memory.
-        let flagged = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];
-        let read_flags = Rules::from([(libc::SYS_preadv2, flagged)]);
+        // `preadv2` with flags can read only what is in memory, or keep what it reads out of memory.
+        let with_flags = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];
+        let read_flags = Rules::from([(libc::SYS_preadv2, with_flags)]);
         Ok(Self(vec![
-            unknown_calls(),
-            program(any_arguments(&[ABSENT, ABSENT_HERE]), libc::ENOSYS)?,
-            program(ignored, 0)?,
-            program(unknown_requests, libc::EINVAL)?,
-            program(read_flags, libc::EOPNOTSUPP)?,
+            filter_unknown_calls(),
+            compile(any_arguments(&[ABSENT, ABSENT_ON_THIS_ARCH]), libc::ENOSYS)?,
+            compile(ignored, 0)?,
+            compile(unknown_requests, libc::EINVAL)?,
+            compile(read_flags, libc::EOPNOTSUPP)?,
             // Last, because it refuses `seccomp` itself.
-            program(rules, libc::EPERM)?,
+            compile(rules, libc::EPERM)?,
         ]))
     }
 
@@ -230,7 +230,7 @@ fn any_arguments(lists: &[&[i64]]) -> Rules {
 }
 
 /// Compiles a filter that answers the calls of `rules` with `errno`; 0 is success.
-fn program(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError> {
+fn compile(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError> {
     let arch = TargetArch::try_from(std::env::consts::ARCH).map_err(|error| unavailable(&error))?;
     let answer = SeccompAction::Errno(errno.cast_unsigned());
     SeccompFilter::new(rules, SeccompAction::Allow, answer, arch)
@@ -238,7 +238,7 @@ fn program(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError>
         .map_err(|error| unavailable(&error))
 }
 
-/// A condition on the lower half of an argument.
+/// A condition on the lower half of argument number `index`, from 0.
 fn argument(
     index: u8,
     compare: SeccompCmpOp,
@@ -248,7 +248,7 @@ fn argument(
     SeccompCondition::new(index, SeccompCmpArgLen::Dword, compare, value)
 }
 
-/// Rules that match if the argument is one of `values`.
+/// Rules that match if argument number `index` is one of `values`.
 fn one_of(index: u8, values: &[libc::c_int]) -> Result<Vec<SeccompRule>, SandboxError> {
     let rules = values
         .iter()
@@ -256,6 +256,7 @@ fn one_of(index: u8, values: &[libc::c_int]) -> Result<Vec<SeccompRule>, Sandbox
     rules.collect()
 }
 
+/// Rules that match `clone` with a flag that creates a namespace.
 fn namespace_rules() -> Result<Vec<SeccompRule>, SandboxError> {
     let rules = NAMESPACE_FLAGS.iter().map(|&flag| {
         let set = SeccompCmpOp::MaskedEq(u64::from(flag.cast_unsigned()));
@@ -281,28 +282,29 @@ fn rule<const N: usize>(
 /// which end with the agent in any case.
 ///
 /// The other filters refuse foreign architectures, so this one does not check the architecture.
-fn unknown_calls() -> BpfProgram {
+fn filter_unknown_calls() -> BpfProgram {
     const LOAD: u16 = (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16;
     const JUMP_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
     const JUMP_GREATER: u16 = (libc::BPF_JMP | libc::BPF_JGT | libc::BPF_K) as u16;
     const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
     /// Offsets in `seccomp_data`: the call's number, and the lower half of its first argument (the
     /// filter compiler supports little-endian machines only).
-    const NUMBER: u32 = 0;
-    const FIRST_ARGUMENT: u32 = 16;
+    const CALL_NUMBER_OFFSET: u32 = 0;
+    const FIRST_ARGUMENT_OFFSET: u32 = 16;
     let step = |code, k| sock_filter {
         code,
         jt: 0,
         jf: 0,
         k,
     };
+    // `jt` and `jf`: number of instructions to skip if the comparison is true or false.
     let jump = |code, k, jt, jf| sock_filter { code, jt, jf, k };
     vec![
-        step(LOAD, NUMBER),
+        step(LOAD, CALL_NUMBER_OFFSET),
         jump(JUMP_GREATER, NEWEST_KNOWN, 5, 0),
         jump(JUMP_EQUAL, libc::SYS_clone3 as u32, 4, 0),
         jump(JUMP_EQUAL, libc::SYS_prctl as u32, 0, 2),
-        step(LOAD, FIRST_ARGUMENT),
+        step(LOAD, FIRST_ARGUMENT_OFFSET),
         jump(JUMP_EQUAL, libc::PR_SET_PDEATHSIG as u32, 2, 0),
         step(RETURN, libc::SECCOMP_RET_ALLOW),
         step(RETURN, libc::SECCOMP_RET_ERRNO | libc::ENOSYS as u32),

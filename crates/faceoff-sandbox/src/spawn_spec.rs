@@ -1,3 +1,5 @@
+//! The input of the sandbox: what to start, and how.
+
 use crate::{Isolation, Limits, Runtime};
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -6,7 +8,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 pub struct SpawnSpec {
     /// The unpacked bundle, mounted read-only at `/agent` (the working directory). A service that runs
     /// as root starts agents as another user: folders in it need mode 0755, files 0644 or 0755. Its parent
-    /// folders may be closed to other users, unless the namespaces layer is given up.
+    /// folders may be closed to other users, unless the namespaces layer is disabled.
     pub bundle_dir: PathBuf,
     /// Program and arguments. A program with a slash is relative to the bundle; otherwise it is searched in
     /// the runtime's PATH.
@@ -18,6 +20,6 @@ pub struct SpawnSpec {
     /// Resources that the process tree may use.
     pub limits: Limits,
     pub isolation: Isolation,
-    /// CPU numbers the agent may run on; empty = those of the service.
+    /// Numbers of the CPUs on which the agent may run; empty: those of the service.
     pub cpus: Vec<usize>,
 }

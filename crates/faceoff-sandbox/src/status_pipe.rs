@@ -21,7 +21,7 @@ const MAX_BYTES: usize = 16 << 10;
 pub(crate) struct StatusPipe {
     pipe: OwnedFd,
     text: Vec<u8>,
-    closed: bool,
+    is_closed: bool,
 }
 
 impl StatusPipe {
@@ -33,7 +33,7 @@ impl StatusPipe {
             Self {
                 pipe,
                 text: Vec::new(),
-                closed: false,
+                is_closed: false,
             },
             writer,
         ))
@@ -49,14 +49,14 @@ impl StatusPipe {
             if let Some(pid) = self.number("child-pid") {
                 return Ok(Pid::from_raw(pid));
             }
-            if self.closed {
+            if self.is_closed {
                 return Ok(None);
             }
-            let ready = wait_for(self.pipe.as_fd(), PollFlags::IN, deadline).context(ACTION)?;
-            if !ready {
+            let is_ready = wait_for(self.pipe.as_fd(), PollFlags::IN, deadline).context(ACTION)?;
+            if !is_ready {
                 return Err(SandboxError::other(
                     ACTION,
-                    "it did not set up the sandbox in time",
+                    "bubblewrap did not set up the sandbox in time",
                 ));
             }
             self.fill().context(ACTION)?;
@@ -66,7 +66,7 @@ impl StatusPipe {
     /// The agent's exit code, if it was started and has ended; 128 + signal after a signal. Valid only after
     /// bubblewrap has ended.
     pub(crate) fn exit_code(&mut self) -> Option<i32> {
-        while !self.closed && matches!(self.fill(), Ok(true)) {}
+        while !self.is_closed && matches!(self.fill(), Ok(true)) {}
         self.number("exit-code")
     }
 
@@ -75,12 +75,12 @@ impl StatusPipe {
         let mut chunk = [0; 1024];
         match read(&self.pipe, &mut chunk) {
             Ok(0) => {
-                self.closed = true;
+                self.is_closed = true;
                 Ok(false)
             }
             Ok(count) => {
                 self.text.extend(&chunk[..count]);
-                self.closed |= self.text.len() > MAX_BYTES;
+                self.is_closed |= self.text.len() > MAX_BYTES;
                 Ok(true)
             }
             Err(Errno::AGAIN | Errno::INTR) => Ok(false),
@@ -88,8 +88,8 @@ impl StatusPipe {
         }
     }
 
-    /// The integer after `"key":` in a complete document. The documents are flat, and only bubblewrap writes
-    /// them.
+    /// The integer after `"key":` in the text so far; `None` if it is not complete yet. The JSON documents are flat, and only
+    /// bubblewrap writes them, so no parser is needed.
     fn number(&self, key: &str) -> Option<i32> {
         let text = std::str::from_utf8(&self.text).ok()?;
         let after = text.split_once(&format!("\"{key}\":"))?.1.trim_start();

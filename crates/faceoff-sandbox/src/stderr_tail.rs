@@ -1,4 +1,4 @@
-//! Standard error of an agent: a thread reads it and keeps its end.
+//! Standard error of an agent, which is its log: a thread reads it and keeps its last bytes.
 
 use crate::sched_stat::SchedStat;
 use rustix::{
@@ -42,8 +42,8 @@ pub(crate) struct StderrTail {
 impl StderrTail {
     /// Starts a thread that reads the socket `log` and keeps its last `keep_bytes`.
     pub(crate) fn drain(log: OwnedFd, keep_bytes: u64) -> io::Result<Self> {
-        let (stopped, stop) = pipe_with(PipeFlags::CLOEXEC)?;
-        let keep = usize::try_from(keep_bytes).unwrap_or(usize::MAX);
+        let (stop_reader, stop) = pipe_with(PipeFlags::CLOEXEC)?;
+        let keep_bytes = usize::try_from(keep_bytes).unwrap_or(usize::MAX);
         let tail = Arc::new(Mutex::new(VecDeque::new()));
         let shared = Arc::clone(&tail);
         let (sender, receiver) = mpsc::channel();
@@ -52,7 +52,7 @@ impl StderrTail {
             .spawn(move || {
                 let _ = sender.send(File::open("/proc/thread-self/schedstat").ok());
                 drop(sender);
-                drain_until_closed(&log, &stopped, keep, &shared);
+                drain_until_closed(&log, &stop_reader, keep_bytes, &shared);
             })?;
         Ok(Self {
             tail,
@@ -71,7 +71,7 @@ impl StderrTail {
     /// Run time of the reading thread. It runs on the evaluator's CPUs, as long as the agent writes.
     pub(crate) fn reader_run_time(&self) -> Duration {
         let file = self.schedule.as_ref();
-        file.and_then(SchedStat::read).unwrap_or_default().ran
+        file.and_then(SchedStat::read).unwrap_or_default().run_time
     }
 
     /// Reads the remaining bytes and ends the thread. Call it when the process tree is dead.
@@ -93,16 +93,21 @@ fn lock(tail: &Mutex<VecDeque<u8>>) -> MutexGuard<'_, VecDeque<u8>> {
     tail.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<VecDeque<u8>>) {
+fn drain_until_closed(
+    log: &OwnedFd,
+    stop: &OwnedFd,
+    keep_bytes: usize,
+    tail: &Mutex<VecDeque<u8>>,
+) {
     let mut chunk = vec![0; CHUNK_BYTES];
     let keep_end = |bytes: &[u8]| {
         let mut tail = lock(tail);
         tail.extend(bytes);
-        let excess = tail.len().saturating_sub(keep);
+        let excess = tail.len().saturating_sub(keep_bytes);
         tail.drain(..excess);
     };
-    // More than a socket can hold after its writers have died. A surviving writer's flood is cut off here.
-    let mut left_after_stop = 1 << 20;
+    // Larger than what a socket can hold after its writers have died. If a writer survives and goes on writing, reading ends here.
+    let mut remaining_bytes_after_stop = 1 << 20;
     loop {
         let mut fds = [
             PollFd::new(log, PollFlags::IN),
@@ -112,8 +117,8 @@ fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<V
             Ok(_) | Err(Errno::INTR) => {}
             Err(_) => return,
         }
-        let stopped = !fds[1].revents().is_empty();
-        // Only the bytes available now: a read without a limit continues as long as the agent writes.
+        let is_stopped = !fds[1].revents().is_empty();
+        // Read only the bytes available now: a read without a limit continues as long as the agent writes.
         let available = ioctl_fionread(log).unwrap_or(0);
         let limit = usize::try_from(available)
             .unwrap_or(CHUNK_BYTES)
@@ -124,9 +129,9 @@ fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<V
             Ok((count, _)) => {
                 keep_end(&chunk[..count]);
                 let cpu_time = own_cpu_time().saturating_sub(before);
-                if stopped {
-                    left_after_stop -= count.min(left_after_stop);
-                    if left_after_stop == 0 {
+                if is_stopped {
+                    remaining_bytes_after_stop -= count.min(remaining_bytes_after_stop);
+                    if remaining_bytes_after_stop == 0 {
                         return;
                     }
                 } else if cpu_time > MAX_READ_CPU_TIME {
@@ -139,7 +144,7 @@ fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<V
                     std::thread::sleep(PAUSE.max(cpu_time * PAUSE_PER_CPU_TIME));
                 }
             }
-            Err(Errno::AGAIN) if stopped => return,
+            Err(Errno::AGAIN) if is_stopped => return,
             Err(Errno::AGAIN | Errno::INTR) => {}
             Err(_) => return,
         }

@@ -2,7 +2,7 @@
 
 use crate::{
     cgroup,
-    memory_image::{IMAGE_PREFIX, MEMORY},
+    memory_image::{IMAGE_PREFIX, MEMORY_FOLDER},
     owner::Owner,
 };
 use std::{fs, path::Path};
@@ -17,7 +17,7 @@ pub(crate) const SCRATCH_PREFIX: &str = "faceoff-scratch-";
 pub fn sweep_stale() -> usize {
     cgroup::sweep()
         + sweep_folder(&std::env::temp_dir(), SCRATCH_PREFIX)
-        + sweep_folder(Path::new(MEMORY), IMAGE_PREFIX)
+        + sweep_folder(Path::new(MEMORY_FOLDER), IMAGE_PREFIX)
 }
 
 fn sweep_folder(folder: &Path, prefix: &str) -> usize {

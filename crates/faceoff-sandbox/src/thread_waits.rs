@@ -1,5 +1,4 @@
-//! Run delay of an agent's threads: how long they were runnable and did not run. Other processes do not delay a
-//! sleeping thread.
+//! Run delay of an agent's threads: how long they were ready to run (runnable) and did not run. A sleeping thread has no run delay.
 //!
 //! Only a bounded number of threads is sampled, so that a sample costs the same for any number of threads.
 
@@ -20,11 +19,11 @@ pub(crate) struct ThreadWaits {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct ThreadState {
-    ran: Duration,
+    run_time: Duration,
     /// Time on the run queue, up to its last time slice.
-    waited: Duration,
+    wait_time: Duration,
     /// Number of time slices.
-    slices: u64,
+    time_slices: u64,
     /// It runs or waits to run now.
     is_runnable: bool,
     /// Its scheduling policy (`SCHED_BATCH`, `SCHED_IDLE`) yields to other threads, so the agent itself chose its
@@ -35,24 +34,29 @@ struct ThreadState {
 impl ThreadWaits {
     /// One thread, which sleeps now.
     #[cfg(test)]
-    pub(crate) fn one_thread(ran: Duration, waited: Duration) -> Self {
+    pub(crate) fn one_thread(run_time: Duration, wait_time: Duration) -> Self {
         // A thread that ran longer had more time slices.
-        let slices = u64::try_from(ran.as_nanos()).unwrap_or(u64::MAX);
-        Self::single(ran, waited, slices, false)
+        let time_slices = u64::try_from(run_time.as_nanos()).unwrap_or(u64::MAX);
+        Self::single(run_time, wait_time, time_slices, false)
     }
 
     /// One thread with this number of time slices.
     #[cfg(test)]
-    pub(crate) fn one_thread_with_slices(slices: u64, is_runnable: bool) -> Self {
-        Self::single(Duration::ZERO, Duration::ZERO, slices, is_runnable)
+    pub(crate) fn one_thread_with_slices(time_slices: u64, is_runnable: bool) -> Self {
+        Self::single(Duration::ZERO, Duration::ZERO, time_slices, is_runnable)
     }
 
     #[cfg(test)]
-    fn single(ran: Duration, waited: Duration, slices: u64, is_runnable: bool) -> Self {
+    fn single(
+        run_time: Duration,
+        wait_time: Duration,
+        time_slices: u64,
+        is_runnable: bool,
+    ) -> Self {
         let thread = ThreadState {
-            ran,
-            waited,
-            slices,
+            run_time,
+            wait_time,
+            time_slices,
             is_runnable,
             is_background: false,
         };
@@ -62,19 +66,21 @@ impl ThreadWaits {
     }
 }
 
-/// Per-thread accounts of the waits that could have delayed an answer, updated by samples while the answer is late.
-/// If a thread got the CPU, went to sleep and did not answer, its earlier waits do not count.
+/// The waits of each thread that could have delayed an answer, updated by samples while the answer is late. If a thread got the CPU,
+/// went to sleep and did not answer, its earlier waits do not count.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WaitLedger(BTreeMap<u32, Account>);
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Account {
-    /// Value of its wait counter from which waits count; zero as long as all of them count.
-    counts_from: Duration,
+    /// The part of its wait counter that does not count: its value when the thread was last found to have finished its
+    /// work, and zero before.
+    discarded_wait: Duration,
     /// Time between successive samples that both found it waiting.
     observed_wait: Duration,
-    /// Its number of time slices at that time.
-    slices: u64,
+    /// Its number of time slices at the last of these samples.
+    time_slices: u64,
+    /// Was it asleep in the last sample?
     was_asleep: bool,
 }
 
@@ -89,19 +95,20 @@ pub enum AnswerState {
 
 impl WaitLedger {
     #[cfg(test)]
-    pub(crate) const NONE: Self = Self(BTreeMap::new());
+    pub(crate) const EMPTY: Self = Self(BTreeMap::new());
 
-    /// Adds a sample without an answer. `between`: time since the last sample in which none of the agent's threads ran.
-    pub(crate) fn add(&mut self, before: &ThreadWaits, now: &ThreadWaits, between: Duration) {
+    /// Adds a sample without an answer. `idle_between`: the time since the last sample in which none of the agent's threads ran.
+    pub(crate) fn add(&mut self, before: &ThreadWaits, now: &ThreadWaits, idle_between: Duration) {
         for (id, thread) in &now.threads {
             let account = self.0.entry(*id).or_default();
             let earlier = before.threads.get(id);
             // If it had slept in between, waking up would have cost a time slice.
-            if earlier.is_some_and(|earlier| earlier.is_runnable && earlier.slices == thread.slices)
-                && thread.is_runnable
+            if earlier.is_some_and(|earlier| {
+                earlier.is_runnable && earlier.time_slices == thread.time_slices
+            }) && thread.is_runnable
             {
-                account.observed_wait += between;
-                account.slices = thread.slices;
+                account.observed_wait += idle_between;
+                account.time_slices = thread.time_slices;
             }
             account.update(thread);
         }
@@ -113,10 +120,11 @@ impl WaitLedger {
         for (id, thread) in &now.threads {
             let account = self.0.entry(*id).or_default();
             let earlier = baseline.threads.get(id);
-            if thread.is_runnable && earlier.is_some_and(|earlier| earlier.slices == thread.slices)
+            if thread.is_runnable
+                && earlier.is_some_and(|earlier| earlier.time_slices == thread.time_slices)
             {
                 account.observed_wait += stolen;
-                account.slices = thread.slices;
+                account.time_slices = thread.time_slices;
             }
             account.update(thread);
         }
@@ -126,17 +134,17 @@ impl WaitLedger {
     pub(crate) fn longest_observed_wait(&self, now: &ThreadWaits, answer: AnswerState) -> Duration {
         let each = self.0.iter().filter_map(|(id, account)| {
             let thread = now.threads.get(id)?;
-            let ran_since = thread.slices != account.slices;
+            let ran_since = thread.time_slices != account.time_slices;
             (!thread.is_background && (ran_since || answer == AnswerState::Pending))
                 .then_some(account.observed_wait)
         });
         each.max().unwrap_or_default()
     }
 
-    fn counts_from(&self, id: u32) -> Duration {
+    fn discarded_wait(&self, id: u32) -> Duration {
         self.0
             .get(&id)
-            .map_or(Duration::ZERO, |account| account.counts_from)
+            .map_or(Duration::ZERO, |account| account.discarded_wait)
     }
 }
 
@@ -145,7 +153,7 @@ impl Account {
     fn update(&mut self, thread: &ThreadState) {
         let is_asleep = !thread.is_runnable;
         if is_asleep && self.was_asleep {
-            self.counts_from = thread.waited;
+            self.discarded_wait = thread.wait_time;
             self.observed_wait = Duration::ZERO;
         }
         self.was_asleep = is_asleep;
@@ -164,16 +172,18 @@ impl ThreadWaits {
         let countable_wait = |(id, now): (&u32, &ThreadState)| {
             // Nothing is known about a thread that was not tracked before.
             let earlier = before.threads.get(id)?;
-            let from = ledger.counts_from(*id).max(earlier.waited);
+            let counted_from = ledger.discarded_wait(*id).max(earlier.wait_time);
             if now.is_background {
                 return None;
             }
-            if now.slices == earlier.slices {
+            if now.time_slices == earlier.time_slices {
                 // The kernel adds a current wait to the counter only when the wait ends.
-                let waits = now.is_runnable && now.ran == earlier.ran && from == earlier.waited;
-                return (waits && answer == AnswerState::Pending).then_some(wall);
+                let is_waiting = now.is_runnable
+                    && now.run_time == earlier.run_time
+                    && counted_from == earlier.wait_time;
+                return (is_waiting && answer == AnswerState::Pending).then_some(wall);
             }
-            Some(now.waited.saturating_sub(from))
+            Some(now.wait_time.saturating_sub(counted_from))
         };
         let each = self.threads.iter().filter_map(countable_wait);
         each.max().unwrap_or_default().min(wall)
@@ -195,31 +205,33 @@ struct TrackedThread {
 }
 
 impl TrackedThreads {
-    /// More threads make every sample more expensive, and the first ones are those that answer.
-    const MAX: usize = 16;
+    /// More threads would make every sample more expensive, and the first ones are those that answer.
+    const MAX_THREADS: usize = 16;
 
     /// Tracks the threads that these processes have now.
     pub(crate) fn update(&mut self, processes: &[Pid]) {
         self.processes.clear();
         let mut tracked = std::mem::take(&mut self.threads);
         for process in processes {
-            if self.threads.len() >= Self::MAX {
+            if self.threads.len() >= Self::MAX_THREADS {
                 return;
             }
             self.processes.push(*process);
             let tasks = format!("/proc/{}/task", process.as_raw_nonzero());
             // The folder is missing if the process has just ended.
             for task in fs::read_dir(tasks).into_iter().flatten().flatten() {
-                if self.threads.len() >= Self::MAX {
+                if self.threads.len() >= Self::MAX_THREADS {
                     return;
                 }
                 let Ok(id) = task.file_name().to_string_lossy().parse() else {
                     continue;
                 };
-                let at = tracked.iter().position(|thread| thread.id == id);
-                let thread = match at {
+                let index = tracked.iter().position(|thread| thread.id == id);
+                let thread = match index {
                     // The id may have been reused by another thread: then the old files can no longer be read.
-                    Some(at) if tracked[at].counters().is_some() => Some(tracked.swap_remove(at)),
+                    Some(index) if tracked[index].counters().is_some() => {
+                        Some(tracked.swap_remove(index))
+                    }
                     _ => TrackedThread::open(id, &task.path()),
                 };
                 self.threads.extend(thread);
@@ -280,14 +292,14 @@ impl TrackedThread {
 impl ThreadState {
     const fn from_counters(counters: SchedStat) -> Self {
         let SchedStat {
-            ran,
-            waited,
-            slices,
+            run_time,
+            wait_time,
+            time_slices,
         } = counters;
         Self {
-            ran,
-            waited,
-            slices,
+            run_time,
+            wait_time,
+            time_slices,
             is_runnable: false,
             is_background: false,
         }
@@ -296,15 +308,15 @@ impl ThreadState {
 
 /// Adds state and policy from the text of `stat`: number, name, state, and much later the policy.
 fn with_state(status: &str, thread: ThreadState) -> Option<ThreadState> {
-    /// Counted from the state, which is the third field of all.
-    const POLICY: usize = 41 - 3;
+    /// Index of the policy, counted from the state. In the whole line the state is field 3, the policy field 41.
+    const POLICY_INDEX: usize = 41 - 3;
     const BATCH: &str = "3";
     const IDLE: &str = "5";
-    // The program chooses its name, which may contain anything.
+    // The second field is the program's name in parentheses, which may contain anything.
     let (_, rest) = status.rsplit_once(')')?;
     let mut fields = rest.split_ascii_whitespace();
     let state = fields.next()?;
-    let policy = fields.nth(POLICY - 1);
+    let policy = fields.nth(POLICY_INDEX - 1);
     Some(ThreadState {
         is_runnable: state.starts_with('R'),
         is_background: policy.is_some_and(|policy| [BATCH, IDLE].contains(&policy)),
@@ -317,13 +329,15 @@ mod tests {
     use super::*;
 
     const WALL: Duration = Duration::from_nanos(1000);
+    /// `NS(5)` is 5 nanoseconds.
     const NS: fn(u64) -> Duration = Duration::from_nanos;
 
-    /// Each thread: its number, its `schedstat`, its state, and its policy.
+    /// Each thread: its number, its `schedstat` (run time in ns, wait time in ns, time slices), its state (`R` runnable, `S` asleep)
+    /// and its policy (0 normal, 3 batch, 5 idle).
     fn waits(threads: &[(u32, &str, &str, &str)]) -> ThreadWaits {
         let parse = |&(id, schedule, state, policy): &(u32, &str, &str, &str)| {
-            let between = "0 ".repeat(37);
-            let status = format!("{id} (a) b) {state} {between}{policy} 0");
+            let skipped_fields = "0 ".repeat(37);
+            let status = format!("{id} (a) b) {state} {skipped_fields}{policy} 0");
             let counters = ThreadState::from_counters(SchedStat::parse(schedule).unwrap());
             (id, with_state(&status, counters).unwrap())
         };
@@ -343,7 +357,11 @@ mod tests {
         use AnswerState::{Pending, Received};
         for answer in [Received, Pending] {
             let longest = |threads| longest(threads, answer).as_nanos();
-            assert_eq!(longest(&[(1, "500 100 3", "S", "0")]), 0, "it slept");
+            assert_eq!(
+                longest(&[(1, "500 100 3", "S", "0")]),
+                0,
+                "the thread slept"
+            );
             assert_eq!(longest(&[(1, "510 400 4", "S", "0")]), 300);
             assert_eq!(longest(&[(1, "510 9000 4", "S", "0")]), 1000);
             assert_eq!(
@@ -357,11 +375,15 @@ mod tests {
                 "its policy is SCHED_BATCH"
             );
             assert_eq!(longest(&[(2, "75 20 2", "S", "0")]), 20);
-            assert_eq!(longest(&[(3, "5 40 2", "R", "0")]), 0, "it was not tracked");
+            assert_eq!(
+                longest(&[(3, "5 40 2", "R", "0")]),
+                0,
+                "the thread was not tracked"
+            );
             assert_eq!(longest(&[]), 0);
         }
         let waiting: &[_] = &[(2, "70 0 1", "R", "0")];
-        assert_eq!(longest(waiting, Pending), WALL, "it never ran");
+        assert_eq!(longest(waiting, Pending), WALL, "the thread never ran");
         assert_eq!(
             longest(waiting, Received),
             NS(0),
@@ -380,9 +402,9 @@ mod tests {
         let answer = waits(&[(1, "530 470 6", "S", "0")]);
         let mut ledger = WaitLedger::default();
         let counts = |ledger: &WaitLedger| {
-            let waited = answer.longest_since(&samples[0], WALL, ledger, AnswerState::Received);
+            let wait_time = answer.longest_since(&samples[0], WALL, ledger, AnswerState::Received);
             let observed_wait = ledger.longest_observed_wait(&answer, AnswerState::Received);
-            (waited.as_nanos(), observed_wait.as_nanos())
+            (wait_time.as_nanos(), observed_wait.as_nanos())
         };
         ledger.add(&samples[0], &samples[1], NS(50));
         assert_eq!(counts(&ledger), (370, 50));
@@ -398,9 +420,9 @@ mod tests {
         let sample = |number: u64| {
             let each: Vec<(u32, String, &str)> = (0..8)
                 .map(|id: u64| {
-                    let slices = number.saturating_sub(id) / 8;
+                    let time_slices = number.saturating_sub(id) / 8;
                     let state = if (number / 2) % 8 == id { "R" } else { "S" };
-                    (id as u32, format!("{slices} 0 {slices}"), state)
+                    (id as u32, format!("{time_slices} 0 {time_slices}"), state)
                 })
                 .collect();
             let each: Vec<_> = each
@@ -428,8 +450,8 @@ mod tests {
                 .as_nanos()
         };
         assert_eq!(now(&[(1, "500 100 3", "R", "0")]), 40);
-        assert_eq!(now(&[(1, "500 100 3", "S", "0")]), 0, "it sleeps");
-        assert_eq!(now(&[(1, "501 100 4", "R", "0")]), 0, "it ran");
+        assert_eq!(now(&[(1, "500 100 3", "S", "0")]), 0, "the thread sleeps");
+        assert_eq!(now(&[(1, "501 100 4", "R", "0")]), 0, "the thread ran");
         assert_eq!(
             now(&[(1, "500 100 3", "R", "5")]),
             0,
@@ -439,16 +461,17 @@ mod tests {
 
     #[test]
     fn tracked_threads_are_bounded() {
-        let over = std::sync::Barrier::new(41);
+        const EXTRA_THREADS: usize = 40;
+        let end_barrier = std::sync::Barrier::new(EXTRA_THREADS + 1);
         std::thread::scope(|scope| {
-            for _ in 0..40 {
-                scope.spawn(|| over.wait());
+            for _ in 0..EXTRA_THREADS {
+                scope.spawn(|| end_barrier.wait());
             }
             let this = rustix::process::getpid();
             let mut tracked = TrackedThreads::default();
             tracked.update(&[this]);
             let waits = tracked.sample().expect("this kernel counts waits");
-            assert!(waits.threads.len() <= TrackedThreads::MAX);
+            assert!(waits.threads.len() <= TrackedThreads::MAX_THREADS);
             assert!(
                 tracked
                     .read_counters()
@@ -460,7 +483,7 @@ mod tests {
             assert!(tracked.sample().is_some());
             tracked.update(&[]);
             assert_eq!((tracked.sample(), tracked.read_counters()), (None, None));
-            over.wait();
+            end_barrier.wait();
         });
     }
 }

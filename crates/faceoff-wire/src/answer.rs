@@ -1,4 +1,4 @@
-//! Answers of an agent, parsed strictly: `ready` and `act`.
+//! Strict parsers for the two answers of an agent: `ready` (to `hello` and `reset`) and `act` (to `step`).
 //!
 //! A line is parsed in one pass without an intermediate tree; the numbers of an action go straight into the
 //! caller's buffer. A second pass is made in two cases only: over a refused line, to explain what is wrong with it,
@@ -11,13 +11,16 @@ use fields::Fields;
 
 mod action;
 mod diagnosis;
+mod error_markers;
 mod fields;
-mod marks;
 mod repeated_keys;
 mod scalar;
 
 pub use diagnosis::too_long;
 pub use scalar::Scalar;
+
+/// Maximum number of characters of an agent's name or version; longer ones are cut.
+const MAX_LABEL_CHARS: usize = 100;
 
 /// The answer to `hello`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,8 +36,8 @@ pub struct Ready {
 /// Parses the answer to `hello`. `line` is without the newline.
 ///
 /// # Errors
-/// The agent fault: not a JSON object, another message, another protocol, no or an unknown
-/// interpolation, a repeated key.
+/// An agent fault, if the line is not a JSON object or not `ready`, has another protocol version, an unknown or no
+/// interpolation, or a repeated key.
 pub fn parse_ready(line: &[u8]) -> Result<Ready, AgentFaultKind> {
     const EXPECTED: &str = "ready with protocol 1 and an interpolation";
     let fields = Fields::parse(line, None)?;
@@ -52,21 +55,21 @@ pub fn parse_ready(line: &[u8]) -> Result<Ready, AgentFaultKind> {
     };
     let interpolation = Interpolation::from_code(code)
         .map_err(|unknown| wrong(format!("ready with interpolation {}", unknown.0)))?;
-    let text = |field: &Option<Scalar<'_>>| match field {
-        Some(Scalar::Text(text)) => Some(text.chars().take(100).collect()),
+    let label = |field: &Option<Scalar<'_>>| match field {
+        Some(Scalar::Text(text)) => Some(text.chars().take(MAX_LABEL_CHARS).collect()),
         _ => None,
     };
     Ok(Ready {
         interpolation,
-        name: text(&fields.name),
-        version: text(&fields.version),
+        name: label(&fields.name),
+        version: label(&fields.version),
     })
 }
 
 /// Parses the answer to `reset`. `line` is without the newline.
 ///
 /// # Errors
-/// The agent fault: not a JSON object, another message or episode, a repeated key.
+/// An agent fault, if the line is not a JSON object, not `ready` for this episode, or has a repeated key.
 pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind> {
     let expected = || format!("ready with episode {episode}");
     let fields = Fields::parse(line, None)?;
@@ -80,8 +83,8 @@ pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind
 /// [`ACTION_LIMIT`](faceoff_types::ACTION_LIMIT) in magnitude; after an error its content is undefined.
 ///
 /// # Errors
-/// The agent fault: not a JSON object, another message or step, another shape, a number that is
-/// not finite or too large, a repeated key at any depth.
+/// An agent fault, if the line is not a JSON object, not `act` for this step, has an action of another shape, a number that
+/// is not finite or too large, or a repeated key at any depth.
 pub fn parse_act(
     line: &[u8],
     step: u32,

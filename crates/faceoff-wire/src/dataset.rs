@@ -1,4 +1,5 @@
-//! JSON files of an evaluation's dataset; its other files are Parquet tables and a log.
+//! JSON files of an evaluation's dataset. A *dataset* is the complete recording of an *evaluation*, in which one agent plays all
+//! episodes of the tasks.
 //!
 //! A dataset is a zip archive with `manifest.json`, `results.json`, `violations.json`,
 //! `calibration.json`, `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
@@ -20,14 +21,14 @@ pub struct DatasetManifest {
     pub ruleset: String,
     /// The simulator that computed the states; only the same one reproduces them.
     pub simulator: SimulatorId,
-    /// The perturbation profile.
+    /// The perturbation profile: a named set of disturbances of the simulation.
     pub profile: Profile,
-    /// Deviations from the ruleset, in playing and in scoring.
+    /// Organisers' deviations from the ruleset, in perturbations and in scoring.
     #[serde(flatten)]
     pub variation: Variation,
     /// The evaluation's seed.
     pub seed: Seed,
-    /// The seed of the season's model mismatch.
+    /// The seed of the season's model mismatch: how the simulated robot deviates from the nominal one that agents know.
     pub mismatch_seed: Seed,
     /// The agent's name.
     pub agent: String,
@@ -42,8 +43,8 @@ pub struct DatasetManifest {
 pub struct SimulatorId {
     /// Version of the program.
     pub version: String,
-    /// BLAKE3 of the simulated states of a few fixed episodes, 64 hexadecimal digits. It differs between simulators
-    /// that differ in one bit of them, whatever their versions.
+    /// BLAKE3 of the simulated states of a few fixed episodes, 64 hexadecimal digits. Two simulators with different
+    /// states have different fingerprints, even if their versions are equal.
     pub fingerprint: String,
 }
 
@@ -91,7 +92,7 @@ pub struct ConstraintViolation {
     pub first_step: u32,
     /// Number of control steps with a violation.
     pub steps: u32,
-    /// The largest value of the constraint; above 0 it is violated.
+    /// The largest excess over the bound, in the constraint's unit; above 0 the constraint is violated.
     pub max: f64,
 }
 
@@ -107,7 +108,7 @@ pub struct SlowEpisode {
     pub max_s: f64,
     /// Penalty points: 0.5, 1 or 2.
     pub points: f64,
-    /// The slowest answer, if a step was answered; since layout 4.
+    /// The slowest answer, if a step was answered. Datasets before [`DATASET_SCHEMA`] 4 do not have it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slowest: Option<SlowStep>,
 }
@@ -120,13 +121,14 @@ pub struct SlowStep {
     pub step: u32,
     /// Wall time from the first attempt to write the observation to the last byte of the answer, in seconds.
     pub wall_s: f64,
-    /// Part of it due to host interference, in seconds; the rest is the computation time.
+    /// Part of the wall time due to host interference (other load on the machine), in seconds; the rest is the computation time.
     pub host_s: f64,
-    /// CPU time of the agent's process tree in that time, in seconds, if the host reports it.
+    /// CPU time of the agent's process tree during the wall time, in seconds, if the host reports it.
     pub cpu_s: Option<f64>,
 }
 
-/// `calibration.json`: timing quality of the slots, measured by the platform.
+/// `calibration.json`: timing quality of the slots, measured by the platform. A *slot* is a place in a worker that runs one job at
+/// a time; a *shard* is a range of episodes that one slot plays as one job.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct CalibrationFile {
     /// [`DATASET_SCHEMA`].

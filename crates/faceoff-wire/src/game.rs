@@ -1,8 +1,9 @@
-//! Games: the specification of a game, and the JSON files of its recording.
+//! The specification of a game between two agents, the *sides*, and the JSON files of its recording.
 //!
 //! A recording is a zip archive with `manifest.json`, `results.json`, `outcome.json`, `calibration.json`,
-//! `motion.parquet`, `rallies.parquet` and, for each side N, `side-N.parquet`, `entries-N.parquet` and
-//! `agent-N.log`. A side's own archive is derived from it: the public files and those of that side, without seeds.
+//! `motion.parquet`, `rallies.parquet` and, for each side N, `side-N.parquet` (its steps), `entries-N.parquet` (how it
+//! got ready for each rally) and `agent-N.log`. A side's own archive is derived from it: the public files and those of that side,
+//! without seeds.
 
 use crate::dataset::{FileDigest, SimulatorId};
 use faceoff_types::{GameLimits, PerturbationSettings, Profile, Ruleset, Seed, SlotTiming};
@@ -14,23 +15,23 @@ pub const GAME_SCHEMA: &str = "faceoff-game/1";
 /// Name and version of the layout of a side's own archive.
 pub const GAME_SIDE_SCHEMA: &str = "faceoff-game-side/1";
 
-/// The specification of a game. The agents' limits are part of the job, and their CPUs are chosen by the host.
+/// The specification of a game. It does not contain the agents' resource limits (memory, processes), which are part of the job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameSpec {
     /// The ruleset.
     pub ruleset: Ruleset,
     /// Control steps of the whole game.
     pub steps: u32,
-    /// The perturbation profile.
+    /// The perturbation profile: a named set of disturbances of the simulation.
     pub profile: Profile,
     /// The game's own seed.
     pub seed: Seed,
-    /// The seed of the season's model mismatch.
+    /// The seed of the season's model mismatch: how the simulated robots deviate from the nominal one that agents know.
     pub mismatch_seed: Seed,
-    /// Limits of each side.
+    /// Limits of each side on time and faults.
     #[serde(default)]
     pub limits: GameLimits,
-    /// Number of earlier attempts that a platform fault ended.
+    /// Number of earlier attempts that a platform fault (a failure that is not the agents') ended.
     #[serde(default)]
     pub platform_retries: u32,
     /// Magnitudes of the profile's perturbations; absent: the ruleset's.
@@ -54,8 +55,8 @@ pub struct GameManifest {
     pub files: BTreeMap<String, FileDigest>,
 }
 
-/// `manifest.json` of a side's own archive. It contains no seed, since the other side's observations could be
-/// reproduced with it.
+/// `manifest.json` of a side's own archive. It contains no seed, since a seed would allow to reproduce the other side's
+/// observations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameSideManifest {
     /// [`GAME_SIDE_SCHEMA`].

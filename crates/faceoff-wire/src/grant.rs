@@ -1,4 +1,5 @@
-//! Grants: which of the server's files the holder of a job may read and write.
+//! Grants: which of the server's files the holder of a lease may read and write. A *lease* is the right to run a job for a limited
+//! time.
 //!
 //! The server seals a grant with a secret key, so it can check grants without storing them, and they cannot be
 //! forged. On each use it also asks the queue whether the lease is still valid.
@@ -15,7 +16,7 @@ pub struct Grant {
     /// Id of the job in the queue.
     #[serde(rename = "unit")]
     pub job_id: Uuid,
-    /// Nonce of the lease for which the grant was issued.
+    /// Nonce (random id) of the lease for which the grant was issued.
     pub nonce: Uuid,
     /// Bundles that may be fetched: those of the job's agents.
     pub bundles: Vec<BundleRef>,
@@ -25,8 +26,8 @@ pub struct Grant {
     /// Specification that a stored recording must match.
     #[serde(rename = "plays")]
     pub expected_recording: ExpectedRecording,
-    /// BLAKE3 of the server program that issued the job, 64 hexadecimal digits. A result of another program version
-    /// is not comparable, so the job is played again.
+    /// BLAKE3 of the executable of the server that issued the job, 64 hexadecimal digits. A result from another executable is not
+    /// comparable, so the job is run again.
     #[serde(default)]
     pub program: String,
 }
@@ -35,7 +36,7 @@ pub struct Grant {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExpectedRecording {
-    /// None is stored.
+    /// No recording.
     #[serde(rename = "nothing")]
     None,
     /// Episodes of a shard.
@@ -62,7 +63,7 @@ pub enum WriteScope {
 pub struct GrantKey([u8; 32]);
 
 /// Longest file name in a recording, in bytes.
-const LONGEST_NAME: usize = 64;
+const MAX_FILE_NAME_BYTES: usize = 64;
 
 impl GrantKey {
     /// Derives the key from the server's secret.
@@ -71,7 +72,8 @@ impl GrantKey {
         Self(blake3::derive_key("faceoff: grants of work orders", secret))
     }
 
-    /// Draws the `number`th pseudo-random number of a lease; it cannot be predicted without the secret.
+    /// The `number`th pseudo-random number of the lease with this nonce. Workers cannot predict it without the secret, so the server
+    /// chooses with it which episodes of a result it simulates again.
     #[must_use]
     pub fn draw(&self, nonce: Uuid, number: u32) -> u64 {
         let mut hasher = blake3::Hasher::new_keyed(&self.0);
@@ -83,6 +85,7 @@ impl GrantKey {
         u64::from_le_bytes(bytes)
     }
 
+    /// The keyed hash (message authentication code) of `bytes`.
     fn mac(&self, bytes: &[u8]) -> blake3::Hash {
         blake3::keyed_hash(&self.0, bytes)
     }
@@ -146,13 +149,18 @@ impl Grant {
 /// Is this a valid file name in a recording? Names that could leave its folder are not.
 fn is_file_name(name: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
-    (1..=LONGEST_NAME).contains(&name.len()) && !name.starts_with('.') && name.chars().all(allowed)
+    (1..=MAX_FILE_NAME_BYTES).contains(&name.len())
+        && !name.starts_with('.')
+        && name.chars().all(allowed)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    const BUNDLE_BLAKE3: &str = "abababababababababababababababababababababababababababababababab";
+    const OTHER_BLAKE3: &str = "cdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcdcd";
 
     fn grant() -> Grant {
         Grant {
@@ -161,32 +169,32 @@ mod tests {
             bundles: vec![BundleRef {
                 key: "bundles/a/b.zip".into(),
                 bytes: 7,
-                blake3: "ab".repeat(32),
+                blake3: BUNDLE_BLAKE3.into(),
                 file_name: "agent.zip".into(),
             }],
             write_scope: WriteScope::Folder("runs/r/n".into()),
             expected_recording: ExpectedRecording::None,
-            program: "cd".repeat(32),
+            program: OTHER_BLAKE3.into(),
         }
     }
 
     #[test]
     fn sealed_grant_opens_and_forgeries_do_not() {
-        let (key, other) = (
+        let (key, other_key) = (
             GrantKey::from_secret(&[1; 32]),
             GrantKey::from_secret(&[2; 32]),
         );
         let sealed = grant().seal(&key).unwrap();
         assert_eq!(Grant::open(&sealed, &key), Some(grant()));
-        assert_eq!(Grant::open(&sealed, &other), None);
+        assert_eq!(Grant::open(&sealed, &other_key), None);
         let (json, seal) = sealed.split_once('.').unwrap();
-        let wider = Grant {
+        let wider_grant = Grant {
             write_scope: WriteScope::Folder("runs/another".into()),
             ..grant()
         };
-        let wider = hex::encode(serde_json::to_vec(&wider).unwrap());
+        let wider_json = hex::encode(serde_json::to_vec(&wider_grant).unwrap());
         for forged in [
-            format!("{wider}.{seal}"),
+            format!("{wider_json}.{seal}"),
             format!("{json}."),
             json.to_owned(),
             String::new(),
@@ -198,8 +206,8 @@ mod tests {
     #[test]
     fn grant_limits_reads_and_writes() {
         let grant = grant();
-        assert!(grant.bundle(&"ab".repeat(32)).is_some());
-        assert!(grant.bundle(&"cd".repeat(32)).is_none());
+        assert!(grant.bundle(BUNDLE_BLAKE3).is_some());
+        assert!(grant.bundle(OTHER_BLAKE3).is_none());
         assert_eq!(
             grant.storage_key("steps.parquet").as_deref(),
             Some("runs/r/n/steps.parquet")
@@ -213,7 +221,7 @@ mod tests {
             "a\\b",
             ".hidden",
             "a b",
-            &"n".repeat(65),
+            &"n".repeat(MAX_FILE_NAME_BYTES + 1),
         ] {
             assert_eq!(grant.storage_key(name), None, "{name:?}");
         }
@@ -222,11 +230,11 @@ mod tests {
             ..grant.clone()
         };
         assert_eq!(file.storage_key("clips").as_deref(), Some("ablations/x"));
-        let nothing = Grant {
+        let no_file = Grant {
             write_scope: WriteScope::None,
             ..grant
         };
-        assert_eq!(nothing.storage_key("clips"), None);
+        assert_eq!(no_file.storage_key("clips"), None);
     }
 
     proptest! {

@@ -1,7 +1,8 @@
-//! Jobs as slots receive them, locally or on another machine, and the reports that slots send back.
+//! Jobs, and the reports on their results. A *job* is a piece of queued work, such as a range of episodes; a *slot* is a place in a
+//! worker process that runs one job at a time, on the server or on another machine.
 //!
-//! A job carries the seeds of its own episodes, never the secret from which they are derived. So a worker learns
-//! nothing about other days.
+//! A job carries the seeds of its own episodes, never the season's secret from which they are derived. So a worker learns nothing
+//! about the episodes of other days.
 
 use crate::game::GameSpec;
 use faceoff_types::{
@@ -32,7 +33,7 @@ pub enum OutputFiles {
     /// No files.
     #[serde(rename = "nothing")]
     None,
-    /// The clips for replays, under this key.
+    /// The clips (shortened recordings for replays in the browser), under this key.
     Clips(String),
     /// The complete recording, under this key prefix.
     Recording(String),
@@ -44,22 +45,22 @@ pub struct Lease {
     /// Id of the job in the queue; the same for each lease of the job.
     #[serde(rename = "unit")]
     pub job_id: Uuid,
-    /// Random id of this lease.
+    /// Random id of this lease; another lease of the same job has another nonce.
     pub nonce: Uuid,
     /// Name of the lease holder.
     pub slot: String,
-    /// When the lease ends unless it is renewed, by the server's clock.
+    /// The instant at which the lease ends unless it is renewed, by the server's clock.
     pub expires_at: Timestamp,
     /// Duration of the lease, and of each renewal, in seconds. Remote workers use it in place of `expires_at`, since
     /// their clocks may differ.
     pub duration_s: u32,
 }
 
-/// The task of a job, by its kind.
+/// The work of a job, by its kind.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum JobPayload {
-    /// Check whether a submitted agent starts, answers and keeps the time limits.
+    /// Check in a few episodes whether a submitted agent starts, answers and keeps the time limits.
     #[serde(rename = "smoke")]
     Validation {
         /// The submission; used in log messages.
@@ -72,10 +73,11 @@ pub enum JobPayload {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         runtimes: Vec<StageRuntimes>,
     },
-    /// Play a range of episodes.
+    /// Play a shard: a range of episodes of one task.
     #[serde(rename = "play")]
     Shard {
-        /// Id of the evaluation or ablation; used in log messages.
+        /// Id of the evaluation or ablation (comparison of the perturbations' effects) to which the shard belongs; used in log
+        /// messages.
         part_of: Uuid,
         /// An agent with a valid bundle.
         agent: AgentSpec,
@@ -137,7 +139,8 @@ pub struct GameFiles {
 pub struct ValidationSpec {
     /// The submission's own seed.
     pub seed: Seed,
-    /// Seed of the season's model mismatch, so that the robot is the same as in counting evaluations.
+    /// Seed of the season's model mismatch (the simulated robot's deviations from the nominal one), so that the robot is the same as
+    /// in counting evaluations.
     pub mismatch_seed: Seed,
 }
 
@@ -151,15 +154,15 @@ pub struct ShardSpec {
     pub task: Task,
     /// The episodes, by their index within the evaluation.
     pub episodes: Range<u32>,
-    /// The perturbation profile.
+    /// The perturbation profile: a named set of disturbances of the simulation.
     pub profile: Profile,
     /// The evaluation's seed.
     pub seed: Seed,
-    /// The seed of the season's model mismatch.
+    /// The seed of the season's model mismatch: how the simulated robot deviates from the nominal one that agents know.
     pub mismatch_seed: Seed,
     /// Agent faults allowed; one more ends the shard early.
     pub max_faults: u32,
-    /// Number of earlier attempts that a platform fault ended.
+    /// Number of earlier attempts that a platform fault (a failure that is not the agent's) ended.
     #[serde(default)]
     pub platform_retries: u32,
     /// Magnitudes of the profile's perturbations; absent: the ruleset's.
@@ -180,7 +183,7 @@ pub struct EvaluationMeta {
     pub agent: String,
     /// The ruleset of the evaluation.
     pub ruleset: Ruleset,
-    /// Deviations from the ruleset, in playing and in scoring.
+    /// Organisers' deviations from the ruleset, in perturbations and in scoring.
     #[serde(flatten)]
     pub variation: Variation,
 }
@@ -193,14 +196,14 @@ const fn first_ruleset() -> Ruleset {
     Ruleset::First
 }
 
-/// The result of a completed job. A platform fault yields no report: it releases the job.
+/// The result of a completed job. After a platform fault there is no report: the job goes back to the queue.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum JobReport {
-    /// Of [`JobPayload::Validation`].
+    /// The result of a [`JobPayload::Validation`].
     #[serde(rename = "smoke")]
     Validation(ValidationOutcome),
-    /// Of [`JobPayload::Shard`].
+    /// The result of a [`JobPayload::Shard`].
     #[serde(rename = "play")]
     Shard {
         /// One outcome per episode, in order; fewer if faults ended the shard.
@@ -212,7 +215,7 @@ pub enum JobReport {
         /// Key prefix of the recording, if it was stored.
         recording: Option<String>,
     },
-    /// Of [`JobPayload::Game`].
+    /// The result of a [`JobPayload::Game`].
     Game {
         /// The score: the content of the game's `results.json`.
         score: Value,
@@ -221,7 +224,7 @@ pub enum JobReport {
         /// Tails of both agents' standard errors with their faults, the home side's first.
         logs: [String; 2],
     },
-    /// Of [`JobPayload::Scoring`].
+    /// The result of a [`JobPayload::Scoring`].
     #[serde(rename = "finalise")]
     Scoring {
         /// Storage key of the dataset.

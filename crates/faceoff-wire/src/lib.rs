@@ -1,5 +1,5 @@
 //! The formats that Faceoff shares with other programs: the agent protocol, the bundle's `agent.toml`, the files of a
-//! dataset, and the jobs of worker slots, which may be on other machines.
+//! dataset, and the jobs of workers, which may be on other machines.
 //!
 //! All formats are versioned and limited in size. The crate does no I/O, reads no clock and starts no process: it
 //! works on byte slices. Answers of agents are parsed once, into types. An invalid answer becomes an
@@ -8,9 +8,9 @@
 //! * [`message`]: messages of the evaluator (`hello`, `reset`, `step`, `end`, `bye`);
 //! * [`answer`]: answers of the agent (`ready`, `act`);
 //! * [`Manifest`][]: `agent.toml`;
-//! * [`dataset`]: `manifest.json` and `violations.json` of a recorded evaluation;
-//! * [`game`]: the specification of a game, and `manifest.json` of its recording;
-//! * [`job`]: jobs of worker slots and their reports;
+//! * [`dataset`]: the JSON files of a recorded evaluation;
+//! * [`game`]: the specification of a game, and the JSON files of its recording;
+//! * [`job`]: jobs of workers and the reports on them;
 //! * [`remote`]: messages between the server and remote workers;
 //! * [`grant`]: the file access of remote workers.
 

@@ -1,3 +1,6 @@
+//! Parser of `agent.toml`, which names an agent and says how to start it. A *bundle* is the archive that a team submits; it contains
+//! this file and the agent's program.
+
 use faceoff_types::{Interpolation, escape_unprintable, is_printable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -13,9 +16,10 @@ pub struct Manifest {
     pub name: String,
     /// Program and arguments; the working directory is the bundle's folder.
     pub command: Vec<String>,
-    /// Name of the runtime that the agent needs. Whether the server offers it is checked by the runner.
+    /// Name of the runtime (language environment, such as `python3`) that the agent needs. The runner checks whether the server
+    /// offers it.
     pub runtime: String,
-    /// The interpolation that `ready` must have, if given here. TOML has no null: an agent that sends whole
+    /// Code of the interpolation that the agent's `ready` must have, if given here. TOML has no null: an agent that sends whole
     /// trajectories omits the key and has `null` in `ready`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolation: Option<i64>,
@@ -52,7 +56,7 @@ impl Manifest {
             )));
         }
         let manifest: Self = toml::from_str(text).map_err(|error| {
-            // The error quotes the text.
+            // The error quotes the text, which may contain unprintable characters.
             ManifestError::Toml(escape_unprintable(&error.to_string()).into_owned())
         })?;
         manifest.check()?;
@@ -161,7 +165,7 @@ fn require(condition: bool, key: &str, problem: &str) -> Result<(), ManifestErro
 mod tests {
     use super::*;
 
-    const GOOD: &str = r#"
+    const VALID_MANIFEST: &str = r#"
         name = "striker"
         command = ["python3", "agent.py"]
         runtime = "python3"
@@ -172,7 +176,7 @@ mod tests {
 
     #[test]
     fn manifest_example_of_the_protocol_is_read() {
-        let manifest = Manifest::parse(GOOD).unwrap();
+        let manifest = Manifest::parse(VALID_MANIFEST).unwrap();
         assert_eq!(manifest.name, "striker");
         assert_eq!(manifest.command, ["python3", "agent.py"]);
         assert_eq!(manifest.interpolation, Some(3));
@@ -183,7 +187,7 @@ mod tests {
 
     #[test]
     fn manifest_error_names_the_key() {
-        for (from, to, needle) in [
+        for (from, to, expected_words) in [
             ("name = \"striker\"", "", "missing field `name`"),
             ("name = \"striker\"", "name = \"\"", "name must have"),
             (
@@ -219,12 +223,15 @@ mod tests {
             ),
             ("OMP_NUM_THREADS", "\"A=B\"", "env.A=B must be a name"),
         ] {
-            assert!(GOOD.contains(from), "{from}");
-            let message = Manifest::parse(&GOOD.replace(from, to))
+            assert!(VALID_MANIFEST.contains(from), "{from}");
+            let message = Manifest::parse(&VALID_MANIFEST.replace(from, to))
                 .unwrap_err()
                 .to_string();
-            assert!(message.contains(needle), "{message:?} lacks {needle:?}");
+            assert!(
+                message.contains(expected_words),
+                "{message:?} lacks {expected_words:?}"
+            );
         }
-        assert!(Manifest::parse(&" ".repeat(70_000)).is_err());
+        assert!(Manifest::parse(&" ".repeat(MANIFEST_MAX_BYTES as usize + 1)).is_err());
     }
 }

@@ -111,13 +111,13 @@ pub struct Env {
     pub n_agents: u32,
     /// Indices of the puck's x, y, yaw in an observation.
     pub puck_pos_ids: Vec<usize>,
-    /// Indices of the puck's velocities in an observation.
+    /// Indices of the rates of x, y and yaw in an observation.
     pub puck_vel_ids: Vec<usize>,
     /// Indices of the joint positions in an observation.
     pub joint_pos_ids: Vec<usize>,
     /// Indices of the filtered joint velocities in an observation.
     pub joint_vel_ids: Vec<usize>,
-    /// Indices of the opponent's end effector in an observation; empty without an opponent.
+    /// Indices of x, y, z of the opponent's end effector in an observation; empty without an opponent.
     pub opponent_ee_ids: Vec<usize>,
     /// The playing surface and the goal mouths.
     pub table: TableEnv,
@@ -158,7 +158,7 @@ pub struct RobotEnv {
     pub n_joints: usize,
     /// Height of the mallet plane in the robot's base frame, metres.
     pub ee_desired_height: f64,
-    /// Height of the universal joint above the table, metres.
+    /// Height above the table of the universal joint, through which the mallet hangs on the arm, metres.
     pub universal_height: f64,
     /// Control steps per second.
     pub control_frequency: f64,
@@ -168,20 +168,20 @@ pub struct RobotEnv {
     pub joint_vel_limit: [[f64; JOINTS]; 2],
     /// Lower and upper acceleration limits, rad/s².
     pub joint_acc_limit: [[f64; JOINTS]; 2],
-    /// `table_from_robot`, homogeneous and row-major, one per robot, the agent's own first.
+    /// Homogeneous transforms from the robot's base frame to the table's frame, row-major, one per robot, the agent's own first.
     pub base_frame: Vec<[[f64; 4]; 4]>,
 }
 
 impl Env {
     /// Indices of the puck's x, y, yaw.
     pub const PUCK_POS_IDS: [usize; 3] = [0, 1, 2];
-    /// Indices of the puck's velocities.
+    /// Indices of the rates of x, y, yaw.
     pub const PUCK_VEL_IDS: [usize; 3] = [3, 4, 5];
     /// Indices of the joint positions.
     pub const JOINT_POS_IDS: [usize; JOINTS] = [6, 7, 8, 9, 10, 11, 12];
     /// Indices of the joint velocities.
     pub const JOINT_VEL_IDS: [usize; JOINTS] = [13, 14, 15, 16, 17, 18, 19];
-    /// Indices of the opponent's end effector, where there is an opponent.
+    /// Indices of x, y, z of the opponent's end effector, if there is an opponent.
     pub const OPPONENT_EE_IDS: [usize; 3] = [20, 21, 22];
 }
 
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     fn line(message: &Message<'_>) -> String {
-        let mut buffer = b"left over".to_vec();
+        let mut buffer = b"previous line".to_vec();
         message.write_line(&mut buffer);
         String::from_utf8(buffer).unwrap()
     }
@@ -225,11 +225,11 @@ mod tests {
             std::f64::consts::PI,
         ];
         let text = line(&Message::step(3, &obs));
-        let Message::Step { obs: back, .. } = serde_json::from_str(&text).unwrap() else {
+        let Message::Step { obs: obs_read, .. } = serde_json::from_str(&text).unwrap() else {
             panic!("not a step: {text}");
         };
         assert_eq!(
-            back.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
+            obs_read.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
             obs.map(f64::to_bits)
         );
     }

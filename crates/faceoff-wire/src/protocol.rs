@@ -1,3 +1,5 @@
+//! Version and size limit of the agent protocol: JSON lines between the evaluator and an agent.
+
 /// Version of the agent protocol, the `protocol` of `hello` and `ready`.
 pub const PROTOCOL_VERSION: u32 = 1;
 

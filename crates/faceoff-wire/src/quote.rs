@@ -1,3 +1,5 @@
+//! Quotes a line of an agent in the description of its fault.
+
 use faceoff_types::escape_unprintable;
 
 /// Maximum number of characters of an offending line in a fault.
@@ -6,7 +8,7 @@ const QUOTED_CHARS: usize = 400;
 /// An offending line for a fault: lossy UTF-8 with unprintable characters escaped, cut to 400 characters.
 #[must_use]
 pub fn quote_line(line: &[u8]) -> String {
-    // A character has at most four bytes, so a long line need not be decoded as a whole.
+    // A character has at most four bytes, so these bytes contain all quoted characters.
     let head = &line[..line.len().min(4 * QUOTED_CHARS)];
     let text = String::from_utf8_lossy(head);
     let text = escape_unprintable(&text);

@@ -1,4 +1,5 @@
-//! JSON messages between the server and remote workers: jobs, requests of workers, live updates of games, and results.
+//! JSON messages between the server and remote workers (processes on other machines that run jobs): jobs, requests of workers,
+//! live updates of games, and results. They are sent over NATS, a message broker.
 
 use crate::job::{JobReport, JobSpec, Lease};
 use faceoff_types::{GameId, LiveEvent, LivePosition, RuntimeInventory};
@@ -16,14 +17,14 @@ pub struct RemoteJob {
     /// Base URL of the server's files (http or https), without a trailing slash.
     #[serde(rename = "files")]
     pub files_url: String,
-    /// BLAKE3 of the server's program, 64 hexadecimal digits. A worker that runs another program does not start the job.
+    /// BLAKE3 of the server's executable, 64 hexadecimal digits. A worker with another executable does not start the job.
     pub program: String,
-    /// Links to bundles and recordings, if they are in a bucket in place of the server.
+    /// Links to bundles and recordings, if they are in a storage bucket instead of on the server.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objects: Option<ObjectLinks>,
 }
 
-/// Links to a job's files in a bucket. Each expires after a while and gives access to one file only.
+/// Links to a job's files in a storage bucket. Each expires after a while and gives access to one file only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ObjectLinks {
     /// Links to fetch bundles, by their BLAKE3.
@@ -32,14 +33,15 @@ pub struct ObjectLinks {
     pub files: BTreeMap<String, String>,
 }
 
-/// A worker's program and runtimes, which decide whether it gets jobs, and its description for organisers.
+/// A worker's executable and runtimes, by which the server decides whether the worker gets jobs, and its description for
+/// organisers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WorkerCapabilities {
-    /// BLAKE3 of its program, 64 hexadecimal digits. Only the same program computes the same bits.
+    /// BLAKE3 of its executable, 64 hexadecimal digits. Only the same executable computes the same bits.
     pub program: String,
     /// Version of its program, for display.
     pub version: String,
-    /// Runtimes that it offers to agents, with their content.
+    /// Runtimes (language environments) that it offers to agents, with their content.
     pub runtimes: Vec<RuntimeInventory>,
     /// Number of jobs that it runs at a time.
     pub slots: u32,
@@ -62,7 +64,7 @@ pub enum WorkerRequest {
     /// Registers the worker, and asks whether it gets jobs.
     #[serde(rename = "may_work")]
     Register(WorkerCapabilities),
-    /// Asks whether a worker like this would get jobs, without registering it.
+    /// Asks whether a worker with these capabilities would get jobs, without registering it.
     #[serde(rename = "would_work")]
     CheckRegistration(WorkerCapabilities),
     /// Asks for the exclusive right to run a job that it has received.
@@ -78,19 +80,19 @@ pub enum WorkerRequest {
     RenewLease {
         /// The lease of the job.
         lease: Lease,
-        /// Number of episodes played so far; in a game, of windows.
+        /// Number of episodes played so far; in a game, number of windows (parts of 500 control steps).
         episodes_done: u32,
-        /// The problem that prevents it from sending the result, for organisers.
+        /// The problem that prevents the worker from sending the result, for organisers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         trouble: Option<String>,
     },
-    /// Reports that the result message is stored in NATS. From then on the server keeps the lease until it has accepted
+    /// Reports that the result message is stored in NATS. From now on the server itself keeps the lease valid until it has accepted
     /// the result.
     #[serde(rename = "handed_in")]
     ResultPending {
         /// The lease of the job.
         lease: Lease,
-        /// Number of episodes played so far; in a game, of windows.
+        /// Number of episodes played so far; in a game, number of windows (parts of 500 control steps).
         episodes_done: u32,
         /// Sequence number of the message in the stream of results.
         sequence: u64,
@@ -185,7 +187,7 @@ pub enum JobEnd {
 }
 
 impl ResultMessage {
-    /// Message id, by which a result is accepted at most once: job id and nonce of the lease.
+    /// Message id: job id and nonce of the lease. The server accepts at most one result per id.
     #[must_use]
     pub fn id(&self) -> String {
         Self::id_of(&self.lease)

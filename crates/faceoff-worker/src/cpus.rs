@@ -136,7 +136,7 @@ impl CpuLayout {
     /// the organiser, if any. Call this before any thread is pinned.
     #[must_use]
     pub fn for_server(slots: usize, agent_cpus: &[usize]) -> Self {
-        let cpus = affinity::allowed().unwrap_or_else(|error| {
+        let cpus = affinity::allowed_cpus().unwrap_or_else(|error| {
             tracing::warn!(%error, "cannot read this process's CPUs; nothing is pinned");
             Vec::new()
         });

@@ -106,13 +106,16 @@ mod tests {
     #[test]
     fn slot_threads_inherit_from_the_starter() {
         let (threads, starter) = SlotThreads::from_starter();
-        let all = affinity::allowed().unwrap();
+        let all = affinity::allowed_cpus().unwrap();
         let requester = thread::spawn(move || {
             affinity::lower_priority(&all[..1]).unwrap();
             let (sender, receiver) = mpsc::channel();
             threads
                 .start("requested".into(), move || {
-                    let seen = (affinity::allowed().unwrap(), affinity::niceness().unwrap());
+                    let seen = (
+                        affinity::allowed_cpus().unwrap(),
+                        affinity::niceness().unwrap(),
+                    );
                     sender.send(seen).unwrap();
                 })
                 .unwrap();
@@ -120,7 +123,7 @@ mod tests {
         });
         starter.run();
         let ((cpus, nice), requester_nice) = requester.join().unwrap();
-        assert_eq!(cpus, affinity::allowed().unwrap());
+        assert_eq!(cpus, affinity::allowed_cpus().unwrap());
         assert_eq!(nice, affinity::niceness().unwrap());
         assert!(requester_nice > nice, "{requester_nice} > {nice}");
     }

@@ -1,4 +1,7 @@
-//! A client of the REST API. It reads the very types that the server writes.
+//! A client of the REST API with the request and response types of `faceoff-api`, which the server uses, too.
+//!
+//! The API's words: a *season* has *stages*, each with its own rules. At a *cutoff* of a stage an *evaluation day* starts:
+//! the active *submission* of each team is run on all *tasks*, which is the team's *evaluation*. *Boards* rank the results.
 
 mod archive;
 mod download;

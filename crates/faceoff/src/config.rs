@@ -355,7 +355,7 @@ impl Config {
         let read = || -> anyhow::Result<Self> {
             let config = Self::parse(&text)?;
             config.check_host(
-                &affinity::allowed().context("reading the CPU affinity of this process")?,
+                &affinity::allowed_cpus().context("reading the CPU affinity of this process")?,
             )?;
             Ok(config)
         };
@@ -425,7 +425,7 @@ impl Config {
             limits: self.limits.clone(),
             time: self.time.clone(),
             isolation: Isolation::Sandboxed {
-                given_up: self.sandbox.given_up.clone(),
+                disabled_layers: self.sandbox.given_up.clone(),
             },
             runtimes,
             images: self.sandbox.images,
@@ -452,7 +452,9 @@ impl Config {
     pub fn override_slots(&mut self, slots: usize) -> anyhow::Result<()> {
         anyhow::ensure!(slots > 0, "--slots: expected at least 1");
         self.workers.slots = Some(slots);
-        self.check_host(&affinity::allowed().context("reading the CPU affinity of this process")?)
+        self.check_host(
+            &affinity::allowed_cpus().context("reading the CPU affinity of this process")?,
+        )
     }
 
     /// Number of worker slots: configured, or one per two CPUs after one is reserved for the server.

@@ -9,7 +9,7 @@ use std::fs;
 #[must_use]
 pub fn agent_machine(cpus: &[usize]) -> AgentMachine {
     let count = match cpus {
-        [] => affinity::allowed().map_or(1, |cpus| cpus.len()),
+        [] => affinity::allowed_cpus().map_or(1, |cpus| cpus.len()),
         cpus => cpus.len(),
     };
     AgentMachine {

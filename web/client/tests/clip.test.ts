@@ -1,9 +1,12 @@
+// Decoding of clips, with valid, truncated and random data.
+
 import { describe, expect, it } from "vitest";
 import { ClipError } from "../src/clip/error";
 import { decodeMotion } from "../src/clip/motion";
 import { decodeObserved } from "../src/clip/observed";
-import { assemble, encode, still } from "./encoder";
+import { assemble, encode, stillArmColumns } from "./encoder";
 
+/** A clip of an episode with five samples, and a field and a column of a later version, which are ignored. */
 const episode = (): Uint8Array =>
   encode(
     {
@@ -17,7 +20,7 @@ const episode = (): Uint8Array =>
       of_the_future: { ignored: true },
     },
     [
-      ...still(
+      ...stillArmColumns(
         5,
         (k) => 0.3 - 0.02 * k,
         (k) => -0.1 * k,
@@ -46,7 +49,7 @@ describe("a motion clip", () => {
 
   it.each([0, 1, 2])("decodes order %i, negative numbers and more than 32 bits", (order) => {
     const values = [0, -1, 1, 63, -64, 2 ** 34, -(2 ** 34), 5];
-    const columns = still(8, (k) => values[k], () => 0); // prettier-ignore
+    const columns = stillArmColumns(8, (k) => values[k], () => 0); // prettier-ignore
     columns[0] = { ...columns[0], scale: 1, order };
     expect([...decodeMotion(encode({ samples: 8 }, columns)).puck.x]).toEqual(values);
   });
@@ -62,8 +65,9 @@ describe("a motion clip", () => {
     expect(() => decodeMotion(new Uint8Array([...episode(), 0]))).toThrow(/1 bytes after its last column/);
   });
 
-  it("throws only ClipError for garbage", () => {
+  it("throws only ClipError for random bytes", () => {
     const bytes = episode();
+    // A linear congruential generator (Park and Miller), so that failures are reproducible.
     let state = 1;
     const random = (below: number): number => {
       state = (state * 48271) % 2147483647;
@@ -87,7 +91,7 @@ describe("a motion clip", () => {
   });
 
   it("names the invalid field", () => {
-    const wrong = encode({ samples: 2, violations: [{ side: 7 }] }, still(2, () => 0, () => 0)); // prettier-ignore
+    const wrong = encode({ samples: 2, violations: [{ side: 7 }] }, stillArmColumns(2, () => 0, () => 0)); // prettier-ignore
     expect(() => decodeMotion(wrong)).toThrow(
       "header.violations[0].side must be a whole number from 0 to 1, but is 7",
     );

@@ -9,6 +9,7 @@ export interface TestColumn {
   first?: number;
 }
 
+/** Zig-zag and LEB128 encoding of whole numbers. */
 export function varints(numbers: number[]): number[] {
   const bytes: number[] = [];
   for (const n of numbers) {
@@ -22,12 +23,14 @@ export function varints(numbers: number[]): number[] {
   return bytes;
 }
 
+/** Differences of the given order. */
 function differences(numbers: number[], order: number): number[] {
   let out = numbers;
   for (let i = 0; i < order; i++) out = out.map((n, k) => (k === 0 ? n : n - out[k - 1]));
   return out;
 }
 
+/** A clip with these columns; `header` replaces or adds header fields. */
 export function encode(header: Record<string, unknown>, columns: TestColumn[]): Uint8Array<ArrayBuffer> {
   const parts = columns.map((column) => {
     const { scale = 1e-4, order = 1 } = column;
@@ -58,6 +61,7 @@ export function encode(header: Record<string, unknown>, columns: TestColumn[]): 
   );
 }
 
+/** A clip from the bytes of its header and payload. */
 export function assemble(header: Uint8Array, payload: number[]): Uint8Array<ArrayBuffer> {
   const bytes = new Uint8Array(4 + header.length + payload.length);
   new DataView(bytes.buffer).setUint32(0, header.length, true);
@@ -67,14 +71,18 @@ export function assemble(header: Uint8Array, payload: number[]): Uint8Array<Arra
 }
 
 /** Required columns of a motion clip: the puck by functions of the sample, a still arm. */
-export function still(samples: number, x: (k: number) => number, y: (k: number) => number): TestColumn[] {
-  const of = (name: string, value: (k: number) => number): TestColumn => ({
+export function stillArmColumns(
+  samples: number,
+  x: (k: number) => number,
+  y: (k: number) => number,
+): TestColumn[] {
+  const column = (name: string, value: (k: number) => number): TestColumn => ({
     name,
     values: Array.from({ length: samples }, (_, k) => value(k)),
   });
   return [
-    of("puck_x", x),
-    of("puck_y", y),
-    ...Array.from({ length: 7 }, (_, i) => of(`q_${i + 1}`, () => i * 0.1)),
+    column("puck_x", x),
+    column("puck_y", y),
+    ...Array.from({ length: 7 }, (_, i) => column(`q_${i + 1}`, () => i * 0.1)),
   ];
 }

@@ -1,3 +1,5 @@
+// Kinematics and margins of the arm, compared with the rules and with recordings of the reference simulator.
+
 import { readFileSync } from "node:fs";
 import { gunzipSync } from "node:zlib";
 import { describe, expect, it } from "vitest";
@@ -5,15 +7,15 @@ import { Kinematics, type Frame } from "../src/model/kinematics";
 import { heightMargin, jointPositionMargin, linkMargin, tableMargin } from "../src/model/margins";
 import { MODEL } from "../src/model/model";
 
-/** Positions (robot frame) and rotations (row-major) of links 4 and 7 and of the end effector. */
+/** A pose of the reference simulator: positions (robot frame) and rotations (row-major) of links 4 and 7 and of the end effector. */
 type Body = "4" | "7" | "ee";
 type Recorded = { q: number[] } & Record<`pos_${Body}` | `rot_${Body}`, number[]>;
 
 const origin = (frame: Frame): number[] => [...frame.slice(9)];
 
-function near(actual: ArrayLike<number>, expected: number[], within: number): void {
+function expectNear(actual: ArrayLike<number>, expected: number[], tolerance: number): void {
   expected.forEach((value, i) => {
-    expect(Math.abs(actual[i] - value)).toBeLessThan(within);
+    expect(Math.abs(actual[i] - value)).toBeLessThan(tolerance);
   });
 }
 
@@ -21,10 +23,10 @@ describe("forward kinematics", () => {
   it("places the end effector of the initial pose as in the rules, on both sides", () => {
     const own = new Kinematics(0);
     own.set(MODEL.initial_q_rad);
-    near(origin(own.endEffector), [-1.51 + 0.65, 0, 0.1645 - 0.1], 1e-4);
+    expectNear(origin(own.endEffector), [-1.51 + 0.65, 0, 0.1645 - 0.1], 1e-4);
     const opponent = new Kinematics(1);
     opponent.set(MODEL.initial_q_rad);
-    near(origin(opponent.endEffector), [1.51 - 0.65, 0, 0.0645], 1e-4);
+    expectNear(origin(opponent.endEffector), [1.51 - 0.65, 0, 0.0645], 1e-4);
   });
 
   it("lets the mallet hang straight down by the angles of the universal joint", () => {
@@ -38,9 +40,9 @@ describe("forward kinematics", () => {
     const cross = [x[1] * level[2] - x[2] * level[1], x[2] * level[0] - x[0] * level[2], x[0] * level[1] - x[1] * level[0]]; // prettier-ignore
     const dot = (a: number[], b: number[]): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     arm.set(MODEL.initial_q_rad, [Math.atan2(dot(y, cross), dot(x, level)), 0]);
-    near([arm.mallet[2], arm.mallet[5], arm.mallet[8]], [0, 0, -1], 1e-9);
-    near(arm.malletCentre, [-0.86, 0, 0.014], 1e-4);
-    near(arm.malletCentre, unrecorded, 1e-9);
+    expectNear([arm.mallet[2], arm.mallet[5], arm.mallet[8]], [0, 0, -1], 1e-9);
+    expectNear(arm.malletCentre, [-0.86, 0, 0.014], 1e-4);
+    expectNear(arm.malletCentre, unrecorded, 1e-9);
   });
 
   it("turns the hinge about y before the hinge about x", () => {
@@ -50,7 +52,7 @@ describe("forward kinematics", () => {
     arm.set(MODEL.initial_q_rad, [0.3, 0.2]);
     // z of Ry(a) Rx(b) is (sin a cos b, −sin b, cos a cos b).
     const z = [Math.sin(0.3) * Math.cos(0.2), -Math.sin(0.2), Math.cos(0.3) * Math.cos(0.2)];
-    near([arm.mallet[2], arm.mallet[5], arm.mallet[8]], [0, 3, 6].map((r) => ee[r] * z[0] + ee[r + 1] * z[1] + ee[r + 2] * z[2]), 1e-12); // prettier-ignore
+    expectNear([arm.mallet[2], arm.mallet[5], arm.mallet[8]], [0, 3, 6].map((r) => ee[r] * z[0] + ee[r + 1] * z[1] + ee[r + 2] * z[2]), 1e-12); // prettier-ignore
   });
 
   it("matches recordings of the reference simulator", () => {
@@ -63,8 +65,8 @@ describe("forward kinematics", () => {
       const frames: [Body, Frame][] = [["4", arm.links[3]], ["7", arm.links[6]], ["ee", arm.endEffector]]; // prettier-ignore
       for (const [body, frame] of frames) {
         const [x, y, z] = origin(frame);
-        near([x + 1.51, y, z + 0.1], recorded[`pos_${body}`], 1e-6);
-        near(frame, recorded[`rot_${body}`], 1e-6);
+        expectNear([x + 1.51, y, z + 0.1], recorded[`pos_${body}`], 1e-6);
+        expectNear(frame, recorded[`rot_${body}`], 1e-6);
       }
     }
   });

@@ -1,3 +1,5 @@
+// Reduction of the rendering quality on slow machines.
+
 import { expect, it } from "vitest";
 import { RenderQuality } from "../src/view3d/quality";
 

@@ -1,3 +1,5 @@
+// Clock, links, events, score, loading, CSV, keys and number formats of a replay.
+
 import { describe, expect, it } from "vitest";
 import { decodeMotion } from "../src/clip/motion";
 import { decodeObserved } from "../src/clip/observed";
@@ -9,15 +11,18 @@ import { endText, eventsOf } from "../src/replay/events";
 import { parseFragment, writeFragment } from "../src/replay/fragment";
 import { Score } from "../src/replay/score";
 import { Source } from "../src/replay/source";
-import { encode, still } from "./encoder";
+import { encode, stillArmColumns } from "./encoder";
+
+/** Duration of a control step. */
+const STEP_S = 0.02;
 
 /** A frame source that tests advance manually. */
-class Frames {
+class ManualFrames {
   private waiting: ((nowMs: number) => void)[] = [];
   request(tick: (nowMs: number) => void): void {
     this.waiting.push(tick);
   }
-  at(nowMs: number): void {
+  advanceTo(nowMs: number): void {
     const now = this.waiting;
     this.waiting = [];
     for (const tick of now) tick(nowMs);
@@ -29,16 +34,16 @@ class Frames {
 
 describe("the clock", () => {
   it("plays at its speed, stops at the end and restarts", () => {
-    const frames = new Frames();
-    const clock = new Clock(0.02, frames);
-    clock.cover(10);
+    const frames = new ManualFrames();
+    const clock = new Clock(STEP_S, frames);
+    clock.extendTo(10);
     clock.setSpeed(0.5);
     clock.play();
-    frames.at(1000);
-    frames.at(1100);
+    frames.advanceTo(1000);
+    frames.advanceTo(1100);
     expect(clock.position).toBeCloseTo(2.5, 9);
-    frames.at(1300);
-    frames.at(1500);
+    frames.advanceTo(1300);
+    frames.advanceTo(1500);
     expect(clock.position).toBe(10);
     expect(clock.playing).toBe(false);
     expect(frames.idle).toBe(true);
@@ -47,33 +52,33 @@ describe("the clock", () => {
   });
 
   it("stops while data is missing", () => {
-    const frames = new Frames();
-    const clock = new Clock(0.02, frames);
+    const frames = new ManualFrames();
+    const clock = new Clock(STEP_S, frames);
     let open = false;
-    clock.cover(100);
-    clock.gate(() => open);
+    clock.extendTo(100);
+    clock.addGate(() => open);
     clock.play();
-    frames.at(0);
-    frames.at(200);
+    frames.advanceTo(0);
+    frames.advanceTo(200);
     expect(clock.position).toBe(0);
     open = true;
-    frames.at(220);
+    frames.advanceTo(220);
     expect(clock.position).toBeCloseTo(1, 9);
   });
 
   it("does not jump after the page was hidden", () => {
-    const frames = new Frames();
-    const clock = new Clock(0.02, frames);
-    clock.cover(10_000);
+    const frames = new ManualFrames();
+    const clock = new Clock(STEP_S, frames);
+    clock.extendTo(10_000);
     clock.play();
-    frames.at(0);
-    frames.at(60_000);
+    frames.advanceTo(0);
+    frames.advanceTo(60_000);
     expect(clock.position).toBeLessThan(15);
   });
 
   it("moves by whole steps within the ends", () => {
-    const clock = new Clock(0.02, new Frames());
-    clock.cover(10);
+    const clock = new Clock(STEP_S, new ManualFrames());
+    clock.extendTo(10);
     clock.seek(3.4);
     clock.step(1);
     expect(clock.position).toBe(4);
@@ -112,7 +117,7 @@ const motion = encode(
     violations: [{ side: 0, group: "ee", from: 1, to: 1, worst: 0.0031 }],
     end: { end: "slow", success: true, why: "at rest behind the line", steps: 3 },
   },
-  still(4, (k) => k * 0.1, () => 0), // prettier-ignore
+  stillArmColumns(4, (k) => k * 0.1, () => 0), // prettier-ignore
 );
 
 describe("events", () => {
@@ -130,7 +135,7 @@ describe("events", () => {
 
   it("describe the end also without a reason", () => {
     const end = { end: "left_table", success: false, why: "", steps: 1 };
-    expect(endText(decodeMotion(encode({ samples: 2, end }, still(2, () => 0, () => 0))))).toBe(
+    expect(endText(decodeMotion(encode({ samples: 2, end }, stillArmColumns(2, () => 0, () => 0))))).toBe(
       "No success: left table",
     ); // prettier-ignore
   });
@@ -141,23 +146,24 @@ describe("the score of a game", () => {
     const score = new Score();
     const goal = (sample: number, a: number, b: number) =>
       ({ sample, what: "goal", by: 0, score: [a, b] }) as const;
-    score.learn(0, [goal(100, 1, 0)], null);
-    score.learn(2, [goal(1200, 1, 1)], null);
+    score.addChunk(0, [goal(100, 1, 0)], null);
+    score.addChunk(2, [goal(1200, 1, 1)], null);
     expect(score.at(50)).toEqual([0, 0]);
     expect(score.at(300)).toEqual([1, 0]);
     expect(score.at(1100)).toBeNull();
     expect(score.at(1300)).toEqual([1, 1]);
-    score.learn(1, [], null);
+    score.addChunk(1, [], null);
     expect(score.at(1100)).toEqual([1, 0]);
     expect(score.at(1500)).toEqual([1, 1]);
-    score.learn(80, [], [4, 2]);
+    score.addChunk(80, [], [4, 2]);
     expect(score.at(40_200)).toEqual([4, 2]);
   });
 });
 
 describe("a source", () => {
+  /** A clip of a chunk of a game in which nothing moves. */
   const chunk = (first: number): Uint8Array<ArrayBuffer> =>
-    encode({ contest: "game", first, samples: 501 }, still(501, () => 0, () => 0)); // prettier-ignore
+    encode({ contest: "game", first, samples: 501 }, stillArmColumns(501, () => 0, () => 0)); // prettier-ignore
 
   it("fetches a chunk once, caches a few, and works without observations", async () => {
     const asked: string[] = [];
@@ -167,15 +173,15 @@ describe("a source", () => {
       const found = path.startsWith("/m/") ? new Response(chunk(500 * Number(path.slice(3)))) : null;
       return Promise.resolve(found ?? new Response(null, { status: 403 }));
     });
-    const [part, same] = await Promise.all([source.at(700), source.at(999.9)]);
+    const [part, same] = await Promise.all([source.partAt(700), source.partAt(999.9)]);
     expect(part).toBe(same);
     expect(part.motion.first).toBe(500);
     expect(part.observationError).toMatch(/access denied/);
     expect(asked).toEqual(["/m/1", "/o/1"]);
     expect(source.indexOf(5000)).toBe(9);
-    for (const position of [1000, 1500, 2000, 2500, 3000, 3500]) await source.at(position);
-    expect(source.loaded(700)).toBeNull();
-    expect(source.loaded(3999)?.motion.first).toBe(3500);
+    for (const position of [1000, 1500, 2000, 2500, 3000, 3500]) await source.partAt(position);
+    expect(source.loadedPartAt(700)).toBeNull();
+    expect(source.loadedPartAt(3999)?.motion.first).toBe(3500);
   });
 
   it("reports the status and can retry", async () => {
@@ -183,18 +189,18 @@ describe("a source", () => {
     const source = new Source({ motion: "/m", observed: null, samples: null }, () =>
       Promise.resolve(status === 200 ? new Response(motion) : new Response(null, { status })),
     );
-    await expect(source.at(0)).rejects.toThrow("the server answered with status 500");
+    await expect(source.partAt(0)).rejects.toThrow("the server answered with status 500");
     status = 404;
-    await expect(source.at(0)).rejects.toThrow("no recording");
+    await expect(source.partAt(0)).rejects.toThrow("no recording");
     status = 200;
-    await expect(source.at(0)).resolves.toMatchObject({ index: 0 });
+    await expect(source.partAt(0)).resolves.toMatchObject({ index: 0 });
   });
 
   it("exports CSV with units", async () => {
     const source = new Source({ motion: "/m", observed: "/o", samples: null }, (address) =>
       Promise.resolve(new Response(address === "/m" ? motion : observed)),
     );
-    const lines = csvOf(await source.at(0)).split("\n");
+    const lines = csvOf(await source.partAt(0)).split("\n");
     expect(lines[0]).toBe("sample,time_s,puck_x,puck_y,q_1,q_2,q_3,q_4,q_5,q_6,q_7,computation_time_s");
     expect(lines[1]).toBe("0,0,0,0,0,0.1,0.2,0.3,0.4,0.5,0.6,");
     expect(lines[3]).toBe("2,0.04,0.2,0,0,0.1,0.2,0.3,0.4,0.5,0.6,0.026");

@@ -1,16 +1,18 @@
+// Strip charts, paths and the outline of the rims.
+
 import { describe, expect, it } from "vitest";
 import { decodeMotion } from "../src/clip/motion";
 import { MODEL, VELOCITY_LIMITS } from "../src/model/model";
 import { rimOutline } from "../src/model/table";
-import { between, pathsOf } from "../src/motion/paths";
+import { pointsBetween, pathsOf } from "../src/motion/paths";
 import { Interpolation } from "../src/motion/pose";
-import type { Part } from "../src/replay/source";
+import type { ReplayPart } from "../src/replay/source";
 import { rangeOf } from "../src/strips/plot";
 import { seriesOf } from "../src/strips/series";
 import { encode, type TestColumn } from "./encoder";
 
 /** The arm in its initial pose, its fourth joint at the given share of its speed limit; a puck that slides. */
-function part(share: number, header: Record<string, unknown> = {}): Part {
+function partWithJointSpeed(share: number, header: Record<string, unknown> = {}): ReplayPart {
   const samples = 3;
   const row = (name: string, value: (k: number) => number): TestColumn => ({
     name,
@@ -40,7 +42,7 @@ function part(share: number, header: Record<string, unknown> = {}): Part {
 
 describe("strips", () => {
   it("show margins and shares as in the rules", () => {
-    const series = seriesOf(part(0.5), 0);
+    const series = seriesOf(partWithJointSpeed(0.5), 0);
     expect(series.map((one) => [one.title, one.valueText(1)])).toEqual([
       ["End effector height: margin", "20.0 mm"],
       ["Edge of the table: margin", "66 mm"],
@@ -53,7 +55,7 @@ describe("strips", () => {
 
   it("mark values beyond the limit and list recorded violations", () => {
     const violations = [{ side: 0, group: "joint_vel", from: 0, to: 2, worst: 0.1 }];
-    const velocity = seriesOf(part(1, { violations }), 0)[4];
+    const velocity = seriesOf(partWithJointSpeed(1, { violations }), 0)[4];
     expect(velocity.valueText(0)).toBe("−0.07 rad/s ▲ beyond");
     expect(velocity.violations).toHaveLength(1);
     const [low, high] = rangeOf(velocity);
@@ -64,15 +66,18 @@ describe("strips", () => {
 
 describe("paths", () => {
   it("are found by position", () => {
-    const { puck } = part(0).paths;
-    expect([...puck.at]).toEqual([0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75, 2]);
-    expect(between(puck, 0.5, 1)).toEqual([2, 4]);
-    expect(between(puck, -Infinity, Infinity)).toEqual([0, 8]);
+    const { puck } = partWithJointSpeed(0).paths;
+    expect([...puck.positions]).toEqual([0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75, 2]);
+    expect(pointsBetween(puck, 0.5, 1)).toEqual([2, 4]);
+    expect(pointsBetween(puck, -Infinity, Infinity)).toEqual([0, 8]);
   });
 
   it("are interrupted at the end of a rally", () => {
-    const game = part(0, { contest: "game", breaks: [{ sample: 0, what: "goal", by: 0, score: [1, 0] }] });
-    expect([...game.paths.puck.gap]).toEqual([1, 1, 1, 1, 0, 0, 0, 0, 0]);
+    const game = partWithJointSpeed(0, {
+      contest: "game",
+      breaks: [{ sample: 0, what: "goal", by: 0, score: [1, 0] }],
+    });
+    expect([...game.paths.puck.gaps]).toEqual([1, 1, 1, 1, 0, 0, 0, 0, 0]);
   });
 });
 

@@ -244,7 +244,7 @@ impl RallyRows {
         self.steps.append_value(row.steps);
         self.ends.append_value(row.ending.as_str());
         self.by
-            .append_option(row.ending.by().map(|side| side.number()));
+            .append_option(row.ending.responsible_side().map(|side| side.number()));
         for (column, score) in self.scores.iter_mut().zip(row.score) {
             column.append_value(score);
         }

@@ -1,15 +1,17 @@
+//! Each kind of end is described in the words that a team reads. States are x, y (m), vx, vy (m/s) of the puck in the table frame.
+
 use super::*;
 use Task::{Defend, Hit, Prepare};
 use faceoff_sim::{episode::task, table::puck::Puck};
 
-/// Success and description of an episode that ends in this state, after 500 steps if nothing else ends it.
+/// Success and description of an episode that ends in this state; if the state does not end it, the limit of 500 steps does.
 fn describe(task: Task, x: f64, y: f64, vx: f64, vy: f64) -> (bool, String) {
     let state = [x, y, 0.0, vx, vy, 0.0];
     let puck = Puck {
         pose: [x, y, 0.0],
         velocity: [vx, vy, 0.0],
     };
-    let end = task::end(task, &puck, 500).expect("it is over after 500 steps");
+    let end = task::end(task, &puck, 500).expect("an episode is over after 500 steps");
     (
         task::success(task, &puck),
         describe_end(task, end, &state, 500, None),
@@ -18,7 +20,7 @@ fn describe(task: Task, x: f64, y: f64, vx: f64, vy: f64) -> (bool, String) {
 
 #[test]
 fn ends_of_hit_are_described() {
-    for (state, success, words) in [
+    for (state, success, expected) in [
         (
             [0.98, 0.03, 1.2, 0.0],
             true,
@@ -61,13 +63,13 @@ fn ends_of_hit_are_described() {
         ),
     ] {
         let [x, y, vx, vy] = state;
-        assert_eq!(describe(Hit, x, y, vx, vy), (success, words.to_owned()));
+        assert_eq!(describe(Hit, x, y, vx, vy), (success, expected.to_owned()));
     }
 }
 
 #[test]
 fn ends_of_defend_are_described() {
-    for (state, success, words) in [
+    for (state, success, expected) in [
         (
             [-0.55, 0.1, 0.05, 0.0],
             true,
@@ -111,13 +113,13 @@ fn ends_of_defend_are_described() {
     ] {
         let [x, y, vx, vy] = state;
         let (is_success, description) = describe(Defend, x, y, vx, vy);
-        assert_eq!((is_success, description), (success, words.to_owned()));
+        assert_eq!((is_success, description), (success, expected.to_owned()));
     }
 }
 
 #[test]
 fn ends_of_prepare_are_described() {
-    for (state, success, words) in [
+    for (state, success, expected) in [
         (
             [-0.5, 0.009, 0.05, 0.0],
             true,
@@ -156,7 +158,7 @@ fn ends_of_prepare_are_described() {
     ] {
         let [x, y, vx, vy] = state;
         let (is_success, description) = describe(Prepare, x, y, vx, vy);
-        assert_eq!((is_success, description), (success, words.to_owned()));
+        assert_eq!((is_success, description), (success, expected.to_owned()));
     }
 }
 
@@ -172,9 +174,9 @@ fn fault_description_contains_the_fault() {
 
 #[test]
 fn described_position_agrees_with_success() {
-    for thousandth in -960..0 {
-        let x = f64::from(thousandth) / 1000.0;
-        let (success, words) = describe(Defend, x, 0.2, 0.0, 0.0);
-        assert_eq!(success, words.contains("inside"), "{words}");
+    for millimetre in -960..0 {
+        let x = f64::from(millimetre) / 1000.0;
+        let (success, description) = describe(Defend, x, 0.2, 0.0, 0.0);
+        assert_eq!(success, description.contains("inside"), "{description}");
     }
 }

@@ -1,12 +1,15 @@
+//! Episodes from scripted answers: recordings, limits on steps, faults and divergence.
+
 use faceoff_episode::{
     AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError, RunningEpisode, StepRow,
     StepSink,
 };
 use faceoff_sim::Bounds;
 use faceoff_types::{
-    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase, Profile, Ruleset,
-    Seed, Task,
+    ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase,
+    Profile, Ruleset, Seed, Task,
 };
+use std::ops::Range;
 
 /// Records everything that a sink receives. Floats are formatted so that they round-trip to the bit.
 #[derive(Default)]
@@ -34,19 +37,26 @@ impl StepSink for SinkLog {
     }
 }
 
+/// Indices in an observation.
+const JOINT_POSITIONS: Range<usize> = 6..13;
+const JOINT_VELOCITIES: Range<usize> = 13..20;
+
+/// Index of the episode within the evaluation; arbitrary.
+const EPISODE: u32 = 4;
+
 fn arena() -> Arena {
-    let seed = Seed::from_number(3);
+    let seed = Seed::from_number(3); // arbitrary
     Arena::new(Profile::Evaluation, seed, seed.model_mismatch())
 }
 
 fn begin<S: StepSink>(task: Task, sink: S) -> RunningEpisode<S> {
-    RunningEpisode::begin(&arena(), task, 4, Some(Interpolation::Cubic), sink)
+    RunningEpisode::begin(&arena(), task, EPISODE, Some(Interpolation::Cubic), sink)
 }
 
 /// Answers with slightly moved joint positions, and a computation time that depends on the step.
 fn answer<S: StepSink>(running: &mut RunningEpisode<S>) -> Option<EpisodeOutcome> {
     let question = running.question().unwrap();
-    let mut action = question.observation[6..13].to_vec();
+    let mut action = question.observation[JOINT_POSITIONS].to_vec();
     action[0] += 0.01;
     action.extend([0.0; 7]);
     let timing = AnswerTiming {
@@ -68,7 +78,7 @@ fn replayed_answers_give_the_same_recording() {
             }
         };
         assert_eq!(running.end(), Some(outcome.end));
-        assert_eq!((outcome.task, outcome.episode), (task, 4));
+        assert_eq!((outcome.task, outcome.episode), (task, EPISODE));
         let max_s = 0.001 * f64::from(outcome.steps - 1);
         assert_eq!(outcome.computation_time.max_s, max_s);
 
@@ -96,8 +106,8 @@ fn fault_has_the_position_of_the_pending_answer() {
     let mut running = begin(Task::Defend, NullSink);
     for (phase, episode, step) in [
         (Phase::StartUp, None, None),
-        (Phase::Reset, Some(4), None),
-        (Phase::Step, Some(4), Some(2)),
+        (Phase::Reset, Some(EPISODE), None),
+        (Phase::Step, Some(EPISODE), Some(2)),
     ] {
         while phase == Phase::Step && running.steps() < 2 {
             assert_eq!(answer(&mut running), None);
@@ -119,18 +129,18 @@ fn inconsistent_recorded_fault_is_refused() {
     assert_eq!(answer(&mut running), None);
     let outcome = running.outcome_after_fault(Phase::Step, AgentFaultKind::NonFinite, None);
     let fault = outcome.fault.unwrap();
-    let with = |change: &dyn Fn(&mut AgentFault)| {
+    let fault_with = |change: &dyn Fn(&mut AgentFault)| {
         let mut fault = fault.clone();
         change(&mut fault);
         fault
     };
     for inconsistent in [
-        with(&|fault| fault.agent_task = Task::Hit.into()),
-        with(&|fault| fault.episode = Some(5)),
-        with(&|fault| fault.step = Some(0)),
-        with(&|fault| fault.step = None),
-        with(&|fault| (fault.episode, fault.step) = (None, None)),
-        with(&|fault| fault.episode = None),
+        fault_with(&|fault| fault.agent_task = Task::Hit.into()),
+        fault_with(&|fault| fault.episode = Some(EPISODE + 1)),
+        fault_with(&|fault| fault.step = Some(0)),
+        fault_with(&|fault| fault.step = None),
+        fault_with(&|fault| (fault.episode, fault.step) = (None, None)),
+        fault_with(&|fault| fault.episode = None),
     ] {
         assert_eq!(
             running.outcome_after_recorded_fault(inconsistent.clone()),
@@ -144,22 +154,22 @@ fn inconsistent_recorded_fault_is_refused() {
             .is_some()
     );
     assert!(answer(&mut running).is_some());
-    let after_the_end = with(&|fault| fault.step = Some(2));
+    let after_the_end = fault_with(&|fault| fault.step = Some(2));
     assert_eq!(running.outcome_after_recorded_fault(after_the_end), None);
 }
 
-/// An action with all numbers at the bound, in the direction in which each joint already turns.
+/// An action with all numbers at the limit of actions, in the direction in which each joint already turns.
 fn extreme_action(observation: &[f64]) -> Vec<f64> {
-    let dq = &observation[13..20];
+    let joint_velocities = &observation[JOINT_VELOCITIES];
     (0..Interpolation::Trajectory.len())
-        .map(|i| 1e4f64.copysign(dq[i % 7]))
+        .map(|i| ACTION_LIMIT.copysign(joint_velocities[i % 7]))
         .collect()
 }
 
 fn begin_within<S: StepSink>(bounds: Bounds, sink: S) -> RunningEpisode<S> {
     let interpolation = Some(Interpolation::Trajectory);
     let arena = arena().with_bounds(bounds);
-    RunningEpisode::begin(&arena, Task::Prepare, 4, interpolation, sink)
+    RunningEpisode::begin(&arena, Task::Prepare, EPISODE, interpolation, sink)
 }
 
 #[test]
@@ -169,19 +179,19 @@ fn divergence_is_an_agent_fault() {
         host_time_s: 0.0,
         cpu_time_s: None,
     };
-    let narrow = Bounds {
+    let narrow_bounds = Bounds {
         joint_rad_s: 50.0,
         ..Bounds::WIDE
     };
     let mut played = SinkLog::default();
-    let mut running = begin_within(narrow, &mut played);
+    let mut running = begin_within(narrow_bounds, &mut played);
     let kind = loop {
         let Question { observation, .. } = running.question().unwrap();
         assert!(observation.iter().all(|number| number.is_finite()));
         let action = extreme_action(observation);
         match running.answer(&action, timing) {
             Ok(None) => {}
-            Ok(Some(outcome)) => panic!("it ended by {:?}", outcome.end),
+            Ok(Some(outcome)) => panic!("the episode ended by {:?}", outcome.end),
             Err(kind) => break kind,
         }
     };
@@ -201,7 +211,7 @@ fn divergence_is_an_agent_fault() {
     );
 
     // A replay of the answers ends in the same way and accepts no other fault.
-    let mut running = begin_within(narrow, SinkLog::default());
+    let mut running = begin_within(narrow_bounds, SinkLog::default());
     let (last, before) = played.actions.split_last().unwrap();
     for action in before {
         assert_eq!(running.answer(action, timing), Ok(None));
@@ -209,16 +219,16 @@ fn divergence_is_an_agent_fault() {
     }
     running.answer(last, timing).unwrap_err();
     assert_eq!(running.sink().lines, played.lines);
-    let with = |change: &dyn Fn(&mut AgentFault)| {
+    let fault_with = |change: &dyn Fn(&mut AgentFault)| {
         let mut fault = fault.clone();
         change(&mut fault);
         fault
     };
     for other in [
-        with(&|fault| fault.fault = AgentFaultKind::NonFinite),
-        with(&|fault| fault.fault = AgentFaultKind::Diverged { detail: "x".into() }),
-        with(&|fault| fault.step = Some(outcome.steps)),
-        with(&|fault| fault.step = None),
+        fault_with(&|fault| fault.fault = AgentFaultKind::NonFinite),
+        fault_with(&|fault| fault.fault = AgentFaultKind::Diverged { detail: "x".into() }),
+        fault_with(&|fault| fault.step = Some(outcome.steps)),
+        fault_with(&|fault| fault.step = None),
     ] {
         assert_eq!(
             running.outcome_after_recorded_fault(other.clone()),

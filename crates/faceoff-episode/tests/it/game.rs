@@ -1,4 +1,4 @@
-//! Games from scripted answers.
+//! Games from scripted answers: late answers, faults, forfeits and divergence.
 
 use faceoff_episode::{
     AnswerTiming, Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry,
@@ -6,22 +6,27 @@ use faceoff_episode::{
 };
 use faceoff_sim::{Bounds, RallyEnd};
 use faceoff_types::{
-    AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Interpolation, Profile, Seed,
-    Side,
+    ACTION_LIMIT, AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Interpolation,
+    Profile, Seed, Side,
 };
+use std::ops::Range;
+
+/// Indices in an observation.
+const JOINT_POSITIONS: Range<usize> = 6..13;
+const JOINT_VELOCITIES: Range<usize> = 13..20;
 
 fn arena() -> Arena {
-    let seed = Seed::from_number(3);
+    let seed = Seed::from_number(3); // arbitrary
     Arena::new(Profile::Ideal, seed, seed.model_mismatch())
 }
 
-/// Bounds that commands at the largest numbers exceed.
-const NARROW: Bounds = Bounds {
+/// Bounds on the simulated motion that the largest commands exceed.
+const NARROW_BOUNDS: Bounds = Bounds {
     joint_rad_s: 20.0,
     ..Bounds::WIDE
 };
 
-fn took(computation_time_s: f64) -> AnswerTiming {
+fn timing(computation_time_s: f64) -> AnswerTiming {
     AnswerTiming {
         computation_time_s,
         host_time_s: 0.0,
@@ -29,7 +34,7 @@ fn took(computation_time_s: f64) -> AnswerTiming {
     }
 }
 
-fn fault() -> SideFault {
+fn side_fault() -> SideFault {
     SideFault {
         kind: AgentFaultKind::ClosedOutput,
         line: None,
@@ -39,12 +44,15 @@ fn fault() -> SideFault {
 /// Records a summary of what a sink receives.
 #[derive(Debug, Default, PartialEq)]
 struct SinkLog {
+    /// Number and first game step of each rally.
     rallies: Vec<(u32, u32)>,
+    /// Effect of each step, per side.
     effects: [Vec<Effect>; 2],
+    /// Number, steps, ending and faults (per side) of each rally.
     ends: Vec<(u32, u32, RallyEnding, [bool; 2])>,
-    observed: usize,
-    /// Joint positions of both robots after each step.
-    q: Vec<[f64; 2]>,
+    observations: usize,
+    /// Position of the first joint of both robots after each step, rad.
+    first_joint: Vec<[f64; 2]>,
 }
 
 impl GameSink for SinkLog {
@@ -54,13 +62,14 @@ impl GameSink for SinkLog {
     }
     fn observe(&mut self, observations: [&[f64]; 2]) {
         assert!(observations.iter().all(|numbers| numbers.len() == 23));
-        self.observed += 1;
+        self.observations += 1;
     }
     fn step(&mut self, row: &GameStepRow<'_>) -> Result<(), RecordError> {
         for (effects, side) in self.effects.iter_mut().zip(&row.sides) {
             effects.push(side.effect);
         }
-        self.q.push(row.state.q.map(|q| q[0]));
+        self.first_joint
+            .push(row.state.q.map(|positions| positions[0]));
         Ok(())
     }
     fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
@@ -73,11 +82,15 @@ impl GameSink for SinkLog {
 /// The behaviour of a side: its response at a step of a rally.
 type Script = fn(rally: u32, step: u32) -> ScriptedStep;
 
-/// Answers have their computation time in seconds.
+/// What a side does in a step. The numbers are computation times in seconds.
 enum ScriptedStep {
+    /// Command the present position.
     Hold(f64),
+    /// Command a position 0.05 rad further.
     Swing(f64),
+    /// Give no valid answer.
     Fault,
+    /// Command the largest numbers, so that the simulation diverges.
     Diverge,
 }
 
@@ -113,34 +126,40 @@ fn play_in(
                 let Some(question) = running.question(side).unwrap() else {
                     continue;
                 };
-                let at = side.index();
+                let index = side.index();
                 assert_eq!(question.step, step);
-                let held: [f64; 7] = question.observation[6..13].try_into().unwrap();
-                speeds[at] = question.observation[13..20].try_into().unwrap();
-                let (target, time) = match scripts[at](rally, step) {
+                let held: [f64; 7] = question.observation[JOINT_POSITIONS].try_into().unwrap();
+                speeds[index] = question.observation[JOINT_VELOCITIES].try_into().unwrap();
+                let (target, time) = match scripts[index](rally, step) {
                     ScriptedStep::Hold(time) => (held, Some(time)),
                     ScriptedStep::Swing(time) => (held.map(|q| q + 0.05), Some(time)),
                     ScriptedStep::Fault => (held, None),
                     ScriptedStep::Diverge => {
-                        let push = speeds[at].map(|dq| if dq > 0.0 { 1e4 } else { -1e4 });
-                        actions[at] = [push; 60].concat();
+                        let push = speeds[index].map(|speed| {
+                            if speed > 0.0 {
+                                ACTION_LIMIT
+                            } else {
+                                -ACTION_LIMIT
+                            }
+                        });
+                        actions[index] = [push; 3 * 20].concat(); // 3 rows per millisecond
                         continue;
                     }
                 };
-                actions[at] = Interpolation::Trajectory.hold_position(&target).to_vec();
-                times[at] = time;
+                actions[index] = Interpolation::Trajectory.hold_position(&target).to_vec();
+                times[index] = time;
             }
-            let responses = [0, 1].map(|at| {
-                let side = Side::BOTH[at];
-                match (running.fault(side), times[at]) {
+            let responses = [0, 1].map(|index| {
+                let side = Side::BOTH[index];
+                match (running.fault(side), times[index]) {
                     (Some(_), _) => Response::Held,
                     (None, None) => Response::Fault {
-                        fault: fault(),
-                        timing: took(1.0),
+                        fault: side_fault(),
+                        timing: timing(1.0),
                     },
                     (None, Some(time)) => Response::Answer {
-                        action: &actions[at],
-                        timing: took(time),
+                        action: &actions[index],
+                        timing: timing(time),
                     },
                 }
             });
@@ -157,6 +176,7 @@ fn hold(_: u32, _: u32) -> ScriptedStep {
 #[test]
 fn late_answers_have_no_effect_and_are_counted() {
     fn late(_: u32, step: u32) -> ScriptedStep {
+        // The limit is 0.02 s.
         ScriptedStep::Swing(if step < 20 { 0.021 } else { 0.02 })
     }
     let game = play(40, GameLimits::default(), [late, hold]);
@@ -167,11 +187,15 @@ fn late_answers_have_no_effect_and_are_counted() {
     assert_eq!(game.sink.effects[0][20..], [Effect::InTime; 20]);
     // The first joint does not move until the first answer in time.
     assert!(
-        game.sink.q[..20]
+        game.sink.first_joint[..20]
             .iter()
             .all(|[first, _]| first.abs() < 1e-3)
     );
-    assert!(game.sink.q[39][0] > 0.01, "{:?}", game.sink.q[39]);
+    assert!(
+        game.sink.first_joint[39][0] > 0.01,
+        "{:?}",
+        game.sink.first_joint[39]
+    );
     assert_eq!(first.windows[0].computation_time.max_s, 0.021);
     assert_eq!(game.answer_times_s[0].len(), 40);
 }
@@ -187,6 +211,7 @@ fn fault_holds_the_arm_and_restarts_the_agent() {
     }
     let game = play(800, GameLimits::default(), [hold, fault_once]);
     let log = &game.sink;
+    // Both arms hold, so the first rally ends with a foul, since the puck stays in one half for too long: after 752 steps.
     assert_eq!(log.effects[1][..3], [Effect::InTime; 3]);
     assert_eq!(log.effects[1][3], Effect::Fault);
     assert_eq!(log.effects[1][4..752], [Effect::Held; 748]);
@@ -201,11 +226,11 @@ fn fault_holds_the_arm_and_restarts_the_agent() {
         panic!("{:?}", log.ends)
     };
     assert!(matches!(first, RallyEnding::Table(RallyEnd::Foul { .. })));
-    let [good, bad] = &game.outcome.sides;
+    let [holding_side, faulty_side] = &game.outcome.sides;
     // One start and two resets, against two starts and two resets.
-    assert!((good.time_used_s - (0.5 + 0.5 + 0.8)).abs() < 1e-9);
-    assert!((bad.time_used_s - (1.0 + 0.5 + 1.0 + 0.051)).abs() < 1e-9);
-    let fault = &bad.faults[0];
+    assert!((holding_side.time_used_s - (0.5 + 0.5 + 0.8)).abs() < 1e-9);
+    assert!((faulty_side.time_used_s - (1.0 + 0.5 + 1.0 + 0.051)).abs() < 1e-9);
+    let fault = &faulty_side.faults[0];
     assert_eq!(fault.game_step, 3);
     let agent_task = AgentTask::Game { side: Side::Second };
     assert_eq!(
@@ -216,7 +241,11 @@ fn fault_holds_the_arm_and_restarts_the_agent() {
         ),
         (agent_task, Some(0), Some(3))
     );
-    let faults: Vec<u32> = bad.windows.iter().map(|window| window.faults).collect();
+    let faults: Vec<u32> = faulty_side
+        .windows
+        .iter()
+        .map(|window| window.faults)
+        .collect();
     assert_eq!(faults, [1, 0]);
 }
 
@@ -236,6 +265,7 @@ fn too_many_faults_forfeit_and_both_sides_draw() {
     };
     let by = Side::Second;
     assert_eq!(game.outcome.end, GameEnd::Forfeit { by, cause });
+    // The second fault is in the first step of the second rally.
     assert_eq!(game.outcome.steps, 753);
     let game = play(45_000, limits, [always_fault, always_fault]);
     let causes = [cause; 2];
@@ -275,7 +305,7 @@ fn failed_start_is_a_fault() {
     let mut running = RunningGame::begin(&arena(), 100, limits, SinkLog::default());
     let start_failed = RallyEntry::StartFailed {
         startup_s: 120.0,
-        fault: fault(),
+        fault: side_fault(),
     };
     let ready_entry = ready(&running, Side::First);
     running.start_rally([ready_entry, start_failed]).unwrap();
@@ -298,12 +328,12 @@ fn divergence_is_the_fault_of_its_side() {
     fn diverge(_: u32, _: u32) -> ScriptedStep {
         ScriptedStep::Diverge
     }
-    let narrow = arena().with_bounds(NARROW);
-    let game = play_in(&narrow, 1000, GameLimits::default(), [hold, diverge]);
-    let [good, bad] = &game.outcome.sides;
-    assert_eq!(good.faults, []);
-    assert!(!bad.faults.is_empty());
-    for fault in &bad.faults {
+    let narrow_arena = arena().with_bounds(NARROW_BOUNDS);
+    let game = play_in(&narrow_arena, 1000, GameLimits::default(), [hold, diverge]);
+    let [holding_side, faulty_side] = &game.outcome.sides;
+    assert_eq!(holding_side.faults, []);
+    assert!(!faulty_side.faults.is_empty());
+    for fault in &faulty_side.faults {
         let kind = &fault.fault.fault;
         assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
     }
@@ -311,5 +341,5 @@ fn divergence_is_the_fault_of_its_side() {
         game.sink.ends.iter().filter(|(_, _, ending, faults)| {
             *faults == [false, true] && ending.as_str() == "diverged"
         });
-    assert_eq!(diverged.count(), bad.faults.len());
+    assert_eq!(diverged.count(), faulty_side.faults.len());
 }

@@ -1,4 +1,4 @@
-//! Limits the open connections of each client address.
+//! Limits the open connections of each client network: one IPv4 address, or one IPv6 /64.
 
 use faceoff_service::network::Network;
 use std::{
@@ -31,13 +31,13 @@ impl ConnectionQuota {
         }
     }
 
-    /// A permit for one connection of the address, or `None` if it has reached its limit.
-    pub(super) fn acquire(self: &Arc<Self>, from: IpAddr) -> Option<ConnectionPermit> {
-        if self.exempt.contains(&from.to_canonical()) {
+    /// A permit for one connection of the address, or `None` if its network has reached the limit.
+    pub(super) fn acquire(self: &Arc<Self>, address: IpAddr) -> Option<ConnectionPermit> {
+        if self.exempt.contains(&address.to_canonical()) {
             return Some(ConnectionPermit { counted_in: None });
         }
-        let network = Network::from_address(from);
-        let mut open = self.open();
+        let network = Network::from_address(address);
+        let mut open = self.lock_open();
         let count = open.entry(network).or_default();
         if *count >= self.max_per_network {
             return None;
@@ -49,7 +49,7 @@ impl ConnectionQuota {
     }
 
     /// Ignores poisoning: the counts are consistent even after a panic.
-    fn open(&self) -> MutexGuard<'_, HashMap<Network, usize>> {
+    fn lock_open(&self) -> MutexGuard<'_, HashMap<Network, usize>> {
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -59,7 +59,7 @@ impl Drop for ConnectionPermit {
         let Some((quota, network)) = self.counted_in.take() else {
             return;
         };
-        let mut open = quota.open();
+        let mut open = quota.lock_open();
         if let Some(count) = open.get_mut(&network) {
             *count -= 1;
             if *count == 0 {
@@ -94,7 +94,7 @@ mod tests {
         drop((permits, network));
         assert!(acquire("10.0.0.1").is_some());
         assert!(
-            quota.open().is_empty(),
+            quota.lock_open().is_empty(),
             "closed connections are not counted"
         );
     }

@@ -11,8 +11,8 @@ use tokio::{
     time::{Instant, Sleep},
 };
 
-/// A write fails once the client has read less than the minimum rate for longer than its grace. Only time in
-/// which data is ready for the client counts, not the time that it waits for a response.
+/// A stream whose writes fail once the client has read more slowly than the minimum rate for longer than the grace. Only
+/// the time in which data is ready for the client counts, not the time in which the client waits for a response.
 #[derive(Debug)]
 pub(super) struct MinRateStream<S> {
     stream: S,
@@ -120,8 +120,12 @@ mod tests {
         grace: Duration::from_secs(30),
     };
 
+    /// Bytes between the stream and its client that are written and not yet read.
+    const BUFFER_BYTES: usize = 100;
+
+    /// A stream with [`RATE`], and its client's end.
     fn stream_with_client() -> (MinRateStream<DuplexStream>, DuplexStream) {
-        let (server, client) = duplex(100);
+        let (server, client) = duplex(BUFFER_BYTES);
         (MinRateStream::new(server, RATE, |_| {}), client)
     }
 
@@ -137,16 +141,18 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn client_that_keeps_the_rate_is_never_dropped() {
         let (mut stream, mut client) = stream_with_client();
-        let reading = tokio::spawn(async move {
-            let mut buffer = [0; 100];
+        let reader = tokio::spawn(async move {
+            let mut buffer = [0; BUFFER_BYTES];
             for _ in 0..1000 {
+                // 100 bytes in 90 ms are more than 1000 bytes per second.
                 tokio::time::sleep(Duration::from_millis(90)).await;
                 client.read_exact(&mut buffer).await.unwrap();
             }
             client
         });
         stream.write_all(&[7; 100_000]).await.unwrap();
-        let _client = reading.await.unwrap();
+        let _client = reader.await.unwrap();
+        // Time without a pending write does not count.
         tokio::time::sleep(Duration::from_secs(1000)).await;
         stream.write_all(&[7; 100]).await.unwrap();
     }
@@ -155,6 +161,7 @@ mod tests {
     async fn client_below_the_rate_is_dropped() {
         let (mut stream, mut client) = stream_with_client();
         tokio::spawn(async move {
+            // One byte per second.
             while client.read_u8().await.is_ok() {
                 tokio::time::sleep(Duration::from_secs(1)).await;
             }

@@ -271,9 +271,9 @@ async fn board_page_shows_next_steps_and_progress() {
         .unwrap();
     for day in ["today", "after midnight"] {
         let html = page(&site, "/").await;
-        let rows = texts(&html, ".under-way .runs li");
+        let rows = texts(&html, ".under-way .evaluation-list li");
         assert_eq!(rows, ["Alpha Running 3 of 12"], "{day}");
-        let whole = texts(&html, ".under-way .whole").join(" ");
+        let whole = texts(&html, ".under-way .total-progress").join(" ");
         assert!(
             whole.starts_with("3 of 12 episodes; 0 of 1 evaluations done."),
             "{whole}"

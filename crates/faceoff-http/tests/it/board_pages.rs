@@ -59,7 +59,7 @@ async fn board_page_shows_changes_since_the_previous_day() {
             ],
             "{path}"
         );
-        let scores = texts(&html, ".board .score .move, .board .success .move");
+        let scores = texts(&html, ".board .score .change, .board .success .change");
         assert_eq!(
             scores,
             ["+30.0 since the day before", "−10.0 since the day before"],
@@ -69,7 +69,7 @@ async fn board_page_shows_changes_since_the_previous_day() {
     // The first day has no previous one.
     let first = page(&site, "/?day=2026-03-01").await;
     assert_eq!(texts(&first, ".board td.rank"), ["1", "2"]);
-    assert!(texts(&first, ".move").is_empty());
+    assert!(texts(&first, ".change").is_empty());
 }
 
 #[tokio::test]

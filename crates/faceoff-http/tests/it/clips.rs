@@ -338,7 +338,7 @@ async fn replay_page_is_complete_without_its_script() {
         let found = page.select(&selector).next()?;
         found.attr(name).map(str::to_owned)
     };
-    let puck_path = attribute(".way.puck", "d").unwrap();
+    let puck_path = attribute(".trajectory.puck", "d").unwrap();
     let samples = view["episodes"][1]["steps"].as_u64().unwrap() + 1;
     assert_eq!(puck_path.matches(['M', 'L']).count() as u64, samples);
     let motion = attribute("#replay", "data-motion").unwrap();

@@ -120,7 +120,7 @@ async fn episode_of_two_teams_is_replayed_side_by_side() {
         let motion = format!("/api/v1/evaluations/{id}/episodes/prepare/0/motion");
         assert_eq!(replay.attr("data-motion"), Some(motion.as_str()));
         assert_eq!(
-            replay.attr("data-together"),
+            replay.attr("data-sync-group"),
             Some("both"),
             "both replays are synchronised"
         );

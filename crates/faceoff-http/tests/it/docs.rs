@@ -171,7 +171,7 @@ async fn api_reference_lists_all_operations_and_schemas() {
 async fn search_finds_sections_and_marks_words() {
     let site = Site::start().await;
     let page = search(&site, "Frozen BOARDS").await;
-    let first = all(&page, ".found li a")[0];
+    let first = all(&page, ".search-results li a")[0];
     assert_eq!(first.attr("href"), Some("/docs/api#frozen-boards"));
     assert_eq!(text_of(first), "Frozen boards");
     let marked: Vec<String> = first
@@ -181,7 +181,7 @@ async fn search_finds_sections_and_marks_words() {
     assert_eq!(marked, ["Frozen", "boards"]);
     // Operations and schemas are found, too.
     let page = search(&site, "BoardView").await;
-    let links = attributes(&page, ".found li a", "href");
+    let links = attributes(&page, ".search-results li a", "href");
     assert_eq!(links[0], "/docs/api-reference/schemas/BoardView");
 
     let page = search(&site, "quidditch").await;
@@ -301,7 +301,7 @@ async fn robots_may_read_pages_and_documentation_only() {
         "/sign-in",
         "/join",
         "/organiser",
-        "/desk",
+        "/dashboard",
     ] {
         assert!(refused.contains(path), "{path}: {}", answer.body);
     }

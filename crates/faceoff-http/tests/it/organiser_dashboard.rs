@@ -68,7 +68,7 @@ async fn organiser_dashboard_is_for_organisers_only() {
                 refused.body
             );
             assert!(
-                refused.body.contains("/desk"),
+                refused.body.contains("/dashboard"),
                 "a link to the member's own dashboard"
             );
         }
@@ -79,8 +79,11 @@ async fn organiser_dashboard_is_for_organisers_only() {
     let refused = ada.submit("/organiser/decide/pause", &paused).await;
     assert_eq!(refused.status, 403);
     assert_eq!(newest(&site, "queue_paused").await, Value::Null);
-    assert_eq!(redirect_target(&grace.open("/desk").await), "/organiser");
-    assert_eq!(grace.open("/desk/submissions/x").await.status, 403);
+    assert_eq!(
+        redirect_target(&grace.open("/dashboard").await),
+        "/organiser"
+    );
+    assert_eq!(grace.open("/dashboard/submissions/x").await.status, 403);
     assert_eq!(grace.open("/organiser/decide/nothing").await.status, 404);
 }
 
@@ -97,7 +100,7 @@ async fn evaluation_is_voided_with_a_reason_and_rerun() {
         ["Void the evaluation of 2026-03-01 by Alpha"]
     );
     assert!(
-        texts(&html, "#what")[0]
+        texts(&html, "#effects")[0]
             .starts_with("The evaluation of 2026-03-01 by Alpha would disappear")
     );
     assert_eq!(newest(&site, "evaluation_voided").await, Value::Null, "yet");
@@ -133,7 +136,7 @@ async fn evaluation_is_voided_with_a_reason_and_rerun() {
     let (link, _) = open_decision(&mut grace, "/organiser/day", "rerun/").await;
     assert!(redirect_target(&grace.submit(&link, &[]).await).ends_with("done=rerun"));
     let (link, page) = open_decision(&mut grace, "/organiser/day", "cancel/").await;
-    assert!(texts(&dashboard_page(&page, 200), "#what")[0].contains("0 of 12 episodes"));
+    assert!(texts(&dashboard_page(&page, 200), "#effects")[0].contains("0 of 12 episodes"));
     let cancelled = grace.submit(&link, &[("reason", "later")]).await;
     assert!(redirect_target(&cancelled).ends_with("done=cancelled"));
     assert_eq!(
@@ -153,7 +156,7 @@ async fn organiser_starts_and_corrects_days_and_pauses_the_queue() {
     assert!(attention.contains("no failures"), "{attention}");
 
     let (link, page) = open_decision(&mut grace, "/organiser/day", "start-day/").await;
-    let effects = texts(&dashboard_page(&page, 200), "#what").remove(0);
+    let effects = texts(&dashboard_page(&page, 200), "#effects").remove(0);
     assert!(
         effects.contains("1 team would have 12 episodes to run"),
         "{effects}"
@@ -173,17 +176,19 @@ async fn organiser_starts_and_corrects_days_and_pauses_the_queue() {
         "{item}"
     );
     let (link, page) = open_decision(&mut grace, "/organiser", "resume").await;
-    assert!(texts(&dashboard_page(&page, 200), "#what")[0].contains("the fan is loud"));
+    assert!(texts(&dashboard_page(&page, 200), "#effects")[0].contains("the fan is loud"));
     assert!(redirect_target(&grace.submit(&link, &[]).await).contains("done=resumed"));
 
     // An extra evaluation, a voided day, and a missed day that is made up.
     site.finish_evaluation(&result([0.5; 3], 10.0)).await;
-    let (link, page) = open_decision(&mut grace, "/organiser/day", "extra-turn/").await;
-    assert!(texts(&dashboard_page(&page, 200), "#what")[0].contains("voided at once"));
+    let (link, page) = open_decision(&mut grace, "/organiser/day", "extra-evaluation/").await;
+    assert!(texts(&dashboard_page(&page, 200), "#effects")[0].contains("voided at once"));
     let form = forms(&link, &page).remove(0);
     assert!(form.fields.contains(&("confirm".into(), "Alpha".into())));
     let fields = [("reason", "lost an hour"), ("confirm", "Alpha")];
-    assert!(redirect_target(&grace.submit(&link, &fields).await).ends_with("done=extra-turn"));
+    assert!(
+        redirect_target(&grace.submit(&link, &fields).await).ends_with("done=extra-evaluation")
+    );
     let unconfirmed = [("reason", "all of it")];
     let (link, _) = open_decision(&mut grace, "/organiser/day", "void-day/").await;
     let refused = dashboard_page(&grace.submit(&link, &unconfirmed).await, 409);
@@ -305,7 +310,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
 
     let (link, page) = open_decision(&mut grace, "/organiser/teams", "disqualify/").await;
     assert!(
-        texts(&dashboard_page(&page, 200), "#what")[0]
+        texts(&dashboard_page(&page, 200), "#effects")[0]
             .starts_with("Alpha would disappear from all boards")
     );
     let fields = [("reason", "it read the seed"), ("confirm", "Alpha")];
@@ -459,7 +464,7 @@ async fn organiser_creates_changes_freezes_and_signs_off_a_stage() {
     let html = dashboard_page(&grace.open("/organiser").await, 200);
     assert!(texts(&html, ".attention li")[0].contains("its result is provisional"));
     let (link, page) = open_decision(&mut grace, &path, "sign-off/").await;
-    assert!(texts(&dashboard_page(&page, 200), "#what")[0].contains("signed off for good"));
+    assert!(texts(&dashboard_page(&page, 200), "#effects")[0].contains("signed off for good"));
     let confirm = [("confirm", name.as_str())];
     assert!(redirect_target(&grace.submit(&link, &confirm).await).ends_with("done=signed-off"));
     assert_eq!(
@@ -500,9 +505,12 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
     let mut ben = Browser::join(&site, "Ben", role(&beta)).await;
     let mut grace = grace(&site).await;
     let words = [("text", "May <b>we</b>?")];
-    let asked = ada.submit("/desk/questions", &words).await;
-    assert_eq!(redirect_target(&asked), "/desk/questions?done=asked");
-    let empty = dashboard_page(&ada.submit("/desk/questions", &[("text", " ")]).await, 422);
+    let asked = ada.submit("/dashboard/questions", &words).await;
+    assert_eq!(redirect_target(&asked), "/dashboard/questions?done=asked");
+    let empty = dashboard_page(
+        &ada.submit("/dashboard/questions", &[("text", " ")]).await,
+        422,
+    );
     assert!(texts(&empty, "[role=alert]")[0].contains("1 to 2000 characters"));
     let html = dashboard_page(&grace.open("/organiser").await, 200);
     assert!(texts(&html, ".attention li")[0].contains("1 open question"));
@@ -521,16 +529,16 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
         "/organiser/messages?done=answered"
     );
     assert_eq!(newest(&site, "answered").await["actor_name"], "Grace");
-    let ada_page = dashboard_page(&ada.open("/desk/questions").await, 200);
+    let ada_page = dashboard_page(&ada.open("/dashboard/questions").await, 200);
     assert!(texts(&ada_page, ".entry")[0].contains("You may."));
-    let ben_page = dashboard_page(&ben.open("/desk/questions").await, 200);
+    let ben_page = dashboard_page(&ben.open("/dashboard/questions").await, 200);
     assert!(
         texts(&ben_page, ".entry").is_empty(),
         "the answer is not public"
     );
     let public = [("text", "Everybody may."), ("public", "on")];
     redirect_target(&grace.submit(&form.action, &public).await);
-    let ben_page = dashboard_page(&ben.open("/desk/questions").await, 200);
+    let ben_page = dashboard_page(&ben.open("/dashboard/questions").await, 200);
     let public_entry = texts(&ben_page, ".entry").remove(0);
     assert!(
         public_entry.contains("Everybody may.") && !public_entry.contains("Alpha"),
@@ -559,7 +567,7 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
         redirect_target(&terms),
         "/organiser/messages?done=published"
     );
-    let html = dashboard_page(&ben.open("/desk").await, 200);
+    let html = dashboard_page(&ben.open("/dashboard").await, 200);
     assert_eq!(
         texts(&html, "section[aria-labelledby=terms] button"),
         ["Accept version 1"]
@@ -600,7 +608,7 @@ async fn organiser_forms_refuse_foreign_origins() {
     for decision in [
         "void/",
         "void-day/",
-        "extra-turn/",
+        "extra-evaluation/",
         "disqualify/",
         "freeze/",
         "pause",

@@ -71,21 +71,23 @@ async fn member_uploads_and_selects_the_active_submission() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let mut ada = member(&site, &team, "Ada").await;
-    let empty = dashboard_page(&ada.open("/desk").await, 200);
+    let empty = dashboard_page(&ada.open("/dashboard").await, 200);
     assert_eq!(texts(&empty, "h1"), ["Alpha"]);
-    assert!(texts(&empty, "[data-live=submissions]")[0].contains("None yet"));
-    assert!(texts(&empty, "[data-live=next]")[0].contains("None: upload a bundle"));
+    assert!(texts(&empty, "[data-live-section=submissions]")[0].contains("None yet"));
+    assert!(texts(&empty, "[data-live-section=next]")[0].contains("None: upload a bundle"));
 
-    let sent = ada.upload("/desk/upload", "striker.tar.gz", &GZIP).await;
+    let sent = ada
+        .upload("/dashboard/upload", "striker.tar.gz", &GZIP)
+        .await;
     assert_eq!(
         (sent.status.as_u16(), sent.header("location")),
-        (303, "/desk?done=uploaded")
+        (303, "/dashboard?done=uploaded")
     );
-    let html = dashboard_page(&ada.open("/desk?done=uploaded").await, 200);
+    let html = dashboard_page(&ada.open("/dashboard?done=uploaded").await, 200);
     assert!(texts(&html, "[role=status]")[0].starts_with("Uploaded."));
     assert_eq!(texts(&html, ".entry .state"), ["validating"]);
     assert_eq!(
-        texts(&html, "[data-moving]").len(),
+        texts(&html, "[data-in-progress]").len(),
         1,
         "the script follows it"
     );
@@ -96,34 +98,34 @@ async fn member_uploads_and_selects_the_active_submission() {
     assert_eq!(log["events"][0]["actor_name"], "Ada", "{log}");
 
     site.finish_validation(valid("ready\n<i>on</i>\n")).await;
-    let html = dashboard_page(&ada.open("/desk").await, 200);
+    let html = dashboard_page(&ada.open("/dashboard").await, 200);
     assert_eq!(
         texts(&html, ".entry .state"),
         ["valid", "active at the next cutoff"]
     );
-    assert!(texts(&html, "[data-live=next]")[0].contains("<b>striker</b>"));
+    assert!(texts(&html, "[data-live-section=next]")[0].contains("<b>striker</b>"));
     let page = links(&html, ".entry h3 a").remove(0);
     let html = dashboard_page(&ada.open(&page).await, 200);
     assert_eq!(texts(&html, "h1"), ["<b>striker</b>"]);
     assert_eq!(texts(&html, "pre"), ["ready <i>on</i>"]);
     assert_eq!(
-        texts(&html, "[data-live=verdict] tbody td"),
+        texts(&html, "[data-live-section=verdict] tbody td"),
         ["321", "0.50", "1.23", "15.00", "0.5"]
     );
 
     // The newest valid submission is active; an older one can be selected.
-    ada.upload("/desk/upload", "second.zip", b"PK\x03\x04\x14\x00")
+    ada.upload("/dashboard/upload", "second.zip", b"PK\x03\x04\x14\x00")
         .await;
     site.finish_validation(valid("")).await;
-    let html = dashboard_page(&ada.open("/desk").await, 200);
+    let html = dashboard_page(&ada.open("/dashboard").await, 200);
     assert_eq!(texts(&html, ".entry[aria-current] .note").len(), 1);
     let chosen = ada.submit(&format!("{page}/activate"), &[]).await;
-    assert_eq!(chosen.header("location"), "/desk?done=activated");
-    let html = dashboard_page(&ada.open("/desk?done=activated").await, 200);
+    assert_eq!(chosen.header("location"), "/dashboard?done=activated");
+    let html = dashboard_page(&ada.open("/dashboard?done=activated").await, 200);
     assert_eq!(links(&html, ".entry[aria-current] h3 a").join(" "), page);
     let withdrawn = ada.submit(&format!("{page}/withdraw"), &[]).await;
-    assert_eq!(withdrawn.header("location"), "/desk?done=withdrawn");
-    let html = dashboard_page(&ada.open("/desk").await, 200);
+    assert_eq!(withdrawn.header("location"), "/dashboard?done=withdrawn");
+    let html = dashboard_page(&ada.open("/dashboard").await, 200);
     assert!(links(&html, ".entry[aria-current] h3 a").is_empty());
     // A second withdrawal is refused as in the API, and the page is shown with the error.
     let twice = ada.submit(&format!("{page}/withdraw"), &[]).await;
@@ -171,7 +173,7 @@ async fn invalid_archive_is_refused_on_the_page() {
         ("empty.zip", b"".as_slice(), 400, "got an empty body"),
         ("", b"".as_slice(), 400, "no file was chosen"),
     ] {
-        let refused = ada.upload("/desk/upload", name, archive).await;
+        let refused = ada.upload("/dashboard/upload", name, archive).await;
         let html = dashboard_page(&refused, status);
         let alert = &texts(&html, "[role=alert]")[0];
         assert!(alert.contains(words), "{alert}");
@@ -184,7 +186,9 @@ async fn invalid_archive_is_refused_on_the_page() {
     // An archive of exactly the maximum size is accepted.
     let most = [&GZIP[..], &vec![0; MAX_BUNDLE as usize - GZIP.len()]].concat();
     assert_eq!(
-        ada.upload("/desk/upload", "most.tgz", &most).await.status,
+        ada.upload("/dashboard/upload", "most.tgz", &most)
+            .await
+            .status,
         303
     );
     let stored = site.get("/api/v1/submissions", Some(&team.token)).await;
@@ -209,8 +213,8 @@ async fn visitor_is_redirected_to_sign_in_and_back() {
     drop(member(&site, &team, "Ada").await);
     let mut browser = Browser::new(&site);
     for (path, next) in [
-        ("/desk", "%2Fdesk"),
-        ("/desk/access?x=1", "%2Fdesk%2Faccess%3Fx%3D1"),
+        ("/dashboard", "%2Fdashboard"),
+        ("/dashboard/access?x=1", "%2Fdashboard%2Faccess%3Fx%3D1"),
         ("/organiser/day", "%2Forganiser%2Fday"),
     ] {
         let redirected = browser.open(path).await;
@@ -221,23 +225,23 @@ async fn visitor_is_redirected_to_sign_in_and_back() {
         );
     }
     let sent = browser
-        .submit("/desk/access/tokens", &[("name", "a")])
+        .submit("/dashboard/access/tokens", &[("name", "a")])
         .await;
-    assert_eq!(sent.header("location"), "/sign-in?next=%2Fdesk");
-    let sent = browser.upload("/desk/upload", "a.zip", &GZIP).await;
-    assert_eq!(sent.header("location"), "/sign-in?next=%2Fdesk");
+    assert_eq!(sent.header("location"), "/sign-in?next=%2Fdashboard");
+    let sent = browser.upload("/dashboard/upload", "a.zip", &GZIP).await;
+    assert_eq!(sent.header("location"), "/sign-in?next=%2Fdashboard");
 
-    let page = browser.open("/sign-in?next=%2Fdesk%2Faccess").await;
+    let page = browser.open("/sign-in?next=%2Fdashboard%2Faccess").await;
     let form = forms("/sign-in", &page).remove(0);
-    let next = ("next".to_owned(), "/desk/access".to_owned());
+    let next = ("next".to_owned(), "/dashboard/access".to_owned());
     assert!(form.fields.contains(&next), "{form:?}");
     let fields = [
         ("name", "Ada"),
         ("password", PASSWORD),
-        ("next", "/desk/access"),
+        ("next", "/dashboard/access"),
     ];
     let signed_in = browser.submit("/sign-in", &fields).await;
-    assert_eq!(signed_in.header("location"), "/desk/access");
+    assert_eq!(signed_in.header("location"), "/dashboard/access");
     // Redirects to other sites are refused.
     let foreign = browser
         .open("/sign-in?next=https%3A%2F%2Fevil.example")
@@ -245,8 +249,8 @@ async fn visitor_is_redirected_to_sign_in_and_back() {
     assert!(!foreign.body.contains("evil"));
     for evil in [
         "//evil.example",
-        "https://evil.example/desk",
-        "/desk\\..\\x",
+        "https://evil.example/dashboard",
+        "/dashboard\\..\\x",
     ] {
         let fields = [fields[0], fields[1], ("next", evil)];
         let signed_in = browser.submit("/sign-in", &fields).await;
@@ -255,32 +259,57 @@ async fn visitor_is_redirected_to_sign_in_and_back() {
 }
 
 #[tokio::test]
+async fn old_dashboard_address_redirects_permanently() {
+    let site = Site::start().await;
+    let mut browser = Browser::new(&site);
+    for (old, new) in [
+        ("/desk", "/dashboard"),
+        ("/desk?done=uploaded", "/dashboard?done=uploaded"),
+        ("/desk/submissions/x", "/dashboard/submissions/x"),
+        ("/desk/access?a=b%26c", "/dashboard/access?a=b%26c"),
+    ] {
+        let redirected = browser.open(old).await;
+        assert_eq!(redirected.status, 308, "{old}");
+        assert_eq!(redirected.header("location"), new);
+    }
+    // Status 308 makes a browser send the form again, with its method and body.
+    let form = browser
+        .submit("/desk/questions", &[("text", "When?")])
+        .await;
+    assert_eq!(form.status, 308);
+    assert_eq!(form.header("location"), "/dashboard/questions");
+}
+
+#[tokio::test]
 async fn token_is_shown_once_and_can_be_revoked() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let mut ada = member(&site, &team, "Ada").await;
     let fields = [("name", "CI"), ("owner", "team"), ("days", "30")];
-    let made = ada.submit("/desk/access/tokens", &fields).await;
+    let made = ada.submit("/dashboard/access/tokens", &fields).await;
     let html = dashboard_page(&made, 201);
     let secret = texts(&html, ".secret code").remove(0);
     let me = site.get("/api/v1/whoami", Some(&secret)).await.json(200);
     assert_eq!(me["role"], "team");
     assert_eq!(me["token"]["expires_at"], "2026-03-31T10:00:00Z");
-    let page = ada.open("/desk/access").await;
+    let page = ada.open("/dashboard/access").await;
     dashboard_page(&page, 200);
     assert!(!page.body.contains(&secret), "the secret is shown once");
     let id = string(&me["token"]["id"]);
     let revoked = ada
-        .submit(&format!("/desk/access/tokens/{id}/revoke"), &[])
+        .submit(&format!("/dashboard/access/tokens/{id}/revoke"), &[])
         .await;
-    assert_eq!(revoked.header("location"), "/desk/access?done=revoked");
+    assert_eq!(revoked.header("location"), "/dashboard/access?done=revoked");
     assert_eq!(site.get("/api/v1/whoami", Some(&secret)).await.status, 401);
     let nameless = [("name", " "), ("owner", "me"), ("days", "")];
-    let refused = dashboard_page(&ada.submit("/desk/access/tokens", &nameless).await, 422);
+    let refused = dashboard_page(
+        &ada.submit("/dashboard/access/tokens", &nameless).await,
+        422,
+    );
     assert!(texts(&refused, "[role=alert]")[0].contains("1 to 80 characters"));
     // A personal token without expiry.
     let own = [("name", "mine"), ("owner", "me"), ("days", "")];
-    let made = ada.submit("/desk/access/tokens", &own).await;
+    let made = ada.submit("/dashboard/access/tokens", &own).await;
     let secret = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
     let me = site.get("/api/v1/whoami", Some(&secret)).await.json(200);
     assert_eq!(
@@ -295,28 +324,31 @@ async fn member_invites_revokes_an_invitation_and_leaves() {
     let team = site.team("Alpha").await;
     let mut ada = member(&site, &team, "Ada").await;
     let made = ada
-        .submit("/desk/access/invitations", &[("note", "Ben")])
+        .submit("/dashboard/access/invitations", &[("note", "Ben")])
         .await;
     let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
     let mut ben = Browser::new(&site);
     let fields = [("name", "Ben"), ("password", PASSWORD)];
     assert_eq!(ben.submit(&link, &fields).await.status, 303);
-    let html = dashboard_page(&ada.open("/desk/access").await, 200);
+    let html = dashboard_page(&ada.open("/dashboard/access").await, 200);
     assert_eq!(
         texts(&html, "section[aria-labelledby=people] tbody th"),
         ["Ada you", "Ben"]
     );
     let made = ada
-        .submit("/desk/access/invitations", &[("note", "Eve")])
+        .submit("/dashboard/access/invitations", &[("note", "Eve")])
         .await;
     let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
-    let listed = forms("/desk/access", &ada.open("/desk/access").await);
+    let listed = forms("/dashboard/access", &ada.open("/dashboard/access").await);
     let revoke_form = listed
         .iter()
         .find(|form| form.action.contains("/invitations/"))
         .unwrap();
     let revoked = ada.submit(&revoke_form.action, &[]).await;
-    assert_eq!(revoked.header("location"), "/desk/access?done=uninvited");
+    assert_eq!(
+        revoked.header("location"),
+        "/dashboard/access?done=uninvited"
+    );
     let eve = Browser::new(&site)
         .submit(&link, &[("name", "Eve"), ("password", PASSWORD)])
         .await;
@@ -327,14 +359,18 @@ async fn member_invites_revokes_an_invitation_and_leaves() {
         let all = users.as_array().unwrap();
         string(&all.iter().find(|one| one["name"] == name).unwrap()["id"])
     };
-    let remove = |name: &str| format!("/desk/access/people/{}/remove", id(name));
+    let remove = |name: &str| format!("/dashboard/access/people/{}/remove", id(name));
     let other = ada.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
     assert_eq!(other.status, 403);
     let wrong = ben.submit(&remove("Ben"), &[("confirm", "Ada")]).await;
     assert!(first_text(&wrong, "[role=alert]").contains("nothing is done yet"));
     let left = ben.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
     assert_eq!(left.status, 303);
-    assert_eq!(ben.open("/desk").await.status, 303, "redirected to sign in");
+    assert_eq!(
+        ben.open("/dashboard").await.status,
+        303,
+        "redirected to sign in"
+    );
 }
 
 #[tokio::test]
@@ -342,7 +378,7 @@ async fn submission_of_another_team_is_not_found() {
     let site = Site::start().await;
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let path = site.valid_submission(&beta, "agent").await;
-    let path = path.replace("/api/v1", "/desk");
+    let path = path.replace("/api/v1", "/dashboard");
     let mut ada = member(&site, &alpha, "Ada").await;
     assert_eq!(ada.open(&path).await.status, 404);
     for action in ["activate", "withdraw", "describe"] {
@@ -350,9 +386,9 @@ async fn submission_of_another_team_is_not_found() {
         let refused = ada.submit(&format!("{path}/{action}"), &fields).await;
         assert_eq!(refused.status, 404, "{action}: {}", refused.body);
     }
-    assert_eq!(ada.open("/desk/submissions/none").await.status, 404);
+    assert_eq!(ada.open("/dashboard/submissions/none").await.status, 404);
     let mut ben = member(&site, &beta, "Ben").await;
-    let html = dashboard_page(&ben.open("/desk").await, 200);
+    let html = dashboard_page(&ben.open("/dashboard").await, 200);
     assert_eq!(texts(&html, ".entry .state").len(), 2, "it is still active");
 }
 
@@ -366,17 +402,18 @@ async fn dashboard_forms_refuse_foreign_origins() {
     site.post("/api/v1/terms", Some(ADMIN), &terms)
         .await
         .json(201);
-    ada.submit("/desk/access/invitations", &[("note", "Ben")])
+    ada.submit("/dashboard/access/invitations", &[("note", "Ben")])
         .await;
-    ada.submit("/desk/access/tokens", &[("name", "CI")]).await;
-    let first_page = dashboard_page(&ada.open("/desk").await, 200);
+    ada.submit("/dashboard/access/tokens", &[("name", "CI")])
+        .await;
+    let first_page = dashboard_page(&ada.open("/dashboard").await, 200);
     let submission = links(&first_page, ".entry h3 a").remove(0);
     let mut actions = Vec::new();
     for path in [
-        "/desk",
+        "/dashboard",
         submission.as_str(),
-        "/desk/questions",
-        "/desk/access",
+        "/dashboard/questions",
+        "/dashboard/access",
     ] {
         let page = ada.open(path).await;
         dashboard_page(&page, 200);
@@ -391,8 +428,8 @@ async fn dashboard_forms_refuse_foreign_origins() {
         }
     }
     for expected in [
-        "/desk/upload",
-        "/desk/terms",
+        "/dashboard/upload",
+        "/dashboard/terms",
         "/withdraw",
         "/describe",
         "/questions",
@@ -405,9 +442,9 @@ async fn dashboard_forms_refuse_foreign_origins() {
         let found = actions.iter().any(|action| action.ends_with(expected));
         assert!(found, "{expected} is not among {actions:?}");
     }
-    let accepted = ada.submit("/desk/terms", &[("version", "1")]).await;
-    assert_eq!(accepted.header("location"), "/desk?done=terms");
-    let body = ada.open("/desk").await.body;
+    let accepted = ada.submit("/dashboard/terms", &[("version", "1")]).await;
+    assert_eq!(accepted.header("location"), "/dashboard?done=terms");
+    let body = ada.open("/dashboard").await.body;
     assert!(!body.contains("Terms to accept"));
 }
 
@@ -421,7 +458,7 @@ async fn dashboard_lists_evaluations_with_their_files() {
         .json(200);
     site.finish_evaluation(&result([0.5; 3], 100.0)).await;
     let mut ada = member(&site, &team, "Ada").await;
-    let html = dashboard_page(&ada.open("/desk").await, 200);
+    let html = dashboard_page(&ada.open("/dashboard").await, 200);
     let row = texts(&html, "section[aria-labelledby=evaluations] tbody tr").remove(0);
     assert!(row.starts_with("2026-03-01finished 50.0"), "{row}");
     let dataset = links(&html, "a[href$='/dataset']").remove(0);

@@ -33,8 +33,8 @@ struct Page {
     episode: u32,
     sides: Vec<Side>,
     /// The nearest episodes of the task with different outcomes.
-    before: Option<u32>,
-    after: Option<u32>,
+    previous_difference: Option<u32>,
+    next_difference: Option<u32>,
     styles: [&'static str; 2],
     script: &'static str,
 }
@@ -52,13 +52,18 @@ pub(crate) async fn page(
     } = path?;
     let clips = AblationClips::load(&app, viewer?, id).await?;
     let mut sides = Vec::new();
-    for (element_id, shown) in [("replay-a", Profile::Ideal), ("replay-b", profile)] {
-        let clip = clips.episode(&app, shown, task, episode).await?;
+    for (element_id, shown_profile) in [("replay-a", Profile::Ideal), ("replay-b", profile)] {
+        let clip = clips.episode(&app, shown_profile, task, episode).await?;
         let api = format!(
-            "{}/ablation/{shown}/{task}/{episode}",
+            "{}/ablation/{shown_profile}/{task}/{episode}",
             paths::submission(id)
         );
-        sides.push(Side::new(element_id, &clip, &api, shown.to_string()));
+        sides.push(Side::new(
+            element_id,
+            &clip,
+            &api,
+            shown_profile.to_string(),
+        ));
     }
     let differing = clips.differing_episodes(&app).await?;
     let differing_episodes = || {
@@ -77,8 +82,8 @@ pub(crate) async fn page(
         task,
         episode,
         sides,
-        before: differing_episodes().filter(|other| *other < episode).max(),
-        after: differing_episodes().filter(|other| *other > episode).min(),
+        previous_difference: differing_episodes().filter(|other| *other < episode).max(),
+        next_difference: differing_episodes().filter(|other| *other > episode).min(),
         styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
         script: assets::REPLAY_SCRIPT.url(),
     })

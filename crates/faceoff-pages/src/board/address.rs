@@ -1,4 +1,4 @@
-//! Addresses of other boards: the query of the current page with one part changed.
+//! Addresses of other boards: those of the current page with another task, day or sort.
 
 use crate::query::with_query;
 use faceoff_api::requests::{BoardColumn, BoardPageQuery, BoardSort};

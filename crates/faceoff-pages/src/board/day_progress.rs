@@ -1,4 +1,5 @@
-//! Progress of the evaluation day: running and queued evaluations, and those that ended without a result.
+//! Progress of the evaluation day, on which each team's active submission is evaluated once: running and queued evaluations, and those
+//! that ended without a result.
 
 use crate::frame::PageProblem;
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView, Progress};
@@ -14,18 +15,18 @@ pub(super) struct DayProgress {
     /// Sum over all evaluations, finished ones included.
     pub(super) episodes: Progress,
     pub(super) evaluations: usize,
-    pub(super) running: Vec<Run>,
-    pub(super) queued: Vec<Run>,
+    pub(super) running: Vec<ListedEvaluation>,
+    pub(super) queued: Vec<ListedEvaluation>,
     /// Ended without a result.
-    pub(super) ended: Vec<Run>,
-    /// Expected end of the last evaluation, from recent durations; `None` if one of them is not known.
+    pub(super) ended: Vec<ListedEvaluation>,
+    /// Expected end of the last evaluation, from recent durations; `None` if the end of one evaluation is not known.
     pub(super) expected_at: Option<Timestamp>,
 }
 
-/// An evaluation without a result.
-pub(super) struct Run {
+/// A running or queued evaluation, or one that ended without a result.
+pub(super) struct ListedEvaluation {
     pub(super) team: String,
-    pub(super) evaluation: EvaluationId,
+    pub(super) id: EvaluationId,
     pub(super) state: &'static str,
     pub(super) progress: Progress,
 }
@@ -42,7 +43,8 @@ impl DayProgress {
         if division.is_some() {
             let mut teams = team::all(app).await?;
             teams.retain(|team| team.division.as_ref() == division);
-            evaluations.retain(|of| teams.iter().any(|team| team.name == of.team_name));
+            evaluations
+                .retain(|evaluation| teams.iter().any(|team| team.name == evaluation.team_name));
         }
         evaluation::add_queue_positions(app, &mut evaluations).await?;
         let mut progress = Self {
@@ -56,16 +58,16 @@ impl DayProgress {
             ended: Vec::new(),
             expected_at: None,
         };
-        let mut is_known = true;
+        let mut is_end_known = true;
         for evaluation in evaluations {
             if !evaluation.status.is_final() {
                 let expected = evaluation.queue.and_then(|queue| queue.expected_at);
-                is_known &= expected.is_some();
+                is_end_known &= expected.is_some();
                 progress.expected_at = progress.expected_at.max(expected);
             }
             progress.add(evaluation);
         }
-        progress.expected_at = progress.expected_at.filter(|_| is_known);
+        progress.expected_at = progress.expected_at.filter(|_| is_end_known);
         Ok(progress)
     }
 
@@ -101,9 +103,9 @@ impl DayProgress {
             ),
             EvaluationStatus::Cancelled { .. } => ("Cancelled by the organisers", &mut self.ended),
         };
-        list.push(Run {
+        list.push(ListedEvaluation {
             team: evaluation.team_name.to_string(),
-            evaluation: evaluation.id,
+            id: evaluation.id,
             state,
             progress: evaluation.progress,
         });

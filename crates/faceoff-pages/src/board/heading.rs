@@ -19,11 +19,12 @@ use jiff::Timestamp;
 pub(super) struct Heading {
     pub(super) stage: String,
     /// Dates of the stage.
-    pub(super) times: String,
-    pub(super) next: Option<NextEvaluation>,
+    pub(super) dates: String,
+    pub(super) next_evaluation: Option<NextEvaluation>,
     /// The revision of the rules, if the stage has several.
     pub(super) rules: Option<String>,
-    pub(super) others: Vec<OtherBoard>,
+    /// Boards of other stages, and of other revisions of the rules of this one.
+    pub(super) other_boards: Vec<OtherBoard>,
     /// Divisions with a board of their own; `division` is the shown one.
     pub(super) divisions: Vec<DivisionName>,
     pub(super) division: Option<DivisionName>,
@@ -31,7 +32,7 @@ pub(super) struct Heading {
     pub(super) all_teams: String,
     /// The queue is paused.
     pub(super) paused: Option<RulingView>,
-    /// The organisers have frozen the board.
+    /// The organisers have *frozen* the board: it hides all later results.
     pub(super) frozen: Option<RulingView>,
     /// What a row contains, for the caption of the table.
     pub(super) rows_caption: String,
@@ -41,7 +42,7 @@ pub(super) struct Heading {
     pub(super) has_own_magnitudes: bool,
     /// Set while only the final day counts and it is still to come.
     pub(super) final_day_notice: Option<&'static str>,
-    /// Who sees a blind board.
+    /// Who sees a *blind* board, whose results are hidden until the organisers reveal them.
     pub(super) blind_notice: Option<&'static str>,
     /// Is it hidden from the viewer?
     pub(super) is_hidden: bool,
@@ -81,7 +82,7 @@ impl Heading {
     ) -> Result<Self, PageProblem> {
         let is_hidden = visibility.is_hidden(board.stage);
         let stages = stage::all(app).await?;
-        let mut others = Vec::new();
+        let mut other_boards = Vec::new();
         let mut heading = None;
         for stage in stages {
             let is_shown = stage.id == board.stage;
@@ -90,7 +91,7 @@ impl Heading {
                 if is_shown && rules.revision == board.revision || (!is_shown && !newest) {
                     continue;
                 }
-                others.push(OtherBoard {
+                other_boards.push(OtherBoard {
                     label: if is_shown {
                         format!("{}, rules of {}", stage.name, utc_minute(rules.since))
                     } else {
@@ -105,8 +106,8 @@ impl Heading {
             }
             if is_shown {
                 heading = Some(Self {
-                    times: times(&stage),
-                    next: stage.next_cutoff.as_ref().map(NextEvaluation::new),
+                    dates: stage_dates(&stage),
+                    next_evaluation: stage.next_cutoff.as_ref().map(NextEvaluation::new),
                     rules: (stage.revisions.len() > 1).then(|| {
                         format!(
                             "revision {}, since {}",
@@ -115,7 +116,7 @@ impl Heading {
                         )
                     }),
                     stage: stage.name.to_string(),
-                    others: Vec::new(),
+                    other_boards: Vec::new(),
                     divisions: app.store.divisions().await.map_err(Problem::from)?,
                     division: board.division.clone(),
                     all_teams: format!("?stage={}&revision={}", board.stage, board.revision),
@@ -136,7 +137,7 @@ impl Heading {
         }
         let heading = heading.ok_or_else(|| Problem::internal("board without its stage"))?;
         Ok(Self {
-            others,
+            other_boards,
             paused,
             ..heading
         })
@@ -175,7 +176,7 @@ fn tabs(shown: Option<Task>, address: &Address<'_>) -> Vec<Tab> {
     TABS.into_iter().map(tab).collect()
 }
 
-fn times(stage: &StageView) -> String {
+fn stage_dates(stage: &StageView) -> String {
     let local = |at: Timestamp| {
         let local = at.to_zoned(stage.zone.time_zone());
         format!("{} {}", local.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)

@@ -10,7 +10,7 @@ use faceoff_types::{DivisionName, EvaluationId, Task, TaskWeights, TeamId, Tier,
 use jiff::civil;
 use std::{cmp::Ordering, collections::BTreeMap};
 
-/// Least probability of another tier that is shown.
+/// Least shown probability that other episodes of the same kind would give another tier.
 const MIN_SHOWN_TIER_CHANGE: f64 = 0.01;
 
 /// The team of a row with its rank.
@@ -18,7 +18,7 @@ pub(super) struct TeamCell {
     pub(super) rank: u32,
     /// Change since the day before, if the board has one.
     pub(super) change: Option<RankChange>,
-    /// The first team of the rank group, if that is another team.
+    /// The first team of the *rank group*, the teams that are statistically tied; `None` for the first team itself and without a tie.
     pub(super) tied_with: Option<String>,
     /// Probability of another tier; `None` below [`MIN_SHOWN_TIER_CHANGE`] and for means of several days.
     pub(super) tier_change: Option<String>,
@@ -31,9 +31,9 @@ pub(super) struct TeamCell {
     /// Reason of an extra evaluation.
     pub(super) extra_evaluation: Option<String>,
     /// Number of days in the mean, if there are several.
-    pub(super) days: Option<usize>,
+    pub(super) day_count: Option<usize>,
     /// Conditions of the evaluation, where they differ between rows.
-    pub(super) setting: Option<String>,
+    pub(super) conditions: Option<String>,
     /// The tier, where rows are not grouped by tier.
     pub(super) tier: Option<TierLabel>,
 }
@@ -63,7 +63,7 @@ pub(super) struct Group<Row> {
 }
 
 /// Conditions of an evaluation. Results under different conditions are not comparable.
-fn setting(row: &BoardRow) -> String {
+fn conditions(row: &BoardRow) -> String {
     format!(
         "{} profile, {} episodes per task, rules {}",
         row.profile,
@@ -85,18 +85,19 @@ fn per_day(row: &BoardRow, episodes: u32) -> u32 {
 }
 
 /// The conditions of all rows; `None` if they differ.
-pub(super) fn common_setting(rows: &[BoardRow]) -> Option<String> {
-    let first = setting(rows.first()?);
+pub(super) fn common_conditions(rows: &[BoardRow]) -> Option<String> {
+    let first = conditions(rows.first()?);
     rows.iter()
-        .all(|row| setting(row) == first)
+        .all(|row| conditions(row) == first)
         .then_some(first)
 }
 
-/// The board around a row: what a row shows by comparison with others.
+/// The board around a row: the other rows, and the board of the day before.
 pub(super) struct Context<'a> {
     board: &'a BoardView,
-    before: Option<&'a EarlierBoard>,
-    has_common_setting: bool,
+    /// The board of the day before.
+    earlier: Option<&'a EarlierBoard>,
+    has_common_conditions: bool,
     is_by_rank: bool,
     /// The first team of each rank group with several teams.
     leaders: BTreeMap<u32, TeamId>,
@@ -106,7 +107,7 @@ impl<'a> Context<'a> {
     /// `is_by_rank`: rows are grouped by tier.
     pub(super) fn new(
         board: &'a BoardView,
-        before: Option<&'a EarlierBoard>,
+        earlier: Option<&'a EarlierBoard>,
         is_by_rank: bool,
     ) -> Self {
         let mut groups: BTreeMap<u32, Vec<&BoardRow>> = BTreeMap::new();
@@ -120,8 +121,8 @@ impl<'a> Context<'a> {
         });
         Self {
             board,
-            before,
-            has_common_setting: common_setting(&board.rows).is_some(),
+            earlier,
+            has_common_conditions: common_conditions(&board.rows).is_some(),
             is_by_rank,
             leaders: leaders.collect(),
         }
@@ -141,12 +142,12 @@ impl<'a> Context<'a> {
     }
 
     fn change(&self, row: &BoardRow) -> Option<RankChange> {
-        let before = self.before?;
-        let Some(previous) = before.rank_of(row.team_id) else {
+        let earlier = self.earlier?;
+        let Some(previous) = earlier.rank_of(row.team_id) else {
             return Some(RankChange {
                 symbol: "new".to_owned(),
                 class: "new",
-                description: format!(": not on the board of {}", before.day),
+                description: format!(": not on the board of {}", earlier.day),
                 score: None,
             });
         };
@@ -166,19 +167,19 @@ impl<'a> Context<'a> {
                 _ => format!("{symbol} {places}"),
             },
             class,
-            description: format!(" {class} since {}", before.day),
+            description: format!(" {class} since {}", earlier.day),
             score: (score != "0.0").then_some(score),
         })
     }
 
     fn team_cell(&self, row: &BoardRow) -> TeamCell {
-        let change = row.tier_change_probability;
+        let tier_change = row.tier_change_probability;
         TeamCell {
             rank: row.rank,
             change: self.change(row),
             tied_with: self.tied_with(row),
-            tier_change: change
-                .filter(|chance| *chance >= MIN_SHOWN_TIER_CHANGE)
+            tier_change: tier_change
+                .filter(|probability| *probability >= MIN_SHOWN_TIER_CHANGE)
                 .map(figures::probability),
             team: row.team.to_string(),
             team_id: row.team_id,
@@ -187,8 +188,8 @@ impl<'a> Context<'a> {
             evaluation: row.evaluation,
             day: row.day,
             extra_evaluation: row.extra_evaluation.clone(),
-            days: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
-            setting: (!self.has_common_setting).then(|| setting(row)),
+            day_count: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
+            conditions: (!self.has_common_conditions).then(|| conditions(row)),
             tier: (!self.is_by_rank).then(|| self.tier(row.tier)),
         }
     }

@@ -33,18 +33,18 @@ impl ColumnHead {
 
 /// Columns of the overall board, or of the board of a task: column, title, unit, CSS class.
 fn columns(task: Option<Task>) -> Vec<(BoardColumn, &'static str, &'static str, &'static str)> {
-    let place = (BoardColumn::Place, "#", "", "rank");
+    let rank = (BoardColumn::Place, "#", "", "rank");
     let team = (BoardColumn::Team, "Team", "", "");
     let points = (BoardColumn::Points, "Penalty", "points", "number");
     match task {
         Some(_) => vec![
-            place,
+            rank,
             team,
             (BoardColumn::Score, "Success", "percent", "number"),
             points,
         ],
         None => vec![
-            place,
+            rank,
             team,
             (BoardColumn::Score, "Score", "percent", "number"),
             (BoardColumn::Task(Task::Hit), "Hit", "success", "number"),
@@ -65,6 +65,7 @@ fn columns(task: Option<Task>) -> Vec<(BoardColumn, &'static str, &'static str, 
     }
 }
 
+/// The sort of a board, with the heads of its columns.
 pub(super) struct Sort {
     key: BoardSort,
     pub(super) heads: Vec<ColumnHead>,
@@ -93,7 +94,7 @@ impl Sort {
         let head = |(column, title, unit, class)| {
             let is_sorted = key.column == column;
             let is_ascending = is_ascending_by_default(column) != key.is_reversed;
-            let next = BoardSort {
+            let sort = BoardSort {
                 column,
                 is_reversed: is_sorted && !key.is_reversed,
             };
@@ -101,7 +102,7 @@ impl Sort {
                 title,
                 unit,
                 class,
-                address: address.with_sort(next),
+                address: address.with_sort(sort),
                 direction: is_sorted.then_some(if is_ascending {
                     "ascending"
                 } else {

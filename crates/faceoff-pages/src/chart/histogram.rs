@@ -1,6 +1,6 @@
-//! Histograms.
+//! Histograms: numbers of values in columns of equal width.
 
-use super::scale::{BOTTOM, GRID, LEFT, RIGHT, Scale, Tick, short};
+use super::scale::{BOTTOM, GRID_INTERVALS, LEFT, RIGHT, Scale, Tick, short};
 use crate::figures;
 
 /// Largest number of labels below the columns; more would overlap on a phone.
@@ -47,7 +47,9 @@ impl Bins {
     pub(crate) fn counts(self, values: &[f64]) -> Vec<usize> {
         let mut counts = vec![0; self.count];
         for value in values {
-            let column = (0..self.count).rev().find(|at| self.start(*at) <= *value);
+            let column = (0..self.count)
+                .rev()
+                .find(|column| self.start(*column) <= *value);
             counts[column.unwrap_or_default()] += 1;
         }
         counts
@@ -70,7 +72,7 @@ impl Bins {
     fn edges(self) -> Vec<Tick> {
         let step = self.count.div_ceil(MAX_LABELS);
         let edges = (0..=self.count).step_by(step).map(|edge| Tick {
-            at: figures::one_decimal(self.x(edge)),
+            position: figures::one_decimal(self.x(edge)),
             label: short(self.start(edge)),
         });
         edges.collect()
@@ -87,7 +89,7 @@ impl Histogram {
         max: usize,
     ) -> Self {
         let scale = Scale {
-            max: f64::from(GRID) * whole_step(max as f64 / f64::from(GRID)),
+            max: f64::from(GRID_INTERVALS) * whole_step(max as f64 / f64::from(GRID_INTERVALS)),
         };
         let filled = || counts.iter().enumerate().filter(|(_, count)| **count > 0);
         let columns = filled().map(|(column, count)| {

@@ -7,17 +7,17 @@ pub(super) const LEFT: f64 = 38.0;
 pub(super) const RIGHT: f64 = 346.0;
 pub(super) const TOP: f64 = 12.0;
 pub(super) const BOTTOM: f64 = 140.0;
-/// Number of intervals on the value axis.
-pub(super) const GRID: u32 = 4;
+/// Number of equal intervals of the value axis.
+pub(super) const GRID_INTERVALS: u32 = 4;
 
-/// A labelled position on an axis.
+/// A labelled position on an axis, in units of the drawing.
 #[derive(Debug)]
 pub(crate) struct Tick {
-    pub(crate) at: String,
+    pub(crate) position: String,
     pub(crate) label: String,
 }
 
-/// Maps a value to a y coordinate.
+/// Maps a value to a y coordinate. The value axis starts at 0.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scale {
     /// Value at the top of the plot.
@@ -32,13 +32,13 @@ impl Scale {
     /// Ticks of the value axis.
     pub(super) fn grid(self) -> Vec<Tick> {
         let line = |part: u32| {
-            let value = self.max * f64::from(part) / f64::from(GRID);
+            let value = self.max * f64::from(part) / f64::from(GRID_INTERVALS);
             Tick {
-                at: figures::one_decimal(self.y(value)),
+                position: figures::one_decimal(self.y(value)),
                 label: short(value),
             }
         };
-        (0..=GRID).map(line).collect()
+        (0..=GRID_INTERVALS).map(line).collect()
     }
 }
 

@@ -1,11 +1,11 @@
-//! The score of a game over time.
+//! A chart of the score of a game over time, with the fouls of both sides.
 
 use super::scale::{BOTTOM, LEFT, RIGHT, Scale, Tick, round_up, without_trailing_zeros};
 use crate::figures;
 use faceoff_replay::model::CONTROL_STEP_S;
 
-/// Distance between the two rows of fouls below the plot.
-const FOUL_ROW: f64 = 16.0;
+/// Height of each of the two rows of foul marks below the plot, in units of the drawing.
+const FOUL_ROW_HEIGHT: f64 = 16.0;
 
 /// Score of both sides over the time of a game, in the form that `chart.html` draws: a step line per side, and marks for fouls.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ impl ScoreChart {
         let x = |step: u32| {
             LEFT + (RIGHT - LEFT) * (f64::from(step) / f64::from(steps.max(1))).clamp(0.0, 1.0)
         };
-        let foul_y = [0.0, 1.0].map(|row| BOTTOM + FOUL_ROW * (0.75 + row));
+        let foul_y = [0.0, 1.0].map(|row| BOTTOM + FOUL_ROW_HEIGHT * (0.75 + row));
         let mut paths = [0, 1].map(|_| {
             format!(
                 "M{} {}",
@@ -66,11 +66,13 @@ impl ScoreChart {
         }
         let minutes = f64::from(steps) * CONTROL_STEP_S / 60.0;
         let ticks = [0.0, 0.5, 1.0].map(|share| Tick {
-            at: figures::one_decimal(LEFT + share * (RIGHT - LEFT)),
+            position: figures::one_decimal(LEFT + share * (RIGHT - LEFT)),
             label: without_trailing_zeros(share * minutes, 1),
         });
         let foul_count = |side: usize| {
-            let fouls = changes.iter().filter(|(_, _, by)| *by == Some(side));
+            let fouls = changes
+                .iter()
+                .filter(|(_, _, foul_by)| *foul_by == Some(side));
             fouls.count()
         };
         Self {

@@ -31,8 +31,8 @@ struct Page {
     teams: [String; 2],
     sides: Vec<Side>,
     /// The nearest episodes of the task that only one team solved.
-    before: Option<u32>,
-    after: Option<u32>,
+    previous_difference: Option<u32>,
+    next_difference: Option<u32>,
     styles: [&'static str; 2],
     script: &'static str,
 }
@@ -61,7 +61,8 @@ pub(crate) async fn page(
         side(&app, &visibility, &view.b, "replay-b", (task, episode)).await?,
     ];
     let solved = view.episodes.as_ref().and_then(|all| all.get(&task));
-    let [before, after] = solved.map_or([None; 2], |solved| differing_neighbours(solved, episode));
+    let [previous_difference, next_difference] =
+        solved.map_or([None; 2], |solved| differing_neighbours(solved, episode));
     let season = SeasonHead::load(&app).await?;
     render(&Page {
         frame: Frame::for_app(&app, season.name, ""),
@@ -71,8 +72,8 @@ pub(crate) async fn page(
         day: view.day,
         teams: [&view.a, &view.b].map(|side| side.team.to_string()),
         sides: sides.into(),
-        before,
-        after,
+        previous_difference,
+        next_difference,
         styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
         script: assets::REPLAY_SCRIPT.url(),
     })

@@ -1,4 +1,4 @@
-//! `/desk/access` and `/organiser/access`: users, invitations, tokens and sessions.
+//! `/dashboard/access` and `/organiser/access`, with the same page for teams and organisers: users, invitations, tokens and sessions.
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
@@ -31,22 +31,28 @@ use jiff::{SignedDuration, Timestamp};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// `base`: path of the dashboard.
-pub(crate) fn router(base: &str) -> Router<App> {
+/// The pages below `dashboard_path`, which is `/dashboard` or `/organiser`.
+pub(crate) fn router(dashboard_path: &str) -> Router<App> {
     Router::new()
-        .route(&format!("{base}/access"), get(page))
-        .route(&format!("{base}/access/tokens"), post(create_token))
+        .route(&format!("{dashboard_path}/access"), get(page))
         .route(
-            &format!("{base}/access/tokens/{{id}}/revoke"),
+            &format!("{dashboard_path}/access/tokens"),
+            post(create_token),
+        )
+        .route(
+            &format!("{dashboard_path}/access/tokens/{{id}}/revoke"),
             post(revoke_token),
         )
-        .route(&format!("{base}/access/invitations"), post(invite))
         .route(
-            &format!("{base}/access/invitations/{{id}}/revoke"),
+            &format!("{dashboard_path}/access/invitations"),
+            post(invite),
+        )
+        .route(
+            &format!("{dashboard_path}/access/invitations/{{id}}/revoke"),
             post(revoke_invitation),
         )
         .route(
-            &format!("{base}/access/people/{{id}}/remove"),
+            &format!("{dashboard_path}/access/people/{{id}}/remove"),
             post(remove_user),
         )
 }
@@ -57,7 +63,7 @@ struct Page {
     frame: Frame,
     head: DashboardHeader,
     /// Path of the page; forms post to paths below it.
-    base: &'static str,
+    path: &'static str,
     is_organiser: bool,
     /// Title and value of a secret, shown only once.
     secret: Option<(String, String)>,
@@ -101,14 +107,14 @@ struct InvitationRow {
     note: String,
     role: String,
     state: String,
-    until: String,
+    valid_until: String,
 }
 
 /// Path of this page for the caller.
-fn base_path(caller: &Caller) -> &'static str {
+fn access_path(caller: &Caller) -> &'static str {
     match caller.is_organiser() {
         true => "/organiser/access",
-        false => "/desk/access",
+        false => "/dashboard/access",
     }
 }
 
@@ -135,12 +141,14 @@ fn token_row(
         (None, None) => "administrator of the host".to_owned(),
     };
     let state = match (token.revoked_at, token.expires_at) {
-        (Some(at), _) => format!("revoked {}", utc_minute(at)),
-        (None, Some(at)) if at <= now => format!("expired {}", utc_minute(at)),
-        (None, Some(at)) => format!("valid until {}", utc_minute(at)),
+        (Some(revoked_at), _) => format!("revoked {}", utc_minute(revoked_at)),
+        (None, Some(expires_at)) if expires_at <= now => {
+            format!("expired {}", utc_minute(expires_at))
+        }
+        (None, Some(expires_at)) => format!("valid until {}", utc_minute(expires_at)),
         (None, None) => "valid, no expiry".to_owned(),
     };
-    let last = token.last_used_at.map(utc_minute);
+    let last_used = token.last_used_at.map(utc_minute);
     TokenRow {
         id: token.id,
         owner,
@@ -149,7 +157,7 @@ fn token_row(
             _ => "token".to_owned(),
         },
         created_at: utc_minute(token.created_at),
-        last_used: last.unwrap_or_else(|| "never".to_owned()),
+        last_used: last_used.unwrap_or_else(|| "never".to_owned()),
         state,
         is_current: token.id == caller.token.id,
         name: token.name,
@@ -175,7 +183,7 @@ fn invitation_row(view: InvitationView, names: &BTreeMap<String, String>) -> Inv
         note: view.note,
         role,
         state: view.state,
-        until: utc_minute(view.expires_at),
+        valid_until: utc_minute(view.expires_at),
     }
 }
 
@@ -187,11 +195,12 @@ async fn page_with(
 ) -> Result<Response, PageProblem> {
     let now = app.config.clock.now();
     let names = event::actor_names(app).await?;
-    let base = base_path(caller);
+    let path = access_path(caller);
     let mut tokens = Vec::new();
     let mut inactive_tokens = Vec::new();
     for token in tokens::tokens(app, caller).await? {
-        let is_active = token.revoked_at.is_none() && token.expires_at.is_none_or(|at| at > now);
+        let is_active = token.revoked_at.is_none()
+            && token.expires_at.is_none_or(|expires_at| expires_at > now);
         let row = token_row(token::view(token), &names, caller, now);
         match is_active {
             true => tokens.push(row),
@@ -202,7 +211,8 @@ async fn page_with(
     let listed = listed
         .into_iter()
         .map(|invitation| invitation_row(invitation::view(invitation, now), &names));
-    let (invitations, closed_invitations) = listed.partition(|one| one.state == "open");
+    let (invitations, closed_invitations) =
+        listed.partition(|invitation| invitation.state == "open");
     let is_organiser = caller.is_organiser();
     let own = caller.user().map(|person| person.id);
     let users = users::list_users(app, caller).await?;
@@ -234,9 +244,9 @@ async fn page_with(
     };
     let season = SeasonHead::load(app).await?.name;
     let page = Page {
-        frame: Frame::for_app(app, season, base),
-        head: DashboardHeader::new(caller, base, notice),
-        base,
+        frame: Frame::for_app(app, season, path),
+        head: DashboardHeader::new(caller, path, notice),
+        path,
         is_organiser,
         users: users.collect(),
         tokens,
@@ -338,7 +348,7 @@ async fn revoke_token(
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
     match tokens::revoke_token(&app, &caller, id).await {
-        Ok(_) => Ok(redirect_done(base_path(&caller), "revoked")),
+        Ok(_) => Ok(redirect_done(access_path(&caller), "revoked")),
         Err(problem) => {
             let state = PageState::default();
             page_with(&app, &caller, Notice::Refused(&problem), state).await
@@ -349,7 +359,7 @@ async fn revoke_token(
 #[derive(Deserialize)]
 struct InvitationForm {
     note: String,
-    /// Only in the form of organisers: `organiser`, `founder`, `member`, `return`.
+    /// Only in the form of organisers: `organiser`, `founder` (first member of a new team), `member`, `return` (password reset).
     #[serde(default)]
     role: String,
     #[serde(default)]
@@ -427,7 +437,7 @@ async fn revoke_invitation(
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
     match invitations::revoke_invitation(&app, &caller, id).await {
-        Ok(_) => Ok(redirect_done(base_path(&caller), "uninvited")),
+        Ok(_) => Ok(redirect_done(access_path(&caller), "uninvited")),
         Err(problem) => {
             let state = PageState::default();
             page_with(&app, &caller, Notice::Refused(&problem), state).await
@@ -450,7 +460,7 @@ async fn remove_user(
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let confirm = Some(form.confirm.trim());
     match users::remove_user(&app, &caller, id, confirm).await {
-        Ok(_) => Ok(redirect_done(base_path(&caller), "removed")),
+        Ok(_) => Ok(redirect_done(access_path(&caller), "removed")),
         Err(problem) => {
             let state = PageState::default();
             page_with(&app, &caller, Notice::Refused(&problem), state).await

@@ -1,4 +1,4 @@
-//! Latest evaluations of a team with datasets, faults and logs.
+//! The latest evaluations of a team, with what only the team sees: dataset, agent faults and log.
 
 use crate::figures::{self, utc_minute};
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView};
@@ -18,7 +18,9 @@ pub(super) struct EvaluationRow {
     pub(super) score: Option<String>,
     /// Episodes done and in total, while the evaluation is not final.
     pub(super) progress: Option<(u32, u32)>,
-    pub(super) next: String,
+    /// What happens next, as a sentence.
+    pub(super) next_step: String,
+    /// Address of the dataset.
     pub(super) dataset: Option<String>,
     /// Agent faults that ended the evaluation.
     pub(super) faults: Vec<String>,
@@ -45,7 +47,8 @@ pub(super) async fn of_team(
 
 fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRow {
     let scored_at = view.status.finished_at();
-    let is_frozen = scored_at.is_some_and(|at| visibility.hiding_freeze(view.stage, at).is_some());
+    let is_frozen = scored_at
+        .is_some_and(|scored_at| visibility.hiding_freeze(view.stage, scored_at).is_some());
     let mut row = EvaluationRow {
         id: view.id,
         day: view.day.to_string(),
@@ -53,18 +56,18 @@ fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRo
         score: None,
         progress: (!view.status.is_final())
             .then_some((view.progress.episodes_done, view.progress.episodes_total)),
-        next: view.next,
+        next_step: view.next,
         dataset: None,
         faults: Vec::new(),
         log: None,
     };
-    let hidden = "finished; the stage is blind";
+    let finished_blind = "finished; the stage is blind";
     row.state = match view.status {
         EvaluationStatus::Queued => "waiting for a free slot".to_owned(),
         EvaluationStatus::Running => "running".to_owned(),
         EvaluationStatus::Finalising => "computing the score".to_owned(),
         EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. } if view.blind => {
-            hidden.to_owned()
+            finished_blind.to_owned()
         }
         EvaluationStatus::Finished { .. } if is_frozen => {
             "finished; the boards of the stage are frozen".to_owned()

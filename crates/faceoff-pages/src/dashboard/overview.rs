@@ -1,4 +1,4 @@
-//! `/desk`: next evaluation, upload, submissions and latest evaluations of a team.
+//! `/dashboard`: next evaluation, upload, submissions and latest evaluations of a team.
 
 use super::evaluations::{self, EvaluationRow};
 use crate::{
@@ -24,7 +24,7 @@ use faceoff_types::EvaluationId;
 use serde::Deserialize;
 
 /// Number of submissions and evaluations in the lists; older submissions are folded.
-const LISTED: usize = 10;
+const MAX_LISTED: usize = 10;
 
 #[derive(Template)]
 #[template(path = "dashboard_overview.html")]
@@ -34,6 +34,7 @@ struct Page {
     me: MeView,
     next_cutoff: Option<String>,
     active: Option<SubmissionRow>,
+    /// Today's evaluation, with what happens next.
     today: Option<(EvaluationId, String)>,
     newest: Vec<SubmissionRow>,
     older: Vec<SubmissionRow>,
@@ -67,21 +68,21 @@ pub(super) async fn page_with(
     let me = me::build(app, team.clone()).await?;
     let submissions = submission::team_submissions(app, team.id).await?;
     let mut newest: Vec<SubmissionRow> = submissions.iter().map(SubmissionRow::from).collect();
-    let older = newest.split_off(newest.len().min(LISTED));
+    let older = newest.split_off(newest.len().min(MAX_LISTED));
     let active = submissions.iter().find(|submission| submission.active);
     let terms = app.store.terms().await.map_err(Problem::from)?;
     let newest_terms = terms.first().map(|terms| terms.version);
     let user = member.caller.user();
     let today = me.today.evaluation.zip(me.today.next.clone());
     let page = Page {
-        frame: Frame::for_app(app, season, "/desk"),
-        head: DashboardHeader::new(&member.caller, "/desk", notice),
+        frame: Frame::for_app(app, season, "/dashboard"),
+        head: DashboardHeader::new(&member.caller, "/dashboard", notice),
         next_cutoff: me.next_cutoff.as_ref().map(ToString::to_string),
         active: active.map(SubmissionRow::from),
         today,
         newest,
         older,
-        evaluations: evaluations::of_team(app, team.id, LISTED).await?,
+        evaluations: evaluations::of_team(app, team.id, MAX_LISTED).await?,
         max_bundle_size: dashboard_frame::bytes(me.max_bundle_bytes),
         terms_to_accept: newest_terms
             .filter(|newest| user.is_some_and(|user| user.accepted_terms != Some(*newest))),
@@ -103,7 +104,7 @@ pub(super) async fn accept_terms(
 ) -> Result<Response, PageProblem> {
     let PageForm(TermsForm { version }) = form?;
     match users::accept_terms(&app, &member.caller, version).await {
-        Ok(_) => Ok(redirect_done("/desk", "terms")),
+        Ok(_) => Ok(redirect_done("/dashboard", "terms")),
         Err(problem) => page_with(&app, &member, Notice::Refused(&problem)).await,
     }
 }

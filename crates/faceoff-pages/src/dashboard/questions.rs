@@ -1,4 +1,4 @@
-//! `/desk/questions`: questions of the team, and published answers.
+//! `/dashboard/questions`: questions of the team, and published answers.
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
@@ -17,7 +17,7 @@ use faceoff_service::{
     views::season::SeasonHead,
 };
 
-const PATH: &str = "/desk/questions";
+const PATH: &str = "/dashboard/questions";
 
 #[derive(Template)]
 #[template(path = "dashboard_questions.html")]
@@ -29,8 +29,8 @@ struct Page {
 }
 
 impl Page {
-    fn at(&self, at: &jiff::Timestamp) -> String {
-        utc_minute(*at)
+    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
+        utc_minute(*instant)
     }
 }
 

@@ -1,4 +1,4 @@
-//! `/desk/submissions/{id}`: validation result, log and actions of a submission.
+//! `/dashboard/submissions/{id}`: validation result, log and actions of a submission.
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
@@ -64,7 +64,7 @@ impl From<&ValidationTiming> for TimingRow {
 }
 
 fn path(id: SubmissionId) -> String {
-    format!("/desk/submissions/{id}")
+    format!("/dashboard/submissions/{id}")
 }
 
 async fn page_with(
@@ -123,7 +123,7 @@ pub(super) async fn activate(
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
     match submissions::activate_submission(&app, &member.team, id).await {
-        Ok(_) => Ok(redirect_done("/desk", "activated")),
+        Ok(_) => Ok(redirect_done("/dashboard", "activated")),
         Err(problem) => page_with(&app, &member, id, Notice::Refused(&problem), None).await,
     }
 }
@@ -136,7 +136,7 @@ pub(super) async fn withdraw(
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
     match submissions::withdraw_submission(&app, &member.team, id).await {
-        Ok(_) => Ok(redirect_done("/desk", "withdrawn")),
+        Ok(_) => Ok(redirect_done("/dashboard", "withdrawn")),
         Err(problem) => page_with(&app, &member, id, Notice::Refused(&problem), None).await,
     }
 }

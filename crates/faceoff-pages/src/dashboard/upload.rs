@@ -1,4 +1,4 @@
-//! `/desk/upload`: a bundle from a form, streamed to disk like uploads through the API.
+//! `/dashboard/upload`: a bundle from a form, streamed to disk like uploads through the API.
 
 use super::overview;
 use crate::{
@@ -46,7 +46,7 @@ pub(super) async fn submit(
 ) -> Result<Response, PageProblem> {
     session::check_same_origin(&headers)?;
     match receive_bundle(&app, &member, &headers, body).await {
-        Ok(_) => Ok(redirect_done("/desk", "uploaded")),
+        Ok(_) => Ok(redirect_done("/dashboard", "uploaded")),
         Err(problem) => overview::page_with(&app, &member, Notice::Refused(&problem)).await,
     }
 }

@@ -1,13 +1,14 @@
-//! The documents that have a page, in order.
+//! The library: the documents of the repository that have a page, in groups and in order.
 
 use super::{
     images,
-    markdown::{self, ContentsEntry, Site},
+    markdown::{self, ContentsEntry, LinkResolver},
     sections::Section,
 };
 use crate::compressed_text::{CompressedText, compressed_text};
 use std::sync::LazyLock;
 
+/// Pages for one kind of readers.
 #[derive(Debug)]
 pub(super) struct Group {
     pub(super) name: &'static str,
@@ -20,7 +21,7 @@ pub(super) struct Page {
     pub(super) name: &'static str,
     pub(super) title: &'static str,
     /// Content of the page in one line.
-    pub(super) about: &'static str,
+    pub(super) summary: &'static str,
     pub(super) html: String,
     pub(super) contents: Vec<ContentsEntry>,
     pub(super) sections: Vec<Section>,
@@ -36,18 +37,19 @@ fn path(name: &str) -> String {
     format!("/docs/{name}")
 }
 
+/// A document before it is rendered.
 struct Source {
     name: &'static str,
-    about: &'static str,
+    summary: &'static str,
     markdown: CompressedText,
 }
 
 /// A file of `docs/`, by its name.
 macro_rules! source {
-    ($name:literal, $about:literal) => {
+    ($name:literal, $summary:literal) => {
         Source {
             name: $name,
-            about: $about,
+            summary: $summary,
             markdown: compressed_text!("docs/", $name, ".md"),
         }
     };
@@ -185,12 +187,16 @@ pub(super) static LIBRARY: LazyLock<Vec<Group>> = LazyLock::new(|| {
 
 fn render(source: &'static Source) -> Page {
     let title = markdown::title(source.markdown.text());
-    let document =
-        markdown::render_document(source.markdown.text(), &path(source.name), title, &DocsSite);
+    let document = markdown::render_document(
+        source.markdown.text(),
+        &path(source.name),
+        title,
+        &LibraryLinks,
+    );
     Page {
         name: source.name,
         title,
-        about: source.about,
+        summary: source.summary,
         html: document.html,
         contents: document.contents,
         sections: document.sections,
@@ -202,9 +208,10 @@ pub(super) fn page(name: &str) -> Option<&'static Page> {
     pages.find(|page| page.name == name)
 }
 
-struct DocsSite;
+/// Links between documents of the library.
+struct LibraryLinks;
 
-impl Site for DocsSite {
+impl LinkResolver for LibraryLinks {
     fn page(&self, file: &str) -> Option<(&str, String)> {
         let name = file.strip_suffix(".md")?;
         let mut sources = SOURCES.iter().flat_map(|(_, sources)| sources.iter());

@@ -24,7 +24,7 @@ pub(super) struct ContentsEntry {
 }
 
 /// Resolves links and pictures of a document.
-pub(super) trait Site {
+pub(super) trait LinkResolver {
     /// Title and path of the page of a Markdown file.
     fn page(&self, file: &str) -> Option<(&str, String)>;
     /// The path of a picture.
@@ -36,11 +36,11 @@ pub(super) fn render_document(
     markdown: &str,
     path: &str,
     title: &str,
-    site: &impl Site,
+    links: &impl LinkResolver,
 ) -> Document {
     let options = Options::ENABLE_TABLES | Options::ENABLE_FOOTNOTES;
     let mut writer = Writer {
-        site,
+        links,
         out: Vec::new(),
         ids: HashSet::new(),
         contents: Vec::new(),
@@ -119,7 +119,7 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 struct Writer<'a, S> {
-    site: &'a S,
+    links: &'a S,
     out: Vec<Event<'a>>,
     ids: HashSet<String>,
     contents: Vec<ContentsEntry>,
@@ -135,7 +135,7 @@ struct Writer<'a, S> {
     link_ends: Vec<String>,
 }
 
-impl<'a, S: Site> Writer<'a, S> {
+impl<'a, S: LinkResolver> Writer<'a, S> {
     fn html(&mut self, html: impl Into<String>) {
         self.out.push(Event::Html(CowStr::from(html.into())));
     }
@@ -241,7 +241,7 @@ impl<'a, S: Site> Writer<'a, S> {
         let shown = plain_text(&inner);
         self.sections.push_text(&shown);
         let alt = escape(&shown);
-        match self.site.picture(file) {
+        match self.links.picture(file) {
             Some(path) => self.html(format!(
                 "<img src=\"{}\" alt=\"{alt}\" loading=\"lazy\">",
                 escape(&path)
@@ -261,11 +261,11 @@ impl<'a, S: Site> Writer<'a, S> {
         let inner = take_until(&Event::End(TagEnd::Link), rest);
         let shown = plain_text(&inner);
         self.sections.push_text(if shown == file {
-            self.site.page(file).map_or(file, |(title, _)| title)
+            self.links.page(file).map_or(file, |(title, _)| title)
         } else {
             &shown
         });
-        match self.site.page(file) {
+        match self.links.page(file) {
             Some((title, path)) => {
                 let anchor = anchor
                     .map(|anchor| format!("#{anchor}"))

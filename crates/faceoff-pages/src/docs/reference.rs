@@ -1,21 +1,21 @@
 //! The API reference, from the OpenAPI document of the server.
 
-mod shape;
+mod type_description;
 
 use super::{
     markdown::{self, Prose},
     sections::Section,
 };
 use serde_json::{Map, Value};
-pub(super) use shape::{Field, Part};
-use shape::{about, fields, shape};
+pub(super) use type_description::{Field, TypePart};
+use type_description::{describe_type, description, fields};
 
 pub(super) const PATH: &str = "/docs/api-reference";
 const SCHEMAS_PATH: &str = "/docs/api-reference/schemas";
 
 #[derive(Debug)]
 pub(super) struct Reference {
-    pub(super) about: Prose,
+    pub(super) description: Prose,
     pub(super) groups: Vec<Group>,
     pub(super) schemas: Vec<Schema>,
     /// Responses shared by many operations, by name.
@@ -24,11 +24,11 @@ pub(super) struct Reference {
     pub(super) tokens: Vec<(String, Prose)>,
 }
 
-/// Operations of a tag.
+/// The operations of a topic, an OpenAPI tag.
 #[derive(Debug)]
 pub(super) struct Group {
     pub(super) name: String,
-    pub(super) about: Prose,
+    pub(super) description: Prose,
     pub(super) operations: Vec<Operation>,
 }
 
@@ -38,17 +38,18 @@ pub(super) struct Operation {
     pub(super) method: String,
     pub(super) path: String,
     pub(super) summary: Prose,
-    pub(super) about: Prose,
-    pub(super) tokens: Tokens,
+    pub(super) description: Prose,
+    pub(super) token: TokenRequirement,
     pub(super) parameters: Vec<Parameter>,
     pub(super) body: Option<Body>,
     pub(super) responses: Vec<ResponseDoc>,
     /// Shared responses: status, and name in [`Reference::responses`].
-    pub(super) shared: Vec<(String, String)>,
+    pub(super) shared_responses: Vec<(String, String)>,
 }
 
+/// Does an operation need a token? With the names of the accepted kinds of tokens.
 #[derive(Debug)]
-pub(super) enum Tokens {
+pub(super) enum TokenRequirement {
     None,
     Optional(String),
     Required(String),
@@ -64,7 +65,7 @@ pub(super) struct Parameter {
 #[derive(Debug)]
 pub(super) struct Body {
     pub(super) is_required: bool,
-    pub(super) about: Prose,
+    pub(super) description: Prose,
     pub(super) media: Vec<Media>,
 }
 
@@ -72,7 +73,7 @@ pub(super) struct Body {
 pub(super) struct ResponseDoc {
     /// The status; the name of a shared response.
     pub(super) name: String,
-    pub(super) about: Prose,
+    pub(super) description: Prose,
     pub(super) media: Vec<Media>,
     pub(super) headers: Vec<String>,
 }
@@ -81,14 +82,14 @@ pub(super) struct ResponseDoc {
 #[derive(Debug)]
 pub(super) struct Media {
     pub(super) name: String,
-    pub(super) shape: Vec<Part>,
+    pub(super) type_parts: Vec<TypePart>,
 }
 
 /// A named type.
 #[derive(Debug)]
 pub(super) struct Schema {
     pub(super) name: String,
-    pub(super) about: Prose,
+    pub(super) description: Prose,
     pub(super) variants: Vec<Variant>,
 }
 
@@ -96,8 +97,8 @@ pub(super) struct Schema {
 #[derive(Debug)]
 pub(super) struct Variant {
     /// Empty for a single variant; the description is that of the schema.
-    pub(super) about: Prose,
-    pub(super) shape: Vec<Part>,
+    pub(super) description: Prose,
+    pub(super) type_parts: Vec<TypePart>,
     pub(super) fields: Vec<Field>,
 }
 
@@ -130,7 +131,7 @@ impl Reference {
             let name = text(&tag["name"]);
             Group {
                 operations: operations(document, &name),
-                about: markdown::render_prose(&text(&tag["description"])),
+                description: markdown::render_prose(&text(&tag["description"])),
                 name,
             }
         });
@@ -142,7 +143,7 @@ impl Reference {
             )
         });
         Self {
-            about: markdown::render_prose(&text(&document["info"]["description"])),
+            description: markdown::render_prose(&text(&document["info"]["description"])),
             groups: groups.collect(),
             schemas: entries(&components["schemas"])
                 .map(|(name, schema)| Schema::new(name, schema))
@@ -191,14 +192,14 @@ impl Operation {
             location: text(&parameter["in"]),
             field: Field {
                 name: text(&parameter["name"]),
-                shape: shape(&parameter["schema"]),
+                type_parts: describe_type(&parameter["schema"]),
                 is_required: parameter["required"] == true,
-                about: about(parameter),
+                description: description(parameter),
             },
         });
         let body = operation.get("requestBody").map(|body| Body {
             is_required: body["required"] == true,
-            about: about(body),
+            description: description(body),
             media: media(body),
         });
         let (shared, own): (Vec<_>, Vec<_>) = entries(&operation["responses"])
@@ -214,19 +215,20 @@ impl Operation {
             method: method.to_uppercase(),
             path: path.to_owned(),
             summary: markdown::render_prose(&text(&operation["summary"])),
-            about: about(operation),
-            tokens: Tokens::new(&operation["security"]),
+            description: description(operation),
+            token: TokenRequirement::new(&operation["security"]),
             parameters: parameters.collect(),
             body,
             responses: responses.collect(),
-            shared: shared.collect(),
+            shared_responses: shared.collect(),
         }
     }
 
     fn search_text(&self) -> String {
         let parameters = self.parameters.iter().map(|parameter| &parameter.field);
-        let parameters = parameters.map(|field| format!("{}: {}", field.name, field.about.plain));
-        let texts = [&self.summary, &self.about].map(|prose| prose.plain.clone());
+        let parameters =
+            parameters.map(|field| format!("{}: {}", field.name, field.description.plain));
+        let texts = [&self.summary, &self.description].map(|prose| prose.plain.clone());
         let texts = texts.into_iter().chain(parameters);
         texts.collect::<Vec<_>>().join(" ")
     }
@@ -237,14 +239,14 @@ impl ResponseDoc {
         let headers = entries(&response["headers"]).map(|(name, _)| name.clone());
         Self {
             name: name.to_owned(),
-            about: about(response),
+            description: description(response),
             media: media(response),
             headers: headers.collect(),
         }
     }
 }
 
-impl Tokens {
+impl TokenRequirement {
     /// From OpenAPI security requirements: `[{}, {"team": []}]` is an optional token.
     fn new(security: &Value) -> Self {
         let names: Vec<&str> = list(security)
@@ -262,26 +264,26 @@ impl Tokens {
 
 impl Schema {
     fn new(name: &str, schema: &Value) -> Self {
-        let forms = list(&schema["oneOf"]).map(|form| Variant {
-            about: about(form),
-            ..Variant::new(form)
+        let variants = list(&schema["oneOf"]).map(|variant| Variant {
+            description: description(variant),
+            ..Variant::new(variant)
         });
-        let mut variants: Vec<Variant> = forms.collect();
+        let mut variants: Vec<Variant> = variants.collect();
         if variants.is_empty() {
             variants.push(Variant::new(schema));
         }
         Self {
             name: name.to_owned(),
-            about: about(schema),
+            description: description(schema),
             variants,
         }
     }
 
     fn search_text(&self) -> String {
         let fields = self.variants.iter().flat_map(|variant| &variant.fields);
-        let fields = fields.map(|field| format!("{}: {}", field.name, field.about.plain));
-        let about = std::iter::once(self.about.plain.clone());
-        about.chain(fields).collect::<Vec<_>>().join(" ")
+        let fields = fields.map(|field| format!("{}: {}", field.name, field.description.plain));
+        let description = std::iter::once(self.description.plain.clone());
+        description.chain(fields).collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -289,10 +291,10 @@ impl Variant {
     fn new(schema: &Value) -> Self {
         let fields = fields(schema);
         Self {
-            about: Prose::default(),
+            description: Prose::default(),
             // Fields are shown in a table instead.
-            shape: if fields.is_empty() {
-                shape(schema)
+            type_parts: if fields.is_empty() {
+                describe_type(schema)
             } else {
                 Vec::new()
             },
@@ -305,7 +307,7 @@ impl Variant {
 fn media(body: &Value) -> Vec<Media> {
     let media = entries(&body["content"]).map(|(name, content)| Media {
         name: name.clone(),
-        shape: shape(&content["schema"]),
+        type_parts: describe_type(&content["schema"]),
     });
     media.collect()
 }

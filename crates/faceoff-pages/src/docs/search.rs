@@ -110,13 +110,13 @@ impl IndexedSection {
 }
 
 /// A range of whole words around a byte position.
-fn snippet_range(text: &str, at: usize) -> Range<usize> {
-    let from = text.floor_char_boundary(at.saturating_sub(SNIPPET_BYTES));
-    let start = match text[from..at].find(' ') {
+fn snippet_range(text: &str, position: usize) -> Range<usize> {
+    let from = text.floor_char_boundary(position.saturating_sub(SNIPPET_BYTES));
+    let start = match text[from..position].find(' ') {
         Some(space) if from > 0 => from + space + 1,
         _ => from,
     };
-    let to = text.ceil_char_boundary((at + SNIPPET_BYTES).min(text.len()));
+    let to = text.ceil_char_boundary((position + SNIPPET_BYTES).min(text.len()));
     let end = text[to..].find(' ').map_or(text.len(), |space| to + space);
     // Limits the range even if a single word is very long.
     start..end.min(text.ceil_char_boundary((to + SNIPPET_BYTES).min(text.len())))
@@ -125,6 +125,7 @@ fn snippet_range(text: &str, at: usize) -> Range<usize> {
 /// Splits `text` at matches of the words; `lower` is the same text in lower case.
 fn pieces(text: &str, lower: &str, words: &[&str]) -> Vec<Piece> {
     let mut pieces = Vec::new();
+    // Up to here the text is split.
     let mut done = 0;
     let mut push = |range: Range<usize>, is_match| {
         if !range.is_empty() {
@@ -133,14 +134,14 @@ fn pieces(text: &str, lower: &str, words: &[&str]) -> Vec<Piece> {
         }
     };
     // The nearest match next; the longest word if several start there.
-    while let Some((at, Reverse(length))) = words
+    while let Some((start, Reverse(length))) = words
         .iter()
         .filter_map(|word| Some((done + lower[done..].find(word)?, Reverse(word.len()))))
         .min()
     {
-        push(done..at, false);
-        push(at..at + length, true);
-        done = at + length;
+        push(done..start, false);
+        push(start..start + length, true);
+        done = start + length;
     }
     push(done..text.len(), false);
     pieces

@@ -5,8 +5,10 @@ use pulldown_cmark::{Event, TagEnd};
 /// Text below a heading of the second or third level, or before the first one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Section {
+    /// Title of the page.
     pub(super) page: String,
     pub(super) heading: String,
+    /// Path of the page with the anchor of the heading.
     pub(super) href: String,
     /// The text in one line.
     pub(super) text: String,

@@ -11,7 +11,9 @@ use faceoff_types::Task;
 /// Start positions of the puck in the episodes of a task: solved ones as dots, others as crosses.
 pub(super) struct StartMap {
     pub(super) task: Task,
+    /// SVG path of the dots.
     pub(super) solved: String,
+    /// SVG path of the crosses.
     pub(super) failed: String,
     pub(super) solved_count: usize,
     pub(super) failed_count: usize,
@@ -23,6 +25,7 @@ pub(super) struct StartMap {
 pub(super) struct SuccessTable {
     pub(super) id: String,
     pub(super) caption: &'static str,
+    /// Name of the value, for the head of the first column.
     pub(super) value: &'static str,
     pub(super) rows: Vec<SuccessRow>,
 }
@@ -101,17 +104,17 @@ fn success_by(
     }
     classes
         .into_iter()
-        .map(|from| {
+        .map(|class_number| {
             let inside: Vec<_> = lines
                 .iter()
-                .filter(|line| class(line).total_cmp(&from).is_eq())
+                .filter(|line| class(line).total_cmp(&class_number).is_eq())
                 .collect();
             let solved = inside.iter().filter(|line| line.success).count();
             SuccessRow {
                 range: format!(
                     "{} … {} {unit}",
-                    figures::signed(from * width).trim_start_matches('+'),
-                    figures::signed((from + 1.0) * width).trim_start_matches('+'),
+                    figures::signed(class_number * width).trim_start_matches('+'),
+                    figures::signed((class_number + 1.0) * width).trim_start_matches('+'),
                 ),
                 solved,
                 total: inside.len(),
@@ -131,7 +134,9 @@ pub(super) struct ViolationMap {
 /// Episodes whose first violation of a joint limit was at this joint.
 pub(super) struct Joint {
     pub(super) joint: u32,
+    /// Violations of the position limit.
     pub(super) position: usize,
+    /// Violations of the velocity limit.
     pub(super) velocity: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Slow answers of an evaluation that cost penalty points.
+//! Slow answers of an evaluation: answers of the agent that came too late and cost penalty points.
 
 use crate::figures;
 use faceoff_api::views::{
@@ -36,9 +36,11 @@ pub(super) struct SlowAnswer {
 
 pub(super) struct SlowStepFigures {
     pub(super) step: u32,
+    /// Time from the observation to the answer.
     pub(super) wall_ms: String,
+    /// Part of it that the host machine caused.
     pub(super) host_ms: String,
-    /// `None` if the host did not measure it.
+    /// CPU time of the agent; `None` if the host did not measure it.
     pub(super) cpu_ms: Option<String>,
 }
 
@@ -51,8 +53,10 @@ impl SlowAnswers {
         view: &EvaluationView,
         result: &ResultView,
     ) -> Result<Self, Problem> {
-        let has_slow_answers =
-            |task: &TaskView| task.violations.is_some_and(|v| v.computation_time > 0);
+        let has_slow_answers = |task: &TaskView| {
+            task.violations
+                .is_some_and(|violations| violations.computation_time > 0)
+        };
         if !result.tasks.values().any(has_slow_answers) {
             return Ok(Self::default());
         }
@@ -80,7 +84,7 @@ impl SlowAnswers {
     }
 
     fn worst(violations: ViolationsView) -> Self {
-        let mut slow: Vec<(Task, SlowEpisode)> = violations
+        let mut episodes: Vec<(Task, SlowEpisode)> = violations
             .tasks
             .into_iter()
             .flat_map(|(task, violations)| {
@@ -88,13 +92,13 @@ impl SlowAnswers {
                 episodes.map(move |episode| (task, episode))
             })
             .collect();
-        slow.sort_by(|(_, a), (_, b)| {
+        episodes.sort_by(|(_, a), (_, b)| {
             let by_points = b.points.total_cmp(&a.points);
             by_points.then_with(|| b.max_s.total_cmp(&a.max_s))
         });
         Self {
-            episodes: slow.len(),
-            shown: slow
+            episodes: episodes.len(),
+            shown: episodes
                 .into_iter()
                 .take(Self::MAX_ROWS)
                 .map(|(task, episode)| SlowAnswer::new(task, &episode))

@@ -19,13 +19,14 @@ pub(super) struct Possession {
     pub(super) untouched: String,
 }
 
+/// Shots of a side: touches after which the puck crosses the middle before any mallet touches it again.
 pub(super) struct Shots {
     pub(super) team: String,
     pub(super) count: usize,
     pub(super) goals: usize,
     /// m/s; `None` without shots.
-    pub(super) mean: Option<String>,
-    pub(super) fastest: Option<String>,
+    pub(super) mean_speed: Option<String>,
+    pub(super) fastest_speed: Option<String>,
     /// Marks of shots that led to a goal, and of other shots.
     pub(super) scored: String,
     pub(super) others: String,
@@ -33,7 +34,7 @@ pub(super) struct Shots {
 }
 
 pub(super) struct ShotRow {
-    pub(super) at: String,
+    pub(super) time: String,
     /// The replay two seconds earlier.
     pub(super) link: String,
     pub(super) position: String,
@@ -57,7 +58,7 @@ pub(super) struct Violations {
 }
 
 pub(super) struct ViolationRow {
-    pub(super) at: String,
+    pub(super) time: String,
     pub(super) link: String,
     pub(super) limit: &'static str,
     pub(super) duration_s: String,
@@ -66,7 +67,7 @@ pub(super) struct ViolationRow {
 }
 
 /// Width of a column of the histogram, m/s.
-const SPEED_STEP: f64 = 0.5;
+const SPEED_COLUMN_M_S: f64 = 0.5;
 /// Largest number of rows of a table: a robot that oscillates at a limit violates it thousands of times.
 const MAX_ROWS: usize = 500;
 
@@ -97,8 +98,9 @@ impl Shots {
             team: team.to_owned(),
             count: shots.len(),
             goals: shots.iter().filter(|shot| shot.goal).count(),
-            mean: fastest.map(|_| figures::one_decimal(speeds().sum::<f64>() / f64::from(count))),
-            fastest: fastest.map(figures::one_decimal),
+            mean_speed: fastest
+                .map(|_| figures::one_decimal(speeds().sum::<f64>() / f64::from(count))),
+            fastest_speed: fastest.map(figures::one_decimal),
             scored: table_drawing::dots(&positions(true)),
             others: table_drawing::crosses(&positions(false)),
             rows: shots.iter().take(MAX_ROWS).map(ShotRow::new).collect(),
@@ -115,7 +117,7 @@ impl Speeds {
         });
         let all = || speeds.iter().flatten().copied();
         all().next()?;
-        let bins = Bins::for_all(SPEED_STEP, all());
+        let bins = Bins::for_all(SPEED_COLUMN_M_S, all());
         let counts = speeds.each_ref().map(|speeds| bins.counts(speeds));
         let most = counts.iter().flatten().copied().max().unwrap_or_default();
         let in_column = |column: usize| counts.each_ref().map(|counts| counts[column]);
@@ -134,7 +136,7 @@ impl Speeds {
 impl ShotRow {
     fn new(shot: &Shot) -> Self {
         Self {
-            at: game_clock(step(shot.t)),
+            time: game_clock(step(shot.t)),
             link: replay_link(step(shot.t)),
             position: position_text(shot.at),
             speed: figures::one_decimal(shot.speed),
@@ -162,7 +164,7 @@ impl Violations {
                 .iter()
                 .take(MAX_ROWS)
                 .map(|violation| ViolationRow {
-                    at: game_clock(violation.from),
+                    time: game_clock(violation.from),
                     link: replay_link(violation.from),
                     limit: group_label(violation.group),
                     duration_s: format!(
@@ -195,6 +197,6 @@ fn position_text([x, y]: Position) -> String {
     clippy::cast_sign_loss,
     reason = "the time is within a game"
 )]
-fn step(t: f64) -> u32 {
-    (t / CONTROL_STEP_S).round() as u32
+fn step(seconds: f64) -> u32 {
+    (seconds / CONTROL_STEP_S).round() as u32
 }

@@ -1,4 +1,4 @@
-//! A running game.
+//! The live view of a running game: score, clock, positions and events.
 
 use crate::{figures, table_drawing::Dot};
 use faceoff_replay::model::CONTROL_STEP_S;
@@ -7,6 +7,7 @@ use faceoff_types::{GameEvent, Side};
 use jiff::{SignedDuration, Timestamp};
 
 pub(super) struct LiveGame {
+    /// Of the home side, then of the away side, as all pairs here.
     pub(super) score: [u32; 2],
     pub(super) fouls: [u32; 2],
     pub(super) played_min: String,
@@ -19,8 +20,14 @@ pub(super) struct LiveGame {
     pub(super) events: Vec<(String, String)>,
 }
 
-/// Control steps before the pace can be estimated.
+/// Control steps before the pace can be estimated: 10 s of the game.
 const MIN_STEPS_FOR_PACE: u32 = 500;
+
+/// Positions of puck, home mallet and away mallet that are drawn before the first position is known.
+const START_POSITIONS: [[f64; 2]; 3] = [[0.0, 0.0], [-0.8, 0.0], [0.8, 0.0]];
+
+/// Control steps in two seconds.
+const REPLAY_LEAD_STEPS: u32 = 100;
 
 impl LiveGame {
     pub(super) fn new(
@@ -33,13 +40,11 @@ impl LiveGame {
         let minutes = |steps: u32| figures::one_decimal(f64::from(steps) * CONTROL_STEP_S / 60.0);
         let last = live.events.last().map_or(0, |last| last.step);
         let step = state.position.map_or(last, |position| position.step);
-        let places = state
-            .position
-            .map_or([[0.0; 2], [-0.8, 0.0], [0.8, 0.0]], |position| {
-                let [x, y, _] = position.puck;
-                [[x, y], position.mallets[0], position.mallets[1]]
-            });
-        let [puck, home, away] = places.map(Dot::at);
+        let positions = state.position.map_or(START_POSITIONS, |position| {
+            let [x, y, _] = position.puck;
+            [[x, y], position.mallets[0], position.mallets[1]]
+        });
+        let [puck, home, away] = positions.map(Dot::at);
         let events = live.events.iter().rev();
         Self {
             score: state.score,
@@ -72,8 +77,8 @@ fn expected_at(since: Timestamp, now: Timestamp, step: u32, steps: u32) -> Optio
         return None;
     }
     let elapsed = now.duration_since(since).as_secs_f64();
-    let left = elapsed * f64::from(steps.saturating_sub(step)) / f64::from(step);
-    now.checked_add(SignedDuration::try_from_secs_f64(left).ok()?)
+    let remaining_s = elapsed * f64::from(steps.saturating_sub(step)) / f64::from(step);
+    now.checked_add(SignedDuration::try_from_secs_f64(remaining_s).ok()?)
         .ok()
 }
 
@@ -86,7 +91,7 @@ pub(super) fn game_clock(step: u32) -> String {
 
 /// Address fragment that opens the replay two seconds before a control step.
 pub(super) fn replay_link(step: u32) -> String {
-    format!("#t={}", step.saturating_sub(100))
+    format!("#t={}", step.saturating_sub(REPLAY_LEAD_STEPS))
 }
 
 /// Text of an event; `None` for events that are not listed.
@@ -126,8 +131,8 @@ mod tests {
     fn expected_end_follows_the_pace() {
         let since: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
         let now: Timestamp = "2026-03-01T10:01:00Z".parse().unwrap();
-        let at: Timestamp = "2026-03-01T10:04:00Z".parse().unwrap();
-        assert_eq!(expected_at(since, now, 1000, 4000), Some(at));
+        let end: Timestamp = "2026-03-01T10:04:00Z".parse().unwrap();
+        assert_eq!(expected_at(since, now, 1000, 4000), Some(end));
         assert_eq!(expected_at(since, now, 10, 4000), None);
     }
 }

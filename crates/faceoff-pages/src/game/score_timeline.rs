@@ -1,4 +1,5 @@
-//! Course of a game: a chart of the score over time, the same as a table, and the paths of the puck into the goals.
+//! Course of a game. A game consists of rallies; a rally ends with a goal, with a foul, or without a result, such as with a stuck puck.
+//! The page shows a chart of the score over time, the ends of rallies as a table, and the paths of the puck into the goals.
 
 use super::live::{game_clock, replay_link};
 use crate::{chart::ScoreChart, table_drawing::path};
@@ -15,7 +16,7 @@ pub(super) struct ScoreTimeline {
 
 /// The end of a rally.
 pub(super) struct Row {
-    pub(super) at: String,
+    pub(super) time: String,
     /// The replay two seconds earlier.
     pub(super) link: String,
     pub(super) event: &'static str,
@@ -36,7 +37,7 @@ impl ScoreTimeline {
             .iter()
             .filter(|end| end.what != RallyEndKind::GameOver)
             .map(|end| Row {
-                at: game_clock(end.sample),
+                time: game_clock(end.sample),
                 link: replay_link(end.sample),
                 event: end_label(end.what),
                 team: match end.by {
@@ -54,7 +55,7 @@ impl ScoreTimeline {
                     let foul_by = (end.what == RallyEndKind::Foul)
                         .then_some(end.by)
                         .flatten()
-                        .map(|by| usize::from(by == 1));
+                        .map(|side| usize::from(side == 1));
                     (end.sample, end.score, foul_by)
                 }),
                 teams,

@@ -58,8 +58,8 @@ struct StageSummary {
     next_cutoff: Option<String>,
 }
 
-/// Use of the storage quota from which a team is listed, in percent.
-const NEARLY_FULL: u64 = 90;
+/// A team is listed if it uses at least this share of its upload quota, in percent.
+const NEARLY_FULL_PERCENT: u64 = 90;
 
 async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem> {
     let mut items = Vec::new();
@@ -105,16 +105,18 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
     }
-    for trouble in workers.problems {
+    for problem in workers.problems {
         items.push(Item {
             class: "bad",
             title: "Problem with remote workers".to_owned(),
-            detail: format!("{trouble}. The server keeps retrying."),
+            detail: format!("{problem}. The server keeps retrying."),
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
     }
     for team in storage::all(app).await? {
-        if team.bundle_bytes.saturating_mul(100) >= team.quota_bytes.saturating_mul(NEARLY_FULL) {
+        if team.bundle_bytes.saturating_mul(100)
+            >= team.quota_bytes.saturating_mul(NEARLY_FULL_PERCENT)
+        {
             items.push(Item {
                 class: "waiting",
                 title: format!("{} has used up most of its upload quota", team.team_name),
@@ -216,16 +218,16 @@ async fn stage_items(app: &App, stage: Stage) -> Result<(Vec<Item>, StageSummary
     let phase = stage.phase(now);
     let mut items = Vec::new();
     if phase == StagePhase::Open && app.store.archived_season().is_none() {
-        for load in capacity::build(app, stage.id).await?.days {
-            let (class, title) = match load.fit {
+        for forecast in capacity::build(app, stage.id).await?.days {
+            let (class, title) = match forecast.fit {
                 Fit::Not => ("bad", "does not fit before its deadline"),
                 Fit::Unknown => ("waiting", "may not fit before its deadline"),
                 Fit::Probably | Fit::Surely => continue,
             };
             items.push(Item {
                 class,
-                title: format!("Evaluation day {} of {} {title}", load.day, stage.name),
-                detail: load.summary,
+                title: format!("Evaluation day {} of {} {title}", forecast.day, stage.name),
+                detail: forecast.summary,
                 links: vec![(
                     format!("/organiser/stages/{}", stage.id),
                     "Stage settings".into(),

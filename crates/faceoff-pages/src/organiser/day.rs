@@ -1,4 +1,5 @@
-//! `/organiser/day`: an evaluation day of a stage: cutoff, load, evaluations and decisions.
+//! `/organiser/day`: an evaluation day of a stage, on which each team's active submission is evaluated once: cutoff (the moment at which
+//! submissions are frozen), expected duration, evaluations and decisions.
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice},
@@ -37,7 +38,8 @@ struct Page {
     cutoff_at: Option<String>,
     deadline_at: Option<String>,
     released_at: Option<String>,
-    missed: Option<String>,
+    /// Why the day was missed and evaluated later; `None` if it was not missed.
+    missed_reason: Option<String>,
     next_cutoff: Option<String>,
     /// May an organiser start today's evaluation?
     can_start: bool,
@@ -48,8 +50,10 @@ struct Page {
     slots: u32,
     /// Running and queued jobs, if known.
     queue: Option<(u32, u32)>,
-    load: Option<String>,
+    /// Estimate of when the day's evaluations end, as a sentence.
+    capacity_forecast: Option<String>,
     rows: Vec<Row>,
+    /// Number of evaluations that have ended.
     done: usize,
     /// Teams without an evaluation, with the reason.
     excluded: Vec<(TeamId, TeamName, String)>,
@@ -65,7 +69,7 @@ struct Row {
     detail: Option<String>,
     /// Episodes done and in total.
     progress: Option<(u32, u32)>,
-    expected: Option<String>,
+    expected_end: Option<String>,
     score: Option<String>,
     can_cancel: bool,
     can_void: bool,
@@ -100,8 +104,8 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         view.status,
         EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. }
     );
-    let counts = has_verdict && view.voided.is_none();
-    let expected = view.queue.and_then(|queue| queue.expected_at);
+    let is_counted = has_verdict && view.voided.is_none();
+    let expected_end = view.queue.and_then(|queue| queue.expected_at);
     let voided = view.voided.map(|ruling| ruling.reason);
     let extra = view
         .extra_evaluation
@@ -116,11 +120,11 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         detail,
         progress: (!is_final)
             .then_some((view.progress.episodes_done, view.progress.episodes_total)),
-        expected: expected.map(utc_minute),
+        expected_end: expected_end.map(utc_minute),
         score,
         can_cancel: !is_final,
-        can_void: counts,
-        can_rerun: is_final && !counts && !replaced.contains(&view.id),
+        can_void: is_counted,
+        can_rerun: is_final && !is_counted && !replaced.contains(&view.id),
     }
 }
 
@@ -132,7 +136,7 @@ pub(super) struct Query {
     done: Option<String>,
 }
 
-/// Without a query: the latest day of the open stage.
+/// The page of a day; without a query, of the latest day of the open stage.
 pub(super) async fn page(
     user: PageOrganiser,
     State(app): State<App>,
@@ -146,8 +150,8 @@ pub(super) async fn page(
         None => stage::current(&app).await?,
     };
     let today = stage.day(now);
-    let all = store.days().await.map_err(Problem::from)?;
-    let mut days: Vec<_> = all.into_iter().map(|(day, _)| day).collect();
+    let all_days = store.days().await.map_err(Problem::from)?;
+    let mut days: Vec<_> = all_days.into_iter().map(|(day, _)| day).collect();
     days.retain(|day| day.stage_day.stage == stage.id);
     let newest = days.iter().map(|day| day.stage_day.date).max();
     let date = query.day.or(newest).unwrap_or(today.date);
@@ -167,8 +171,8 @@ pub(super) async fn page(
         .into_iter()
         .map(|evaluation| row(evaluation, &replaced))
         .collect();
-    let without = view.without_submission.into_iter();
-    let mut excluded: Vec<_> = without
+    let without_submission = view.without_submission.into_iter();
+    let mut excluded: Vec<_> = without_submission
         .filter(|team| team.retired_at.is_none() && team.disqualified.is_none())
         .map(|team| (team.id, team.name, "no valid submission".to_owned()))
         .collect();
@@ -177,15 +181,15 @@ pub(super) async fn page(
         excluded_teams.map(|exclusion| (exclusion.team, exclusion.team_name, exclusion.reason)),
     );
     let is_archive = store.archived_season().is_some();
-    let load = match is_archive {
+    let forecast = match is_archive {
         true => None,
         false => {
-            let loads = capacity::build(&app, stage.id).await?.days;
-            loads.into_iter().find(|load| load.day == date)
+            let forecasts = capacity::build(&app, stage.id).await?.days;
+            forecasts.into_iter().find(|forecast| forecast.day == date)
         }
     };
     let health = health::check(&app).await.ok();
-    let missed = store.missed_days().await.map_err(Problem::from)?;
+    let missed_days = store.missed_days().await.map_err(Problem::from)?;
     let mut dates: Vec<Date> = days.iter().map(|day| day.stage_day.date).collect();
     dates.sort_unstable_by(|a, b| b.cmp(a));
     let is_open = stage.phase(now) == StagePhase::Open;
@@ -204,7 +208,7 @@ pub(super) async fn page(
         cutoff_at: day.map(|day| utc_minute(day.cutoff_at)),
         deadline_at: day.and_then(|day| day.deadline_at).map(utc_minute),
         released_at: day.and_then(|day| day.released_at).map(utc_minute),
-        missed: missed
+        missed_reason: missed_days
             .into_iter()
             .find_map(|(day, reason)| (day == stage_day).then_some(reason)),
         next_cutoff: day::next_cutoff(&app, &stage)
@@ -216,7 +220,7 @@ pub(super) async fn page(
         paused: season.paused,
         slots: queue::slots(&app),
         queue: health.map(|health| (health.running, health.waiting)),
-        load: load.map(|load| load.summary),
+        capacity_forecast: forecast.map(|forecast| forecast.summary),
         done: rows.iter().filter(|row| !row.can_cancel).count(),
         can_void: rows.iter().any(|row| row.can_void || row.can_cancel),
         rows,

@@ -44,7 +44,7 @@ async fn page_with(
     render_dashboard(&page, notice)
 }
 
-/// What it would do.
+/// The preview of a decision, with its form.
 pub(super) async fn page(
     user: PageOrganiser,
     State(app): State<App>,

@@ -53,8 +53,8 @@ struct FormValues {
 }
 
 impl Page {
-    fn at(&self, at: &jiff::Timestamp) -> String {
-        utc_minute(*at)
+    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
+        utc_minute(*instant)
     }
 
     fn team(&self, question: &QuestionView) -> &str {

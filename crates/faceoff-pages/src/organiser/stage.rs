@@ -38,8 +38,8 @@ struct Page {
 }
 
 impl Page {
-    fn at(&self, at: &jiff::Timestamp) -> String {
-        utc_minute(*at)
+    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
+        utc_minute(*instant)
     }
 }
 

@@ -20,16 +20,21 @@ pub(super) struct StageForm {
     pub(super) closes_at: String,
     pub(super) zone: String,
     pub(super) profile: String,
+    /// Checkboxes: empty if not ticked, as `blind`.
     pub(super) task_hit: String,
     pub(super) task_defend: String,
     pub(super) task_prepare: String,
     pub(super) episodes_per_task: String,
     pub(super) max_faults: String,
-    /// A time, a cron expression of five fields, or empty.
+    /// Daily cutoff: a time, a cron expression of five fields, or empty if an organiser starts each day.
     pub(super) schedule: String,
+    /// Dates without an evaluation, separated by spaces or commas.
     pub(super) days_off: String,
+    /// `next-cut` (the next cutoff), `never`, or hours such as `30h`.
     pub(super) day_deadline: String,
+    /// Which result of a team counts: `latest`, `best`, `final` or `mean_of_last:5`.
     pub(super) standings: String,
+    /// When datasets become public: `never`, `at_close` or `at_release`.
     pub(super) publishes: String,
     pub(super) blind: String,
     pub(super) ablation_episodes: String,
@@ -38,10 +43,11 @@ pub(super) struct StageForm {
 }
 
 /// A time in the format of an input `datetime-local`.
-fn datetime_local(at: Timestamp) -> String {
-    at.strftime("%Y-%m-%dT%H:%M").to_string()
+fn datetime_local(instant: Timestamp) -> String {
+    instant.strftime("%Y-%m-%dT%H:%M").to_string()
 }
 
+/// Value that a browser sends for a ticked checkbox.
 const TICKED: &str = "on";
 
 fn checkbox_value(is_ticked: bool) -> String {
@@ -60,10 +66,12 @@ fn parse_time(field: &str, text: &str) -> Result<Option<Timestamp>, Problem> {
     if text.is_empty() {
         return Ok(None);
     }
-    let at: DateTime = text.parse().map_err(|error| invalid_field(field, error))?;
-    let at = at.to_zoned(TimeZone::UTC);
+    let local: DateTime = text.parse().map_err(|error| invalid_field(field, error))?;
+    let zoned = local.to_zoned(TimeZone::UTC);
     Ok(Some(
-        at.map_err(|error| invalid_field(field, error))?.timestamp(),
+        zoned
+            .map_err(|error| invalid_field(field, error))?
+            .timestamp(),
     ))
 }
 
@@ -78,7 +86,7 @@ impl StageForm {
         let (rules, settings) = (&stage.rules.rules, &stage.settings);
         let schedule = serde_json::to_value(&settings.schedule).unwrap_or_default();
         let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-        let at = match &schedule["daily"] {
+        let time_or_cron = match &schedule["daily"] {
             Value::String(daily) => daily.strip_suffix(":00").unwrap_or(daily).to_owned(),
             _ => text(&schedule["cron"]),
         };
@@ -96,7 +104,7 @@ impl StageForm {
             task_prepare: task_checkbox(Task::Prepare),
             episodes_per_task: rules.episodes_per_task.to_string(),
             max_faults: rules.max_faults.to_string(),
-            schedule: at,
+            schedule: time_or_cron,
             days_off: days_off.unwrap_or_default(),
             day_deadline: settings.day_deadline.to_string(),
             standings: settings.standings.to_string(),
@@ -122,13 +130,15 @@ impl StageForm {
     }
 
     fn tasks(&self) -> Vec<Task> {
-        let ticks = [
+        let checkboxes = [
             (Task::Hit, &self.task_hit),
             (Task::Defend, &self.task_defend),
             (Task::Prepare, &self.task_prepare),
         ];
-        let ticks = ticks.into_iter().filter(|(_, tick)| !tick.is_empty());
-        ticks.map(|(task, _)| task).collect()
+        let ticked = checkboxes
+            .into_iter()
+            .filter(|(_, value)| !value.is_empty());
+        ticked.map(|(task, _)| task).collect()
     }
 
     fn profile(&self) -> Result<Profile, Problem> {
@@ -145,18 +155,18 @@ impl StageForm {
     }
 
     fn schedule(&self) -> Result<Option<Schedule>, Problem> {
-        let at = self.schedule.trim();
-        if at.is_empty() {
+        let time_or_cron = self.schedule.trim();
+        if time_or_cron.is_empty() {
             return Ok(None);
         }
-        let kind = if at.contains(' ') || at.starts_with('@') {
+        let kind = if time_or_cron.contains(' ') || time_or_cron.starts_with('@') {
             "cron"
         } else {
             "daily"
         };
         let dates = self.days_off.split([' ', ',', '\n', '\r']);
         let dates: Vec<&str> = dates.filter(|date| !date.is_empty()).collect();
-        let fields = json!({ kind: at, "days_off": dates });
+        let fields = json!({ kind: time_or_cron, "days_off": dates });
         let parsed = serde_json::from_value(fields);
         parsed
             .map(Some)

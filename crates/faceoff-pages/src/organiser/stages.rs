@@ -41,8 +41,8 @@ impl Page {
         board_status::phase_label(stage.phase, stage.finalised.is_some())
     }
 
-    fn at(&self, at: &jiff::Timestamp) -> String {
-        utc_minute(*at)
+    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
+        utc_minute(*instant)
     }
 }
 

@@ -24,7 +24,7 @@ struct Page {
     min_free: String,
     is_short: bool,
     teams: Vec<StorageView>,
-    /// Stages with their retention rule.
+    /// Stages with their *retention*: which files the server keeps, and for how long.
     stages: Vec<(StageId, StageName, String)>,
 }
 
@@ -32,7 +32,7 @@ struct Page {
 struct Disk {
     free: String,
     size: String,
-    used: u64,
+    used_percent: u64,
 }
 
 impl Page {
@@ -49,7 +49,7 @@ pub(super) async fn page(
     let disks = space.disks().into_iter().flatten().map(|disk| Disk {
         free: dashboard_frame::bytes(disk.free_bytes),
         size: dashboard_frame::bytes(disk.size_bytes),
-        used: 100
+        used_percent: 100
             - (100 * disk.free_bytes)
                 .checked_div(disk.size_bytes)
                 .unwrap_or(100)

@@ -31,15 +31,15 @@ struct Page {
     frame: Frame,
     head: DashboardHeader,
     teams: Vec<TeamView>,
-    waiting: Vec<RegistrationView>,
+    pending: Vec<RegistrationView>,
     decided: Vec<RegistrationView>,
     divisions: Vec<DivisionName>,
     season: SeasonForm,
 }
 
 impl Page {
-    fn at(&self, at: &jiff::Timestamp) -> String {
-        utc_minute(*at)
+    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
+        utc_minute(*instant)
     }
 }
 
@@ -53,7 +53,7 @@ async fn page_with(
 ) -> Result<Response, PageProblem> {
     let registrations = app.store.registrations().await.map_err(Problem::from)?;
     let registrations = registrations.into_iter().map(invitation::registration);
-    let (waiting, decided) =
+    let (pending, decided) =
         registrations.partition(|registration| registration.state == "waiting");
     let divisions = app.store.divisions().await.map_err(Problem::from)?;
     let season = app.store.season().await.map_err(Problem::from)?;
@@ -73,7 +73,7 @@ async fn page_with(
         frame: Frame::for_app(app, name, PATH),
         head: DashboardHeader::new(&user.caller, PATH, notice),
         teams: team::all(app).await?,
-        waiting,
+        pending,
         decided,
         divisions,
         season: form,

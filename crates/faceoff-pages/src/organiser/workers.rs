@@ -1,4 +1,5 @@
-//! `/organiser/workers`: local slots, remote workers and bans.
+//! `/organiser/workers`: *slots* of this server, each of which runs one job at a time, *remote workers*, which run jobs on other
+//! machines, and banned workers.
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice},
@@ -36,8 +37,8 @@ impl Page {
         }
     }
 
-    fn minute(&self, at: &Timestamp) -> String {
-        at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+    fn timestamp(&self, instant: &Timestamp) -> String {
+        instant.strftime("%Y-%m-%d %H:%M UTC").to_string()
     }
 }
 

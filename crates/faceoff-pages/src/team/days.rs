@@ -1,7 +1,7 @@
 //! Results of a team by day: the latest result, charts, and violations.
 
 use crate::{
-    chart::{Bound, DayValue, Panel},
+    chart::{Bound, DayChart, DayValue},
     figures::{self, Rate},
 };
 use faceoff_api::views::history::HistoryRow;
@@ -83,7 +83,7 @@ fn points_per_episode(row: &HistoryRow) -> f64 {
 }
 
 /// Charts of score, penalty points and the success rate of each task, over the same days.
-pub(super) fn panels(rows: &[HistoryRow], variation: &Variation) -> Vec<Panel> {
+pub(super) fn charts(rows: &[HistoryRow], variation: &Variation) -> Vec<DayChart> {
     let day_value = |row: &HistoryRow, value, interval| DayValue {
         day: row.day,
         value,
@@ -107,9 +107,9 @@ pub(super) fn panels(rows: &[HistoryRow], variation: &Variation) -> Vec<Panel> {
             value: variation.tier_bounds.improvable().as_f64(),
         },
     ];
-    let mut panels = vec![
-        Panel::from_percent("Score", &score),
-        Panel::from_zero(
+    let mut charts = vec![
+        DayChart::from_percent("Score", &score),
+        DayChart::from_zero(
             "Penalty points",
             "per episode, the worst task",
             &points,
@@ -128,10 +128,10 @@ pub(super) fn panels(rows: &[HistoryRow], variation: &Variation) -> Vec<Panel> {
         });
         let rates: Vec<_> = rates.collect();
         if !rates.is_empty() {
-            panels.push(Panel::from_percent(title, &rates));
+            charts.push(DayChart::from_percent(title, &rates));
         }
     }
-    panels
+    charts
 }
 
 /// Episodes of a task with violations, over all released days.

@@ -88,7 +88,7 @@ impl Cell {
             label,
             symbol,
             class: if game.withdrawn_team.is_some() {
-                "out"
+                "excluded"
             } else {
                 class
             },

@@ -12,7 +12,7 @@ pub(super) struct Entrant {
     pub(super) team_id: TeamId,
     pub(super) entered_at: String,
     /// Since when and why the team is out of the tournament.
-    pub(super) left: Option<String>,
+    pub(super) departure: Option<String>,
     pub(super) submissions: Vec<RoundsSubmission>,
 }
 
@@ -40,19 +40,19 @@ pub(super) async fn entrants(
                 agent: agent.map(|name| faceoff_types::escape_unprintable(&name).into_owned()),
             });
         }
-        let left = entrant.departure.as_ref().map(|departure| {
-            let how = standings::left_label(departure.r#as);
+        let departure = entrant.departure.as_ref().map(|departure| {
+            let kind = standings::departure_label(departure.r#as);
             let from = departure.from_round;
             match spoilers.hides_results() {
-                true => format!("{how} from round {from}"),
-                false => format!("{how} from round {from}: {}", departure.reason),
+                true => format!("{kind} from round {from}"),
+                false => format!("{kind} from round {from}: {}", departure.reason),
             }
         });
         entrants.push(Entrant {
             team: entrant.team_name.clone(),
             team_id: entrant.team,
             entered_at: utc_minute(entrant.entered_at),
-            left,
+            departure,
             submissions,
         });
     }

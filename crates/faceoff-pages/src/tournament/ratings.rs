@@ -1,4 +1,5 @@
-//! Ratings of the submissions, independent of the standings.
+//! Ratings of the submissions: estimates of their strength from all games, independent of the standings. A *pool* is a set of submissions
+//! that games connect, directly or through others.
 
 use faceoff_scoring::tournament::rating::{Pool, Ratings};
 use faceoff_types::TeamName;
@@ -24,7 +25,7 @@ pub(super) struct Row {
 /// Tables by results and by goals; several of each if no chain of games connects all submissions.
 pub(super) fn tables(ratings: &Ratings, rounds: &BTreeMap<String, String>) -> Vec<RatingTable> {
     let mut tables = Vec::new();
-    for (by, basis, pools) in [
+    for (key, basis, pools) in [
         (
             "results",
             "results; a draw is half a win for each team",
@@ -35,12 +36,12 @@ pub(super) fn tables(ratings: &Ratings, rounds: &BTreeMap<String, String>) -> Ve
         for (number, pool) in (1..).zip(pools) {
             let pool_note = match pools.len() {
                 1 => String::new(),
-                many => format!(
-                    " Pool {number} of {many}: no games between the pools, so their ratings cannot be compared."
+                count => format!(
+                    " Pool {number} of {count}: no games between the pools, so their ratings cannot be compared."
                 ),
             };
             tables.push(RatingTable {
-                id: format!("ratings-by-{by}-{number}"),
+                id: format!("ratings-by-{key}-{number}"),
                 caption: format!("By {basis}.{pool_note}"),
                 rows: rows(pool, rounds),
             });

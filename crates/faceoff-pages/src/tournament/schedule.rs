@@ -11,9 +11,12 @@ pub(super) struct Round {
     pub(super) is_hidden: bool,
     /// In the order of play.
     pub(super) games: Vec<GameRow>,
+    /// Teams without an opponent on a matchday.
     pub(super) byes: Vec<(u32, TeamName)>,
+    /// Teams of each group; empty without a group stage.
     pub(super) groups: Vec<Vec<TeamName>>,
-    pub(super) has_halves: bool,
+    /// Does each pairing play a mirrored pair of games?
+    pub(super) has_mirrored_pairs: bool,
 }
 
 impl Round {
@@ -35,7 +38,7 @@ impl Round {
                 .map(|bye| (bye.matchday, bye.team_name.clone()))
                 .collect(),
             groups: round.groups.clone(),
-            has_halves: view.rules.mirrored,
+            has_mirrored_pairs: view.rules.mirrored,
         };
         if is_hidden {
             shown.games.clear();
@@ -57,14 +60,14 @@ fn progress_text(round: &RoundView) -> String {
         "{} of {} games played",
         progress.played, progress.games
     )];
-    for (count, words) in [
+    for (count, label) in [
         (progress.running, "running"),
         (progress.queued, "queued"),
         (progress.to_be_rerun, "void or failed, to be played again"),
         (progress.cancelled, "not played"),
     ] {
         if count > 0 {
-            parts.push(format!("{count} {words}"));
+            parts.push(format!("{count} {label}"));
         }
     }
     let end = match round.ended_at {

@@ -21,20 +21,24 @@ pub(super) struct Row {
     pub(super) team: TeamName,
     pub(super) team_id: TeamId,
     pub(super) points: u32,
+    /// Points of each round.
     pub(super) per_round: Vec<u32>,
     pub(super) wins: u32,
     pub(super) draws: u32,
     pub(super) losses: u32,
+    /// Matchdays without an opponent.
     pub(super) byes: u32,
+    /// Scored and conceded.
     pub(super) goals: [u64; 2],
     pub(super) difference: String,
     pub(super) penalty_points: String,
-    pub(super) left: Option<&'static str>,
+    /// How the team left the tournament, if it did.
+    pub(super) departure: Option<&'static str>,
 }
 
 /// Title of a table.
-pub(super) fn title(of: TableScope) -> String {
-    match of {
+pub(super) fn title(scope: TableScope) -> String {
+    match scope {
         TableScope::Tournament => "Standings".to_owned(),
         TableScope::Group(number) => format!("Group {number}"),
         TableScope::Final => "Final round".to_owned(),
@@ -60,7 +64,7 @@ impl Standings {
                     goals: [standing.goals_for, standing.goals_against],
                     difference: difference(standing.goals_for, standing.goals_against),
                     penalty_points: figures::one_decimal(standing.penalty_points),
-                    left: standing.departure.map(left_label),
+                    departure: standing.departure.map(departure_label),
                 })
             })
             .collect::<Result<_, Problem>>()?;
@@ -81,8 +85,8 @@ impl Standings {
     }
 }
 
-pub(super) const fn left_label(left_as: DepartureKind) -> &'static str {
-    match left_as {
+pub(super) const fn departure_label(kind: DepartureKind) -> &'static str {
+    match kind {
         DepartureKind::Withdrawn => "withdrawn",
         DepartureKind::Disqualified => "disqualified",
     }

@@ -1,4 +1,4 @@
-//! The evaluations of a day as CSV.
+//! The evaluations of a day in the season archive, as CSV: one line per team, with its results in all tasks.
 
 use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
@@ -8,6 +8,7 @@ use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::Task;
 use std::collections::BTreeMap;
 
+/// Columns of each task; the table prefixes them with the task's name.
 const TASK_COLUMNS: [&str; 7] = [
     "episodes",
     "successes",
@@ -18,8 +19,8 @@ const TASK_COLUMNS: [&str; 7] = [
     "tier",
 ];
 
-/// These columns, followed by those of all tasks.
-fn with_tasks(columns: &[&str]) -> Vec<String> {
+/// `columns`, followed by [`TASK_COLUMNS`] of each task.
+fn columns_with_tasks(columns: &[&str]) -> Vec<String> {
     let mut all: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in Task::ALL {
         all.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
@@ -27,6 +28,7 @@ fn with_tasks(columns: &[&str]) -> Vec<String> {
     all
 }
 
+/// The values of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
 fn task_fields(tasks: Option<&BTreeMap<Task, TaskView>>) -> impl Iterator<Item = String> + '_ {
     Task::ALL
         .into_iter()
@@ -46,7 +48,7 @@ fn task_fields(tasks: Option<&BTreeMap<Task, TaskView>>) -> impl Iterator<Item =
 
 /// A table with one line per evaluation.
 pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
-    let columns = with_tasks(&[
+    let columns = columns_with_tasks(&[
         "evaluation",
         "team",
         "team_id",

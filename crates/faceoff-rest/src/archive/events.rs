@@ -1,4 +1,4 @@
-//! The event log of an archive.
+//! The event log in the season archive.
 
 use super::files::Files;
 use faceoff_service::{
@@ -9,6 +9,7 @@ use faceoff_service::{
 };
 use tokio::io::{AsyncWriteExt, BufWriter};
 
+/// Events that are read from the database at once.
 const PAGE_EVENTS: u32 = 1000;
 
 /// Writes all events of the snapshot, one per line, oldest first. Only one page of them is in memory at a time.

@@ -1,4 +1,4 @@
-//! The files of an archive while it is prepared.
+//! The files of a season archive while it is prepared.
 
 use faceoff_archive::Entry;
 use faceoff_service::{free_space, problem::Problem};
@@ -8,11 +8,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Entries of the manifest, and the paths of their contents.
+/// The files of an archive: their entries in its manifest, and the local files with their contents.
 pub(super) struct Files {
+    /// Where new files are created.
     folder: PathBuf,
     entries: Vec<Entry>,
-    paths: Vec<PathBuf>,
+    /// Path of the local file of each entry.
+    local_paths: Vec<PathBuf>,
 }
 
 impl Files {
@@ -21,17 +23,18 @@ impl Files {
         Self {
             folder: folder.to_owned(),
             entries: Vec::new(),
-            paths: Vec::new(),
+            local_paths: Vec::new(),
         }
     }
 
+    /// Writes a new file, and adds it to the archive as `path`.
     pub(super) async fn put(&mut self, path: &str, content: Vec<u8>) -> Result<(), Problem> {
-        let source = self.new_path();
+        let local_path = self.new_path();
         let (bytes, blake3) = (content.len() as u64, blake3::hash(&content).to_string());
-        tokio::fs::write(&source, content)
+        tokio::fs::write(&local_path, content)
             .await
             .map_err(free_space::write_problem)?;
-        self.add_hashed(path, source, bytes, blake3);
+        self.add_hashed(path, local_path, bytes, blake3);
         Ok(())
     }
 
@@ -50,25 +53,32 @@ impl Files {
         self.folder.join(format!("file-{}", self.entries.len()))
     }
 
-    /// Adds an existing file, which is read for its hash.
-    pub(super) async fn add(&mut self, path: &str, source: PathBuf) -> Result<(), Problem> {
-        let (bytes, blake3) = hash(source.clone()).await?;
-        self.add_hashed(path, source, bytes, blake3);
+    /// Adds an existing local file to the archive as `path`, after reading it for its hash.
+    pub(super) async fn add(&mut self, path: &str, local_path: PathBuf) -> Result<(), Problem> {
+        let (bytes, blake3) = hash(local_path.clone()).await?;
+        self.add_hashed(path, local_path, bytes, blake3);
         Ok(())
     }
 
-    /// Adds an existing file with its known hash.
-    pub(super) fn add_hashed(&mut self, path: &str, source: PathBuf, bytes: u64, blake3: String) {
+    /// Adds an existing local file, whose length and hash are known, to the archive as `path`.
+    pub(super) fn add_hashed(
+        &mut self,
+        path: &str,
+        local_path: PathBuf,
+        bytes: u64,
+        blake3: String,
+    ) {
         self.entries.push(Entry {
             path: path.to_owned(),
             bytes,
             blake3,
         });
-        self.paths.push(source);
+        self.local_paths.push(local_path);
     }
 
+    /// The entries of the manifest, and the path of the local file of each.
     pub(super) fn into_parts(self) -> (Vec<Entry>, Vec<PathBuf>) {
-        (self.entries, self.paths)
+        (self.entries, self.local_paths)
     }
 }
 

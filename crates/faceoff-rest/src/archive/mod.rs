@@ -1,5 +1,6 @@
-//! The season archive, made while the server is running: a snapshot of the database, reduced to what the edition
-//! contains; the responses of the API as files; and the artifacts, which are read while the archive is sent.
+//! The season archive, made while the server is running. It contains a snapshot of the database, reduced to what its edition
+//! (public or the organisers') may contain; responses of the API as files; and artifacts, which are stored files such as
+//! datasets. Artifacts are read only while the archive is sent.
 
 use faceoff_archive::{Edition, FORMAT, Manifest};
 use faceoff_scoring::EpisodeSummary;
@@ -25,22 +26,22 @@ mod files;
 mod results;
 mod send;
 
-/// Program and version in the manifest.
+/// Program and version that made the archive, for its manifest (the list of its files).
 const PROGRAM: &str = concat!("faceoff ", env!("CARGO_PKG_VERSION"));
 
 /// File name of the database in an archive.
 const DATABASE: &str = "database.sqlite3";
 
-/// A prepared archive that only has to be written.
-pub(crate) struct Prepared {
+/// A prepared archive, whose files are known and hashed, and only have to be sent.
+pub(crate) struct PreparedArchive {
     pub(crate) manifest: Manifest,
-    /// Current path of each file in the manifest, in its order.
-    paths: Vec<PathBuf>,
-    /// Folder of the files that are not artifacts. Removed on drop; after a crash, at the next start with all uploads.
+    /// Local path of each file in the manifest, in its order.
+    local_paths: Vec<PathBuf>,
+    /// Folder of the files that are not artifacts. It is removed on drop; after a crash, at the server's next start.
     _folder: TempDir,
 }
 
-impl Prepared {
+impl PreparedArchive {
     /// File name of the download.
     pub(crate) fn file_name(&self) -> String {
         format!(
@@ -52,7 +53,7 @@ impl Prepared {
     }
 }
 
-/// The edition in the store's type.
+/// The edition as the store's type of the same name.
 pub(crate) const fn store_edition(edition: Edition) -> faceoff_store::Edition {
     match edition {
         Edition::Public => faceoff_store::Edition::Public,
@@ -64,7 +65,7 @@ pub(crate) const fn store_edition(edition: Edition) -> faceoff_store::Edition {
 ///
 /// # Errors
 /// `StorageFull`; `Conflict` if an organiser's archive is requested from a public one.
-pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Problem> {
+pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchive, Problem> {
     free_space::check(app)?;
     let folder = tempfile::Builder::new()
         .prefix("archive-")
@@ -90,15 +91,15 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
         )
         .await?;
 
-    let frozen = snapshot_app(app, &snapshot, archived.made_at);
+    let snapshot_state = snapshot_app(app, &snapshot, archived.made_at);
     let viewer = match edition {
         Edition::Public => Viewer::Visitor,
         Edition::Organiser => Viewer::Organiser,
     };
-    let mut artifacts = results::collect(&frozen, viewer, &mut files).await?;
-    results::put_questions(&frozen, edition, &mut files).await?;
-    events::put(&frozen, &mut files).await?;
-    drop(frozen);
+    let mut artifacts = results::collect(&snapshot_state, viewer, &mut files).await?;
+    results::put_questions(&snapshot_state, edition, &mut files).await?;
+    events::put(&snapshot_state, &mut files).await?;
+    drop(snapshot_state);
 
     let mut left_out = Vec::new();
     if snapshot.under_way > 0 {
@@ -128,7 +129,7 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
     files.add(DATABASE, database).await?;
     results::add_artifacts(app, artifacts, &mut files, &mut left_out).await?;
 
-    let (entries, paths) = files.into_parts();
+    let (entries, local_paths) = files.into_parts();
     let manifest = Manifest {
         format: FORMAT,
         program: PROGRAM.to_owned(),
@@ -138,11 +139,11 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
         left_out,
         files: entries,
     };
-    // Checked before the response begins, which could only break off afterwards.
+    // The check comes before the response begins: after that, an error could only break the response off.
     manifest.check().map_err(Problem::internal)?;
-    Ok(Prepared {
+    Ok(PreparedArchive {
         manifest,
-        paths,
+        local_paths,
         _folder: folder,
     })
 }

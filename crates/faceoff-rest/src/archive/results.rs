@@ -1,4 +1,5 @@
-//! The results of a season as JSON and CSV: stages, boards, days, tournaments, teams and announcements.
+//! The results of a season in its archive, as JSON and CSV: stages, boards, days, tournaments, teams and announcements; and
+//! the table of the archive's artifacts, which are stored files such as datasets.
 
 use super::{
     day_csv,
@@ -26,10 +27,13 @@ use std::collections::BTreeMap;
 
 /// An artifact of the archive, and its line in `datasets.csv`.
 pub(super) struct ArtifactRow {
+    /// Key of the artifact in the store.
     key: String,
     /// `None` for datasets of older versions.
     blake3: Option<String>,
+    /// Kind of the resource that the artifact belongs to: evaluation, submission, proposal or game.
     kind: &'static str,
+    /// Id of that resource.
     id: String,
     team: String,
     stage: String,
@@ -58,7 +62,7 @@ impl ArtifactRow {
     }
 }
 
-/// A name as part of a path.
+/// A name as part of a path: lower-case letters, digits and hyphens, 60 characters at most.
 pub(super) fn slug(name: &str) -> String {
     let chars = name.chars().map(|c| match c {
         c if c.is_ascii_alphanumeric() => c.to_ascii_lowercase(),
@@ -96,20 +100,21 @@ pub(super) async fn collect(
     let mut artifacts = Vec::new();
     for (number, stage) in app.store.stages().await?.into_iter().enumerate() {
         let folder = format!("results/{}-{}", number + 1, slug(stage.name.as_str()));
-        boards(app, &visibility, &stage, &folder, files).await?;
+        put_boards(app, &visibility, &stage, &folder, files).await?;
         for (day, _) in app.store.days().await? {
             if day.stage_day.stage == stage.id && day.released_at.is_some() {
-                add_day(app, &visibility, day.stage_day, &folder, files).await?;
-                artifacts.extend(datasets(app, &visibility, viewer, &stage, day.stage_day).await?);
+                put_day(app, &visibility, day.stage_day, &folder, files).await?;
+                artifacts
+                    .extend(day_datasets(app, &visibility, viewer, &stage, day.stage_day).await?);
             }
         }
     }
-    tournaments(app, viewer, files).await?;
+    put_tournaments(app, viewer, files).await?;
     Ok(artifacts)
 }
 
-/// Tournaments with their games, as the viewer may see them.
-async fn tournaments(app: &AppState, viewer: Viewer, files: &mut Files) -> Result<(), Problem> {
+/// Adds all tournaments with their games, as the viewer may see them.
+async fn put_tournaments(app: &AppState, viewer: Viewer, files: &mut Files) -> Result<(), Problem> {
     for tournament in app.store.tournaments().await? {
         let name = slug(tournament.name.as_str());
         let folder = format!("results/tournament-{}-{name}", tournament.number);
@@ -126,8 +131,8 @@ async fn tournaments(app: &AppState, viewer: Viewer, files: &mut Files) -> Resul
     Ok(())
 }
 
-/// A stage, and a board for each revision of its rules with rows.
-async fn boards(
+/// Adds a stage with its newest board, and the boards of earlier revisions of its rules, if they have rows.
+async fn put_boards(
     app: &AppState,
     visibility: &Visibility,
     stage: &Stage,
@@ -175,7 +180,8 @@ async fn boards(
     Ok(())
 }
 
-async fn add_day(
+/// Adds the evaluations of a day.
+async fn put_day(
     app: &AppState,
     visibility: &Visibility,
     stage_day: StageDay,
@@ -193,7 +199,7 @@ async fn add_day(
 }
 
 /// The datasets of a day that the viewer may download.
-async fn datasets(
+async fn day_datasets(
     app: &AppState,
     visibility: &Visibility,
     viewer: Viewer,
@@ -228,23 +234,23 @@ async fn datasets(
     Ok(found)
 }
 
-/// Questions with their answers: public ones, and in the organiser's edition all. The public database does not contain
-/// them, because a question there has a team.
+/// Adds the questions with their answers: the organiser's edition contains all, the public one those with a public answer.
+/// The database of the public edition has no questions, because each row names the asking team.
 pub(super) async fn put_questions(
     app: &AppState,
     edition: Edition,
     files: &mut Files,
 ) -> Result<(), Problem> {
-    let is_organisers = edition == Edition::Organiser;
+    let is_organiser_edition = edition == Edition::Organiser;
     let questions = app.store.questions().await?.into_iter();
-    let shown: Vec<QuestionView> = questions
-        .map(|question| announcement::question(question, is_organisers))
-        .filter(|question| question.public || is_organisers)
+    let included: Vec<QuestionView> = questions
+        .map(|question| announcement::question(question, is_organiser_edition))
+        .filter(|question| question.public || is_organiser_edition)
         .collect();
-    files.put_json("results/questions.json", &shown).await
+    files.put_json("results/questions.json", &included).await
 }
 
-/// Adds the artifacts and the table of them. Artifacts that no longer exist are listed in `left_out`.
+/// Adds the artifacts, and `datasets.csv`, the table of them. Artifacts that no longer exist are listed in `left_out`.
 pub(super) async fn add_artifacts(
     app: &AppState,
     artifacts: Vec<ArtifactRow>,
@@ -254,6 +260,7 @@ pub(super) async fn add_artifacts(
     let mut table = csv::Table::new(&[
         "path", "of", "id", "team", "stage", "day", "public", "bytes", "blake3",
     ]);
+    // Local path, length and hash of each file, by its path in the archive.
     let mut sources = BTreeMap::new();
     for artifact in artifacts {
         let path = format!("artifacts/{}", artifact.key);
@@ -280,15 +287,16 @@ pub(super) async fn add_artifacts(
             bytes.to_string(),
             blake3.clone(),
         ]);
-        // Clips are added if they exist.
-        let clips = match artifact.key.strip_suffix("/game.zip") {
+        // The clips of the recording (data for the replay viewer) are added if they exist.
+        let clips_key = match artifact.key.strip_suffix("/game.zip") {
             Some(folder) => format!("{folder}/clips"),
             None => Artifacts::clips_key(&artifact.key),
         };
-        if app.store.artifacts().size_bytes(&clips).await?.is_some() {
-            let source = app.store.artifacts().local_path(&clips)?;
+        let clips_bytes = app.store.artifacts().size_bytes(&clips_key).await?;
+        if clips_bytes.is_some() {
+            let source = app.store.artifacts().local_path(&clips_key)?;
             let (bytes, blake3) = files::hash(source.clone()).await?;
-            sources.insert(format!("artifacts/{clips}"), (source, bytes, blake3));
+            sources.insert(format!("artifacts/{clips_key}"), (source, bytes, blake3));
         }
         sources.insert(path, (source, bytes, blake3));
     }

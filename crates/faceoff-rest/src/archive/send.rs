@@ -1,6 +1,6 @@
-//! Sending an archive: a separate thread writes it, a few chunks ahead of the reader.
+//! Sending a season archive. A separate thread writes it, a few chunks ahead of the client that downloads it.
 
-use super::Prepared;
+use super::PreparedArchive;
 use axum::body::{Body, Bytes};
 use faceoff_archive::{ArchiveError, Writer};
 use std::{
@@ -9,15 +9,15 @@ use std::{
 };
 use tokio::sync::{OwnedSemaphorePermit, mpsc};
 
-/// Length of a chunk.
+/// Length of a chunk of the response.
 const CHUNK_BYTES: usize = 256 << 10;
-/// Chunks that wait for the reader.
-const MAX_BUFFERED: usize = 4;
+/// Chunks that may wait for the client; the thread waits while there are so many.
+const MAX_BUFFERED_CHUNKS: usize = 4;
 
-/// The archive as the body of a response. If a file has changed, the body breaks off, so that it cannot be mistaken for
-/// a complete archive. Writing stops when the client disconnects.
-pub(crate) fn send(prepared: Prepared, permit: OwnedSemaphorePermit) -> Body {
-    let (chunks, received) = mpsc::channel(MAX_BUFFERED);
+/// The archive as the body of a response. If a file has changed since the archive was prepared, the body breaks off, so that
+/// the client cannot mistake it for a complete archive. Writing stops when the client disconnects.
+pub(crate) fn send(prepared: PreparedArchive, permit: OwnedSemaphorePermit) -> Body {
+    let (chunks, received) = mpsc::channel(MAX_BUFFERED_CHUNKS);
     tokio::task::spawn_blocking(move || {
         // The next archive may begin once the files of this one are removed.
         let (_permit, prepared) = (permit, prepared);
@@ -44,9 +44,9 @@ pub(crate) fn send(prepared: Prepared, permit: OwnedSemaphorePermit) -> Body {
     }))
 }
 
-fn write(prepared: &Prepared, sink: &mut ChunkWriter) -> Result<(), ArchiveError> {
+fn write(prepared: &PreparedArchive, sink: &mut ChunkWriter) -> Result<(), ArchiveError> {
     let mut writer = Writer::begin(&mut *sink, &prepared.manifest)?;
-    for path in &prepared.paths {
+    for path in &prepared.local_paths {
         writer.next(|_| Ok(BufReader::with_capacity(CHUNK_BYTES, File::open(path)?)))?;
     }
     writer.finish()?;
@@ -54,7 +54,7 @@ fn write(prepared: &Prepared, sink: &mut ChunkWriter) -> Result<(), ArchiveError
     Ok(())
 }
 
-/// Collects written bytes into chunks and sends them to the reader.
+/// Collects written bytes into chunks and sends them to the client.
 struct ChunkWriter {
     chunks: mpsc::Sender<io::Result<Bytes>>,
     buffer: Vec<u8>,

@@ -1,4 +1,4 @@
-//! Old names of response fields in the document: optional and deprecated, with the schema of the new name.
+//! Old names of response fields in the OpenAPI document. Each is optional and deprecated, with the schema of the new name.
 
 use faceoff_api::views::{
     attempt::GameAttemptView,
@@ -23,19 +23,20 @@ use faceoff_types::DeprecatedNames;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-/// Name of a schema, and its renamed fields with their old and new names.
-type Renamed = (String, &'static [(&'static str, &'static str)]);
+/// Name of a schema, and the old and new name of each of its renamed fields.
+type SchemaRenames = (String, &'static [(&'static str, &'static str)]);
 
-fn renamed<T: DeprecatedNames + ToSchema>() -> Renamed {
+/// The renamed fields of `T`, in its own schema.
+fn renamed<T: DeprecatedNames + ToSchema>() -> SchemaRenames {
     (T::name().into_owned(), T::DEPRECATED_NAMES)
 }
 
-/// Fields of `T` that are flattened into the schema `container`.
-fn flattened<T: DeprecatedNames>(container: &str) -> Renamed {
+/// The renamed fields of `T`, in the schema `container`, into which they are flattened.
+fn flattened<T: DeprecatedNames>(container: &str) -> SchemaRenames {
     (container.to_owned(), T::DEPRECATED_NAMES)
 }
 
-fn renamed_fields() -> Vec<Renamed> {
+fn renamed_fields() -> Vec<SchemaRenames> {
     vec![
         renamed::<BaselineRow>(),
         renamed::<BoardRow>(),
@@ -87,15 +88,15 @@ fn add_names(schema: &mut Value, fields: &[(&str, &str)]) {
     if let Some(Value::Object(properties)) = schema.get_mut("properties") {
         for (old, new) in fields {
             if let Some(property) = properties.get(*new) {
-                let deprecated = deprecated(property, new);
-                properties.insert((*old).to_owned(), deprecated);
+                let old_property = deprecated_property(property, new);
+                properties.insert((*old).to_owned(), old_property);
             }
         }
     }
 }
 
 /// The schema of a renamed field under its old name.
-fn deprecated(property: &Value, new_name: &str) -> Value {
+fn deprecated_property(property: &Value, new_name: &str) -> Value {
     let mut schema = property.clone();
     schema["deprecated"] = true.into();
     schema["description"] = format!("Deprecated: the old name of `{new_name}`.").into();
@@ -109,6 +110,7 @@ mod tests {
 
     #[test]
     fn old_name_is_deprecated_and_optional() {
+        // The field `job` of the second alternative was once named `unit`.
         let mut schema = json!({"oneOf": [
             {"properties": {"state": {"type": "string"}}, "required": ["state"]},
             {"properties": {"job": {"$ref": "#/components/schemas/Job"}}, "required": ["job"]},

@@ -1,5 +1,5 @@
-//! Conditional and range requests in the document: routes with `If-None-Match` can return 304, routes with `Range` 206
-//! and 416.
+//! Conditional and range requests in the OpenAPI document: routes with the header `If-None-Match` can return 304, routes with
+//! `Range` also 206 and 416.
 
 use utoipa::{
     IntoParams,
@@ -12,7 +12,7 @@ use utoipa::{
 const IF_NONE_MATCH: &str = "If-None-Match";
 const RANGE: &str = "Range";
 
-/// Request headers of a route whose response has a tag.
+/// Request headers of a route whose response has a tag (`ETag`).
 pub(crate) struct TagHeader;
 
 impl IntoParams for TagHeader {
@@ -26,8 +26,8 @@ impl IntoParams for TagHeader {
 pub(crate) struct FileHeaders;
 
 impl IntoParams for FileHeaders {
-    fn into_params(place: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let mut params = TagHeader::into_params(place);
+    fn into_params(parameter_in: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let mut params = TagHeader::into_params(parameter_in);
         let description = "`bytes=FIRST-LAST`, `bytes=FIRST-` or `bytes=-LENGTH`; the response is 206 with this range. Several \
                            ranges and malformed ones return the whole file";
         params.push(header(RANGE, description));
@@ -47,13 +47,14 @@ fn header(name: &str, description: &str) -> Parameter {
         .build()
 }
 
-/// Adds the responses that follow from these headers, and their response headers.
+/// Adds the responses that the operation can return because of its request headers.
 pub(super) fn complete(operation: &mut Operation) {
     if !has_header_parameter(operation, IF_NONE_MATCH) {
         return;
     }
     let responses = &mut operation.responses.responses;
-    let mut not_modified = Response::new("not modified; the client already has it");
+    let mut not_modified =
+        Response::new("not modified; the client already has the current response");
     add_header(&mut not_modified, "ETag", "tag of the response");
     let Some(RefOr::T(whole)) = responses.get_mut("200") else {
         return;
@@ -90,11 +91,11 @@ pub(super) fn complete(operation: &mut Operation) {
 
 fn has_header_parameter(operation: &Operation, name: &str) -> bool {
     let parameters = operation.parameters.iter().flatten();
-    let mut plain = parameters.filter_map(|parameter| match parameter {
+    let mut inline = parameters.filter_map(|parameter| match parameter {
         RefOr::T(parameter) => Some(parameter),
         RefOr::Ref(_) => None,
     });
-    plain.any(|parameter| parameter.parameter_in == ParameterIn::Header && parameter.name == name)
+    inline.any(|parameter| parameter.parameter_in == ParameterIn::Header && parameter.name == name)
 }
 
 fn add_header(response: &mut Response, name: &str, description: &str) {

@@ -1,5 +1,5 @@
-//! Unsigned integers get their own formats (`uint32`, `uint64`). The derived schemas have those of signed integers, which
-//! exclude the upper half of the valid values.
+//! Formats of unsigned integers in the OpenAPI document: `uint32` and `uint64`. The derived schemas have the formats of signed
+//! integers, which exclude the upper half of the valid values.
 
 use serde_json::Value;
 

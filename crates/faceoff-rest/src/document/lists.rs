@@ -1,18 +1,18 @@
-//! Paged lists in the document: routes with the parameter `after` return a link to the next page.
+//! Paged lists in the OpenAPI document: routes with the query parameter `after` return a link to the next page.
 
 use utoipa::openapi::{
     Header, Object, RefOr, Response, Type,
     path::{Operation, ParameterIn},
 };
 
-/// Adds the header and the response that follow from this parameter.
+/// Adds the header `Link` and the response 422 to the operation, if it returns a paged list.
 pub(super) fn complete(operation: &mut Operation) {
     let parameters = operation.parameters.iter().flatten();
-    let mut plain = parameters.filter_map(|parameter| match parameter {
+    let mut inline = parameters.filter_map(|parameter| match parameter {
         RefOr::T(parameter) => Some(parameter),
         RefOr::Ref(_) => None,
     });
-    let is_list = plain
+    let is_list = inline
         .any(|parameter| parameter.parameter_in == ParameterIn::Query && parameter.name == "after");
     if !is_list {
         return;

@@ -1,4 +1,5 @@
-//! Responses that many routes share, derived from their parameters and bodies. Routes describe only specific ones.
+//! Responses in the OpenAPI document that many routes share. They are derived from the routes' parameters, bodies and
+//! security; a route itself describes only its specific responses.
 
 use super::{files, lists};
 use axum::http::StatusCode;
@@ -19,7 +20,7 @@ struct CommonResponse {
     /// Name of the component in the document.
     name: &'static str,
     description: &'static str,
-    /// Whether an operation can return it, even if its own description does not mention it.
+    /// Whether an operation can return this response, even if its own description does not mention it.
     applies_to: fn(&OperationTraits<'_>) -> bool,
     headers: &'static [ResponseHeader],
 }
@@ -37,7 +38,7 @@ const RETRY_AFTER: ResponseHeader = ResponseHeader {
     description: "seconds to wait before the next attempt",
 };
 
-const COMMON: &[CommonResponse] = &[
+const COMMON_RESPONSES: &[CommonResponse] = &[
     CommonResponse {
         status: StatusCode::BAD_REQUEST,
         name: "Malformed",
@@ -136,21 +137,21 @@ impl OperationTraits<'_> {
         self.method != HttpMethod::Get
     }
 
-    fn has(&self, place: &ParameterIn) -> bool {
+    fn has_parameter_in(&self, place: &ParameterIn) -> bool {
         let parameters = self.operation.parameters.iter().flatten();
-        let mut plain = parameters.filter_map(|parameter| match parameter {
+        let mut inline = parameters.filter_map(|parameter| match parameter {
             RefOr::T(parameter) => Some(parameter),
             RefOr::Ref(_) => None,
         });
-        plain.any(|parameter| parameter.parameter_in == *place)
+        inline.any(|parameter| parameter.parameter_in == *place)
     }
 
     fn has_query(&self) -> bool {
-        self.has(&ParameterIn::Query)
+        self.has_parameter_in(&ParameterIn::Query)
     }
 
     fn has_path_parameters(&self) -> bool {
-        self.has(&ParameterIn::Path)
+        self.has_parameter_in(&ParameterIn::Path)
     }
 
     fn has_json(&self) -> bool {
@@ -176,7 +177,7 @@ impl OperationTraits<'_> {
 /// Adds the common responses to all operations.
 pub(super) fn complete(document: &mut openapi::OpenApi) {
     let components = document.components.get_or_insert_default();
-    for common in COMMON {
+    for common in COMMON_RESPONSES {
         let mut response = Response::new(common.description);
         finish(&mut response, common.status.as_str());
         components
@@ -206,17 +207,17 @@ fn complete_operation(method: HttpMethod, operation: &mut Operation) {
         method,
         operation: &*operation,
     };
-    let applicable: Vec<StatusCode> = COMMON
+    let applicable: Vec<StatusCode> = COMMON_RESPONSES
         .iter()
         .filter(|common| (common.applies_to)(&traits))
         .map(|common| common.status)
         .collect();
     let responses = &mut operation.responses.responses;
-    for common in COMMON {
+    for common in COMMON_RESPONSES {
         let status = common.status.as_str();
         let is_common = match responses.get(status) {
             // A status without a description has its common meaning.
-            Some(RefOr::T(own)) => own.description.is_empty(),
+            Some(RefOr::T(specific)) => specific.description.is_empty(),
             Some(RefOr::Ref(_)) => false,
             None => applicable.contains(&common.status),
         };
@@ -233,7 +234,7 @@ fn complete_operation(method: HttpMethod, operation: &mut Operation) {
 }
 
 fn common_response(status: &str) -> Option<&'static CommonResponse> {
-    COMMON
+    COMMON_RESPONSES
         .iter()
         .find(|common| common.status.as_str() == status)
 }
@@ -255,11 +256,11 @@ fn finish(response: &mut Response, status: &str) {
     response
         .content
         .insert(Problem::MEDIA_TYPE.to_owned(), RefOr::T(problem));
-    for common in common_response(status).map_or(&[][..], |common| common.headers) {
-        let mut header = Header::new(Object::with_type(common.kind.clone()));
-        header.description = Some(common.description.to_owned());
+    for common_header in common_response(status).map_or(&[][..], |common| common.headers) {
+        let mut header = Header::new(Object::with_type(common_header.kind.clone()));
+        header.description = Some(common_header.description.to_owned());
         response
             .headers
-            .insert(common.name.to_owned(), RefOr::T(header));
+            .insert(common_header.name.to_owned(), RefOr::T(header));
     }
 }

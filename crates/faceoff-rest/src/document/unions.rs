@@ -1,6 +1,6 @@
-//! Schemas of types with flattened parts, rewritten for client generators.
+//! Schemas of types with flattened parts, rewritten in the OpenAPI document for client generators.
 //!
-//! The derived schema of a struct with a flattened enum is allOf(oneOf(variants), fields). That is correct, but generators
+//! The derived schema of a struct with a flattened enum is allOf(oneOf(variants), fields). This is correct, but generators
 //! cannot make a class of it. The equivalent oneOf(variant with fields, …) works.
 
 use std::{collections::BTreeMap, mem};
@@ -32,18 +32,18 @@ fn is_composed(schema: &RefOr<Schema>) -> bool {
 
 fn flattened(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<RefOr<Schema>> {
     let mut variants = variants(schema, schemas)?;
-    let own = match schema {
+    let description = match schema {
         RefOr::T(Schema::AllOf(all)) => all.description.clone(),
         RefOr::T(Schema::OneOf(one)) => one.description.clone(),
         _ => None,
     };
     if variants.len() == 1 {
-        let mut only = variants.remove(0);
-        only.description = own.or(only.description);
-        return Some(only.into());
+        let mut only_variant = variants.remove(0);
+        only_variant.description = description.or(only_variant.description);
+        return Some(only_variant.into());
     }
     let mut one = OneOf::new();
-    one.description = own;
+    one.description = description;
     one.items = variants
         .into_iter()
         .map(|object| RefOr::T(Schema::Object(object)))
@@ -67,15 +67,16 @@ fn variants(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<Vec<Object>> {
             Some(parts.collect::<Option<Vec<_>>>()?.concat())
         }
         RefOr::T(Schema::AllOf(all)) => {
-            let mut products = vec![Object::new()];
-            for item in &all.items {
-                let factors = variants(item, schemas)?;
-                products = products
+            // Each alternative of one part is combined with each alternative of all others.
+            let mut combined = vec![Object::new()];
+            for part in &all.items {
+                let alternatives = variants(part, schemas)?;
+                combined = combined
                     .iter()
-                    .flat_map(|left| factors.iter().map(move |right| merge(left, right)))
+                    .flat_map(|left| alternatives.iter().map(move |right| merge(left, right)))
                     .collect();
             }
-            Some(products)
+            Some(combined)
         }
         RefOr::T(_) => None,
     }
@@ -86,7 +87,7 @@ fn merge(left: &Object, right: &Object) -> Object {
     let mut both = left.clone();
     both.required.extend(right.required.iter().cloned());
     both.properties.extend(right.properties.clone());
-    let described = mem::take(&mut both.description);
-    both.description = described.or_else(|| right.description.clone());
+    let left_description = mem::take(&mut both.description);
+    both.description = left_description.or_else(|| right.description.clone());
     both
 }

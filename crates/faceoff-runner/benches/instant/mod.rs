@@ -24,15 +24,15 @@ pub fn instant_agent() {
     let (mut line, mut answer) = (Vec::new(), Vec::new());
     while input.read_until(b'\n', &mut line).unwrap() > 0 {
         answer.clear();
-        if line.starts_with(b"{\"type\":\"step\",\"step\":") {
-            let digits = line[22..].split(|byte| *byte == b',').next().unwrap();
+        if let Some(rest) = line.strip_prefix(b"{\"type\":\"step\",\"step\":") {
+            let digits = rest.split(|byte| *byte == b',').next().unwrap();
             answer.extend_from_slice(b"{\"type\":\"act\",\"step\":");
             answer.extend_from_slice(digits);
             answer.extend_from_slice(b",\"action\":");
             answer.extend_from_slice(ACTION.as_bytes());
             answer.extend_from_slice(b"}\n");
-        } else if line.starts_with(b"{\"type\":\"reset\",\"episode\":") {
-            let digits = line[26..].split(|byte| *byte == b'}').next().unwrap();
+        } else if let Some(rest) = line.strip_prefix(b"{\"type\":\"reset\",\"episode\":") {
+            let digits = rest.split(|byte| *byte == b'}').next().unwrap();
             answer.extend_from_slice(b"{\"type\":\"ready\",\"episode\":");
             answer.extend_from_slice(digits);
             answer.extend_from_slice(b"}\n");

@@ -1,4 +1,4 @@
-//! Cost limits of unpacking any archive.
+//! Cost limits of unpacking an archive, whatever its format, so that no small archive can occupy the host.
 
 use super::error::BundleError;
 use faceoff_types::BundleLimits;
@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Bytes that may be read of an archive beside its files' contents (headers, long names, extended
+/// Bytes that may be read of an archive in addition to its files' contents (headers, long names, extended
 /// attributes, padding, directories), before its first entry.
 const OVERHEAD_BYTES: u64 = 16 << 20;
 /// Additional overhead per entry: a header with its padding, and as much for its extension headers.
@@ -20,15 +20,15 @@ const ENTRIES_PER_FILE: u64 = 4;
 const SEEK_BYTES: u64 = 64;
 /// Maximum number of successive compressed streams in one file. `bgzip` starts a new stream every 64 KiB. Layers for
 /// partial downloads have a stream per file, or several, so the maximum is the number of entries if that is larger.
-const STREAMS: u64 = 1 << 16;
+const MAX_STREAMS: u64 = 1 << 16;
 /// Bytes that compressors add to a stream: its header, and notes in it. Apart from this and [`OVERHEAD_BYTES`],
 /// compressed data is never larger than its content.
 const PACKED_BYTES_PER_STREAM: u64 = 1 << 10;
 /// Maximum bytes of names that may be compared while following all links.
-const LINK_BYTES: u64 = 128 << 20;
+const MAX_LINK_BYTES: u64 = 128 << 20;
 /// Maximum bytes of names that may be looked up for the entries of an image's layers. A hundred thousand entries with
 /// ordinary paths use a tenth of it.
-const LOOKUP_BYTES: u64 = 256 << 20;
+const MAX_LOOKUP_BYTES: u64 = 256 << 20;
 /// A name counts as this many additional bytes, because a short name also costs time.
 const LOOKUP_BYTES_PER_NAME: u64 = 16;
 
@@ -42,33 +42,35 @@ pub(super) type Now<'a> = &'a dyn Fn() -> Instant;
 /// the last limit: it stops work that the counts miss, or a host that hangs. Therefore a timeout is a platform fault
 /// and not the archive's.
 ///
-/// The budget keeps the failure itself, because a library between the budget and the reader may replace the error by
-/// its own.
+/// The budget stores its failure, because a library between it and the caller may replace the error by its own.
 pub(super) struct Budget<'a> {
     limits: BundleLimits,
-    until: Instant,
+    deadline: Instant,
     now: Now<'a>,
     cancelled: &'a dyn Fn() -> bool,
     /// Bytes read through [`MeteredReader`]: everything that the archive consists of.
-    read: Cell<u64>,
-    /// Current limit of `read`.
-    allowed: Cell<u64>,
+    read_bytes: Cell<u64>,
+    /// Current limit of `read_bytes`.
+    allowed_bytes: Cell<u64>,
     /// Bytes of file contents.
-    content: Cell<u64>,
-    /// Sum of the file sizes in the archive's directory, in bytes.
-    stated: Cell<u64>,
+    content_bytes: Cell<u64>,
+    /// Sum of the file sizes that the archive's directory states.
+    stated_bytes: Cell<u64>,
     entries: Cell<u64>,
     streams: Cell<u64>,
     /// Input of the decompressors, in bytes.
-    packed: Cell<u64>,
+    packed_bytes: Cell<u64>,
     /// Output of the decompressors, in bytes.
-    decompressed: Cell<u64>,
+    decompressed_bytes: Cell<u64>,
+    /// Bytes of names compared while following links.
     link_bytes: Cell<u64>,
+    /// Bytes of names looked up in an image's root.
     lookup_bytes: Cell<u64>,
     /// Bytes read of an image's packed files.
     image_bytes: Cell<u64>,
-    /// The counted content is that of an image's layers.
+    /// Is the content of an image's layers being counted (not that of the archive's files)?
     in_layers: Cell<bool>,
+    /// The first exceeded limit, timeout or cancellation.
     failure: RefCell<Option<BundleError>>,
 }
 
@@ -81,17 +83,17 @@ impl<'a> Budget<'a> {
     ) -> Self {
         Self {
             limits: *limits,
-            until: now() + Duration::from_secs(limits.unpack_s.into()),
+            deadline: now() + Duration::from_secs(limits.unpack_s.into()),
             now,
             cancelled,
-            read: Cell::new(0),
-            allowed: Cell::new(OVERHEAD_BYTES),
-            content: Cell::new(0),
-            stated: Cell::new(0),
+            read_bytes: Cell::new(0),
+            allowed_bytes: Cell::new(OVERHEAD_BYTES),
+            content_bytes: Cell::new(0),
+            stated_bytes: Cell::new(0),
             entries: Cell::new(0),
             streams: Cell::new(0),
-            packed: Cell::new(0),
-            decompressed: Cell::new(0),
+            packed_bytes: Cell::new(0),
+            decompressed_bytes: Cell::new(0),
             link_bytes: Cell::new(0),
             lookup_bytes: Cell::new(0),
             image_bytes: Cell::new(0),
@@ -104,11 +106,14 @@ impl<'a> Budget<'a> {
         &self.limits
     }
 
-    /// Replaces the error of `done` by the failure of this budget, if there is one.
-    pub(super) fn own_failure_or<T>(&self, done: Result<T, BundleError>) -> Result<T, BundleError> {
-        match (done, self.failure.take()) {
+    /// Replaces the error of `result` by the failure of this budget, if there is one.
+    pub(super) fn prefer_own_failure<T>(
+        &self,
+        result: Result<T, BundleError>,
+    ) -> Result<T, BundleError> {
+        match (result, self.failure.take()) {
             (Err(_), Some(reason)) => Err(reason),
-            (done, _) => done,
+            (result, _) => result,
         }
     }
 
@@ -131,7 +136,7 @@ impl<'a> Budget<'a> {
         if (self.cancelled)() {
             return Err(self.fail(BundleError::Cancelled));
         }
-        if (self.now)() > self.until {
+        if (self.now)() > self.deadline {
             return Err(self.fail(BundleError::Io(io::Error::new(
                 io::ErrorKind::TimedOut,
                 format!(
@@ -141,7 +146,7 @@ impl<'a> Budget<'a> {
                 ),
             ))));
         }
-        let (read, allowed) = (self.read.get(), self.allowed.get());
+        let (read, allowed) = (self.read_bytes.get(), self.allowed_bytes.get());
         if read > allowed {
             return self.refuse(format!(
                 "the archive has more bytes than its files explain: {read} bytes contained {} entries, \
@@ -171,14 +176,16 @@ impl<'a> Budget<'a> {
 
     /// Counts content of a file, including files that are left out.
     pub(super) fn count_content(&self, entry: &str, bytes: usize) -> Result<(), BundleError> {
-        self.content.set(self.content.get() + bytes as u64);
-        self.check_content(entry, self.content.get())
+        self.content_bytes
+            .set(self.content_bytes.get() + bytes as u64);
+        self.check_content(entry, self.content_bytes.get())
     }
 
     /// Counts the size of a file according to the archive's directory, before its content is read.
     pub(super) fn count_stated(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
-        self.stated.set(self.stated.get().saturating_add(bytes));
-        self.check_content(entry, self.stated.get())
+        self.stated_bytes
+            .set(self.stated_bytes.get().saturating_add(bytes));
+        self.check_content(entry, self.stated_bytes.get())
     }
 
     fn check_content(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
@@ -201,7 +208,7 @@ impl<'a> Budget<'a> {
     /// Starts counting the content of an image's layers, which have been unpacked as files before: the content has its
     /// own limit. All other counts continue.
     pub(super) fn begin_layers(&self) {
-        self.content.set(0);
+        self.content_bytes.set(0);
         self.in_layers.set(true);
     }
 
@@ -214,7 +221,7 @@ impl<'a> Budget<'a> {
             self.refuse(format!(
                 "the image's layers have more than {max} bytes, counting a layer each time that it is named"
             ))
-            .map_err(as_io)?;
+            .map_err(to_io_error)?;
         }
         Ok(())
     }
@@ -223,7 +230,7 @@ impl<'a> Budget<'a> {
     pub(super) fn count_lookup(&self, bytes: usize) -> Result<(), BundleError> {
         let lookup_bytes = self.lookup_bytes.get() + bytes as u64 + LOOKUP_BYTES_PER_NAME;
         self.lookup_bytes.set(lookup_bytes);
-        if lookup_bytes > LOOKUP_BYTES {
+        if lookup_bytes > MAX_LOOKUP_BYTES {
             return self
                 .refuse("the image's paths lead through too many folders and links".to_owned());
         }
@@ -234,7 +241,7 @@ impl<'a> Budget<'a> {
     pub(super) fn count_link_bytes(&self, bytes: usize) -> Result<(), BundleError> {
         let link_bytes = self.link_bytes.get() + bytes as u64 + LOOKUP_BYTES_PER_NAME;
         self.link_bytes.set(link_bytes);
-        if link_bytes > LINK_BYTES {
+        if link_bytes > MAX_LINK_BYTES {
             return self.refuse("the archive's links lead through too many others".to_owned());
         }
         self.check()
@@ -243,12 +250,13 @@ impl<'a> Budget<'a> {
     /// Raises the limit of read bytes: by the size of the next file, or by the size of an archive that is read in
     /// place.
     pub(super) fn allow(&self, bytes: u64) {
-        self.allowed.set(self.allowed.get().saturating_add(bytes));
+        self.allowed_bytes
+            .set(self.allowed_bytes.get().saturating_add(bytes));
     }
 
     fn count_stream(&self) -> Result<(), BundleError> {
         self.streams.set(self.streams.get() + 1);
-        let max = STREAMS.max(self.max_entries());
+        let max = MAX_STREAMS.max(self.max_entries());
         if self.streams.get() > max {
             return self.refuse(format!(
                 "the archive is made of more than {max} compressed streams"
@@ -260,11 +268,11 @@ impl<'a> Budget<'a> {
     /// Refuses compressed data that is larger than its content: empty blocks cost as much time as others.
     fn check_compression(&self) -> Result<(), BundleError> {
         let explained = OVERHEAD_BYTES + (self.streams.get() + 1) * PACKED_BYTES_PER_STREAM;
-        if self.packed.get() > self.decompressed.get().saturating_add(explained) {
+        if self.packed_bytes.get() > self.decompressed_bytes.get().saturating_add(explained) {
             return self.refuse(format!(
                 "the archive is larger than its content: {} compressed bytes contain {} bytes",
-                self.packed.get(),
-                self.decompressed.get()
+                self.packed_bytes.get(),
+                self.decompressed_bytes.get()
             ));
         }
         self.check()
@@ -272,7 +280,7 @@ impl<'a> Budget<'a> {
 }
 
 /// Converts to an error of a reader; the budget keeps the original.
-fn as_io(error: BundleError) -> io::Error {
+fn to_io_error(error: BundleError) -> io::Error {
     io::Error::other(error.to_string())
 }
 
@@ -290,17 +298,21 @@ impl<'a, R> MeteredReader<'a, R> {
 
 impl<R: Read> Read for MeteredReader<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.budget.check().map_err(as_io)?;
+        self.budget.check().map_err(to_io_error)?;
         let read = self.inner.read(buffer)?;
-        self.budget.read.set(self.budget.read.get() + read as u64);
+        self.budget
+            .read_bytes
+            .set(self.budget.read_bytes.get() + read as u64);
         Ok(read)
     }
 }
 
 impl<R: Seek> Seek for MeteredReader<'_, R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.budget.read.set(self.budget.read.get() + SEEK_BYTES);
-        self.budget.check().map_err(as_io)?;
+        self.budget
+            .read_bytes
+            .set(self.budget.read_bytes.get() + SEEK_BYTES);
+        self.budget.check().map_err(to_io_error)?;
         self.inner.seek(to)
     }
 }
@@ -320,7 +332,7 @@ impl<'a, R> CancellableReader<'a, R> {
 
 impl<R: Read> Read for CancellableReader<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.budget.check().map_err(as_io)?;
+        self.budget.check().map_err(to_io_error)?;
         self.inner.read(buffer)
     }
 }
@@ -328,7 +340,7 @@ impl<R: Read> Read for CancellableReader<'_, R> {
 /// A decompressor of one stream, in a file that may contain several successive streams.
 pub(super) trait StreamDecoder<R>: Read + Sized {
     fn begin(packed: R) -> io::Result<Self>;
-    fn packed(self) -> R;
+    fn into_packed(self) -> R;
 }
 
 impl<R: BufRead> StreamDecoder<R> for flate2::bufread::GzDecoder<R> {
@@ -336,7 +348,7 @@ impl<R: BufRead> StreamDecoder<R> for flate2::bufread::GzDecoder<R> {
         Ok(Self::new(packed))
     }
 
-    fn packed(self) -> R {
+    fn into_packed(self) -> R {
         self.into_inner()
     }
 }
@@ -346,7 +358,7 @@ impl<R: BufRead> StreamDecoder<R> for zstd::Decoder<'static, R> {
         Ok(Self::with_buffer(packed)?.single_frame())
     }
 
-    fn packed(self) -> R {
+    fn into_packed(self) -> R {
         self.finish()
     }
 }
@@ -367,14 +379,14 @@ impl<R: BufRead> Read for PackedInput<'_, R> {
 
 impl<R: BufRead> BufRead for PackedInput<'_, R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        self.budget.check_compression().map_err(as_io)?;
+        self.budget.check_compression().map_err(to_io_error)?;
         self.inner.fill_buf()
     }
 
     fn consume(&mut self, bytes: usize) {
         self.budget
-            .packed
-            .set(self.budget.packed.get() + bytes as u64);
+            .packed_bytes
+            .set(self.budget.packed_bytes.get() + bytes as u64);
         self.inner.consume(bytes);
     }
 }
@@ -409,12 +421,12 @@ impl<'a, R: BufRead, M: StreamDecoder<PackedInput<'a, R>>> Read for MultiStreamR
         while let Some(decoder) = &mut self.current {
             let read = decoder.read(buffer)?;
             if read > 0 {
-                let decompressed = &self.budget.decompressed;
+                let decompressed = &self.budget.decompressed_bytes;
                 decompressed.set(decompressed.get() + read as u64);
                 return Ok(read);
             }
-            self.budget.count_stream().map_err(as_io)?;
-            let Some(mut packed) = self.current.take().map(StreamDecoder::packed) else {
+            self.budget.count_stream().map_err(to_io_error)?;
+            let Some(mut packed) = self.current.take().map(StreamDecoder::into_packed) else {
                 break;
             };
             if has_next_stream(&mut packed)? {
@@ -428,12 +440,12 @@ impl<'a, R: BufRead, M: StreamDecoder<PackedInput<'a, R>>> Read for MultiStreamR
 /// Does another stream follow? Zeros pad the blocks of tapes, and are skipped.
 fn has_next_stream(packed: &mut impl BufRead) -> io::Result<bool> {
     loop {
-        let ahead = packed.fill_buf()?;
-        let zeros = ahead.iter().take_while(|&&byte| byte == 0).count();
-        if zeros < ahead.len() || zeros == 0 {
-            let is_there = !ahead.is_empty();
+        let next_bytes = packed.fill_buf()?;
+        let zeros = next_bytes.iter().take_while(|&&byte| byte == 0).count();
+        if zeros < next_bytes.len() || zeros == 0 {
+            let has_more = !next_bytes.is_empty();
             packed.consume(zeros);
-            return Ok(is_there);
+            return Ok(has_more);
         }
         packed.consume(zeros);
     }

@@ -1,4 +1,4 @@
-//! Rules for entries of any archive.
+//! Rules for an entry (file, folder or link) of an archive of any format, and the functions that write it to the disk.
 
 use super::{budget::Budget, error::BundleError};
 use fs_err::OpenOptions;
@@ -9,10 +9,12 @@ use std::{
     path::Path,
 };
 
-/// Set explicitly, whatever the service's umask: if the service is root, agents run as other users.
+/// Mode of all folders. It is set explicitly, whatever the service's umask: if the service is root, agents run as other users, who must
+/// be able to read them.
 pub(super) const FOLDER_MODE: u32 = 0o755;
 /// Longest path in an archive, in bytes; together with the target folder it must stay below the system's 4096.
 pub(super) const PATH_MAX_BYTES: usize = 1024;
+/// Longest name of a file or folder on Linux, in bytes.
 const NAME_MAX_BYTES: usize = 255;
 
 /// An error for an invalid entry.
@@ -51,10 +53,10 @@ pub(super) fn normalise(entry: &str) -> Result<String, BundleError> {
 }
 
 /// An error for an entry of a kind that neither a bundle nor a layer may contain.
-pub(super) fn unusable(entry: &str, what: &str) -> BundleError {
+pub(super) fn unusable(entry: &str, kind: &str) -> BundleError {
     invalid(
         entry,
-        format_args!("is {what}; a bundle holds files, folders and links"),
+        format_args!("is {kind}; a bundle holds files, folders and links"),
     )
 }
 
@@ -101,7 +103,7 @@ pub(super) fn write_new(
             Ok(0) => return Ok(()),
             Ok(read) => read,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            Err(error) => return Err(BundleError::on_read(entry)(error)),
+            Err(error) => return Err(BundleError::from_read_error(entry)(error)),
         };
         budget.count_content(entry, read)?;
         file.write_all(&buffer[..read])?;

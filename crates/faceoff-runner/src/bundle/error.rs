@@ -1,3 +1,5 @@
+//! The error of opening or unpacking a bundle.
+
 use std::io;
 
 /// Failure to open or unpack a bundle.
@@ -16,9 +18,9 @@ pub enum BundleError {
 }
 
 impl BundleError {
-    /// Converts an error of reading an archive. If the disk failed, the error carries a system error number; otherwise
-    /// the bytes are invalid. Errors of `fs_err`, which name the path, have lost the number: read from the plain file.
-    pub(super) fn on_read(entry: &str) -> impl FnOnce(io::Error) -> Self + '_ {
+    /// Converts an error of reading `entry` of an archive (empty: of the archive itself). If the disk failed, the error has a system
+    /// error number; otherwise the bytes are invalid. Errors of `fs_err` do not have the number, so readers use plain files.
+    pub(super) fn from_read_error(entry: &str) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| match source.raw_os_error() {
             Some(_) => Self::Io(io::Error::new(
                 source.kind(),

@@ -1,4 +1,5 @@
-//! A bundle that is a container image: its agent sees only the merged layers.
+//! A bundle that is a container image. An image consists of *layers*, archives that are applied one over another; the agent sees only
+//! the merged result.
 
 mod archive;
 mod digest;
@@ -23,7 +24,7 @@ const DEFAULT_PATH: &str = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/s
 pub struct Image {
     /// Folder with the merged layers. Its symbolic links may lead anywhere, so no code on the host may follow one.
     pub root: PathBuf,
-    /// The variables of its `ENV`.
+    /// The variables that the image sets (`ENV` in a Dockerfile).
     pub env: BTreeMap<String, String>,
 }
 
@@ -51,21 +52,22 @@ pub(super) fn unpack<'a>(
     budget.begin_layers();
     let mut root = Root::new(&root_dir, budget)?;
     let count = layers.len();
-    for (index, part) in layers.iter_mut().enumerate() {
-        part.name = archive
-            .resolve_name(&part.name)
-            .map_err(|error| part.in_layer(error, index + 1, count))?;
+    for (index, layer) in layers.iter_mut().enumerate() {
+        layer.name = archive
+            .resolve_name(&layer.name)
+            .map_err(|error| layer.add_layer_to(error, index + 1, count))?;
     }
-    for (index, part) in layers.iter().enumerate() {
+    for (index, layer) in layers.iter().enumerate() {
         let is_needed_again = layers[index + 1..]
             .iter()
-            .any(|later| later.name == part.name);
+            .any(|later| later.name == layer.name);
         root.begin_layer();
         // Take the budget's own failure here, so that the message names the layer.
-        let applied = budget.own_failure_or(layer::apply(&mut archive, part, &mut root, budget));
-        applied.map_err(|error| part.in_layer(error, index + 1, count))?;
+        let applied =
+            budget.prefer_own_failure(layer::apply(&mut archive, layer, &mut root, budget));
+        applied.map_err(|error| layer.add_layer_to(error, index + 1, count))?;
         if !is_needed_again {
-            archive.remove(&part.name)?;
+            archive.remove(&layer.name)?;
         }
     }
     archive.clear()?;

@@ -1,3 +1,5 @@
+//! Symbolic links of a bundle must not lead out of it. Links are followed in memory, before any is created.
+
 use super::{error::BundleError, node::Node};
 use std::collections::BTreeMap;
 
@@ -7,7 +9,7 @@ const MAX_LINKS: usize = 40;
 /// Follows the link at `path` through the tree as the system would. A step above the bundle's
 /// folder `root` (a path in the tree, empty for its top) is an escape, even if the path returns.
 /// A target that does not exist is harmless as long as it would be inside. `count_bytes` gets the length of each
-/// target and of each name that is looked up, and ends a walk that is too long.
+/// target and of each name that is looked up, and returns an error if there are too many.
 pub(super) fn check(
     nodes: &BTreeMap<String, Node>,
     root: &str,
@@ -15,41 +17,41 @@ pub(super) fn check(
     target: &str,
     count_bytes: &mut dyn FnMut(usize) -> Result<(), BundleError>,
 ) -> Result<(), String> {
-    let leaves = || format!("is a link that leaves the bundle: {target:?}");
-    let inside =
+    let escape_error = || format!("is a link that leaves the bundle: {target:?}");
+    let is_inside =
         |path: &[String]| root.is_empty() || path.first().is_some_and(|first| first == root);
-    let mut at: Vec<String> = path.split('/').map(str::to_owned).collect();
-    at.pop();
+    let mut current: Vec<String> = path.split('/').map(str::to_owned).collect();
+    current.pop();
     let mut links = 1;
     let mut count = |name: &str| count_bytes(name.len()).map_err(|error| error.to_string());
     count(target)?;
-    // The remaining parts of the walk, the next one last.
-    let mut todo: Vec<String> = parts(target).ok_or_else(leaves)?;
-    while let Some(part) = todo.pop() {
+    // The parts that are still to be followed, the next one last.
+    let mut pending: Vec<String> = reversed_parts(target).ok_or_else(escape_error)?;
+    while let Some(part) = pending.pop() {
         if part == ".." {
-            if at.pop().is_none() || !inside(&at) {
-                return Err(leaves());
+            if current.pop().is_none() || !is_inside(&current) {
+                return Err(escape_error());
             }
             continue;
         }
-        at.push(part);
-        let name = at.join("/");
+        current.push(part);
+        let name = current.join("/");
         count(&name)?;
         if let Some(Node::Link { target: next }) = nodes.get(&name) {
             links += 1;
             if links > MAX_LINKS {
                 return Err(format!("is a link that leads in a circle: {target:?}"));
             }
-            at.pop();
+            current.pop();
             count(next)?;
-            todo.extend(parts(next).ok_or_else(leaves)?);
+            pending.extend(reversed_parts(next).ok_or_else(escape_error)?);
         }
     }
     Ok(())
 }
 
-/// The parts of a relative path, last first; `None` for an absolute one.
-fn parts(path: &str) -> Option<Vec<String>> {
+/// The parts of a relative path, the last one first; `None` for an absolute path.
+fn reversed_parts(path: &str) -> Option<Vec<String>> {
     if path.starts_with('/') {
         return None;
     }
@@ -61,6 +63,7 @@ fn parts(path: &str) -> Option<Vec<String>> {
 mod tests {
     use super::*;
 
+    /// A tree of links: path and target.
     fn tree(links: &[(&str, &str)]) -> BTreeMap<String, Node> {
         links
             .iter()
@@ -103,7 +106,7 @@ mod tests {
         assert!(!check_all("", &[("a/b", "../../c")]));
         assert!(
             !check_all("", &[("a/b", "../../a/c")]),
-            "it leaves before it returns"
+            "the link leaves before it returns"
         );
         assert!(
             !check_all("top", &[("top/a", "..")]),
@@ -114,7 +117,7 @@ mod tests {
 
     #[test]
     fn link_through_a_link_is_followed() {
-        // As text, deep/up/.. is deep; followed, deep/up is the root and its parent is outside.
+        // As a text, deep/up/.. is deep. But the link deep/up leads to the root, whose parent is outside.
         assert!(!check_all(
             "",
             &[("deep/up", ".."), ("escape", "deep/up/../x")]

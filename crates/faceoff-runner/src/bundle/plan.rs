@@ -1,3 +1,5 @@
+//! The plan of a bundle's tree: names and kinds of an archive's entries, checked before anything is written.
+
 use super::{
     entry::{invalid, normalise},
     error::BundleError,
@@ -5,21 +7,22 @@ use super::{
 };
 use std::collections::BTreeMap;
 
-/// The names and kinds of an archive's entries, in memory. Checks everything that does not depend on the content:
+/// The names and kinds of an archive's entries, in memory. The plan checks everything that does not depend on the content:
 /// names, modes, paths and numbers.
 pub(super) struct Plan {
     nodes: BTreeMap<String, Node>,
-    /// Maximum number of files and links, and maximum number of folders.
-    max: u64,
+    /// Maximum number of files and links, and also of folders.
+    max_files: u64,
+    /// Number of files and links so far.
     files: u64,
     folders: u64,
 }
 
 impl Plan {
-    pub fn new(max: u64) -> Self {
+    pub fn new(max_files: u64) -> Self {
         Self {
             nodes: BTreeMap::new(),
-            max,
+            max_files,
             files: 0,
             folders: 0,
         }
@@ -87,14 +90,14 @@ impl Plan {
             )
         };
         let mut missing = Vec::new();
-        let mut rest = path;
+        let mut remaining = path;
         // The parents of an existing folder exist, too.
-        while let Some((folder, _)) = rest.rsplit_once('/') {
+        while let Some((folder, _)) = remaining.rsplit_once('/') {
             if !is_missing(folder) {
                 break;
             }
             missing.push(folder.to_owned());
-            rest = folder;
+            remaining = folder;
         }
         missing.reverse();
         missing
@@ -120,10 +123,10 @@ impl Plan {
             return Err(invalid(entry, "is in the archive twice"));
         }
         self.files += 1;
-        if self.files > self.max {
+        if self.files > self.max_files {
             return Err(BundleError::Invalid(format!(
                 "the archive has more than {} files",
-                self.max
+                self.max_files
             )));
         }
         self.nodes.insert(path.clone(), node);
@@ -131,13 +134,21 @@ impl Plan {
     }
 
     /// Adds a folder and its parents; these are a few hundred at most, because the length of a path is limited.
-    fn insert_folder(&mut self, entry: &str, path: &str, named: bool) -> Result<(), BundleError> {
+    fn insert_folder(
+        &mut self,
+        entry: &str,
+        path: &str,
+        has_own_entry: bool,
+    ) -> Result<(), BundleError> {
         match self.nodes.get_mut(path) {
-            Some(Node::Folder { named: before, .. }) => {
-                if named && *before {
+            Some(Node::Folder {
+                has_own_entry: had_own_entry,
+                ..
+            }) => {
+                if has_own_entry && *had_own_entry {
                     return Err(invalid(entry, "is in the archive twice"));
                 }
-                *before |= named;
+                *had_own_entry |= has_own_entry;
                 return Ok(());
             }
             Some(Node::File) => {
@@ -158,15 +169,20 @@ impl Plan {
             self.insert_folder(entry, parent, false)?;
         }
         self.folders += 1;
-        if self.folders > self.max {
+        if self.folders > self.max_files {
             return Err(BundleError::Invalid(format!(
                 "the archive has more than {} folders",
-                self.max
+                self.max_files
             )));
         }
         let is_created = false;
-        self.nodes
-            .insert(path.to_owned(), Node::Folder { named, is_created });
+        self.nodes.insert(
+            path.to_owned(),
+            Node::Folder {
+                has_own_entry,
+                is_created,
+            },
+        );
         Ok(())
     }
 }

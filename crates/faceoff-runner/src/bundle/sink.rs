@@ -1,3 +1,5 @@
+//! The receiver of an archive's entries: a bundle's tree, or the root of a container image.
+
 use super::error::BundleError;
 use std::io::Read;
 
@@ -13,7 +15,7 @@ pub(super) trait Sink {
     fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError>;
 }
 
-/// An entry without content.
+/// The kind of an entry that is neither file, folder nor link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Special {
     /// The device 0/0, with which overlayfs marks hidden files.

@@ -1,3 +1,5 @@
+//! Reads a tar archive and passes its entries to a sink.
+
 use super::{
     budget::{Budget, MeteredReader},
     entry::unusable,
@@ -7,8 +9,8 @@ use super::{
 use std::io::{self, Read};
 use tar::{Archive, EntryType, Header};
 
-/// Longest header that only describes the next entry (long names, extended attributes). Headers are held in memory,
-/// and no honest bundle has a longer one.
+/// Longest *extension header*: one that only describes the next entry (long names, extended attributes). Headers are held in memory,
+/// and no ordinary bundle has a longer one.
 const EXTENSION_MAX_BYTES: u64 = 1 << 20;
 
 /// Values of extension headers for the following entry.
@@ -33,10 +35,10 @@ pub(super) fn unpack<'a>(
     let mut extensions = Extensions::default();
     for entry in archive
         .entries()
-        .map_err(BundleError::on_read(""))?
+        .map_err(BundleError::from_read_error(""))?
         .raw(true)
     {
-        let mut entry = entry.map_err(BundleError::on_read(""))?;
+        let mut entry = entry.map_err(BundleError::from_read_error(""))?;
         budget.count_entry()?;
         let kind = entry.header().entry_type();
         match kind {
@@ -51,24 +53,27 @@ pub(super) fn unpack<'a>(
                 read_extension(&mut entry)?;
             }
             _ => {
-                let extended = std::mem::take(&mut extensions);
+                let entry_extensions = std::mem::take(&mut extensions);
                 let header = entry.header();
-                let path = extended
+                let path = entry_extensions
                     .path
                     .unwrap_or_else(|| header.path_bytes().into_owned());
-                let name = text(path)?;
-                if extended.is_sparse {
-                    return Err(sparse(&name));
+                let name = utf8_name(path)?;
+                if entry_extensions.is_sparse {
+                    return Err(sparse_error(&name));
                 }
                 // A size that does not fit into the header's field exceeds every limit. A different size would make
                 // readers disagree about the start of the next entry.
-                if extended.size.is_some_and(|size| size != entry.size()) {
+                if entry_extensions
+                    .size
+                    .is_some_and(|size| size != entry.size())
+                {
                     return Err(BundleError::Invalid(format!(
                         "the archive states a size outside of its header, near entry {name:?}"
                     )));
                 }
-                let mode = mode(header).map_err(BundleError::on_read(&name))?;
-                let link = extended.link;
+                let mode = mode_of(header).map_err(BundleError::from_read_error(&name))?;
+                let link = entry_extensions.link;
                 let link = link.or_else(|| header.link_name_bytes().map(|link| link.into_owned()));
                 match kind {
                     EntryType::Regular | EntryType::Continuous if name.ends_with('/') => {
@@ -81,8 +86,12 @@ pub(super) fn unpack<'a>(
                         count_rest(&name, &mut entry, budget)?;
                     }
                     EntryType::Directory => sink.folder(&name, mode)?,
-                    EntryType::Symlink => sink.link(&name, &text(link.unwrap_or_default())?)?,
-                    EntryType::Link => sink.hard_link(&name, &text(link.unwrap_or_default())?)?,
+                    EntryType::Symlink => {
+                        sink.link(&name, &utf8_name(link.unwrap_or_default())?)?
+                    }
+                    EntryType::Link => {
+                        sink.hard_link(&name, &utf8_name(link.unwrap_or_default())?)?
+                    }
                     EntryType::Char | EntryType::Block => {
                         // An empty field is 0.
                         let is_zero =
@@ -98,7 +107,7 @@ pub(super) fn unpack<'a>(
                         sink.special(&name, special)?;
                     }
                     EntryType::Fifo => sink.special(&name, Special::Pipe)?,
-                    EntryType::GNUSparse => return Err(sparse(&name)),
+                    EntryType::GNUSparse => return Err(sparse_error(&name)),
                     _ => return Err(unusable(&name, "of an unknown kind")),
                 }
             }
@@ -117,7 +126,7 @@ fn read_extension(entry: &mut tar::Entry<'_, impl Read>) -> Result<Vec<u8>, Bund
     let mut bytes = Vec::new();
     entry
         .read_to_end(&mut bytes)
-        .map_err(BundleError::on_read(""))?;
+        .map_err(BundleError::from_read_error(""))?;
     Ok(bytes)
 }
 
@@ -138,13 +147,13 @@ fn count_rest(name: &str, content: &mut impl Read, budget: &Budget<'_>) -> Resul
             Ok(0) => return Ok(()),
             Ok(read) => budget.count_content(name, read)?,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(BundleError::on_read(name)(error)),
+            Err(error) => return Err(BundleError::from_read_error(name)(error)),
         }
     }
 }
 
 /// The mode of an entry; the default if the field is empty.
-fn mode(header: &Header) -> io::Result<u32> {
+fn mode_of(header: &Header) -> io::Result<u32> {
     let is_empty = |field: &[u8]| field.iter().all(|byte| matches!(byte, 0 | b' '));
     if is_empty(&header.as_old().mode) {
         return Ok(0o644);
@@ -152,7 +161,7 @@ fn mode(header: &Header) -> io::Result<u32> {
     header.mode()
 }
 
-fn sparse(name: &str) -> BundleError {
+fn sparse_error(name: &str) -> BundleError {
     unusable(
         name,
         "a sparse file, whose holes are left out: write it in full (tar without --sparse)",
@@ -161,18 +170,18 @@ fn sparse(name: &str) -> BundleError {
 
 /// Reads pax records. Each is `LENGTH KEY=VALUE` and a newline; the length is that of the whole record, because values
 /// may contain newlines.
-fn read_pax(mut bytes: &[u8], found: &mut Extensions) -> Result<(), BundleError> {
+fn read_pax(mut bytes: &[u8], extensions: &mut Extensions) -> Result<(), BundleError> {
     while !bytes.is_empty() {
         let (key, value, rest) = pax_record(bytes).ok_or_else(|| {
             BundleError::Invalid("the archive is damaged: a malformed pax extension".to_owned())
         })?;
         bytes = rest;
         match key {
-            b"path" => found.path = Some(value.to_vec()),
-            b"linkpath" => found.link = Some(value.to_vec()),
+            b"path" => extensions.path = Some(value.to_vec()),
+            b"linkpath" => extensions.link = Some(value.to_vec()),
             // An invalid number becomes a size that no header has.
-            b"size" => found.size = Some(number(value).unwrap_or(u64::MAX)),
-            key if key.starts_with(b"GNU.sparse") => found.is_sparse = true,
+            b"size" => extensions.size = Some(number(value).unwrap_or(u64::MAX)),
+            key if key.starts_with(b"GNU.sparse") => extensions.is_sparse = true,
             _ => {}
         }
     }
@@ -195,7 +204,7 @@ fn number(digits: &[u8]) -> Option<u64> {
     std::str::from_utf8(digits).ok()?.parse().ok()
 }
 
-fn text(bytes: Vec<u8>) -> Result<String, BundleError> {
+fn utf8_name(bytes: Vec<u8>) -> Result<String, BundleError> {
     String::from_utf8(bytes).map_err(|error| {
         BundleError::Invalid(format!(
             "the archive has a name that is not UTF-8: {:?}",

@@ -1,3 +1,5 @@
+//! Writes the entries of an archive into a folder, as the files of a bundle.
+
 use super::{
     budget::Budget,
     entry::{FOLDER_MODE, add_hard_link, check_target, invalid, make_folder, unusable, write_new},
@@ -20,35 +22,35 @@ use std::{
 /// disk, and symbolic links are created last, so nothing can be written through a link.
 ///
 /// A folder is created when a file is put into it, or at the end. So an archive with too many folders is refused before
-/// any is created; removing them would be slower still.
+/// any is created; removing them would take even longer.
 pub(super) struct Tree<'a> {
-    into: PathBuf,
+    dir: PathBuf,
     budget: &'a Budget<'a>,
     plan: Plan,
 }
 
 impl<'a> Tree<'a> {
-    /// An empty tree in the folder `into`.
-    pub fn new(into: &Path, budget: &'a Budget<'a>) -> Result<Self, BundleError> {
-        fs::create_dir_all(into)?;
-        fs::set_permissions(into, Permissions::from_mode(FOLDER_MODE))?;
-        if fs::read_dir(into)?.next().is_some() {
-            let what = format!("unpacking into {}: it is not empty", into.display());
+    /// An empty tree in the folder `dir`.
+    pub fn new(dir: &Path, budget: &'a Budget<'a>) -> Result<Self, BundleError> {
+        fs::create_dir_all(dir)?;
+        fs::set_permissions(dir, Permissions::from_mode(FOLDER_MODE))?;
+        if fs::read_dir(dir)?.next().is_some() {
+            let what = format!("unpacking into {}: it is not empty", dir.display());
             return Err(io::Error::new(io::ErrorKind::DirectoryNotEmpty, what).into());
         }
         Ok(Self {
-            into: into.to_owned(),
+            dir: dir.to_owned(),
             budget,
             plan: Plan::new(budget.limits().files),
         })
     }
 
-    /// The plan, for checking an archive with a directory before anything is written.
+    /// The plan. If an archive has a directory (a list of its entries), it is checked with the plan before anything is written.
     pub fn plan_mut(&mut self) -> &mut Plan {
         &mut self.plan
     }
 
-    /// Resets the plan after that check: the entries come again with their contents.
+    /// Resets the plan after that check; then the entries are added again with their contents.
     pub fn reset_plan(&mut self) {
         self.plan = Plan::new(self.budget.limits().files);
     }
@@ -56,15 +58,15 @@ impl<'a> Tree<'a> {
     /// Creates the parent folders of `path`; returns its path on the disk.
     fn make_parents(&mut self, path: &str) -> Result<PathBuf, BundleError> {
         for folder in self.plan.missing_folders(path) {
-            make_folder(&self.into.join(&folder))?;
+            make_folder(&self.dir.join(&folder))?;
             self.plan.set_created(&folder);
         }
-        Ok(self.into.join(path))
+        Ok(self.dir.join(path))
     }
 
     /// The folder and its content, without finishing it as a bundle: symbolic links and empty folders are not created.
     pub fn into_parts(self) -> (PathBuf, BTreeMap<String, Node>) {
-        (self.into, self.plan.into_nodes())
+        (self.dir, self.plan.into_nodes())
     }
 
     /// The folder that contains `manifest`: the root (an empty path) or the single top-level folder.
@@ -73,8 +75,8 @@ impl<'a> Tree<'a> {
         if nodes.contains_key(manifest) {
             return Some(String::new());
         }
-        let mut top = nodes.iter().filter(|(path, _)| !path.contains('/'));
-        match (top.next(), top.next()) {
+        let mut top_level = nodes.iter().filter(|(path, _)| !path.contains('/'));
+        match (top_level.next(), top_level.next()) {
             (Some((folder, Node::Folder { .. })), None)
                 if nodes.contains_key(&format!("{folder}/{manifest}")) =>
             {
@@ -91,8 +93,8 @@ impl<'a> Tree<'a> {
         };
         let nodes = self.plan.nodes();
         let has = |path: &str| nodes.contains_key(path);
-        let mut tops = nodes.iter().filter(|(path, _)| !path.contains('/'));
-        let only_top = tops.next().filter(|_| tops.next().is_none());
+        let mut top_level = nodes.iter().filter(|(path, _)| !path.contains('/'));
+        let only_top = top_level.next().filter(|_| top_level.next().is_none());
         BundleError::Invalid(match only_top {
             _ if has(".dockerenv") || (has("etc") && has("usr") && !has("agent.toml")) => format!(
                 "{message}. This looks like the file system of a container (`docker export`): send its image, as \
@@ -124,12 +126,12 @@ impl<'a> Tree<'a> {
             } = node
             {
                 self.budget.check()?;
-                make_folder(&self.into.join(path))?;
+                make_folder(&self.dir.join(path))?;
             }
         }
         for (path, node) in nodes {
             if let Node::Link { target } = node {
-                symlink(target, self.into.join(path))?;
+                symlink(target, self.dir.join(path))?;
             }
         }
         Ok(())
@@ -137,7 +139,7 @@ impl<'a> Tree<'a> {
 }
 
 impl Sink for Tree<'_> {
-    /// Created by [`Tree::finish`], or with the first file in it.
+    /// The folder is created by [`Tree::finish`], or with the first file in it.
     fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
         self.plan.add_folder(entry, mode)
     }
@@ -148,7 +150,7 @@ impl Sink for Tree<'_> {
         write_new(entry, &path_on_disk, mode, content, self.budget)
     }
 
-    /// Checked and created by [`Tree::finish`].
+    /// The link is checked and created by [`Tree::finish`].
     fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         check_target(entry, target)?;
         self.plan.add_link(entry, target)
@@ -158,7 +160,7 @@ impl Sink for Tree<'_> {
     fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         let (existing, path) = self.plan.add_hard_link(entry, target)?;
         let path_on_disk = self.make_parents(&path)?;
-        add_hard_link(entry, &self.into.join(existing), &path_on_disk)
+        add_hard_link(entry, &self.dir.join(existing), &path_on_disk)
     }
 
     fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {

@@ -1,3 +1,5 @@
+//! Reads a zip archive, whose *central directory* at its end lists the entries, and writes them into a tree.
+
 use super::{
     budget::{Budget, MeteredReader},
     entry::unusable,
@@ -17,6 +19,7 @@ use zip::{
     unstable::read::ZipIterable,
 };
 
+/// The file type in a Unix mode.
 const KIND_MASK: u32 = 0o170_000;
 const KIND_FOLDER: u32 = 0o040_000;
 const KIND_FILE: u32 = 0o100_000;
@@ -39,7 +42,7 @@ enum Kind {
 }
 
 impl Header {
-    fn of(entry: &ZipFileEntry<'_>) -> Result<Self, BundleError> {
+    fn from_entry(entry: &ZipFileEntry<'_>) -> Result<Self, BundleError> {
         let name = std::str::from_utf8(entry.name_raw())
             .map_err(|_| {
                 BundleError::Invalid(format!(
@@ -86,13 +89,13 @@ impl Header {
 /// without any output.
 pub(super) fn unpack<'a>(
     file: BufReader<File>,
-    packed: u64,
+    packed_bytes: u64,
     tree: &mut Tree<'a>,
     budget: &'a Budget<'a>,
 ) -> Result<(), BundleError> {
     // Each byte is needed about once, and those of the directory once more for its check. Finding the directory behind
     // a prefix of the archive is a search. The allowance per entry covers the seeks of both passes.
-    budget.allow(3 * packed);
+    budget.allow(3 * packed_bytes);
     let file = MeteredReader::new(file, budget);
     let mut archive =
         ZipIterable::try_new(file, Config::default()).map_err(|error| damaged("", error))?;
@@ -102,7 +105,7 @@ pub(super) fn unpack<'a>(
     let files = archive.files().map_err(|error| damaged("", error))?;
     while let Some(entry) = files.next() {
         let entry = entry.map_err(|error| damaged("", error))?;
-        let Header { name, mode, kind } = Header::of(&entry)?;
+        let Header { name, mode, kind } = Header::from_entry(&entry)?;
         let mut content = entry
             .with_reader(files.reader_mut(), ZipReadOptions::new())
             .map_err(|error| damaged(&name, error))?;
@@ -114,7 +117,7 @@ pub(super) fn unpack<'a>(
                 (&mut content)
                     .take(LINK_MAX_BYTES)
                     .read_to_end(&mut target)
-                    .map_err(BundleError::on_read(&name))?;
+                    .map_err(BundleError::from_read_error(&name))?;
                 let target = String::from_utf8(target)
                     .map_err(|_| unusable(&name, "a link to a name that is not UTF-8"))?;
                 tree.link(&name, &target)?;
@@ -134,7 +137,7 @@ fn check_directory<R: Read + Seek>(
     for entry in archive.files().map_err(|error| damaged("", error))? {
         let entry = entry.map_err(|error| damaged("", error))?;
         budget.count_entry()?;
-        let Header { name, mode, kind } = Header::of(&entry)?;
+        let Header { name, mode, kind } = Header::from_entry(&entry)?;
         match kind {
             Kind::Folder => plan.add_folder(&name, mode)?,
             Kind::File => {
@@ -150,7 +153,7 @@ fn check_directory<R: Read + Seek>(
 
 fn damaged(entry: &str, error: ZipError) -> BundleError {
     match error {
-        ZipError::Io(error) => BundleError::on_read(entry)(error),
+        ZipError::Io(error) => BundleError::from_read_error(entry)(error),
         other if entry.is_empty() => {
             BundleError::Invalid(format!("the archive is damaged: {other}"))
         }

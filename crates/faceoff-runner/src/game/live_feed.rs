@@ -14,7 +14,7 @@ pub trait LiveFeedSink {
     /// Receives the events since the last call, immediately, and the current positions. Without events it is called
     /// at the interval [`POSITION_INTERVAL`]. The game waits for the call.
     fn receive(&mut self, events: Vec<LiveEvent>, position: LivePosition);
-    /// As [`GameObserver::cancelled`].
+    /// Should the game stop? See [`GameObserver::cancelled`].
     fn cancelled(&self) -> bool;
 }
 
@@ -22,11 +22,12 @@ pub trait LiveFeedSink {
 pub struct LiveFeed<'a> {
     sink: &'a mut dyn LiveFeedSink,
     position_interval: Duration,
-    sent_at: Option<Instant>,
+    last_sent_at: Option<Instant>,
     /// Control step of the game at which the rally began.
-    rally_begun_at: u32,
+    rally_start_step: u32,
+    /// Number of faults of each side so far.
     faults: [u32; 2],
-    last: LivePosition,
+    last_position: LivePosition,
 }
 
 impl<'a> LiveFeed<'a> {
@@ -35,10 +36,10 @@ impl<'a> LiveFeed<'a> {
         Self {
             sink,
             position_interval,
-            sent_at: None,
-            rally_begun_at: 0,
+            last_sent_at: None,
+            rally_start_step: 0,
             faults: [0; 2],
-            last: LivePosition {
+            last_position: LivePosition {
                 step: 0,
                 puck: [0.0; 3],
                 mallets: [[0.0; 2]; 2],
@@ -62,48 +63,48 @@ impl<'a> LiveFeed<'a> {
     }
 
     fn send(&mut self, events: Vec<LiveEvent>) {
-        self.sink.receive(events, self.last);
-        self.sent_at = Some(Instant::now());
+        self.sink.receive(events, self.last_position);
+        self.last_sent_at = Some(Instant::now());
     }
 }
 
 impl GameObserver for LiveFeed<'_> {
     fn on_rally_start(&mut self, start: &RallyStart<'_>) {
-        self.rally_begun_at = start.game_step;
-        self.last = position(start.game_step, start.state);
+        self.rally_start_step = start.game_step;
+        self.last_position = position(start.game_step, start.state);
         let restarted = Side::BOTH
             .into_iter()
             .zip(start.entries)
             .filter(|(_, entry)| start.rally > 0 && has_started(entry))
             .map(|(side, _)| GameEvent::Restarted { side });
-        let begun = GameEvent::RallyBegun {
+        let rally_begun = GameEvent::RallyBegun {
             rally: start.rally,
             serves: start.serves,
         };
         let step = start.game_step;
-        let all = restarted.chain([begun]);
-        self.send(all.map(|event| LiveEvent { step, event }).collect());
+        let events = restarted.chain([rally_begun]);
+        self.send(events.map(|event| LiveEvent { step, event }).collect());
     }
 
     fn on_step(&mut self, row: &GameStepRow<'_>) {
-        self.last = position(row.game_step + 1, row.state);
+        self.last_position = position(row.game_step + 1, row.state);
         let is_due = self
-            .sent_at
-            .is_none_or(|sent_at| sent_at.elapsed() >= self.position_interval);
+            .last_sent_at
+            .is_none_or(|last_sent_at| last_sent_at.elapsed() >= self.position_interval);
         if is_due {
             self.send(Vec::new());
         }
     }
 
     fn on_rally_end(&mut self, row: &RallyRow<'_>) {
-        let step = self.rally_begun_at + row.steps;
-        let mut all = Vec::new();
+        let step = self.rally_start_step + row.steps;
+        let mut events = Vec::new();
         for (side, fault) in Side::BOTH.into_iter().zip(row.faults) {
             if let Some(fault) = fault {
                 let count = &mut self.faults[side.index()];
                 *count += 1;
-                all.push(LiveEvent {
-                    step: self.rally_begun_at + fault.step.unwrap_or(0),
+                events.push(LiveEvent {
+                    step: self.rally_start_step + fault.step.unwrap_or(0),
                     event: GameEvent::Fault {
                         side,
                         count: *count,
@@ -112,8 +113,8 @@ impl GameObserver for LiveFeed<'_> {
             }
         }
         let event = ending_event(row);
-        all.extend(event.map(|event| LiveEvent { step, event }));
-        self.send(all);
+        events.extend(event.map(|event| LiveEvent { step, event }));
+        self.send(events);
     }
 
     fn cancelled(&self) -> bool {

@@ -1,5 +1,5 @@
-//! Runs both sides of a game in lock-step. Both sides get their question before the evaluator waits for either, and
-//! neither can affect the other's clock. If both share CPUs, a side that has answered is frozen until its next
+//! Runs both sides of a game in *lock-step*: both get their question before the evaluator waits for either answer, and neither can affect
+//! the measured time of the other. If both share CPUs, a side that has answered is frozen until its next
 //! question, because it would otherwise compute in the other's time.
 
 use super::side_player::SidePlayer;
@@ -9,10 +9,11 @@ use faceoff_sandbox::{Layer, SandboxError};
 use faceoff_types::{Side, TimeLimits};
 use std::time::{Duration, Instant};
 
-/// If handling one side takes longer than this, it counts as absence of the evaluator for the other side.
+/// If handling one side takes longer than this, the time counts as *absence* of the evaluator for the other side, which is not charged
+/// for it.
 const MIN_ABSENCE: Duration = Duration::from_millis(1);
 
-/// Handling of a side that has answered before the other one.
+/// What happens to a side that has answered before the other one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum AfterAnswer {
     /// It has its own CPUs and continues.
@@ -44,7 +45,7 @@ pub(super) fn play<S: GameSink>(
             freeze_idle(side, after_answer);
         }
         for calibration in &mut *calibrations {
-            calibration.between_episodes()?;
+            calibration.measure_between_episodes()?;
         }
     }
     for side in sides {
@@ -62,20 +63,23 @@ fn start_rally<S: GameSink>(
     let rally = game.rally();
     let [first, second] = sides;
     freeze_idle(second, after_answer);
-    let first_started = first.start()?;
+    let first_start = first.start()?;
     freeze_idle(first, after_answer);
-    let second_started = second.start()?;
+    let second_start = second.start()?;
     if after_answer == AfterAnswer::Freeze && !(first.can_freeze() && second.can_freeze()) {
-        return Err(no_freezer().into());
+        return Err(missing_freezer_error().into());
     }
     ask_both(sides, |_, player| {
         player.ask(|session| session.send_reset(rally))
     })?;
     wait_for_both(sides, after_answer)?;
     let [first, second] = sides;
-    let entries = [first.entry(first_started), second.entry(second_started)];
+    let entries = [
+        first.rally_entry(first_start),
+        second.rally_entry(second_start),
+    ];
     game.start_rally(entries)?;
-    end_faulty(game, sides);
+    kill_faulty_agents(game, sides);
     Ok(())
 }
 
@@ -102,12 +106,12 @@ fn step<S: GameSink>(
     wait_for_both(sides, after_answer)?;
     let [first, second] = &*sides;
     game.answer([first.response(), second.response()])?;
-    end_faulty(game, sides);
+    kill_faulty_agents(game, sides);
     Ok(())
 }
 
 /// Kills the running processes of sides with a fault in this rally.
-fn end_faulty<S: GameSink>(game: &RunningGame<S>, sides: &mut [SidePlayer<'_>; 2]) {
+fn kill_faulty_agents<S: GameSink>(game: &RunningGame<S>, sides: &mut [SidePlayer<'_>; 2]) {
     for (side, player) in Side::BOTH.into_iter().zip(sides) {
         if let Some(fault) = game.fault(side)
             && !player.is_fault_logged()
@@ -124,9 +128,9 @@ fn ask_both(
 ) -> Result<(), PlatformFault> {
     let [first, second] = sides;
     ask(Side::First, first)?;
-    let before = Instant::now();
+    let started_at = Instant::now();
     ask(Side::Second, second)?;
-    record_absence(first, before);
+    record_absence(first, started_at);
     Ok(())
 }
 
@@ -141,8 +145,11 @@ fn wait_for_both(
             (None, None) => return Ok(()),
             (Some(_), None) => wait_for_last(first, second, after_answer)?,
             (None, Some(_)) => wait_for_last(second, first, after_answer)?,
-            (Some(a), Some(b)) => {
-                Session::wait_for_any(&[a, b], Instant::now() + TimeLimits::MAX_WAIT)?;
+            (Some(first_session), Some(second_session)) => {
+                Session::wait_for_any(
+                    &[first_session, second_session],
+                    Instant::now() + TimeLimits::MAX_WAIT,
+                )?;
                 poll_side(first, second)?;
                 poll_side(second, first)?;
             }
@@ -170,7 +177,7 @@ fn wait_for_last(
     late.poll(Instant::now() + TimeLimits::MAX_WAIT)
 }
 
-fn no_freezer() -> SandboxError {
+fn missing_freezer_error() -> SandboxError {
     SandboxError::Unavailable {
         layer: Layer::CgroupCpu,
         reason: "the agents of a game share CPUs here, so that an agent that has answered must be frozen until its \
@@ -183,14 +190,15 @@ fn no_freezer() -> SandboxError {
 /// Checks one side for its answer. Diagnosing the exit of an agent may take seconds, which must not count for the
 /// other side.
 fn poll_side(polled: &mut SidePlayer<'_>, other: &mut SidePlayer<'_>) -> Result<(), PlatformFault> {
-    let before = Instant::now();
-    polled.poll(before)?;
-    record_absence(other, before);
+    let started_at = Instant::now();
+    polled.poll(started_at)?;
+    record_absence(other, started_at);
     Ok(())
 }
 
-fn record_absence(other: &mut SidePlayer<'_>, since: Instant) {
-    let absence = since.elapsed();
+/// Records the time since `started_at` as absence of the evaluator for the side `other`.
+fn record_absence(other: &mut SidePlayer<'_>, started_at: Instant) {
+    let absence = started_at.elapsed();
     if absence > MIN_ABSENCE {
         other.add_absence(absence);
     }

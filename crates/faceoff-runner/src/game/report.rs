@@ -1,3 +1,5 @@
+//! Runs a whole game, records it, and reports its result.
+
 use super::{
     lock_step::{self, AfterAnswer},
     side_player::SidePlayer,
@@ -37,13 +39,14 @@ pub trait GameObserver {
 pub struct GameReport {
     /// Score, outcome and the archives' hashes.
     pub archives: GameArchives,
-    /// Timing noise of the slot for each side.
+    /// Timing noise of the worker's slot, measured on the CPUs of each side.
     pub calibration: GameCalibration,
     /// The ends of both agents' standard error, with their faults.
     pub logs: [String; 2],
 }
 
-const TABLES: &str = "tables.partial";
+/// Folder of the tables while they are written.
+const TABLES_FOLDER: &str = "tables.partial";
 
 /// Runs a game and records it in the folder `out`, which is created: `game.zip`, and `side-1.zip` and
 /// `side-2.zip` for the teams. In all arrays the first side comes first.
@@ -73,16 +76,16 @@ pub fn run_game_monitored(
     observer: &mut dyn GameObserver,
     monitors: [&dyn InterferenceMonitor; 2],
 ) -> Result<GameReport, PlatformFault> {
-    let clear =
+    let remove_old_files =
         || remove_game(out).map_err(PlatformFault::io(format!("clearing {}", out.display())));
-    clear()?;
-    let tables = out.join(TABLES);
+    remove_old_files()?;
+    let tables = out.join(TABLES_FOLDER);
     let report = record(spec, bundles, envs, out, &tables, observer, monitors);
     if report.is_err() {
         if let Err(error) = fs::remove_dir_all(&tables) {
             tracing::debug!(%error, "a failed game has left no tables to remove");
         }
-        if let Err(error) = clear() {
+        if let Err(error) = remove_old_files() {
             tracing::warn!(%error, "the files of a failed game could not be removed");
         }
     }
@@ -142,9 +145,15 @@ pub fn play_game<S: GameSink>(
         spec.mismatch_seed,
     );
     let mut sides = Side::BOTH.map(|side| {
-        let at = side.index();
+        let index = side.index();
         let restart_s = spec.limits.restart_s;
-        SidePlayer::new(side, bundles[at], envs[at], restart_s, monitors[at])
+        SidePlayer::new(
+            side,
+            bundles[index],
+            envs[index],
+            restart_s,
+            monitors[index],
+        )
     });
     let observed = ObservedSink {
         sink,

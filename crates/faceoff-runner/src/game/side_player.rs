@@ -1,3 +1,5 @@
+//! One *side* of a game, as the evaluator drives it: an agent's process, its questions and its faults.
+
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
@@ -22,9 +24,10 @@ pub(super) struct SidePlayer<'a> {
     /// `None` before its first rally and after a fault.
     session: Option<Session<'a>>,
     was_started: bool,
-    /// Its fault in this rally is in the log.
+    /// Is its fault in this rally in the log?
     is_fault_logged: bool,
-    asked: Instant,
+    /// Time of the last question.
+    asked_at: Instant,
     /// Result of the last question; `None` while its answer is pending, or if there is no question.
     result: Option<Result<AnswerTiming, SideFailure>>,
     /// The wait for the missing answer, if a timeout ended the agent.
@@ -50,7 +53,7 @@ pub(super) enum StartResult {
 impl SideFailure {
     /// Separates agent faults from platform faults. A missing answer due to host interference is a platform fault: the
     /// game is run again.
-    fn new(error: SessionError, asked: Instant) -> Result<Self, PlatformFault> {
+    fn new(error: SessionError, asked_at: Instant) -> Result<Self, PlatformFault> {
         let failure = |kind, line, wait: Option<WaitBreakdown>| Self {
             fault: SideFault { kind, line },
             timing: match &wait {
@@ -60,7 +63,7 @@ impl SideFailure {
                     cpu_time_s: wait.cpu_time_s,
                 },
                 None => AnswerTiming {
-                    computation_time_s: asked.elapsed().as_secs_f64(),
+                    computation_time_s: asked_at.elapsed().as_secs_f64(),
                     host_time_s: 0.0,
                     cpu_time_s: None,
                 },
@@ -100,7 +103,7 @@ impl<'a> SidePlayer<'a> {
             session: None,
             was_started: false,
             is_fault_logged: false,
-            asked: Instant::now(),
+            asked_at: Instant::now(),
             result: None,
             wait: None,
             log: Log::new(env.limits.stderr_tail_bytes),
@@ -121,7 +124,7 @@ impl<'a> SidePlayer<'a> {
         };
         self.was_started = true;
         self.result = None;
-        let begun = Instant::now();
+        let started_at = Instant::now();
         let agent_task = AgentTask::Game { side: self.side };
         match Session::start_monitored(self.bundle, env, agent_task, self.monitor) {
             Ok(session) => {
@@ -130,7 +133,7 @@ impl<'a> SidePlayer<'a> {
                 Ok(StartResult::Ready { startup_s })
             }
             Err((error, stderr)) => {
-                let failure = SideFailure::new(error, begun)?;
+                let failure = SideFailure::new(error, started_at)?;
                 self.log.add(&stderr, None);
                 self.wait = failure.wait;
                 Ok(StartResult::Failed {
@@ -146,13 +149,13 @@ impl<'a> SidePlayer<'a> {
         &mut self,
         question: impl FnOnce(&mut Session<'_>) -> Result<(), SessionError>,
     ) -> Result<(), PlatformFault> {
-        self.asked = Instant::now();
+        self.asked_at = Instant::now();
         self.result = None;
         let Some(session) = &mut self.session else {
             return Ok(());
         };
         if let Err(error) = question(session) {
-            self.result = Some(Err(SideFailure::new(error, self.asked)?));
+            self.result = Some(Err(SideFailure::new(error, self.asked_at)?));
         }
         Ok(())
     }
@@ -164,18 +167,18 @@ impl<'a> SidePlayer<'a> {
             .filter(|session| self.result.is_none() && session.is_pending())
     }
 
-    /// Waits for the pending answer until `until`.
-    pub fn poll(&mut self, until: Instant) -> Result<(), PlatformFault> {
+    /// Waits for the pending answer until `deadline`.
+    pub fn poll(&mut self, deadline: Instant) -> Result<(), PlatformFault> {
         let Some(session) = &mut self.session else {
             return Ok(());
         };
-        match session.poll(until) {
+        match session.poll(deadline) {
             Ok(None) => {}
             Ok(Some(timing)) => {
                 self.longest_stall_s = self.longest_stall_s.max(timing.host_time_s);
                 self.result = Some(Ok(timing));
             }
-            Err(error) => self.result = Some(Err(SideFailure::new(error, self.asked)?)),
+            Err(error) => self.result = Some(Err(SideFailure::new(error, self.asked_at)?)),
         }
         Ok(())
     }
@@ -194,16 +197,16 @@ impl<'a> SidePlayer<'a> {
         self.session.as_ref().is_none_or(Session::can_freeze)
     }
 
-    /// Adds time in which the evaluator was busy elsewhere.
+    /// Adds time in which the evaluator was busy with the other side.
     pub fn add_absence(&mut self, absence: Duration) {
         if let Some(session) = &mut self.session {
             session.add_absence(absence);
         }
     }
 
-    /// Entry of this side into the rally, after the answer to its reset.
-    pub fn entry(&mut self, started: StartResult) -> RallyEntry {
-        let startup_s = match started {
+    /// How this side got ready for the rally; called after the answer to its reset.
+    pub fn rally_entry(&mut self, start: StartResult) -> RallyEntry {
+        let startup_s = match start {
             StartResult::Ready { startup_s } => startup_s,
             StartResult::Failed { startup_s, fault } => {
                 return RallyEntry::StartFailed { startup_s, fault };

@@ -107,7 +107,7 @@ pub fn sandboxed() -> AgentEnvironment {
             ..TimeLimits::default()
         },
         isolation: Isolation::Sandboxed {
-            given_up: Vec::new(),
+            disabled_layers: Vec::new(),
         },
         runtimes: BTreeMap::from([
             ("native".to_owned(), Runtime::native()),

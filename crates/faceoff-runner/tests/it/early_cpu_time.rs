@@ -13,7 +13,7 @@ use faceoff_types::Task;
 /// The agent and the evaluator share one CPU.
 fn on_last_cpu() -> AgentEnvironment {
     let mut env = sandboxed();
-    env.agent_cpus = vec![*affinity::allowed().unwrap().last().unwrap()];
+    env.agent_cpus = vec![*affinity::allowed_cpus().unwrap().last().unwrap()];
     env
 }
 

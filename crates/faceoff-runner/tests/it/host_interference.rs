@@ -304,7 +304,7 @@ fn busy_s(cpu: usize) -> Option<f64> {
 #[test]
 fn event_storms_of_the_agent_are_not_host_interference() {
     let out = tempfile::tempdir().unwrap();
-    let cpu = *affinity::allowed().unwrap().last().unwrap();
+    let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
     for (name, storm) in STORMS {
         let agent = Agent::with(&format!(
             "import ctypes, signal, threading\n\
@@ -406,7 +406,7 @@ impl Drop for BusyLoops {
 #[test]
 fn other_load_on_the_agents_cpu_is_measured() {
     let out = tempfile::tempdir().unwrap();
-    let cpu = *affinity::allowed().unwrap().last().unwrap();
+    let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
     let mut env = sandboxed();
     env.agent_cpus = vec![cpu];
     // The agent gets only a part of the CPU, and each of its steps needs 0.1 s of CPU time.
@@ -455,7 +455,7 @@ const HELPERS: [(&str, &str); 4] = [
 
 #[test]
 fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
-    let cpu = *affinity::allowed().unwrap().last().unwrap();
+    let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
     for (name, body) in HELPERS {
         let agent = Agent::with(&format!(
             "def help():\n        {body}\n\

@@ -56,7 +56,7 @@ fn unsupported_image_is_refused_with_a_reason() {
     for isolation in [
         Isolation::None,
         Isolation::Sandboxed {
-            given_up: vec![Layer::Namespaces],
+            disabled_layers: vec![Layer::Namespaces],
         },
     ] {
         let mut unsupported = sandboxed();

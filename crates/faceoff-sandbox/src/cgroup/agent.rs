@@ -1,4 +1,4 @@
-//! The cgroup of one agent in all needed hierarchies.
+//! The cgroup of one agent: one folder (*leaf*) in each hierarchy that has a needed controller.
 
 use super::{
     files,
@@ -9,7 +9,7 @@ use super::{
 use crate::{
     Isolation, Layer, Limits, SandboxError,
     affinity::{self, cpu_list},
-    cpu_accounting::{CpuAccounting, RunTime},
+    cpu_accounting::{CpuAccounting, RunTimeFiles},
     error::IoContext,
 };
 use rustix::process::Pid;
@@ -20,7 +20,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Period of the CPU quota. It bounds how long an agent over its quota is throttled: half a control step.
+/// Period of the CPU quota, and so the longest time for which an agent over its quota is throttled: half a control step (20 ms).
 const CPU_PERIOD_US: u64 = 10_000;
 /// The kernel charges memory in batches, so the peak may stay this far below the limit.
 const PEAK_SLACK_BYTES: u64 = 1 << 20;
@@ -39,15 +39,19 @@ pub(crate) enum LimitHit {
 /// The cgroup of one agent. [`AgentCgroup::remove`] or drop kills its processes and removes it.
 #[derive(Debug)]
 pub(crate) struct AgentCgroup {
+    /// All folders.
     leaves: Vec<PathBuf>,
+    /// The folder with the memory limit.
     memory: Option<(Version, PathBuf)>,
+    /// The folder with the limit of processes.
     pids: Option<PathBuf>,
-    /// The cgroup with the CPU quota.
+    /// The folder with the CPU quota.
     cpu: Option<(Version, PathBuf)>,
+    /// The counter of the tree's CPU time.
     cpu_usage: Option<(Version, File)>,
     /// Accounting of other run time on its CPUs; `None` if the host has no such counters.
     pub(crate) cpu_accounting: Option<CpuAccounting>,
-    /// A cpuset confines the tree to its CPUs, whatever affinity it requests.
+    /// Does a cpuset confine the tree to its CPUs, whatever affinity it requests?
     pub(crate) confines_cpus: bool,
     /// `None` if the host has no usable freezer.
     freezer: Option<Freezer>,
@@ -65,11 +69,11 @@ impl AgentCgroup {
             (Layer::CgroupPids, "pids"),
             (Layer::CgroupCpu, "cpu"),
         ];
-        let wanted: Vec<_> = layers
+        let enforced: Vec<_> = layers
             .into_iter()
             .filter(|(layer, _)| isolation.enforces(*layer))
             .collect();
-        if wanted.is_empty() {
+        if enforced.is_empty() {
             return Ok(None);
         }
         let hierarchies = Hierarchies::read()?;
@@ -84,31 +88,35 @@ impl AgentCgroup {
             freezer: None,
         };
         // Controllers that share a v2 hierarchy are enabled together.
-        let all: Vec<&str> = wanted.iter().map(|(_, controller)| *controller).collect();
+        let all_controllers: Vec<&str> =
+            enforced.iter().map(|(_, controller)| *controller).collect();
         let name = leaf_name();
-        for (layer, controller) in wanted {
+        for (layer, controller) in enforced {
             let unavailable = |reason: String| SandboxError::Unavailable { layer, reason };
             let hierarchy = hierarchies.find(controller).ok_or_else(|| {
                 unavailable(format!(
                     "no cgroup hierarchy with the controller {controller} is mounted"
                 ))
             })?;
-            let together: Vec<&str> = if hierarchy.version == Version::V2 {
-                all.iter()
+            let shared_controllers: Vec<&str> = if hierarchy.version == Version::V2 {
+                all_controllers
+                    .iter()
                     .copied()
                     .filter(|name| hierarchies.find(name).as_ref() == Some(&hierarchy))
                     .collect()
             } else {
                 vec![controller]
             };
-            let leaf = group.leaf(&hierarchy, &together, &name).map_err(|error| {
-                unavailable(format!(
-                    "cannot make a cgroup in {}: {error}",
-                    hierarchy.service_dir.display()
-                ))
-            })?;
+            let leaf = group
+                .leaf(&hierarchy, &shared_controllers, &name)
+                .map_err(|error| {
+                    unavailable(format!(
+                        "cannot make a cgroup in {}: {error}",
+                        hierarchy.service_dir.display()
+                    ))
+                })?;
             group
-                .limit(layer, hierarchy.version, &leaf, limits)
+                .set_limit(layer, hierarchy.version, &leaf, limits)
                 .map_err(|error| unavailable(error.to_string()))?;
         }
         group.measure_cpu(&hierarchies, &name, cpus);
@@ -163,7 +171,8 @@ impl AgentCgroup {
         ))
     }
 
-    fn limit(
+    /// Writes the limit of `layer` into the leaf.
+    fn set_limit(
         &mut self,
         layer: Layer,
         version: Version,
@@ -238,30 +247,30 @@ impl AgentCgroup {
         };
         let run_time = match hierarchy.version {
             Version::V1 => {
-                const EACH: &str = "cpuacct.usage_percpu";
-                open(hierarchy.mount_point.join(EACH))
-                    .zip(open(leaf.join(EACH)))
-                    .map(|(all, agent)| RunTime::PerCpu { all, agent })
+                const USAGE_PER_CPU: &str = "cpuacct.usage_percpu";
+                open(hierarchy.mount_point.join(USAGE_PER_CPU))
+                    .zip(open(leaf.join(USAGE_PER_CPU)))
+                    .map(|(all, agent)| RunTimeFiles::PerCpu { all, agent })
             }
-            Version::V2 => open(leaf.join(file)).map(|agent| RunTime::Whole { agent }),
+            Version::V2 => open(leaf.join(file)).map(|agent| RunTimeFiles::Whole { agent }),
         };
-        let limited = self.cpu.as_ref().map(|(_, leaf)| leaf.join("cpu.stat"));
+        let cpu_stat_path = self.cpu.as_ref().map(|(_, leaf)| leaf.join("cpu.stat"));
         self.cpu_accounting = run_time
             .filter(|_| !cpus.is_empty())
             .map(|run_time| CpuAccounting {
                 cpus,
                 run_time,
-                throttled: limited.and_then(open),
+                throttled: cpu_stat_path.and_then(open),
             });
     }
 
     /// Confines the tree to `cpus` by a cpuset; returns whether the host offers one.
     fn confine_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> bool {
-        let before = self.leaves.len();
+        let first_new_leaf = self.leaves.len();
         let is_confined = self.set_cpus(hierarchies, name, cpus).is_some();
         if !is_confined {
             // No process can enter an incomplete cpuset.
-            for leaf in self.leaves.drain(before..) {
+            for leaf in self.leaves.drain(first_new_leaf..) {
                 remove_leaf(&leaf);
             }
         }

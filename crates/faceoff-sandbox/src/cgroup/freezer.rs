@@ -17,6 +17,7 @@ pub(crate) struct Freezer {
     weight: Option<Weight>,
 }
 
+/// The CPU weight of a cgroup: its share of a CPU that others want as well.
 #[derive(Debug)]
 struct Weight {
     file: File,
@@ -55,7 +56,7 @@ impl Freezer {
     ) -> Option<Self> {
         let state = fs::OpenOptions::new()
             .write(true)
-            .open(leaf.join(file(version)))
+            .open(leaf.join(state_file(version)))
             .ok()?;
         Some(Self {
             version,
@@ -64,7 +65,7 @@ impl Freezer {
         })
     }
 
-    /// Returns whether the kernel accepted it.
+    /// Freezes the cgroup; returns whether the kernel accepted the request.
     pub(crate) fn freeze(&self) -> bool {
         if let Some(weight) = &self.weight {
             weight.set(weight.least);
@@ -75,7 +76,7 @@ impl Freezer {
         })
     }
 
-    /// Returns whether the kernel accepted it. Has no effect on a tree that is not frozen.
+    /// Thaws the cgroup, if it is frozen; returns whether the kernel accepted the request.
     pub(crate) fn thaw(&self) -> bool {
         let thawed = self.set(match self.version {
             Version::V1 => "THAWED",
@@ -99,14 +100,15 @@ impl Freezer {
 /// Thaws the agents of a dead service, so that they can die.
 pub(super) fn thaw_leaf(leaf: &Path) {
     for (version, state) in [(Version::V1, "THAWED"), (Version::V2, "0")] {
-        let file = leaf.join(file(version));
+        let file = leaf.join(state_file(version));
         if file.exists() {
             let _ = fs::write(file, state);
         }
     }
 }
 
-const fn file(version: Version) -> &'static str {
+/// The file by which a cgroup is frozen.
+const fn state_file(version: Version) -> &'static str {
     match version {
         Version::V1 => "freezer.state",
         Version::V2 => "cgroup.freeze",

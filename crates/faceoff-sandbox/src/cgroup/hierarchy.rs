@@ -1,4 +1,5 @@
-//! Cgroup hierarchies of the host: where each controller is mounted, and where the service can create cgroups.
+//! Cgroup hierarchies of the host. A *controller* limits one resource, such as memory; a *hierarchy* is a mounted tree of cgroups with
+//! one or more controllers. This module finds them, and the place where the service can create cgroups.
 
 use super::files;
 use crate::{SandboxError, error::IoContext};
@@ -39,7 +40,7 @@ pub(super) struct Hierarchy {
 }
 
 /// Name of the folder for agents in the service's cgroup.
-pub(super) const FOLDER: &str = "faceoff";
+pub(super) const AGENTS_FOLDER: &str = "faceoff";
 /// Name of the cgroup to which the service itself moves, because in v2 inner cgroups must not contain processes.
 const SERVICE_LEAF: &str = "faceoff-service";
 
@@ -88,7 +89,7 @@ impl Hierarchy {
 
     /// Creates the folder for agents and enables `controllers` in it.
     pub(super) fn prepare_folder(&self, controllers: &[&str]) -> io::Result<PathBuf> {
-        let folder = self.service_dir.join(FOLDER);
+        let folder = self.service_dir.join(AGENTS_FOLDER);
         if self.version == Version::V2 {
             self.delegate(&self.service_dir, controllers)?;
         }
@@ -113,7 +114,7 @@ impl Hierarchy {
         Ok(folder)
     }
 
-    /// v2: enables `controllers` for the children of `dir`.
+    /// Version 2 only: enables `controllers` for the children of `dir`.
     fn delegate(&self, dir: &Path, controllers: &[&str]) -> io::Result<()> {
         let offered = files::read(&dir.join("cgroup.controllers"))?;
         if let Some(missing) = controllers.iter().find(|name| !has_word(&offered, name)) {
@@ -153,7 +154,7 @@ impl Hierarchy {
     }
 }
 
-/// v2: moves the processes of the service's own cgroup into a child cgroup beside the agents' folder.
+/// Version 2 only: moves the processes of the service's own cgroup into a child cgroup beside the agents' folder.
 fn move_processes_out(dir: &Path) -> io::Result<()> {
     let processes = files::processes(dir);
     if processes.is_empty() {
@@ -177,7 +178,8 @@ fn move_processes_out(dir: &Path) -> io::Result<()> {
 /// The host's hierarchies, read once per agent.
 pub(super) struct Hierarchies {
     mountinfo: String,
-    own: String,
+    own_cgroups: String,
+    /// Cache of [`Self::find`].
     found: RefCell<BTreeMap<String, Option<Hierarchy>>>,
 }
 
@@ -187,7 +189,7 @@ impl Hierarchies {
             |path: &str| fs::read_to_string(path).context(format_args!("cannot read {path}"));
         Ok(Self {
             mountinfo: read("/proc/self/mountinfo")?,
-            own: read("/proc/self/cgroup")?,
+            own_cgroups: read("/proc/self/cgroup")?,
             found: RefCell::default(),
         })
     }
@@ -196,7 +198,7 @@ impl Hierarchies {
         let mut found = self.found.borrow_mut();
         found
             .entry(controller.to_owned())
-            .or_insert_with(|| Hierarchy::find(controller, &self.mountinfo, &self.own))
+            .or_insert_with(|| Hierarchy::find(controller, &self.mountinfo, &self.own_cgroups))
             .clone()
     }
 }
@@ -216,25 +218,25 @@ struct Mount<'a> {
 
 impl<'a> Mount<'a> {
     fn parse(line: &'a str) -> Option<Self> {
-        let (before, after) = line.split_once(" - ")?;
-        let mut before = before.split(' ').skip(3);
-        let mut after = after.split(' ');
+        let (mount_fields, filesystem_fields) = line.split_once(" - ")?;
+        let mut mount_fields = mount_fields.split(' ').skip(3);
+        let mut filesystem_fields = filesystem_fields.split(' ');
         Some(Self {
-            root: before.next()?,
-            point: before.next()?,
-            filesystem: after.next()?,
-            options: after.nth(1)?,
+            root: mount_fields.next()?,
+            point: mount_fields.next()?,
+            filesystem: filesystem_fields.next()?,
+            options: filesystem_fields.nth(1)?,
         })
     }
 
     /// The host path of the cgroup that the kernel names `cgroup`. A container may mount only its own part, or see a
     /// name from outside of it.
     fn resolve(&self, cgroup: &str) -> PathBuf {
-        let inside = Path::new(cgroup)
+        let relative = Path::new(cgroup)
             .strip_prefix(self.root)
             .unwrap_or(Path::new(""));
-        let path = Path::new(self.point).join(inside.strip_prefix("/").unwrap_or(inside));
-        if path.is_dir() || inside.as_os_str().is_empty() {
+        let path = Path::new(self.point).join(relative.strip_prefix("/").unwrap_or(relative));
+        if path.is_dir() || relative.as_os_str().is_empty() {
             path
         } else {
             self.point.into()

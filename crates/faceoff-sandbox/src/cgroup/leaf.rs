@@ -1,4 +1,4 @@
-//! The folder of one agent in one hierarchy: name and removal.
+//! The folder (*leaf*) of one agent in one cgroup hierarchy: its name and its removal.
 
 use super::{files, freezer::thaw_leaf};
 use crate::owner::Owner;
@@ -11,12 +11,12 @@ use std::{
 };
 
 pub(super) const LEAF_PREFIX: &str = "agent-";
-static NEXT: AtomicU64 = AtomicU64::new(0);
+static NEXT_NUMBER: AtomicU64 = AtomicU64::new(0);
 
 /// Kills the processes of `leaf`, waits for their end and removes the folder. The last leaf also removes its parent
-/// folder. A leaf that cannot be removed is logged and left for the sweep of the next start.
+/// folder. A leaf that cannot be removed is logged and left for [`sweep`](super::sweep) at the next start.
 pub(super) fn remove_leaf(leaf: &Path) {
-    /// The kernel releases a dead process's cgroup shortly after the parent has reaped the process.
+    /// Ample: the kernel releases a dead process's cgroup shortly after the parent has reaped the process.
     const TIMEOUT: Duration = Duration::from_secs(60);
     let deadline = Instant::now() + TIMEOUT;
     loop {
@@ -54,6 +54,6 @@ fn kill_all(leaf: &Path) {
 
 /// `agent-<pid>-<start time>-<namespace>-<number>`: identifies the service even after its death.
 pub(super) fn leaf_name() -> String {
-    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    let number = NEXT_NUMBER.fetch_add(1, Ordering::Relaxed);
     format!("{}{number}", Owner::this_process().name_prefix(LEAF_PREFIX))
 }

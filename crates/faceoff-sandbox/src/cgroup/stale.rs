@@ -1,7 +1,7 @@
 //! Removal of the cgroups of killed services.
 
 use super::{
-    hierarchy::{FOLDER, Hierarchies},
+    hierarchy::{AGENTS_FOLDER, Hierarchies},
     leaf::{LEAF_PREFIX, kill_and_thaw, remove_leaf},
 };
 use crate::owner::Owner;
@@ -15,7 +15,7 @@ pub(crate) fn sweep() -> usize {
     let folders: BTreeSet<PathBuf> = ["memory", "pids", "cpu", "cpuacct", "cpuset", "freezer"]
         .iter()
         .filter_map(|controller| hierarchies.find(controller))
-        .map(|hierarchy| hierarchy.service_dir.join(FOLDER))
+        .map(|hierarchy| hierarchy.service_dir.join(AGENTS_FOLDER))
         .collect();
     let entries = folders
         .into_iter()

@@ -1,52 +1,65 @@
-//! Lower bounds of host interference, derived from two readings of the counters.
+//! Lower bounds of *host interference*, derived from two readings of the kernel's counters. Host interference is the time in which an
+//! agent was ready to run, but other processes ran on its CPUs or the hypervisor had stopped them (*steal time*).
 
 use super::reading::CpuReading;
 use crate::{
-    cpu_counters::ticks,
+    cpu_counters::ticks_to_duration,
     thread_waits::{AnswerState, WaitLedger},
 };
 use std::time::Duration;
 
 /// Derives interference from pairs of readings.
 pub(super) struct InterferenceEstimator<'a> {
-    /// The counters include all processes, in nanoseconds.
-    pub precise: bool,
+    /// Do the counters include all processes, in nanoseconds? Otherwise the time of other processes is known in ticks only.
+    pub is_precise: bool,
+    /// Earlier waits of the agent's threads.
     pub ledger: &'a WaitLedger,
     pub answer: AnswerState,
 }
 
 impl InterferenceEstimator<'_> {
     /// The longest countable wait of one of the agent's threads; `None` if the kernel has no such counters.
-    fn longest_wait(&self, from: &CpuReading, to: &CpuReading, wall: Duration) -> Option<Duration> {
-        let (from, to) = (from.waits.as_ref()?, to.waits.as_ref()?);
-        Some(to.longest_since(from, wall, self.ledger, self.answer))
+    fn longest_wait(
+        &self,
+        earlier: &CpuReading,
+        later: &CpuReading,
+        wall: Duration,
+    ) -> Option<Duration> {
+        let (earlier, later) = (earlier.waits.as_ref()?, later.waits.as_ref()?);
+        Some(later.longest_since(earlier, wall, self.ledger, self.answer))
     }
 
     /// Time in which other processes provably occupied all of the agent's CPUs at once.
-    pub fn others_time(&self, from: &CpuReading, to: &CpuReading) -> Duration {
-        let wall = to.at.saturating_duration_since(from.at);
-        let agent = to.agent.saturating_sub(from.agent);
+    pub fn others_time(&self, earlier: &CpuReading, later: &CpuReading) -> Duration {
+        let wall = later.read_at.saturating_duration_since(earlier.read_at);
+        let agent = later.agent_run_time.saturating_sub(earlier.agent_run_time);
         let (mut busy, mut idle, mut stolen) = (0, 0, 0);
-        for (from, to) in from.ticks.iter().zip(&to.ticks) {
+        for (earlier, later) in earlier.ticks.iter().zip(&later.ticks) {
             // A counter that advanced by n ticks has counted more than n - 1 and less than n + 1.
-            let at_least = |from: u64, to: u64| to.saturating_sub(from).saturating_sub(1);
-            busy += std::iter::zip(from.busy, to.busy)
-                .map(|(from, to)| at_least(from, to))
+            let at_least =
+                |earlier: u64, later: u64| later.saturating_sub(earlier).saturating_sub(1);
+            busy += std::iter::zip(earlier.busy, later.busy)
+                .map(|(earlier, later)| at_least(earlier, later))
                 .sum::<u64>();
-            idle += std::iter::zip(from.idle, to.idle)
-                .map(|(from, to)| to.saturating_sub(from) + 1)
+            idle += std::iter::zip(earlier.idle, later.idle)
+                .map(|(earlier, later)| later.saturating_sub(earlier) + 1)
                 .sum::<u64>();
-            stolen += at_least(from.stolen, to.stolen);
+            stolen += at_least(earlier.stolen, later.stolen);
         }
         // A sleeping thread is not delayed, even by steal time. Only time in which a thread ran, seemed to run, or
         // waited to run can count.
-        let wait = self.longest_wait(from, to, wall).unwrap_or(wall);
-        let cpus = u32::try_from(to.ticks.len()).unwrap_or(u32::MAX);
-        let (busy, idle, stolen) = (ticks(busy), ticks(idle), ticks(stolen));
-        let others = if self.precise {
+        let wait = self.longest_wait(earlier, later, wall).unwrap_or(wall);
+        let cpus = u32::try_from(later.ticks.len()).unwrap_or(u32::MAX);
+        let (busy, idle, stolen) = (
+            ticks_to_duration(busy),
+            ticks_to_duration(idle),
+            ticks_to_duration(stolen),
+        );
+        let others = if self.is_precise {
             // Kernels differ in whether steal time also counts as run time of a process: it must not count twice.
-            to.all
-                .saturating_sub(from.all)
+            later
+                .total_run_time
+                .saturating_sub(earlier.total_run_time)
                 .saturating_sub(agent)
                 .max(stolen)
         } else {
@@ -63,13 +76,13 @@ impl InterferenceEstimator<'_> {
             ?agent,
             ?stolen,
             ?wait,
-            from = ?from.ticks,
-            to = ?to.ticks,
+            earlier = ?earlier.ticks,
+            later = ?later.ticks,
             "counters of host interference"
         );
         others
             .saturating_sub(wall * cpus.saturating_sub(1))
-            .saturating_sub(to.throttled.saturating_sub(from.throttled))
+            .saturating_sub(later.throttled.saturating_sub(earlier.throttled))
             .min(stolen.min(wait + agent).saturating_add(wait))
             .min(wall)
     }
@@ -77,19 +90,19 @@ impl InterferenceEstimator<'_> {
     /// Run delay by counters that do not lag. On a single CPU: the wait of one of the agent's threads, less the run
     /// time of all its threads. In any case: the steal time while a thread ran, seemed to run, or waited to run. An
     /// agent can cause neither, and a sleeping agent has no run delay.
-    pub fn run_delay(&self, from: &CpuReading, to: &CpuReading) -> Duration {
-        if !self.precise {
+    pub fn run_delay(&self, earlier: &CpuReading, later: &CpuReading) -> Duration {
+        if !self.is_precise {
             return Duration::ZERO;
         }
-        let wall = to.at.saturating_duration_since(from.at);
-        let wait = match &to.ticks[..] {
-            [_] => self.longest_wait(from, to, wall).unwrap_or_default(),
+        let wall = later.read_at.saturating_duration_since(earlier.read_at);
+        let wait = match &later.ticks[..] {
+            [_] => self.longest_wait(earlier, later, wall).unwrap_or_default(),
             _ => Duration::ZERO,
         };
-        let ran = to.agent.saturating_sub(from.agent);
-        let stolen = stolen_time(from, to).min(wait + ran);
+        let ran = later.agent_run_time.saturating_sub(earlier.agent_run_time);
+        let stolen = stolen_time(earlier, later).min(wait + ran);
         wait.saturating_sub(ran)
-            .saturating_sub(to.throttled.saturating_sub(from.throttled))
+            .saturating_sub(later.throttled.saturating_sub(earlier.throttled))
             .max(stolen)
             .min(wall)
     }
@@ -97,29 +110,31 @@ impl InterferenceEstimator<'_> {
 
 /// Upper bound of interference: run time of other processes plus steal time on all CPUs, less the time in which the
 /// agent's own quota throttled it.
-pub(super) fn upper_bound(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
+pub(super) fn upper_bound(earlier: &CpuReading, later: &CpuReading, is_precise: bool) -> Duration {
     let (mut busy, mut stolen) = (0, 0);
-    for (from, to) in from.ticks.iter().zip(&to.ticks) {
-        let each = std::iter::zip(from.busy, to.busy);
-        busy += each.map(|(from, to)| to.saturating_sub(from)).sum::<u64>();
-        stolen += to.stolen.saturating_sub(from.stolen);
+    for (earlier, later) in earlier.ticks.iter().zip(&later.ticks) {
+        let each = std::iter::zip(earlier.busy, later.busy);
+        busy += each
+            .map(|(earlier, later)| later.saturating_sub(earlier))
+            .sum::<u64>();
+        stolen += later.stolen.saturating_sub(earlier.stolen);
     }
-    let all = if precise {
-        to.all.saturating_sub(from.all)
+    let all = if is_precise {
+        later.total_run_time.saturating_sub(earlier.total_run_time)
     } else {
-        ticks(busy)
+        ticks_to_duration(busy)
     };
-    all.saturating_sub(to.agent.saturating_sub(from.agent))
-        .saturating_add(ticks(stolen))
-        .saturating_sub(to.throttled.saturating_sub(from.throttled))
+    all.saturating_sub(later.agent_run_time.saturating_sub(earlier.agent_run_time))
+        .saturating_add(ticks_to_duration(stolen))
+        .saturating_sub(later.throttled.saturating_sub(earlier.throttled))
 }
 
 /// Steal time, without correction for the rounding of ticks. Of several CPUs the smallest counts: at least that CPU
 /// was available for the rest of the time.
-pub(super) fn stolen_time(from: &CpuReading, to: &CpuReading) -> Duration {
-    let each = std::iter::zip(&from.ticks, &to.ticks);
-    let stolen = each.map(|(from, to)| to.stolen.saturating_sub(from.stolen));
-    ticks(stolen.min().unwrap_or_default())
+pub(super) fn stolen_time(earlier: &CpuReading, later: &CpuReading) -> Duration {
+    let each = std::iter::zip(&earlier.ticks, &later.ticks);
+    let stolen = each.map(|(earlier, later)| later.stolen.saturating_sub(earlier.stolen));
+    ticks_to_duration(stolen.min().unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -128,30 +143,33 @@ mod tests {
     use crate::{CpuSamples, cpu_counters::Ticks, thread_waits::ThreadWaits};
     use std::time::Instant;
 
+    /// `MS(5)` is 5 milliseconds.
     const MS: fn(u64) -> Duration = Duration::from_millis;
 
     /// An estimator for a pending answer, without earlier samples.
-    const fn estimator(precise: bool) -> InterferenceEstimator<'static> {
-        static NONE: WaitLedger = WaitLedger::NONE;
+    const fn estimator(is_precise: bool) -> InterferenceEstimator<'static> {
+        static EMPTY: WaitLedger = WaitLedger::EMPTY;
         InterferenceEstimator {
-            precise,
-            ledger: &NONE,
+            is_precise,
+            ledger: &EMPTY,
             answer: AnswerState::Pending,
         }
     }
 
-    fn reading(at: Instant, agent: u64, all: u64, ticks: &[Ticks]) -> CpuReading {
+    /// A reading with the run times of the agent and of all processes, in milliseconds.
+    fn reading(read_at: Instant, agent: u64, all: u64, ticks: &[Ticks]) -> CpuReading {
         CpuReading {
-            at,
-            agent: MS(agent),
-            clocks: MS(agent),
-            all: MS(all),
+            read_at,
+            agent_run_time: MS(agent),
+            agent_clock_time: MS(agent),
+            total_run_time: MS(all),
             throttled: Duration::ZERO,
             ticks: ticks.to_vec(),
             waits: None,
         }
     }
 
+    /// Counters of one CPU, in ticks of 10 ms.
     fn cpu(busy: u64, idle: u64, stolen: u64) -> Ticks {
         Ticks {
             busy: [busy, 0, 0],
@@ -162,32 +180,32 @@ mod tests {
 
     #[test]
     fn interference_excludes_the_agent_and_is_capped() {
-        let begun = Instant::now();
+        let start = Instant::now();
         let others_time = |agent: u64, all: u64, ticks: &[Ticks], wall: u64| {
-            let zero = vec![Ticks::default(); ticks.len()];
-            let from = reading(begun, 500, 700, &zero);
-            let to = reading(begun + MS(wall), 500 + agent, 700 + all, ticks);
-            estimator(true).others_time(&from, &to)
+            let zero_ticks = vec![Ticks::default(); ticks.len()];
+            let earlier = reading(start, 500, 700, &zero_ticks);
+            let later = reading(start + MS(wall), 500 + agent, 700 + all, ticks);
+            estimator(true).others_time(&earlier, &later)
         };
-        let one = [cpu(0, 0, 0)];
-        assert_eq!(others_time(0, 60, &one, 100), MS(60));
+        let one_cpu = [cpu(0, 0, 0)];
+        assert_eq!(others_time(0, 60, &one_cpu, 100), MS(60));
         assert_eq!(
-            others_time(40, 100, &one, 100),
+            others_time(40, 100, &one_cpu, 100),
             MS(60),
-            "less its own run time"
+            "without the agent's own run time"
         );
         assert_eq!(
-            others_time(90, 90, &one, 100),
+            others_time(90, 90, &one_cpu, 100),
             MS(0),
-            "its own threads do not count"
+            "the agent's own threads do not count"
         );
         assert_eq!(
-            others_time(0, 0, &one, 100),
+            others_time(0, 0, &one_cpu, 100),
             MS(0),
-            "it slept, or its timers fired"
+            "the agent slept, or its timers fired"
         );
         assert_eq!(
-            others_time(0, 250, &one, 100),
+            others_time(0, 250, &one_cpu, 100),
             MS(100),
             "run time before the span does not count"
         );
@@ -199,76 +217,83 @@ mod tests {
         assert_eq!(
             others_time(0, 60, &[cpu(0, 0, 5)], 100),
             MS(60),
-            "and is not counted twice"
+            "steal time is not counted twice"
         );
         // Of two CPUs, at least one was free for the rest of the time.
-        let two = [cpu(0, 0, 0); 2];
-        assert_eq!(others_time(0, 100, &two, 100), MS(0));
-        assert_eq!(others_time(0, 170, &two, 100), MS(70));
+        let two_cpus = [cpu(0, 0, 0); 2];
+        assert_eq!(others_time(0, 100, &two_cpus, 100), MS(0));
+        assert_eq!(others_time(0, 170, &two_cpus, 100), MS(70));
     }
 
     #[test]
     fn run_delay_on_one_cpu_excludes_the_agents_own_threads() {
-        let begun = Instant::now();
+        let start = Instant::now();
         let run_delay = |agent: u64, wait: u64, ticks: &[Ticks]| {
-            let zero = vec![Ticks::default(); ticks.len()];
-            let mut from = reading(begun, 500, 700, &zero);
-            let mut to = reading(begun + MS(30), 500 + agent, 700, ticks);
-            from.waits = Some(ThreadWaits::one_thread(MS(400), MS(10)));
-            to.waits = Some(ThreadWaits::one_thread(MS(401), MS(10 + wait)));
-            estimator(true).run_delay(&from, &to)
+            let zero_ticks = vec![Ticks::default(); ticks.len()];
+            let mut earlier = reading(start, 500, 700, &zero_ticks);
+            let mut later = reading(start + MS(30), 500 + agent, 700, ticks);
+            earlier.waits = Some(ThreadWaits::one_thread(MS(400), MS(10)));
+            later.waits = Some(ThreadWaits::one_thread(MS(401), MS(10 + wait)));
+            estimator(true).run_delay(&earlier, &later)
         };
-        let one = [cpu(0, 0, 0)];
-        assert_eq!(run_delay(1, 26, &one), MS(25));
-        assert_eq!(run_delay(30, 29, &one), MS(0), "its other threads ran");
-        assert_eq!(run_delay(1, 0, &one), MS(0), "it slept");
+        let one_cpu = [cpu(0, 0, 0)];
+        assert_eq!(run_delay(1, 26, &one_cpu), MS(25));
+        assert_eq!(
+            run_delay(30, 29, &one_cpu),
+            MS(0),
+            "the agent's other threads ran"
+        );
+        assert_eq!(run_delay(1, 0, &one_cpu), MS(0), "the agent slept");
         assert_eq!(
             run_delay(1, 26, &[cpu(0, 0, 0); 2]),
             MS(0),
-            "another was free"
+            "the other CPU was free"
         );
         assert_eq!(
             run_delay(25, 0, &[cpu(0, 0, 2)]),
             MS(20),
-            "steal time while it seemed to run"
+            "steal time while the agent seemed to run"
         );
         assert_eq!(
             run_delay(1, 0, &[cpu(0, 0, 2)]),
             MS(1),
-            "it slept in between"
+            "the agent slept in between"
         );
         assert_eq!(
             run_delay(20, 25, &[cpu(0, 0, 9)]),
             MS(30),
-            "never more than all"
+            "never more than the whole time"
         );
         assert_eq!(run_delay(1, 0, &[cpu(0, 0, 2), cpu(0, 0, 0)]), MS(0));
-        let mut from = reading(begun, 500, 700, &one);
-        let mut to = reading(begun + MS(250), 501, 700, &[cpu(0, 0, 15)]);
-        from.waits = Some(ThreadWaits::one_thread(MS(400), MS(10)));
-        to.waits = from.waits.clone();
+        let mut earlier = reading(start, 500, 700, &one_cpu);
+        let mut later = reading(start + MS(250), 501, 700, &[cpu(0, 0, 15)]);
+        earlier.waits = Some(ThreadWaits::one_thread(MS(400), MS(10)));
+        later.waits = earlier.waits.clone();
         assert_eq!(
-            estimator(true).others_time(&from, &to),
+            estimator(true).others_time(&earlier, &later),
             MS(1),
             "a sleeping thread is not delayed"
         );
-        let zero = reading(begun, 0, 0, &one);
+        let zero_ticks = reading(start, 0, 0, &one_cpu);
         assert_eq!(
-            estimator(false).run_delay(&zero, &zero),
+            estimator(false).run_delay(&zero_ticks, &zero_ticks),
             MS(0),
-            "ticks alone"
+            "ticks do not show it"
         );
     }
 
     #[test]
     fn observed_wait_excludes_the_agents_run_time() {
-        let begun = Instant::now();
-        let at = |ms, agent, slices, stolen, is_runnable| {
-            let mut reading = reading(begun + MS(ms), agent, 0, &[cpu(0, 0, stolen)]);
-            reading.waits = Some(ThreadWaits::one_thread_with_slices(slices, is_runnable));
+        let start = Instant::now();
+        let reading_at = |ms, agent, time_slices, stolen, is_runnable| {
+            let mut reading = reading(start + MS(ms), agent, 0, &[cpu(0, 0, stolen)]);
+            reading.waits = Some(ThreadWaits::one_thread_with_slices(
+                time_slices,
+                is_runnable,
+            ));
             reading
         };
-        let first = at(10, 3, 7, 5, true);
+        let first = reading_at(10, 3, 7, 5, true);
         let pending = |samples: &CpuSamples, now: &CpuReading| {
             let waits = now.waits.as_ref().unwrap();
             samples
@@ -276,32 +301,40 @@ mod tests {
                 .longest_observed_wait(waits, AnswerState::Pending)
         };
         let observed_wait = |later: &CpuReading| {
-            let mut samples = CpuSamples::begin(first.clone(), None, begun);
+            let mut samples = CpuSamples::begin(first.clone(), None, start);
             samples.add(later.clone());
             pending(&samples, later)
         };
-        assert_eq!(observed_wait(&at(15, 3, 7, 5, true)), MS(5));
+        assert_eq!(observed_wait(&reading_at(15, 3, 7, 5, true)), MS(5));
         assert_eq!(
-            observed_wait(&at(15, 5, 7, 5, true)),
+            observed_wait(&reading_at(15, 5, 7, 5, true)),
             MS(3),
-            "less its run time"
+            "without the agent's run time"
         );
         assert_eq!(
-            observed_wait(&at(15, 9, 7, 5, true)),
+            observed_wait(&reading_at(15, 9, 7, 5, true)),
             MS(0),
-            "with its other threads"
+            "nor the run time of its other threads"
         );
         assert_eq!(
-            observed_wait(&at(15, 3, 8, 5, true)),
+            observed_wait(&reading_at(15, 3, 8, 5, true)),
             MS(0),
-            "it may have slept"
+            "the thread may have slept"
         );
-        assert_eq!(observed_wait(&at(15, 3, 7, 5, false)), MS(0), "it sleeps");
-        let mut throttled = at(15, 3, 7, 5, true);
+        assert_eq!(
+            observed_wait(&reading_at(15, 3, 7, 5, false)),
+            MS(0),
+            "the thread sleeps"
+        );
+        let mut throttled = reading_at(15, 3, 7, 5, true);
         throttled.throttled = MS(4);
-        assert_eq!(observed_wait(&throttled), MS(1), "its own quota");
-        let mut ended = at(15, 3, 7, 5, true);
-        (ended.clocks, ended.agent) = (MS(0), MS(7));
+        assert_eq!(
+            observed_wait(&throttled),
+            MS(1),
+            "without the throttling by its own quota"
+        );
+        let mut ended = reading_at(15, 3, 7, 5, true);
+        (ended.agent_clock_time, ended.agent_run_time) = (MS(0), MS(7));
         assert_eq!(
             observed_wait(&ended),
             MS(1),
@@ -309,51 +342,67 @@ mod tests {
         );
 
         // A baseline does not contain the states of threads.
-        let baseline = at(0, 3, 7, 4, false);
+        let baseline = reading_at(0, 3, 7, 4, false);
         let stolen = |now: &CpuReading| {
-            let samples = CpuSamples::begin(now.clone(), Some(&baseline), begun + MS(2));
+            let samples = CpuSamples::begin(now.clone(), Some(&baseline), start + MS(2));
             pending(&samples, now)
         };
-        assert_eq!(stolen(&at(10, 3, 7, 4, true)), MS(0), "no steal time");
-        assert_eq!(stolen(&at(20, 3, 7, 5, true)), MS(10));
-        assert_eq!(stolen(&at(10, 3, 7, 6, true)), MS(8), "never more than all");
-        assert_eq!(stolen(&at(10, 3, 7, 6, false)), MS(0), "it sleeps");
-        assert_eq!(stolen(&at(10, 3, 8, 6, true)), MS(0), "it ran");
+        assert_eq!(
+            stolen(&reading_at(10, 3, 7, 4, true)),
+            MS(0),
+            "no steal time"
+        );
+        assert_eq!(stolen(&reading_at(20, 3, 7, 5, true)), MS(10));
+        assert_eq!(
+            stolen(&reading_at(10, 3, 7, 6, true)),
+            MS(8),
+            "never more than the whole time"
+        );
+        assert_eq!(
+            stolen(&reading_at(10, 3, 7, 6, false)),
+            MS(0),
+            "the thread sleeps"
+        );
+        assert_eq!(
+            stolen(&reading_at(10, 3, 8, 6, true)),
+            MS(0),
+            "the thread ran"
+        );
     }
 
     #[test]
     fn upper_bound_is_other_run_time_plus_steal_time() {
-        let begun = Instant::now();
-        let zero = [Ticks::default(); 2];
-        let from = reading(begun, 500, 700, &zero);
-        let mut to = reading(begun + MS(100), 520, 750, &[cpu(4, 0, 1), cpu(0, 0, 2)]);
-        assert_eq!(upper_bound(&from, &to, true), MS(30 + 30));
-        assert_eq!(upper_bound(&from, &to, false), MS(20 + 30));
-        to.throttled = MS(45);
+        let start = Instant::now();
+        let zero_ticks = [Ticks::default(); 2];
+        let earlier = reading(start, 500, 700, &zero_ticks);
+        let mut later = reading(start + MS(100), 520, 750, &[cpu(4, 0, 1), cpu(0, 0, 2)]);
+        assert_eq!(upper_bound(&earlier, &later, true), MS(30 + 30));
+        assert_eq!(upper_bound(&earlier, &later, false), MS(20 + 30));
+        later.throttled = MS(45);
         assert_eq!(
-            upper_bound(&from, &to, true),
+            upper_bound(&earlier, &later, true),
             MS(15),
             "its own quota does not count"
         );
-        assert_eq!(upper_bound(&from, &from, true), MS(0));
+        assert_eq!(upper_bound(&earlier, &earlier, true), MS(0));
     }
 
     #[test]
     fn throttling_by_the_own_quota_is_subtracted() {
-        let begun = Instant::now();
-        let from = reading(begun, 0, 0, &[cpu(0, 0, 0)]);
-        let mut to = reading(begun + MS(100), 10, 90, &[cpu(0, 0, 0)]);
-        to.throttled = MS(50);
-        assert_eq!(estimator(true).others_time(&from, &to), MS(30));
+        let start = Instant::now();
+        let earlier = reading(start, 0, 0, &[cpu(0, 0, 0)]);
+        let mut later = reading(start + MS(100), 10, 90, &[cpu(0, 0, 0)]);
+        later.throttled = MS(50);
+        assert_eq!(estimator(true).others_time(&earlier, &later), MS(30));
     }
 
     #[test]
     fn tick_rounding_never_favours_the_agent() {
-        let begun = Instant::now();
+        let start = Instant::now();
         let others_time = |agent, ticks| {
-            let from = reading(begun, 0, 0, &[cpu(0, 0, 0)]);
-            let to = reading(begun + MS(200), agent, 0, &[ticks]);
-            estimator(false).others_time(&from, &to)
+            let earlier = reading(start, 0, 0, &[cpu(0, 0, 0)]);
+            let later = reading(start + MS(200), agent, 0, &[ticks]);
+            estimator(false).others_time(&earlier, &later)
         };
         assert_eq!(others_time(0, cpu(20, 0, 0)), MS(180));
         assert_eq!(others_time(50, cpu(20, 0, 0)), MS(130));
@@ -362,10 +411,10 @@ mod tests {
             MS(0),
             "a tick proves nothing"
         );
-        assert_eq!(others_time(0, cpu(10, 0, 10)), MS(180), "steal counts");
-        // It runs at each tick and sleeps in between, which counts as idle.
+        assert_eq!(others_time(0, cpu(10, 0, 10)), MS(180), "steal time counts");
+        // The agent runs at each tick and sleeps in between, which counts as idle.
         assert_eq!(others_time(20, cpu(20, 17, 0)), MS(0));
-        // Its timers' interrupts came while the CPU was idle: no tick shows run time of a process.
+        // The interrupts of the agent's timers came while the CPU was idle: no tick shows run time of a process.
         assert_eq!(others_time(1, cpu(1, 2, 0)), MS(0));
     }
 }

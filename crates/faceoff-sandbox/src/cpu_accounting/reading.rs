@@ -1,4 +1,4 @@
-//! One reading of the CPU counters.
+//! One reading of the kernel's counters of an agent's CPUs and threads.
 
 use crate::{cpu_counters::Ticks, thread_waits::ThreadWaits};
 use std::time::{Duration, Instant};
@@ -6,14 +6,17 @@ use std::time::{Duration, Instant};
 /// The counters at one time. Only the difference of two readings has a meaning.
 #[derive(Debug, Clone)]
 pub struct CpuReading {
-    pub(super) at: Instant,
-    pub(super) agent: Duration,
-    /// The same by the clocks of its processes, which do not lag behind but miss processes that have ended; zero in a
-    /// baseline.
-    pub(super) clocks: Duration,
+    pub(super) read_at: Instant,
+    /// Run time of the agent, by its cgroup.
+    pub(super) agent_run_time: Duration,
+    /// Run time of the agent, by the clocks of its processes. They do not lag behind, but miss processes that have ended. Zero in
+    /// a baseline (a reading before a question, which takes only a few microseconds).
+    pub(super) agent_clock_time: Duration,
     /// Run time of all processes on the agent's CPUs; zero if the host counts in ticks only.
-    pub(super) all: Duration,
+    pub(super) total_run_time: Duration,
+    /// Time in which the agent's own CPU quota throttled it.
     pub(super) throttled: Duration,
+    /// Counters of each of the agent's CPUs, in ticks of 10 ms.
     pub(super) ticks: Vec<Ticks>,
     /// Scheduling counters of the agent's threads, if the kernel has them.
     pub(super) waits: Option<ThreadWaits>,
@@ -23,15 +26,17 @@ impl CpuReading {
     /// Time since `before` in which none of the agent's threads ran, without the time in which its own quota throttled
     /// it.
     pub(super) fn idle_since(&self, before: &Self) -> Duration {
-        self.at
-            .saturating_duration_since(before.at)
+        self.read_at
+            .saturating_duration_since(before.read_at)
             .saturating_sub(self.ran_since(before))
             .saturating_sub(self.throttled.saturating_sub(before.throttled))
     }
 
     /// Run time of the agent since `before`: the maximum of both counters.
     fn ran_since(&self, before: &Self) -> Duration {
-        let by_clocks = self.clocks.saturating_sub(before.clocks);
-        by_clocks.max(self.agent.saturating_sub(before.agent))
+        let by_clocks = self
+            .agent_clock_time
+            .saturating_sub(before.agent_clock_time);
+        by_clocks.max(self.agent_run_time.saturating_sub(before.agent_run_time))
     }
 }

@@ -10,6 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+/// Ways of blocking or misusing a channel; `tests/agents/blocks_channel.py` describes them.
 const KINDS: [&str; 15] = [
     "splice-output",
     "splice-input",
@@ -28,29 +29,29 @@ const KINDS: [&str; 15] = [
     "passes-files",
 ];
 
-/// A call of the evaluator on a channel.
+/// A call of the evaluator on an agent.
 #[derive(Debug, Clone, Copy)]
 enum Call {
     Send { bytes: usize },
-    IsPending,
+    HasPendingOutput,
     Read { within_ms: u64 },
-    LookOut,
+    SpinUntil,
     WaitForAny,
-    Log,
-    Counters,
+    ReadLog,
+    ReadCounters,
     Diagnose,
     FreezeAndThaw,
 }
 
-fn call() -> impl Strategy<Value = Call> {
+fn any_call() -> impl Strategy<Value = Call> {
     prop_oneof![
         (0..100_000_usize).prop_map(|bytes| Call::Send { bytes }),
-        Just(Call::IsPending),
+        Just(Call::HasPendingOutput),
         (0..20_u64).prop_map(|within_ms| Call::Read { within_ms }),
-        Just(Call::LookOut),
+        Just(Call::SpinUntil),
         Just(Call::WaitForAny),
-        Just(Call::Log),
-        Just(Call::Counters),
+        Just(Call::ReadLog),
+        Just(Call::ReadCounters),
         Just(Call::Diagnose),
         Just(Call::FreezeAndThaw),
     ]
@@ -64,27 +65,29 @@ enum End {
     Drop,
 }
 
-fn end() -> impl Strategy<Value = End> {
+fn any_end() -> impl Strategy<Value = End> {
     prop_oneof![Just(End::Finish), Just(End::Kill), Just(End::Drop)]
 }
 
-fn make(call: Call, agent: &mut AgentProcess) {
-    let soon = |ms| Instant::now() + Duration::from_millis(ms);
-    // An agent cannot cause a platform fault; which agent fault it causes does not matter here.
+fn perform(call: Call, agent: &mut AgentProcess) {
+    let deadline_in = |ms| Instant::now() + Duration::from_millis(ms);
+    // The calls must not report a platform fault. Agent faults are ignored.
     match call {
         Call::Send { bytes } => {
             let mut line = vec![b'q'; bytes];
             line.push(b'\n');
             let _ = agent.send_line(&line);
         }
-        Call::IsPending => {
+        Call::HasPendingOutput => {
             agent.has_pending_output().unwrap();
         }
-        Call::Read { within_ms } => drop(agent.read_line(LINE_CAP, soon(within_ms)).unwrap()),
-        Call::LookOut => agent.spin_until(soon(1)).unwrap(),
-        Call::WaitForAny => AgentProcess::wait_for_any(&[agent], soon(5)).unwrap(),
-        Call::Log => drop(agent.stderr_tail()),
-        Call::Counters => {
+        Call::Read { within_ms } => {
+            drop(agent.read_line(LINE_CAP, deadline_in(within_ms)).unwrap())
+        }
+        Call::SpinUntil => agent.spin_until(deadline_in(1)).unwrap(),
+        Call::WaitForAny => AgentProcess::wait_for_any(&[agent], deadline_in(5)).unwrap(),
+        Call::ReadLog => drop(agent.stderr_tail()),
+        Call::ReadCounters => {
             agent.track_threads();
             drop((
                 agent.read_baseline(Some(&[0])),
@@ -100,8 +103,8 @@ fn make(call: Call, agent: &mut AgentProcess) {
     }
 }
 
-/// Makes the calls on a separate thread, as a slot does, and waits for it.
-fn drive(kind: &str, calls: Vec<Call>, end: End) {
+/// Makes the calls on a separate thread, as a worker does, and checks that all return.
+fn assert_calls_return(kind: &str, calls: Vec<Call>, end: End) {
     let subject = Subject::new("blocks_channel", &[kind]);
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "ready");
@@ -109,7 +112,7 @@ fn drive(kind: &str, calls: Vec<Call>, end: End) {
     let (sender, ended) = mpsc::channel();
     let slot = thread::spawn(move || {
         for call in calls {
-            make(call, &mut agent);
+            perform(call, &mut agent);
         }
         match end {
             End::Finish => drop(agent.finish(Duration::from_millis(1)).unwrap()),
@@ -127,27 +130,28 @@ fn drive(kind: &str, calls: Vec<Call>, end: End) {
 }
 
 #[test]
-fn held_channel_never_blocks_the_evaluator() {
+fn blocked_channel_never_blocks_the_evaluator() {
     for kind in KINDS {
         let mut runner = TestRunner::deterministic();
         for _ in 0..3 {
             let mut generate = |strategy: BoxedStrategy<(Vec<Call>, End)>| {
                 strategy.new_tree(&mut runner).unwrap().current()
             };
-            let (calls, end) = generate((prop::collection::vec(call(), 1..40), end()).boxed());
-            drive(kind, calls, end);
+            let (calls, end) =
+                generate((prop::collection::vec(any_call(), 1..40), any_end()).boxed());
+            assert_calls_return(kind, calls, end);
         }
     }
 }
 
 #[test]
 fn out_of_band_bytes_end_no_later_than_the_deadline() {
-    drive(
+    assert_calls_return(
         "out-of-band",
         vec![
             Call::Read { within_ms: 20 },
             Call::Send { bytes: 10 },
-            Call::LookOut,
+            Call::SpinUntil,
         ],
         End::Drop,
     );
@@ -159,15 +163,15 @@ fn agent_is_killed_from_another_thread() {
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "ready");
     let killer = agent.killer().unwrap();
-    let other = thread::spawn(move || {
+    let killing_thread = thread::spawn(move || {
         killer.kill();
         killer
     });
-    // Only the killer ends it.
+    // Only the other thread ends the agent.
     while !processes_marked(&subject.mark).is_empty() {
         thread::yield_now();
     }
-    let killer = other.join().unwrap();
+    let killer = killing_thread.join().unwrap();
     let line = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT);
     assert!(
         matches!(line, Ok(faceoff_sandbox::ReadLine::Closed) | Err(_)),
@@ -188,11 +192,11 @@ fn frozen_agent_uses_no_time_and_then_continues() {
         return;
     }
     // A thread freezes when it next leaves the kernel.
-    let used = |agent: &AgentProcess| agent.cpu_time_s().unwrap();
-    let mut before = used(&agent);
+    let cpu_time = |agent: &AgentProcess| agent.cpu_time_s().unwrap();
+    let mut before = cpu_time(&agent);
     loop {
         thread::sleep(Duration::from_millis(50));
-        let now = used(&agent);
+        let now = cpu_time(&agent);
         if now == before {
             break;
         }
@@ -206,7 +210,7 @@ fn frozen_agent_uses_no_time_and_then_continues() {
     );
     agent.thaw();
     assert_eq!(expect_line(&mut agent), "hello");
-    while used(&agent) == before {
+    while cpu_time(&agent) == before {
         thread::yield_now();
     }
     // A frozen agent can be killed, too.

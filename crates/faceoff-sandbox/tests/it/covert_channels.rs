@@ -1,6 +1,6 @@
-#![cfg(target_arch = "x86_64")]
 //! Covert channels: no agent sees any effect of another agent on shared files, at the same time or later. The test
 //! program knows the system call numbers of this architecture only.
+#![cfg(target_arch = "x86_64")]
 
 use crate::harness::{Subject, TIMEOUT, expect_echo, expect_line};
 use std::{
@@ -12,9 +12,10 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-/// A file of Python's library, which every agent sees.
-const SHARED: &str = "library";
+/// The argument by which the test agent examines a file of Python's library, which every agent sees.
+const LIBRARY_FILE: &str = "library";
 
+/// Results of the test agent's calls: an error, a value or `ok`.
 type Answers = BTreeMap<String, String>;
 
 fn parsed(line: &str) -> Answers {
@@ -105,8 +106,8 @@ fn assert_no_traces(mut found: Answers) {
 
 #[test]
 fn traces_of_one_agent_are_invisible_to_others() {
-    let first = Subject::new("covert_channel", &[SHARED, "hold"]);
-    let second = Subject::new("covert_channel", &[SHARED]);
+    let first = Subject::new("covert_channel", &[LIBRARY_FILE, "hold"]);
+    let second = Subject::new("covert_channel", &[LIBRARY_FILE]);
     let mut agent = first.spawn();
     assert_no_traces(parsed(&expect_line(&mut agent)));
     assert_eq!(expect_line(&mut agent), "held");
@@ -143,6 +144,7 @@ fn python(script: &str, path: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
+/// Removes the file's pages from the page cache.
 fn drop_from_memory(path: &Path) {
     const DROP: &str = "import os, sys\n\
         fd = os.open(sys.argv[1], os.O_RDWR); os.fsync(fd)\n\
@@ -156,7 +158,7 @@ fn advice_neither_loads_nor_drops_a_shared_file() {
     let file = subject.bundle.path().join("big");
     // Larger than the read-ahead of a single page.
     fs::write(&file, vec![7; 8 << 20]).unwrap();
-    let pages = 2048;
+    let pages = (8 << 20) / 4096;
     drop_from_memory(&file);
     if pages_in_memory(&file) > 0 {
         println!(
@@ -170,13 +172,16 @@ fn advice_neither_loads_nor_drops_a_shared_file() {
     // Only most of the pages must be in memory: a host may reclaim a page at any time, as hosts that share memory do.
     // An agent that could drop the file would drop all of it.
     let is_in_memory = |file: &Path| pages_in_memory(file) > pages / 2;
-    let read = (0..100).any(|_| {
+    let is_cached = (0..100).any(|_| {
         assert_eq!(fs::read(&file).unwrap().len(), 8 << 20);
         is_in_memory(&file)
     });
-    assert!(read, "this host does not cache a file that was just read");
+    assert!(
+        is_cached,
+        "this host does not cache a file that was just read"
+    );
     subject.report();
-    assert!(is_in_memory(&file), "it was dropped");
+    assert!(is_in_memory(&file), "the agent dropped the file");
 }
 
 #[test]
@@ -202,7 +207,7 @@ fn ordinary_python_libraries_work() {
     assert!(answers.len() >= 15, "{answers:?}");
 }
 
-/// Tries every path that `/proc` has for the ends of the channel, and its size.
+/// The test agent tries to open the ends of its channel by every path in `/proc`, and to change their buffer sizes.
 #[test]
 fn channel_ends_cannot_be_reopened_or_shrunk() {
     let report = Subject::new("reopens_channel", &[]).report();

@@ -1,17 +1,19 @@
+//! The number of CPUs that an agent finds: exactly those on which it may run, by every interface.
+
 use crate::harness::Subject;
 use faceoff_sandbox::affinity;
 use serde_json::json;
 
 /// Report of an agent on these CPUs with this CPU quota.
 fn report(cpus: &[usize], quota: f64) -> serde_json::Value {
-    let mut subject = Subject::new("counts_cpus", &[]).limits(|limits| limits.cpus = quota);
+    let mut subject = Subject::new("counts_cpus", &[]).with_limits(|limits| limits.cpus = quota);
     subject.spec.cpus = cpus.to_vec();
     subject.report()
 }
 
 #[test]
 fn agent_finds_its_cpus_by_every_interface() {
-    let all = affinity::allowed().unwrap();
+    let all = affinity::allowed_cpus().unwrap();
     let last = &all[all.len() - 1..];
     // The last CPU: counting CPUs from 0 would give a wrong number.
     for (cpus, quota, threads) in [

@@ -1,18 +1,21 @@
-use crate::harness::{Subject, expect_echo, expect_line, has};
+//! CPU limits: an agent stays on its CPUs, within its quota, and its CPU time is measured.
+
+use crate::harness::{Subject, expect_echo, expect_line, has_layer};
 use faceoff_sandbox::{Layer, affinity};
 
 #[test]
 fn agent_stays_on_its_cpus_and_is_accounted() {
     let mut subject = Subject::new("moves_cpu", &[]);
     // The last CPU that this process may use.
-    let cpu = *affinity::allowed().unwrap().last().unwrap();
+    let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
     subject.spec.cpus = vec![cpu];
     let mut agent = subject.spawn();
     let report: serde_json::Value = serde_json::from_str(&expect_line(&mut agent)).unwrap();
     assert_eq!(report["before"], serde_json::json!([cpu]));
     assert_eq!(report["after"], serde_json::json!([cpu]), "{report}");
-    if has(Layer::CgroupCpu) {
+    if has_layer(Layer::CgroupCpu) {
         let used = agent.cpu_time_s().unwrap();
+        // The test agent computes for this long before it answers.
         assert!(used >= 0.2, "{used}");
         expect_echo(&mut agent, "more");
         assert!(agent.cpu_time_s().unwrap() >= used);
@@ -22,17 +25,17 @@ fn agent_stays_on_its_cpus_and_is_accounted() {
 
 #[test]
 fn agent_on_all_cpus_is_limited_to_its_quota() {
-    if !has(Layer::CgroupCpu) {
+    if !has_layer(Layer::CgroupCpu) {
         return;
     }
-    let subject = Subject::new("moves_cpu", &[]).limits(|limits| limits.cpus = 0.25);
+    let subject = Subject::new("moves_cpu", &[]).with_limits(|limits| limits.cpus = 0.25);
     let mut agent = subject.spawn();
     let started = std::time::Instant::now();
     let used_before = agent.cpu_time_s().unwrap();
     expect_line(&mut agent);
     let used = agent.cpu_time_s().unwrap() - used_before;
-    // This bounds the share, not the time, so it holds on a slow host, too. One period may have begun before the
-    // measurement, and one may be counted in full at its end.
+    // The test bounds the share, not the time, so it also passes on a slow host. One period of the quota (10 ms) may have begun before
+    // the measurement, and one may be counted in full at its end.
     let share = used / (started.elapsed().as_secs_f64() + 0.02);
     assert!(share <= 0.27, "{share} of a CPU");
     subject.finish(agent);

@@ -1,31 +1,39 @@
-use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_line, has, is_root};
+//! Why an agent ended: each cause is reported as the right agent fault, or as a platform fault.
+
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_line, has_layer, is_root};
 use faceoff_sandbox::{
     AgentProcess, Isolation, Layer, ReadLine, SandboxError, SpawnError, WriteError,
 };
 use faceoff_types::AgentFaultKind;
 use std::{fs, os::unix::fs::PermissionsExt, time::Instant};
 
-/// Reads to the end of output; returns the agent fault and the log.
-fn end_of(arguments: &[&str]) -> (AgentFaultKind, String) {
+/// Runs the test agent `exits`, which ends as `arguments` say; returns the agent fault and the log.
+fn run_to_end(arguments: &[&str]) -> (AgentFaultKind, String) {
     let subject = Subject::new("exits", arguments);
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "ready");
     let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
     assert!(matches!(outcome, ReadLine::Closed), "{outcome:?}");
-    let end = subject.end(&mut agent);
+    let end = subject.wait_for_end(&mut agent);
     (end, subject.finish(agent).stderr_tail)
 }
 
 #[test]
 fn exits_are_reported_with_their_status() {
-    assert_eq!(end_of(&["exit", "0"]).0, AgentFaultKind::Exited { code: 0 });
-    assert_eq!(end_of(&["exit", "3"]).0, AgentFaultKind::Exited { code: 3 });
-    assert_eq!(end_of(&["half"]).0, AgentFaultKind::Exited { code: 3 });
+    assert_eq!(
+        run_to_end(&["exit", "0"]).0,
+        AgentFaultKind::Exited { code: 0 }
+    );
+    assert_eq!(
+        run_to_end(&["exit", "3"]).0,
+        AgentFaultKind::Exited { code: 3 }
+    );
+    assert_eq!(run_to_end(&["half"]).0, AgentFaultKind::Exited { code: 3 });
 }
 
 #[test]
 fn crash_leaves_its_traceback_in_the_log() {
-    let (end, log) = end_of(&["crash"]);
+    let (end, log) = run_to_end(&["crash"]);
     assert_eq!(end, AgentFaultKind::Exited { code: 1 });
     assert!(
         log.contains("about to crash") && log.contains("RuntimeError: crashed on purpose"),
@@ -36,13 +44,13 @@ fn crash_leaves_its_traceback_in_the_log() {
 #[test]
 fn signals_are_reported_by_number() {
     assert_eq!(
-        end_of(&["segfault"]).0,
+        run_to_end(&["segfault"]).0,
         AgentFaultKind::Signalled {
             signal: libc::SIGSEGV
         }
     );
     // A namespace's first process cannot raise SIGABRT on itself; the C library then crashes deliberately.
-    let AgentFaultKind::Signalled { signal } = end_of(&["abort"]).0 else {
+    let AgentFaultKind::Signalled { signal } = run_to_end(&["abort"]).0 else {
         panic!("no signal")
     };
     assert!(
@@ -67,15 +75,20 @@ fn closed_output_of_a_running_agent_is_detected() {
 fn write_to_an_ended_agent_fails_as_closed() {
     let subject = Subject::new("exits", &["exit", "4"]);
     let mut agent = subject.spawn();
-    assert_eq!(subject.end(&mut agent), AgentFaultKind::Exited { code: 4 });
+    assert_eq!(
+        subject.wait_for_end(&mut agent),
+        AgentFaultKind::Exited { code: 4 }
+    );
     let outcome = agent.send_line(b"hello\n");
     assert!(matches!(outcome, Err(WriteError::Closed)), "{outcome:?}");
-    // Its earlier output is still available.
+    // The agent's earlier output is still available.
     assert_eq!(expect_line(&mut agent), "ready");
     subject.finish(agent);
 }
 
-fn cannot_start(command: &[&str]) -> String {
+/// The description of the agent fault if `command` is not executable. The bundle has the file `echo.py`, a script without an
+/// interpreter, and a file that is no program.
+fn start_error(command: &[&str]) -> String {
     let mut subject = Subject::new("echo", &[]);
     fs::write(
         subject.bundle.path().join("script"),
@@ -100,7 +113,7 @@ fn cannot_start(command: &[&str]) -> String {
         Ok(mut agent) => {
             let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
             assert!(matches!(outcome, ReadLine::Closed), "{outcome:?}");
-            subject.end(&mut agent)
+            subject.wait_for_end(&mut agent)
         }
     };
     subject.assert_nothing_left();
@@ -112,32 +125,35 @@ fn cannot_start(command: &[&str]) -> String {
 
 #[test]
 fn command_that_cannot_be_executed_is_an_agent_fault() {
-    assert_eq!(cannot_start(&[]), "the command is empty");
+    assert_eq!(start_error(&[]), "the command is empty");
     assert_eq!(
-        cannot_start(&["./missing"]),
+        start_error(&["./missing"]),
         "`./missing` is not in the bundle"
     );
     assert_eq!(
-        cannot_start(&["./echo.py"]),
+        start_error(&["./echo.py"]),
         "`./echo.py` is not executable (mode 644)"
     );
     assert_eq!(
-        cannot_start(&["no-such-program"]),
+        start_error(&["no-such-program"]),
         "no-such-program: No such file or directory"
     );
     assert_eq!(
-        cannot_start(&["/usr/sbin/no-such"]),
+        start_error(&["/usr/sbin/no-such"]),
         "/usr/sbin/no-such: No such file or directory"
     );
     assert_eq!(
-        cannot_start(&["./script"]),
+        start_error(&["./script"]),
         "./script: No such file or directory"
     );
-    // The C library passes a file that is no program to the shell, which cannot run it either.
+    // A program of the runtime that starts, but cannot run, is an exit.
     let mut subject = Subject::new("echo", &[]);
     subject.spec.command = vec!["python3".into(), "no-such-script.py".into()];
     let mut agent = subject.spawn();
-    assert_eq!(subject.end(&mut agent), AgentFaultKind::Exited { code: 2 });
+    assert_eq!(
+        subject.wait_for_end(&mut agent),
+        AgentFaultKind::Exited { code: 2 }
+    );
     subject.finish(agent);
 }
 
@@ -211,10 +227,10 @@ fn failed_sandbox_set_up_is_a_platform_fault() {
                 matches!(outcome, Err(_) | Ok(ReadLine::Closed)),
                 "{outcome:?}"
             );
-            let late = agent.diagnose_end(TIMEOUT);
+            let end = agent.diagnose_end(TIMEOUT);
             assert!(
-                late.is_err(),
-                "a platform fault is not an agent fault: {late:?}"
+                end.is_err(),
+                "a platform fault is not an agent fault: {end:?}"
             );
             let error = agent
                 .finish(TIMEOUT)
@@ -234,7 +250,7 @@ fn missing_layer_is_named_and_prevents_the_start() {
     }
     let mut subject = Subject::new("echo", &[]);
     subject.spec.isolation = Isolation::Sandboxed {
-        given_up: Vec::new(),
+        disabled_layers: Vec::new(),
     };
     match AgentProcess::spawn(&subject.spec) {
         Err(SpawnError::Platform(SandboxError::Unavailable { layer, reason })) => {
@@ -243,6 +259,6 @@ fn missing_layer_is_named_and_prevents_the_start() {
         }
         other => panic!("{other:?}"),
     }
-    assert!(!has(Layer::CgroupMemory));
+    assert!(!has_layer(Layer::CgroupMemory));
     subject.assert_nothing_left();
 }

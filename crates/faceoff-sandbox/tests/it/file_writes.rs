@@ -1,3 +1,5 @@
+//! An agent can write only to its scratch folders.
+
 use crate::harness::Subject;
 use std::fs;
 

@@ -1,4 +1,5 @@
-//! Starts the programs of `tests/agents` and checks that they leave nothing behind.
+//! Starts the test agents (the Python programs of `tests/agents`) in the sandbox, and checks that they leave nothing behind. What an
+//! argument makes an agent do is described in its program.
 
 use faceoff_sandbox::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SpawnSpec, Usage, probe_host,
@@ -14,12 +15,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Timeout that only a dead machine reaches; no passing test waits for it.
+/// Timeout of everything that should happen; no passing test waits for it.
 pub const TIMEOUT: Duration = Duration::from_secs(600);
+/// Maximum length of a line, in bytes.
 pub const LINE_CAP: usize = 64 << 10;
 
-/// Runs one test at a time per process, because the names of remains contain only the pid of the test process. Has no
-/// effect under nextest, where each test is a process.
+/// Lets one test at a time run per process, because the names of left-over folders and cgroups contain only the pid of the test
+/// process. It has no effect under nextest, where each test is a process.
 pub struct SerialGuard(());
 
 static LOCK: Mutex<()> = Mutex::new(());
@@ -32,7 +34,7 @@ impl SerialGuard {
     pub fn lock() -> Self {
         HELD.with_borrow_mut(|(count, guard)| {
             if *count == 0 {
-                // A failed test has poisoned it; the other tests continue.
+                // After a failed test the lock is poisoned; the other tests continue.
                 *guard = Some(LOCK.lock().unwrap_or_else(PoisonError::into_inner));
             }
             *count += 1;
@@ -90,7 +92,7 @@ impl Subject {
                 ..Limits::default()
             },
             isolation: Isolation::Sandboxed {
-                given_up: missing_layers().to_vec(),
+                disabled_layers: missing_layers().to_vec(),
             },
             cpus: Vec::new(),
         };
@@ -102,7 +104,7 @@ impl Subject {
         }
     }
 
-    pub fn limits(mut self, change: impl FnOnce(&mut Limits)) -> Self {
+    pub fn with_limits(mut self, change: impl FnOnce(&mut Limits)) -> Self {
         change(&mut self.spec.limits);
         self
     }
@@ -111,7 +113,7 @@ impl Subject {
         AgentProcess::spawn(&self.spec).unwrap()
     }
 
-    /// The line that it prints; it must then exit on its own and leave nothing behind.
+    /// Runs the agent; returns the line (JSON) that it prints. The agent must then exit on its own and leave nothing behind.
     pub fn report(&self) -> serde_json::Value {
         let mut agent = self.spawn();
         let line = expect_line(&mut agent);
@@ -121,15 +123,15 @@ impl Subject {
         serde_json::from_str(&line).unwrap()
     }
 
-    /// The agent fault with which it ends on its own.
-    pub fn end(&self, agent: &mut AgentProcess) -> AgentFaultKind {
+    /// Waits until the agent ends on its own; returns the agent fault.
+    pub fn wait_for_end(&self, agent: &mut AgentProcess) -> AgentFaultKind {
         agent
             .diagnose_end(TIMEOUT)
             .unwrap()
             .unwrap_or_else(|| panic!("no end; {}", agent.stderr_tail()))
     }
 
-    /// Kills it at once and checks that it left nothing behind.
+    /// Kills the agent and checks that it left nothing behind.
     pub fn finish(&self, agent: AgentProcess) -> Usage {
         let usage = agent.finish(Duration::ZERO).unwrap();
         self.assert_nothing_left();
@@ -208,7 +210,7 @@ pub fn missing_layers() -> &'static [Layer] {
 }
 
 /// Is the layer available? Prints a note if the test cannot check anything without it.
-pub fn has(layer: Layer) -> bool {
+pub fn has_layer(layer: Layer) -> bool {
     let is_available = !missing_layers().contains(&layer);
     if !is_available {
         println!("this test checks nothing on this host: it needs the layer {layer}");

@@ -1,3 +1,5 @@
+//! What an agent sees of the host: its bundle and its runtime, no other files, processes, users or rights.
+
 use crate::harness::{Subject, expect_echo, is_root, processes_marked};
 use faceoff_sandbox::{AgentProcess, Isolation, Layer, SandboxError, SpawnError};
 use std::{
@@ -154,10 +156,10 @@ fn bundle_in_a_private_folder_is_visible_to_its_agent() {
 #[test]
 fn unreachable_bundle_is_a_platform_fault() {
     let (mut subject, _private) = private_bundle();
-    let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+    let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
         unreachable!()
     };
-    given_up.push(Layer::Namespaces);
+    disabled_layers.push(Layer::Namespaces);
     match AgentProcess::spawn(&subject.spec) {
         Err(SpawnError::Platform(SandboxError::Unavailable {
             layer: Layer::Namespaces,

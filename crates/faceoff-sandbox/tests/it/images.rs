@@ -1,4 +1,4 @@
-//! Agents that are container images: with their own root folder, as unpacked from a bundle.
+//! Agents that are container images: the unpacked image is the agent's root folder.
 
 use crate::harness::{Subject, TIMEOUT, expect_echo, expect_line};
 use faceoff_sandbox::{AgentProcess, Isolation, Layer, Runtime, SpawnError};
@@ -11,9 +11,9 @@ use std::{
 };
 
 /// A root folder with a shell and its shared libraries.
-struct Root(tempfile::TempDir);
+struct ImageRoot(tempfile::TempDir);
 
-impl Root {
+impl ImageRoot {
     fn new() -> Self {
         let folder = tempfile::Builder::new()
             .prefix("image-")
@@ -22,7 +22,7 @@ impl Root {
             .unwrap();
         let root = Self(folder);
         for folder in ["agent", "dev", "etc", "opt/bin", "proc", "sys", "tmp"] {
-            fs::create_dir_all(root.at(folder)).unwrap();
+            fs::create_dir_all(root.path_of(folder)).unwrap();
         }
         for file in ["passwd", "group", "own"] {
             root.write(&format!("etc/{file}"), "the image's", 0o644);
@@ -34,30 +34,30 @@ impl Root {
             .split_whitespace()
             .filter(|word| word.starts_with('/'));
         for library in libraries {
-            let copy = root.at(&library[1..]);
+            let copy = root.path_of(&library[1..]);
             fs::create_dir_all(copy.parent().unwrap()).unwrap();
             fs::copy(library, copy).unwrap();
         }
-        fs::copy(shell, root.at("opt/bin/the-shell")).unwrap();
+        fs::copy(shell, root.path_of("opt/bin/the-shell")).unwrap();
         // Links are resolved in the root, whatever files the host has at these paths.
-        symlink("opt/bin", root.at("bin")).unwrap();
-        symlink("/bin/the-shell", root.at("opt/bin/sh")).unwrap();
+        symlink("opt/bin", root.path_of("bin")).unwrap();
+        symlink("/bin/the-shell", root.path_of("opt/bin/sh")).unwrap();
         root
     }
 
-    fn at(&self, path: &str) -> std::path::PathBuf {
+    fn path_of(&self, path: &str) -> std::path::PathBuf {
         self.0.path().join(path)
     }
 
     fn write(&self, path: &str, content: &str, mode: u32) {
-        fs::write(self.at(path), content).unwrap();
-        fs::set_permissions(self.at(path), fs::Permissions::from_mode(mode)).unwrap();
+        fs::write(self.path_of(path), content).unwrap();
+        fs::set_permissions(self.path_of(path), fs::Permissions::from_mode(mode)).unwrap();
     }
 
     /// An agent of this image that runs `command`, with a `PATH` as from an image's `ENV`.
     fn subject(&self, command: &[&str]) -> Subject {
         let mut subject = Subject::new("echo", &[]);
-        subject.spec.bundle_dir = self.at("agent");
+        subject.spec.bundle_dir = self.path_of("agent");
         subject.spec.runtime = Runtime::from_image(self.0.path(), "/opt/bin");
         subject.spec.command = command.iter().map(|&word| word.to_owned()).collect();
         subject.spec.command.push(subject.mark.clone());
@@ -91,7 +91,7 @@ fn refusal(spawned: Result<AgentProcess, SpawnError>) -> String {
 
 #[test]
 fn image_starts_and_answers() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     root.write(
         "agent/run",
         "#!/bin/sh\nwhile read -r line; do echo \"$line\"; done\n",
@@ -107,7 +107,7 @@ fn image_starts_and_answers() {
 
 #[test]
 fn image_sees_only_its_own_files() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     let hidden = tempfile::tempdir().unwrap();
     let host = [
         hidden.path().to_str().unwrap(),
@@ -153,9 +153,9 @@ fn image_sees_only_its_own_files() {
 
 #[test]
 fn image_writes_only_to_its_scratch_folders() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     root.write("open", "", 0o666);
-    fs::set_permissions(root.at("opt"), fs::Permissions::from_mode(0o777)).unwrap();
+    fs::set_permissions(root.path_of("opt"), fs::Permissions::from_mode(0o777)).unwrap();
     let places = [
         "/x",
         "/open",
@@ -177,15 +177,15 @@ fn image_writes_only_to_its_scratch_folders() {
     );
     assert_eq!(root.output(&script), ["/tmp/x", "/dev/shm/x"]);
     assert_eq!(
-        fs::read_to_string(root.at("etc/own")).unwrap(),
+        fs::read_to_string(root.path_of("etc/own")).unwrap(),
         "the image's"
     );
-    assert_eq!(fs::read_dir(root.at("tmp")).unwrap().count(), 0);
+    assert_eq!(fs::read_dir(root.path_of("tmp")).unwrap().count(), 0);
 }
 
 #[test]
 fn variables_of_the_spec_replace_defaults() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     let mut subject = root.subject(&["sh", "-c", "echo $PATH $MODE $HOME"]);
     subject.spec.env = BTreeMap::from([
         ("PATH".to_owned(), "/bin:/opt".to_owned()),
@@ -198,7 +198,7 @@ fn variables_of_the_spec_replace_defaults() {
 
 #[test]
 fn image_has_the_limits_of_any_agent() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     let mut subject = root.subject(&[
         "sh",
         "-c",
@@ -246,14 +246,14 @@ fn links_at_mount_points_are_refused() {
         ("etc/passwd", "file"),
         ("etc/group", "file"),
     ] {
-        let root = Root::new();
-        let at = root.at(place);
+        let root = ImageRoot::new();
+        let mount_point = root.path_of(place);
         if kind == "folder" {
-            fs::remove_dir_all(&at).unwrap();
-            symlink(host.path(), &at).unwrap();
+            fs::remove_dir_all(&mount_point).unwrap();
+            symlink(host.path(), &mount_point).unwrap();
         } else {
-            fs::remove_file(&at).unwrap();
-            symlink(host.path().join("passwd"), &at).unwrap();
+            fs::remove_file(&mount_point).unwrap();
+            symlink(host.path().join("passwd"), &mount_point).unwrap();
         }
         let error = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
         assert_eq!(
@@ -261,8 +261,8 @@ fn links_at_mount_points_are_refused() {
             format!("the agent's root has no {kind} /{place}: it is something else")
         );
     }
-    let root = Root::new();
-    fs::remove_dir(root.at("tmp")).unwrap();
+    let root = ImageRoot::new();
+    fs::remove_dir(root.path_of("tmp")).unwrap();
     let error = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
     assert!(
         error.starts_with("the agent's root has no folder /tmp: "),
@@ -277,11 +277,11 @@ fn links_at_mount_points_are_refused() {
 
 #[test]
 fn image_without_namespaces_is_refused() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     for isolation in [
         Isolation::None,
         Isolation::Sandboxed {
-            given_up: vec![Layer::Namespaces],
+            disabled_layers: vec![Layer::Namespaces],
         },
     ] {
         let mut subject = root.subject(&["sh"]);
@@ -296,11 +296,11 @@ fn image_without_namespaces_is_refused() {
 
 #[test]
 fn command_is_looked_up_in_the_image_only() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     let host = tempfile::tempdir().unwrap();
     fs::write(host.path().join("secret"), "").unwrap();
-    symlink(host.path(), root.at("agent/host")).unwrap();
-    symlink("/opt/bin/sh", root.at("agent/shell")).unwrap();
+    symlink(host.path(), root.path_of("agent/host")).unwrap();
+    symlink("/opt/bin/sh", root.path_of("agent/shell")).unwrap();
     root.write("agent/data", "", 0o644);
     let detail = |program: &str| {
         let subject = root.subject(&[program, "-c", "echo started"]);
@@ -309,7 +309,7 @@ fn command_is_looked_up_in_the_image_only() {
             Err(SpawnError::Agent(AgentFaultKind::CannotStart { detail })) => return detail,
             Err(other) => panic!("{other:?}"),
         };
-        let AgentFaultKind::CannotStart { detail } = subject.end(&mut agent) else {
+        let AgentFaultKind::CannotStart { detail } = subject.wait_for_end(&mut agent) else {
             panic!("{program} started");
         };
         detail
@@ -328,7 +328,7 @@ fn command_is_looked_up_in_the_image_only() {
 
 #[test]
 fn image_root_in_a_closed_folder_is_reachable() {
-    let root = Root::new();
+    let root = ImageRoot::new();
     let closed = tempfile::tempdir().unwrap();
     let inside = closed.path().join("root");
     let moved = std::process::Command::new("cp")

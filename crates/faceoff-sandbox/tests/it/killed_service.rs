@@ -22,7 +22,9 @@ fn agent_of_a_killed_service_dies_with_its_cgroup() {
     assert_ends_with_its_service("killed_service::service_waits_with_an_agent", false);
 }
 
-fn assert_ends_with_its_service(service: &str, by_sweep: bool) {
+/// Kills the service that the ignored test `service` runs, and checks that its agent ends. `needs_sweep`: only the sweep of the next
+/// service ends it.
+fn assert_ends_with_its_service(service: &str, needs_sweep: bool) {
     let mut service = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", service, "--ignored", "--nocapture"])
         .stdin(Stdio::piped())
@@ -49,7 +51,7 @@ fn assert_ends_with_its_service(service: &str, by_sweep: bool) {
 
     service.kill().unwrap();
     service.wait().unwrap();
-    if by_sweep {
+    if needs_sweep {
         sweep_stale();
     }
     let timeout = Timespec {
@@ -93,6 +95,6 @@ fn run_service(before_waiting: impl FnOnce(&mut AgentProcess)) {
     assert_eq!(expect_line(&mut agent), "ready");
     before_waiting(&mut agent);
     println!("the mark is {}", subject.mark);
-    // Runs until it or its parent is killed.
+    // Waits until this process or its parent is killed.
     let _ = std::io::stdin().read_line(&mut String::new());
 }

@@ -1,3 +1,5 @@
+//! An agent reaches neither the network nor a socket of the host.
+
 use crate::harness::Subject;
 use std::{
     io,
@@ -55,10 +57,10 @@ fn network_namespace_isolates_without_the_filter() {
     let abstract_address = SocketAddr::from_abstract_name(&name).unwrap();
     let _abstract_socket = UnixListener::bind_addr(&abstract_address).unwrap();
     let mut subject = Subject::new("connects_out", &[&port, "/nowhere", &name]);
-    let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+    let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
         unreachable!()
     };
-    given_up.push(Layer::Seccomp);
+    disabled_layers.push(Layer::Seccomp);
     let report = subject.report();
     assert_eq!(report["tcp"], "Connection refused");
     assert_eq!(report["unix_abstract"], "Connection refused");

@@ -41,7 +41,7 @@ fn exit_causes_are_distinguished_without_a_sandbox() {
         let subject = unsandboxed("exits", arguments);
         let mut agent = subject.spawn();
         assert_eq!(expect_line(&mut agent), "ready");
-        let end = subject.end(&mut agent);
+        let end = subject.wait_for_end(&mut agent);
         subject.finish(agent);
         end
     };

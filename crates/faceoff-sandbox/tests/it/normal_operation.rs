@@ -1,4 +1,6 @@
-use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line, has};
+//! An ordinary agent: it answers line by line, may be silent for a while, and can use processes, threads and files.
+
+use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line, has_layer};
 use faceoff_sandbox::{Layer, ReadLine};
 use std::time::{Duration, Instant};
 
@@ -9,17 +11,18 @@ fn agent_answers_line_by_line_and_exits_cleanly() {
     for question in ["one", "two", "three"] {
         let before = Instant::now();
         agent.send_line(format!("{question}\n").as_bytes()).unwrap();
-        let ReadLine::Line { bytes, at } = agent.read_line(LINE_CAP, before + TIMEOUT).unwrap()
+        let ReadLine::Line { bytes, received_at } =
+            agent.read_line(LINE_CAP, before + TIMEOUT).unwrap()
         else {
             panic!("no line")
         };
         assert_eq!(bytes, question.as_bytes());
-        assert!(before <= at && at <= Instant::now());
+        assert!(before <= received_at && received_at <= Instant::now());
         assert!(!agent.has_pending_output().unwrap());
     }
     let usage = agent.finish(TIMEOUT).unwrap();
     assert_eq!(usage.exit, None);
-    if has(Layer::CgroupMemory) {
+    if has_layer(Layer::CgroupMemory) {
         let peak = usage.peak_memory_bytes.unwrap();
         assert!((1 << 20..256 << 20).contains(&peak), "{peak}");
         assert!(usage.cpu_time_s.unwrap() > 0.0);

@@ -1,3 +1,5 @@
+//! Agents that print too much, or read nothing: lines and log are cut, and deadlines hold.
+
 use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line};
 use faceoff_sandbox::ReadLine;
 use std::time::Instant;
@@ -33,7 +35,7 @@ fn output_flood_is_read_only_on_demand() {
 #[test]
 fn log_flood_blocks_no_answer_and_keeps_its_end_only() {
     let subject =
-        Subject::new("floods", &["stderr"]).limits(|limits| limits.stderr_tail_bytes = 1000);
+        Subject::new("floods", &["stderr"]).with_limits(|limits| limits.stderr_tail_bytes = 1000);
     let mut agent = subject.spawn();
     for number in 0..200 {
         expect_echo(&mut agent, &number.to_string());

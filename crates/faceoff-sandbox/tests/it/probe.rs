@@ -1,3 +1,5 @@
+//! The probe of the host's sandbox features.
+
 use crate::harness::{SerialGuard, missing_layers};
 use faceoff_sandbox::{Layer, probe_host};
 

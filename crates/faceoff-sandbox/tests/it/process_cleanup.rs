@@ -1,7 +1,10 @@
+//! All processes of an agent are killed with it, whatever they do against it.
+
 use crate::harness::{Subject, TIMEOUT, expect_line, processes_marked};
 use faceoff_types::AgentFaultKind;
 use std::time::Duration;
 
+/// `kind`: what the test agent `resists_kill` does against its end.
 fn assert_is_killed(kind: &str) {
     let subject = Subject::new("resists_kill", &[kind]);
     let mut agent = subject.spawn();
@@ -49,14 +52,14 @@ fn process_tree_is_killed_without_namespaces() {
     use faceoff_sandbox::{Isolation, Layer};
     for kind in ["ignores", "group", "daemon-stays"] {
         let mut subject = Subject::new("resists_kill", &[kind]);
-        let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+        let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
             unreachable!()
         };
-        if kind == "daemon-stays" && given_up.contains(&Layer::CgroupPids) {
+        if kind == "daemon-stays" && disabled_layers.contains(&Layer::CgroupPids) {
             println!("a daemon can be found only by its cgroup, which this host does not offer");
             continue;
         }
-        given_up.push(Layer::Namespaces);
+        disabled_layers.push(Layer::Namespaces);
         let mut agent = subject.spawn();
         assert_eq!(expect_line(&mut agent), "ready");
         subject.finish(agent);

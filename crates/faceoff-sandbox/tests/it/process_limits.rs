@@ -1,18 +1,20 @@
-use crate::harness::{Subject, TIMEOUT, expect_echo, expect_line, has, processes_marked};
+//! The limit on processes and threads of an agent.
+
+use crate::harness::{Subject, TIMEOUT, expect_echo, expect_line, has_layer, processes_marked};
 use faceoff_sandbox::Layer;
 use faceoff_types::AgentFaultKind;
 
 #[test]
 fn process_above_the_limit_is_refused() {
-    if !has(Layer::CgroupPids) {
+    if !has_layer(Layer::CgroupPids) {
         return;
     }
-    let subject = Subject::new("forks", &["count"]).limits(|limits| limits.pids = 20);
+    let subject = Subject::new("forks", &["count"]).with_limits(|limits| limits.pids = 20);
     let mut agent = subject.spawn();
     assert_eq!(
         expect_line(&mut agent),
         "19 Resource temporarily unavailable"
-    );
+    ); // number of children, and the error of the next fork
     expect_echo(&mut agent, "still there");
     assert!(processes_marked(&subject.mark).len() >= 20);
     subject.finish(agent);
@@ -20,14 +22,14 @@ fn process_above_the_limit_is_refused() {
 
 #[test]
 fn fork_bomb_is_contained_and_killed() {
-    if !has(Layer::CgroupPids) {
+    if !has_layer(Layer::CgroupPids) {
         return;
     }
-    let subject = Subject::new("forks", &["bomb"]).limits(|limits| limits.pids = 50);
+    let subject = Subject::new("forks", &["bomb"]).with_limits(|limits| limits.pids = 50);
     let bystander = Subject::new("echo", &[]);
     let mut other = bystander.spawn();
     let mut agent = subject.spawn();
-    assert_eq!(expect_line(&mut agent), "lit");
+    assert_eq!(expect_line(&mut agent), "lit"); // the fork bomb has started
     // While the fork bomb runs, another agent answers.
     for number in 0..100 {
         expect_echo(&mut other, &number.to_string());
@@ -39,10 +41,10 @@ fn fork_bomb_is_contained_and_killed() {
 
 #[test]
 fn exit_after_refused_processes_names_the_limit() {
-    if !has(Layer::CgroupPids) {
+    if !has_layer(Layer::CgroupPids) {
         return;
     }
-    let subject = Subject::new("forks", &["exit"]).limits(|limits| limits.pids = 10);
+    let subject = Subject::new("forks", &["exit"]).with_limits(|limits| limits.pids = 10);
     let mut agent = subject.spawn();
     expect_line(&mut agent);
     let end = agent.diagnose_end(TIMEOUT).unwrap();

@@ -1,3 +1,5 @@
+//! Runtimes: which files of the host programs find, natively, with Python, and with a copy of the files in memory.
+
 use crate::harness::{Subject, expect_echo, expect_line};
 use faceoff_sandbox::{MemoryImage, Runtime};
 use std::{
@@ -56,8 +58,8 @@ fn python_outside_of_usr_shows_only_its_prefix() {
     fs::set_permissions(host.path(), fs::Permissions::from_mode(0o755)).unwrap();
     let prefix = host.path().join("python");
     fs::write(host.path().join("secret"), "secret").unwrap();
-    let usual = Runtime::python3().unwrap().interpreter().unwrap();
-    let venv = std::process::Command::new(&usual)
+    let host_python = Runtime::python3().unwrap().interpreter().unwrap();
+    let venv = std::process::Command::new(&host_python)
         .args(["-m", "venv", "--without-pip", prefix.to_str().unwrap()])
         .output()
         .unwrap();

@@ -1,5 +1,5 @@
+//! The system calls that the seccomp filter refuses. The test program knows the system call numbers of this architecture only.
 #![cfg(target_arch = "x86_64")]
-//! The test program knows the system call numbers of this architecture only.
 
 use crate::harness::Subject;
 use faceoff_sandbox::{Isolation, Layer};
@@ -31,10 +31,10 @@ fn dangerous_system_calls_are_refused() {
 fn refusals_come_from_the_filter() {
     // Without the filter these calls succeed, or fail for another reason.
     let mut subject = Subject::new("system_calls", &[]);
-    let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+    let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
         unreachable!()
     };
-    given_up.push(Layer::Seccomp);
+    disabled_layers.push(Layer::Seccomp);
     let answers = answers(&subject);
     assert_eq!(answers["parent_death_signal"], "0");
     for call in [
@@ -63,10 +63,10 @@ fn refusals_come_from_the_filter() {
 #[test]
 fn filter_works_without_namespaces() {
     let mut subject = Subject::new("system_calls", &[]);
-    let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+    let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
         unreachable!()
     };
-    given_up.push(Layer::Namespaces);
+    disabled_layers.push(Layer::Namespaces);
     let answers = answers(&subject);
     for call in [
         "ptrace",

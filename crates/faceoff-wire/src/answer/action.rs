@@ -1,15 +1,17 @@
-use super::marks;
+//! Reads the `action` of an `act` line: nested arrays of numbers, whose shape depends on the agent's interpolation.
+
+use super::error_markers;
 use faceoff_types::ACTION_LIMIT;
 use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 use std::fmt;
 
-/// Reads nested arrays of exactly `shape` into `out`, row-major, and refuses numbers beyond
-/// [`ACTION_LIMIT`].
+/// A serde seed (a deserialiser with parameters) that reads nested arrays of exactly `shape` into `numbers`, row-major, and
+/// refuses numbers beyond [`ACTION_LIMIT`].
 ///
 /// The shape bounds the recursion: an array in place of a number is refused before it is entered.
 pub(super) struct ActionSeed<'s> {
     pub shape: &'static [usize],
-    pub out: &'s mut Vec<f64>,
+    pub numbers: &'s mut Vec<f64>,
 }
 
 impl<'de> DeserializeSeed<'de> for ActionSeed<'_> {
@@ -23,35 +25,35 @@ impl<'de> Visitor<'de> for ActionSeed<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(marks::SHAPE)
+        f.write_str(error_markers::SHAPE)
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
         let Some((&expected, inner)) = self.shape.split_first() else {
-            return Err(A::Error::custom(marks::SHAPE));
+            return Err(A::Error::custom(error_markers::SHAPE));
         };
         if inner.is_empty() {
             for _ in 0..expected {
                 let Some(Number(value)) = seq.next_element()? else {
-                    return Err(A::Error::custom(marks::SHAPE));
+                    return Err(A::Error::custom(error_markers::SHAPE));
                 };
                 if value.abs() > ACTION_LIMIT {
                     return Err(A::Error::custom(format_args!(
                         "{}{} {value:?}",
-                        marks::TOO_LARGE,
-                        self.out.len()
+                        error_markers::TOO_LARGE,
+                        self.numbers.len()
                     )));
                 }
-                self.out.push(value);
+                self.numbers.push(value);
             }
         } else {
             for _ in 0..expected {
                 let seed = ActionSeed {
                     shape: inner,
-                    out: self.out,
+                    numbers: self.numbers,
                 };
                 if seq.next_element_seed(seed)?.is_none() {
-                    return Err(A::Error::custom(marks::SHAPE));
+                    return Err(A::Error::custom(error_markers::SHAPE));
                 }
             }
         }
@@ -59,11 +61,12 @@ impl<'de> Visitor<'de> for ActionSeed<'_> {
         // them as a wrong shape.
         match seq.next_element::<serde::de::IgnoredAny>()? {
             None => Ok(()),
-            Some(_) => Err(A::Error::custom(marks::SHAPE)),
+            Some(_) => Err(A::Error::custom(error_markers::SHAPE)),
         }
     }
 }
 
+/// A JSON number; anything else is an error with the marker of a wrong shape.
 struct Number(f64);
 
 impl<'de> serde::Deserialize<'de> for Number {
@@ -72,7 +75,7 @@ impl<'de> serde::Deserialize<'de> for Number {
         impl Visitor<'_> for NumberVisitor {
             type Value = Number;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(marks::SHAPE)
+                f.write_str(error_markers::SHAPE)
             }
             fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
                 Ok(Number(value))

@@ -1,17 +1,17 @@
-//! Explains what is wrong with a line that the one-pass parser refused. Not on the hot path.
+//! Explains what is wrong with an agent's line that the parser refused. It may be slow, since a refused line ends the episode.
 
-use super::marks;
+use super::error_markers;
 use crate::protocol::MAX_LINE_BYTES;
 use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation};
 use serde_json::Value;
 
 /// Maximum number of characters of a repeated key in a message.
-const QUOTED_KEY_CHARS: usize = 60;
+const MAX_KEY_CHARS: usize = 60;
 
 /// Maximum number of characters of a parser message, without the position at its end.
-const DETAIL_CHARS: usize = 200;
-/// Longest position at the end of a parser message.
-const PLACE_BYTES: usize = 40;
+const MAX_DETAIL_CHARS: usize = 200;
+/// Maximum length of the position at the end of a parser message, such as ` at character 17`.
+const MAX_POSITION_BYTES: usize = 40;
 
 /// The fault of a line longer than the protocol allows.
 #[must_use]
@@ -21,22 +21,22 @@ pub const fn too_long() -> AgentFaultKind {
     }
 }
 
-/// The fault behind a parser error. `interpolation` is the agreed one if an action was due.
+/// The fault behind a parser error. `interpolation` is the one from the agent's `ready` if the line should contain an action.
 pub(super) fn diagnose(
     text: &str,
     error: &serde_json::Error,
     interpolation: Option<Interpolation>,
 ) -> AgentFaultKind {
     let message = error.to_string();
-    if let Some(rest) = message.strip_prefix(marks::TWICE) {
-        return twice(rest.split(' ').next().unwrap_or_default());
+    if let Some(rest) = message.strip_prefix(error_markers::REPEATED_KEY) {
+        return repeated_key(rest.split(' ').next().unwrap_or_default());
     }
-    if let Some(code) = interpolation {
-        if let Some(found) = message.strip_prefix(marks::TOO_LARGE) {
-            return too_large(found, code);
+    if let Some(interpolation) = interpolation {
+        if let Some(index_and_value) = message.strip_prefix(error_markers::TOO_LARGE) {
+            return too_large(index_and_value, interpolation);
         }
-        if message.contains(marks::SHAPE) {
-            return wrong_shape(text, code);
+        if message.contains(error_markers::SHAPE) {
+            return wrong_shape(text, interpolation);
         }
     }
     if message.starts_with("number out of range") || has_non_finite_word(text) {
@@ -50,47 +50,50 @@ pub(super) fn diagnose(
     // The text is a single line, so only the column helps.
     let detail = message.replace(" at line 1 column ", " at character ");
     AgentFaultKind::NotJson {
-        detail: cut(&detail),
+        detail: shorten(&detail),
     }
 }
 
 /// The fault for a repeated key.
-pub(super) fn twice(key: &str) -> AgentFaultKind {
-    let key: String = key.chars().take(QUOTED_KEY_CHARS).collect();
+pub(super) fn repeated_key(key: &str) -> AgentFaultKind {
+    let key: String = key.chars().take(MAX_KEY_CHARS).collect();
     AgentFaultKind::NotJson {
         detail: format!("the key {key:?} is given twice"),
     }
 }
 
 /// Shortens a parser message, which may quote a whole line, but keeps the position at its end.
-fn cut(detail: &str) -> String {
-    let Some((end, _)) = detail.char_indices().nth(DETAIL_CHARS) else {
+fn shorten(detail: &str) -> String {
+    let Some((end, _)) = detail.char_indices().nth(MAX_DETAIL_CHARS) else {
         return detail.to_owned();
     };
-    let place = detail[end..].rfind(" at ").map(|at| &detail[end + at..]);
-    let place = place.filter(|place| place.len() <= PLACE_BYTES);
-    format!("{}…{}", &detail[..end], place.unwrap_or_default())
+    let position = detail[end..]
+        .rfind(" at ")
+        .map(|offset| &detail[end + offset..]);
+    let position = position.filter(|position| position.len() <= MAX_POSITION_BYTES);
+    format!("{}…{}", &detail[..end], position.unwrap_or_default())
 }
 
-/// `found` holds the number's index in the action and its value.
-fn too_large(found: &str, code: Interpolation) -> AgentFaultKind {
-    let mut words = found.split(' ');
+/// The fault for a number beyond [`ACTION_LIMIT`]. `index_and_value` is its row-major index in the action and its value,
+/// separated by a space.
+fn too_large(index_and_value: &str, interpolation: Interpolation) -> AgentFaultKind {
+    let mut words = index_and_value.split(' ');
     let mut index: usize = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
     let value = words.next().and_then(|word| word.parse().ok());
-    let mut place = Vec::new();
-    for len in code.shape().iter().rev() {
-        place.push(index % len);
+    let mut indices = Vec::new();
+    for len in interpolation.shape().iter().rev() {
+        indices.push(index % len);
         index /= len;
     }
-    place.reverse();
+    indices.reverse();
     AgentFaultKind::TooLarge {
-        place: format!("action{}", shape_text(&place)),
+        place: format!("action{}", shape_text(&indices)),
         value: value.unwrap_or(f64::MAX),
         limit: ACTION_LIMIT,
     }
 }
 
-fn wrong_shape(text: &str, code: Interpolation) -> AgentFaultKind {
+fn wrong_shape(text: &str, interpolation: Interpolation) -> AgentFaultKind {
     let got = match serde_json::from_str::<Value>(text) {
         Ok(value) => describe_action(&value["action"]),
         Err(error) if error.to_string().starts_with("number out of range") => {
@@ -100,16 +103,18 @@ fn wrong_shape(text: &str, code: Interpolation) -> AgentFaultKind {
         Err(_) => "arrays nested too deep, or cut off".to_owned(),
     };
     AgentFaultKind::WrongShape {
-        expected: shape_text(code.shape()),
+        expected: shape_text(interpolation.shape()),
         got,
     }
 }
 
+/// `[2][7]` for `[2, 7]`; used for shapes and for the indices of a number.
 fn shape_text(shape: &[usize]) -> String {
     shape.iter().map(|len| format!("[{len}]")).collect()
 }
 
-/// `[2][6]` for a regular array; otherwise the first element that breaks the shape.
+/// A description of an action of a wrong shape: its shape, such as `[2][6]`, if it is regular; otherwise the first element that
+/// breaks the shape.
 fn describe_action(action: &Value) -> String {
     let mut shape = Vec::new();
     let mut inner = action;
@@ -129,6 +134,7 @@ fn describe_action(action: &Value) -> String {
     }
 }
 
+/// Describes the first element, below the element at `path`, that does not fit `shape`; `None` if all fit.
 fn irregularity(value: &Value, shape: &[usize], path: &mut Vec<usize>) -> Option<String> {
     match (value, shape.split_first()) {
         (Value::Array(items), Some((&len, inner))) => {
@@ -162,6 +168,7 @@ const fn kind_of(value: &Value) -> &'static str {
     }
 }
 
+/// Does `rest` start with `word`, followed by no letter or digit?
 fn is_word(rest: &[u8], word: &[u8]) -> bool {
     rest.strip_prefix(word)
         .is_some_and(|after| !after.first().is_some_and(u8::is_ascii_alphanumeric))
@@ -175,7 +182,7 @@ fn has_non_finite_word(text: &str) -> bool {
     }
     let mut in_string = false;
     let mut escaped = false;
-    text.bytes().enumerate().any(|(at, byte)| {
+    text.bytes().enumerate().any(|(index, byte)| {
         if in_string {
             match byte {
                 _ if escaped => escaped = false,
@@ -187,8 +194,8 @@ fn has_non_finite_word(text: &str) -> bool {
         }
         match byte {
             b'"' => in_string = true,
-            b'N' => return is_word(&text.as_bytes()[at..], b"NaN"),
-            b'I' => return is_word(&text.as_bytes()[at..], b"Infinity"),
+            b'N' => return is_word(&text.as_bytes()[index..], b"NaN"),
+            b'I' => return is_word(&text.as_bytes()[index..], b"Infinity"),
             _ => {}
         }
         false

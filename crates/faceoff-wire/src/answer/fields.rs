@@ -1,4 +1,6 @@
-use super::{action::ActionSeed, diagnosis, marks, repeated_keys, scalar::Scalar};
+//! Reads one line of an agent into the fields that the protocol defines, in one pass.
+
+use super::{action::ActionSeed, diagnosis, error_markers, repeated_keys, scalar::Scalar};
 use crate::protocol::MAX_LINE_BYTES;
 use faceoff_types::{AgentFaultKind, Interpolation, escape_unprintable};
 use serde::{
@@ -7,9 +9,13 @@ use serde::{
 };
 use std::fmt;
 
+/// Maximum number of characters of an unexpected message type in a fault.
+const MAX_TYPE_CHARS: usize = 60;
+
 /// The fields of an answer that the protocol defines; `None` if absent.
 #[derive(Debug, Default)]
 pub(super) struct Fields<'a> {
+    /// The field `type`.
     pub kind: Option<Scalar<'a>>,
     pub protocol: Option<Scalar<'a>>,
     pub interpolation: Option<Scalar<'a>>,
@@ -19,11 +25,11 @@ pub(super) struct Fields<'a> {
     pub version: Option<Scalar<'a>>,
     /// Was an action read into the caller's buffer?
     pub has_action: bool,
-    /// Was a value skipped, so that its keys have not been checked for repetition?
-    has_skipped: bool,
+    /// Was an array or object skipped, or the value of an unknown field, so that its keys have not been checked for repetition?
+    has_skipped_values: bool,
 }
 
-/// The agreed interpolation and the buffer for an expected action.
+/// The interpolation from the agent's `ready` and the buffer for its action; `None` if no action is expected.
 pub(super) type ActionSink<'s> = Option<(Interpolation, &'s mut Vec<f64>)>;
 
 impl<'a> Fields<'a> {
@@ -35,30 +41,30 @@ impl<'a> Fields<'a> {
         let text = std::str::from_utf8(line).map_err(|error| AgentFaultKind::NotJson {
             detail: format!("not UTF-8 after byte {}", error.valid_up_to()),
         })?;
-        let interpolation = sink.as_ref().map(|(code, _)| *code);
+        let interpolation = sink.as_ref().map(|(interpolation, _)| *interpolation);
         let mut json = serde_json::Deserializer::from_str(text);
         let fields = json
             .deserialize_map(FieldsVisitor { sink })
             .and_then(|fields| json.end().map(|()| fields))
             .map_err(|error| diagnosis::diagnose(text, &error, interpolation))?;
-        if fields.has_skipped {
+        if fields.has_skipped_values {
             repeated_keys::refuse(text)?;
         }
         Ok(fields)
     }
 
-    /// Is this an `act` for `step`? The check of the hot path.
+    /// Is this an `act` for `step`? A check without allocations, since it is made for each answer.
     pub fn is_act(&self, step: u32) -> bool {
         matches!(&self.kind, Some(Scalar::Text(kind)) if kind == "act")
             && self.step == Some(Scalar::Integer(i64::from(step)))
     }
 
-    /// Requires this `type`.
+    /// Requires the `type` to be `kind`. `expected` describes the whole expected answer, for the fault.
     pub fn require_type(&self, kind: &str, expected: &str) -> Result<(), AgentFaultKind> {
         let got = match &self.kind {
             Some(Scalar::Text(got)) if got == kind => return Ok(()),
             Some(Scalar::Text(got)) => {
-                let head: String = got.chars().take(60).collect();
+                let head: String = got.chars().take(MAX_TYPE_CHARS).collect();
                 escape_unprintable(&head).into_owned()
             }
             Some(other) => format!("an object whose type is {other}"),
@@ -70,7 +76,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Requires the field `name` to be this integer.
+    /// Requires `field`, which is called `name`, to be `value`. `expected` is as in [`Self::require_type`].
     pub fn require_integer(
         &self,
         name: &str,
@@ -118,34 +124,37 @@ impl<'de> Visitor<'de> for FieldsVisitor<'_> {
                 Key::Version => &mut fields.version,
                 Key::Action => match &mut self.sink {
                     Some(_) if fields.has_action => {
-                        return Err(A::Error::custom(format_args!("{}action", marks::TWICE)));
+                        return Err(A::Error::custom(format_args!(
+                            "{}action",
+                            error_markers::REPEATED_KEY
+                        )));
                     }
-                    Some((code, out)) => {
+                    Some((interpolation, numbers)) => {
                         map.next_value_seed(ActionSeed {
-                            shape: code.shape(),
-                            out,
+                            shape: interpolation.shape(),
+                            numbers,
                         })?;
                         fields.has_action = true;
                         continue;
                     }
                     None => {
-                        fields.has_skipped = true;
+                        fields.has_skipped_values = true;
                         map.next_value::<IgnoredAny>()?;
                         continue;
                     }
                 },
                 Key::Unknown => {
-                    fields.has_skipped = true;
+                    fields.has_skipped_values = true;
                     map.next_value::<IgnoredAny>()?;
                     continue;
                 }
             };
             let value = map.next_value()?;
-            fields.has_skipped |= matches!(value, Scalar::Array | Scalar::Object);
+            fields.has_skipped_values |= matches!(value, Scalar::Array | Scalar::Object);
             if field.replace(value).is_some() {
                 return Err(A::Error::custom(format_args!(
                     "{}{}",
-                    marks::TWICE,
+                    error_markers::REPEATED_KEY,
                     key.as_str()
                 )));
             }

@@ -1,7 +1,12 @@
+//! The value of a field of an agent's answer.
+
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::{borrow::Cow, fmt};
 
-/// The value of a field that should be no array or object. Those are skipped, and only their kind is kept.
+/// Maximum number of characters of a string in a fault's description.
+const MAX_QUOTED_CHARS: usize = 60;
+
+/// The value of a field that must not be an array or object. The content of an array or object is skipped.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Scalar<'a> {
     /// `null`
@@ -28,7 +33,7 @@ impl fmt::Display for Scalar<'_> {
             Self::Integer(value) => value.fmt(f),
             Self::Number(value) => write!(f, "{value:?}"),
             Self::Text(text) => {
-                let head: String = text.chars().take(60).collect();
+                let head: String = text.chars().take(MAX_QUOTED_CHARS).collect();
                 write!(f, "{head:?}")
             }
             Self::Array => f.write_str("an array"),

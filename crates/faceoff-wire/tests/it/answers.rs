@@ -1,9 +1,16 @@
+//! Valid and invalid lines of an agent. Unless a test says otherwise, the line answers step 4 and the interpolation is cubic, so that
+//! an action has 2 rows of 7 numbers.
+
 use faceoff_types::{AgentFaultKind, Interpolation};
 use faceoff_wire::{
     MAX_LINE_BYTES,
     answer::{parse_act, parse_ready, parse_reset_ready},
 };
 
+const STEP: u32 = 4;
+const STEP_TEXT: &str = "4";
+
+/// One number for each of the 7 joints.
 fn row(value: &str) -> String {
     format!("[{}]", [value; 7].join(","))
 }
@@ -12,17 +19,17 @@ fn act(step: &str, action: &str) -> String {
     format!("{{\"type\":\"act\",\"step\":{step},\"action\":{action}}}")
 }
 
-fn good() -> String {
-    act("4", &format!("[{},{}]", row("0.5"), row("-0")))
+fn valid_act() -> String {
+    act(STEP_TEXT, &format!("[{},{}]", row("0.5"), row("-0")))
 }
 
 fn parse(line: &str) -> Result<Vec<f64>, AgentFaultKind> {
-    let mut action = vec![9.0; 3];
-    parse_act(line.as_bytes(), 4, Interpolation::Cubic, &mut action).map(|()| action)
+    let mut action = vec![9.0; 3]; // content that parsing must replace
+    parse_act(line.as_bytes(), STEP, Interpolation::Cubic, &mut action).map(|()| action)
 }
 
 #[track_caller]
-fn wrong_message(line: &str, expected_got: &str) {
+fn assert_wrong_message(line: &str, expected_got: &str) {
     match parse(line) {
         Err(AgentFaultKind::WrongMessage { got, .. }) => assert_eq!(got, expected_got),
         other => panic!("{line}: {other:?}"),
@@ -30,7 +37,7 @@ fn wrong_message(line: &str, expected_got: &str) {
 }
 
 #[track_caller]
-fn wrong_shape(action: &str, expected_got: &str) {
+fn assert_wrong_shape(action: &str, expected_got: &str) {
     match parse(&act("4", action)) {
         Err(AgentFaultKind::WrongShape { expected, got }) => {
             assert_eq!((expected.as_str(), got.as_str()), ("[2][7]", expected_got));
@@ -40,10 +47,13 @@ fn wrong_shape(action: &str, expected_got: &str) {
 }
 
 #[track_caller]
-fn not_json(line: &str, needle: &str) {
+fn assert_not_json(line: &str, expected_words: &str) {
     match parse(line) {
         Err(AgentFaultKind::NotJson { detail }) => {
-            assert!(detail.contains(needle), "{detail:?} lacks {needle:?}");
+            assert!(
+                detail.contains(expected_words),
+                "{detail:?} lacks {expected_words:?}"
+            );
         }
         other => panic!("{line}: {other:?}"),
     }
@@ -51,7 +61,7 @@ fn not_json(line: &str, needle: &str) {
 
 #[test]
 fn action_is_read_row_major_with_its_bits() {
-    let action = parse(&good()).unwrap();
+    let action = parse(&valid_act()).unwrap();
     assert_eq!(action.len(), 14);
     assert_eq!(action[..7], [0.5; 7]);
     assert!(
@@ -93,42 +103,51 @@ fn all_action_shapes_are_read() {
 
 #[test]
 fn wrong_message_or_step_is_named() {
-    wrong_message(&good().replace("act", "ready"), "ready");
-    wrong_message(&good().replace("\"act\"", "7"), "an object whose type is 7");
-    wrong_message(
-        &good().replace("\"type\"", "\"kind\""),
+    assert_wrong_message(&valid_act().replace("act", "ready"), "ready");
+    assert_wrong_message(
+        &valid_act().replace("\"act\"", "7"),
+        "an object whose type is 7",
+    );
+    assert_wrong_message(
+        &valid_act().replace("\"type\"", "\"kind\""),
         "an object without type",
     );
-    wrong_message(&good().replace(":4,", ":3,"), "act with step 3");
-    wrong_message(&good().replace(":4,", ":4.0,"), "act with step 4.0");
-    wrong_message(&good().replace(":4,", ":-1,"), "act with step -1");
-    wrong_message(&good().replace(":4,", ":[[4]],"), "act with step an array");
-    wrong_message(&good().replace("\"step\"", "\"Step\""), "act without step");
-    wrong_message("{\"type\":\"act\",\"step\":4}", "act without action");
+    assert_wrong_message(&valid_act().replace(":4,", ":3,"), "act with step 3");
+    assert_wrong_message(&valid_act().replace(":4,", ":4.0,"), "act with step 4.0");
+    assert_wrong_message(&valid_act().replace(":4,", ":-1,"), "act with step -1");
+    assert_wrong_message(
+        &valid_act().replace(":4,", ":[[4]],"),
+        "act with step an array",
+    );
+    assert_wrong_message(
+        &valid_act().replace("\"step\"", "\"Step\""),
+        "act without step",
+    );
+    assert_wrong_message("{\"type\":\"act\",\"step\":4}", "act without action");
 }
 
 #[test]
 fn wrong_shape_is_named() {
-    wrong_shape(&row("1"), "[7]");
-    wrong_shape(&format!("[{}]", row("1")), "[1][7]");
-    wrong_shape(&format!("[{0},{0},{0}]", row("1")), "[3][7]");
-    wrong_shape("[[1,2],[3,4]]", "[2][2]");
-    wrong_shape("[]", "[0]");
-    wrong_shape("3", "a number");
-    wrong_shape("null", "null");
-    wrong_shape(
+    assert_wrong_shape(&row("1"), "[7]");
+    assert_wrong_shape(&format!("[{}]", row("1")), "[1][7]");
+    assert_wrong_shape(&format!("[{0},{0},{0}]", row("1")), "[3][7]");
+    assert_wrong_shape("[[1,2],[3,4]]", "[2][2]");
+    assert_wrong_shape("[]", "[0]");
+    assert_wrong_shape("3", "a number");
+    assert_wrong_shape("null", "null");
+    assert_wrong_shape(
         &format!("[{},[1,2]]", row("1")),
         "2 numbers or rows at action[1]",
     );
-    wrong_shape(
+    assert_wrong_shape(
         &format!("[{},{}]", row("1"), row("\"1\"")),
         "a string at action[1][0]",
     );
-    wrong_shape(
+    assert_wrong_shape(
         &format!("[{},{}]", row("1"), row("[1]")),
         "an array at action[1][0]",
     );
-    wrong_shape(
+    assert_wrong_shape(
         &format!("[{},{}]", row("null"), row("1")),
         "null at action[0][0]",
     );
@@ -144,25 +163,31 @@ fn non_finite_numbers_are_refused_in_any_notation() {
         "-1e400",
         "1e99999999999999999999",
     ] {
-        let line = act("4", &format!("[{},{}]", row("0.1"), row(word)));
+        let line = act(STEP_TEXT, &format!("[{},{}]", row("0.1"), row(word)));
         assert_eq!(parse(&line), Err(AgentFaultKind::NonFinite), "{word}");
     }
-    assert_eq!(parse(&act("4", "NaN")), Err(AgentFaultKind::NonFinite));
-    let endless = "9".repeat(5000);
     assert_eq!(
-        parse(&act("4", &format!("[{},{}]", row("0"), row(&endless)))),
+        parse(&act(STEP_TEXT, "NaN")),
+        Err(AgentFaultKind::NonFinite)
+    );
+    let long_number = "9".repeat(5000);
+    assert_eq!(
+        parse(&act(
+            STEP_TEXT,
+            &format!("[{},{}]", row("0"), row(&long_number))
+        )),
         Err(AgentFaultKind::NonFinite)
     );
 }
 
 #[test]
 fn too_large_number_is_refused_with_its_place() {
-    let too_large = |text: &str, expected_value: f64| {
-        let mut second = ["0.5"; 7];
-        second[3] = text;
-        let action = format!("[{},[{}]]", row("-1"), second.join(","));
+    let assert_too_large = |text: &str, expected_value: f64| {
+        let mut second_row = ["0.5"; 7];
+        second_row[3] = text;
+        let action = format!("[{},[{}]]", row("-1"), second_row.join(","));
         assert_eq!(
-            parse(&act("4", &action)),
+            parse(&act(STEP_TEXT, &action)),
             Err(AgentFaultKind::TooLarge {
                 place: "action[1][3]".to_owned(),
                 value: expected_value,
@@ -179,49 +204,60 @@ fn too_large_number_is_refused_with_its_place() {
         "-10001",
         "123456789012345678901234567890",
     ] {
-        too_large(text, text.parse().unwrap());
+        assert_too_large(text, text.parse().unwrap());
     }
-    let null = Interpolation::from_code(None).unwrap();
-    let step = format!("[{0},{0},{0}]", row("0"));
-    let last = format!("[{0},{0},{1}]", row("0"), row("2e4"));
-    let trajectory = [vec![&*step; 19], vec![&*last]].concat().join(",");
-    let line = act("4", &format!("[{trajectory}]"));
-    let fault = parse_act(line.as_bytes(), 4, null, &mut Vec::new()).unwrap_err();
+    let trajectory_interpolation = Interpolation::from_code(None).unwrap();
+    let millisecond = format!("[{0},{0},{0}]", row("0"));
+    let last_millisecond = format!("[{0},{0},{1}]", row("0"), row("2e4"));
+    let trajectory = [vec![&*millisecond; 19], vec![&*last_millisecond]]
+        .concat()
+        .join(",");
+    let line = act(STEP_TEXT, &format!("[{trajectory}]"));
+    let fault = parse_act(
+        line.as_bytes(),
+        STEP,
+        trajectory_interpolation,
+        &mut Vec::new(),
+    )
+    .unwrap_err();
     assert_eq!(
         fault.to_string(),
         "action[19][2][0] is 20000.0: expected numbers between -10000 and 10000 (rad, rad/s, rad/s²)"
     );
-    // At the bound, denormal, vanishing, and with more digits than a number holds.
-    let digits = format!("0.{}1", "0".repeat(4000));
+    // Accepted: numbers at the bound, a denormal, one that rounds to 0, and one with more digits than a double holds.
+    let many_digits = format!("0.{}1", "0".repeat(4000));
     for (text, value) in [
         ("10000", 1e4),
         ("-1e4", -1e4),
         ("5e-324", 5e-324),
         ("1e-999", 0.0),
-        (&*digits, 0.0),
+        (&*many_digits, 0.0),
     ] {
-        let line = act("4", &format!("[{},{}]", row("0"), row(text)));
+        let line = act(STEP_TEXT, &format!("[{},{}]", row("0"), row(text)));
         assert_eq!(parse(&line).unwrap()[13], value, "{text}");
     }
 }
 
 #[test]
 fn invalid_json_is_refused_with_a_reason() {
-    not_json("", "the line is empty");
-    not_json("   ", "the line is empty");
-    not_json("hello", "at character 1");
-    not_json("[1,2]", "expected an object");
-    not_json("null", "expected an object");
-    not_json("\"act\"", "expected an object");
-    not_json(&good()[..30], "EOF");
-    not_json(&format!("{}{}", good(), good()), "trailing characters");
-    not_json("{'type':'act'}", "key must be a string");
-    not_json("{\"type\":NaNsense}", "at character 9");
-    not_json("loss: NaN", "at character 1");
+    assert_not_json("", "the line is empty");
+    assert_not_json("   ", "the line is empty");
+    assert_not_json("hello", "at character 1");
+    assert_not_json("[1,2]", "expected an object");
+    assert_not_json("null", "expected an object");
+    assert_not_json("\"act\"", "expected an object");
+    assert_not_json(&valid_act()[..30], "EOF");
+    assert_not_json(
+        &format!("{}{}", valid_act(), valid_act()),
+        "trailing characters",
+    );
+    assert_not_json("{'type':'act'}", "key must be a string");
+    assert_not_json("{\"type\":NaNsense}", "at character 9");
+    assert_not_json("loss: NaN", "at character 1");
     let long = format!("\"{}\"", "é".repeat(20_000));
-    not_json(&long, "… at character 40002");
-    let at_an_end = format!("\"{} at {}\"", "é".repeat(300), "é".repeat(300));
-    for line in [long.clone(), format!("\n{long}"), at_an_end] {
+    assert_not_json(&long, "… at character 40002");
+    let with_at_near_end = format!("\"{} at {}\"", "é".repeat(300), "é".repeat(300));
+    for line in [long.clone(), format!("\n{long}"), with_at_near_end] {
         let Err(AgentFaultKind::NotJson { detail }) = parse(&line) else {
             panic!("expected NotJson");
         };
@@ -241,7 +277,7 @@ fn invalid_json_is_refused_with_a_reason() {
 #[test]
 fn repeated_key_is_refused() {
     for key in ["type", "step", "action"] {
-        let line = good().replacen(
+        let line = valid_act().replacen(
             '{',
             &format!(
                 "{{\"{key}\":{},",
@@ -253,7 +289,7 @@ fn repeated_key_is_refused() {
             ),
             1,
         );
-        not_json(&line, &format!("the key \"{key}\" is given twice"));
+        assert_not_json(&line, &format!("the key \"{key}\" is given twice"));
     }
 }
 
@@ -270,8 +306,8 @@ fn repeated_key_is_refused_at_any_depth() {
         (r#""name":{"a":0,"a":0}"#, "a"),
         (r#""version":[{"a":0,"a":0}]"#, "a"),
     ] {
-        let line = good().replacen('{', &format!("{{{extra},"), 1);
-        not_json(&line, &format!("the key {key:?} is given twice"));
+        let line = valid_act().replacen('{', &format!("{{{extra},"), 1);
+        assert_not_json(&line, &format!("the key {key:?} is given twice"));
         let ready = format!(r#"{{"type":"ready","protocol":1,"interpolation":3,{extra}}}"#);
         let fault = parse_ready(ready.as_bytes());
         assert!(
@@ -279,11 +315,11 @@ fn repeated_key_is_refused_at_any_depth() {
             "{ready}"
         );
     }
-    not_json(
-        &good().replacen('{', r#"{"x":{"\ud800":1},"#, 1),
+    assert_not_json(
+        &valid_act().replacen('{', r#"{"x":{"\ud800":1},"#, 1),
         "a key cannot be read",
     );
-    // An action that is not due is skipped, but checked for repeated keys.
+    // An action in a `ready` is skipped like an unknown field, but checked for repeated keys.
     let ready = r#"{"type":"ready","episode":1,"action":[{"a":1,"a":2}]}"#;
     assert!(matches!(
         parse_reset_ready(ready.as_bytes(), 1),
@@ -297,17 +333,17 @@ fn repeated_key_is_refused_at_any_depth() {
         r#""x":[{"a":1},{"a":1}]"#,
         r#""x":{"a\\":1,"a":"\"a\":1,"}"#,
     ] {
-        let line = good().replacen('{', &format!("{{{extra},"), 1);
+        let line = valid_act().replacen('{', &format!("{{{extra},"), 1);
         assert!(parse(&line).is_ok(), "{line}");
     }
 }
 
 #[test]
 fn line_limit_is_64_kib() {
-    let pad = MAX_LINE_BYTES - good().len();
-    assert!(parse(&format!("{}{}", good(), " ".repeat(pad))).is_ok());
+    let pad = MAX_LINE_BYTES - valid_act().len();
+    assert!(parse(&format!("{}{}", valid_act(), " ".repeat(pad))).is_ok());
     assert_eq!(
-        parse(&format!("{}{}", good(), " ".repeat(pad + 1))),
+        parse(&format!("{}{}", valid_act(), " ".repeat(pad + 1))),
         Err(AgentFaultKind::LineTooLong {
             limit_bytes: 65_536
         })
@@ -316,37 +352,45 @@ fn line_limit_is_64_kib() {
 
 #[test]
 fn deep_nesting_does_not_exhaust_the_stack() {
-    let deep = MAX_LINE_BYTES - 200;
+    let nesting_bytes = MAX_LINE_BYTES - 200; // leaves space for the rest of the line
     for opening in ["[", "{\"a\":"] {
-        let nested = opening.repeat(deep / opening.len());
+        let nested = opening.repeat(nesting_bytes / opening.len());
         for field in ["x", "type", "step", "action", "name"] {
             let line = format!("{{\"{field}\":{nested}");
             assert!(parse(&line).is_err(), "{field}");
             assert!(parse_ready(line.as_bytes()).is_err(), "{field}");
         }
     }
-    let closed = format!("{}{}", "[".repeat(deep / 2), "]".repeat(deep / 2));
+    let closed = format!(
+        "{}{}",
+        "[".repeat(nesting_bytes / 2),
+        "]".repeat(nesting_bytes / 2)
+    );
     assert!(matches!(
-        parse(&act("4", &closed)),
+        parse(&act(STEP_TEXT, &closed)),
         Err(AgentFaultKind::WrongShape { .. })
     ));
-    let ignored = good().replacen('{', &format!("{{\"x\":{closed},"), 1);
-    assert!(ignored.len() <= MAX_LINE_BYTES);
-    assert!(parse(&ignored).is_ok());
+    let with_unknown_field = valid_act().replacen('{', &format!("{{\"x\":{closed},"), 1);
+    assert!(with_unknown_field.len() <= MAX_LINE_BYTES);
+    assert!(parse(&with_unknown_field).is_ok());
 }
 
 #[test]
 fn ready_to_hello_is_parsed_and_checked() {
-    let ready = |text: &str| parse_ready(text.as_bytes());
+    let parse = |text: &str| parse_ready(text.as_bytes());
     let full = r#"{"type":"ready","protocol":1,"interpolation":3,"name":"x","version":"2"}"#;
-    let parsed = ready(full).unwrap();
+    let parsed = parse(full).unwrap();
     assert_eq!(parsed.interpolation, Interpolation::Cubic);
     assert_eq!(
         (parsed.name.as_deref(), parsed.version.as_deref()),
         (Some("x"), Some("2"))
     );
-    let null = ready(r#"{"type":"ready","protocol":1,"interpolation":null,"name":7}"#).unwrap();
-    assert_eq!((null.interpolation.code(), null.name), (None, None));
+    let with_null =
+        parse(r#"{"type":"ready","protocol":1,"interpolation":null,"name":7}"#).unwrap();
+    assert_eq!(
+        (with_null.interpolation.code(), with_null.name),
+        (None, None)
+    );
 
     for (line, expected_got) in [
         (full.replace("ready", "act"), "act"),
@@ -365,7 +409,7 @@ fn ready_to_hello_is_parsed_and_checked() {
             "ready with interpolation \"3\"",
         ),
     ] {
-        match ready(&line) {
+        match parse(&line) {
             Err(AgentFaultKind::WrongMessage { got, .. }) => assert_eq!(got, expected_got),
             other => panic!("{line}: {other:?}"),
         }
@@ -390,5 +434,5 @@ fn ready_to_reset_must_name_the_episode() {
         "ready with episode 16"
     );
     assert_eq!(got(r#"{"type":"ready"}"#), "ready without episode");
-    assert_eq!(got(&good()), "act");
+    assert_eq!(got(&valid_act()), "act");
 }

@@ -8,16 +8,17 @@ use std::{collections::BTreeMap, fmt::Debug};
 use uuid::Uuid;
 
 fn assert_round_trips<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
-    let text = serde_json::to_string(value).expect("it is JSON");
+    let text = serde_json::to_string(value).expect("the value is written as JSON");
     assert_eq!(
         serde_json::from_str::<T>(&text)
             .as_ref()
-            .expect("it is read back"),
+            .expect("the JSON is read back"),
         value,
         "{text}"
     );
 }
 
+/// A job with an arbitrary lease. Numbers and ids in these helpers are arbitrary, but differ, so that a test notices swapped fields.
 fn job(payload: JobPayload) -> JobSpec {
     JobSpec {
         lease: Lease {
@@ -216,7 +217,7 @@ fn jobs_without_variation_round_trip_unchanged() {
     };
     let text = serde_json::to_string(&spec).expect("it is JSON");
     assert!(!text.contains("perturbations"), "{text}");
-    let read: ShardSpec = serde_json::from_str(&text).expect("it comes back");
+    let read: ShardSpec = serde_json::from_str(&text).expect("it is read back");
     assert_eq!(*read.perturbations, PerturbationSettings::default());
     let mut changed = spec;
     changed.perturbations.disturbance.sigma_n_per_m_s = 1.0 / 3.0;

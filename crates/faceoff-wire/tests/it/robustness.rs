@@ -1,3 +1,5 @@
+//! Property tests: actions and observations keep their bits, and no line of an agent makes the parser panic.
+
 use faceoff_types::{ACTION_LIMIT, Interpolation};
 use faceoff_wire::{
     Message,
@@ -6,7 +8,10 @@ use faceoff_wire::{
 };
 use proptest::prelude::*;
 
-fn interpolation() -> impl Strategy<Value = Interpolation> {
+/// Numbers of an action with the trajectory interpolation: 20 ms × (position, velocity, acceleration) × 7 joints.
+const LONGEST_ACTION: usize = 20 * 3 * 7;
+
+fn any_interpolation() -> impl Strategy<Value = Interpolation> {
     prop::sample::select(vec![
         Some(1),
         Some(2),
@@ -19,15 +24,15 @@ fn interpolation() -> impl Strategy<Value = Interpolation> {
     .prop_map(|code| Interpolation::from_code(code).expect("a code of the protocol"))
 }
 
-fn finite() -> impl Strategy<Value = f64> {
+fn finite_number() -> impl Strategy<Value = f64> {
     any::<u64>()
         .prop_map(f64::from_bits)
         .prop_filter("finite", |value| value.is_finite())
 }
 
-/// Any number that an action may hold.
-fn in_bounds() -> impl Strategy<Value = f64> {
-    finite().prop_map(|value| {
+/// Any number that an action may contain.
+fn action_number() -> impl Strategy<Value = f64> {
+    finite_number().prop_map(|value| {
         if value.abs() > ACTION_LIMIT {
             value % ACTION_LIMIT
         } else {
@@ -51,13 +56,14 @@ fn act_line(step: u32, shape: &[usize], values: &[f64]) -> String {
 proptest! {
     #[test]
     fn actions_round_trip_bit_for_bit(
-        code in interpolation(),
+        interpolation in any_interpolation(),
         step in any::<u32>(),
-        pool in prop::collection::vec(in_bounds(), 420),
+        numbers in prop::collection::vec(action_number(), LONGEST_ACTION),
     ) {
-        let values = &pool[..code.len()];
+        let values = &numbers[..interpolation.len()];
         let mut action = Vec::new();
-        parse_act(act_line(step, code.shape(), values).as_bytes(), step, code, &mut action).unwrap();
+        let line = act_line(step, interpolation.shape(), values);
+        parse_act(line.as_bytes(), step, interpolation, &mut action).unwrap();
         prop_assert_eq!(
             action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
             values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
@@ -66,27 +72,27 @@ proptest! {
 
     #[test]
     fn observations_round_trip_bit_for_bit(
-        step in any::<u32>(), obs in prop::collection::vec(finite(), 0..24)
+        step in any::<u32>(), obs in prop::collection::vec(finite_number(), 0..24)
     ) {
         let mut line = Vec::new();
         Message::step(step, &obs).write_line(&mut line);
         prop_assert_eq!(line.iter().filter(|byte| **byte == b'\n').count(), 1);
-        let Message::Step { step: back, obs: read } = serde_json::from_slice(&line).unwrap() else {
+        let Message::Step { step: step_read, obs: obs_read } = serde_json::from_slice(&line).unwrap() else {
             return Err(TestCaseError::fail("not a step"));
         };
-        prop_assert_eq!(back, step);
+        prop_assert_eq!(step_read, step);
         prop_assert_eq!(
-            read.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
+            obs_read.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
             obs.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
         );
     }
 
     #[test]
     fn arbitrary_bytes_do_not_panic(
-        bytes in prop::collection::vec(any::<u8>(), 0..300), code in interpolation()
+        bytes in prop::collection::vec(any::<u8>(), 0..300), interpolation in any_interpolation()
     ) {
         let mut action = Vec::new();
-        prop_assert!(parse_act(&bytes, 0, code, &mut action).is_err());
+        prop_assert!(parse_act(&bytes, 0, interpolation, &mut action).is_err());
         let _ = parse_ready(&bytes);
         let _ = parse_reset_ready(&bytes, 0);
         prop_assert!(quote_line(&bytes).chars().count() <= 400);
@@ -95,19 +101,20 @@ proptest! {
     /// A valid line with one part removed or overwritten either parses to a complete, finite action or is refused.
     #[test]
     fn damaged_lines_give_a_complete_action_or_a_fault(
-        code in interpolation(),
-        pool in prop::collection::vec(-10.0..10.0f64, 420),
-        at in any::<prop::sample::Index>(),
-        len in 0..20usize,
-        insert in "[\\[\\]{}\",:0-9eE.NaInfity\\\\ -]{0,8}",
+        interpolation in any_interpolation(),
+        numbers in prop::collection::vec(-10.0..10.0f64, LONGEST_ACTION),
+        damage_start in any::<prop::sample::Index>(),
+        damage_bytes in 0..20usize,
+        replacement in "[\\[\\]{}\",:0-9eE.NaInfity\\\\ -]{0,8}",
     ) {
-        let mut line = act_line(5, code.shape(), &pool[..code.len()]);
-        let start = at.index(line.len());
-        let end = (start + len).min(line.len());
-        line.replace_range(start..end, &insert);
+        const STEP: u32 = 5;
+        let mut line = act_line(STEP, interpolation.shape(), &numbers[..interpolation.len()]);
+        let start = damage_start.index(line.len());
+        let end = (start + damage_bytes).min(line.len());
+        line.replace_range(start..end, &replacement);
         let mut action = Vec::new();
-        if parse_act(line.as_bytes(), 5, code, &mut action).is_ok() {
-            prop_assert_eq!(action.len(), code.len());
+        if parse_act(line.as_bytes(), STEP, interpolation, &mut action).is_ok() {
+            prop_assert_eq!(action.len(), interpolation.len());
             prop_assert!(action.iter().all(|value| value.abs() <= ACTION_LIMIT));
         }
     }

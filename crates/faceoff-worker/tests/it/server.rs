@@ -81,7 +81,7 @@ impl Server {
                         ..TimeLimits::default()
                     },
                     isolation: Isolation::Sandboxed {
-                        given_up: Vec::new(),
+                        disabled_layers: Vec::new(),
                     },
                     runtimes,
                     images: false,

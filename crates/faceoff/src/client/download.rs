@@ -1,4 +1,5 @@
-//! Resumable downloads of files.
+//! Resumable downloads of files. An interrupted download leaves a partial file, which the next one continues if the
+//! server's ETag, which identifies one content of a file, is still the same.
 
 use super::{ApiError, Client};
 use anyhow::{Context, anyhow, bail, ensure};
@@ -12,7 +13,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Response header with a file's BLAKE3 hash.
+/// Response header with the hexadecimal BLAKE3 hash of a file.
 const HASH_HEADER: &str = "x-content-blake3";
 
 /// A complete downloaded file.
@@ -58,7 +59,7 @@ impl Client {
         bar.set_position(resumed_at);
         let mut bytes = resumed_at;
         let mut stream = response.bytes_stream();
-        let mut broken = None;
+        let mut stream_error = None;
         while let Some(piece) = stream.next().await {
             match piece {
                 Ok(piece) => {
@@ -67,19 +68,19 @@ impl Client {
                     bar.set_position(bytes);
                 }
                 Err(error) => {
-                    broken = Some(error.without_url());
+                    stream_error = Some(error.without_url());
                     break;
                 }
             }
         }
-        if broken.is_some() || info.total.is_some_and(|total| total != bytes) {
+        if stream_error.is_some() || info.total.is_some_and(|total| total != bytes) {
             let advice = if info.tag.is_some() {
                 "run the same command again to resume it"
             } else {
                 "try again"
             };
             let message = format!("the download was interrupted after {bytes} bytes; {advice}");
-            return Err(match broken {
+            return Err(match stream_error {
                 Some(error) => anyhow!(error).context(message),
                 None => anyhow!(super::Unreachable(message)),
             });
@@ -104,12 +105,12 @@ impl Client {
         &self,
         path: &str,
         part: &PartialFile,
-        from: u64,
+        first_byte: u64,
     ) -> anyhow::Result<Response> {
         let mut request = self.request(Method::GET, path);
-        if let (true, Some(tag)) = (from > 0, &part.tag) {
+        if let (true, Some(tag)) = (first_byte > 0, &part.tag) {
             request = request
-                .header(header::RANGE, format!("bytes={from}-"))
+                .header(header::RANGE, format!("bytes={first_byte}-"))
                 .header(header::IF_RANGE, tag);
         }
         self.send(request).await
@@ -215,10 +216,10 @@ impl PartialFile {
         }
     }
 
-    /// Keeps the first `at` bytes and records the ETag of their source.
-    fn truncate_to(&mut self, at: u64, tag: Option<&str>) -> anyhow::Result<()> {
+    /// Keeps the first `length` bytes and records the ETag of their source.
+    fn truncate_to(&mut self, length: u64, tag: Option<&str>) -> anyhow::Result<()> {
         let writing = || format!("writing {}", self.path.display());
-        if at == 0 {
+        if length == 0 {
             // The old ETag does not describe the new file.
             match fs::remove_file(&self.tag_path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
@@ -227,9 +228,11 @@ impl PartialFile {
                 _ => {}
             }
         }
-        self.file.set_len(at).with_context(writing)?;
-        self.file.seek(SeekFrom::Start(at)).with_context(writing)?;
-        if let (0, Some(tag)) = (at, tag) {
+        self.file.set_len(length).with_context(writing)?;
+        self.file
+            .seek(SeekFrom::Start(length))
+            .with_context(writing)?;
+        if let (0, Some(tag)) = (length, tag) {
             fs::write(&self.tag_path, tag)
                 .with_context(|| format!("writing {}", self.tag_path.display()))?;
         }

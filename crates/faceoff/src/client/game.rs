@@ -1,4 +1,5 @@
-//! Requests about single games.
+//! Requests about single games. A *game* is a match of two agents, one on each *side* of the table; an *attempt* is one run of
+//! a game by a worker's slot, repeated after a fault of the platform.
 
 use super::{
     Client,
@@ -26,12 +27,12 @@ impl Client {
         self.call(Method::DELETE, &format!("/games/{id}")).await
     }
 
-    /// Organiser: every attempt of a slot to run the game.
+    /// Organiser: every attempt to run the game.
     pub async fn attempts(&self, id: GameId) -> anyhow::Result<Vec<GameAttemptView>> {
         self.get(&format!("/games/{id}/attempts")).await
     }
 
-    /// Organiser: voids the result of a game; `confirm` is `HOME - AWAY`.
+    /// Organiser: voids the result of a game; `confirm` is `HOME - AWAY`, the names of the two teams.
     pub async fn void_game(&self, id: GameId, decision: &Decision) -> anyhow::Result<GameView> {
         let path = format!("/games/{id}/void");
         self.call_with_body(Method::POST, &path, decision).await
@@ -42,7 +43,7 @@ impl Client {
         self.call(Method::POST, &format!("/games/{id}/rerun")).await
     }
 
-    /// Downloads the dataset of one side.
+    /// Downloads the dataset of one side: what its agent observed and did.
     pub async fn download_side(
         &self,
         id: GameId,
@@ -72,18 +73,18 @@ impl Client {
         response.text().await.context("reading the server's answer")
     }
 
-    /// The live events of a game after the event `last`. The stream ends when the server ends it; a broken connection
+    /// The live events of a game after the event `last_event_id`, by default all. The stream ends when the server ends it; a broken connection
     /// ends it with an error.
     pub async fn watch_game(
         &self,
         id: GameId,
-        last: Option<&str>,
+        last_event_id: Option<&str>,
     ) -> anyhow::Result<impl Stream<Item = anyhow::Result<ServerEvent>> + use<>> {
         let mut request = self
             .request(Method::GET, &format!("/games/{id}/live"))
             .header(header::ACCEPT, "text/event-stream");
-        if let Some(last) = last {
-            request = request.header("last-event-id", last);
+        if let Some(id) = last_event_id {
+            request = request.header("last-event-id", id);
         }
         let response = self.send(request).await?;
         let pieces = response.bytes_stream();

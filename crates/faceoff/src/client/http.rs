@@ -1,3 +1,5 @@
+//! The address of a server, and the HTTP client that connects to it.
+
 use anyhow::{Context, bail};
 use reqwest::redirect::Policy;
 use rustls::ClientConfig;

@@ -1,4 +1,4 @@
-//! Links that download a file without a token.
+//! Download links: URLs that download one file without a token, for a limited time.
 
 use super::Client;
 use faceoff_api::{requests::NewLink, views::link::LinkView};

@@ -1,4 +1,4 @@
-//! Paginated lists.
+//! Paginated lists: the server sends one page at a time, and the `Link` header of a response names the next page.
 
 use super::{Client, read_json};
 use anyhow::Context;

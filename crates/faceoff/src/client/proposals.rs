@@ -1,4 +1,5 @@
-//! Trials and proposed re-evaluations.
+//! Requests about trials and proposed re-evaluations. A *trial* evaluates submissions without effect on the boards; a *proposed
+//! re-evaluation* repeats counting evaluations, and its results count only once an organiser applies it.
 
 use super::{Client, read_json};
 use faceoff_api::{
@@ -19,7 +20,7 @@ impl Client {
         self.get(&format!("/proposals/{id}")).await
     }
 
-    /// Organiser: starts a trial of active submissions, which does not count.
+    /// Organiser: starts a trial of the active submissions.
     pub async fn trial(&self, stage: StageId, trial: &Trial) -> anyhow::Result<ProposalView> {
         let request = self.request(Method::POST, &format!("/stages/{stage}/trial"));
         read_json(self.send(request.json(trial)).await?).await

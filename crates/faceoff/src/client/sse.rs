@@ -26,22 +26,25 @@ pub fn events<B: AsRef<[u8]>>(
             if let Some(event) = decoder.ready.pop_front() {
                 return Some((Ok(event), (pieces, decoder)));
             }
-            let fed = match pieces.next().await? {
+            let result = match pieces.next().await? {
                 Ok(piece) => decoder.feed(piece.as_ref()),
                 Err(error) => Err(error),
             };
-            if let Err(error) = fed {
+            if let Err(error) = result {
                 return Some((Err(error), (pieces, decoder)));
             }
         }
     })
 }
 
+/// A decoder of pieces that may end within a line.
 #[derive(Debug, Default)]
 struct Decoder {
     /// The received beginning of the current line.
     line: Vec<u8>,
+    /// The lines of the current event, which an empty line completes.
     event: ServerEvent,
+    /// Complete events that have not been returned yet.
     ready: VecDeque<ServerEvent>,
 }
 
@@ -118,9 +121,9 @@ mod tests {
             event("over", "x", None),
         ];
         assert_eq!(decoded(&[text.as_bytes()]), expected);
-        for cut in 0..text.len() {
-            let (one, other) = text.as_bytes().split_at(cut);
-            assert_eq!(decoded(&[one, other]), expected, "cut at {cut}");
+        for split_at in 0..text.len() {
+            let (one, other) = text.as_bytes().split_at(split_at);
+            assert_eq!(decoded(&[one, other]), expected, "split at {split_at}");
         }
     }
 

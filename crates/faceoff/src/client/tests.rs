@@ -19,11 +19,18 @@ use indicatif::ProgressBar;
 use jiff::Timestamp;
 use tempfile::TempDir;
 
+/// The organiser's token.
 const ADMIN: &str = "fo_admin_test";
+/// The bundle limit of servers on which nothing is uploaded, or only a bundle that is too large.
+const SMALL_BUNDLE_BYTES: u64 = 64;
+/// The bundle limit of servers that accept the bundle of these tests.
+const BUNDLE_BYTES: u64 = 1 << 20;
+const LEASE_SECONDS: u32 = 60;
 
 mod download;
 mod tls;
 
+/// A running server with an open stage, and the client of its organiser.
 struct Site {
     url: String,
     organiser: Client,
@@ -36,7 +43,8 @@ fn now() -> Timestamp {
     "2026-03-01T10:00:00Z".parse().unwrap()
 }
 
-async fn site(max_bundle_bytes: u64) -> Site {
+/// Starts a server that accepts bundles of at most `max_bundle_bytes`.
+async fn start_site(max_bundle_bytes: u64) -> Site {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     assert!(
@@ -94,7 +102,8 @@ async fn site(max_bundle_bytes: u64) -> Site {
     }
 }
 
-fn bundle(site: &Site) -> std::path::PathBuf {
+/// Creates the folder of a small agent.
+fn create_bundle(site: &Site) -> std::path::PathBuf {
     let folder = site.folder.path().join("my-agent");
     std::fs::create_dir(&folder).unwrap();
     std::fs::write(folder.join("agent.toml"), "name = \"mine\"\n").unwrap();
@@ -104,11 +113,11 @@ fn bundle(site: &Site) -> std::path::PathBuf {
 
 #[tokio::test]
 async fn submission_passes_from_upload_to_evaluation() {
-    let site = site(1 << 20).await;
+    let site = start_site(BUNDLE_BYTES).await;
     site.organiser.health().await.unwrap();
     let team = site.organiser.create_team("Alpha").await.unwrap();
     let client = site.organiser.with_token(&team.token);
-    let uploaded = client.upload(&bundle(&site)).await.unwrap();
+    let uploaded = client.upload(&create_bundle(&site)).await.unwrap();
     assert_eq!(uploaded.file_name, "my-agent.tar.gz");
     assert_eq!(uploaded.status, SubmissionStatus::Validating);
 
@@ -131,7 +140,7 @@ async fn submission_passes_from_upload_to_evaluation() {
     files.sort();
     assert_eq!(files, ["agent.py", "agent.toml"]);
 
-    let claimed = site.store.claim("slot 0", 60, now());
+    let claimed = site.store.claim("slot 0", LEASE_SECONDS, now());
     let ClaimedJob { claim, job } = claimed
         .await
         .unwrap()
@@ -230,12 +239,15 @@ async fn submission_passes_from_upload_to_evaluation() {
 
 #[tokio::test]
 async fn invalid_bundle_is_refused_before_the_upload() {
-    let site = site(64).await;
+    let site = start_site(SMALL_BUNDLE_BYTES).await;
     let team = site.organiser.create_team("Alpha").await.unwrap();
     let client = site.organiser.with_token(&team.token);
-    let folder = bundle(&site);
+    let folder = create_bundle(&site);
     let error = client.upload(&folder).await.unwrap_err().to_string();
-    assert!(error.contains("at most 64"), "{error}");
+    assert!(
+        error.contains(&format!("at most {SMALL_BUNDLE_BYTES}")),
+        "{error}"
+    );
     std::fs::remove_file(folder.join("agent.toml")).unwrap();
     let error = client.upload(&folder).await.unwrap_err().to_string();
     assert!(error.contains("no agent.toml"), "{error}");
@@ -249,7 +261,7 @@ async fn invalid_bundle_is_refused_before_the_upload() {
 
 #[tokio::test]
 async fn api_error_keeps_status_and_detail() {
-    let site = site(64).await;
+    let site = start_site(SMALL_BUNDLE_BYTES).await;
     let stranger = site.organiser.with_token("fo_team_wrong");
     let error = stranger.me().await.unwrap_err();
     let refused = error.downcast_ref::<ApiError>().unwrap();
@@ -264,7 +276,7 @@ async fn api_error_keeps_status_and_detail() {
 
 #[tokio::test]
 async fn season_is_closed_only_with_its_name() {
-    let site = site(64).await;
+    let site = start_site(SMALL_BUNDLE_BYTES).await;
     let refused = site.organiser.close_season("Season").await.unwrap_err();
     assert!(refused.to_string().contains("Season 1"), "{refused}");
     assert_eq!(site.organiser.season().await.unwrap().secret, None);
@@ -283,7 +295,7 @@ async fn season_is_closed_only_with_its_name() {
 
 #[tokio::test]
 async fn stage_change_keeps_the_fields_it_leaves_out() {
-    let site = site(64).await;
+    let site = start_site(SMALL_BUNDLE_BYTES).await;
     let new = NewStage {
         name: "Final".into(),
         opens_at: None,
@@ -308,15 +320,15 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
         standings: Some(CountingResult::MeanOfLast(3)),
         retention: serde_json::from_str(r#"{"last":3}"#).unwrap(),
     };
-    let made = site.organiser.create_stage(&new).await.unwrap();
-    assert_eq!(made.settings.schedule, new.schedule);
+    let created = site.organiser.create_stage(&new).await.unwrap();
+    assert_eq!(created.settings.schedule, new.schedule);
     let no_change = StageChange::default();
     let same = site
         .organiser
-        .change_stage(made.id, &no_change)
+        .change_stage(created.id, &no_change)
         .await
         .unwrap();
-    assert_eq!(same, made);
+    assert_eq!(same, created);
     // An explicit null clears a field.
     let cleared = StageChange {
         closes_at: Some(None),
@@ -325,9 +337,9 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
     };
     let changed = site
         .organiser
-        .change_stage(made.id, &cleared)
+        .change_stage(created.id, &cleared)
         .await
         .unwrap();
     assert_eq!((changed.closes_at, changed.settings.schedule), (None, None));
-    assert_eq!(changed.rules, made.rules);
+    assert_eq!(changed.rules, created.rules);
 }

@@ -57,22 +57,24 @@ fn with_roots(roots: RootCertStore) -> ClientConfig {
 
 /// Advice for an error that TLS has caused.
 pub(super) fn advice(error: &anyhow::Error) -> Option<&'static str> {
-    use rustls::{CertificateError as Bad, Error};
+    use rustls::{CertificateError, Error};
     let tls_error = error.chain().find_map(find_tls_error)?;
     Some(match tls_error {
         // Another authority with the same name gives a bad signature.
-        Error::InvalidCertificate(Bad::UnknownIssuer | Bad::BadSignature) => {
+        Error::InvalidCertificate(
+            CertificateError::UnknownIssuer | CertificateError::BadSignature,
+        ) => {
             "the server's certificate is signed by an unknown authority; if your organisers run their own authority, \
             name its file (PEM) with --ca-file or FACEOFF_CA_FILE"
         }
-        Error::InvalidCertificate(Bad::NotValidForName | Bad::NotValidForNameContext { .. }) => {
-            "the server's certificate belongs to another host; is the address right?"
-        }
         Error::InvalidCertificate(
-            Bad::Expired
-            | Bad::ExpiredContext { .. }
-            | Bad::NotValidYet
-            | Bad::NotValidYetContext { .. },
+            CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. },
+        ) => "the server's certificate belongs to another host; is the address right?",
+        Error::InvalidCertificate(
+            CertificateError::Expired
+            | CertificateError::ExpiredContext { .. }
+            | CertificateError::NotValidYet
+            | CertificateError::NotValidYetContext { .. },
         ) => {
             "the server's certificate has expired or is not valid yet, or this machine's clock is wrong; ask the organisers"
         }

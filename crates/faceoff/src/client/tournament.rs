@@ -1,4 +1,5 @@
-//! Requests about tournaments.
+//! Requests about tournaments. A *tournament* is a series of rounds of games between the teams' agents. A *replay* of it plays
+//! all its games again with new seeds, to see how much the winner depended on chance.
 
 use super::Client;
 use faceoff_api::{
@@ -76,7 +77,7 @@ impl Client {
             .await
     }
 
-    /// Organiser: removes a team from a tournament.
+    /// Organiser: removes a team from a tournament, as withdrawn or disqualified.
     pub async fn record_departure(
         &self,
         id: TournamentId,
@@ -153,7 +154,7 @@ impl Client {
             .await
     }
 
-    /// Team: its friendly and test games, the newest first. Organiser: all of them.
+    /// Team: its friendly and test games, which do not count, the newest first. Organiser: those of all teams.
     pub async fn uncounted_games(&self, id: TournamentId) -> anyhow::Result<Vec<GameView>> {
         self.list(self.request(Method::GET, &tournament_path(id, "/uncounted-games")))
             .await

@@ -1,4 +1,5 @@
-//! A team's submissions.
+//! A team's submissions. A *submission* is an uploaded *bundle*, the files of an agent; an *ablation* evaluates it under each
+//! perturbation alone.
 
 use super::{Client, read_json};
 use crate::packing::BundleFile;
@@ -42,9 +43,9 @@ impl Client {
         let file = tokio::fs::File::open(bundle.path())
             .await
             .with_context(|| format!("opening {}", bundle.path().display()))?;
-        let counted = progress.clone();
+        let upload_progress = progress.clone();
         let stream = ReaderStream::with_capacity(file, 256 * 1024).inspect(move |chunk| {
-            counted.inc(chunk.as_ref().map_or(0, |chunk| chunk.len() as u64));
+            upload_progress.inc(chunk.as_ref().map_or(0, |chunk| chunk.len() as u64));
         });
         let request = self
             .request(Method::POST, "/submissions")

@@ -1,4 +1,4 @@
-//! Remote workers.
+//! Remote workers: processes on other machines that run the server's jobs.
 
 use super::Client;
 use faceoff_api::{requests::Reason, views::workers::WorkersView};
@@ -6,7 +6,7 @@ use faceoff_store::WorkerName;
 use reqwest::Method;
 
 impl Client {
-    /// Organiser: the remote workers and the bans.
+    /// Organiser: the remote workers, and the bans that exclude some of them from jobs.
     pub async fn workers(&self) -> anyhow::Result<WorkersView> {
         self.get("/workers").await
     }

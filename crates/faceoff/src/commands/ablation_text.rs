@@ -1,3 +1,5 @@
+//! Text of an ablation: how much worse an agent does under each perturbation alone than under ideal conditions.
+
 use faceoff_api::views::ablation::{AblationStatus, AblationView};
 
 /// Formats an ablation for people.

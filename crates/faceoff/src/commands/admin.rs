@@ -1,4 +1,4 @@
-//! `faceoff admin`: the organisers' half of the API.
+//! `faceoff admin`: the organisers' commands. Each calls the REST API of a server with an organiser's token.
 
 mod announcements;
 mod authentication;
@@ -226,7 +226,7 @@ enum Action {
 
 #[derive(Debug, Subcommand)]
 enum SeasonAction {
-    /// Show the season's name, commitment and state
+    /// Show the season's name, its commitment (the hash of its secret) and its state
     Show,
     /// Close the season permanently: its secret is published, uploads and evaluations end
     Close {
@@ -299,7 +299,9 @@ impl AdminCommand {
                     );
                     let exclusions = day.excluded.iter();
                     lines.extend(
-                        exclusions.map(|one| format!("{:<40} {}", one.team_name, one.reason)),
+                        exclusions.map(|excluded| {
+                            format!("{:<40} {}", excluded.team_name, excluded.reason)
+                        }),
                     );
                     lines.join("\n")
                 })
@@ -391,12 +393,11 @@ impl AdminCommand {
                 .into_iter()
                 .filter_map(|(name, value)| Some((name, value?)))
                 .collect();
-                let found = client.events(&parameters).await?;
-                print(self.json, &found, || {
-                    let mut lines: Vec<String> = found.events.iter().map(event_line).collect();
+                let page = client.events(&parameters).await?;
+                print(self.json, &page, || {
+                    let mut lines: Vec<String> = page.events.iter().map(event_line).collect();
                     lines.extend(
-                        found
-                            .next_before
+                        page.next_before
                             .map(|number| format!("older entries: --before {number}")),
                     );
                     lines_or(lines, "no matching entry")

@@ -9,8 +9,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Names of an operation that creates a folder.
-pub struct FolderKind {
+/// An operation that creates a folder: `backup`, `restore` or `import`.
+pub struct FolderOperation {
     /// The operation, for messages and for the name of the lock file.
     pub name: &'static str,
     /// Suffix of the temporary folder.
@@ -56,27 +56,31 @@ impl AtomicFolder {
     ///
     /// # Errors
     /// If another process is building `target`, a foreign folder has the temporary name, or a file cannot be written.
-    pub fn create(target: &Path, kind: &FolderKind) -> anyhow::Result<Self> {
+    pub fn create(target: &Path, operation: &FolderOperation) -> anyhow::Result<Self> {
         let Some(name) = target.file_name() else {
             bail!("{} is not a folder that can be created", target.display());
         };
         let mut name = name.to_owned();
-        name.push(format!(".{}", kind.suffix));
+        name.push(format!(".{}", operation.suffix));
         let folder = target.with_file_name(name);
-        let lock_path = folder.join(format!("faceoff-{}.lock", kind.name));
+        let lock_path = folder.join(format!("faceoff-{}.lock", operation.name));
         if folder.exists() {
             let old_lock = File::open(&lock_path).with_context(|| {
                 format!(
                     "{} already exists and is not from an interrupted {}: move it, or name another folder",
                     folder.display(),
-                    kind.name
+                    operation.name
                 )
             })?;
             match old_lock.try_lock() {
                 Ok(()) => fs::remove_dir_all(&folder)
                     .with_context(|| format!("removing {}", folder.display()))?,
                 Err(TryLockError::WouldBlock) => {
-                    bail!("another {} into {} is running", kind.name, target.display())
+                    bail!(
+                        "another {} into {} is running",
+                        operation.name,
+                        target.display()
+                    )
                 }
                 Err(TryLockError::Error(error)) => {
                     return Err(error).with_context(|| format!("locking {}", lock_path.display()));
@@ -85,7 +89,7 @@ impl AtomicFolder {
         }
         let parent = parent_of(&folder);
         create_private(parent)?;
-        check_disk(target, parent)?;
+        check_renameable(target, parent)?;
         // Fails if the folder has been created meanwhile, possibly by another user.
         DirBuilder::new()
             .mode(0o700)
@@ -170,7 +174,7 @@ fn parent_of(folder: &Path) -> &Path {
 }
 
 /// Refuses a target that cannot be replaced by renaming: the root of another file system, or a symbolic link.
-fn check_disk(target: &Path, parent: &Path) -> anyhow::Result<()> {
+fn check_renameable(target: &Path, parent: &Path) -> anyhow::Result<()> {
     let Ok(found) = fs::symlink_metadata(target) else {
         return Ok(());
     };

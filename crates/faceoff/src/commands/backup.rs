@@ -4,7 +4,7 @@ pub mod files;
 pub mod manifest;
 
 use super::{
-    atomic_folder::{self, AtomicFolder, FolderKind},
+    atomic_folder::{self, AtomicFolder, FolderOperation},
     output::print,
     serve::ADMIN_TOKEN_FILE,
     storage::bytes,
@@ -15,7 +15,7 @@ use clap::Args;
 use faceoff_store::{RequiredArtifact, Store, StoreError};
 use files::{CopiedFile, copy_file, copy_tree};
 use jiff::Timestamp;
-use manifest::{ARTIFACTS, DATABASE, MANIFEST, Manifest, Missing, Part};
+use manifest::{ARTIFACTS, BackupFile, DATABASE, MANIFEST, Manifest, MissingFile};
 use std::{
     collections::BTreeMap,
     fs,
@@ -41,7 +41,7 @@ pub struct BackupCommand {
     json: bool,
 }
 
-const BACKUP: FolderKind = FolderKind {
+const BACKUP: FolderOperation = FolderOperation {
     name: "backup",
     suffix: "backing-up",
 };
@@ -110,7 +110,7 @@ fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Man
     atomic_folder::create_private(&folder)?;
     let database = folder.join(DATABASE);
     // The database comes first: the server writes a file before the database refers to it, and keeps it for a day
-    // after.
+    // after the database has stopped referring to it.
     let checked = super::block_on(async {
         match Store::copy_database(data_dir, &database).await {
             Err(StoreError::NotFound(_)) => bail!(
@@ -143,7 +143,7 @@ fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Man
         missing: missing_files(&checked.needed, &files),
         files: files
             .into_iter()
-            .map(|(path, file)| Part {
+            .map(|(path, file)| BackupFile {
                 path,
                 bytes: file.bytes,
                 blake3: file.blake3,
@@ -160,15 +160,15 @@ fn back_up(data_dir: &Path, target: &Path, now: Timestamp) -> anyhow::Result<Man
 fn missing_files(
     needed: &[RequiredArtifact],
     copied: &BTreeMap<String, CopiedFile>,
-) -> Vec<Missing> {
+) -> Vec<MissingFile> {
     let path = |key: &str| format!("{ARTIFACTS}/{key}");
     let mut missing = Vec::new();
     for item in needed {
         match item {
             RequiredArtifact::File { key, blake3 } => match (copied.get(&path(key)), blake3) {
-                (None, _) => missing.push(Missing::Gone { path: path(key) }),
+                (None, _) => missing.push(MissingFile::Gone { path: path(key) }),
                 (Some(found), Some(blake3)) if found.blake3 != *blake3 => {
-                    missing.push(Missing::Changed {
+                    missing.push(MissingFile::Changed {
                         path: path(key),
                         expected: blake3.clone(),
                         found: found.blake3.clone(),
@@ -180,7 +180,7 @@ fn missing_files(
                 let prefix = format!("{}/", path(key));
                 let first = copied.range(prefix.clone()..).next();
                 if !first.is_some_and(|(name, _)| name.starts_with(&prefix)) {
-                    missing.push(Missing::Gone { path: prefix });
+                    missing.push(MissingFile::Gone { path: prefix });
                 }
             }
         }
@@ -192,7 +192,7 @@ fn missing_files(
 ///
 /// # Errors
 /// If the folder is no backup, or a backup of a later version.
-pub fn open(folder: &Path) -> anyhow::Result<Manifest> {
+pub fn read_manifest(folder: &Path) -> anyhow::Result<Manifest> {
     let file = folder.join(MANIFEST);
     let text = fs::read(&file).with_context(|| {
         format!(

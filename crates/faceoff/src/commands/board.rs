@@ -1,4 +1,4 @@
-//! `faceoff board`: prints a board.
+//! `faceoff board`: prints a *board*, the ranking of the teams of a stage by their results.
 
 pub(super) mod table;
 
@@ -27,7 +27,7 @@ pub struct BoardCommand {
     day: Option<Date>,
     /// Rank by each team's best or latest result instead of the stage's own rule
     #[arg(long)]
-    by: Option<By>,
+    by: Option<RankBy>,
     /// For organisers: show the live results of a frozen board
     #[arg(long)]
     live: bool,
@@ -40,12 +40,12 @@ pub struct BoardCommand {
 
 /// The result that ranks a team.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum By {
+enum RankBy {
     Best,
     Latest,
 }
 
-impl By {
+impl RankBy {
     const fn to_api(self) -> BoardBy {
         match self {
             Self::Best => BoardBy::Best,
@@ -71,7 +71,7 @@ impl BoardCommand {
                 revision: self.revision,
                 division: self.division,
                 day: self.day,
-                by: self.by.map(By::to_api),
+                by: self.by.map(RankBy::to_api),
                 live: self.live,
                 format: None,
             };

@@ -1,3 +1,5 @@
+//! The option `--ca-file` of all commands that connect to a server.
+
 use clap::Args;
 use std::path::{Path, PathBuf};
 

@@ -68,7 +68,7 @@ impl CompareCommand {
     }
 
     fn compare_files(&self) -> anyhow::Result<()> {
-        let (a, b) = (open(&self.a)?, open(&self.b)?);
+        let (a, b) = (read_evaluation(&self.a)?, read_evaluation(&self.b)?);
         let comparison = comparison_input(&a).compare(&comparison_input(&b)).context(
             "the two evaluations have different episodes; run both with the same --seed, --mismatch-seed, --profile, --task and --episodes",
         )?;
@@ -136,7 +136,7 @@ struct Evaluation {
     summary: EpisodeSummary,
 }
 
-fn open(path: &str) -> anyhow::Result<Evaluation> {
+fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
     let read = || -> anyhow::Result<Evaluation> {
         let dataset = Dataset::open_lazily(Path::new(path))?;
         let episodes = dataset.episodes()?.into_iter();

@@ -1,8 +1,9 @@
-//! `faceoff dataset`: downloads datasets and prints their content.
+//! `faceoff dataset`: downloads datasets and prints their content. A *dataset* records every control step of an evaluation's
+//! episodes.
 
 pub(super) mod download;
 mod list;
-mod moved;
+mod moved_export;
 mod slice;
 
 use clap::{Args, Subcommand};
@@ -24,7 +25,7 @@ enum Action {
     Download(download::DownloadArgs),
     /// Moved to the Python package: python -m faceoff.dataset export
     #[command(hide = true)]
-    Export(moved::MovedArgs),
+    Export(moved_export::MovedExportArgs),
 }
 
 impl DatasetCommand {

@@ -29,10 +29,10 @@ use tokio::{
 };
 
 /// Interval between requests for progress.
-const POLL: Duration = Duration::from_millis(200);
-/// Time limit for the server's start. A server that ends is noticed at once, so the limit is only for one that hangs,
-/// and is long enough for a busy machine.
-const START_LIMIT: Duration = Duration::from_secs(600);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
+/// Time limit for the server's start. It only matters if the server hangs, because the end of its process is noticed at
+/// once. So it is long enough for a busy machine.
+const START_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Starts a server on an empty folder, creates a team per bundle, uploads the bundles, runs an evaluation
 /// day, prints the board and downloads a dataset.
@@ -101,7 +101,7 @@ impl DemoCommand {
         // Checked before anything is removed: on another server's port, the demo would talk to that server.
         TcpListener::bind(self.listen).with_context(|| {
             format!(
-                "{} is in use; choose another with LISTEN=127.0.0.1:PORT",
+                "{} is in use; choose another with --listen 127.0.0.1:PORT (with make demo: LISTEN=127.0.0.1:PORT)",
                 self.listen
             )
         })?;
@@ -116,7 +116,7 @@ impl DemoCommand {
         ));
         let log = self.data_dir.join("server.log");
         let mut server = Server::start(self.listen, &self.data_dir, self.episodes, &log)?;
-        let organiser = server.ready().await.with_context(|| {
+        let organiser = server.wait_until_ready().await.with_context(|| {
             format!(
                 "the server did not start; the end of {}:\n{}\n",
                 log.display(),
@@ -228,7 +228,7 @@ fn tail(log: &Path) -> String {
 /// Creates the folder, or empties that of an earlier demo; refuses a folder with other content.
 fn prepare_folder(folder: &Path) -> anyhow::Result<()> {
     /// Marks a folder that a demo may replace.
-    const MARK: &str = ".faceoff-demo";
+    const MARKER: &str = ".faceoff-demo";
     if folder.exists() {
         let empty = folder
             .read_dir()
@@ -236,7 +236,7 @@ fn prepare_folder(folder: &Path) -> anyhow::Result<()> {
             .next()
             .is_none();
         ensure!(
-            empty || folder.join(MARK).exists(),
+            empty || folder.join(MARKER).exists(),
             "{} exists and was not made by a demo; choose another folder with --data-dir",
             folder.display()
         );
@@ -244,7 +244,7 @@ fn prepare_folder(folder: &Path) -> anyhow::Result<()> {
             .with_context(|| format!("removing {}", folder.display()))?;
     }
     std::fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
-    std::fs::write(folder.join(MARK), "")
+    std::fs::write(folder.join(MARKER), "")
         .with_context(|| format!("writing to {}", folder.display()))
 }
 
@@ -260,7 +260,7 @@ fn team_name(bundle: &Path) -> anyhow::Result<String> {
 /// The server as a separate process, as an organiser would run it.
 struct Server {
     child: Child,
-    /// Empty until [`ready`](Self::ready) returns.
+    /// Empty until [`wait_until_ready`](Self::wait_until_ready) returns.
     url: String,
     data_dir: PathBuf,
 }
@@ -302,21 +302,24 @@ impl Server {
     }
 
     /// Waits until the server prints its address; returns the organiser's client.
-    async fn ready(&mut self) -> anyhow::Result<Client> {
+    async fn wait_until_ready(&mut self) -> anyhow::Result<Client> {
         let stdout = self
             .child
             .stdout
             .take()
-            .context("its output is not piped")?;
+            .context("the server's output is not piped")?;
         let mut output = BufReader::new(stdout).lines();
-        let url = tokio::time::timeout(START_LIMIT, output.next_line())
+        let url = tokio::time::timeout(START_TIMEOUT, output.next_line())
             .await
-            .with_context(|| format!("it did not start within {START_LIMIT:?}"))?
-            .context("reading its address")?;
+            .with_context(|| format!("the server did not start within {START_TIMEOUT:?}"))?
+            .context("reading the server's address")?;
         let Some(url) = url else {
             bail!(
-                "it ended with {}",
-                self.child.wait().await.context("waiting for it")?
+                "the server ended with {}",
+                self.child
+                    .wait()
+                    .await
+                    .context("waiting for the server to end")?
             )
         };
         self.url = url;
@@ -345,7 +348,10 @@ impl Server {
     }
 }
 
-/// Waits for the validation of a submission; an error if the agent is not valid.
+/// Waits for the validation of a submission and returns its verdict.
+///
+/// # Errors
+/// If the agent is not valid.
 async fn wait_for_validation(
     client: &Client,
     submission: &SubmissionView,
@@ -353,7 +359,7 @@ async fn wait_for_validation(
     loop {
         let current = client.submission(submission.id).await?;
         match current.status {
-            SubmissionStatus::Validating => tokio::time::sleep(POLL).await,
+            SubmissionStatus::Validating => tokio::time::sleep(POLL_INTERVAL).await,
             SubmissionStatus::Valid { .. } => {
                 let agent = current.agent_name.unwrap_or_default();
                 return Ok(format!(
@@ -371,7 +377,10 @@ async fn wait_for_validation(
     }
 }
 
-/// Shows progress until all evaluations have ended; an error if one did not finish.
+/// Shows progress until all evaluations have ended.
+///
+/// # Errors
+/// If an evaluation fails.
 async fn wait_for_evaluations(
     organiser: &Client,
     created: &[EvaluationView],
@@ -407,7 +416,7 @@ async fn wait_for_evaluations(
             }
             ended.push(evaluation);
         }
-        tokio::time::sleep(POLL).await;
+        tokio::time::sleep(POLL_INTERVAL).await;
     }
     // The end of the last evaluation has released the day.
     ensure!(

@@ -1,4 +1,7 @@
 //! `faceoff doctor`: checks what a host offers to agents and their sandbox, and how to fix what is missing.
+//!
+//! A *layer* is one protection of the sandbox, e.g. the memory limit. The configuration may *give up* layers: agents then run
+//! without them. Each report says what was `found` and, as its `cure`, how to fix a problem.
 
 mod check;
 mod clock;
@@ -15,7 +18,8 @@ use check::Check;
 use clap::Args;
 use faceoff_runner::take_inventory;
 use faceoff_sandbox::{
-    HostFeature, Isolation, Layer, MEMORY, MemoryImage, MemoryImageError, Runtime, probe_host,
+    HostFeature, Isolation, Layer, MEMORY_FOLDER, MemoryImage, MemoryImageError, Runtime,
+    probe_host,
 };
 use faceoff_store::FreeSpace;
 use faceoff_types::{RuntimeContent, RuntimeInventory};
@@ -40,7 +44,7 @@ pub struct DoctorCommand {
 }
 
 /// Packages whose versions are shown.
-const KNOWN_PACKAGES: [&str; 4] = ["numpy", "scipy", "onnxruntime", "torch"];
+const SHOWN_PACKAGES: [&str; 4] = ["numpy", "scipy", "onnxruntime", "torch"];
 
 #[derive(Debug, Serialize)]
 struct Findings {
@@ -89,7 +93,7 @@ struct MemoryReport {
 #[derive(Debug, Serialize)]
 struct LayerReport {
     #[serde(flatten)]
-    host: HostFeature,
+    feature: HostFeature,
     /// Named in `[sandbox] given_up`.
     given_up: bool,
 }
@@ -110,7 +114,7 @@ struct CpuReport {
     slots: usize,
     /// CPUs that agents are bound to; empty: all.
     agent_cpus: Vec<usize>,
-    /// A reason why computation times may be unfair.
+    /// A reason error computation times may be unfair.
     advice: Option<String>,
 }
 
@@ -132,12 +136,14 @@ impl DoctorCommand {
         } else {
             findings.print(&mut out)?;
         }
-        let missing: Vec<_> = missing(&findings.features).map(Layer::as_str).collect();
-        if !missing.is_empty() {
+        let missing_layers: Vec<_> = missing_layers(&findings.features)
+            .map(Layer::as_str)
+            .collect();
+        if !missing_layers.is_empty() {
             bail!(
                 "agents cannot run on this host: {} missing; apply the fixes above, or give the layers up \
-                in the configuration: [sandbox] given_up = {missing:?}",
-                missing.join(", ")
+                in the configuration: [sandbox] given_up = {missing_layers:?}",
+                missing_layers.join(", ")
             );
         }
         Ok(())
@@ -149,12 +155,12 @@ impl Findings {
         let given_up = &config.sandbox.given_up;
         let features: Vec<_> = probe_host()
             .into_iter()
-            .map(|host| LayerReport {
-                given_up: given_up.contains(&host.layer),
-                host,
+            .map(|feature| LayerReport {
+                given_up: given_up.contains(&feature.layer),
+                feature,
             })
             .collect();
-        let ok = missing(&features).next().is_none();
+        let ok = missing_layers(&features).next().is_none();
         Self {
             ok,
             runtimes: runtimes(config, &features),
@@ -170,19 +176,19 @@ impl Findings {
 }
 
 /// Layers that are neither available nor given up.
-fn missing(features: &[LayerReport]) -> impl Iterator<Item = Layer> {
+fn missing_layers(features: &[LayerReport]) -> impl Iterator<Item = Layer> {
     features
         .iter()
-        .filter(|feature| !feature.host.available && !feature.given_up)
-        .map(|feature| feature.host.layer)
+        .filter(|layer| !layer.feature.available && !layer.given_up)
+        .map(|layer| layer.feature.layer)
 }
 
 /// Inspects each runtime inside the sandbox, with the layers that this host has.
 fn runtimes(config: &Config, features: &[LayerReport]) -> Vec<RuntimeReport> {
     let mut env = config.agent_environment();
-    let lacking = features.iter().filter(|feature| !feature.host.available);
+    let unavailable = features.iter().filter(|layer| !layer.feature.available);
     env.isolation = Isolation::Sandboxed {
-        given_up: lacking.map(|feature| feature.host.layer).collect(),
+        disabled_layers: unavailable.map(|layer| layer.feature.layer).collect(),
     };
     let mut found: Vec<_> = take_inventory(&env)
         .into_iter()
@@ -215,14 +221,16 @@ fn in_memory(config: &Config) -> MemoryReport {
             ),
             cure: None,
         },
-        Err(why) => MemoryReport {
+        Err(error) => MemoryReport {
             available: false,
-            found: format!("{why}: without that, an agent can infer which files others have read"),
-            cure: Some(match why {
+            found: format!(
+                "{error}: without that, an agent can infer which files others have read"
+            ),
+            cure: Some(match error {
                 MemoryImageError::NotEnoughMemory { bytes, .. } => {
                     let mib = (bytes >> 20).next_multiple_of(100) + 100;
                     format!(
-                        "offer smaller runtimes, or enlarge {MEMORY}: mount -o remount,size={mib}m {MEMORY}; \
+                        "offer smaller runtimes, or enlarge {MEMORY_FOLDER}: mount -o remount,size={mib}m {MEMORY_FOLDER}; \
                          in Docker: docker run --shm-size {mib}m"
                     )
                 }
@@ -240,7 +248,7 @@ fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
             let interpreter = runtime.and_then(Runtime::interpreter);
             let location = interpreter.map(|path| format!(" at {}", path.display()));
             let is_installed = |name: &&str| python.packages.contains_key(*name);
-            let known: Vec<_> = KNOWN_PACKAGES
+            let known: Vec<_> = SHOWN_PACKAGES
                 .iter()
                 .filter(|name| is_installed(name))
                 .map(|name| format!("{name} {}", python.packages[*name]))
@@ -285,16 +293,16 @@ fn cure(config: &Config, name: &str, content: &RuntimeContent) -> Option<String>
 fn cpus(config: &Config) -> CpuReport {
     let usable = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let slots = config.slots();
-    let fitting = Config::slots_on(usable);
+    let recommended_slots = Config::slots_on(usable);
     // An agent and its simulator alternate on a CPU. Two agents on one CPU disturb each other's computation
     // times, and HTTP requests disturb those of a simulator.
-    let advice = (slots > fitting).then(|| {
+    let advice = (slots > recommended_slots).then(|| {
         let effect = if slots * 2 > usable {
             "disturb each other's computation times"
         } else {
             "leave no CPU for the server's own work, which then runs on the simulators' CPUs"
         };
-        format!("{slots} slots on {usable} CPUs {effect}; set workers.slots = {fitting}")
+        format!("{slots} slots on {usable} CPUs {effect}; set workers.slots = {recommended_slots}")
     });
     CpuReport {
         usable,
@@ -368,8 +376,8 @@ fn disk(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
         };
     };
     let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
-    let room = FreeSpace::new(vec![existing.to_owned()], min_free_bytes);
-    let cure = room.is_short().then(|| {
+    let free_space = FreeSpace::new(vec![existing.to_owned()], min_free_bytes);
+    let cure = free_space.is_short().then(|| {
         "the queue would pause and uploads would be refused: free disk space, or lower server.min_free_bytes"
             .to_owned()
     });
@@ -390,7 +398,7 @@ mod tests {
     use super::*;
 
     fn findings(available: bool, given_up: bool) -> Findings {
-        let host = HostFeature {
+        let feature = HostFeature {
             layer: Layer::CgroupMemory,
             available,
             found: "no memory controller".into(),
@@ -398,7 +406,7 @@ mod tests {
         };
         Findings {
             ok: available || given_up,
-            features: vec![LayerReport { host, given_up }],
+            features: vec![LayerReport { feature, given_up }],
             runtimes: Vec::new(),
             in_memory: in_memory(&Config::default()),
             cpus: cpus(&Config::default()),
@@ -412,17 +420,16 @@ mod tests {
     #[test]
     fn full_disk_is_reported_with_its_cure() {
         let folder = std::env::temp_dir().join("not/yet/made");
-        let roomy = disk(folder.clone(), 1);
+        let ample = disk(folder.clone(), 1);
         assert!(
-            roomy.free_bytes.is_some() && roomy.cure.is_none(),
-            "{roomy:?}"
+            ample.free_bytes.is_some() && ample.cure.is_none(),
+            "{ample:?}"
         );
-        let short = disk(folder, u64::MAX);
-        assert_eq!(short.free_bytes.is_some(), roomy.free_bytes.is_some());
+        let full = disk(folder, u64::MAX);
+        assert_eq!(full.free_bytes.is_some(), ample.free_bytes.is_some());
         assert!(
-            short
-                .cure
-                .expect("it is short")
+            full.cure
+                .expect("it is full")
                 .contains("server.min_free_bytes")
         );
     }
@@ -431,7 +438,7 @@ mod tests {
     fn missing_layer_is_reported_unless_given_up() {
         let found = findings(false, false);
         assert_eq!(
-            missing(&found.features).collect::<Vec<_>>(),
+            missing_layers(&found.features).collect::<Vec<_>>(),
             [Layer::CgroupMemory]
         );
         let mut text = Vec::new();
@@ -450,7 +457,7 @@ mod tests {
         let text = String::from_utf8(text).unwrap();
         assert_eq!(text.matches("MISSING").count(), 2, "{text}");
         assert_eq!(text.matches("-> enable it").count(), 1, "{text}");
-        assert_eq!(missing(&findings(false, true).features).count(), 0);
-        assert_eq!(missing(&findings(true, false).features).count(), 0);
+        assert_eq!(missing_layers(&findings(false, true).features).count(), 0);
+        assert_eq!(missing_layers(&findings(true, false).features).count(), 0);
     }
 }

@@ -225,7 +225,7 @@ impl EvalCommand {
         let env = local_bundle::environment(config, runtime, self.no_sandbox);
         let workers = usize::from(self.workers);
         // The process may be restricted to some of the machine's CPUs.
-        let cpus = affinity::allowed().context("reading the CPU affinity of this process")?;
+        let cpus = affinity::allowed_cpus().context("reading the CPU affinity of this process")?;
         let layout = CpuLayout::divide(&cpus, workers, 1);
         if layout.shared && workers > 1 {
             self.notes().print(format_args!(

@@ -1,7 +1,7 @@
 //! `faceoff import`: unpacks the archive of a season into a data folder that `faceoff serve` shows.
 
 use super::{
-    atomic_folder::{self, AtomicFolder, FolderKind, create_private},
+    atomic_folder::{self, AtomicFolder, FolderOperation, create_private},
     output::print,
 };
 use anyhow::{Context, bail};
@@ -23,7 +23,7 @@ const ARTIFACTS: &str = "artifacts";
 /// Folder for all other files of the archive.
 const REST: &str = "archive";
 
-const IMPORT: FolderKind = FolderKind {
+const IMPORT: FolderOperation = FolderOperation {
     name: "import",
     suffix: "importing",
 };

@@ -10,7 +10,7 @@ use faceoff_api::{
 };
 
 /// A user as one line.
-pub(super) fn person_line(person: &UserView) -> String {
+pub(super) fn user_line(person: &UserView) -> String {
     let role = match person.team {
         Some(team) => format!("member of {team}"),
         None => "organiser".to_owned(),

@@ -1,7 +1,7 @@
 //! `faceoff restore`: creates a data folder from a backup.
 
 use super::{
-    atomic_folder::{self, AtomicFolder, FolderKind},
+    atomic_folder::{self, AtomicFolder, FolderOperation},
     backup::{
         self, files,
         manifest::{ARTIFACTS, DATABASE, Manifest},
@@ -47,7 +47,7 @@ pub struct RestoreCommand {
     json: bool,
 }
 
-const RESTORE: FolderKind = FolderKind {
+const RESTORE: FolderOperation = FolderOperation {
     name: "restore",
     suffix: "restoring",
 };
@@ -58,7 +58,7 @@ impl RestoreCommand {
     /// # Errors
     /// If the backup is damaged, or the folder is not empty or in use by a server. Nothing is changed then.
     pub fn run(self) -> anyhow::Result<()> {
-        let manifest = backup::open(&self.folder)?;
+        let manifest = backup::read_manifest(&self.folder)?;
         let Some(data) = self.data else {
             check(&self.folder, &manifest)?;
             for missing in &manifest.missing {

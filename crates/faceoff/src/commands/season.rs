@@ -4,7 +4,7 @@ use super::{output::print, server::ServerArgs};
 use clap::Args;
 use faceoff_api::views::season::SeasonView;
 
-/// Shows the season: name, commitment and state.
+/// Shows the season: its name, its commitment (the hash of its secret) and its state.
 #[derive(Debug, Args)]
 pub struct SeasonCommand {
     #[command(flatten)]

@@ -2,7 +2,7 @@
 
 use super::{
     output::{lines_or, print},
-    people::{invitation_line, invitation_lines, new_invitation_text, person_line},
+    people::{invitation_line, invitation_lines, new_invitation_text, user_line},
     server::ServerArgs,
     storage::storage_line,
 };
@@ -144,7 +144,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
         Action::Members => {
             let people = client.users().await?;
             print(json, &people, || {
-                let lines = people.iter().map(person_line).collect();
+                let lines = people.iter().map(user_line).collect();
                 lines_or(
                     lines,
                     "no members yet; invite one with faceoff team invite NOTE",
@@ -173,7 +173,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
         Action::Leave { confirm } => {
             let id = own_person(client).await?;
             let person = client.remove_user(id, confirm).await?;
-            print(json, &person, || person_line(&person))
+            print(json, &person, || user_line(&person))
         }
         Action::Retire { confirm } => {
             let team = own_team(client).await?;
@@ -205,7 +205,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             accept: Some(version),
         } => {
             let person = client.accept_terms(version).await?;
-            print(json, &person, || person_line(&person))
+            print(json, &person, || user_line(&person))
         }
     }
 }

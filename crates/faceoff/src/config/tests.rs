@@ -88,7 +88,7 @@ fn all_sections_are_read() {
     assert_eq!(
         environment.isolation,
         Isolation::Sandboxed {
-            given_up: vec![Layer::CgroupMemory]
+            disabled_layers: vec![Layer::CgroupMemory]
         }
     );
     assert!(environment.runtimes.contains_key("julia"));

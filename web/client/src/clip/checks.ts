@@ -1,3 +1,5 @@
+// Checked access to the fields of a clip header, which is JSON from the server.
+
 import { ClipError } from "./error";
 
 /** Reads fields of a clip header with type checks. Error messages contain the path of the field. */
@@ -20,48 +22,51 @@ export class Fields {
 
   text(name: string): string {
     const value = this.value[name];
-    if (typeof value !== "string") throw this.wrong(name, "text");
+    if (typeof value !== "string") throw this.typeError(name, "text");
     return value;
   }
 
   number(name: string): number {
     const value = this.value[name];
-    if (typeof value !== "number" || !Number.isFinite(value)) throw this.wrong(name, "a number");
+    if (typeof value !== "number" || !Number.isFinite(value)) throw this.typeError(name, "a number");
     return value;
   }
 
-  /** A whole number from `least` to `most`. */
-  whole(name: string, least: number, most: number): number {
+  /** A whole number from `min` to `max`. */
+  integer(name: string, min: number, max: number): number {
     const value = this.number(name);
-    if (!Number.isInteger(value) || value < least || value > most) {
-      throw this.wrong(name, `a whole number from ${least} to ${most}`);
+    if (!Number.isInteger(value) || value < min || value > max) {
+      throw this.typeError(name, `a whole number from ${min} to ${max}`);
     }
     return value;
   }
 
-  flag(name: string): boolean {
+  boolean(name: string): boolean {
     const value = this.value[name];
-    if (typeof value !== "boolean") throw this.wrong(name, "true or false");
+    if (typeof value !== "boolean") throw this.typeError(name, "true or false");
     return value;
   }
 
   /** The entries of a list; empty if the field is missing. */
-  list(name: string): { at: string; value: unknown }[] {
+  list(name: string): { path: string; value: unknown }[] {
     if (!this.has(name)) return [];
     const value = this.value[name];
-    if (!Array.isArray(value)) throw this.wrong(name, "a list");
-    return value.map((entry: unknown, i) => ({ at: `${this.path}.${name}[${i}]`, value: entry }));
+    if (!Array.isArray(value)) throw this.typeError(name, "a list");
+    return value.map((entry: unknown, i) => ({ path: `${this.path}.${name}[${i}]`, value: entry }));
   }
 
+  /** The entries of a list of objects. */
   objects(name: string): Fields[] {
-    return this.list(name).map((entry) => Fields.of(entry.value, entry.at));
+    return this.list(name).map((entry) => Fields.of(entry.value, entry.path));
   }
 
-  inside(name: string): Fields {
+  /** A field that is an object. */
+  object(name: string): Fields {
     return Fields.of(this.value[name], `${this.path}.${name}`);
   }
 
-  wrong(name: string, expected: string): ClipError {
+  /** The error for a field with another type or value. */
+  typeError(name: string, expected: string): ClipError {
     const actual = JSON.stringify(this.value[name]) as string | undefined;
     return new ClipError(
       `${this.path}.${name} must be ${expected}, but is ${actual === undefined ? "missing" : actual.slice(0, 40)}`,

@@ -1,5 +1,8 @@
+// The container format of all clips. A clip is a recording of an episode, or of a chunk of a game: a JSON header and columns of
+// values by sample. Sample k is the state after k control steps.
+
 import { Fields } from "./checks";
-import { decodeColumn, parsePlan, type Column } from "./column";
+import { decodeColumn, parseEncoding, type Column } from "./column";
 import { ClipError } from "./error";
 
 /** The supported format. */
@@ -39,33 +42,36 @@ export function openContainer(bytes: Uint8Array, isNeeded: (name: string) => boo
       `the replay has the format "${format.slice(0, 40)}", but this page supports "${FORMAT}"; reload the page, which may be older than the server`,
     );
   }
-  const samples = header.whole("samples", 1, MAX_SAMPLES);
+  const samples = header.integer("samples", 1, MAX_SAMPLES);
   const stepS = header.number("step_s");
-  if (stepS <= 0) throw header.wrong("step_s", "above 0");
+  if (stepS <= 0) throw header.typeError("step_s", "above 0");
 
   const columns = new Map<string, Column>();
-  let at = 4 + length;
+  let offset = 4 + length;
   for (const entry of header.objects("columns")) {
-    const plan = parsePlan(entry, samples);
-    if (plan.bytes > bytes.length - at) {
+    const encoding = parseEncoding(entry, samples);
+    if (encoding.bytes > bytes.length - offset) {
       throw new ClipError(
-        `the clip ends inside column ${plan.name} (${plan.bytes} bytes expected, ${bytes.length - at} received)`,
+        `the clip ends inside column ${encoding.name} (${encoding.bytes} bytes expected, ${bytes.length - offset} received)`,
       );
     }
-    if (columns.has(plan.name)) throw new ClipError(`column ${plan.name} appears twice`);
-    if (isNeeded(plan.name))
-      columns.set(plan.name, decodeColumn(plan, bytes.subarray(at, at + plan.bytes), samples));
-    at += plan.bytes;
+    if (columns.has(encoding.name)) throw new ClipError(`column ${encoding.name} appears twice`);
+    if (isNeeded(encoding.name))
+      columns.set(
+        encoding.name,
+        decodeColumn(encoding, bytes.subarray(offset, offset + encoding.bytes), samples),
+      );
+    offset += encoding.bytes;
   }
-  if (at !== bytes.length)
-    throw new ClipError(`the clip has ${bytes.length - at} bytes after its last column`);
+  if (offset !== bytes.length)
+    throw new ClipError(`the clip has ${bytes.length - offset} bytes after its last column`);
 
   return {
     kind: header.text("kind"),
     header,
     contest: header.text("contest"),
-    episode: header.has("episode") ? header.whole("episode", 0, Number.MAX_SAFE_INTEGER) : null,
-    first: header.whole("first", 0, Number.MAX_SAFE_INTEGER),
+    episode: header.has("episode") ? header.integer("episode", 0, Number.MAX_SAFE_INTEGER) : null,
+    first: header.integer("first", 0, Number.MAX_SAFE_INTEGER),
     samples,
     stepS,
     columns,

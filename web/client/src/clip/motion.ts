@@ -1,16 +1,21 @@
+// The motion clip: recorded motion of puck and arms, with contacts, violations and ends of rallies. Visible to everyone.
+
 import { ClipError } from "./error";
 import type { Fields } from "./checks";
 import type { Column } from "./column";
 import { openContainer, type Container } from "./container";
 
+/** The kind of recording: an episode of a task, or a game. */
 export type Contest = "hit" | "defend" | "prepare" | "game";
-export type Touched = "rim" | "mallet" | "opponent_mallet";
-export type Group = "ee" | "link" | "joint_pos" | "joint_vel";
+/** What the puck touched. */
+export type ContactKind = "rim" | "mallet" | "opponent_mallet";
+/** Groups of constraints: end effector, elbow and wrist, joint positions, joint velocities. */
+export type ConstraintGroup = "ee" | "link" | "joint_pos" | "joint_vel";
 
 /** A contact of the puck; `t` in seconds from sample 0 of the episode or game, x and y in the table frame. */
 export interface Contact {
   readonly t: number;
-  readonly what: Touched;
+  readonly what: ContactKind;
   readonly x: number;
   readonly y: number;
 }
@@ -18,30 +23,37 @@ export interface Contact {
 /** A violation of a constraint at samples `from` to `to`, inclusive. */
 export interface Violation {
   readonly side: 0 | 1;
-  readonly group: Group;
+  readonly group: ConstraintGroup;
   readonly from: number;
   readonly to: number;
-  /** In rad, rad/s or m, by group. */
+  /** Largest excess over the limit, in rad, rad/s or m, by group. */
   readonly worst: number;
 }
 
 /** The end of a rally at `sample`; the next rally starts at the following sample. */
-export interface Break {
+export interface RallyEnd {
   readonly sample: number;
   readonly what: string;
+  /** The side that scored or fouled. */
   readonly by: 0 | 1 | null;
+  /** Score after the rally. */
   readonly score: readonly [number, number] | null;
 }
 
 /** The end of the episode or game. */
-export interface End {
+export interface EpisodeEnd {
+  /** How it ended, as an identifier such as `left_table`. */
   readonly end: string;
   readonly success: boolean | null;
+  /** Why it ended, as text. */
   readonly why: string;
   readonly steps: number;
 }
 
-/** Joints of an arm by sample, rad and rad/s; `dq` and `universal` are null if not recorded. */
+/**
+ * Joints of an arm by sample, rad and rad/s: angles `q`, velocities `dq`, and angles of the universal joint of the mallet; null if
+ * not recorded.
+ */
 export interface ArmMotion {
   readonly q: readonly Float64Array[];
   readonly dq: readonly Float64Array[] | null;
@@ -52,6 +64,7 @@ export interface ArmMotion {
 export interface Motion {
   readonly contest: Contest;
   readonly episode: number | null;
+  /** Index of the first sample in the episode or game. */
   readonly first: number;
   readonly samples: number;
   readonly stepS: number;
@@ -66,18 +79,19 @@ export interface Motion {
   readonly arms: readonly ArmMotion[];
   readonly contacts: readonly Contact[];
   readonly violations: readonly Violation[];
-  readonly breaks: readonly Break[];
+  readonly breaks: readonly RallyEnd[];
   /** Score at the first sample of a game clip, if recorded. */
   readonly score: readonly [number, number] | null;
-  readonly end: End | null;
+  readonly end: EpisodeEnd | null;
   /** All decoded columns in order, for the data table. */
   readonly columns: readonly Column[];
 }
 
-const KNOWN = /^(puck_(x|y|yaw|vx|vy)|(opponent_)?(q|dq)_[1-7]|(opponent_)?universal_[12])$/;
+/** Names of the columns that are decoded. */
+const MOTION_COLUMNS = /^(puck_(x|y|yaw|vx|vy)|(opponent_)?(q|dq)_[1-7]|(opponent_)?universal_[12])$/;
 
 export function decodeMotion(bytes: Uint8Array): Motion {
-  const container = openContainer(bytes, (name) => KNOWN.test(name));
+  const container = openContainer(bytes, (name) => MOTION_COLUMNS.test(name));
   if (container.kind !== "motion") {
     throw new ClipError(`expected a clip of kind "motion", got "${container.kind}"`);
   }
@@ -115,18 +129,18 @@ export function decodeMotion(bytes: Uint8Array): Motion {
     violations: header.objects("violations").map((v) => ({
       side: sideOf(v, "side"),
       group: oneOf(v, "group", ["ee", "link", "joint_pos", "joint_vel"] as const),
-      from: v.whole("from", 0, Number.MAX_SAFE_INTEGER),
-      to: v.whole("to", 0, Number.MAX_SAFE_INTEGER),
+      from: v.integer("from", 0, Number.MAX_SAFE_INTEGER),
+      to: v.integer("to", 0, Number.MAX_SAFE_INTEGER),
       worst: v.number("worst"),
     })),
     breaks: header.objects("breaks").map((b) => ({
-      sample: b.whole("sample", 0, Number.MAX_SAFE_INTEGER),
+      sample: b.integer("sample", 0, Number.MAX_SAFE_INTEGER),
       what: b.text("what"),
       by: b.has("by") ? sideOf(b, "by") : null,
       score: scoreOf(b),
     })),
     score: scoreOf(header),
-    end: header.has("end") ? endOf(header.inside("end")) : null,
+    end: header.has("end") ? endOf(header.object("end")) : null,
     columns: [...container.columns.values()],
   };
 }
@@ -136,7 +150,7 @@ function valuesOf(container: Container, name: string): Float64Array | null {
 }
 
 /** The columns `name_1` to `name_count`; null if one is missing. */
-export function family(container: Container, name: string, count: number): Float64Array[] | null {
+export function numberedColumns(container: Container, name: string, count: number): Float64Array[] | null {
   const found: Float64Array[] = [];
   for (let i = 1; i <= count; i++) {
     const values = valuesOf(container, `${name}_${i}`);
@@ -147,12 +161,12 @@ export function family(container: Container, name: string, count: number): Float
 }
 
 function armOf(container: Container, prefix: string): ArmMotion | null {
-  const q = family(container, `${prefix}q`, 7);
+  const q = numberedColumns(container, `${prefix}q`, 7);
   if (q === null) return null;
-  const universal = family(container, `${prefix}universal`, 2);
+  const universal = numberedColumns(container, `${prefix}universal`, 2);
   return {
     q,
-    dq: family(container, `${prefix}dq`, 7),
+    dq: numberedColumns(container, `${prefix}dq`, 7),
     universal: universal === null ? null : [universal[0], universal[1]],
   };
 }
@@ -160,12 +174,12 @@ function armOf(container: Container, prefix: string): ArmMotion | null {
 function oneOf<T extends string>(fields: Fields, name: string, known: readonly T[]): T {
   const text = fields.text(name);
   const found = known.find((word) => word === text);
-  if (found === undefined) throw fields.wrong(name, `one of ${known.join(", ")}`);
+  if (found === undefined) throw fields.typeError(name, `one of ${known.join(", ")}`);
   return found;
 }
 
 function sideOf(fields: Fields, name: string): 0 | 1 {
-  return fields.whole(name, 0, 1) === 0 ? 0 : 1;
+  return fields.integer(name, 0, 1) === 0 ? 0 : 1;
 }
 
 function scoreOf(fields: Fields): readonly [number, number] | null {
@@ -173,11 +187,11 @@ function scoreOf(fields: Fields): readonly [number, number] | null {
   return typeof a === "number" && typeof b === "number" ? [a, b] : null;
 }
 
-function endOf(fields: Fields): End {
+function endOf(fields: Fields): EpisodeEnd {
   return {
     end: fields.text("end"),
-    success: fields.has("success") ? fields.flag("success") : null,
+    success: fields.has("success") ? fields.boolean("success") : null,
     why: fields.has("why") ? fields.text("why") : "",
-    steps: fields.whole("steps", 0, Number.MAX_SAFE_INTEGER),
+    steps: fields.integer("steps", 0, Number.MAX_SAFE_INTEGER),
   };
 }

@@ -1,8 +1,10 @@
+// Buttons for the view (3-D or flat) and the camera.
+
 import { CAMERAS, type Camera } from "../replay/fragment";
 import { button, h } from "./dom";
 import { ICONS } from "./icons";
 
-const NAMES: Record<Camera, string> = {
+const CAMERA_NAMES: Record<Camera, string> = {
   corner: "Corner",
   side: "Side",
   robot: "Robot’s view",
@@ -11,69 +13,69 @@ const NAMES: Record<Camera, string> = {
 
 export interface CameraActions {
   readonly preset: (camera: Camera) => void;
-  /** In units of a small turn. */
+  /** Turns the camera by a number of small turns. */
   readonly orbit: (right: number, up: number) => void;
-  readonly closer: (steps: number) => void;
+  readonly zoom: (steps: number) => void;
   readonly flat: (flat: boolean) => void;
 }
 
 /** Choice of view and camera. The buttons offer everything that dragging does. */
 export class Cameras {
   readonly element: HTMLElement;
-  private readonly solid: HTMLButtonElement;
-  private readonly flat: HTMLButtonElement;
+  private readonly button3d: HTMLButtonElement;
+  private readonly buttonFlat: HTMLButtonElement;
   private readonly presets = new Map<Camera, HTMLButtonElement>();
-  private readonly orbit: HTMLElement;
-  private readonly places: HTMLElement;
+  private readonly orbitButtons: HTMLElement;
+  private readonly presetButtons: HTMLElement;
 
   constructor(actions: CameraActions) {
-    this.solid = button("3-D", () => { actions.flat(false); }); // prettier-ignore
-    this.flat = button("Flat", () => { actions.flat(true); }); // prettier-ignore
+    this.button3d = button("3-D", () => { actions.flat(false); }); // prettier-ignore
+    this.buttonFlat = button("Flat", () => { actions.flat(true); }); // prettier-ignore
     for (const camera of CAMERAS) {
-      this.presets.set(camera, button(NAMES[camera], () => { actions.preset(camera); })); // prettier-ignore
+      this.presets.set(camera, button(CAMERA_NAMES[camera], () => { actions.preset(camera); })); // prettier-ignore
     }
     const turn = (name: string, right: number, up: number, iconPath: string): HTMLButtonElement =>
       button(name, () => { actions.orbit(right, up); }, iconPath); // prettier-ignore
-    this.places = h(
+    this.presetButtons = h(
       "span",
-      { class: "joined", attributes: { role: "group", "aria-label": "Camera" } },
+      { class: "button-group", attributes: { role: "group", "aria-label": "Camera" } },
       ...this.presets.values(),
     );
-    this.orbit = h(
+    this.orbitButtons = h(
       "span",
-      { class: "joined", attributes: { role: "group", "aria-label": "Turn the camera" } },
+      { class: "button-group", attributes: { role: "group", "aria-label": "Turn the camera" } },
       turn("Turn left", -1, 0, ICONS.left),
       turn("Turn right", 1, 0, ICONS.right),
       turn("Turn up", 0, 1, ICONS.up),
       turn("Turn down", 0, -1, ICONS.down),
-      button("Zoom in", () => { actions.closer(1); }, ICONS.closer),
-      button("Zoom out", () => { actions.closer(-1); }, ICONS.farther),
+      button("Zoom in", () => { actions.zoom(1); }, ICONS.closer),
+      button("Zoom out", () => { actions.zoom(-1); }, ICONS.farther),
     ); // prettier-ignore
     this.element = h(
       "div",
       { class: "row cameras" },
       h(
         "span",
-        { class: "joined", attributes: { role: "group", "aria-label": "View" } },
-        this.solid,
-        this.flat,
+        { class: "button-group", attributes: { role: "group", "aria-label": "View" } },
+        this.button3d,
+        this.buttonFlat,
       ),
-      this.places,
-      this.orbit,
+      this.presetButtons,
+      this.orbitButtons,
     );
   }
 
   /** `camera`: null if turned manually. */
-  update(flat: boolean, camera: Camera | null, solidPossible: boolean): void {
-    press(this.solid, !flat);
-    press(this.flat, flat);
-    this.solid.disabled = !solidPossible;
-    for (const [name, element] of this.presets) press(element, !flat && name === camera);
-    this.places.hidden = flat;
-    this.orbit.hidden = flat;
+  update(flat: boolean, camera: Camera | null, is3dAvailable: boolean): void {
+    setPressed(this.button3d, !flat);
+    setPressed(this.buttonFlat, flat);
+    this.button3d.disabled = !is3dAvailable;
+    for (const [name, element] of this.presets) setPressed(element, !flat && name === camera);
+    this.presetButtons.hidden = flat;
+    this.orbitButtons.hidden = flat;
   }
 }
 
-function press(element: HTMLElement, pressed: boolean): void {
+function setPressed(element: HTMLElement, pressed: boolean): void {
   element.setAttribute("aria-pressed", String(pressed));
 }

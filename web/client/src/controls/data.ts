@@ -1,17 +1,19 @@
+// The recorded values around the cursor as a table, and their download as CSV.
+
 import { columnName, columnsOf, csvOf } from "../replay/csv";
-import type { Part } from "../replay/source";
+import type { ReplayPart } from "../replay/source";
 import { button, h } from "./dom";
 import { fixed } from "./format";
 
-/** Samples before and after the cursor. */
-const AROUND = 5;
+/** Rows before and after the row of the cursor. */
+const ROWS_EACH_SIDE = 5;
 
 /** A table of samples around the cursor, and a download of all samples. */
 export class DataTable {
   readonly element: HTMLDetailsElement;
   private readonly head = h("tr");
   private readonly body = h("tbody");
-  private part: Part | null = null;
+  private part: ReplayPart | null = null;
   private cells: HTMLElement[][] = [];
   private rows: HTMLElement[] = [];
   private step = -1;
@@ -43,7 +45,7 @@ export class DataTable {
     });
   }
 
-  show(part: Part): void {
+  show(part: ReplayPart): void {
     this.part = part;
     const columns = columnsOf(part);
     this.head.replaceChildren(
@@ -52,7 +54,7 @@ export class DataTable {
       ),
     );
     this.rows = [];
-    this.cells = Array.from({ length: 2 * AROUND + 1 }, () => {
+    this.cells = Array.from({ length: 2 * ROWS_EACH_SIDE + 1 }, () => {
       const sample = h("th", { class: "number", attributes: { scope: "row" } });
       const cells = Array.from({ length: columns.length + 1 }, () => h("td", { class: "number" }));
       this.rows.push(h("tr", {}, sample, ...cells));
@@ -74,11 +76,11 @@ export class DataTable {
     const { first, samples, stepS } = part.motion;
     const columns = columnsOf(part);
     this.cells.forEach((cells, row) => {
-      const k = this.step - first + row - AROUND;
+      const k = this.step - first + row - ROWS_EACH_SIDE;
       const exists = k >= 0 && k < samples;
       this.rows[row].hidden = !exists;
       if (!exists) return;
-      if (row === AROUND) this.rows[row].setAttribute("aria-current", "step");
+      if (row === ROWS_EACH_SIDE) this.rows[row].setAttribute("aria-current", "step");
       cells[0].textContent = String(first + k);
       cells[1].textContent = fixed((first + k) * stepS, 2);
       columns.forEach((column, i) => {
@@ -89,7 +91,8 @@ export class DataTable {
   }
 }
 
-export function fileName(title: string, part: Part): string {
+/** Name of a file with data of a part, without its extension. */
+export function fileName(title: string, part: ReplayPart): string {
   const slug = title
     .toLowerCase()
     .replaceAll(/[^a-z0-9]+/g, "-")
@@ -97,6 +100,7 @@ export function fileName(title: string, part: Part): string {
   return `${slug || "replay"}-${part.motion.first}`;
 }
 
+/** Saves content as a download of the browser. */
 export function saveFile(content: Blob, name: string): void {
   const address = URL.createObjectURL(content);
   const link = h("a", { attributes: { href: address, download: name } });

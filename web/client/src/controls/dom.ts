@@ -1,3 +1,5 @@
+// Helpers to create HTML elements.
+
 type Child = Node | string | null;
 
 interface Properties {
@@ -6,7 +8,7 @@ interface Properties {
   readonly on?: Readonly<Record<string, (event: Event) => void>>;
 }
 
-/** Creates an element with children; strings are inserted as text, never as markup. */
+/** Creates an element with children (hyperscript); strings are inserted as text, never as markup. */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   properties: Properties = {},
@@ -41,12 +43,13 @@ export function button(name: string, pressed: () => void, iconPath?: string): HT
     element.append(name);
   } else {
     element.append(icon(iconPath));
-    element.classList.add("sign");
+    element.classList.add("icon-button");
     rename(element, name);
   }
   return element;
 }
 
+/** Sets the accessible name and the tooltip. */
 export function rename(element: HTMLElement, name: string): void {
   element.setAttribute("aria-label", name);
   element.title = name;

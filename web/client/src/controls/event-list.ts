@@ -1,3 +1,5 @@
+// The list of events below the picture.
+
 import type { ReplayEvent } from "../replay/events";
 import { h } from "./dom";
 import { seconds } from "./format";
@@ -11,7 +13,7 @@ export class EventList {
   private events: readonly ReplayEvent[] = [];
   private current = -1;
 
-  constructor(private readonly go: (event: ReplayEvent) => void) {
+  constructor(private readonly seekToEvent: (event: ReplayEvent) => void) {
     this.element = h("details", { class: "events", attributes: { open: "" } }, this.summary, this.list);
   }
 
@@ -26,12 +28,16 @@ export class EventList {
           attributes: { type: "button" },
           on: {
             click: () => {
-              this.go(event);
+              this.seekToEvent(event);
             },
           },
         },
-        h("span", { class: "when" }, seconds(event.position, stepS)),
-        h("span", { class: `mark-sign ${event.kind}`, attributes: { "aria-hidden": "true" } }, event.symbol),
+        h("span", { class: "event-time" }, seconds(event.position, stepS)),
+        h(
+          "span",
+          { class: `event-symbol ${event.kind}`, attributes: { "aria-hidden": "true" } },
+          event.symbol,
+        ),
         h("span", {}, event.text),
       ),
     );

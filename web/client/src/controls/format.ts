@@ -1,3 +1,5 @@
+// Numbers and times as text.
+
 /** A number with fixed digits and a true minus sign; zero has no sign. */
 export function fixed(value: number, digits: number): string {
   const text = value.toFixed(digits);

@@ -1,6 +1,8 @@
+// The help dialog.
+
 import { button, h } from "./dom";
 
-const KEYS: readonly [keys: string, what: string][] = [
+const SHORTCUTS: readonly [keys: string, what: string][] = [
   ["Space", "play, pause"],
   ["← →", "one step back, forward"],
   ["Shift + ← →", "ten steps"],
@@ -14,7 +16,9 @@ const KEYS: readonly [keys: string, what: string][] = [
 
 /** Dialog with the keyboard shortcuts. */
 export function helpDialog(): HTMLDialogElement {
-  const rows = KEYS.map(([keys, what]) => h("div", {}, h("dt", {}, h("kbd", {}, keys)), h("dd", {}, what)));
+  const rows = SHORTCUTS.map(([keys, what]) =>
+    h("div", {}, h("dt", {}, h("kbd", {}, keys)), h("dd", {}, what)),
+  );
   const close = button("Close", () => {
     dialog.close();
   });

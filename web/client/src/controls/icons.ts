@@ -1,3 +1,5 @@
+// Icons of the buttons.
+
 /** SVG paths of the icons, in a box of 16 × 16. */
 export const ICONS = {
   play: "M4 2.5v11l9-5.5z",

@@ -1,8 +1,11 @@
+// Keyboard shortcuts of a replay.
+
 import { CAMERAS, type Camera } from "../replay/fragment";
 
+/** What keys can do. */
 export interface KeyActions {
   readonly toggle: () => void;
-  readonly step: (by: number) => void;
+  readonly step: (steps: number) => void;
   readonly event: (direction: 1 | -1) => void;
   readonly camera: (camera: Camera) => void;
   readonly flat: () => void;
@@ -10,35 +13,35 @@ export interface KeyActions {
 }
 
 /**
- * The action of a key; null without one. `on`: the focused control. Keys that the control itself needs are left to it:
+ * The action of a key; null without one. `focus`: the focused control. Keys that the control itself needs are left to it:
  * arrows of a slider, space of a button, all keys of a text field.
  */
 export function actionFor(
   key: string,
   shift: boolean,
-  on: "picture" | "slider" | "button" | "other",
+  focus: "picture" | "slider" | "button" | "other",
   actions: KeyActions,
 ): (() => void) | null {
-  if (on === "other") return null;
+  if (focus === "other") return null;
   const camera = CAMERAS[Number(key) - 1] as Camera | undefined;
   if (camera !== undefined) return () => { actions.camera(camera); }; // prettier-ignore
-  const steps = (by: number): (() => void) => () => { actions.step(by); }; // prettier-ignore
+  const stepAction = (count: number): (() => void) => () => { actions.step(count); }; // prettier-ignore
   switch (key) {
     case " ":
-      return on === "button" ? null : actions.toggle;
+      return focus === "button" ? null : actions.toggle;
     case "ArrowLeft":
     case "ArrowRight": {
-      const by = key === "ArrowLeft" ? -1 : 1;
-      if (shift) return steps(10 * by);
-      return on === "slider" ? null : steps(by);
+      const signedStep = key === "ArrowLeft" ? -1 : 1;
+      if (shift) return stepAction(10 * signedStep);
+      return focus === "slider" ? null : stepAction(signedStep);
     }
     case "Home":
     case "End":
-      return on === "slider" ? null : steps(key === "Home" ? -Infinity : Infinity);
+      return focus === "slider" ? null : stepAction(key === "Home" ? -Infinity : Infinity);
     case ",":
-      return steps(-1);
+      return stepAction(-1);
     case ".":
-      return steps(1);
+      return stepAction(1);
     case "n":
       return () => { actions.event(1); }; // prettier-ignore
     case "p":
@@ -70,5 +73,5 @@ function focusOf(target: EventTarget | null): "picture" | "slider" | "button" | 
     return target.type === "range" ? "slider" : target.type === "checkbox" ? "button" : "other";
   }
   if (target.closest("button, summary, a") !== null) return "button";
-  return target.classList.contains("stage") ? "picture" : "other";
+  return target.classList.contains("canvas-area") ? "picture" : "other";
 }

@@ -1,3 +1,5 @@
+// Checkboxes for the paths that are drawn.
+
 import type { Layers } from "../replay/frame-state";
 import { h } from "./dom";
 
@@ -10,7 +12,7 @@ interface Choice {
 
 const CHOICES: readonly Choice[] = [
   { layer: "puck", name: "Puck’s path", sample: "trail" },
-  { layer: "real", name: "Mallet’s path", sample: "real" },
+  { layer: "mallet", name: "Mallet’s path", sample: "real" },
   { layer: "commanded", name: "Commanded path", sample: "commanded" },
   { layer: "seen", name: "Observed puck", sample: "seen" },
 ];
@@ -28,29 +30,29 @@ export class LayerChoice {
         layers[layer] = box.checked;
         changed();
       });
-      const row = h("label", {}, box, h("span", { class: `sample ${sample}` }), name);
+      const row = h("label", {}, box, h("span", { class: `line-sample ${sample}` }), name);
       this.rows.set(layer, row);
       return row;
     });
-    const span = h("select", {}, h("option", {}, "last second"), h("option", {}, "everything"));
-    span.selectedIndex = layers.whole ? 1 : 0;
-    span.addEventListener("change", () => {
-      layers.whole = span.selectedIndex === 1;
+    const trailChoice = h("select", {}, h("option", {}, "last second"), h("option", {}, "everything"));
+    trailChoice.selectedIndex = layers.wholePart ? 1 : 0;
+    trailChoice.addEventListener("change", () => {
+      layers.wholePart = trailChoice.selectedIndex === 1;
       changed();
     });
     this.element = h(
       "div",
       { class: "row layers", attributes: { role: "group", "aria-label": "Paths" } },
       ...boxes,
-      h("label", {}, "Trail: ", span),
+      h("label", {}, "Trail: ", trailChoice),
     );
   }
 
   /** Hides choices without data. */
-  update(has: { seen: boolean; commanded: boolean }): void {
+  update(available: { seen: boolean; commanded: boolean }): void {
     const seen = this.rows.get("seen");
     const commanded = this.rows.get("commanded");
-    if (seen !== undefined) seen.hidden = !has.seen;
-    if (commanded !== undefined) commanded.hidden = !has.commanded;
+    if (seen !== undefined) seen.hidden = !available.seen;
+    if (commanded !== undefined) commanded.hidden = !available.commanded;
   }
 }

@@ -1,3 +1,5 @@
+// Buttons to share a replay: link, picture, full screen; and help.
+
 import { button, h } from "./dom";
 import { ICONS } from "./icons";
 
@@ -17,7 +19,7 @@ export function shareRow(full: HTMLElement, actions: Actions): HTMLElement {
   });
   const copy = button("Copy link to this moment", () => {
     const link = actions.link();
-    copied(link).then(
+    copyText(link).then(
       () => {
         actions.announce("Link copied");
         flash(copy, "Link copied");
@@ -41,18 +43,20 @@ export function shareRow(full: HTMLElement, actions: Actions): HTMLElement {
   const help = button("?", actions.help);
   help.setAttribute("aria-label", "Keys");
   help.title = "Keys";
-  help.classList.add("sign");
+  help.classList.add("icon-button");
   row.append(help);
   return row;
 }
 
-async function copied(text: string): Promise<void> {
+/** Copies a text to the clipboard. */
+async function copyText(text: string): Promise<void> {
   // Undefined outside secure contexts, contrary to its type.
   const clipboard = navigator.clipboard as Clipboard | undefined;
   if (clipboard === undefined) throw new Error("no clipboard");
   await clipboard.writeText(text);
 }
 
+/** Shows another text on a button for two seconds. */
 function flash(element: HTMLElement, text: string): void {
   const before = element.dataset.name ?? element.textContent;
   element.dataset.name = before;

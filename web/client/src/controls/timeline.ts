@@ -1,3 +1,5 @@
+// The timeline: a slider for the time, with a mark for each event.
+
 import type { Clock } from "../replay/clock";
 import type { ReplayEvent } from "../replay/events";
 import { h, setText } from "./dom";
@@ -17,7 +19,7 @@ export class Timeline {
     class: "marks",
     attributes: { role: "group", "aria-label": "Events on the timeline" },
   });
-  private readonly tip = h("span", { class: "tip", attributes: { hidden: "" } });
+  private readonly tooltip = h("span", { class: "tooltip", attributes: { hidden: "" } });
   private events: readonly ReplayEvent[] = [];
   private buttons: HTMLButtonElement[] = [];
   private last = -1;
@@ -25,7 +27,7 @@ export class Timeline {
 
   constructor(
     clock: Clock,
-    private readonly go: (event: ReplayEvent) => void,
+    private readonly seekToEvent: (event: ReplayEvent) => void,
     title: string,
   ) {
     this.slider.setAttribute("aria-label", `Time of ${title}`);
@@ -35,12 +37,12 @@ export class Timeline {
     });
     // Arrow keys move between marks, so that all marks are a single tab stop.
     this.marks.addEventListener("keydown", (event) => {
-      const by = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+      const direction = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
       const from = this.buttons.findIndex((mark) => mark === document.activeElement);
-      if (by === 0 || from < 0) return;
+      if (direction === 0 || from < 0) return;
       event.preventDefault();
       event.stopPropagation();
-      const next = this.buttons[Math.min(Math.max(from + by, 0), this.buttons.length - 1)];
+      const next = this.buttons[Math.min(Math.max(from + direction, 0), this.buttons.length - 1)];
       this.buttons[from].tabIndex = -1;
       next.tabIndex = 0;
       next.focus();
@@ -52,7 +54,7 @@ export class Timeline {
     if (last !== this.last) {
       this.last = last;
       this.slider.max = String(last);
-      this.place(stepS);
+      this.placeMarks(stepS);
     }
     if (step !== this.step) {
       this.step = step;
@@ -63,20 +65,20 @@ export class Timeline {
 
   show(events: readonly ReplayEvent[], stepS: number): void {
     this.events = events;
-    this.place(stepS);
+    this.placeMarks(stepS);
   }
 
-  private place(stepS: number): void {
+  private placeMarks(stepS: number): void {
     if (this.last <= 0) return;
     const share = (position: number): string =>
       `${(100 * Math.min(Math.max(position / this.last, 0), 1)).toFixed(3)}%`;
     const spans: HTMLElement[] = [];
     this.buttons = [];
     for (const event of this.events.slice(0, MAX_MARKS)) {
-      if (event.until > event.position) {
+      if (event.endPosition > event.position) {
         const span = h("span", { class: `span ${event.kind}` });
         span.style.left = share(event.position);
-        span.style.width = share(event.until - event.position);
+        span.style.width = share(event.endPosition - event.position);
         spans.push(span);
       }
       const label = `${seconds(event.position, stepS)}: ${event.text}`;
@@ -87,12 +89,12 @@ export class Timeline {
           attributes: { type: "button", tabindex: this.buttons.length === 0 ? "0" : "-1", "aria-label": label },
           on: {
             click: () => {
-              this.go(event);
+              this.seekToEvent(event);
             },
-            pointerenter: () => { this.showTip(label, event.position); },
-            focus: () => { this.showTip(label, event.position); },
-            pointerleave: () => { this.tip.hidden = true; },
-            blur: () => { this.tip.hidden = true; },
+            pointerenter: () => { this.showTooltip(label, event.position); },
+            focus: () => { this.showTooltip(label, event.position); },
+            pointerleave: () => { this.tooltip.hidden = true; },
+            blur: () => { this.tooltip.hidden = true; },
           },
         },
         event.symbol,
@@ -100,17 +102,17 @@ export class Timeline {
       mark.style.left = share(event.position);
       this.buttons.push(mark);
     }
-    this.marks.replaceChildren(...spans, ...this.buttons, this.tip);
+    this.marks.replaceChildren(...spans, ...this.buttons, this.tooltip);
     this.marks.hidden = this.buttons.length === 0;
   }
 
   /** Shows the tip above its mark, inside the width of the picture. */
-  private showTip(label: string, position: number): void {
-    setText(this.tip, label);
-    this.tip.hidden = false;
+  private showTooltip(label: string, position: number): void {
+    setText(this.tooltip, label);
+    this.tooltip.hidden = false;
     const width = this.marks.clientWidth;
-    const half = this.tip.offsetWidth / 2;
+    const half = this.tooltip.offsetWidth / 2;
     const centre = Math.min(Math.max((position / this.last) * width, half), Math.max(width - half, half));
-    this.tip.style.left = `${centre - half}px`;
+    this.tooltip.style.left = `${centre - half}px`;
   }
 }

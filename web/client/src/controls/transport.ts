@@ -1,3 +1,5 @@
+// Buttons for playback, like those of a video player.
+
 import { SPEEDS, type Clock } from "../replay/clock";
 import { button, h, rename, setText } from "./dom";
 import { ICONS } from "./icons";
@@ -36,16 +38,16 @@ export class Transport {
     for (const value of SPEEDS) {
       this.speed.append(h("option", { attributes: { value: String(value) } }, `${value} ×`));
     }
-    const by = (name: string, steps: number, iconPath: string): HTMLButtonElement =>
+    const stepButton = (name: string, steps: number, iconPath: string): HTMLButtonElement =>
       button(name, () => { clock.step(steps); }, iconPath); // prettier-ignore
     this.element = h(
       "div",
       { class: "row transport", attributes: { role: "group", "aria-label": "Playback" } },
-      by("To the start", -Infinity, ICONS.start),
-      by("One step back", -1, ICONS.back),
+      stepButton("To the start", -Infinity, ICONS.start),
+      stepButton("One step back", -1, ICONS.back),
       this.play,
-      by("One step forward", 1, ICONS.forward),
-      by("To the end", Infinity, ICONS.end),
+      stepButton("One step forward", 1, ICONS.forward),
+      stepButton("To the end", Infinity, ICONS.end),
       h("span", { class: "clock" }, this.time, this.step),
       h("span", { class: "pair" },
         button("Previous event", () => { actions.event(-1); }),

@@ -1,34 +1,36 @@
-import { OUTER } from "../model/table";
+// Coordinates of the flat view.
+
+import { OUTER_HALF_SIZE } from "../model/table";
 
 /** Margins for the axes, CSS pixels. */
-const LEFT = 46;
-const BOTTOM = 40;
-const RIGHT = 14;
-const TOP = 14;
+const LEFT_MARGIN = 46;
+const BOTTOM_MARGIN = 40;
+const RIGHT_MARGIN = 14;
+const TOP_MARGIN = 14;
 
 /** From the table frame (m, y up) to the picture (pixels, y down); the same scale along both. */
 export class Projection {
   readonly scale: number;
-  private readonly x0: number;
-  private readonly y0: number;
+  private readonly originX: number;
+  private readonly originY: number;
 
   constructor(
     readonly width: number,
     readonly height: number,
   ) {
-    const wide = (width - LEFT - RIGHT) / (2 * OUTER.x);
-    const high = (height - TOP - BOTTOM) / (2 * OUTER.y);
+    const wide = (width - LEFT_MARGIN - RIGHT_MARGIN) / (2 * OUTER_HALF_SIZE.x);
+    const high = (height - TOP_MARGIN - BOTTOM_MARGIN) / (2 * OUTER_HALF_SIZE.y);
     this.scale = Math.max(Math.min(wide, high), 1);
-    this.x0 = LEFT + (width - LEFT - RIGHT) / 2;
-    this.y0 = TOP + (height - TOP - BOTTOM) / 2;
+    this.originX = LEFT_MARGIN + (width - LEFT_MARGIN - RIGHT_MARGIN) / 2;
+    this.originY = TOP_MARGIN + (height - TOP_MARGIN - BOTTOM_MARGIN) / 2;
   }
 
   x(x: number): number {
-    return this.x0 + x * this.scale;
+    return this.originX + x * this.scale;
   }
 
   y(y: number): number {
-    return this.y0 - y * this.scale;
+    return this.originY - y * this.scale;
   }
 
   length(metres: number): number {

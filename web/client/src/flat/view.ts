@@ -1,26 +1,31 @@
+// The flat view: everything from above, on a 2-D canvas.
+
 import type { Contest } from "../clip/motion";
 import { MODEL } from "../model/model";
-import { between, type Path } from "../motion/paths";
+import { pointsBetween, type Path } from "../motion/paths";
 import type { Palette } from "../replay/palette";
-import { trail, type FrameState, type View } from "../replay/frame-state";
+import { trailRange, type FrameState, type View } from "../replay/frame-state";
 import { drawArm, drawMallet, type ArmColours } from "./arm";
 import { Projection } from "./projection";
 import { drawTable } from "./table";
 
-const COMMANDED = [5, 3];
-const SEEN = [4, 3];
+// Patterns of dashes: lengths of dash and gap, pixels.
+const COMMANDED_DASHES = [5, 3];
+const SEEN_DASHES = [4, 3];
 const SOLID: number[] = [];
 
 /** The table from above, to scale, with its axes. Needs no WebGL. */
 export class FlatView implements View {
   readonly canvas = document.createElement("canvas");
   private readonly context: CanvasRenderingContext2D;
-  private readonly under = document.createElement("canvas");
-  private at = new Projection(1, 1);
+  /** The static parts, drawn once and copied into each frame. */
+  private readonly background = document.createElement("canvas");
+  private projection = new Projection(1, 1);
+  /** Device pixels per CSS pixel. */
   private ratio = 1;
   private palette: Palette | null = null;
   private arms: readonly [ArmColours, ArmColours] | null = null;
-  private drawnFor: Contest | null = null;
+  private backgroundContest: Contest | null = null;
 
   constructor() {
     const context = this.canvas.getContext("2d");
@@ -29,13 +34,13 @@ export class FlatView implements View {
   }
 
   resize(width: number, height: number, ratio: number): void {
-    for (const canvas of [this.canvas, this.under]) {
+    for (const canvas of [this.canvas, this.background]) {
       canvas.width = Math.max(Math.round(width * ratio), 1);
       canvas.height = Math.max(Math.round(height * ratio), 1);
     }
     this.ratio = ratio;
-    this.at = new Projection(width, height);
-    this.drawnFor = null;
+    this.projection = new Projection(width, height);
+    this.backgroundContest = null;
   }
 
   paint(palette: Palette): void {
@@ -44,66 +49,66 @@ export class FlatView implements View {
       { link: palette["rp-joint"], mallet: palette["rp-mallet"], outline: palette["rp-table"] },
       { link: palette["rp-other-joint"], mallet: palette["rp-other-mallet"], outline: palette["rp-table"] },
     ];
-    this.drawnFor = null;
+    this.backgroundContest = null;
   }
 
   draw(frame: FrameState): number {
-    const { context, at, palette, arms } = this;
+    const { context, projection: at, palette, arms } = this;
     if (palette === null || arms === null) return 0;
     const { motion, paths, observed } = frame.part;
-    this.still(palette, motion.contest);
+    this.drawBackground(palette, motion.contest);
     context.setTransform(1, 0, 0, 1, 0, 0);
-    context.drawImage(this.under, 0, 0);
+    context.drawImage(this.background, 0, 0);
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
 
     for (let i = 0; i < motion.arms.length; i++) drawArm(context, at, frame.arms[i], arms[i]);
-    const [from, to] = trail(frame);
+    const [from, to] = trailRange(frame);
     if (frame.layers.puck) {
-      this.line(paths.puck, from, to, palette["rp-trail"], SOLID);
-      this.contacts(frame, from, to, palette);
+      this.drawLine(paths.puck, from, to, palette["rp-trail"], SOLID);
+      this.drawContacts(frame, from, to, palette);
     }
     for (let i = 0; i < motion.arms.length; i++) drawMallet(context, at, frame.arms[i], arms[i]);
-    if (frame.layers.real) {
-      for (const path of paths.real) this.line(path, from, to, palette.ink, SOLID);
+    if (frame.layers.mallet) {
+      for (const path of paths.mallets) this.drawLine(path, from, to, palette.ink, SOLID);
     }
     if (frame.layers.commanded && paths.commanded !== null) {
-      this.line(paths.commanded, from, to, palette["rp-commanded"], COMMANDED);
+      this.drawLine(paths.commanded, from, to, palette["rp-commanded"], COMMANDED_DASHES);
     }
-    this.puck(frame, palette);
-    if (observed !== null && frame.layers.seen) this.seen(frame, palette);
+    this.drawPuck(frame, palette);
+    if (observed !== null && frame.layers.seen) this.drawSeenPuck(frame, palette);
     return 0;
   }
 
-  private still(palette: Palette, contest: Contest): void {
-    if (this.drawnFor === contest) return;
-    const context = this.under.getContext("2d");
+  private drawBackground(palette: Palette, contest: Contest): void {
+    if (this.backgroundContest === contest) return;
+    const context = this.background.getContext("2d");
     if (context === null) return;
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
-    drawTable(context, this.at, palette, contest);
-    this.drawnFor = contest;
+    drawTable(context, this.projection, palette, contest);
+    this.backgroundContest = contest;
   }
 
-  private line(path: Path, from: number, to: number, colour: string, dashes: number[]): void {
-    const { context, at } = this;
-    const [first, last] = between(path, from, to);
+  private drawLine(path: Path, from: number, to: number, colour: string, dashes: number[]): void {
+    const { context, projection: at } = this;
+    const [first, last] = pointsBetween(path, from, to);
     context.strokeStyle = colour;
     context.lineWidth = 1.5;
     context.setLineDash(dashes);
     context.beginPath();
     let pen = false;
     for (let i = first; i <= last; i++) {
-      const x = at.x(path.places[3 * i]);
-      const y = at.y(path.places[3 * i + 1]);
+      const x = at.x(path.points[3 * i]);
+      const y = at.y(path.points[3 * i + 1]);
       if (pen) context.lineTo(x, y);
       else context.moveTo(x, y);
-      pen = path.gap[i] === 0;
+      pen = path.gaps[i] === 0;
     }
     context.stroke();
     context.setLineDash(SOLID);
   }
 
-  private contacts(frame: FrameState, from: number, to: number, palette: Palette): void {
-    const { context, at } = this;
+  private drawContacts(frame: FrameState, from: number, to: number, palette: Palette): void {
+    const { context, projection: at } = this;
     const { contacts, stepS } = frame.part.motion;
     context.strokeStyle = palette["rp-trail"];
     context.lineWidth = 1;
@@ -119,8 +124,8 @@ export class FlatView implements View {
     context.stroke();
   }
 
-  private puck(frame: FrameState, palette: Palette): void {
-    const { context, at } = this;
+  private drawPuck(frame: FrameState, palette: Palette): void {
+    const { context, projection: at } = this;
     const { x, y, yaw } = frame.pose;
     const radius = at.length(MODEL.puck.radius_m);
     context.fillStyle = palette["rp-puck"];
@@ -136,20 +141,20 @@ export class FlatView implements View {
     context.stroke();
   }
 
-  private seen(frame: FrameState, palette: Palette): void {
+  private drawSeenPuck(frame: FrameState, palette: Palette): void {
     if (Number.isNaN(frame.seenX)) return;
-    const { context, at } = this;
+    const { context, projection: at } = this;
     const x = at.x(frame.seenX);
     const y = at.y(frame.seenY);
     const radius = at.length(MODEL.puck.radius_m);
     context.strokeStyle = palette["rp-seen"];
     context.lineWidth = 2;
-    context.setLineDash(SEEN);
+    context.setLineDash(SEEN_DASHES);
     context.beginPath();
     context.arc(x, y, radius, 0, 2 * Math.PI);
     context.stroke();
     context.setLineDash(SOLID);
-    if (!frame.lost) return;
+    if (!frame.isPuckLost) return;
     context.beginPath();
     context.moveTo(x - radius, y - radius);
     context.lineTo(x + radius, y + radius);

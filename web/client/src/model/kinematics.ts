@@ -1,4 +1,6 @@
-import { JOINTS, MODEL } from "./model";
+// Forward kinematics of the arm: frames of its links from the angles of its joints.
+
+import { JOINT_COUNT, MODEL } from "./model";
 
 /** A frame: rotation (row-major) and origin, in one array of twelve: r00 r01 r02 r10 … r22 x y z. */
 export type Frame = Float64Array;
@@ -7,14 +9,14 @@ export type Frame = Float64Array;
 export type Angles = ArrayLike<number>;
 
 const LINK_FRAMES: readonly Frame[] = MODEL.links.map((link) =>
-  fixed(link.orientation_wxyz, link.position_m),
+  linkFrame(link.orientation_wxyz, link.position_m),
 );
 
 /** Orientation of a mallet that hangs straight down, the target of the universal joint's controller. */
-const DOWNWARDS = [1, 0, 0, 0, -1, 0, 0, 0, -1];
+const DOWNWARDS_ROTATION = [1, 0, 0, 0, -1, 0, 0, 0, -1];
 
 /** Angles of a universal joint that was not recorded: the mallet is assumed to hang straight down. */
-export const UNRECORDED: Angles = [NaN, NaN];
+export const UNRECORDED_ANGLES: Angles = [NaN, NaN];
 
 /**
  * Forward kinematics of one arm in the table frame. `set` overwrites the frames of the instance: a replay updates them 60
@@ -22,13 +24,14 @@ export const UNRECORDED: Angles = [NaN, NaN];
  */
 export class Kinematics {
   /** Link frames 1 to 7, after the rotation of their joints. */
-  readonly links: readonly Frame[] = Array.from({ length: JOINTS }, () => new Float64Array(12));
+  readonly links: readonly Frame[] = Array.from({ length: JOINT_COUNT }, () => new Float64Array(12));
   /** The end effector ("striker joint link"), fixed on link 7. */
   readonly endEffector: Frame = new Float64Array(12);
   /** The mallet on the universal joint; the axis of its cylinder is z. */
   readonly mallet: Frame = new Float64Array(12);
   /** Centre of the mallet's cylinder. */
   readonly malletCentre = new Float64Array(3);
+  /** The base of the robot in the table frame. */
   readonly base: Frame;
 
   /** `side` 0: robot 1 at negative x; 1: robot 2, opposite, turned by half a turn. */
@@ -38,25 +41,26 @@ export class Kinematics {
     this.base = new Float64Array([cos, 0, 0, 0, cos, 0, 0, 0, 1, base.x_m, base.y_m, base.z_m]);
   }
 
-  set(q: Angles, universal: Angles = UNRECORDED): void {
+  /** Updates all frames from the angles of the seven joints and of the universal joint. */
+  set(q: Angles, universal: Angles = UNRECORDED_ANGLES): void {
     let parent = this.base;
-    for (let i = 0; i < JOINTS; i++) {
+    for (let i = 0; i < JOINT_COUNT; i++) {
       compose(parent, LINK_FRAMES[i], this.links[i]);
-      turnZ(this.links[i], q[i]);
+      rotateZ(this.links[i], q[i]);
       parent = this.links[i];
     }
     const ee = this.endEffector;
     ee.set(parent);
-    along(parent, MODEL.end_effector_z_m, ee, 9);
+    pointOnZAxis(parent, MODEL.end_effector_z_m, ee, 9);
     this.mallet.set(ee);
     if (Number.isNaN(universal[0])) {
-      this.mallet.set(DOWNWARDS);
+      this.mallet.set(DOWNWARDS_ROTATION);
     } else {
       // Hinge y, then hinge x.
-      turnY(this.mallet, universal[0]);
-      turnX(this.mallet, universal[1]);
+      rotateY(this.mallet, universal[0]);
+      rotateX(this.mallet, universal[1]);
     }
-    along(this.mallet, MODEL.mallet.centre_z_m, this.malletCentre, 0);
+    pointOnZAxis(this.mallet, MODEL.mallet.centre_z_m, this.malletCentre, 0);
   }
 
   /** Converts a height from the table frame to the base frame of the robot, which the constraints use. */
@@ -65,13 +69,14 @@ export class Kinematics {
   }
 }
 
-/** The point at distance z along a frame's z. */
-function along(frame: Frame, z: number, out: Float64Array, at: number): void {
-  out[at] = frame[9] + frame[2] * z;
-  out[at + 1] = frame[10] + frame[5] * z;
-  out[at + 2] = frame[11] + frame[8] * z;
+/** Writes the point at distance `z` along a frame's z axis to `out`, from index `offset`. */
+function pointOnZAxis(frame: Frame, z: number, out: Float64Array, offset: number): void {
+  out[offset] = frame[9] + frame[2] * z;
+  out[offset + 1] = frame[10] + frame[5] * z;
+  out[offset + 2] = frame[11] + frame[8] * z;
 }
 
+/** Writes the frame `b`, which is given relative to `a`, to `out`. */
 function compose(a: Frame, b: Frame, out: Frame): void {
   for (let row = 0; row < 3; row++) {
     const r = row * 3;
@@ -82,20 +87,20 @@ function compose(a: Frame, b: Frame, out: Frame): void {
   }
 }
 
-function turnZ(frame: Frame, angle: number): void {
-  mix(frame, 0, 1, angle);
+function rotateZ(frame: Frame, angle: number): void {
+  rotateColumns(frame, 0, 1, angle);
 }
 
-function turnY(frame: Frame, angle: number): void {
-  mix(frame, 2, 0, angle);
+function rotateY(frame: Frame, angle: number): void {
+  rotateColumns(frame, 2, 0, angle);
 }
 
-function turnX(frame: Frame, angle: number): void {
-  mix(frame, 1, 2, angle);
+function rotateX(frame: Frame, angle: number): void {
+  rotateColumns(frame, 1, 2, angle);
 }
 
-/** Turns the frame about its own third axis, from its column `u` towards its column `v`. */
-function mix(frame: Frame, u: number, v: number, angle: number): void {
+/** Rotates the frame about one of its axes: column `u` towards column `v` of its rotation. */
+function rotateColumns(frame: Frame, u: number, v: number, angle: number): void {
   const cos = Math.cos(angle);
   const sin = Math.sin(angle);
   for (let row = 0; row < 9; row += 3) {
@@ -106,7 +111,8 @@ function mix(frame: Frame, u: number, v: number, angle: number): void {
   }
 }
 
-function fixed(orientation: readonly number[], position: readonly number[]): Frame {
+/** The frame of a link relative to its parent, from a unit quaternion w, x, y, z and a position. */
+function linkFrame(orientation: readonly number[], position: readonly number[]): Frame {
   const [w, x, y, z] = orientation;
   const [px, py, pz] = position;
   return new Float64Array([

@@ -1,21 +1,23 @@
+// Distances of an arm from the limits that the rules set.
+
 import type { Angles, Kinematics } from "./kinematics";
-import { JOINTS, MODEL, RANGES, VELOCITY_LIMITS } from "./model";
+import { JOINT_COUNT, MODEL, JOINT_RANGES, VELOCITY_LIMITS } from "./model";
 
-const LIMITS = MODEL.constraints;
+const CONSTRAINTS = MODEL.constraints;
 
-/** Least distance of a joint from 95 % of its range, rad; negative beyond it. */
+/** Smallest distance of a joint from 95 % of its range, rad; negative beyond it. */
 export function jointPositionMargin(q: Angles): number {
   let least = Infinity;
-  for (let i = 0; i < JOINTS; i++)
-    least = Math.min(least, LIMITS.limit_fraction * RANGES[i] - Math.abs(q[i]));
+  for (let i = 0; i < JOINT_COUNT; i++)
+    least = Math.min(least, CONSTRAINTS.limit_fraction * JOINT_RANGES[i] - Math.abs(q[i]));
   return least;
 }
 
-/** Least distance of a joint velocity from 95 % of its limit, rad/s. */
+/** Smallest distance of a joint velocity from 95 % of its limit, rad/s. */
 export function jointVelocityMargin(dq: Angles): number {
   let least = Infinity;
-  for (let i = 0; i < JOINTS; i++) {
-    least = Math.min(least, LIMITS.limit_fraction * VELOCITY_LIMITS[i] - Math.abs(dq[i]));
+  for (let i = 0; i < JOINT_COUNT; i++) {
+    least = Math.min(least, CONSTRAINTS.limit_fraction * VELOCITY_LIMITS[i] - Math.abs(dq[i]));
   }
   return least;
 }
@@ -28,7 +30,7 @@ export function velocityShare(joint: number, velocity: number): number {
 /** Distance of the end effector's height from the edge of its tolerance, m. */
 export function heightMargin(arm: Kinematics): number {
   const height = arm.heightAboveBase(arm.endEffector[11]);
-  return LIMITS.ee_height_tolerance_m - Math.abs(height - LIMITS.ee_height_m);
+  return CONSTRAINTS.ee_height_tolerance_m - Math.abs(height - CONSTRAINTS.ee_height_m);
 }
 
 /** Distance of the end effector from the nearest edge of its half of the table, m: the own short side and both long sides. */
@@ -41,5 +43,5 @@ export function tableMargin(arm: Kinematics): number {
 
 /** Height of the lower one of elbow (link 4) and wrist (link 7) above the limit, m. */
 export function linkMargin(arm: Kinematics): number {
-  return arm.heightAboveBase(Math.min(arm.links[3][11], arm.links[6][11])) - LIMITS.link_height_m;
+  return arm.heightAboveBase(Math.min(arm.links[3][11], arm.links[6][11])) - CONSTRAINTS.link_height_m;
 }

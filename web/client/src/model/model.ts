@@ -1,9 +1,11 @@
+// Numbers of robot and table.
+
 import numbers from "./model.json";
 
 /** Robot and table. All numbers are in `model.json`; a test of the simulator compares them with its own. */
 export const MODEL = numbers;
 
-export const JOINTS = 7;
+export const JOINT_COUNT = 7;
 
 const RAD_PER_DEG = Math.PI / 180;
 
@@ -13,4 +15,4 @@ export const VELOCITY_LIMITS: readonly number[] = numbers.links.map(
 );
 
 /** Joint ranges ±, rad. */
-export const RANGES: readonly number[] = numbers.links.map((link) => link.range_rad);
+export const JOINT_RANGES: readonly number[] = numbers.links.map((link) => link.range_rad);

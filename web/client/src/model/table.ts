@@ -1,16 +1,18 @@
+// Outlines of the table for both views. Coordinates are in the table frame: origin in the centre, x towards the opponent, in metres.
+
 import type { Contest } from "../clip/motion";
 import { MODEL } from "./model";
 
 export type Point = readonly [x: number, y: number];
 
 /** Half the size of the table with its rims, m. */
-export const OUTER = {
+export const OUTER_HALF_SIZE = {
   x: MODEL.table.outer_half_length_m,
   y: MODEL.table.half_width_m + MODEL.table.rim_width_m,
 };
 
 /** Number of chords per rounded corner, as in the collision shapes of the reference. */
-const CHORDS = 7;
+const CHORDS_PER_CORNER = 7;
 
 /**
  * Outline of the rim at positive y, from above; the other rim is its mirror image. The goal is open behind its line, and
@@ -19,10 +21,11 @@ const CHORDS = 7;
 export function rimOutline(): Point[] {
   const { half_length_m, half_width_m, goal_edge_from_m, goal_edge_to_m, goal_half_width_m, post_radius_m } =
     MODEL.table;
-  const right: Point[] = [[OUTER.x, OUTER.y]];
-  for (let i = 0; i <= CHORDS; i++) right.push(onPost(goal_edge_to_m, 0 - (i / CHORDS) * (Math.PI / 2)));
-  for (let i = 0; i <= CHORDS; i++) {
-    right.push(onPost(goal_edge_from_m, -Math.PI / 2 - (i / CHORDS) * (Math.PI / 2)));
+  const right: Point[] = [[OUTER_HALF_SIZE.x, OUTER_HALF_SIZE.y]];
+  for (let i = 0; i <= CHORDS_PER_CORNER; i++)
+    right.push(onPost(goal_edge_to_m, 0 - (i / CHORDS_PER_CORNER) * (Math.PI / 2)));
+  for (let i = 0; i <= CHORDS_PER_CORNER; i++) {
+    right.push(onPost(goal_edge_from_m, -Math.PI / 2 - (i / CHORDS_PER_CORNER) * (Math.PI / 2)));
   }
   right.push([half_length_m, half_width_m]);
   const left = right.map(([x, y]): Point => [-x, y]).reverse();

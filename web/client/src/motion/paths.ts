@@ -1,47 +1,52 @@
+// Paths of puck and mallets as lines through space.
+
 import type { Motion } from "../clip/motion";
 import type { Observed } from "../clip/observed";
 import { Kinematics } from "../model/kinematics";
-import { JOINTS } from "../model/model";
+import { JOINT_COUNT } from "../model/model";
 import { Interpolation, newPose } from "./pose";
 
-/** A line through space with the position (in control steps) of each of its points. */
+/** A line through space. Each of its points belongs to a position of the replay, in control steps. */
 export interface Path {
-  readonly at: Float64Array;
+  readonly positions: Float64Array;
   /** x, y, z one after the other, table frame. */
-  readonly places: Float32Array;
-  /** 1: no line from this point to the next one, because a rally ended or data is missing. */
-  readonly gap: Uint8Array;
+  readonly points: Float32Array;
+  /** 1 at a point: no line from this point to the next one, because a rally ended or data is missing. */
+  readonly gaps: Uint8Array;
 }
 
 /** Lines of one part of a replay. */
 export interface Paths {
   readonly puck: Path;
   /** Actual path of the end effector, per arm. */
-  readonly real: readonly Path[];
+  readonly mallets: readonly Path[];
   /** Commanded path of the end effector; null if the viewer may not see it. */
   readonly commanded: Path | null;
 }
 
 /** Points of the path of the puck per control step, in addition to contacts. */
-const PUCK_POINTS = 4;
-const MALLET_POINTS = 4;
-const PUCK_Z = 0.002;
+const PUCK_POINTS_PER_STEP = 4;
+/** Points of the path of a mallet per control step. */
+const MALLET_POINTS_PER_STEP = 4;
+/** Height of the path of the puck above the table, so that it stays visible. */
+const PUCK_LINE_Z_M = 0.002;
 
 export function pathsOf(motion: Motion, interpolation: Interpolation, observed: Observed | null): Paths {
   const command = observed?.command ?? null;
   return {
     puck: puckPath(motion, interpolation),
-    real: motion.arms.map((_, side) => realPath(motion, interpolation, side === 0 ? 0 : 1)),
+    mallets: motion.arms.map((_, side) => malletPath(motion, interpolation, side === 0 ? 0 : 1)),
     commanded: observed === null || command === null ? null : commandedPath(observed, command),
   };
 }
 
 /** Indices of the points between two positions, as [first, last]; last < first if there are none. */
-export function between(path: Path, from: number, to: number): [number, number] {
-  return [firstAt(path.at, from), firstAt(path.at, to + 1e-9) - 1];
+export function pointsBetween(path: Path, from: number, to: number): [number, number] {
+  return [firstIndexFrom(path.positions, from), firstIndexFrom(path.positions, to + 1e-9) - 1];
 }
 
-function firstAt(sorted: Float64Array, value: number): number {
+/** Index of the first value that is at least `value`. */
+function firstIndexFrom(sorted: Float64Array, value: number): number {
   let low = 0;
   let high = sorted.length;
   while (low < high) {
@@ -58,8 +63,8 @@ function puckPath(motion: Motion, interpolation: Interpolation): Path {
     .map((contact) => contact.t / motion.stepS)
     .filter((position) => position > motion.first && position < last);
   for (let k = 0; k < motion.samples; k++) {
-    for (let i = 0; i < (k < motion.samples - 1 ? PUCK_POINTS : 1); i++)
-      at.push(motion.first + k + i / PUCK_POINTS);
+    for (let i = 0; i < (k < motion.samples - 1 ? PUCK_POINTS_PER_STEP : 1); i++)
+      at.push(motion.first + k + i / PUCK_POINTS_PER_STEP);
   }
   at.sort((a, b) => a - b);
   const ends = new Set(motion.breaks.map((end) => end.sample));
@@ -67,16 +72,16 @@ function puckPath(motion: Motion, interpolation: Interpolation): Path {
   const gap = new Uint8Array(at.length);
   const pose = newPose();
   at.forEach((position, i) => {
-    interpolation.at(position, pose);
-    places.set([pose.x, pose.y, PUCK_Z], 3 * i);
+    interpolation.poseAt(position, pose);
+    places.set([pose.x, pose.y, PUCK_LINE_Z_M], 3 * i);
     if (ends.has(Math.floor(position))) gap[i] = 1;
   });
-  return { at: Float64Array.from(at), places, gap };
+  return { positions: Float64Array.from(at), points: places, gaps: gap };
 }
 
-/** Quarter steps, so that the line ends at the mallet also between samples. */
-function realPath(motion: Motion, interpolation: Interpolation, side: 0 | 1): Path {
-  const count = (motion.samples - 1) * MALLET_POINTS + 1;
+/** Points at quarter steps, so that the line ends at the mallet also between samples. */
+function malletPath(motion: Motion, interpolation: Interpolation, side: 0 | 1): Path {
+  const count = (motion.samples - 1) * MALLET_POINTS_PER_STEP + 1;
   const at = new Float64Array(count);
   const places = new Float32Array(3 * count);
   const gap = new Uint8Array(count);
@@ -84,13 +89,13 @@ function realPath(motion: Motion, interpolation: Interpolation, side: 0 | 1): Pa
   const arm = new Kinematics(side);
   const pose = newPose();
   for (let i = 0; i < count; i++) {
-    at[i] = motion.first + i / MALLET_POINTS;
-    interpolation.at(at[i], pose);
+    at[i] = motion.first + i / MALLET_POINTS_PER_STEP;
+    interpolation.poseAt(at[i], pose);
     arm.set(pose.arms[side].q);
     places.set(arm.endEffector.subarray(9, 12), 3 * i);
     if (ends.has(Math.floor(at[i]))) gap[i] = 1;
   }
-  return { at, places, gap };
+  return { positions: at, points: places, gaps: gap };
 }
 
 function commandedPath(observed: Observed, command: readonly Float64Array[]): Path {
@@ -99,10 +104,10 @@ function commandedPath(observed: Observed, command: readonly Float64Array[]): Pa
   const places = new Float32Array(3 * samples);
   const gap = new Uint8Array(samples);
   const arm = new Kinematics(side);
-  const q = new Float64Array(JOINTS);
+  const q = new Float64Array(JOINT_COUNT);
   for (let k = 0; k < samples; k++) {
     at[k] = first + k;
-    for (let i = 0; i < JOINTS; i++) q[i] = command[i][k];
+    for (let i = 0; i < JOINT_COUNT; i++) q[i] = command[i][k];
     if (Number.isNaN(q[0])) {
       // No command for this sample: no line to it or from it.
       gap[k] = 1;
@@ -112,5 +117,5 @@ function commandedPath(observed: Observed, command: readonly Float64Array[]): Pa
     arm.set(q);
     places.set(arm.endEffector.subarray(9, 12), 3 * k);
   }
-  return { at, places, gap };
+  return { positions: at, points: places, gaps: gap };
 }

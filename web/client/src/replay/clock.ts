@@ -1,21 +1,27 @@
+// The clock of a replay: position, speed and playback.
+
 /** Offered speeds, as multiples of real time. */
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
 
+/** A source of animation frames. */
 export interface Ticker {
   /** Schedules `tick` before the next frame. */
   request(tick: (nowMs: number) => void): void;
 }
+
+/** Longest time between two frames that moves the clock; a longer one means that the page was hidden. */
+const MAX_FRAME_MS = 250;
 
 /**
  * Position of a replay, in control steps from sample 0. Viewers that share a clock are synchronised. The clock requests
  * frames only while it plays.
  */
 export class Clock {
-  private at = 0;
-  private end = 0;
-  private running = false;
-  private rate = 1;
-  private before: number | null = null;
+  private current = 0;
+  private lastStep = 0;
+  private isRunning = false;
+  private currentSpeed = 1;
+  private previousFrameMs: number | null = null;
   private readonly listeners = new Set<() => void>();
   private readonly gates = new Set<(position: number) => boolean>();
 
@@ -25,92 +31,96 @@ export class Clock {
   ) {}
 
   get position(): number {
-    return this.at;
+    return this.current;
   }
 
   /** Last step of the longest replay of this clock. */
   get last(): number {
-    return this.end;
+    return this.lastStep;
   }
 
   get playing(): boolean {
-    return this.running;
+    return this.isRunning;
   }
 
   get speed(): number {
-    return this.rate;
+    return this.currentSpeed;
   }
 
   /** Calls `changed` after each change of position, speed or playback. */
-  listen(changed: () => void): void {
+  addListener(changed: () => void): void {
     this.listeners.add(changed);
   }
 
-  /** Time stops while a gate returns false because data for the position is missing. */
-  gate(open: (position: number) => boolean): void {
-    this.gates.add(open);
+  /** Adds a gate: time stops while it returns false, because data for the position is missing. */
+  addGate(isOpen: (position: number) => boolean): void {
+    this.gates.add(isOpen);
   }
 
   /** Extends the clock to a replay with `last` as its last step. */
-  cover(last: number): void {
-    if (last > this.end) {
-      this.end = last;
+  extendTo(last: number): void {
+    if (last > this.lastStep) {
+      this.lastStep = last;
       this.notify();
     }
   }
 
   seek(position: number): void {
-    this.at = Math.min(Math.max(position, 0), this.end);
+    this.current = Math.min(Math.max(position, 0), this.lastStep);
     this.notify();
   }
 
   /** Moves by whole steps and stops playback. */
-  step(by: number): void {
-    this.running = false;
-    const whole = by > 0 ? Math.floor(this.at + 1e-6) : Math.ceil(this.at - 1e-6);
-    this.seek(whole + by);
+  step(steps: number): void {
+    this.isRunning = false;
+    const whole = steps > 0 ? Math.floor(this.current + 1e-6) : Math.ceil(this.current - 1e-6);
+    this.seek(whole + steps);
   }
 
   setSpeed(speed: number): void {
-    this.rate = speed;
+    this.currentSpeed = speed;
     this.notify();
   }
 
   pause(): void {
-    if (!this.running) return;
-    this.running = false;
+    if (!this.isRunning) return;
+    this.isRunning = false;
     this.notify();
   }
 
   /** Starts playback; from the start if the clock is at the end. */
   play(): void {
-    if (this.running || this.end === 0) return;
-    if (this.at >= this.end) this.at = 0;
-    this.running = true;
-    this.before = null;
+    if (this.isRunning || this.lastStep === 0) return;
+    if (this.current >= this.lastStep) this.current = 0;
+    this.isRunning = true;
+    this.previousFrameMs = null;
     this.notify();
     this.ticker.request(this.tick);
   }
 
   toggle(): void {
-    if (this.running) this.pause();
+    if (this.isRunning) this.pause();
     else this.play();
   }
 
   private readonly tick = (nowMs: number): void => {
-    if (!this.running) return;
+    if (!this.isRunning) return;
     // After the page was hidden, playback continues at the same position.
-    const passed = this.before === null ? 0 : Math.min(nowMs - this.before, 250);
-    this.before = nowMs;
-    const next = Math.min(this.at + ((passed / 1000) * this.rate) / this.stepS, this.end);
-    let open = true;
-    for (const gate of this.gates) open = gate(next) && open;
-    if (open) {
-      this.at = next;
-      if (next >= this.end) this.running = false;
+    const elapsedMs =
+      this.previousFrameMs === null ? 0 : Math.min(nowMs - this.previousFrameMs, MAX_FRAME_MS);
+    this.previousFrameMs = nowMs;
+    const next = Math.min(
+      this.current + ((elapsedMs / 1000) * this.currentSpeed) / this.stepS,
+      this.lastStep,
+    );
+    let areGatesOpen = true;
+    for (const gate of this.gates) areGatesOpen = gate(next) && areGatesOpen;
+    if (areGatesOpen) {
+      this.current = next;
+      if (next >= this.lastStep) this.isRunning = false;
       this.notify();
     }
-    if (this.running) this.ticker.request(this.tick);
+    if (this.isRunning) this.ticker.request(this.tick);
   };
 
   private notify(): void {

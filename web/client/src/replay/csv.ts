@@ -1,5 +1,7 @@
+// Recorded values as CSV.
+
 import type { Column } from "../clip/column";
-import type { Part } from "./source";
+import type { ReplayPart } from "./source";
 
 /** Column name with its unit: `puck_x_m`, `dq_1_rad_s`. */
 export function columnName(column: Column): string {
@@ -8,23 +10,23 @@ export function columnName(column: Column): string {
 }
 
 /** All columns of a part: motion, then observations. */
-export function columnsOf(part: Part): readonly Column[] {
+export function columnsOf(part: ReplayPart): readonly Column[] {
   return [...part.motion.columns, ...(part.observed?.columns ?? [])];
 }
 
 /** The whole part as CSV, one line per sample; missing values are empty. */
-export function csvOf(part: Part): string {
+export function csvOf(part: ReplayPart): string {
   const columns = columnsOf(part);
   const lines = [["sample", "time_s", ...columns.map(columnName)].join(",")];
-  for (let k = 0; k < part.motion.samples; k++) {
-    const sample = part.motion.first + k;
-    const values = columns.map((column) => plain(column.values[k]));
-    lines.push([sample, plain(sample * part.motion.stepS), ...values].join(","));
+  for (let index = 0; index < part.motion.samples; index++) {
+    const sample = part.motion.first + index;
+    const values = columns.map((column) => numberText(column.values[index]));
+    lines.push([sample, numberText(sample * part.motion.stepS), ...values].join(","));
   }
   return lines.join("\n") + "\n";
 }
 
 /** A number without rounding noise in the last digits. */
-function plain(value: number | undefined): string {
+function numberText(value: number | undefined): string {
   return value === undefined || Number.isNaN(value) ? "" : String(Number(value.toPrecision(12)));
 }

@@ -1,21 +1,23 @@
-import type { Group, Motion, Violation } from "../clip/motion";
+// Events of a replay as text: contacts, violations, ends of rallies, lost observations and late answers.
+
+import type { ConstraintGroup, Motion, Violation } from "../clip/motion";
 import type { Observed } from "../clip/observed";
 import { fixed } from "../controls/format";
 
-export type Kind = "contact" | "violation" | "rally" | "lost" | "late" | "end";
+export type EventKind = "contact" | "violation" | "rally" | "lost" | "late" | "end";
 
 /** An event for the timeline and the list. */
 export interface ReplayEvent {
-  readonly kind: Kind;
+  readonly kind: EventKind;
   /** In control steps from sample 0. */
   readonly position: number;
   /** End of the event; equal to `position` for an instant. */
-  readonly until: number;
+  readonly endPosition: number;
   readonly text: string;
   readonly symbol: string;
 }
 
-const SYMBOLS: Record<Kind, string> = {
+const SYMBOLS: Record<EventKind, string> = {
   contact: "•",
   violation: "▲",
   rally: "◆",
@@ -24,35 +26,49 @@ const SYMBOLS: Record<Kind, string> = {
   end: "■",
 };
 
-/** Name and unit of a group of constraints. */
-export const GROUPS: Record<Group, { name: string; unit: string; scale: number }> = {
+/** Name, unit and factor from SI units of the violations of each group of constraints. */
+export const CONSTRAINT_NAMES: Record<ConstraintGroup, { name: string; unit: string; scale: number }> = {
   ee: { name: "end effector out of bounds", unit: "mm", scale: 1000 },
   link: { name: "elbow or wrist too low", unit: "mm", scale: 1000 },
   joint_pos: { name: "joint position beyond 95 % of its range", unit: "rad", scale: 1 },
   joint_vel: { name: "joint velocity beyond 95 % of its limit", unit: "rad/s", scale: 1 },
 };
 
-const TOUCHED = { rim: "the rim", mallet: "the mallet", opponent_mallet: "the opponent's mallet" };
+/** What the puck hit, as text. */
+const CONTACT_NAMES = { rim: "the rim", mallet: "the mallet", opponent_mallet: "the opponent's mallet" };
 
 /** All events of a part in order of time. */
 export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent[] {
-  const game = motion.contest === "game";
+  const isGame = motion.contest === "game";
   const events: ReplayEvent[] = [];
-  const add = (kind: Kind, position: number, until: number, text: string, symbol = SYMBOLS[kind]): void => {
-    events.push({ kind, position, until, text, symbol });
+  const add = (
+    kind: EventKind,
+    position: number,
+    until: number,
+    text: string,
+    symbol = SYMBOLS[kind],
+  ): void => {
+    events.push({ kind, position, endPosition: until, text, symbol });
   };
 
   for (const contact of motion.contacts) {
-    const at = contact.t / motion.stepS;
-    const what =
-      game && contact.what !== "rim"
+    const position = contact.t / motion.stepS;
+    const struckName =
+      isGame && contact.what !== "rim"
         ? `mallet ${contact.what === "mallet" ? "A" : "B"}`
-        : TOUCHED[contact.what];
-    add("contact", at, at, `puck hits ${what} at (${fixed(contact.x, 2)}, ${fixed(contact.y, 2)}) m`);
+        : CONTACT_NAMES[contact.what];
+    add(
+      "contact",
+      position,
+      position,
+      `puck hits ${struckName} at (${fixed(contact.x, 2)}, ${fixed(contact.y, 2)}) m`,
+    );
   }
   for (const violation of motion.violations) {
     const prefix =
-      motion.arms.length > 1 && (game || violation.side === 1) ? `${sideName(motion, violation.side)}: ` : "";
+      motion.arms.length > 1 && (isGame || violation.side === 1)
+        ? `${sideName(motion, violation.side)}: `
+        : "";
     add("violation", violation.from, violation.to, prefix + violationText(violation));
   }
   for (const end of motion.breaks)
@@ -60,7 +76,7 @@ export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent
   for (const lost of observed?.lost ?? []) {
     add("lost", lost.from, lost.to, `camera lost the puck for ${lost.to - lost.from + 1} steps`);
   }
-  for (const [from, to] of runs(observed?.late ?? [])) {
+  for (const [from, to] of consecutiveRanges(observed?.late ?? [])) {
     const times = observed?.computationTimeS ?? null;
     let worst = 0;
     for (let k = from; k <= to; k++) worst = Math.max(worst, times?.[k - (observed?.first ?? 0)] ?? 0);
@@ -89,7 +105,7 @@ export function sideName(motion: Motion, side: 0 | 1): string {
 }
 
 function violationText(violation: Violation): string {
-  const { name, unit, scale } = GROUPS[violation.group];
+  const { name, unit, scale } = CONSTRAINT_NAMES[violation.group];
   const span =
     violation.from === violation.to ? `step ${violation.from}` : `steps ${violation.from} to ${violation.to}`;
   return `${name}, ${span}, by ${fixed(violation.worst * scale, unit === "mm" ? 1 : 3)} ${unit}`;
@@ -108,8 +124,8 @@ function rallyText(what: string, by: 0 | 1 | null, score: readonly [number, numb
   return (texts[what] ?? what.replaceAll("_", " ") + side) + scoreText;
 }
 
-/** Merges consecutive numbers into ranges. */
-function runs(sorted: readonly number[]): [number, number][] {
+/** Merges consecutive numbers into ranges, first and last number inclusive. */
+function consecutiveRanges(sorted: readonly number[]): [number, number][] {
   const found: [number, number][] = [];
   for (const n of [...sorted].sort((a, b) => a - b)) {
     const last = found.at(-1);

@@ -1,3 +1,5 @@
+// The fragment of an address (`#t=37&cam=side`) that links to a moment and a view of a replay.
+
 import { SPEEDS } from "./clock";
 
 export const CAMERAS = ["corner", "side", "robot", "above"] as const;

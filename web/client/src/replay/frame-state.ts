@@ -1,16 +1,22 @@
+// The state that a view draws.
+
 import type { Kinematics } from "../model/kinematics";
 import type { Pose } from "../motion/pose";
 import type { Palette } from "./palette";
-import type { Part } from "./source";
+import type { ReplayPart } from "./source";
 
 /** Layers switched on by the visitor. */
 export interface Layers {
+  /** The observed puck. */
   seen: boolean;
-  real: boolean;
+  /** Actual paths of the mallets. */
+  mallet: boolean;
+  /** Commanded path of the mallet. */
   commanded: boolean;
+  /** Path of the puck. */
   puck: boolean;
   /** Lines of the whole part instead of the last second only. */
-  whole: boolean;
+  wholePart: boolean;
 }
 
 /** Length of the trail in seconds. */
@@ -18,7 +24,8 @@ export const TRAIL_S = 1;
 
 /** State to draw. One instance is updated for each frame. */
 export interface FrameState {
-  part: Part;
+  part: ReplayPart;
+  /** In control steps from sample 0. */
   position: number;
   readonly pose: Pose;
   /** The arms on the table, set to the pose. */
@@ -28,7 +35,7 @@ export interface FrameState {
   seenX: number;
   seenY: number;
   /** The camera has lost the puck. */
-  lost: boolean;
+  isPuckLost: boolean;
 }
 
 /** A renderer of table, puck and arms. */
@@ -36,13 +43,14 @@ export interface View {
   readonly canvas: HTMLCanvasElement;
   /** Size in CSS pixels; `ratio`: device pixels per CSS pixel. */
   resize(width: number, height: number, ratio: number): void;
+  /** Sets the colours. */
   paint(palette: Palette): void;
   /** Draws and returns the number of draw calls. */
   draw(frame: FrameState): number;
 }
 
 /** Positions of the start and end of the drawn lines. */
-export function trail(frame: FrameState): [number, number] {
-  if (frame.layers.whole) return [-Infinity, Infinity];
+export function trailRange(frame: FrameState): [number, number] {
+  if (frame.layers.wholePart) return [-Infinity, Infinity];
   return [frame.position - TRAIL_S / frame.part.motion.stepS, frame.position];
 }

@@ -1,24 +1,26 @@
+// The animation loop of a page.
+
 /** One animation frame callback for all viewers: clocks tick first, then viewers draw. */
 export class FrameLoop {
   private ticks: ((nowMs: number) => void)[] = [];
   private draws: ((nowMs: number) => void)[] = [];
-  private asked = false;
+  private isRequested = false;
 
   /** Schedules `tick` before drawing in the next frame. */
   request(tick: (nowMs: number) => void): void {
     this.ticks.push(tick);
-    this.ask();
+    this.requestFrame();
   }
 
   /** Schedules `draw` in the next frame, or in the current one if called by a tick. */
   draw(draw: (nowMs: number) => void): void {
     this.draws.push(draw);
-    this.ask();
+    this.requestFrame();
   }
 
-  private ask(): void {
-    if (this.asked) return;
-    this.asked = true;
+  private requestFrame(): void {
+    if (this.isRequested) return;
+    this.isRequested = true;
     requestAnimationFrame(this.run);
   }
 
@@ -28,9 +30,9 @@ export class FrameLoop {
     for (const tick of ticks) tick(nowMs);
     const draws = this.draws;
     this.draws = [];
-    this.asked = false;
+    this.isRequested = false;
     for (const draw of draws) draw(nowMs);
     // Ticks and draws may have scheduled more.
-    if (this.ticks.length > 0 || this.draws.length > 0) this.ask();
+    if (this.ticks.length > 0 || this.draws.length > 0) this.requestFrame();
   };
 }

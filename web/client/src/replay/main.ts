@@ -1,3 +1,5 @@
+// Entry point: starts a viewer in each section with a replay on the page.
+
 import { MODEL } from "../model/model";
 import { Clock } from "./clock";
 import { FrameLoop } from "./loop";
@@ -5,19 +7,19 @@ import { Source } from "./source";
 import { Viewer } from "./viewer";
 
 const loop = new FrameLoop();
-const together = new Map<string, Clock>();
-const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+const clocksByGroup = new Map<string, Clock>();
+const prefersReducedMotion = matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 /** Replays of the same group share a clock. */
-function clockOf(name: string | undefined): Clock {
-  const known = name === undefined ? undefined : together.get(name);
+function clockOf(group: string | undefined): Clock {
+  const known = group === undefined ? undefined : clocksByGroup.get(group);
   const clock = known ?? new Clock(MODEL.step_s, loop);
-  if (name !== undefined) together.set(name, clock);
+  if (group !== undefined) clocksByGroup.set(group, clock);
   return clock;
 }
 
 for (const section of document.querySelectorAll<HTMLElement>("section[data-motion], section[data-chunks]")) {
-  const { motion, observed, chunks, observedChunks, samples, title, together: name } = section.dataset;
+  const { motion, observed, chunks, observedChunks, samples, title, syncGroup } = section.dataset;
   const count = chunks === undefined ? null : Number(samples ?? 1);
   const source = new Source(
     {
@@ -32,9 +34,9 @@ for (const section of document.querySelectorAll<HTMLElement>("section[data-motio
     title: title ?? "the replay",
     source,
     steps: count === null ? null : count - 1,
-    clock: clockOf(name),
+    clock: clockOf(syncGroup),
     loop,
-    still,
+    prefersReducedMotion: prefersReducedMotion,
   });
   void viewer.open();
 }

@@ -1,3 +1,5 @@
+// Colours of the pictures, from the style sheet.
+
 /** Colours of the pictures: custom properties of the style sheet, which defines the light and dark scheme. */
 const NAMES = [
   "ground", "card", "ink", "soft", "line", "accent", "good", "fair", "poor",

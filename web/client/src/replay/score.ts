@@ -1,4 +1,6 @@
-import type { Break } from "../clip/motion";
+// The score of a game at any position.
+
+import type { RallyEnd } from "../clip/motion";
 import { CHUNK_STEPS } from "./source";
 
 type GameScore = readonly [number, number];
@@ -8,9 +10,10 @@ type GameScore = readonly [number, number];
  * start score needs all chunks before it.
  */
 export class Score {
-  private readonly chunks = new Map<number, { breaks: readonly Break[]; start: GameScore | null }>();
+  private readonly chunks = new Map<number, { breaks: readonly RallyEnd[]; start: GameScore | null }>();
 
-  learn(chunk: number, breaks: readonly Break[], start: GameScore | null): void {
+  /** Adds a loaded chunk with its ends of rallies and the score at its start, if recorded. */
+  addChunk(chunk: number, breaks: readonly RallyEnd[], start: GameScore | null): void {
     this.chunks.set(chunk, { breaks, start });
   }
 

@@ -1,3 +1,5 @@
+// Loading of clips. A replay is shown in parts: an episode has one part; a game has a part for each chunk of 500 control steps.
+
 import { ClipError } from "../clip/error";
 import { decodeMotion, type Motion } from "../clip/motion";
 import { decodeObserved, type Observed } from "../clip/observed";
@@ -19,7 +21,8 @@ export interface Addresses {
 }
 
 /** An episode, or a chunk of a game, ready to be drawn. */
-export interface Part {
+export interface ReplayPart {
+  /** Number of the chunk; 0 for an episode. */
   readonly index: number;
   readonly motion: Motion;
   readonly observed: Observed | null;
@@ -31,45 +34,45 @@ export interface Part {
 
 /** Fetches the parts of a replay on demand and caches a few. */
 export class Source {
-  private readonly parts = new Map<number, Part>();
-  private readonly pending = new Map<number, Promise<Part>>();
+  private readonly parts = new Map<number, ReplayPart>();
+  private readonly pending = new Map<number, Promise<ReplayPart>>();
 
   constructor(
     private readonly addresses: Addresses,
-    private readonly get: typeof fetch,
+    private readonly fetchFile: typeof fetch,
   ) {}
 
-  private get chunks(): number {
+  private get chunkCount(): number {
     const { samples } = this.addresses;
     return samples === null ? 1 : Math.max(Math.ceil((samples - 1) / CHUNK_STEPS), 1);
   }
 
   indexOf(position: number): number {
     if (this.addresses.samples === null) return 0;
-    return Math.min(Math.max(Math.floor(position / CHUNK_STEPS), 0), this.chunks - 1);
+    return Math.min(Math.max(Math.floor(position / CHUNK_STEPS), 0), this.chunkCount - 1);
   }
 
   /** The position at which a part starts; null if there is no such part. */
   startOf(index: number): number | null {
-    return index >= 0 && index < this.chunks ? index * CHUNK_STEPS : null;
+    return index >= 0 && index < this.chunkCount ? index * CHUNK_STEPS : null;
   }
 
   /** The part at a position if it is loaded. */
-  loaded(position: number): Part | null {
+  loadedPartAt(position: number): ReplayPart | null {
     return this.parts.get(this.indexOf(position)) ?? null;
   }
 
-  async at(position: number): Promise<Part> {
-    return this.part(this.indexOf(position));
+  async partAt(position: number): Promise<ReplayPart> {
+    return this.loadOnce(this.indexOf(position));
   }
 
   /** Starts to fetch the part after this position. A failure is reported when the part is needed. */
   prefetch(position: number): void {
     const next = this.indexOf(position) + 1;
-    if (next < this.chunks) this.part(next).catch(() => undefined);
+    if (next < this.chunkCount) this.loadOnce(next).catch(() => undefined);
   }
 
-  private async part(index: number): Promise<Part> {
+  private async loadOnce(index: number): Promise<ReplayPart> {
     const cached = this.parts.get(index);
     if (cached !== undefined) {
       // Most recently used last.
@@ -85,22 +88,24 @@ export class Source {
     return pending;
   }
 
-  private async load(index: number): Promise<Part> {
+  private async load(index: number): Promise<ReplayPart> {
     const address = (pattern: string): string => pattern.replace("{chunk}", String(index));
     const [motion, observed] = await Promise.all([
-      this.bytes(address(this.addresses.motion)).then(decodeMotion),
-      this.observed(this.addresses.observed === null ? null : address(this.addresses.observed)),
+      this.fetchBytes(address(this.addresses.motion)).then(decodeMotion),
+      this.fetchObserved(this.addresses.observed === null ? null : address(this.addresses.observed)),
     ]);
     const interpolation = new Interpolation(motion);
     const seen = observed.observed;
-    const fits = seen === null || (seen.first === motion.first && seen.samples === motion.samples);
+    const hasSameSamples = seen === null || (seen.first === motion.first && seen.samples === motion.samples);
     const part = {
       index,
       motion,
-      observed: fits ? seen : null,
-      observationError: fits ? observed.observationError : "its samples differ from those of the motion",
+      observed: hasSameSamples ? seen : null,
+      observationError: hasSameSamples
+        ? observed.observationError
+        : "its samples differ from those of the motion",
       interpolation,
-      paths: pathsOf(motion, interpolation, fits ? seen : null),
+      paths: pathsOf(motion, interpolation, hasSameSamples ? seen : null),
     };
     this.parts.set(index, part);
     for (const oldest of this.parts.keys()) {
@@ -111,21 +116,21 @@ export class Source {
   }
 
   /** A failure is not fatal: the motion is shown without observations. */
-  private async observed(
+  private async fetchObserved(
     address: string | null,
   ): Promise<{ observed: Observed | null; observationError: string | null }> {
     if (address === null) return { observed: null, observationError: null };
     try {
-      return { observed: decodeObserved(await this.bytes(address)), observationError: null };
+      return { observed: decodeObserved(await this.fetchBytes(address)), observationError: null };
     } catch (error) {
       return { observed: null, observationError: errorText(error) };
     }
   }
 
-  private async bytes(address: string): Promise<Uint8Array> {
+  private async fetchBytes(address: string): Promise<Uint8Array> {
     let response: Response;
     try {
-      response = await this.get(address, { headers: { Accept: "application/octet-stream" } });
+      response = await this.fetchFile(address, { headers: { Accept: "application/octet-stream" } });
     } catch {
       throw new ClipError("the server could not be reached");
     }

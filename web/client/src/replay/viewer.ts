@@ -1,3 +1,5 @@
+// The viewer: one replay on a page with all its controls.
+
 import { Cameras } from "../controls/cameras";
 import { DataTable, fileName, saveFile } from "../controls/data";
 import { button, h, setText } from "../controls/dom";
@@ -11,7 +13,7 @@ import { Transport } from "../controls/transport";
 import { fixed } from "../controls/format";
 import { Kinematics } from "../model/kinematics";
 import { newPose } from "../motion/pose";
-import { Strips } from "../strips/strips";
+import { StripCharts } from "../strips/strips";
 import type { Clock } from "./clock";
 import { endText, eventsOf, type ReplayEvent } from "./events";
 import { parseFragment, writeFragment, type Camera } from "./fragment";
@@ -19,13 +21,14 @@ import type { FrameLoop } from "./loop";
 import { paletteOf } from "./palette";
 import { Score } from "./score";
 import type { Layers, FrameState } from "./frame-state";
-import { errorText, type Part, type Source } from "./source";
-import { Stage } from "./stage";
+import { errorText, type ReplayPart, type Source } from "./source";
+import { Picture } from "./picture";
 
 /** Update interval of the data table during playback. */
 const TABLE_UPDATE_MS = 200;
 
-export interface Setting {
+/** What a viewer needs from its page. */
+export interface ViewerOptions {
   readonly section: HTMLElement;
   readonly title: string;
   readonly source: Source;
@@ -34,60 +37,66 @@ export interface Setting {
   readonly clock: Clock;
   readonly loop: FrameLoop;
   /** The visitor prefers reduced motion: no camera animations. */
-  readonly still: boolean;
+  readonly prefersReducedMotion: boolean;
 }
 
 /** One replay on a page: the picture, its controls, and data synchronised with it. */
 export class Viewer {
   private readonly element = h("div", { class: "viewer" });
-  private readonly live = h("p", { class: "sr", attributes: { role: "status" } });
-  private readonly facts = h("p", { class: "now" });
-  private readonly trouble = h("div", { class: "trouble", attributes: { role: "alert", hidden: "" } });
-  private readonly layers: Layers = { seen: true, real: true, commanded: true, puck: true, whole: false };
+  private readonly statusLine = h("p", { class: "sr", attributes: { role: "status" } });
+  private readonly currentValues = h("p", { class: "current-values" });
+  private readonly problem = h("div", { class: "problem", attributes: { role: "alert", hidden: "" } });
+  private readonly layers: Layers = {
+    seen: true,
+    mallet: true,
+    commanded: true,
+    puck: true,
+    wholePart: false,
+  };
   private readonly events = new Map<number, readonly ReplayEvent[]>();
   private readonly score = new Score();
-  private readonly stage: Stage;
+  private readonly picture: Picture;
   private readonly transport: Transport;
   private readonly timeline: Timeline;
   private readonly cameras: Cameras;
-  private readonly choice: LayerChoice;
-  private readonly strips: Strips;
-  private readonly list: EventList;
-  private readonly data: DataTable;
+  private readonly layerChoice: LayerChoice;
+  private readonly strips: StripCharts;
+  private readonly eventList: EventList;
+  private readonly dataTable: DataTable;
   private frame: FrameState | null = null;
-  private last = 0;
-  private drawing = false;
-  private loading: number | null = null;
+  private lastStep = 0;
+  private isDrawRequested = false;
+  private loadingIndex: number | null = null;
   private wasPlaying = false;
   private tableUpdatedMs = 0;
   private step = -1;
 
-  constructor(private readonly setting: Setting) {
-    const { clock, title, section } = setting;
-    this.stage = new Stage(title, setting.still, this.invalidate, () => {
+  constructor(private readonly options: ViewerOptions) {
+    const { clock, title, section } = options;
+    this.picture = new Picture(title, options.prefersReducedMotion, this.invalidate, () => {
       this.viewSwitched();
     });
-    const go = (event: ReplayEvent): void => {
+    const seekToEvent = (event: ReplayEvent): void => {
       clock.pause();
       clock.seek(event.position);
     };
     this.transport = new Transport(clock, { event: this.toEvent });
-    this.timeline = new Timeline(clock, go, title);
+    this.timeline = new Timeline(clock, seekToEvent, title);
     this.cameras = new Cameras({
       preset: this.toCamera,
-      orbit: (right, up) => this.stage.solid?.orbit.turn(right, up),
-      closer: (steps) => this.stage.solid?.orbit.closer(steps),
+      orbit: (right, up) => this.picture.view3d?.orbit.turn(right, up),
+      zoom: (steps) => this.picture.view3d?.orbit.zoom(steps),
       flat: (flat) => {
-        this.stage.setFlat(flat);
+        this.picture.setFlat(flat);
       },
     });
-    this.choice = new LayerChoice(this.layers, this.invalidate);
-    this.strips = new Strips((sample) => {
+    this.layerChoice = new LayerChoice(this.layers, this.invalidate);
+    this.strips = new StripCharts((sample) => {
       clock.pause();
       clock.seek(sample);
     });
-    this.list = new EventList(go);
-    this.data = new DataTable(title);
+    this.eventList = new EventList(seekToEvent);
+    this.dataTable = new DataTable(title);
     const help = helpDialog();
     const share = shareRow(this.element, {
       link: () => location.href.replace(/#.*$/, "") + this.fragment(),
@@ -100,23 +109,23 @@ export class Viewer {
       h(
         "div",
         { class: "screen" },
-        this.stage.element,
+        this.picture.element,
         this.timeline.element,
         this.transport.element,
         this.cameras.element,
       ),
-      this.trouble,
-      this.live,
+      this.problem,
+      this.statusLine,
       help,
     );
     if (!embedded) {
       this.element.append(
-        this.facts,
-        this.choice.element,
+        this.currentValues,
+        this.layerChoice.element,
         share,
         this.strips.element,
-        this.list.element,
-        this.data.element,
+        this.eventList.element,
+        this.dataTable.element,
       );
     }
     listenForKeys(this.element, {
@@ -124,76 +133,76 @@ export class Viewer {
       step: (by) => { clock.step(by); },
       event: this.toEvent,
       camera: this.toCamera,
-      flat: () => { this.stage.setFlat(!this.stage.flat); },
+      flat: () => { this.picture.setFlat(!this.picture.isFlat); },
       help: () => { help.showModal(); },
     }); // prettier-ignore
-    clock.listen(this.invalidate);
-    clock.gate((position) => this.ready(position));
+    clock.addListener(this.invalidate);
+    clock.addGate((position) => this.ensureLoaded(position));
   }
 
   /** Loads the first part and replaces the still picture. */
   async open(): Promise<void> {
-    const { section, clock, source, steps } = this.setting;
+    const { section, clock, source, steps } = this.options;
     section.dataset.state = "loading";
     section.classList.add("replay");
     const waiting = h("p", { class: "waiting", attributes: { role: "status" } }, "Loading the replay …");
     this.insertBelowStill(waiting);
     const target = parseFragment(location.hash);
     try {
-      const part = await source.at(target.step ?? 0);
+      const part = await source.partAt(target.step ?? 0);
       waiting.remove();
-      this.last = steps ?? part.motion.samples - 1;
+      this.lastStep = steps ?? part.motion.samples - 1;
       this.mount();
-      clock.cover(this.last);
+      clock.extendTo(this.lastStep);
       this.addPart(part);
       this.show(part);
-      this.follow();
+      this.applyFragment();
     } catch (error) {
       waiting.remove();
       section.dataset.state = "failed";
-      const again = h("div", { class: "trouble", attributes: { role: "alert" } });
-      again.append(
+      const failure = h("div", { class: "problem", attributes: { role: "alert" } });
+      failure.append(
         h("p", {}, `The replay could not be loaded: ${errorText(error)}.`),
         button("Try again", () => {
-          again.remove();
+          failure.remove();
           void this.open();
         }),
       );
-      this.insertBelowStill(again);
+      this.insertBelowStill(failure);
     }
   }
 
   /** Inserts an element below the still picture. */
   private insertBelowStill(element: HTMLElement): void {
-    const still = this.setting.section.querySelector(".still");
-    if (still === null) this.setting.section.prepend(element);
+    const still = this.options.section.querySelector(".still");
+    if (still === null) this.options.section.prepend(element);
     else still.after(element);
   }
 
   private mount(): void {
-    const { section } = this.setting;
+    const { section } = this.options;
     const still = section.querySelector(".still");
     if (still === null) section.prepend(this.element);
     else still.replaceWith(this.element);
-    section.dataset.view = this.stage.flat ? "flat" : "3d";
-    this.stage.paint(paletteOf(section));
+    section.dataset.view = this.picture.isFlat ? "flat" : "3d";
+    this.picture.paint(paletteOf(section));
     this.strips.paint(paletteOf(section));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.stage.paint(paletteOf(section));
+      this.picture.paint(paletteOf(section));
       this.strips.paint(paletteOf(section));
       this.invalidate();
     });
     addEventListener("hashchange", () => {
-      this.follow();
+      this.applyFragment();
     });
   }
 
-  /** Applies the fragment of the address. */
-  private follow(): void {
-    const { clock } = this.setting;
+  /** Goes to the moment and view in the fragment of the address. */
+  private applyFragment(): void {
+    const { clock } = this.options;
     const target = parseFragment(location.hash);
-    if (target.camera !== undefined) this.stage.setCamera(target.camera);
-    if (target.flat !== undefined) this.stage.setFlat(target.flat);
+    if (target.camera !== undefined) this.picture.setCamera(target.camera);
+    if (target.flat !== undefined) this.picture.setFlat(target.flat);
     if (target.speed !== undefined) clock.setSpeed(target.speed);
     if (target.step !== undefined) {
       clock.pause();
@@ -203,28 +212,28 @@ export class Viewer {
   }
 
   private fragment(): string {
-    const { clock } = this.setting;
-    const step = Math.min(Math.floor(clock.position + 1e-6), this.last);
+    const { clock } = this.options;
+    const step = Math.min(Math.floor(clock.position + 1e-6), this.lastStep);
     return writeFragment({
       step,
       camera: this.camera() ?? "corner",
-      flat: this.stage.flat,
+      flat: this.picture.isFlat,
       speed: clock.speed,
     });
   }
 
   private camera(): Camera | null {
-    return this.stage.solid?.orbit.camera ?? null;
+    return this.picture.view3d?.orbit.camera ?? null;
   }
 
   private readonly toCamera = (camera: Camera): void => {
-    if (this.stage.unavailable !== null) return;
-    this.stage.setFlat(false);
-    this.stage.setCamera(camera);
+    if (this.picture.unavailable !== null) return;
+    this.picture.setFlat(false);
+    this.picture.setCamera(camera);
   };
 
   private readonly toEvent = (direction: 1 | -1): void => {
-    const { clock } = this.setting;
+    const { clock } = this.options;
     clock.pause();
     const from = clock.position;
     this.findEvent(from, direction).then(
@@ -246,11 +255,11 @@ export class Viewer {
 
   /** The nearest event in a direction; searches further parts of a game if necessary. */
   private async findEvent(from: number, direction: 1 | -1): Promise<ReplayEvent | null> {
-    const { source } = this.setting;
-    for (let index = source.indexOf(Math.min(from, this.last)); ; index += direction) {
+    const { source } = this.options;
+    for (let index = source.indexOf(Math.min(from, this.lastStep)); ; index += direction) {
       const start = source.startOf(index);
       if (start === null) return null;
-      if (!this.events.has(index)) this.addPart(await source.at(start));
+      if (!this.events.has(index)) this.addPart(await source.partAt(start));
       const events = this.events.get(index) ?? [];
       const found =
         direction === 1
@@ -266,21 +275,21 @@ export class Viewer {
   }
 
   /** Adds the events and scores of a loaded part. */
-  private addPart(part: Part): void {
+  private addPart(part: ReplayPart): void {
     if (this.events.has(part.index)) return;
     this.events.set(part.index, eventsOf(part.motion, part.observed));
-    this.score.learn(part.index, part.motion.breaks, part.motion.score);
+    this.score.addChunk(part.index, part.motion.breaks, part.motion.score);
     const events = this.allEvents();
     const { stepS } = part.motion;
-    const note = this.setting.steps === null ? "" : ", loaded parts only";
-    this.timeline.update(Math.max(this.step, 0), this.last, stepS);
+    const note = this.options.steps === null ? "" : ", loaded parts only";
+    this.timeline.update(Math.max(this.step, 0), this.lastStep, stepS);
     this.timeline.show(events, stepS);
-    this.list.show(events, stepS, note);
+    this.eventList.show(events, stepS, note);
   }
 
   /** Shows a part. */
-  private show(part: Part): void {
-    const { section } = this.setting;
+  private show(part: ReplayPart): void {
+    const { section } = this.options;
     this.frame ??= {
       part,
       position: 0,
@@ -289,151 +298,151 @@ export class Viewer {
       layers: this.layers,
       seenX: NaN,
       seenY: NaN,
-      lost: false,
+      isPuckLost: false,
     };
     this.frame.part = part;
     this.strips.show(part);
-    this.data.show(part);
-    this.choice.update({
+    this.dataTable.show(part);
+    this.layerChoice.update({
       seen: part.observed !== null && part.observed.seenX !== null,
       commanded: part.paths.commanded !== null,
     });
     section.dataset.state = "ready";
     if (part.observationError !== null) {
-      this.trouble.classList.add("minor");
-      this.trouble.replaceChildren(
+      this.problem.classList.add("minor");
+      this.problem.replaceChildren(
         h("p", {}, `Observations of the agent are not shown: ${part.observationError}.`),
       );
-      this.trouble.hidden = false;
+      this.problem.hidden = false;
     } else {
-      this.trouble.hidden = true;
+      this.problem.hidden = true;
     }
     this.invalidate();
   }
 
-  /** Can a position be shown? If not, starts to fetch its part. */
-  private ready(position: number): boolean {
-    const { source, section } = this.setting;
-    const at = Math.min(position, this.last);
-    if (this.frame === null || source.loaded(at) !== null) return true;
-    const index = source.indexOf(at);
-    if (this.loading === index) return false;
-    this.loading = index;
+  /** Is the part at a position loaded? If not, starts to fetch it. */
+  private ensureLoaded(position: number): boolean {
+    const { source, section } = this.options;
+    const clamped = Math.min(position, this.lastStep);
+    if (this.frame === null || source.loadedPartAt(clamped) !== null) return true;
+    const index = source.indexOf(clamped);
+    if (this.loadingIndex === index) return false;
+    this.loadingIndex = index;
     section.dataset.state = "loading";
-    this.stage.setTexts({ state: "Loading …", outcome: "", good: false, score: "" });
-    source.at(at).then(
+    this.picture.setTexts({ state: "Loading …", outcome: "", good: false, score: "" });
+    source.partAt(clamped).then(
       (part) => {
         this.addPart(part);
-        if (this.loading !== index) return;
-        this.loading = null;
+        if (this.loadingIndex !== index) return;
+        this.loadingIndex = null;
         this.invalidate();
       },
       (error: unknown) => {
-        if (this.loading !== index) return;
-        this.setting.clock.pause();
+        if (this.loadingIndex !== index) return;
+        this.options.clock.pause();
         section.dataset.state = "failed";
-        this.stage.setTexts({ state: "Not loaded", outcome: "", good: false, score: "" });
-        this.trouble.classList.remove("minor");
-        this.trouble.replaceChildren(
+        this.picture.setTexts({ state: "Not loaded", outcome: "", good: false, score: "" });
+        this.problem.classList.remove("minor");
+        this.problem.replaceChildren(
           h("p", {}, `This part of the replay could not be loaded: ${errorText(error)}.`),
           button("Try again", () => {
-            this.loading = null;
-            this.trouble.hidden = true;
+            this.loadingIndex = null;
+            this.problem.hidden = true;
             this.invalidate();
           }),
         );
-        this.trouble.hidden = false;
+        this.problem.hidden = false;
       },
     );
     return false;
   }
 
   private readonly invalidate = (): void => {
-    if (this.drawing) return;
-    this.drawing = true;
-    this.setting.loop.draw(this.draw);
+    if (this.isDrawRequested) return;
+    this.isDrawRequested = true;
+    this.options.loop.draw(this.draw);
   };
 
   private readonly draw = (nowMs: number): void => {
-    this.drawing = false;
-    const { clock, source } = this.setting;
+    this.isDrawRequested = false;
+    const { clock, source } = this.options;
     const { frame } = this;
     if (frame === null) return;
-    const position = Math.min(clock.position, this.last);
+    const position = Math.min(clock.position, this.lastStep);
     const step = Math.floor(position + 1e-6);
     const { stepS } = frame.part.motion;
-    this.transport.update(step, this.last, stepS);
-    this.timeline.update(step, this.last, stepS);
+    this.transport.update(step, this.lastStep, stepS);
+    this.timeline.update(step, this.lastStep, stepS);
     this.announcePlayback(step);
-    if (!this.ready(position)) return;
-    this.recover();
-    const part = source.loaded(position);
+    if (!this.ensureLoaded(position)) return;
+    this.clearProblem();
+    const part = source.loadedPartAt(position);
     if (part !== null && part !== frame.part) {
       this.show(part);
       this.addPart(part);
     }
     if (clock.playing) {
       source.prefetch(position);
-      if (!this.stage.flat) this.stage.solid?.adaptQuality(nowMs);
+      if (!this.picture.isFlat) this.picture.view3d?.adaptQuality(nowMs);
     }
 
-    this.pose(frame, position, step);
-    const orbit = this.stage.solid?.orbit;
-    const moving = !this.stage.flat && orbit?.tick(nowMs) === true;
-    const calls = this.stage.draw(frame);
-    this.figures(frame, step, nowMs);
-    this.cameras.update(this.stage.flat, this.camera(), this.stage.unavailable === null);
-    const { section } = this.setting;
-    mark(section, "step", String(step));
-    mark(section, "drawCalls", String(calls));
+    this.updatePose(frame, position, step);
+    const orbit = this.picture.view3d?.orbit;
+    const moving = !this.picture.isFlat && orbit?.tick(nowMs) === true;
+    const calls = this.picture.draw(frame);
+    this.updateValues(frame, step, nowMs);
+    this.cameras.update(this.picture.isFlat, this.camera(), this.picture.unavailable === null);
+    const { section } = this.options;
+    setData(section, "step", String(step));
+    setData(section, "drawCalls", String(calls));
     section.dataset.state = "ready";
     if (moving) this.invalidate();
   };
 
   /** Clears an error after the visitor has moved to another part; the failed part is retried when needed again. */
-  private recover(): void {
-    if (this.trouble.hidden || this.trouble.classList.contains("minor")) return;
-    this.trouble.hidden = true;
-    this.loading = null;
+  private clearProblem(): void {
+    if (this.problem.hidden || this.problem.classList.contains("minor")) return;
+    this.problem.hidden = true;
+    this.loadingIndex = null;
   }
 
-  private pose(frame: FrameState, position: number, step: number): void {
+  private updatePose(frame: FrameState, position: number, step: number): void {
     const { interpolation, motion, observed } = frame.part;
     frame.position = position;
-    interpolation.at(position, frame.pose);
+    interpolation.poseAt(position, frame.pose);
     for (let i = 0; i < motion.arms.length; i++)
       frame.arms[i].set(frame.pose.arms[i].q, frame.pose.arms[i].universal);
     // An observation holds until the next one.
     const k = step - motion.first;
     frame.seenX = observed?.seenX?.[k] ?? NaN;
     frame.seenY = observed?.seenY?.[k] ?? NaN;
-    frame.lost = observed?.lost.some(({ from, to }) => from <= step && step <= to) === true;
+    frame.isPuckLost = observed?.lost.some(({ from, to }) => from <= step && step <= to) === true;
   }
 
-  private figures(frame: FrameState, step: number, nowMs: number): void {
+  private updateValues(frame: FrameState, step: number, nowMs: number): void {
     const { motion } = frame.part;
     const { x, y } = frame.pose;
     this.strips.update(frame.position);
-    this.list.update(frame.position);
-    if (!this.setting.clock.playing || nowMs - this.tableUpdatedMs > TABLE_UPDATE_MS) {
+    this.eventList.update(frame.position);
+    if (!this.options.clock.playing || nowMs - this.tableUpdatedMs > TABLE_UPDATE_MS) {
       this.tableUpdatedMs = nowMs;
-      this.data.update(step);
+      this.dataTable.update(step);
     }
     // Update the numbers only once per step during playback.
-    if (step === this.step && this.setting.clock.playing) return;
+    if (step === this.step && this.options.clock.playing) return;
     const k = step - motion.first;
     const speed = Math.hypot(motion.puck.vx?.[k] ?? NaN, motion.puck.vy?.[k] ?? NaN);
-    const seen = frame.lost ? ", not seen by the camera" : "";
+    const seen = frame.isPuckLost ? ", not seen by the camera" : "";
     setText(
-      this.facts,
+      this.currentValues,
       `Puck at x ${fixed(x, 3)} m, y ${fixed(y, 3)} m, ${Number.isNaN(speed) ? "" : `${fixed(speed, 2)} m/s`}${seen}`,
     );
-    const over = motion.end !== null && step >= motion.end.steps;
+    const hasEnded = motion.end !== null && step >= motion.end.steps;
     const score = motion.contest === "game" ? this.score.at(frame.position) : null;
     const symbol = motion.end?.success === true ? "✓ " : motion.end?.success === false ? "✕ " : "";
-    this.stage.setTexts({
-      state: this.last === 0 ? "No steps" : frame.lost ? "○ Puck not seen by the camera" : "",
-      outcome: over ? symbol + endText(motion) : "",
+    this.picture.setTexts({
+      state: this.lastStep === 0 ? "No steps" : frame.isPuckLost ? "○ Puck not seen by the camera" : "",
+      outcome: hasEnded ? symbol + endText(motion) : "",
       good: motion.end?.success === true,
       score: score === null ? "" : `A ${score[0]} : ${score[1]} B`,
     });
@@ -442,37 +451,38 @@ export class Viewer {
 
   /** Announces start and end of playback to screen readers; never changes of each frame. */
   private announcePlayback(step: number): void {
-    const { clock } = this.setting;
+    const { clock } = this.options;
     if (clock.playing === this.wasPlaying) return;
     this.wasPlaying = clock.playing;
     const motion = this.frame?.part.motion;
     if (clock.playing) this.announce("Playing");
-    else if (step >= this.last && motion !== undefined) this.announce(endText(motion) || "End");
+    else if (step >= this.lastStep && motion !== undefined) this.announce(endText(motion) || "End");
     else this.announce(`Paused at step ${step}`);
   }
 
   private viewSwitched(): void {
-    const { section } = this.setting;
+    const { section } = this.options;
     // Also called during the construction of the stage.
-    const stage = this.stage as Stage | undefined;
+    const stage = this.picture as Picture | undefined;
     if (stage === undefined) return;
-    section.dataset.view = stage.flat ? "flat" : "3d";
-    if (this.frame !== null) this.announce(stage.unavailable ?? (stage.flat ? "Flat view" : "3-D view"));
+    section.dataset.view = stage.isFlat ? "flat" : "3d";
+    if (this.frame !== null) this.announce(stage.unavailable ?? (stage.isFlat ? "Flat view" : "3-D view"));
     this.invalidate();
   }
 
   private announce(text: string): void {
-    this.live.textContent = text;
+    this.statusLine.textContent = text;
   }
 
   private async save(): Promise<void> {
     if (this.frame === null) return;
-    const picture = await this.stage.picture(this.frame);
+    const picture = await this.picture.toPng(this.frame);
     if (picture === null) this.announce("The picture could not be saved");
-    else saveFile(picture, `${fileName(this.setting.title, this.frame.part)}-step-${this.step}.png`);
+    else saveFile(picture, `${fileName(this.options.title, this.frame.part)}-step-${this.step}.png`);
   }
 }
 
-function mark(section: HTMLElement, name: string, value: string): void {
+/** Sets a data attribute, which tests read, if it differs. */
+function setData(section: HTMLElement, name: string, value: string): void {
   if (section.dataset[name] !== value) section.dataset[name] = value;
 }

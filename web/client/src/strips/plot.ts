@@ -1,9 +1,11 @@
+// Drawing of a strip chart.
+
 import type { Palette } from "../replay/palette";
 import type { Series } from "./series";
 
 const DASHES = [4, 3];
 const SOLID: number[] = [];
-const PAD = 4;
+const PADDING_PX = 4;
 
 /** Range of values to draw, including the limit. */
 export function rangeOf(series: Series): [number, number] {
@@ -30,7 +32,8 @@ export function plot(
   palette: Palette,
 ): void {
   const [low, high] = rangeOf(series);
-  const y = (value: number): number => PAD + ((high - value) / (high - low)) * (height - 2 * PAD);
+  const y = (value: number): number =>
+    PADDING_PX + ((high - value) / (high - low)) * (height - 2 * PADDING_PX);
   const x = (k: number): number => (samples < 2 ? 0 : (k / (samples - 1)) * width);
   context.clearRect(0, 0, width, height);
 

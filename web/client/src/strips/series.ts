@@ -1,4 +1,6 @@
-import type { Group, Violation } from "../clip/motion";
+// The values that strip charts show: distances from limits, joint speeds and computation times.
+
+import type { ConstraintGroup, Violation } from "../clip/motion";
 import { fixed } from "../controls/format";
 import { Kinematics } from "../model/kinematics";
 import {
@@ -9,10 +11,11 @@ import {
   tableMargin,
   velocityShare,
 } from "../model/margins";
-import { JOINTS, MODEL } from "../model/model";
+import { JOINT_COUNT, MODEL } from "../model/model";
 import type { ColourName } from "../replay/palette";
-import type { Part } from "../replay/source";
+import type { ReplayPart } from "../replay/source";
 
+/** A line of a chart: a value per sample. */
 export interface Line {
   readonly values: Float64Array;
   readonly colour: ColourName;
@@ -34,11 +37,11 @@ export interface Series {
 }
 
 /** Charts of one arm; charts without data are omitted. */
-export function seriesOf(part: Part, side: 0 | 1): Series[] {
+export function seriesOf(part: ReplayPart, side: 0 | 1): Series[] {
   const { motion, observed } = part;
   const arm = motion.arms[side];
   const margins = marginsOf(part, side);
-  const violations = (group: Group): Violation[] =>
+  const violations = (group: ConstraintGroup): Violation[] =>
     motion.violations.filter((violation) => violation.side === side && violation.group === group);
 
   const margin = (
@@ -46,7 +49,7 @@ export function seriesOf(part: Part, side: 0 | 1): Series[] {
     values: Float64Array,
     unit: string,
     digits: number,
-    group: Group,
+    group: ConstraintGroup,
   ): Series => ({
     title,
     unit,
@@ -66,41 +69,47 @@ export function seriesOf(part: Part, side: 0 | 1): Series[] {
   ];
   if (arm.dq !== null) {
     all.push(margin("Joint velocities: smallest margin", margins.velocity, "rad/s", 2, "joint_vel"));
-    all.push(shares(arm.dq, violations("joint_vel")));
+    all.push(jointSpeedShares(arm.dq, violations("joint_vel")));
   }
   if (observed !== null && observed.side === side && observed.computationTimeS !== null) {
-    all.push(computation(observed.computationTimeS, observed.hostTimeS, observed.late));
+    all.push(computationTime(observed.computationTimeS, observed.hostTimeS, observed.late));
   }
   return all;
 }
 
 function marginsOf(
-  part: Part,
+  part: ReplayPart,
   side: 0 | 1,
 ): Record<"position" | "velocity" | "height" | "table" | "link", Float64Array> {
   const { motion } = part;
   const { q, dq } = motion.arms[side];
-  const row = (): Float64Array => new Float64Array(motion.samples).fill(NaN);
-  const found = { position: row(), velocity: row(), height: row(), table: row(), link: row() };
+  const emptyRow = (): Float64Array => new Float64Array(motion.samples).fill(NaN);
+  const margins = {
+    position: emptyRow(),
+    velocity: emptyRow(),
+    height: emptyRow(),
+    table: emptyRow(),
+    link: emptyRow(),
+  };
   const arm = new Kinematics(side);
-  const at = new Float64Array(JOINTS);
-  const speed = new Float64Array(JOINTS);
+  const angles = new Float64Array(JOINT_COUNT);
+  const velocities = new Float64Array(JOINT_COUNT);
   for (let k = 0; k < motion.samples; k++) {
-    for (let i = 0; i < JOINTS; i++) {
-      at[i] = q[i][k];
-      speed[i] = dq === null ? NaN : dq[i][k];
+    for (let i = 0; i < JOINT_COUNT; i++) {
+      angles[i] = q[i][k];
+      velocities[i] = dq === null ? NaN : dq[i][k];
     }
-    arm.set(at);
-    found.position[k] = jointPositionMargin(at);
-    found.velocity[k] = jointVelocityMargin(speed);
-    found.height[k] = 1000 * heightMargin(arm);
-    found.table[k] = 1000 * tableMargin(arm);
-    found.link[k] = 1000 * linkMargin(arm);
+    arm.set(angles);
+    margins.position[k] = jointPositionMargin(angles);
+    margins.velocity[k] = jointVelocityMargin(velocities);
+    margins.height[k] = 1000 * heightMargin(arm);
+    margins.table[k] = 1000 * tableMargin(arm);
+    margins.link[k] = 1000 * linkMargin(arm);
   }
-  return found;
+  return margins;
 }
 
-function shares(dq: readonly Float64Array[], violations: readonly Violation[]): Series {
+function jointSpeedShares(dq: readonly Float64Array[], violations: readonly Violation[]): Series {
   const lines = dq.map((values, joint) => ({
     values: values.map((velocity) => 100 * velocityShare(joint, velocity)),
     colour: `rp-${joint + 1}` as ColourName,
@@ -123,7 +132,7 @@ function shares(dq: readonly Float64Array[], violations: readonly Violation[]): 
   };
 }
 
-function computation(times: Float64Array, host: Float64Array | null, late: readonly number[]): Series {
+function computationTime(times: Float64Array, host: Float64Array | null, late: readonly number[]): Series {
   const values = times.map((time) => 1000 * time);
   return {
     title: "Computation time",
@@ -135,8 +144,8 @@ function computation(times: Float64Array, host: Float64Array | null, late: reado
     digits: 1,
     valueText: (k) => {
       if (Number.isNaN(values[k])) return "–";
-      const hosts = host === null || !(host[k] > 0) ? "" : `, host ${fixed(1000 * host[k], 1)} ms`;
-      return `${fixed(values[k], 1)} ms${hosts}`;
+      const hostText = host === null || !(host[k] > 0) ? "" : `, host ${fixed(1000 * host[k], 1)} ms`;
+      return `${fixed(values[k], 1)} ms${hostText}`;
     },
   };
 }

@@ -1,3 +1,5 @@
+// A strip chart: a value over the samples of a part, with a cursor at the current sample.
+
 import { h, setText } from "../controls/dom";
 import { fixed } from "../controls/format";
 import type { Palette } from "../replay/palette";
@@ -5,7 +7,7 @@ import { plot, rangeOf } from "./plot";
 import type { Series } from "./series";
 
 /** A small chart with the value at the cursor. */
-export class Strip {
+export class StripChart {
   readonly element: HTMLElement;
   private readonly canvas = h("canvas", { attributes: { role: "img" } });
   private readonly cursor = h("span", { class: "cursor" });

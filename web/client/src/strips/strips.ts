@@ -1,20 +1,22 @@
+// All strip charts below the picture.
+
 import { h } from "../controls/dom";
 import { fixed } from "../controls/format";
 import { sideName } from "../replay/events";
 import type { Palette } from "../replay/palette";
-import type { Part } from "../replay/source";
+import type { ReplayPart } from "../replay/source";
 import { seriesOf } from "./series";
-import { Strip } from "./strip";
+import { StripChart } from "./strip";
 
 /** Charts below the picture for the current part; in a game for one side at a time. */
-export class Strips {
+export class StripCharts {
   readonly element: HTMLElement;
   private readonly body = h("div");
   private readonly span = h("span", { class: "note" });
   private readonly choice = h("select");
   private readonly choiceRow = h("label", {}, "Arm ", this.choice);
-  private strips: Strip[] = [];
-  private part: Part | null = null;
+  private strips: StripChart[] = [];
+  private part: ReplayPart | null = null;
   private palette: Palette | null = null;
   private position = 0;
 
@@ -44,7 +46,7 @@ export class Strips {
     }).observe(this.body);
   }
 
-  show(part: Part): void {
+  show(part: ReplayPart): void {
     if (part === this.part) return;
     this.part = part;
     const chosen = Math.max(this.choice.selectedIndex, 0);
@@ -76,7 +78,7 @@ export class Strips {
     if (part === null) return;
     const { first, samples } = part.motion;
     this.strips = seriesOf(part, this.choice.selectedIndex === 1 ? 1 : 0).map(
-      (series) => new Strip(series, first, samples, this.seek),
+      (series) => new StripChart(series, first, samples, this.seek),
     );
     this.body.replaceChildren(...this.strips.map((strip) => strip.element));
     this.redraw();

@@ -1,3 +1,5 @@
+// The arm in the 3-D view.
+
 import { Group, Mesh, MeshStandardMaterial, Vector3 } from "three";
 import type { Frame, Kinematics } from "../model/kinematics";
 import { MODEL } from "../model/model";
@@ -6,10 +8,10 @@ import { ColouredGeometry, type Piece } from "./coloured-geometry";
 import { ball, bar, drum } from "./shapes";
 
 // Dimensions for drawing, m. The simulation does not use them.
-const LINK_RADII = [0.088, 0.083, 0.078, 0.074, 0.066, 0.06, 0.047];
-const JOINT_HALF_LENGTH = 0.07;
-const FLANGE_LENGTH = 0.06;
-const ROD_RADIUS = 0.0125;
+const LINK_RADII_M = [0.088, 0.083, 0.078, 0.074, 0.066, 0.06, 0.047];
+const JOINT_HALF_LENGTH_M = 0.07;
+const FLANGE_LENGTH_M = 0.06;
+const ROD_RADIUS_M = 0.0125;
 
 interface Colours {
   readonly link: ColourName;
@@ -36,7 +38,7 @@ export class ArmModel {
 
   constructor(arm: Kinematics) {
     const colours = COLOURS[arm.side];
-    this.links = LINK_RADII.map((_, i) => this.mesh(linkPieces(i, colours)));
+    this.links = LINK_RADII_M.map((_, i) => this.mesh(linkPieces(i, colours)));
     this.mallet = this.mesh(malletPieces(colours));
     const base = this.mesh([
       [bar(new Vector3(0, 0, 0), new Vector3(0, 0, 0.03), 0.13, 0.13, 40), colours.joint],
@@ -70,22 +72,22 @@ export class ArmModel {
 }
 
 function linkPieces(i: number, colours: Colours): Piece[] {
-  const radius = LINK_RADII[i];
+  const radius = LINK_RADII_M[i];
   const origin = new Vector3();
-  if (i === LINK_RADII.length - 1) {
-    const flange = new Vector3(0, 0, FLANGE_LENGTH);
+  if (i === LINK_RADII_M.length - 1) {
+    const flange = new Vector3(0, 0, FLANGE_LENGTH_M);
     const tip = new Vector3(0, 0, MODEL.end_effector_z_m);
     return [
       [bar(origin, flange, radius, radius), colours.joint],
-      [bar(flange, tip, ROD_RADIUS, ROD_RADIUS, 16), colours.link],
+      [bar(flange, tip, ROD_RADIUS_M, ROD_RADIUS_M, 16), colours.link],
       [ball(0.018).translate(0, 0, MODEL.end_effector_z_m), colours.joint],
     ];
   }
   const next = new Vector3(...MODEL.links[i + 1].position_m);
-  const body: Piece = [bar(origin, next, radius, LINK_RADII[i + 1]), colours.link];
+  const body: Piece = [bar(origin, next, radius, LINK_RADII_M[i + 1]), colours.link];
   // Odd joints turn about the axis of the arm (drawn as a collar), even joints across it (a drum).
   if (i % 2 === 0) return [body, [drum(radius + 0.003, -0.012, 0.012, 0.004), colours.joint]];
-  const half = JOINT_HALF_LENGTH * (radius / LINK_RADII[1]);
+  const half = JOINT_HALF_LENGTH_M * (radius / LINK_RADII_M[1]);
   return [
     body,
     [ball(radius), colours.link],

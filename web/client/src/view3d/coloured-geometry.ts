@@ -1,3 +1,5 @@
+// Geometries whose pieces have colours of the palette.
+
 import { BufferAttribute, Color, type BufferGeometry } from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import type { ColourName, Palette } from "../replay/palette";

@@ -1,6 +1,8 @@
+// The camera of the 3-D view, which moves on a sphere around a point of the table.
+
 import type { Camera } from "../replay/fragment";
 
-/** Camera position: a target, and angles and distance around it. */
+/** Camera position: the point x, y, z that it looks at, and its angles (rad) and distance (m) from there. */
 interface CameraPosition {
   readonly x: number;
   readonly y: number;
@@ -10,21 +12,24 @@ interface CameraPosition {
   readonly distance: number;
 }
 
-const DEG = Math.PI / 180;
+const RAD_PER_DEG = Math.PI / 180;
 
 const PRESETS: Record<Camera, CameraPosition> = {
-  corner: { x: -0.27, y: 0, z: 0.08, azimuth: -58 * DEG, elevation: 30 * DEG, distance: 4.0 },
-  side: { x: -0.3, y: 0, z: 0.2, azimuth: -90 * DEG, elevation: 14 * DEG, distance: 3.6 },
-  robot: { x: -0.16, y: 0, z: 0, azimuth: 180 * DEG, elevation: 62 * DEG, distance: 3.6 },
-  above: { x: -0.34, y: 0, z: 0, azimuth: -90 * DEG, elevation: 89.5 * DEG, distance: 3.6 },
+  corner: { x: -0.27, y: 0, z: 0.08, azimuth: -58 * RAD_PER_DEG, elevation: 30 * RAD_PER_DEG, distance: 4.0 },
+  side: { x: -0.3, y: 0, z: 0.2, azimuth: -90 * RAD_PER_DEG, elevation: 14 * RAD_PER_DEG, distance: 3.6 },
+  robot: { x: -0.16, y: 0, z: 0, azimuth: 180 * RAD_PER_DEG, elevation: 62 * RAD_PER_DEG, distance: 3.6 },
+  above: { x: -0.34, y: 0, z: 0, azimuth: -90 * RAD_PER_DEG, elevation: 89.5 * RAD_PER_DEG, distance: 3.6 },
 };
 
-const SMALL_TURN = 15 * DEG;
+const TURN_STEP_RAD = 15 * RAD_PER_DEG;
+/** Distance after a zoom step, relative to the distance before. */
+const ZOOM_FACTOR = 0.85;
 const RADIANS_PER_PIXEL = 0.006;
-const WIDER = 1.2;
-const TURN_MS = 350;
-const ELEVATION = [2 * DEG, 89.5 * DEG] as const;
-const DISTANCE = [0.6, 9] as const;
+/** With a second arm the camera is farther away. */
+const TWO_ARM_DISTANCE_FACTOR = 1.2;
+const ANIMATION_MS = 350;
+const ELEVATION_RANGE_RAD = [2 * RAD_PER_DEG, 89.5 * RAD_PER_DEG] as const;
+const DISTANCE_RANGE_M = [0.6, 9] as const;
 
 /** The camera with its animated movements. */
 export class Orbit {
@@ -36,14 +41,14 @@ export class Orbit {
   distance = 1;
   /** The selected preset; null after manual turning. */
   camera: Camera | null = "corner";
-  private from: CameraPosition | null = null;
-  private to: CameraPosition = PRESETS.corner;
+  private animationStart: CameraPosition | null = null;
+  private target: CameraPosition = PRESETS.corner;
   private startedMs = 0;
-  private wide = false;
+  private hasTwoArms = false;
 
   /** `still`: the visitor prefers reduced motion. */
   constructor(
-    private readonly still: boolean,
+    private readonly prefersReducedMotion: boolean,
     private readonly changed: () => void,
   ) {
     this.moveTo(PRESETS.corner);
@@ -51,44 +56,44 @@ export class Orbit {
 
   preset(camera: Camera): void {
     this.camera = camera;
-    this.go(this.position(camera));
+    this.animateTo(this.presetPosition(camera));
   }
 
   /** Widens the view for a second arm; moves the camera at once if it is at a preset. */
   widen(): void {
-    if (this.wide) return;
-    this.wide = true;
+    if (this.hasTwoArms) return;
+    this.hasTwoArms = true;
     if (this.camera === null) return;
-    this.from = null;
-    this.to = this.position(this.camera);
-    this.moveTo(this.to);
+    this.animationStart = null;
+    this.target = this.presetPosition(this.camera);
+    this.moveTo(this.target);
   }
 
   turn(right: number, up: number): void {
     this.camera = null;
-    this.go(this.turned(this.to, right * SMALL_TURN, up * SMALL_TURN, 1));
+    this.animateTo(this.turned(this.target, right * TURN_STEP_RAD, up * TURN_STEP_RAD, 1));
   }
 
-  closer(steps: number): void {
+  zoom(steps: number): void {
     this.camera = null;
-    this.go(this.turned(this.to, 0, 0, 0.85 ** steps));
+    this.animateTo(this.turned(this.target, 0, 0, ZOOM_FACTOR ** steps));
   }
 
   /** Turns by pointer movement in pixels, without animation. */
   drag(dx: number, dy: number): void {
     this.camera = null;
-    this.from = null;
-    this.to = this.turned(this, -dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, 1);
-    this.moveTo(this.to);
+    this.animationStart = null;
+    this.target = this.turned(this, -dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, 1);
+    this.moveTo(this.target);
     this.changed();
   }
 
   /** Continues the animation; true until it is finished. */
   tick(nowMs: number): boolean {
-    const { from, to } = this;
+    const { animationStart: from, target: to } = this;
     if (from === null) return false;
     if (this.startedMs === 0) this.startedMs = nowMs;
-    const share = Math.min((nowMs - this.startedMs) / TURN_MS, 1);
+    const share = Math.min((nowMs - this.startedMs) / ANIMATION_MS, 1);
     const s = share * share * (3 - 2 * share);
     this.x = from.x + (to.x - from.x) * s;
     this.y = from.y + (to.y - from.y) * s;
@@ -96,26 +101,26 @@ export class Orbit {
     this.azimuth = from.azimuth + (to.azimuth - from.azimuth) * s;
     this.elevation = from.elevation + (to.elevation - from.elevation) * s;
     this.distance = from.distance + (to.distance - from.distance) * s;
-    if (share === 1) this.from = null;
+    if (share === 1) this.animationStart = null;
     return share < 1;
   }
 
-  private position(camera: Camera): CameraPosition {
+  private presetPosition(camera: Camera): CameraPosition {
     const position = PRESETS[camera];
-    if (!this.wide || camera === "robot") return position;
-    return { ...position, x: 0, distance: position.distance * WIDER };
+    if (!this.hasTwoArms || camera === "robot") return position;
+    return { ...position, x: 0, distance: position.distance * TWO_ARM_DISTANCE_FACTOR };
   }
 
-  private go(position: CameraPosition): void {
+  private animateTo(position: CameraPosition): void {
     // Turn the shorter way.
     const turns = Math.round((this.azimuth - position.azimuth) / (2 * Math.PI));
-    this.to = { ...position, azimuth: position.azimuth + turns * 2 * Math.PI };
-    if (this.still) {
-      this.from = null;
-      this.moveTo(this.to);
+    this.target = { ...position, azimuth: position.azimuth + turns * 2 * Math.PI };
+    if (this.prefersReducedMotion) {
+      this.animationStart = null;
+      this.moveTo(this.target);
     } else {
       const { x, y, z, azimuth, elevation, distance } = this;
-      this.from = { x, y, z, azimuth, elevation, distance };
+      this.animationStart = { x, y, z, azimuth, elevation, distance };
       this.startedMs = 0;
     }
     this.changed();
@@ -132,8 +137,8 @@ export class Orbit {
       y: position.y,
       z: position.z,
       azimuth: position.azimuth + azimuth,
-      elevation: clamp(position.elevation + elevation, ELEVATION),
-      distance: clamp(position.distance * distance, DISTANCE),
+      elevation: clamp(position.elevation + elevation, ELEVATION_RANGE_RAD),
+      distance: clamp(position.distance * distance, DISTANCE_RANGE_M),
     };
   }
 

@@ -1,3 +1,5 @@
+// Mouse and touch input of the 3-D view.
+
 import type { Orbit } from "./orbit";
 
 /** Dragging turns the camera. Touch turns sideways only: a vertical drag scrolls the page; buttons turn up and down. */
@@ -22,7 +24,7 @@ export function followPointer(canvas: HTMLCanvasElement, orbit: Orbit): void {
       // Without Ctrl the wheel scrolls the page.
       if (!event.ctrlKey) return;
       event.preventDefault();
-      orbit.closer(event.deltaY < 0 ? 1 : -1);
+      orbit.zoom(event.deltaY < 0 ? 1 : -1);
     },
     { passive: false },
   );

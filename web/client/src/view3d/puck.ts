@@ -1,3 +1,5 @@
+// The puck in the 3-D view.
+
 import { BoxGeometry, Group, Mesh, MeshBasicMaterial, MeshStandardMaterial, TorusGeometry } from "three";
 import { MODEL } from "../model/model";
 import type { Palette } from "../replay/palette";
@@ -42,7 +44,7 @@ export class PuckModel {
     this.puck.rotation.z = pose.yaw;
     const seen = frame.layers.seen && !Number.isNaN(frame.seenX);
     this.seen.visible = seen;
-    this.lost.visible = seen && frame.lost;
+    this.lost.visible = seen && frame.isPuckLost;
     if (!seen) return;
     // Above the puck, else the outline would be hidden when both positions are equal.
     this.seen.position.set(frame.seenX, frame.seenY, HEIGHT + 0.002);

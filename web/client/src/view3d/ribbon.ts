@@ -1,8 +1,11 @@
-import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, MeshBasicMaterial } from "three";
-import { between, type Path } from "../motion/paths";
+// Paths in the 3-D view.
 
-const WIDTH = 0.006;
-/** A dash with its gap is one segment of the path: a control step of the commanded path. */
+import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, MeshBasicMaterial } from "three";
+import { pointsBetween, type Path } from "../motion/paths";
+
+/** Width of the band. */
+const WIDTH_M = 0.006;
+/** Length of a dash relative to a dash with its gap, which is one segment: a control step of the commanded path. */
 const DASH_SHARE = 0.55;
 
 /** A path as a flat band, because WebGL lines are always one pixel wide. */
@@ -27,24 +30,24 @@ export class Ribbon {
       this.mesh.visible = false;
       return;
     }
-    const [first, last] = between(path, from, to);
+    const [first, last] = pointsBetween(path, from, to);
     this.mesh.visible = last > first;
     this.mesh.geometry.setDrawRange(6 * first, 6 * Math.max(last - first, 0));
   }
 
   private geometry(path: Path): BufferGeometry {
-    const segments = Math.max(path.at.length - 1, 0);
+    const segments = Math.max(path.positions.length - 1, 0);
     const corners = new Float32Array(12 * segments);
     const index = new Uint32Array(6 * segments);
-    const { places } = path;
+    const { points: places } = path;
     for (let i = 0; i < segments; i++) {
-      const share = path.gap[i] === 1 ? 0 : this.dashed ? DASH_SHARE : 1;
+      const share = path.gaps[i] === 1 ? 0 : this.dashed ? DASH_SHARE : 1;
       const [x, y, z] = places.subarray(3 * i, 3 * i + 3);
       const dx = places[3 * i + 3] - x;
       const dy = places[3 * i + 4] - y;
       const dz = places[3 * i + 5] - z;
       const length = Math.hypot(dx, dy) || 1;
-      const half = share === 0 ? 0 : WIDTH / 2;
+      const half = share === 0 ? 0 : WIDTH_M / 2;
       const nx = (-dy / length) * half;
       const ny = (dx / length) * half;
       corners.set([x + nx, y + ny, z, x - nx, y - ny, z], 12 * i);

@@ -1,3 +1,5 @@
+// Basic shapes of the 3-D view. Lengths are in metres.
+
 import {
   BoxGeometry,
   CylinderGeometry,
@@ -28,15 +30,15 @@ export function bar(
 }
 
 /** A cylinder about z with bevelled edges, between two heights. */
-export function drum(radius: number, from: number, to: number, corner: number): BufferGeometry {
+export function drum(radius: number, from: number, to: number, bevel: number): BufferGeometry {
   const profile = [
     [0, from],
-    [radius - corner, from],
-    [radius - 0.3 * corner, from + 0.3 * corner],
-    [radius, from + corner],
-    [radius, to - corner],
-    [radius - 0.3 * corner, to - 0.3 * corner],
-    [radius - corner, to],
+    [radius - bevel, from],
+    [radius - 0.3 * bevel, from + 0.3 * bevel],
+    [radius, from + bevel],
+    [radius, to - bevel],
+    [radius - 0.3 * bevel, to - 0.3 * bevel],
+    [radius - bevel, to],
     [0, to],
   ].map(([x, y]) => new Vector2(x, y));
   // The lathe rotates about y; rotate the axis to z.

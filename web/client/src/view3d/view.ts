@@ -1,3 +1,5 @@
+// The 3-D view: everything with three.js on a WebGL canvas.
+
 import {
   Color,
   DirectionalLight,
@@ -9,7 +11,7 @@ import {
 } from "three";
 import type { Contest } from "../clip/motion";
 import type { Palette } from "../replay/palette";
-import { trail, type FrameState, type View } from "../replay/frame-state";
+import { trailRange, type FrameState, type View } from "../replay/frame-state";
 import { ArmModel } from "./arm";
 import { RenderQuality } from "./quality";
 import { Orbit } from "./orbit";
@@ -18,7 +20,7 @@ import { PuckModel } from "./puck";
 import { Ribbon } from "./ribbon";
 import { TableModel } from "./table";
 
-const FIELD_OF_VIEW = 30;
+const FIELD_OF_VIEW_DEG = 30;
 /** Aspect ratio for which the presets are made; on a narrower picture the camera moves back. */
 const REFERENCE_ASPECT = 1.6;
 
@@ -28,11 +30,11 @@ export class View3D implements View {
   readonly orbit: Orbit;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, REFERENCE_ASPECT, 0.05, 30);
+  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, REFERENCE_ASPECT, 0.05, 30);
   private readonly puck = new PuckModel();
   private readonly puckPath = new Ribbon(false);
-  private readonly real = [new Ribbon(false), new Ribbon(false)];
-  private readonly commanded = new Ribbon(true);
+  private readonly malletPaths = [new Ribbon(false), new Ribbon(false)];
+  private readonly commandedPath = new Ribbon(true);
   private readonly arms: ArmModel[] = [];
   private table: TableModel | null = null;
   private palette: Palette | null = null;
@@ -40,7 +42,7 @@ export class View3D implements View {
   private readonly quality = new RenderQuality();
   private ratio = 1;
 
-  constructor(still: boolean, changed: () => void) {
+  constructor(prefersReducedMotion: boolean, changed: () => void) {
     this.canvas = document.createElement("canvas");
     // Created here, because the library would log an error on browsers without WebGL 2.
     const context = this.canvas.getContext("webgl2", {
@@ -54,7 +56,7 @@ export class View3D implements View {
     this.renderer.shadowMap.type = PCFShadowMap;
     // Draw calls of shadows must be counted, too.
     this.renderer.info.autoReset = false;
-    this.orbit = new Orbit(still, changed);
+    this.orbit = new Orbit(prefersReducedMotion, changed);
     followPointer(this.canvas, this.orbit);
     this.camera.up.set(0, 0, 1);
     this.scene.background = new Color();
@@ -62,8 +64,8 @@ export class View3D implements View {
     this.scene.add(
       this.puck.group,
       this.puckPath.mesh,
-      this.commanded.mesh,
-      ...this.real.map((ribbon) => ribbon.mesh),
+      this.commandedPath.mesh,
+      ...this.malletPaths.map((ribbon) => ribbon.mesh),
     );
   }
 
@@ -84,8 +86,8 @@ export class View3D implements View {
     for (const arm of this.arms) arm.paint(palette);
     this.puck.paint(palette);
     this.puckPath.mesh.material.color.set(palette["rp-trail"]);
-    for (const ribbon of this.real) ribbon.mesh.material.color.set(palette.ink);
-    this.commanded.mesh.material.color.set(palette["rp-commanded"]);
+    for (const ribbon of this.malletPaths) ribbon.mesh.material.color.set(palette.ink);
+    this.commandedPath.mesh.material.color.set(palette["rp-commanded"]);
   }
 
   draw(frame: FrameState): number {
@@ -93,12 +95,16 @@ export class View3D implements View {
     this.addObjects(frame, motion.contest);
     for (let i = 0; i < this.arms.length; i++) this.arms[i].set(frame.arms[i]);
     this.puck.set(frame);
-    const [from, to] = trail(frame);
+    const [from, to] = trailRange(frame);
     this.puckPath.set(frame.layers.puck ? paths.puck : null, from, to);
-    for (let i = 0; i < this.real.length; i++) {
-      this.real[i].set(frame.layers.real && i < paths.real.length ? paths.real[i] : null, from, to);
+    for (let i = 0; i < this.malletPaths.length; i++) {
+      this.malletPaths[i].set(
+        frame.layers.mallet && i < paths.mallets.length ? paths.mallets[i] : null,
+        from,
+        to,
+      );
     }
-    this.commanded.set(frame.layers.commanded ? paths.commanded : null, from, to);
+    this.commandedPath.set(frame.layers.commanded ? paths.commanded : null, from, to);
     this.placeCamera();
     this.renderer.info.reset();
     this.renderer.render(this.scene, this.camera);

@@ -237,7 +237,7 @@ async fn excluded_game_names_the_team_that_left() {
     assert!(texts(&game_page, ".lead")[0].contains(&words));
     let html = page(&cup.site, &path(&cup)).await;
     assert_eq!(
-        links(&html, ".cross a.out").len(),
+        links(&html, ".cross a.excluded").len(),
         4,
         "its two games are struck through in both rows"
     );
@@ -440,7 +440,7 @@ async fn running_game_page_shows_score_and_live_stream() {
         stream(&html),
         Some(format!("/api/v1/games/{}/live", game.id))
     );
-    let puck = Selector::parse("[data-live-place=puck]").unwrap();
+    let puck = Selector::parse("[data-live-piece=puck]").unwrap();
     let puck = html.select(&puck).next().unwrap();
     assert_eq!(
         (puck.attr("cx"), puck.attr("cy")),

@@ -1,8 +1,11 @@
+//! Rendering of Markdown: escaped HTML, links, anchors, tables and sections for the search.
+
 use super::*;
 
-struct OnePage;
+/// Resolves two links: the page of `rules.md` and the picture `robot.svg`.
+struct RulesAndRobot;
 
-impl Site for OnePage {
+impl LinkResolver for RulesAndRobot {
     fn page(&self, file: &str) -> Option<(&str, String)> {
         (file == "rules.md").then(|| ("The rules", "/docs/rules".into()))
     }
@@ -13,7 +16,7 @@ impl Site for OnePage {
 }
 
 fn html(markdown: &str) -> String {
-    render_document(markdown, "/docs/page", "Page", &OnePage).html
+    render_document(markdown, "/docs/page", "Page", &RulesAndRobot).html
 }
 
 #[test]
@@ -75,7 +78,7 @@ fn heading_ids_follow_github_rules() {
         ("Über snake_case", "über-snake_case"),
     ] {
         let markdown = format!("## {heading}\n\n## {heading}\n");
-        let rendered = render_document(&markdown, "/docs/page", "Page", &OnePage);
+        let rendered = render_document(&markdown, "/docs/page", "Page", &RulesAndRobot);
         let ids: Vec<&str> = rendered
             .contents
             .iter()
@@ -107,7 +110,7 @@ fn sections_have_the_text_below_their_headings() {
         "# Page\n\nIntro\nhere.\n\n## One\n\nA **b**c.\n\n- d\n- e\n\n### Two\n\n```\ncode\n```\n\n| x | y |\n|---|---|\n| [rules.md](rules.md) | 2 |\n",
         "/docs/page",
         "Page",
-        &OnePage,
+        &RulesAndRobot,
     );
     let sections: Vec<(&str, &str, &str)> = rendered
         .sections

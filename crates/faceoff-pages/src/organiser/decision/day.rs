@@ -1,4 +1,4 @@
-//! Decisions about an evaluation day.
+//! Decisions about an evaluation day: start today's, make up for a missed one, or void one.
 
 use super::preview::{DecisionPreview, PUBLIC_REASON, day_page, sentence};
 use faceoff_api::requests;
@@ -60,8 +60,10 @@ impl DayDecision {
             }
             Self::Start(id) => {
                 let stage = app.store.stage(id).await?;
-                let load = capacity::build(app, id).await?.days;
-                let next = load.into_iter().rfind(|load| !load.is_under_way);
+                let forecasts = capacity::build(app, id).await?.days;
+                let next = forecasts
+                    .into_iter()
+                    .rfind(|forecast| !forecast.is_under_way);
                 let day = stage.day(app.config.clock.now());
                 Ok(DecisionPreview {
                     title: format!("Start the evaluation day {}", day.date),

@@ -1,4 +1,4 @@
-//! Decisions about an evaluation.
+//! Decisions about an evaluation: void, cancel or repeat it, or grant an extra one.
 
 use super::preview::{DecisionPreview, PUBLIC_REASON, day_page, sentence};
 use faceoff_api::{
@@ -22,6 +22,7 @@ pub(in crate::organiser) enum EvaluationDecision {
     Extra(StageDay, TeamId),
 }
 
+/// Readers of a reason that only the team sees.
 const TEAM_REASON: &str = "visible to the team";
 
 async fn evaluation(app: &AppState, id: EvaluationId) -> Result<EvaluationView, Problem> {
@@ -41,7 +42,8 @@ impl EvaluationDecision {
             "void" => Self::Void(subject.parse().ok()?),
             "cancel" => Self::Cancel(subject.parse().ok()?),
             "rerun" => Self::Rerun(subject.parse().ok()?),
-            "extra-turn" => {
+            // `extra-turn` is the path in older versions.
+            "extra-evaluation" | "extra-turn" => {
                 let (day, team) = subject.rsplit_once('/')?;
                 Self::Extra(day.parse().ok()?, team.parse().ok()?)
             }
@@ -149,7 +151,7 @@ impl EvaluationDecision {
                     confirm,
                 };
                 evaluations::grant_extra_evaluation(app, actor, day, &new).await?;
-                Ok("extra-turn")
+                Ok("extra-evaluation")
             }
         }
     }

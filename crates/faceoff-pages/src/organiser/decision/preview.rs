@@ -1,4 +1,4 @@
-//! The preview of a decision.
+//! The preview of a decision: what it would do, before an organiser confirms it.
 
 use faceoff_service::services::decisions::Preview;
 use faceoff_types::StageDay;
@@ -18,6 +18,7 @@ pub(in crate::organiser) struct DecisionPreview {
     pub(in crate::organiser) return_path: String,
 }
 
+/// Readers of a reason that everyone can see.
 pub(super) const PUBLIC_REASON: &str = "public";
 
 /// Path of the page of an evaluation day.
@@ -25,7 +26,7 @@ pub(super) fn day_page(day: StageDay) -> String {
     format!("/organiser/day?stage={}&day={}", day.stage, day.date)
 }
 
-/// The effects as a sentence.
+/// The effects as a sentence, with a capital letter and a full stop.
 pub(super) fn sentence(effects: &Preview) -> String {
     let mut chars = effects.effect.chars();
     let first: String = chars

@@ -1,4 +1,4 @@
-//! Decisions about the queue.
+//! Decisions about the queue of jobs: pause it or resume it.
 
 use super::preview::{DecisionPreview, PUBLIC_REASON};
 use crate::figures::utc_minute;

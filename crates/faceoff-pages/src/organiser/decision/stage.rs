@@ -1,4 +1,4 @@
-//! Decisions about a stage and its result.
+//! Decisions about a stage and its result: freeze or unfreeze its boards, start its final day, or sign it off.
 
 use super::preview::{DecisionPreview, PUBLIC_REASON, sentence};
 use faceoff_api::requests;

@@ -1,4 +1,4 @@
-//! Decisions about teams and registrations.
+//! Decisions about teams and registrations: disqualify or reinstate a team, approve or refuse a registration.
 
 use super::preview::{DecisionPreview, PUBLIC_REASON, sentence};
 use faceoff_api::requests;
@@ -18,7 +18,8 @@ pub(in crate::organiser) enum TeamDecision {
     Refuse(RegistrationId),
 }
 
-const TEAMS: &str = "/organiser/teams";
+/// Page to return to.
+const TEAMS_PATH: &str = "/organiser/teams";
 
 impl TeamDecision {
     pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
@@ -42,7 +43,7 @@ impl TeamDecision {
                     confirm_name: Some(effects.name),
                     button: "Disqualify the team",
                     is_grave: true,
-                    return_path: TEAMS.to_owned(),
+                    return_path: TEAMS_PATH.to_owned(),
                 })
             }
             Self::Reinstate(id) => {
@@ -54,7 +55,7 @@ impl TeamDecision {
                     confirm_name: None,
                     button: "Reinstate the team",
                     is_grave: false,
-                    return_path: TEAMS.to_owned(),
+                    return_path: TEAMS_PATH.to_owned(),
                 })
             }
             Self::Approve(id) | Self::Refuse(id) => {
@@ -77,7 +78,7 @@ impl TeamDecision {
                     confirm_name: None,
                     button: if approves { "Approve" } else { "Refuse" },
                     is_grave: !approves,
-                    return_path: TEAMS.to_owned(),
+                    return_path: TEAMS_PATH.to_owned(),
                 })
             }
         }

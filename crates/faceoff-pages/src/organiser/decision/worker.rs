@@ -1,4 +1,4 @@
-//! Decisions about remote workers.
+//! Decisions about remote workers, which run jobs on other machines: ban one or readmit it.
 
 use super::preview::DecisionPreview;
 use faceoff_api::requests;

@@ -1,3 +1,5 @@
+//! The budget's own failures: timeout, cancellation, and limits that no archive of a test reaches.
+
 use super::*;
 
 const LIMITS: BundleLimits = BundleLimits {
@@ -10,27 +12,28 @@ const LIMITS: BundleLimits = BundleLimits {
 #[test]
 fn timeout_is_a_platform_fault_and_cancellation_is_none() {
     let start = Instant::now();
-    let passed = Cell::new(Duration::ZERO);
+    let elapsed = Cell::new(Duration::ZERO);
     let cancelled = Cell::new(false);
-    let (now, asked) = (|| start + passed.get(), || cancelled.get());
-    let budget = Budget::new(&LIMITS, &now, &asked);
+    let (now, is_cancelled) = (|| start + elapsed.get(), || cancelled.get());
+    let budget = Budget::new(&LIMITS, &now, &is_cancelled);
     let mut reader = MeteredReader::new(io::repeat(0).take(100), &budget);
-    passed.set(Duration::from_secs(60));
+    elapsed.set(Duration::from_secs(60));
     assert_eq!(reader.read(&mut [0; 10]).unwrap(), 10);
-    passed.set(Duration::from_secs(61));
-    let broken = reader.read(&mut [0; 10]).unwrap_err();
-    // Even if a library replaces the error.
-    let message: Result<(), _> = budget.own_failure_or(Err(BundleError::on_read("x")(broken)));
+    elapsed.set(Duration::from_secs(61));
+    let read_error = reader.read(&mut [0; 10]).unwrap_err();
+    // The budget's failure is reported, even if a library replaces the error.
+    let message: Result<(), _> =
+        budget.prefer_own_failure(Err(BundleError::from_read_error("x")(read_error)));
     assert!(
         matches!(&message, Err(BundleError::Io(error)) if error.kind() == io::ErrorKind::TimedOut),
         "{message:?}"
     );
 
-    passed.set(Duration::ZERO);
-    let budget = Budget::new(&LIMITS, &now, &asked);
+    elapsed.set(Duration::ZERO);
+    let budget = Budget::new(&LIMITS, &now, &is_cancelled);
     budget.count_entry().unwrap();
     cancelled.set(true);
-    let message = budget.own_failure_or(budget.count_entry());
+    let message = budget.prefer_own_failure(budget.count_entry());
     assert!(
         matches!(message, Err(BundleError::Cancelled)),
         "{message:?}"
@@ -41,11 +44,11 @@ fn timeout_is_a_platform_fault_and_cancellation_is_none() {
 fn links_with_short_names_are_counted() {
     let (now, never) = (Instant::now, || false);
     let budget = Budget::new(&LIMITS, &now, &never);
-    let almost = usize::try_from(LINK_BYTES - 2 * LOOKUP_BYTES_PER_NAME).unwrap();
-    budget.count_link_bytes(almost).unwrap();
+    let bytes_before_limit = usize::try_from(MAX_LINK_BYTES - 2 * LOOKUP_BYTES_PER_NAME).unwrap();
+    budget.count_link_bytes(bytes_before_limit).unwrap();
     budget.count_link_bytes(0).unwrap();
     let message = budget
-        .own_failure_or(budget.count_link_bytes(0))
+        .prefer_own_failure(budget.count_link_bytes(0))
         .unwrap_err()
         .to_string();
     assert!(
@@ -60,10 +63,10 @@ fn overhead_is_counted_for_any_reader() {
     let budget = Budget::new(&LIMITS, &now, &never);
     let mut reader = MeteredReader::new(io::repeat(0), &budget);
     let read = io::copy(&mut reader, &mut io::sink()).unwrap_err();
-    let message = budget.own_failure_or(Err::<(), _>(BundleError::on_read("")(read)));
+    let message = budget.prefer_own_failure(Err::<(), _>(BundleError::from_read_error("")(read)));
     let BundleError::Invalid(message) = message.unwrap_err() else {
         panic!("expected a refusal of the archive");
     };
     assert!(message.contains("than its files explain"), "{message}");
-    assert!(budget.read.get() < OVERHEAD_BYTES + (1 << 20));
+    assert!(budget.read_bytes.get() < OVERHEAD_BYTES + (1 << 20));
 }

@@ -1,3 +1,6 @@
+//! The unpacked archive of a container image: its JSON documents, and its layers as packed files. There are two formats: the one of
+//! `docker save`, and the *OCI layout* of the Open Container Initiative.
+
 use super::{
     digest::{Digest, HashingReader},
     messages::invalid,
@@ -20,7 +23,8 @@ use std::{
 pub(super) const DOCKER_LIST: &str = "manifest.json";
 /// Index file of an OCI layout.
 pub(super) const OCI_INDEX: &str = "index.json";
-const OCI_MARK: &str = "oci-layout";
+/// File that marks an OCI layout.
+const OCI_LAYOUT_FILE: &str = "oci-layout";
 /// Largest JSON document, in bytes; the documents of ordinary images have a few kilobytes.
 const DOCUMENT_MAX_BYTES: u64 = 1 << 20;
 /// Maximum number of read documents, because lists can contain lists.
@@ -28,36 +32,37 @@ const MAX_DOCUMENTS: u32 = 64;
 /// As many links as Linux follows on one path.
 const MAX_LINKS: usize = 40;
 
-/// The files of an unpacked archive that may be an image. Its content is known from memory. No link is on the disk, and
-/// only the folders that contain a file.
+/// The files of an unpacked archive that may be an image. Its content is known from memory. The disk has no links, and only those
+/// folders that contain a file.
 pub(in crate::bundle) struct Archive<'a> {
-    into: PathBuf,
+    dir: PathBuf,
     nodes: BTreeMap<String, Node>,
     budget: &'a Budget<'a>,
+    /// Number of documents read so far.
     documents: u32,
     /// Digests of the blobs that have been verified.
     verified: BTreeSet<Digest>,
 }
 
 impl<'a> Archive<'a> {
-    /// The files in the folder `into`. If they are all inside a single top-level folder, that folder is used.
+    /// The files in the folder `dir`. If they are all inside a single top-level folder, that folder is used.
     pub(in crate::bundle) fn new(
-        into: PathBuf,
+        dir: PathBuf,
         nodes: BTreeMap<String, Node>,
         budget: &'a Budget<'a>,
     ) -> Self {
-        let (into, nodes) = match single_top_folder(&nodes) {
+        let (dir, nodes) = match single_top_folder(&nodes) {
             Some(folder) => {
                 let inside = nodes.iter().filter_map(|(path, node)| {
                     let path = path.strip_prefix(&folder)?.strip_prefix('/')?;
                     Some((path.to_owned(), node.clone()))
                 });
-                (into.join(&folder), inside.collect())
+                (dir.join(&folder), inside.collect())
             }
-            None => (into, nodes),
+            None => (dir, nodes),
         };
         Self {
-            into,
+            dir,
             nodes,
             budget,
             documents: 0,
@@ -65,29 +70,29 @@ impl<'a> Archive<'a> {
         }
     }
 
-    /// Does it have the index file of an image?
+    /// Does the archive have the index file of an image?
     pub(in crate::bundle) fn is_image(&self) -> bool {
-        self.has(DOCKER_LIST) || self.is_layout()
+        self.has_file(DOCKER_LIST) || self.is_layout()
     }
 
-    /// Does it have an OCI layout?
+    /// Does the archive have an OCI layout?
     pub(super) fn is_layout(&self) -> bool {
-        self.has(OCI_MARK) && self.has(OCI_INDEX)
+        self.has_file(OCI_LAYOUT_FILE) && self.has_file(OCI_INDEX)
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
+    pub(super) fn has_file(&self, name: &str) -> bool {
         self.nodes.get(name) == Some(&Node::File)
     }
 
     /// The file to which `name` leads. Links inside of the archive are followed in memory: earlier versions of Docker
     /// write a link for a layer that is the same as another.
     pub(super) fn resolve_name(&self, name: &str) -> Result<String, BundleError> {
-        let mut at = name.to_owned();
+        let mut path = name.to_owned();
         for _ in 0..MAX_LINKS {
-            match self.nodes.get(&at) {
-                Some(Node::File) => return Ok(at),
-                Some(Node::Link { target }) => match join(&at, target) {
-                    Some(next) => at = next,
+            match self.nodes.get(&path) {
+                Some(Node::File) => return Ok(path),
+                Some(Node::Link { target }) => match join(&path, target) {
+                    Some(next) => path = next,
                     None => break,
                 },
                 _ => break,
@@ -105,7 +110,7 @@ impl<'a> Archive<'a> {
     }
 
     fn path(&self, name: &str) -> Result<PathBuf, BundleError> {
-        Ok(self.into.join(self.resolve_name(name)?))
+        Ok(self.dir.join(self.resolve_name(name)?))
     }
 
     /// Opens the file `name`. Its bytes are counted, because an image may name the same file many times.
@@ -126,7 +131,7 @@ impl<'a> Archive<'a> {
             return Ok(());
         }
         let mut hashed = HashingReader::new(self.reader(&self.path(name)?)?);
-        io::copy(&mut hashed, &mut io::sink()).map_err(BundleError::on_read(name))?;
+        io::copy(&mut hashed, &mut io::sink()).map_err(BundleError::from_read_error(name))?;
         digest.check(name, hashed.into_hash())?;
         self.verified.insert(digest);
         Ok(())
@@ -158,9 +163,9 @@ impl<'a> Archive<'a> {
         self.open(name)?
             .take(DOCUMENT_MAX_BYTES)
             .read_to_end(&mut bytes)
-            .map_err(BundleError::on_read(name))?;
+            .map_err(BundleError::from_read_error(name))?;
         serde_json::from_slice(&bytes).map_err(|error| {
-            // The message may quote the document.
+            // The message may quote unprintable characters of the document.
             let message = error.to_string();
             invalid(format_args!(
                 "cannot be read: {name}: {}",
@@ -172,14 +177,14 @@ impl<'a> Archive<'a> {
     /// A path that the archive does not use.
     pub(super) fn unused_path(&self) -> PathBuf {
         let mut names = (0_u64..).map(|number| format!("root{number}"));
-        let free = names.find(|name| !self.nodes.contains_key(name));
-        self.into.join(free.unwrap_or_default())
+        let unused = names.find(|name| !self.nodes.contains_key(name));
+        self.dir.join(unused.unwrap_or_default())
     }
 
     /// Removes a file that is no longer needed.
     pub(super) fn remove(&mut self, name: &str) -> Result<(), BundleError> {
         if self.nodes.remove(name) == Some(Node::File) {
-            fs::remove_file(self.into.join(name))?;
+            fs::remove_file(self.dir.join(name))?;
         }
         Ok(())
     }
@@ -187,7 +192,7 @@ impl<'a> Archive<'a> {
     /// Removes all remaining files.
     pub(super) fn clear(self) -> Result<(), BundleError> {
         for top in self.top_level_names() {
-            let path = self.into.join(top);
+            let path = self.dir.join(top);
             match self.nodes.get(top) {
                 Some(Node::Folder {
                     is_created: true, ..
@@ -228,21 +233,21 @@ impl Read for Blob<'_> {
     }
 }
 
-/// The path to which a link at `from` leads; `None` if it is outside of the archive.
-fn join(from: &str, target: &str) -> Option<String> {
+/// The path to which the link at `link_path` leads; `None` if it is outside of the archive.
+fn join(link_path: &str, target: &str) -> Option<String> {
     if target.starts_with('/') {
         return None;
     }
-    let mut at: Vec<&str> = from.split('/').collect();
-    at.pop();
+    let mut parts: Vec<&str> = link_path.split('/').collect();
+    parts.pop();
     for part in target.split('/') {
         match part {
             "" | "." => {}
-            ".." => drop(at.pop()?),
-            part => at.push(part),
+            ".." => drop(parts.pop()?),
+            part => parts.push(part),
         }
     }
-    Some(at.join("/"))
+    Some(parts.join("/"))
 }
 
 #[cfg(test)]

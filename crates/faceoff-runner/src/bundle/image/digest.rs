@@ -1,3 +1,5 @@
+//! SHA-256 digests, by which a container image refers to its documents and layers (*blobs*).
+
 use super::messages::invalid;
 use crate::bundle::error::BundleError;
 use sha2::{Digest as _, Sha256};
@@ -44,6 +46,7 @@ impl Digest {
     }
 }
 
+/// Folder of the blobs in an OCI layout.
 const BLOBS: &str = "blobs/sha256/";
 
 fn is_hash(digits: &str) -> bool {

@@ -1,4 +1,5 @@
-//! Finds the layers of an archive's image in its JSON documents.
+//! Finds the layers of a container image in the JSON documents of its archive. An archive has a list of images, written by Docker, or an
+//! *OCI layout* (the format of the Open Container Initiative), or both.
 
 use super::{
     archive::{Archive, DOCKER_LIST, OCI_INDEX},
@@ -11,7 +12,7 @@ use faceoff_types::escape_unprintable;
 use serde::{Deserialize, de::IgnoredAny};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// As many as the file system of most container engines can stack.
+/// As many layers as the file system of most container engines can stack.
 const MAX_LAYERS: usize = 127;
 /// Maximum number of entries in all lists of one archive.
 const MAX_ENTRIES: usize = 256;
@@ -30,8 +31,9 @@ pub(super) struct ImageParts {
     pub layers: Vec<LayerPart>,
 }
 
+/// One layer of an image.
 pub(super) struct LayerPart {
-    /// Its file in the archive.
+    /// The layer's file in the archive.
     pub name: String,
     /// Digest of its uncompressed content.
     pub diff_id: Digest,
@@ -41,7 +43,7 @@ pub(super) struct LayerPart {
 
 impl LayerPart {
     /// Adds the layer to the message of an error. `number`: position of the layer from below, from 1.
-    pub fn in_layer(&self, error: BundleError, number: usize, count: usize) -> BundleError {
+    pub fn add_layer_to(&self, error: BundleError, number: usize, count: usize) -> BundleError {
         let step = self.step.as_ref();
         let step = step.map_or(String::new(), |step| format!(" ({step})"));
         match error {
@@ -78,6 +80,7 @@ struct OciImage {
     layers: Option<Vec<Descriptor>>,
 }
 
+/// A reference to a document or a layer, by its digest.
 #[derive(Debug, Clone, Deserialize)]
 struct Descriptor {
     digest: String,
@@ -99,7 +102,7 @@ struct Annotations {
 struct Platform {
     architecture: String,
     os: String,
-    /// The CPU variant that it needs.
+    /// The CPU variant that the image needs, e.g. `v3`.
     variant: Option<String>,
 }
 
@@ -123,12 +126,14 @@ struct Step {
     empty_layer: bool,
 }
 
+/// Environment variables of an image.
 #[derive(Debug, Deserialize)]
 struct Variables {
     #[serde(rename = "Env")]
     env: Option<Vec<String>>,
 }
 
+/// Digests of the uncompressed layers, the lowest first.
 #[derive(Debug, Deserialize)]
 struct RootFs {
     diff_ids: Option<Vec<String>>,
@@ -154,7 +159,7 @@ impl Platform {
         (&self.architecture, &self.os) == (&host.architecture, &host.os)
     }
 
-    /// Does it run on every processor of its architecture?
+    /// Does the image run on every processor of its architecture?
     fn is_general(&self) -> bool {
         matches!(self.variant.as_deref(), None | Some("" | "v1" | "v8"))
     }
@@ -172,7 +177,7 @@ impl std::fmt::Display for Platform {
 /// layout, some without the layers. Of an image for several platforms, Docker's list has the one of the machine that
 /// saved it, and the layout has all.
 pub(super) fn read(archive: &mut Archive<'_>) -> Result<ImageParts, BundleError> {
-    let (mut image, mut config) = if archive.has(DOCKER_LIST) {
+    let (mut image, mut config) = if archive.has_file(DOCKER_LIST) {
         let image = read_docker_list(archive)?;
         let config: Config = archive.document(&image.config)?;
         (image, config)
@@ -180,12 +185,12 @@ pub(super) fn read(archive: &mut Archive<'_>) -> Result<ImageParts, BundleError>
         read_oci_layout(archive)?
     };
     if !config.platform.matches_host()
-        && archive.has(DOCKER_LIST)
+        && archive.has_file(DOCKER_LIST)
         && archive.is_layout()
-        && let Ok((other, its_config)) = read_oci_layout(archive)
-        && its_config.platform.matches_host()
+        && let Ok((other, other_config)) = read_oci_layout(archive)
+        && other_config.platform.matches_host()
     {
-        (image, config) = (other, its_config);
+        (image, config) = (other, other_config);
     }
     if image.layers.len() > MAX_LAYERS {
         return Err(invalid(format_args!(
@@ -204,15 +209,20 @@ pub(super) fn read(archive: &mut Archive<'_>) -> Result<ImageParts, BundleError>
             diff_ids.len()
         )));
     }
-    let steps = steps(config.history.unwrap_or_default(), diff_ids.len());
-    let part = |((name, diff_id), made_by): ((String, &String), Option<String>)| {
+    let steps = build_steps(config.history.unwrap_or_default(), diff_ids.len());
+    let layer_part = |((name, diff_id), step): ((String, &String), Option<String>)| {
         Ok(LayerPart {
             name,
             diff_id: Digest::parse(diff_id)?,
-            step: made_by,
+            step,
         })
     };
-    let layers = image.layers.into_iter().zip(&diff_ids).zip(steps).map(part);
+    let layers = image
+        .layers
+        .into_iter()
+        .zip(&diff_ids)
+        .zip(steps)
+        .map(layer_part);
     let variables = config.config.and_then(|config| config.env);
     Ok(ImageParts {
         env: env::read(&variables.unwrap_or_default())?,
@@ -221,7 +231,7 @@ pub(super) fn read(archive: &mut Archive<'_>) -> Result<ImageParts, BundleError>
 }
 
 /// The build step of each layer, if the history has the same number of steps.
-fn steps(history: Vec<Step>, layers: usize) -> Vec<Option<String>> {
+fn build_steps(history: Vec<Step>, layers: usize) -> Vec<Option<String>> {
     let steps: Vec<String> = history
         .into_iter()
         .filter(|step| !step.empty_layer)
@@ -256,7 +266,7 @@ fn read_docker_list(archive: &mut Archive<'_>) -> Result<DockerImage, BundleErro
         .collect();
     match (images.pop_first(), images.len()) {
         (Some(image), 0) => Ok(image),
-        (Some(_), more) => Err(several(more + 1, &tags)),
+        (Some(_), more) => Err(several_images_error(more + 1, &tags)),
         (None, _) => Err(with_image_hint(invalid(
             "is missing: manifest.json names none",
         ))),
@@ -265,10 +275,11 @@ fn read_docker_list(archive: &mut Archive<'_>) -> Result<DockerImage, BundleErro
 
 fn read_oci_layout(archive: &mut Archive<'_>) -> Result<(DockerImage, Config), BundleError> {
     let list: OciList = archive.document(OCI_INDEX).map_err(with_image_hint)?;
-    let image = choose(collect_images(archive, list)?)?;
+    let image = choose_image(collect_images(archive, list)?)?;
     let image: OciImage = archive.document(&Digest::parse(&image.digest)?.blob_path())?;
-    let blob_path =
-        |part: &Descriptor| Digest::parse(&part.digest).map(|digest| digest.blob_path());
+    let blob_path = |layer_part: &Descriptor| {
+        Digest::parse(&layer_part.digest).map(|digest| digest.blob_path())
+    };
     let layers = image.layers.unwrap_or_default();
     let image = DockerImage {
         config: blob_path(&image.config)?,
@@ -285,17 +296,17 @@ fn collect_images(
     list: OciList,
 ) -> Result<Vec<Descriptor>, BundleError> {
     let mut images = Vec::new();
-    let mut seen = BTreeSet::new();
-    let mut todo = list.manifests.unwrap_or_default();
-    let mut entries = todo.len();
-    while let Some(entry) = todo.pop() {
+    let mut visited = BTreeSet::new();
+    let mut pending = list.manifests.unwrap_or_default();
+    let mut entries = pending.len();
+    while let Some(entry) = pending.pop() {
         if entries > MAX_ENTRIES {
             return Err(invalid(format_args!(
                 "is one of more than {MAX_ENTRIES} in the archive's lists: save it alone"
             )));
         }
         let digest = Digest::parse(&entry.digest)?;
-        if entry.annotations.reference_type.is_some() || !seen.insert(digest.clone()) {
+        if entry.annotations.reference_type.is_some() || !visited.insert(digest.clone()) {
             continue;
         }
         if LIST_TYPES.contains(&entry.media_type.as_str()) {
@@ -303,7 +314,7 @@ fn collect_images(
             let inner: OciList = archive.document(&digest.blob_path())?;
             let inner = inner.manifests.unwrap_or_default();
             entries += inner.len();
-            todo.extend(inner);
+            pending.extend(inner);
         } else {
             images.push(entry);
         }
@@ -313,7 +324,7 @@ fn collect_images(
 
 /// Chooses the only image. Of several images: the only one for this host, or the only one that declares this platform,
 /// or the only one of these that needs no particular CPU variant.
-fn choose(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
+fn choose_image(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
     let count = images.len();
     if count > 1 {
         let others: BTreeSet<String> = images
@@ -321,7 +332,8 @@ fn choose(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
             .filter_map(|image| image.platform.as_ref().map(ToString::to_string))
             .collect();
         let is_for_host = |image: &Descriptor| image.platform.as_ref().map(Platform::matches_host);
-        let general = |image: &Descriptor| image.platform.as_ref().is_none_or(Platform::is_general);
+        let is_general =
+            |image: &Descriptor| image.platform.as_ref().is_none_or(Platform::is_general);
         images.retain(|image| is_for_host(image) != Some(false));
         if images.is_empty() {
             let others: Vec<String> = others.into_iter().take(8).collect();
@@ -330,13 +342,13 @@ fn choose(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
         if images.iter().any(|image| is_for_host(image) == Some(true)) {
             images.retain(|image| is_for_host(image) == Some(true));
         }
-        if images.iter().any(general) {
-            images.retain(general);
+        if images.iter().any(is_general) {
+            images.retain(is_general);
         }
     }
     match (images.pop(), images.len()) {
         (Some(image), 0) => Ok(image),
-        (Some(_), more) => Err(several(more + 1, &BTreeSet::new())),
+        (Some(_), more) => Err(several_images_error(more + 1, &BTreeSet::new())),
         (None, _) => Err(with_image_hint(invalid(
             "is missing: index.json names none",
         ))),
@@ -351,7 +363,7 @@ fn wrong_platform(platforms: &str) -> BundleError {
 }
 
 /// An error for an archive with several images. `docker save` with a name but no tag saves all tags.
-fn several(count: usize, tags: &BTreeSet<String>) -> BundleError {
+fn several_images_error(count: usize, tags: &BTreeSet<String>) -> BundleError {
     let shown = |tag: &String| escape_unprintable(tag).chars().take(60).collect::<String>();
     let tags: Vec<String> = tags.iter().take(8).map(shown).collect();
     let tags = match tags.is_empty() {

@@ -1,10 +1,12 @@
+//! The environment variables of a container image (`ENV` in a Dockerfile).
+
 use super::messages::invalid;
 use crate::bundle::error::BundleError;
 use faceoff_types::escape_unprintable;
 use faceoff_wire::Manifest;
 use std::collections::BTreeMap;
 
-/// More than the images of large frameworks have.
+/// Maximum number of variables: more than the images of large frameworks have.
 const MAX_VARIABLES: usize = 128;
 /// Limit for all names and values together. With the variables of `agent.toml` this is far below the system's limit.
 const MAX_BYTES: usize = 64 << 10;
@@ -79,7 +81,7 @@ mod tests {
                 "{wrong:?}"
             );
         }
-        for odd in [
+        for unsupported in [
             "=x",
             "a-b=c",
             "discovery.type=x",
@@ -87,7 +89,11 @@ mod tests {
             "A\u{202e}=x",
             "A\0=x",
         ] {
-            assert_eq!(result_text(&[odd, "A=b"]), r#"{"A": "b"}"#, "{odd:?}");
+            assert_eq!(
+                result_text(&[unsupported, "A=b"]),
+                r#"{"A": "b"}"#,
+                "{unsupported:?}"
+            );
         }
         let long = format!("A={}", "x".repeat(4097));
         assert!(result_text(&[&long]).contains("too long"));

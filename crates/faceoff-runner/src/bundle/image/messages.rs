@@ -1,7 +1,9 @@
+//! Error messages about container images.
+
 use crate::bundle::error::BundleError;
 use faceoff_types::IMAGE_RUNTIME;
 
-/// An error for an archive that looks like an image and contains none that can run.
+/// An error for an archive that looks like an image, but contains no image that can run.
 pub(super) fn invalid(problem: impl std::fmt::Display) -> BundleError {
     BundleError::Invalid(format!("the container image {problem}"))
 }

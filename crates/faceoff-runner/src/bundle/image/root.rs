@@ -1,3 +1,6 @@
+//! The root folder of a container image, to which its *layers* (archives) are applied one over another. A layer hides entries of lower
+//! layers by *whiteouts*: empty files with special names.
+
 use super::messages::{dockerfile_hint, invalid};
 use crate::bundle::{
     budget::Budget,
@@ -29,34 +32,34 @@ const SANDBOX_FILES: [(&str, &str); 5] = [
     ("resolv.conf", ""),
 ];
 /// Folder of the agent in its image.
-const AGENT: &str = "agent";
+const AGENT_FOLDER: &str = "agent";
 /// Name prefix of a whiteout, with which a layer removes an entry of the layers below.
-const WHITEOUT: &str = ".wh.";
+const WHITEOUT_PREFIX: &str = ".wh.";
 /// Whiteout that removes all entries that a folder has from layers below.
-const OPAQUE: &str = ".wh..wh..opq";
-/// Name prefix of metadata of aufs, the origin of whiteouts; container engines skip them, too.
-const WHITEOUT_METADATA: &str = ".wh..wh.";
+const OPAQUE_WHITEOUT: &str = ".wh..wh..opq";
+/// Name prefix of metadata of aufs, the file system from which whiteouts come. Container engines skip these files, too.
+const WHITEOUT_METADATA_PREFIX: &str = ".wh..wh.";
 
 /// The root folder to which layers are applied. Its content is known from memory and never read back from the disk,
 /// which contains only folders and files until all layers are applied. Symbolic links are resolved in memory, inside
 /// of the root, and created last. So no link can reach a file of the host, whatever its target is. A folder is created
-/// when a file is put into it, or at the end. So too many folders are refused before any is created and must be
-/// removed.
+/// when a file is put into it, or at the end. So an image with too many folders is refused before they are created.
 pub(super) struct Root<'a> {
     disk_path: PathBuf,
     budget: &'a Budget<'a>,
-    top: Folder,
+    top_folder: Folder,
     /// The layer that is being applied, from 1.
     layer: u32,
     /// Number of files and links created so far.
     files: u64,
+    /// Number of folders added so far.
     folders: u64,
 }
 
 #[derive(Debug, Default)]
 struct Folder {
     children: BTreeMap<String, Node>,
-    /// It exists on the disk, and so do its parents.
+    /// Does it exist on the disk? Then its parents exist, too.
     is_created: bool,
 }
 
@@ -93,6 +96,7 @@ impl Location {
 }
 
 impl Folder {
+    /// The child folder `name`.
     fn folder(&self, name: &str) -> Option<&Self> {
         match self.children.get(name).map(|node| &node.kind) {
             Some(Kind::Folder(folder)) => Some(folder),
@@ -100,13 +104,14 @@ impl Folder {
         }
     }
 
-    fn at(&self, path: &[String]) -> Option<&Self> {
-        path.iter().try_fold(self, |at, name| at.folder(name))
+    fn descendant(&self, path: &[String]) -> Option<&Self> {
+        path.iter()
+            .try_fold(self, |folder, name| folder.folder(name))
     }
 
-    fn at_mut(&mut self, path: &[String]) -> Option<&mut Self> {
+    fn descendant_mut(&mut self, path: &[String]) -> Option<&mut Self> {
         path.iter()
-            .try_fold(self, |at, name| match at.children.get_mut(name) {
+            .try_fold(self, |folder, name| match folder.children.get_mut(name) {
                 Some(Node {
                     kind: Kind::Folder(folder),
                     ..
@@ -172,7 +177,7 @@ impl<'a> Root<'a> {
         Ok(Self {
             disk_path: disk_path.to_owned(),
             budget,
-            top: Folder {
+            top_folder: Folder {
                 children: BTreeMap::new(),
                 is_created: true,
             },
@@ -194,21 +199,24 @@ impl<'a> Root<'a> {
     /// Resolves a path: links are followed inside of the root, and the parent of the root is the root itself. Missing
     /// components resolve to the location where they would be created.
     fn resolve(&self, entry: &str, path: &str) -> Result<Vec<String>, BundleError> {
-        let mut at: Vec<(String, Option<&Folder>)> = Vec::new();
-        // The remaining parts of the walk, the next one last.
-        let mut todo: Vec<String> = parts(path);
+        // The resolved parts of the path, with their folders if they exist.
+        let mut resolved: Vec<(String, Option<&Folder>)> = Vec::new();
+        // The parts that are still to be resolved, the next one last.
+        let mut pending: Vec<String> = reversed_parts(path);
         let mut links = 0;
-        while let Some(part) = todo.pop() {
+        while let Some(part) = pending.pop() {
             self.budget.count_lookup(part.len())?;
             if part == ".." {
-                at.pop();
+                resolved.pop();
                 continue;
             }
-            let current = at.last().map_or(Some(&self.top), |(_, folder)| *folder);
+            let current = resolved
+                .last()
+                .map_or(Some(&self.top_folder), |(_, folder)| *folder);
             match current.and_then(|current| current.children.get(&part)) {
-                None => at.push((part, None)),
+                None => resolved.push((part, None)),
                 Some(node) => match &node.kind {
-                    Kind::Folder(folder) => at.push((part, Some(folder))),
+                    Kind::Folder(folder) => resolved.push((part, Some(folder))),
                     Kind::File | Kind::Special => {
                         let shown: String = part.chars().take(200).collect();
                         return Err(invalid_entry(
@@ -226,14 +234,14 @@ impl<'a> Root<'a> {
                         }
                         self.budget.count_lookup(target.len())?;
                         if target.starts_with('/') {
-                            at.clear();
+                            resolved.clear();
                         }
-                        todo.extend(parts(target));
+                        pending.extend(reversed_parts(target));
                     }
                 },
             }
         }
-        let path: Vec<String> = at.into_iter().map(|(part, _)| part).collect();
+        let path: Vec<String> = resolved.into_iter().map(|(part, _)| part).collect();
         if path.iter().map(|part| part.len() + 1).sum::<usize>() > PATH_MAX_BYTES {
             return Err(invalid_entry(
                 entry,
@@ -266,7 +274,7 @@ impl<'a> Root<'a> {
         let Some(location) = self.location(entry, entry)? else {
             return Ok(None);
         };
-        if let Some(hidden) = location.name.strip_prefix(WHITEOUT) {
+        if let Some(hidden) = location.name.strip_prefix(WHITEOUT_PREFIX) {
             self.white_out(entry, &location, hidden)?;
             return Ok(None);
         }
@@ -274,15 +282,20 @@ impl<'a> Root<'a> {
     }
 
     /// Removes the nodes of layers below, regardless of the whiteout's position in its own layer.
-    fn white_out(&mut self, entry: &str, at: &Location, hidden: &str) -> Result<(), BundleError> {
-        let (layer, budget, dir) = (self.layer, self.budget, self.path_on_disk(&at.folder));
-        let Some(folder) = self.top.at_mut(&at.folder) else {
+    fn white_out(
+        &mut self,
+        entry: &str,
+        location: &Location,
+        hidden: &str,
+    ) -> Result<(), BundleError> {
+        let (layer, budget, dir) = (self.layer, self.budget, self.path_on_disk(&location.folder));
+        let Some(folder) = self.top_folder.descendant_mut(&location.folder) else {
             return Ok(());
         };
-        if at.name == OPAQUE {
+        if location.name == OPAQUE_WHITEOUT {
             return folder.remove_children_below(&dir, layer, budget);
         }
-        if at.name.starts_with(WHITEOUT_METADATA) {
+        if location.name.starts_with(WHITEOUT_METADATA_PREFIX) {
             return Ok(());
         }
         if matches!(hidden, "" | "." | "..") {
@@ -301,8 +314,8 @@ impl<'a> Root<'a> {
         self.add_folders(&location.folder)?;
         let disk_path = self.path_on_disk(&location.folder).join(&location.name);
         let folder = self
-            .top
-            .at_mut(&location.folder)
+            .top_folder
+            .descendant_mut(&location.folder)
             .ok_or_else(|| invalid_entry(entry, "needs a folder that does not exist"))?;
         match folder.children.remove(&location.name).map(|node| node.kind) {
             Some(Kind::Folder(existing)) if existing.is_created => fs::remove_dir_all(disk_path)?,
@@ -314,7 +327,12 @@ impl<'a> Root<'a> {
 
     /// Adds a node that is not a folder. An existing node is removed, because the later entry of an archive replaces
     /// the earlier one. A file is always created as a new one, because other names of the old file keep its content.
-    fn put(&mut self, entry: &str, at: &Location, kind: Kind) -> Result<PathBuf, BundleError> {
+    fn put(
+        &mut self,
+        entry: &str,
+        location: &Location,
+        kind: Kind,
+    ) -> Result<PathBuf, BundleError> {
         self.files += 1;
         let max = self.budget.limits().files;
         if self.files > max {
@@ -324,21 +342,21 @@ impl<'a> Root<'a> {
         }
         let layer = self.layer;
         let is_written = matches!(kind, Kind::File);
-        let folder = self.clear(entry, at)?;
+        let folder = self.clear(entry, location)?;
         folder
             .children
-            .insert(at.name.clone(), Node { layer, kind });
+            .insert(location.name.clone(), Node { layer, kind });
         if is_written {
-            self.make_parents(&at.folder)?;
+            self.make_parents(&location.folder)?;
         }
-        Ok(self.path_on_disk(&at.folder).join(&at.name))
+        Ok(self.path_on_disk(&location.folder).join(&location.name))
     }
 
     fn add_folders(&mut self, path: &[String]) -> Result<(), BundleError> {
         let max = self.budget.limits().files;
-        let mut at = &mut self.top;
+        let mut folder = &mut self.top_folder;
         for name in path {
-            let node = match at.children.entry(name.clone()) {
+            let node = match folder.children.entry(name.clone()) {
                 Entry::Occupied(existing) => existing.into_mut(),
                 Entry::Vacant(free) => {
                     self.folders += 1;
@@ -353,8 +371,8 @@ impl<'a> Root<'a> {
                     })
                 }
             };
-            at = match &mut node.kind {
-                Kind::Folder(folder) => folder,
+            folder = match &mut node.kind {
+                Kind::Folder(child) => child,
                 Kind::File | Kind::Link(_) | Kind::Special => {
                     return Err(invalid(format_args!("needs {name:?} to be a folder")));
                 }
@@ -365,13 +383,13 @@ impl<'a> Root<'a> {
 
     /// Creates the folders of a path that do not exist on the disk yet.
     fn make_parents(&mut self, path: &[String]) -> Result<(), BundleError> {
-        let (mut at, mut disk_path) = (&mut self.top, self.disk_path.clone());
+        let (mut parent, mut disk_path) = (&mut self.top_folder, self.disk_path.clone());
         for name in path {
             disk_path.push(name);
             let Some(Node {
                 kind: Kind::Folder(folder),
                 ..
-            }) = at.children.get_mut(name)
+            }) = parent.children.get_mut(name)
             else {
                 return Err(invalid(format_args!("needs {name:?} to be a folder")));
             };
@@ -379,7 +397,7 @@ impl<'a> Root<'a> {
                 make_folder(&disk_path)?;
                 folder.is_created = true;
             }
-            at = folder;
+            parent = folder;
         }
         Ok(())
     }
@@ -388,17 +406,22 @@ impl<'a> Root<'a> {
     /// Returns the agent's folder, which is a real folder with a real file `manifest`; neither is a link.
     pub(super) fn finish(mut self, manifest: &str) -> Result<PathBuf, BundleError> {
         self.begin_layer();
-        let agent = match self.top.children.get(AGENT).map(|node| &node.kind) {
+        let agent = match self
+            .top_folder
+            .children
+            .get(AGENT_FOLDER)
+            .map(|node| &node.kind)
+        {
             Some(Kind::Folder(agent)) => agent,
             Some(Kind::File | Kind::Link(_) | Kind::Special) => {
                 return Err(invalid(format_args!(
-                    "has something other than a folder as /{AGENT}; {}",
+                    "has something other than a folder as /{AGENT_FOLDER}; {}",
                     dockerfile_hint()
                 )));
             }
             None => {
                 return Err(invalid(format_args!(
-                    "has no /{AGENT}; {}",
+                    "has no /{AGENT_FOLDER}; {}",
                     dockerfile_hint()
                 )));
             }
@@ -407,18 +430,18 @@ impl<'a> Root<'a> {
             Some(Kind::File) => {}
             Some(Kind::Folder(_) | Kind::Link(_) | Kind::Special) => {
                 return Err(invalid(format_args!(
-                    "has something other than a file as /{AGENT}/{manifest}"
+                    "has something other than a file as /{AGENT_FOLDER}/{manifest}"
                 )));
             }
             None => {
                 return Err(invalid(format_args!(
-                    "has no /{AGENT}/{manifest}; {}",
+                    "has no /{AGENT_FOLDER}/{manifest}; {}",
                     dockerfile_hint()
                 )));
             }
         }
         if let Some(Kind::File | Kind::Link(_) | Kind::Special) =
-            self.top.children.get("etc").map(|node| &node.kind)
+            self.top_folder.children.get("etc").map(|node| &node.kind)
         {
             return Err(invalid("has something other than a folder as /etc"));
         }
@@ -444,9 +467,9 @@ impl<'a> Root<'a> {
             self.clear(name, &location)?;
             self.add_folders(&[name.to_owned()])?;
         }
-        make_folders(&mut self.top, &self.disk_path, self.budget)?;
-        make_links(&self.top, &self.disk_path)?;
-        Ok(self.disk_path.join(AGENT))
+        make_folders(&mut self.top_folder, &self.disk_path, self.budget)?;
+        make_links(&self.top_folder, &self.disk_path)?;
+        Ok(self.disk_path.join(AGENT_FOLDER))
     }
 }
 
@@ -459,7 +482,7 @@ impl Sink for Root<'_> {
         let layer = self.layer;
         let mut path = location.folder.clone();
         path.push(location.name.clone());
-        if let Some(parent) = self.top.at_mut(&location.folder)
+        if let Some(parent) = self.top_folder.descendant_mut(&location.folder)
             && let Some(node) = parent.children.get_mut(&location.name)
             && matches!(node.kind, Kind::Folder(_))
         {
@@ -479,7 +502,7 @@ impl Sink for Root<'_> {
         write_new(entry, &disk_path, mode, content, self.budget)
     }
 
-    /// Created by [`Root::finish`]. It may point anywhere, because it is followed only inside of the sandbox.
+    /// [`Root::finish`] creates the link on the disk. It may point anywhere, because it is followed only inside of the sandbox.
     fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
@@ -505,7 +528,10 @@ impl Sink for Root<'_> {
             )
         };
         let existing = self.location(entry, target)?.ok_or_else(missing_file)?;
-        let folder = self.top.at(&existing.folder).ok_or_else(missing_file)?;
+        let folder = self
+            .top_folder
+            .descendant(&existing.folder)
+            .ok_or_else(missing_file)?;
         let kind = match folder.children.get(&existing.name).map(|node| &node.kind) {
             Some(Kind::File) => Kind::File,
             Some(Kind::Link(target)) => Kind::Link(target.clone()),
@@ -551,8 +577,8 @@ impl Sink for Root<'_> {
     }
 }
 
-/// The parts of a path, last first.
-fn parts(path: &str) -> Vec<String> {
+/// The parts of a path, the last one first.
+fn reversed_parts(path: &str) -> Vec<String> {
     let part = |part: &str| (!matches!(part, "" | ".")).then(|| part.to_owned());
     path.rsplit('/').filter_map(part).collect()
 }

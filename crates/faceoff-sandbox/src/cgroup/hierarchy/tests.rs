@@ -1,3 +1,5 @@
+//! Hosts with cgroup version 1, version 2 and both (*hybrid*), as `/proc/self/mountinfo` and `/proc/self/cgroup` show them.
+
 use super::*;
 
 const HYBRID_MOUNTS: &str = "\
@@ -6,12 +8,13 @@ const HYBRID_MOUNTS: &str = "\
 35 31 0:32 / /sys/fs/cgroup/memory rw,relatime - cgroup cgroup rw,memory
 41 31 0:38 / /sys/fs/cgroup/unified rw,relatime - cgroup2 cgroup2 rw
 ";
-const HYBRID_OWN: &str = "4:memory:/no-such-cgroup\n2:cpu,cpuacct:/\n0::/\n";
+const HYBRID_OWN_CGROUPS: &str = "4:memory:/no-such-cgroup\n2:cpu,cpuacct:/\n0::/\n";
 
 #[test]
 fn controllers_are_found_on_a_hybrid_host() {
-    let find =
-        |controller| Hierarchy::find(controller, HYBRID_MOUNTS, HYBRID_OWN).expect(controller);
+    let find = |controller| {
+        Hierarchy::find(controller, HYBRID_MOUNTS, HYBRID_OWN_CGROUPS).expect(controller)
+    };
     // The kernel's name of the service's cgroup is not visible here, so the mount point is used.
     assert_eq!(
         find("memory"),
@@ -36,8 +39,8 @@ fn controllers_are_found_on_a_hybrid_host() {
 #[test]
 fn unified_host_has_all_controllers_in_one_cgroup() {
     let host = tempfile::tempdir().unwrap();
-    let own = host.path().join("system.slice/faceoff.service");
-    std::fs::create_dir_all(own.join(SERVICE_LEAF)).unwrap();
+    let service_dir = host.path().join("system.slice/faceoff.service");
+    std::fs::create_dir_all(service_dir.join(SERVICE_LEAF)).unwrap();
     let mounts = format!(
         "29 22 0:26 / {} rw - cgroup2 cgroup2 rw,nsdelegate\n",
         host.path().display()
@@ -52,7 +55,7 @@ fn unified_host_has_all_controllers_in_one_cgroup() {
             Hierarchy {
                 version: Version::V2,
                 mount_point: host.path().into(),
-                service_dir: own.clone()
+                service_dir: service_dir.clone()
             }
         );
     }
@@ -91,7 +94,10 @@ fn agents_have_ten_times_the_default_weight() {
         service_dir: host.path().into(),
     };
     let folder = hierarchy.prepare_folder(&["memory"]).unwrap();
-    assert!(!folder.join("cpu.shares").exists(), "another controller's");
+    assert!(
+        !folder.join("cpu.shares").exists(),
+        "only with the controller cpu"
+    );
     assert_eq!(hierarchy.prepare_folder(&["cpu"]).unwrap(), folder);
     let written = std::fs::read_to_string(folder.join("cpu.shares")).unwrap();
     assert_eq!(written, "10240");

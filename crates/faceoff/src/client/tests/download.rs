@@ -8,11 +8,15 @@ use tokio::{
     net::{TcpListener, TcpStream},
 };
 
+/// The bundle limit of the servers, more than enough for [`upload_large`].
+const LARGE_BUNDLE_BYTES: u64 = 32 << 20;
+
 /// Uploads a submission that is larger than the buffers of a connection; returns its team's client.
 async fn upload_large(site: &Site) -> (Client, SubmissionView) {
     let team = site.organiser.create_team("Alpha").await.unwrap();
     let client = site.organiser.with_token(&team.token);
-    let folder = bundle(site);
+    let folder = create_bundle(site);
+    // Pseudorandom bytes, because the bundle is compressed.
     let mut weights = vec![0; 8 << 20];
     blake3::Hasher::new().finalize_xof().fill(&mut weights);
     std::fs::write(folder.join("weights.npz"), weights).unwrap();
@@ -20,7 +24,7 @@ async fn upload_large(site: &Site) -> (Client, SubmissionView) {
     (client, uploaded)
 }
 
-async fn get(
+async fn download(
     client: &Client,
     submission: &SubmissionView,
     file: &Path,
@@ -61,26 +65,32 @@ async fn start_breaking_proxy(site: &Site, limit: u64) -> String {
 
 #[tokio::test]
 async fn interrupted_download_is_resumed() {
-    let site = site(32 << 20).await;
+    let site = start_site(LARGE_BUNDLE_BYTES).await;
     let (client, uploaded) = upload_large(&site).await;
     let file = site.folder.path().join("again.tar.gz");
     let token = client.token.clone();
     let proxy = start_breaking_proxy(&site, 1 << 20).await;
     let proxied = Client::new(&proxy, token.as_deref(), None).unwrap();
-    let error = get(&proxied, &uploaded, &file).await.unwrap_err();
+    let error = download(&proxied, &uploaded, &file).await.unwrap_err();
     let message = format!("{error:#}");
     assert!(
         message.contains("run the same command again to resume it"),
         "{message}"
     );
     assert!(!file.exists());
-    let begun = std::fs::metadata(sibling(&file, ".part")).unwrap().len();
-    assert!(begun > 0 && begun < uploaded.bytes, "{begun}");
+    let partial_bytes = std::fs::metadata(sibling(&file, ".part")).unwrap().len();
+    assert!(
+        partial_bytes > 0 && partial_bytes < uploaded.bytes,
+        "{partial_bytes}"
+    );
 
-    let done = get(&client, &uploaded, &file).await.unwrap();
-    assert_eq!((done.resumed_at, done.bytes), (begun, uploaded.bytes));
+    let resumed = download(&client, &uploaded, &file).await.unwrap();
     assert_eq!(
-        (done.blake3.as_str(), done.checked),
+        (resumed.resumed_at, resumed.bytes),
+        (partial_bytes, uploaded.bytes)
+    );
+    assert_eq!(
+        (resumed.blake3.as_str(), resumed.checked),
         (uploaded.blake3.as_str(), true)
     );
     for suffix in [".part", ".part.etag"] {
@@ -90,14 +100,14 @@ async fn interrupted_download_is_resumed() {
 
 #[tokio::test]
 async fn foreign_partial_file_is_not_resumed() {
-    let site = site(32 << 20).await;
+    let site = start_site(LARGE_BUNDLE_BYTES).await;
     let (client, uploaded) = upload_large(&site).await;
     let file = site.folder.path().join("again.tar.gz");
-    let whole = get(&client, &uploaded, &file).await.unwrap();
+    let whole = download(&client, &uploaded, &file).await.unwrap();
     assert_eq!(whole.resumed_at, 0);
     let bytes = std::fs::read(&file).unwrap();
     let tag = format!("\"blake3-{}\"", uploaded.blake3);
-    let begin = |part: &[u8], tag: Option<&str>| {
+    let write_partial_file = |part: &[u8], tag: Option<&str>| {
         std::fs::write(sibling(&file, ".part"), part).unwrap();
         match tag {
             Some(tag) => std::fs::write(sibling(&file, ".part.etag"), tag).unwrap(),
@@ -105,21 +115,42 @@ async fn foreign_partial_file_is_not_resumed() {
         }
     };
     // Without an ETag, or with that of another file, the download starts at 0.
-    begin(&bytes[..1000], None);
-    assert_eq!(get(&client, &uploaded, &file).await.unwrap().resumed_at, 0);
-    begin(&bytes[..1000], Some("\"blake3-00\""));
-    assert_eq!(get(&client, &uploaded, &file).await.unwrap().resumed_at, 0);
+    write_partial_file(&bytes[..1000], None);
+    assert_eq!(
+        download(&client, &uploaded, &file)
+            .await
+            .unwrap()
+            .resumed_at,
+        0
+    );
+    write_partial_file(&bytes[..1000], Some("\"blake3-00\""));
+    assert_eq!(
+        download(&client, &uploaded, &file)
+            .await
+            .unwrap()
+            .resumed_at,
+        0
+    );
     // The partial file is longer than the file.
-    begin(&[&bytes[..], b"x"].concat(), Some(&tag));
-    assert_eq!(get(&client, &uploaded, &file).await.unwrap().resumed_at, 0);
+    write_partial_file(&[&bytes[..], b"x"].concat(), Some(&tag));
+    assert_eq!(
+        download(&client, &uploaded, &file)
+            .await
+            .unwrap()
+            .resumed_at,
+        0
+    );
     // The partial file is complete and only needs its name.
-    begin(&bytes, Some(&tag));
-    assert_eq!(get(&client, &uploaded, &file).await.unwrap(), whole);
+    write_partial_file(&bytes, Some(&tag));
+    assert_eq!(download(&client, &uploaded, &file).await.unwrap(), whole);
     // Damage is detected, and the partial file is deleted.
-    begin(&[0; 1000], Some(&tag));
-    let message = format!("{:#}", get(&client, &uploaded, &file).await.unwrap_err());
+    write_partial_file(&[0; 1000], Some(&tag));
+    let message = format!(
+        "{:#}",
+        download(&client, &uploaded, &file).await.unwrap_err()
+    );
     assert!(message.contains("it was damaged in transfer"), "{message}");
     assert!(!sibling(&file, ".part").exists() && !sibling(&file, ".part.etag").exists());
-    assert_eq!(get(&client, &uploaded, &file).await.unwrap(), whole);
+    assert_eq!(download(&client, &uploaded, &file).await.unwrap(), whole);
     assert_eq!(std::fs::read(&file).unwrap(), bytes);
 }

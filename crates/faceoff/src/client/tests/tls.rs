@@ -70,7 +70,7 @@ async fn refusal(client: &Client) -> String {
 
 #[tokio::test]
 async fn server_of_a_named_authority_is_trusted() {
-    let site = site(1 << 20).await;
+    let site = start_site(BUNDLE_BYTES).await;
     let authority = authority("ours");
     let address = start_tls_proxy(&site, &authority, "localhost").await;
     let ca_file = write_ca_file(&site, &authority);
@@ -79,7 +79,10 @@ async fn server_of_a_named_authority_is_trusted() {
     client.health().await.unwrap();
     // Request and response bodies pass through TLS.
     let team = client.create_team("Alpha").await.unwrap();
-    let uploaded = client.with_token(&team.token).upload(&bundle(&site)).await;
+    let uploaded = client
+        .with_token(&team.token)
+        .upload(&create_bundle(&site))
+        .await;
     let uploaded = uploaded.unwrap();
     let copy = site.folder.path().join("copy.tar.gz");
     let bar = ProgressBar::hidden();
@@ -91,7 +94,7 @@ async fn server_of_a_named_authority_is_trusted() {
 
 #[tokio::test]
 async fn self_signed_certificate_is_trusted_if_named() {
-    let site = site(64).await;
+    let site = start_site(SMALL_BUNDLE_BYTES).await;
     let key = KeyPair::generate().unwrap();
     let params = CertificateParams::new(["localhost".to_owned()]).unwrap();
     let certificate = params.self_signed(&key).unwrap();
@@ -105,7 +108,7 @@ async fn self_signed_certificate_is_trusted_if_named() {
 
 #[tokio::test]
 async fn untrusted_tls_server_gets_no_token() {
-    let site = site(64).await;
+    let site = start_site(SMALL_BUNDLE_BYTES).await;
     let (trusted, other) = (authority("trusted"), authority("other"));
     let ca_file = write_ca_file(&site, &trusted);
     let unknown = start_tls_proxy(&site, &other, "localhost").await;

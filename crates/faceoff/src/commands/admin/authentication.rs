@@ -1,4 +1,5 @@
-//! The token that the organisers' commands use.
+//! The token that the organisers' commands use. The *host's token* has all rights of an organiser; the server writes it to its
+//! data folder when it first starts.
 
 use crate::{
     client::Client,
@@ -9,30 +10,35 @@ use crate::{
 use anyhow::Context;
 use std::{net::IpAddr, path::Path};
 
-/// A client with the first token of: `--token` or `FACEOFF_ADMIN_TOKEN`; the host's, if `--data-dir` names its data
-/// folder; the login to the server; the host's in the local data folder, if the server runs on this machine. The
-/// host's token is never sent to another machine unless `--data-dir` asks for it.
+/// A client with the first token that exists of:
+///
+/// 1. `token`: that of `--token` or `FACEOFF_ADMIN_TOKEN`,
+/// 2. the host's token in the folder of `--data-dir`,
+/// 3. the token of `faceoff login` to this server,
+/// 4. the host's token in the configured data folder, if the server runs on this machine.
+///
+/// The host's token is sent to another machine only if `--data-dir` names its folder.
 pub(super) fn admin_client(
     server: Option<&str>,
     token: Option<&str>,
     data_dir: Option<&Path>,
     ca_file: Option<&Path>,
 ) -> anyhow::Result<Client> {
-    let option = token.map(|token| (token, "FACEOFF_ADMIN_TOKEN"));
-    let mut found = Connection::resolve(server, option, ca_file)?;
-    let is_given = token.is_some() || (data_dir.is_none() && found.token.is_some());
-    if !is_given {
-        if data_dir.is_none() && !is_local(&found.server) {
+    let explicit_token = token.map(|token| (token, "FACEOFF_ADMIN_TOKEN"));
+    let mut connection = Connection::resolve(server, explicit_token, ca_file)?;
+    let has_token = token.is_some() || (data_dir.is_none() && connection.token.is_some());
+    if !has_token {
+        if data_dir.is_none() && !is_local(&connection.server) {
             return Err(NotSignedIn(format!(
                 "not signed in to {}: sign in with faceoff login, or give the token with --token or \
                 FACEOFF_ADMIN_TOKEN, or name the server's data folder with --data-dir",
-                found.server
+                connection.server
             ))
             .into());
         }
-        found.token = Some(read_host_token(data_dir)?.trim().to_owned());
+        connection.token = Some(read_host_token(data_dir)?.trim().to_owned());
     }
-    found.client()
+    connection.client()
 }
 
 /// The server is on this machine.

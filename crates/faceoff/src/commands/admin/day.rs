@@ -1,4 +1,5 @@
-//! `faceoff admin freeze`, `unfreeze`, `missed-day` and `extra-turn`: interventions in boards and evaluation days.
+//! `faceoff admin freeze`, `unfreeze`, `missed-day` and `extra-turn`: changes of boards and evaluation days, i.e. of all
+//! evaluations of one cutoff. `extra-turn` adds one evaluation.
 
 use super::{lines::evaluation_line, team_lookup::find_team};
 use crate::{

@@ -1,3 +1,5 @@
+//! `faceoff admin export`: downloads the season's archive, one file with all its data, which `faceoff import` reads.
+
 use crate::{client::Client, commands::output::print};
 use faceoff_archive::Edition;
 use serde_json::json;

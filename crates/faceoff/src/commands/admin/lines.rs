@@ -1,3 +1,5 @@
+//! One-line texts for lists of evaluations.
+
 use crate::commands::evaluation_text::status_text;
 use faceoff_api::views::evaluation::EvaluationView;
 

@@ -5,7 +5,7 @@ use crate::{
     client::Client,
     commands::{
         output::{lines_or, print},
-        people::{invitation_line, invitation_lines, new_invitation_text, person_line},
+        people::{invitation_line, invitation_lines, new_invitation_text, user_line},
     },
 };
 use anyhow::bail;
@@ -86,26 +86,23 @@ pub(super) enum RegistrationAction {
     },
 }
 
-async fn find_person(client: &Client, name_or_id: &str) -> anyhow::Result<UserId> {
+async fn find_user(client: &Client, name_or_id: &str) -> anyhow::Result<UserId> {
     if let Ok(id) = name_or_id.parse() {
         return Ok(id);
     }
-    let people = client.users().await?;
-    match people
-        .iter()
-        .find(|person| person.name.as_str() == name_or_id)
-    {
-        Some(person) => Ok(person.id),
+    let users = client.users().await?;
+    match users.iter().find(|user| user.name.as_str() == name_or_id) {
+        Some(user) => Ok(user.id),
         None => bail!("there is no user {name_or_id:?}; see faceoff admin people list"),
     }
 }
 
-async fn invite(client: &Client, json: bool, new: NewInvitation) -> anyhow::Result<()> {
-    let invitation = client.invite(&new).await?;
-    print(json, &invitation, || new_invitation_text(&invitation))
+async fn invite(client: &Client, json: bool, invitation: NewInvitation) -> anyhow::Result<()> {
+    let created = client.invite(&invitation).await?;
+    print(json, &created, || new_invitation_text(&created))
 }
 
-const fn new(role: InvitedRole, note: String) -> NewInvitation {
+const fn new_invitation(role: InvitedRole, note: String) -> NewInvitation {
     NewInvitation {
         role,
         team: None,
@@ -122,9 +119,9 @@ pub(super) async fn people(
 ) -> anyhow::Result<()> {
     match action {
         PeopleAction::List => {
-            let people = client.users().await?;
-            print(json, &people, || {
-                let lines = people.iter().map(person_line).collect();
+            let users = client.users().await?;
+            print(json, &users, || {
+                let lines = users.iter().map(user_line).collect();
                 lines_or(
                     lines,
                     "no users yet; invite the first with faceoff admin people invite-organiser NOTE",
@@ -132,22 +129,22 @@ pub(super) async fn people(
             })
         }
         PeopleAction::InviteOrganiser { note } => {
-            invite(client, json, new(InvitedRole::Organiser, note)).await
+            invite(client, json, new_invitation(InvitedRole::Organiser, note)).await
         }
         PeopleAction::InviteMember { team, note } => {
             let invitation = NewInvitation {
                 team: Some(find_team(client, &team).await?),
-                ..new(InvitedRole::Member, note)
+                ..new_invitation(InvitedRole::Member, note)
             };
             invite(client, json, invitation).await
         }
         PeopleAction::InviteTeam { note } => {
-            invite(client, json, new(InvitedRole::Founder, note)).await
+            invite(client, json, new_invitation(InvitedRole::Founder, note)).await
         }
         PeopleAction::InviteBack { person } => {
             let invitation = NewInvitation {
-                person: Some(find_person(client, &person).await?),
-                ..new(InvitedRole::Return, person)
+                person: Some(find_user(client, &person).await?),
+                ..new_invitation(InvitedRole::Return, person)
             };
             invite(client, json, invitation).await
         }
@@ -160,9 +157,9 @@ pub(super) async fn people(
             print(json, &revoked, || invitation_line(&revoked))
         }
         PeopleAction::Remove { person, confirm } => {
-            let id = find_person(client, &person).await?;
+            let id = find_user(client, &person).await?;
             let removed = client.remove_user(id, confirm).await?;
-            print(json, &removed, || person_line(&removed))
+            print(json, &removed, || user_line(&removed))
         }
     }
 }

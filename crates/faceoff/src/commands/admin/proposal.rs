@@ -1,4 +1,5 @@
-//! `faceoff admin proposal`: trials and proposed re-evaluations.
+//! `faceoff admin proposal`: trials, which evaluate submissions without effect on the boards, and proposed re-evaluations, whose
+//! results replace the old ones once an organiser applies the proposal.
 
 use crate::{
     client::Client,
@@ -76,7 +77,7 @@ pub(super) enum ProposalAction {
 }
 
 pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> anyhow::Result<()> {
-    let shown = match action {
+    let proposal_view = match action {
         ProposalAction::List => {
             let all = client.proposals().await?;
             return print(json, &all, || {
@@ -129,7 +130,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
             client.drop_proposal(proposal, confirm).await?
         }
     };
-    print(json, &shown, || proposal_text(&shown))
+    print(json, &proposal_view, || proposal_text(&proposal_view))
 }
 
 fn proposal_line(proposal: &ProposalView) -> String {

@@ -1,4 +1,5 @@
 //! `faceoff admin evaluation`, `submission`, `ablation`, `order-ablation` and `download-dataset`: results of any team.
+//! An *ablation* evaluates a submission under each perturbation alone, to show what each one costs it.
 
 use crate::{
     client::Client,

@@ -1,4 +1,4 @@
-//! `faceoff admin stage`: creates, changes and lists the season's stages.
+//! `faceoff admin stage`: creates, changes and lists the season's *stages*, periods with their own rules, cutoffs and board.
 
 use crate::{
     client::Client,
@@ -111,13 +111,13 @@ pub(super) struct StageOptions {
     #[arg(long, value_name = "FILE")]
     perturbations: Option<PathBuf>,
     /// Limits of agents instead of the server's, e.g. '{"memory_bytes":4294967296,"step_s":0.5}'; {} resets them
-    #[arg(long, value_name = "JSON", value_parser = json::<StageLimits>)]
+    #[arg(long, value_name = "JSON", value_parser = parse_json::<StageLimits>)]
     limits: Option<StageLimits>,
     /// Allowed runtimes, e.g. native,python3; `all`: all that the server offers
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     runtimes: Option<Vec<String>>,
     /// Upload limits of each team instead of the server's, e.g. '{"waiting":2,"day_bytes":1073741824}'
-    #[arg(long, value_name = "JSON", value_parser = json::<StageUploadLimits>)]
+    #[arg(long, value_name = "JSON", value_parser = parse_json::<StageUploadLimits>)]
     uploads: Option<StageUploadLimits>,
     /// Daily cutoff at this time
     #[arg(long, value_name = "HH:MM", conflicts_with = "cron")]
@@ -145,7 +145,7 @@ pub(super) struct StageOptions {
     publishes: Option<Publication>,
     /// Retention of datasets and bundles, e.g. '{"last":5,"days_after_sign_off":90}' or
     /// '{"until":"2027-06-01T00:00:00Z"}'; {} keeps all files
-    #[arg(long, value_name = "JSON", value_parser = json::<Retention>)]
+    #[arg(long, value_name = "JSON", value_parser = parse_json::<Retention>)]
     retention: Option<Retention>,
     /// The result that counts for a team: latest, best, mean_of_last:N, or final
     #[arg(long, value_name = "RESULT")]
@@ -197,18 +197,19 @@ impl StageOptions {
     }
 }
 
-fn json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+/// Parses an option in JSON; an error names the wrong field.
+fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     let mut json = serde_json::Deserializer::from_str(text);
     serde_path_to_error::deserialize(&mut json).map_err(|error| error.to_string())
 }
 
 /// Parses a time with an offset or a zone; without them, it is local time in `zone`.
-fn parse_instant(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
-    if let Ok(at) = text.parse::<Timestamp>() {
-        return Ok(at);
+fn parse_time(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
+    if let Ok(time) = text.parse::<Timestamp>() {
+        return Ok(time);
     }
-    if let Ok(at) = text.parse::<Zoned>() {
-        return Ok(at.timestamp());
+    if let Ok(time) = text.parse::<Zoned>() {
+        return Ok(time.timestamp());
     }
     let local: DateTime = text.parse().ok().with_context(|| {
         format!(
@@ -216,8 +217,8 @@ fn parse_instant(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
             2026-12-01T06:00+01:00"
         )
     })?;
-    let at = local.to_zoned(zone.time_zone());
-    Ok(at
+    let time = local.to_zoned(zone.time_zone());
+    Ok(time
         .with_context(|| format!("the time {text:?}"))?
         .timestamp())
 }
@@ -244,16 +245,16 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 Some(zone) => zone.clone(),
                 None => default_zone(client).await?,
             };
-            let at = |text: &Option<String>| {
-                let at = text.as_deref().map(|text| parse_instant(text, &zone));
-                at.transpose()
+            let parse_optional = |text: &Option<String>| {
+                let time = text.as_deref().map(|text| parse_time(text, &zone));
+                time.transpose()
             };
             let new = NewStage {
                 name,
                 perturbations: options.perturbations()?,
                 runtimes: options.runtimes(),
-                opens_at: at(&options.opens)?,
-                closes_at: at(&options.closes)?,
+                opens_at: parse_optional(&options.opens)?,
+                closes_at: parse_optional(&options.closes)?,
                 schedule: options.schedule()?,
                 zone: options.zone,
                 profile: options.profile,
@@ -272,8 +273,8 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 standings: options.standings,
                 retention: options.retention,
             };
-            let made = client.create_stage(&new).await?;
-            print(json, &made, || stage_text(&made))
+            let created = client.create_stage(&new).await?;
+            print(json, &created, || stage_text(&created))
         }
         StageAction::Change {
             stage,
@@ -285,9 +286,9 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
         } => {
             let stage = find_stage(client, &stage).await?;
             let zone = options.zone.clone().unwrap_or_else(|| stage.zone.clone());
-            let at = |text: &Option<String>| {
-                let at = text.as_deref().map(|text| parse_instant(text, &zone));
-                at.transpose()
+            let parse_optional = |text: &Option<String>| {
+                let time = text.as_deref().map(|text| parse_time(text, &zone));
+                time.transpose()
             };
             let schedule = options
                 .schedule()?
@@ -297,8 +298,10 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 name: rename,
                 perturbations: options.perturbations()?,
                 runtimes: options.runtimes(),
-                opens_at: at(&options.opens)?,
-                closes_at: at(&options.closes)?.map(Some).or(open_end.then_some(None)),
+                opens_at: parse_optional(&options.opens)?,
+                closes_at: parse_optional(&options.closes)?
+                    .map(Some)
+                    .or(open_end.then_some(None)),
                 schedule,
                 zone: options.zone,
                 profile: options.profile,
@@ -334,8 +337,8 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
         }
         StageAction::Finalise { stage, confirm } => {
             let stage = find_stage(client, &stage).await?;
-            let done = client.finalise(stage.id, confirm).await?;
-            print(json, &done, || stage_text(&done))
+            let signed_off = client.finalise(stage.id, confirm).await?;
+            print(json, &signed_off, || stage_text(&signed_off))
         }
     }
 }
@@ -349,15 +352,16 @@ async fn default_zone(client: &Client) -> anyhow::Result<Zone> {
 }
 
 /// Warnings about evaluation days that do not fit into their time.
-fn warnings(stage: &StageView) -> impl Iterator<Item = String> {
+fn capacity_warnings(stage: &StageView) -> impl Iterator<Item = String> {
     let loads = stage.capacity.iter().flatten();
     let overflows = loads.filter(|load| load.fit == Fit::Not);
     overflows.map(|load| format!("\n  warning  {}", load.summary))
 }
 
+/// A stage as several lines: times, rules, settings and state.
 fn stage_text(stage: &StageView) -> String {
-    let local_time = |at: Timestamp| {
-        let local = at.to_zoned(stage.zone.time_zone());
+    let local_time = |time: Timestamp| {
+        let local = time.to_zoned(stage.zone.time_zone());
         local.strftime("%Y-%m-%d %H:%M:%S").to_string()
     };
     let phase = match stage.phase {
@@ -370,12 +374,16 @@ fn stage_text(stage: &StageView) -> String {
         .map_or_else(|| "open end".to_owned(), local_time);
     let rules = &stage.rules.rules;
     let tasks: Vec<&str> = rules.tasks.iter().map(|task| task.as_str()).collect();
-    let next = match &stage.next_cutoff {
+    let next_cutoff = match &stage.next_cutoff {
         Some(next) => next.to_string(),
         None => "none".to_owned(),
     };
     let result = match &stage.finalised {
-        Some(done) => format!("signed off on {} by {}", local_time(done.at), done.by),
+        Some(sign_off) => format!(
+            "signed off on {} by {}",
+            local_time(sign_off.at),
+            sign_off.by
+        ),
         None => "provisional".to_owned(),
     };
     let settings = &stage.settings;
@@ -401,11 +409,11 @@ fn stage_text(stage: &StageView) -> String {
                 .iter()
                 .map(|runtimes| format!("\n  runtimes {runtimes} only")),
         )
-        .chain(warnings(stage))
+        .chain(capacity_warnings(stage))
         .collect();
     let blind = if settings.blind { ", blind" } else { "" };
     format!(
-        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  cutoff   {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
+        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  cutoff   {next_cutoff}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
         episodes per task ({}), at most {} faults\n  score    weights {}, tiers up to {} \
          points per episode, perturbations {}{overrides}\n  board    by {}, {result}\n  datasets public {}\n  kept     {}",
         stage.name,
@@ -443,7 +451,7 @@ mod tests {
     #[test]
     fn time_without_offset_is_in_the_zone_of_the_stage() {
         let berlin: Zone = "Europe/Berlin".parse().unwrap();
-        let at = |text: &str| parse_instant(text, &berlin).map(|at| at.to_string());
+        let parse = |text: &str| parse_time(text, &berlin).map(|time| time.to_string());
         for text in [
             "2026-12-01 06:00",
             "2026-12-01T06:00:00",
@@ -451,10 +459,10 @@ mod tests {
             "2026-12-01T06:00+01:00",
             "2026-12-01T00:00[America/New_York]",
         ] {
-            assert_eq!(at(text).unwrap(), "2026-12-01T05:00:00Z", "{text}");
+            assert_eq!(parse(text).unwrap(), "2026-12-01T05:00:00Z", "{text}");
         }
         for wrong in ["tomorrow", "2026-13-01 06:00", ""] {
-            let error = at(wrong).unwrap_err().to_string();
+            let error = parse(wrong).unwrap_err().to_string();
             assert!(error.contains("2026-12-01 06:00"), "{error}");
         }
     }

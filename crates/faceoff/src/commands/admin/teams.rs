@@ -1,5 +1,5 @@
 //! `faceoff admin create-team`, `change-team`, `new-token`, `disqualify`, `reinstate`, `retire-team`, `return-team`
-//! and `teams`.
+//! and `teams`: the teams of the season and their tokens.
 
 use super::team_lookup::find_team;
 use crate::{

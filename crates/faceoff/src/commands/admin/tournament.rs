@@ -1,4 +1,4 @@
-//! `faceoff admin tournament`: opens, runs and closes tournaments.
+//! `faceoff admin tournament`: opens, runs and closes tournaments, which are rounds of games between the teams' agents.
 
 mod options;
 
@@ -167,7 +167,7 @@ pub(super) async fn act(
     json: bool,
     action: TournamentAction,
 ) -> anyhow::Result<()> {
-    let shown = match action {
+    let view = match action {
         TournamentAction::List => {
             let tournaments = client.tournaments().await?;
             return print(json, &tournaments, || text::tournament_list(&tournaments));
@@ -188,11 +188,13 @@ pub(super) async fn act(
             cancel: _,
         } => {
             let id = find_tournament(client, &tournament).await?;
-            let certainty = match times {
+            let champion_shares = match times {
                 Some(times) => client.request_replays(id, times).await?,
                 None => client.cancel_replays(id).await?,
             };
-            return print(json, &certainty, || text::champion_shares_text(&certainty));
+            return print(json, &champion_shares, || {
+                text::champion_shares_text(&champion_shares)
+            });
         }
         TournamentAction::StartRound { tournament } => {
             let id = find_tournament(client, &tournament).await?;
@@ -310,5 +312,5 @@ pub(super) async fn act(
             client.close_tournament(id, confirm).await?
         }
     };
-    print(json, &shown, || text::tournament_text(&shown))
+    print(json, &view, || text::tournament_text(&view))
 }

@@ -1,4 +1,4 @@
-//! `faceoff admin worker`: lists, bans and readmits remote workers.
+//! `faceoff admin worker`: lists, bans and readmits remote workers, the processes on other machines that run the server's jobs.
 
 use crate::{
     client::Client,
@@ -56,7 +56,7 @@ async fn print_workers(
 }
 
 fn workers_text(view: &WorkersView) -> String {
-    let own = format!(
+    let slots_line = format!(
         "slots in use: {} on the server, {} on remote workers",
         view.own_slots, view.remote_slots
     );
@@ -66,7 +66,7 @@ fn workers_text(view: &WorkersView) -> String {
         false => "remote workers are not enabled".to_owned(),
     };
     let bans = view.bans.iter().map(ban_lines);
-    [own]
+    [slots_line]
         .into_iter()
         .chain(view.problems.iter().cloned())
         .chain(view.alarms.iter().cloned())
@@ -83,9 +83,9 @@ fn worker_lines(worker: &WorkerView) -> String {
         WorkerState::Refused => "refused",
         WorkerState::Silent => "silent",
     };
-    let at = worker.last_at.strftime("%Y-%m-%d %H:%M:%S UTC");
+    let last_contact = worker.last_at.strftime("%Y-%m-%d %H:%M:%S UTC");
     let mut lines = vec![format!(
-        "{:<24} {state}  slots:{}  version {}  last contact {at}",
+        "{:<24} {state}  slots:{}  version {}  last contact {last_contact}",
         worker.name, worker.slots, worker.version
     )];
     if !worker.labels.is_empty() {
@@ -102,13 +102,13 @@ fn busy_line(busy: &BusySlotView) -> String {
         .job_description
         .as_deref()
         .unwrap_or("job from before the server's start");
-    let long = if busy.is_long {
+    let duration_note = if busy.is_long {
         "  for more than an hour"
     } else {
         ""
     };
     format!(
-        "  {}: {job} since {}{long}",
+        "  {}: {job} since {}{duration_note}",
         busy.slot,
         busy.since.strftime("%H:%M:%S UTC")
     )

@@ -11,7 +11,7 @@ use std::{
 };
 
 /// Size of the copy buffer.
-const PIECE_BYTES: usize = 1 << 20;
+const BUFFER_BYTES: usize = 1 << 20;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CopiedFile {
@@ -33,10 +33,10 @@ fn copy_open_file(mut source: File, from: &Path, to: &Path) -> anyhow::Result<Co
     let writing = || format!("writing {}", to.display());
     let mut copy = new_file(to)?;
     let mut hash = blake3::Hasher::new();
-    let mut piece = vec![0; PIECE_BYTES];
+    let mut buffer = vec![0; BUFFER_BYTES];
     let mut bytes = 0;
     loop {
-        let read = match source.read(&mut piece) {
+        let read = match source.read(&mut buffer) {
             Ok(0) => break,
             Ok(read) => read,
             Err(error) if error.kind() == ErrorKind::Interrupted => continue,
@@ -44,8 +44,8 @@ fn copy_open_file(mut source: File, from: &Path, to: &Path) -> anyhow::Result<Co
                 return Err(error).with_context(|| format!("reading {}", from.display()));
             }
         };
-        hash.update(&piece[..read]);
-        copy.write_all(&piece[..read]).with_context(writing)?;
+        hash.update(&buffer[..read]);
+        copy.write_all(&buffer[..read]).with_context(writing)?;
         bytes += read as u64;
     }
     copy.sync_all().with_context(writing)?;

@@ -1,4 +1,4 @@
-//! Manifest of a backup.
+//! Manifest of a backup, `backup.json`: where the backup comes from, and the length and hash of each of its files.
 
 use anyhow::{Context, ensure};
 use jiff::Timestamp;
@@ -32,14 +32,14 @@ pub struct Manifest {
     pub made_at: Timestamp,
     /// Files that the database refers to and that the data folder lacked.
     #[serde(default)]
-    pub missing: Vec<Missing>,
-    pub files: Vec<Part>,
+    pub missing: Vec<MissingFile>,
+    pub files: Vec<BackupFile>,
 }
 
 /// A file of a backup.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Part {
+pub struct BackupFile {
     /// Relative to the backup's folder.
     pub path: String,
     pub bytes: u64,
@@ -50,7 +50,7 @@ pub struct Part {
 /// A file that the database refers to and that the data folder lacked.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Missing {
+pub enum MissingFile {
     /// The file did not exist.
     Gone {
         /// Relative to the data folder.
@@ -67,7 +67,7 @@ pub enum Missing {
     },
 }
 
-impl fmt::Display for Missing {
+impl fmt::Display for MissingFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Gone { path } => write!(f, "missing: {path}"),

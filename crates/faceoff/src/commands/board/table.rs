@@ -1,4 +1,5 @@
-//! Text of a board: rows by tier, with the columns of the paper's qualifying table.
+//! Text of a board: rows by *tier*, the class of an agent by its penalty points, with the columns of the qualifying table in the
+//! paper of the Robot Air Hockey Challenge 2023.
 
 use faceoff_api::views::board::{BoardRow, BoardView};
 use faceoff_types::{Task, Tier};

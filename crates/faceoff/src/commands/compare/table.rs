@@ -1,3 +1,5 @@
+//! Tables of `faceoff compare`: the paired results of two evaluations A and B, and the episodes that each solved.
+
 use faceoff_scoring::{Comparison, SolvedEpisodes};
 use faceoff_types::Task;
 use std::{collections::BTreeMap, fmt::Write as _};
@@ -5,11 +7,11 @@ use std::{collections::BTreeMap, fmt::Write as _};
 /// The comparison as text.
 pub(super) fn comparison_table(comparison: &Comparison) -> String {
     let mut out = String::new();
-    write(&mut out, comparison).expect("writing to memory cannot fail");
+    write_table(&mut out, comparison).expect("writing to memory cannot fail");
     out
 }
 
-fn write(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
+fn write_table(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
     writeln!(
         out,
         "\n{:<8} {:>6} {:>6} {:>6} {:>7} {:>8} {:>8} {:>8} {:>18} {:>9}  verdict",
@@ -75,13 +77,13 @@ fn ranges(numbers: &[u32]) -> String {
     if numbers.is_empty() {
         return "–".to_owned();
     }
-    let runs = numbers.chunk_by(|one, next| one + 1 == *next);
-    let run = |run: &[u32]| match run {
+    let runs = numbers.chunk_by(|number, next| number + 1 == *next);
+    let run_text = |run: &[u32]| match run {
         [first, .., last] => format!("{first}-{last}"),
         [only] => only.to_string(),
         [] => String::new(),
     };
-    runs.map(run).collect::<Vec<_>>().join(" ")
+    runs.map(run_text).collect::<Vec<_>>().join(" ")
 }
 
 fn p_value(p: f64) -> String {

@@ -1,3 +1,5 @@
+//! `faceoff dataset download`.
+
 use crate::{
     client::Client,
     commands::{

@@ -1,3 +1,5 @@
+//! `faceoff dataset list`: one line per episode.
+
 use crate::terminal;
 use clap::Args;
 use faceoff_dataset::Dataset;

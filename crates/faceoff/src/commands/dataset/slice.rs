@@ -1,3 +1,5 @@
+//! `faceoff dataset slice`: the control steps of one episode as CSV or JSON lines.
+
 use crate::terminal;
 use anyhow::Context;
 use arrow_array::{
@@ -31,7 +33,7 @@ pub struct SliceArgs {
     episode: u32,
     /// Only these control steps, from A to before B
     #[arg(long, value_name = "A..B")]
-    steps: Option<Steps>,
+    steps: Option<StepRange>,
     /// Only these columns, in this order [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     columns: Option<Vec<String>>,
@@ -53,24 +55,25 @@ enum Format {
 
 /// A range of steps, `A..B`; either end may be left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Steps(Range<u32>);
+struct StepRange(Range<u32>);
 
-impl FromStr for Steps {
+impl FromStr for StepRange {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
-        let wrong = || format!("expected A..B, such as 10..20, got {s:?}");
-        let (from, to) = s.split_once("..").ok_or_else(wrong)?;
-        let end = |text: &str, open: u32| match text {
-            "" => Ok(open),
-            number => number.parse().map_err(|_| wrong()),
+        let format_error = || format!("expected A..B, such as 10..20, got {s:?}");
+        let (from, to) = s.split_once("..").ok_or_else(format_error)?;
+        let bound = |text: &str, default: u32| match text {
+            "" => Ok(default),
+            number => number.parse().map_err(|_| format_error()),
         };
-        Ok(Self(end(from, 0)?..end(to, u32::MAX)?))
+        Ok(Self(bound(from, 0)?..bound(to, u32::MAX)?))
     }
 }
 
 impl SliceArgs {
     pub fn run(self) -> anyhow::Result<()> {
         let dataset = Dataset::open_lazily(&self.dataset)?;
+        // The step numbers are always read, because `--steps` selects by them.
         let columns = self.columns.as_ref().map(|names| {
             let step = "step".to_owned();
             names.iter().cloned().chain([step]).collect::<Vec<_>>()
@@ -94,13 +97,13 @@ impl SliceArgs {
             writeln!(out, "{}", names.join(","))?;
         }
         let steps = self.steps.map_or(0..u32::MAX, |steps| steps.0);
-        let numbers = rows["step"].as_primitive::<UInt32Type>();
+        let step_numbers = rows["step"].as_primitive::<UInt32Type>();
         let columns: Vec<(&str, &dyn Array)> = names
             .iter()
             .map(|name| (name.as_str(), &*rows[name.as_str()]))
             .collect();
         for row in 0..rows.num_rows() {
-            if steps.contains(&numbers.value(row)) {
+            if steps.contains(&step_numbers.value(row)) {
                 write_row(&mut out, self.format, &columns, row)?;
             }
         }
@@ -116,7 +119,7 @@ fn write_row(
 ) -> anyhow::Result<()> {
     let cells = columns
         .iter()
-        .map(|(name, column)| (*name, json(*column, row)));
+        .map(|(name, column)| (*name, cell_value(*column, row)));
     match format {
         Format::Jsonl => {
             let object: Map<String, Value> =
@@ -138,8 +141,8 @@ fn write_row(
     Ok(())
 }
 
-/// A cell. Numbers have the fewest digits that round-trip to the same bits.
-fn json(column: &dyn Array, row: usize) -> Value {
+/// The value of a cell. Numbers have the fewest digits that round-trip to the same bits.
+fn cell_value(column: &dyn Array, row: usize) -> Value {
     if column.is_null(row) {
         return Value::Null;
     }
@@ -150,7 +153,7 @@ fn json(column: &dyn Array, row: usize) -> Value {
         DataType::Utf8 => column.as_string::<i32>().value(row).into(),
         DataType::List(_) => {
             let values = column.as_list::<i32>().value(row);
-            (0..values.len()).map(|i| json(&values, i)).collect()
+            (0..values.len()).map(|i| cell_value(&values, i)).collect()
         }
         other => format!("{other}").into(),
     }

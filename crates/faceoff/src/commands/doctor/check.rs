@@ -1,3 +1,5 @@
+//! The result type of the checks of `faceoff doctor`.
+
 use serde::Serialize;
 
 /// The result of a check: `cure` says how to fix a problem, and is `None` if there is none.

@@ -9,7 +9,7 @@ use std::{
 };
 
 /// How far a file's time may be ahead of the clock, because file systems round.
-const TOLERANCE: SignedDuration = SignedDuration::from_secs(5);
+const FILE_TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(5);
 
 /// Checks whether the clock is synchronised and not behind the last change of the database.
 pub fn clock(data_dir: &Path, now: Timestamp) -> Check {
@@ -18,7 +18,7 @@ pub fn clock(data_dir: &Path, now: Timestamp) -> Check {
         .filter_map(|name| data_dir.join(name).metadata().ok()?.modified().ok())
         .max();
     if let Some(newest) = newest.and_then(|at| Timestamp::try_from(at).ok())
-        && newest.duration_since(now) > TOLERANCE
+        && newest.duration_since(now) > FILE_TIME_TOLERANCE
     {
         return Check {
             name: "clock",

@@ -9,12 +9,13 @@ use std::{
 };
 
 /// Permission bits of the group and of other users.
-const OTHERS: u32 = 0o077;
+const GROUP_AND_OTHERS: u32 = 0o077;
 
 /// Checks owner and mode of the data folder and its secrets, for a server that runs as the current user.
 pub fn permissions(data_dir: &Path) -> Check {
-    let own = rustix::process::geteuid().as_raw();
+    let own_uid = rustix::process::geteuid().as_raw();
     let mut problems = Vec::new();
+    // The empty name stands for the folder itself.
     for name in ["", ADMIN_TOKEN_FILE, "faceoff.sqlite3"] {
         let path = if name.is_empty() {
             data_dir.to_owned()
@@ -22,7 +23,7 @@ pub fn permissions(data_dir: &Path) -> Check {
             data_dir.join(name)
         };
         match fs::metadata(&path) {
-            Ok(found) => problems.extend(find_problem(&path, &found, own)),
+            Ok(found) => problems.extend(find_problem(&path, &found, own_uid)),
             Err(error) if error.kind() == ErrorKind::NotFound => {}
             Err(error) => problems.push((
                 format!("{}: {error}", path.display()),
@@ -53,20 +54,20 @@ pub fn permissions(data_dir: &Path) -> Check {
 }
 
 /// The problem of a file or folder, and its cure.
-fn find_problem(path: &Path, metadata: &Metadata, own: u32) -> Option<(String, String)> {
+fn find_problem(path: &Path, metadata: &Metadata, own_uid: u32) -> Option<(String, String)> {
     let shown = path.display();
-    if own != 0 && metadata.uid() != own {
+    if own_uid != 0 && metadata.uid() != own_uid {
         return Some((
             format!(
-                "{shown} belongs to user {}, this is user {own}",
+                "{shown} belongs to user {}, this is user {own_uid}",
                 metadata.uid()
             ),
-            format!("run the server as that user, or chown -R {own} {shown}"),
+            format!("run the server as that user, or chown -R {own_uid} {shown}"),
         ));
     }
     let mode = metadata.permissions().mode() & 0o777;
     // The mode of the folder protects its files; only the token is protected a second time.
-    let is_open = mode & OTHERS != 0 && !path.ends_with("faceoff.sqlite3");
+    let is_open = mode & GROUP_AND_OTHERS != 0 && !path.ends_with("faceoff.sqlite3");
     is_open.then(|| {
         (
             format!("{shown} has mode {mode:04o}: other users can read it"),

@@ -5,8 +5,8 @@ use faceoff_sandbox::HostFeature;
 use std::io::Write;
 
 impl LayerReport {
-    const fn mark(&self) -> &'static str {
-        match (self.host.available, self.given_up) {
+    const fn status(&self) -> &'static str {
+        match (self.feature.available, self.given_up) {
             (_, true) => "given up",
             (true, false) => "ok",
             (false, false) => "MISSING",
@@ -17,31 +17,29 @@ impl LayerReport {
 impl Findings {
     pub(super) fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
         writeln!(out, "Sandbox")?;
-        let mut features = self.features.iter().peekable();
-        while let Some(feature) = features.next() {
+        let mut layers = self.features.iter().peekable();
+        while let Some(layer) = layers.next() {
             let HostFeature {
-                layer, found, cure, ..
-            } = &feature.host;
-            writeln!(
-                out,
-                "  {:<9} {:<14} {found}",
-                feature.mark(),
-                layer.as_str()
-            )?;
+                layer: name,
+                found,
+                cure,
+                ..
+            } = &layer.feature;
+            writeln!(out, "  {:<9} {:<14} {found}", layer.status(), name.as_str())?;
             // A cure of several layers in a row is printed once, below the last.
-            if features.peek().is_none_or(|next| next.host.cure != *cure) {
+            if layers.peek().is_none_or(|next| next.feature.cure != *cure) {
                 print_cure(out, cure.as_deref())?;
             }
         }
         writeln!(out, "Runtimes")?;
         for runtime in &self.runtimes {
-            let mark = if runtime.available { "ok" } else { "none" };
-            writeln!(out, "  {mark:<9} {:<14} {}", runtime.name, runtime.found)?;
+            let status = if runtime.available { "ok" } else { "none" };
+            writeln!(out, "  {status:<9} {:<14} {}", runtime.name, runtime.found)?;
             print_cure(out, runtime.cure.as_deref())?;
         }
         let memory = &self.in_memory;
-        let mark = if memory.available { "ok" } else { "none" };
-        writeln!(out, "  {mark:<9} {:<14} {}", "in memory", memory.found)?;
+        let status = if memory.available { "ok" } else { "none" };
+        writeln!(out, "  {status:<9} {:<14} {}", "in memory", memory.found)?;
         print_cure(out, memory.cure.as_deref())?;
         let cpus = &self.cpus;
         writeln!(out, "CPUs")?;

@@ -1,4 +1,4 @@
-//! Whether a worker on this host would get jobs from a server.
+//! Checks whether a worker on this host would get jobs from the server, to which it connects through a NATS message server.
 
 use super::check::Check;
 use crate::{
@@ -8,8 +8,8 @@ use crate::{
 use anyhow::Context as _;
 use faceoff_worker::check_connection;
 
-/// The oldest recommended version of nats-server. Debian's older version works, too.
-const RECOMMENDED: (u32, u32) = (2, 12);
+/// The oldest recommended version of nats-server, as major and minor number. Debian's older version works, too.
+const RECOMMENDED_NATS: (u32, u32) = (2, 12);
 
 /// Connects to NATS and asks the server; empty if no NATS server is configured.
 pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec<Check>> {
@@ -17,13 +17,13 @@ pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec
         return Ok(Vec::new());
     };
     let name = name.map_or_else(host_name, Ok)?;
-    let own = own_capabilities(&config.agent_environment(), config.slots())?;
-    let examined = tokio::runtime::Builder::new_current_thread()
+    let capabilities = own_capabilities(&config.agent_environment(), config.slots())?;
+    let connection = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .context("starting the async runtime")?
-        .block_on(check_connection(&nats, &name, &own));
-    let mut found = vec![match examined.nats {
+        .block_on(check_connection(&nats, &name, &capabilities));
+    let mut found = vec![match connection.nats {
         Ok(version) => Check {
             name: "NATS",
             cure: is_old(&version).then(|| {
@@ -31,23 +31,23 @@ pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec
             }),
             found: format!("nats-server {version} at {}", nats.url),
         },
-        Err(why) => Check {
+        Err(error) => Check {
             name: "NATS",
-            found: format!("cannot be reached at {}: {why}", nats.url),
+            found: format!("cannot be reached at {}: {error}", nats.url),
             cure: Some("start nats-server -js, or correct nats.url, nats.nkey_file and nats.ca_file".to_owned()),
         },
     }];
-    if let Some(server) = examined.server {
+    if let Some(server) = connection.server {
         found.push(match server {
             Ok(()) => Check {
                 name: "server",
                 found: format!("would give jobs to a worker {name:?} on this host"),
                 cure: None,
             },
-            Err(why) => Check {
+            Err(error) => Check {
                 name: "server",
                 found: "would give no jobs".to_owned(),
-                cure: Some(why),
+                cure: Some(error),
             },
         });
     }
@@ -57,7 +57,7 @@ pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec
 fn is_old(version: &str) -> bool {
     let mut parts = version.split('.').map(str::parse::<u32>);
     match (parts.next(), parts.next()) {
-        (Some(Ok(major)), Some(Ok(minor))) => (major, minor) < RECOMMENDED,
+        (Some(Ok(major)), Some(Ok(minor))) => (major, minor) < RECOMMENDED_NATS,
         _ => false,
     }
 }

@@ -105,7 +105,7 @@ fn environments(
     config: &Config,
     bundles: &[Bundle; 2],
 ) -> anyhow::Result<[AgentEnvironment; 2]> {
-    let cpus = affinity::allowed().context("reading the CPU affinity of this process")?;
+    let cpus = affinity::allowed_cpus().context("reading the CPU affinity of this process")?;
     let layout = CpuLayout::divide(&cpus, 1, 2);
     if layout.shared && !options.json {
         println!(

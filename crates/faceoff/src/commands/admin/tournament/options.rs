@@ -1,9 +1,11 @@
+//! Options of `faceoff admin tournament open` and `change`, and the JSON of the API's rules and settings that they stand for.
+
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use faceoff_types::{Profile, Publication};
 use serde_json::{Map, Value, json};
 
-/// Rules and settings of a tournament. Options that are left out do not change, or are those of the original challenge.
+/// Rules and settings of a tournament. Options that are left out do not change, or are those of the Robot Air Hockey Challenge 2023.
 #[derive(Debug, Args)]
 pub(in crate::commands::admin) struct TournamentOptions {
     /// Pairing: round robin; drawn groups and a final of their best teams; Swiss system
@@ -28,7 +30,7 @@ pub(in crate::commands::admin) struct TournamentOptions {
     #[arg(long, value_name = "true|false")]
     mirrored: Option<bool>,
     /// Further rules in the API's format, e.g. '{"game_limits":{"max_faults":5}}'
-    #[arg(long, value_name = "JSON", value_parser = object)]
+    #[arg(long, value_name = "JSON", value_parser = parse_object)]
     rules: Option<Map<String, Value>>,
     /// Friendly and test games that a team may request per UTC day
     #[arg(long, value_name = "N")]
@@ -49,13 +51,13 @@ impl TournamentOptions {
     /// The rules that the options set.
     pub(super) fn rules(&self) -> anyhow::Result<Option<Map<String, Value>>> {
         let mut rules = self.rules.clone().unwrap_or_default();
-        let given = [
+        let option_values = [
             ("format", self.format()?),
             ("steps", self.steps.map(|steps| json!(steps))),
             ("profile", self.profile.map(|profile| json!(profile))),
             ("mirrored", self.mirrored.map(|mirrored| json!(mirrored))),
         ];
-        for (name, value) in given {
+        for (name, value) in option_values {
             if let Some(value) = value {
                 rules.insert(name.to_owned(), value);
             }
@@ -67,20 +69,20 @@ impl TournamentOptions {
         let Some(format) = self.format else {
             return Ok(None);
         };
-        let refused = |given: Option<u32>, option: &str| match given {
+        let refuse_value = |value: Option<u32>, option: &str| match value {
             Some(_) => anyhow::bail!("--{option} does not apply to this --format; leave it out"),
             None => Ok(()),
         };
         Ok(Some(match format {
             Format::Groups => {
-                refused(self.rounds, "rounds")?;
+                refuse_value(self.rounds, "rounds")?;
                 let groups = self.groups.context("--format groups needs --groups N")?;
                 let advance = self.advance.unwrap_or(1);
                 json!({"kind": "groups", "groups": groups, "advance": advance})
             }
             Format::RoundRobin | Format::Swiss => {
-                refused(self.groups, "groups")?;
-                refused(self.advance, "advance")?;
+                refuse_value(self.groups, "groups")?;
+                refuse_value(self.advance, "advance")?;
                 if format == Format::RoundRobin {
                     json!({"kind": "round_robin", "rounds": self.rounds.unwrap_or(2)})
                 } else {
@@ -93,14 +95,14 @@ impl TournamentOptions {
 
     /// The settings that the options set.
     pub(super) fn settings(&self) -> Option<Map<String, Value>> {
-        let given = [
+        let option_values = [
             (
                 "free_games_per_day",
                 self.free_games.map(|games| json!(games)),
             ),
             ("publishes", self.publishes.map(|when| json!(when))),
         ];
-        let settings: Map<String, Value> = given
+        let settings: Map<String, Value> = option_values
             .into_iter()
             .filter_map(|(name, value)| Some((name.to_owned(), value?)))
             .collect();
@@ -108,7 +110,7 @@ impl TournamentOptions {
     }
 }
 
-fn object(text: &str) -> Result<Map<String, Value>, String> {
+fn parse_object(text: &str) -> Result<Map<String, Value>, String> {
     serde_json::from_str(text).map_err(|error| format!("expected a JSON object: {error}"))
 }
 
@@ -118,19 +120,20 @@ mod tests {
     use clap::Parser;
 
     #[derive(Debug, Parser)]
-    struct Line {
+    struct TestCommand {
         #[command(flatten)]
         options: TournamentOptions,
     }
 
     fn options(args: &[&str]) -> TournamentOptions {
         let args = ["open"].iter().chain(args);
-        Line::try_parse_from(args).unwrap().options
+        TestCommand::try_parse_from(args).unwrap().options
     }
 
     #[test]
     fn options_become_valid_rules_and_settings() {
         let rules = |args: &[&str]| options(args).rules().unwrap().unwrap();
+        // `--steps` wins over the "steps" of `--rules`.
         let all = rules(&[
             "--format",
             "groups",
@@ -161,9 +164,9 @@ mod tests {
         assert_eq!(options(&[]).settings(), None);
         let settings = options(&["--free-games", "2", "--publishes", "at_release"]);
         let settings = Value::Object(settings.settings().unwrap());
-        let read: faceoff_types::TournamentSettings =
+        let parsed: faceoff_types::TournamentSettings =
             serde_json::from_value(settings.clone()).unwrap();
-        assert_eq!(json!(read), settings);
+        assert_eq!(json!(parsed), settings);
     }
 
     #[test]
@@ -183,7 +186,7 @@ mod tests {
             let error = options(args).rules().unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
-        assert!(Line::try_parse_from(["open", "--rules", "[]"]).is_err());
-        assert!(Line::try_parse_from(["open", "--rounds", "2"]).is_err());
+        assert!(TestCommand::try_parse_from(["open", "--rules", "[]"]).is_err());
+        assert!(TestCommand::try_parse_from(["open", "--rounds", "2"]).is_err());
     }
 }

@@ -1,15 +1,17 @@
+//! `faceoff dataset export`, which has moved to the Python package: it only says so.
+
 use clap::Args;
 use std::ffi::OsString;
 
 /// Arguments of `faceoff dataset export`, which has moved to the Python package.
 #[derive(Debug, Args)]
-pub struct MovedArgs {
+pub struct MovedExportArgs {
     /// Ignored
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<OsString>,
 }
 
-impl MovedArgs {
+impl MovedExportArgs {
     pub fn run(self) -> anyhow::Result<()> {
         let Self { arguments: _ } = self;
         anyhow::bail!(

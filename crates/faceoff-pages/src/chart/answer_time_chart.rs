@@ -1,4 +1,4 @@
-//! Answer times on a logarithmic axis, a row per task.
+//! A chart of the agent's answer times: a row per task on a logarithmic axis. Lengths are in units of the drawing.
 
 use super::scale::{RIGHT, Tick, short};
 use crate::figures;
@@ -7,13 +7,13 @@ use crate::figures;
 const FIRST_DECADE: f64 = -2.0;
 const LAST_DECADE: f64 = 3.0;
 /// Left edge of the plot; row names are to the left of it.
-const STRIP_LEFT: f64 = 58.0;
+const PLOT_LEFT: f64 = 58.0;
 /// Height of a row without and with a distribution.
-const ROW: u32 = 24;
-const TALL_ROW: u32 = 48;
+const ROW_HEIGHT: u32 = 24;
+const TALL_ROW_HEIGHT: u32 = 48;
 /// Height of a distribution, and its distance from the row.
-const SHAPE: f64 = 26.0;
-const SHAPE_GAP: u32 = 8;
+const DISTRIBUTION_HEIGHT: f64 = 26.0;
+const DISTRIBUTION_GAP: u32 = 8;
 /// Duration of a control step, in milliseconds.
 const STEP_MS: f64 = 20.0;
 
@@ -38,15 +38,16 @@ pub(crate) struct TimeBin {
 
 /// Times on a logarithmic axis, in the form that `chart.html` draws.
 #[derive(Debug)]
-pub(crate) struct Strip {
-    pub(crate) rows: Vec<StripRow>,
+pub(crate) struct AnswerTimeChart {
+    pub(crate) rows: Vec<AnswerTimeRow>,
     pub(crate) grid: Vec<Tick>,
     /// Are distributions drawn?
-    pub(crate) has_shapes: bool,
-    /// x of the duration of a control step.
+    pub(crate) has_distributions: bool,
+    /// x of the duration of a control step, within which an answer must arrive.
     pub(crate) limit: String,
-    /// x and width of the noise floor.
-    pub(crate) floor: Option<[String; 2]>,
+    /// x and width of the *noise floor*, the delay that the server itself adds to an answer.
+    pub(crate) noise_floor: Option<[String; 2]>,
+    /// y of the lower end of the plot.
     pub(crate) bottom: u32,
     pub(crate) height: u32,
     /// The distributions as a table, a row per column.
@@ -60,44 +61,48 @@ pub(crate) struct Strip {
 pub(crate) struct CountRow {
     pub(crate) from: String,
     pub(crate) to: String,
-    /// In the order of [`Strip::rows`].
+    /// In the order of [`AnswerTimeChart::rows`].
     pub(crate) counts: Vec<u64>,
 }
 
 /// Positions of the times of a task.
 #[derive(Debug)]
-pub(crate) struct StripRow {
+pub(crate) struct AnswerTimeRow {
     pub(crate) name: &'static str,
     pub(crate) y: u32,
     pub(crate) mean: String,
     pub(crate) p99: String,
     pub(crate) max: String,
     /// The distribution as an SVG path.
-    pub(crate) shape: String,
+    pub(crate) distribution: String,
 }
 
-impl Strip {
-    /// `floor`: median and 99th percentile of the noise floor, in milliseconds.
-    pub(crate) fn new(summaries: &[TimeSummary], floor: Option<[f64; 2]>) -> Self {
-        let has_shapes = summaries.iter().any(|summary| !summary.bins.is_empty());
+impl AnswerTimeChart {
+    /// `noise_floor`: its median and 99th percentile, in milliseconds.
+    pub(crate) fn new(summaries: &[TimeSummary], noise_floor: Option<[f64; 2]>) -> Self {
+        let has_distributions = summaries.iter().any(|summary| !summary.bins.is_empty());
         let mut y = 0;
         let rows = summaries.iter().map(|summary| {
-            y += if has_shapes { TALL_ROW } else { ROW };
+            y += if has_distributions {
+                TALL_ROW_HEIGHT
+            } else {
+                ROW_HEIGHT
+            };
             let [mean, p99, max] =
                 [summary.mean, summary.p99, summary.max].map(|ms| figures::one_decimal(x(ms)));
-            StripRow {
+            AnswerTimeRow {
                 name: summary.name,
                 y,
                 mean,
                 p99,
                 max,
-                shape: shape(&summary.bins, y - SHAPE_GAP),
+                distribution: distribution(&summary.bins, y - DISTRIBUTION_GAP),
             }
         });
         let rows = rows.collect();
-        let bottom = y + ROW / 2;
+        let bottom = y + ROW_HEIGHT / 2;
         let grid = [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0].map(|ms| Tick {
-            at: figures::one_decimal(x(ms)),
+            position: figures::one_decimal(x(ms)),
             label: short(ms),
         });
         let texts = summaries.iter().map(|summary| {
@@ -111,9 +116,10 @@ impl Strip {
         Self {
             rows,
             grid: grid.into(),
-            has_shapes,
+            has_distributions,
             limit: figures::one_decimal(x(STEP_MS)),
-            floor: floor.map(|[from, to]| [x(from), x(to) - x(from)].map(figures::one_decimal)),
+            noise_floor: noise_floor
+                .map(|[from, to]| [x(from), x(to) - x(from)].map(figures::one_decimal)),
             bottom,
             height: bottom + 20,
             counts: count_rows(summaries),
@@ -146,11 +152,11 @@ fn count_rows(summaries: &[TimeSummary]) -> Vec<CountRow> {
 }
 
 /// Columns above `bottom`. Heights are logarithmic, so that a few slow answers among thousands stay visible.
-fn shape(bins: &[TimeBin], bottom: u32) -> String {
+fn distribution(bins: &[TimeBin], bottom: u32) -> String {
     let height = |count: u64| (1.0 + count as f64).ln();
     let max = bins.iter().map(|bin| bin.count).max().map_or(1.0, height);
     let columns = bins.iter().filter(|bin| bin.count > 0).map(|bin| {
-        let top = f64::from(bottom) - SHAPE * height(bin.count) / max;
+        let top = f64::from(bottom) - DISTRIBUTION_HEIGHT * height(bin.count) / max;
         let [left, right, top] = [x(bin.from), x(bin.to), top].map(figures::one_decimal);
         format!("M{left} {bottom}V{top}H{right}V{bottom}z")
     });
@@ -161,7 +167,7 @@ fn shape(bins: &[TimeBin], bottom: u32) -> String {
 fn x(ms: f64) -> f64 {
     let decade = ms.max(f64::MIN_POSITIVE).log10();
     let share = (decade - FIRST_DECADE) / (LAST_DECADE - FIRST_DECADE);
-    STRIP_LEFT + share.clamp(0.0, 1.0) * (RIGHT - STRIP_LEFT)
+    PLOT_LEFT + share.clamp(0.0, 1.0) * (RIGHT - PLOT_LEFT)
 }
 
 #[cfg(test)]
@@ -177,17 +183,17 @@ mod tests {
             max: 5000.0,
             bins: Vec::new(),
         };
-        let strip = Strip::new(std::slice::from_ref(&summary), Some([0.001, 1.0]));
-        assert!(!strip.has_shapes && strip.height == 56, "{strip:?}");
+        let chart = AnswerTimeChart::new(std::slice::from_ref(&summary), Some([0.001, 1.0]));
+        assert!(!chart.has_distributions && chart.height == 56, "{chart:?}");
         let bin = |from, to, count| TimeBin { from, to, count };
         let with_bins = TimeSummary {
             bins: vec![bin(0.1, 1.0, 99), bin(1.0, 10.0, 0), bin(10.0, 100.0, 9)],
             ..summary
         };
-        let tall = Strip::new(&[with_bins], None);
-        assert!(tall.has_shapes);
+        let tall = AnswerTimeChart::new(&[with_bins], None);
+        assert!(tall.has_distributions);
         assert_eq!(
-            tall.rows[0].shape, "M115.6 40V14.0H173.2V40zM230.8 40V27.0H288.4V40z",
+            tall.rows[0].distribution, "M115.6 40V14.0H173.2V40zM230.8 40V27.0H288.4V40z",
             "a tenth of the count is half as high; an empty column is not drawn"
         );
         let rows: Vec<_> = tall
@@ -196,16 +202,19 @@ mod tests {
             .map(|row| (&*row.from, &*row.counts))
             .collect();
         assert_eq!(rows, [("0.10", &[99][..]), ("10", &[9])]);
-        let row = &strip.rows[0];
+        let row = &chart.rows[0];
         assert_eq!(
             [&row.mean, &row.p99, &row.max],
             ["115.6", "230.8", "346.0"],
             "a fifth, three fifths, and the end"
         );
-        assert_eq!(strip.floor, Some(["58.0", "115.2"].map(str::to_owned)));
-        assert_eq!(strip.limit, "248.1");
+        assert_eq!(
+            chart.noise_floor,
+            Some(["58.0", "115.2"].map(str::to_owned))
+        );
+        assert_eq!(chart.limit, "248.1");
         assert!(
-            strip
+            chart
                 .description
                 .contains("hit: mean 0.1, 99th percentile 10, maximum 5000")
         );

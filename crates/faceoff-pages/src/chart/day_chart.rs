@@ -1,4 +1,4 @@
-//! A value over evaluation days.
+//! A chart of a value over evaluation days.
 
 use super::scale::{LEFT, RIGHT, Scale, Tick, round_up, without_trailing_zeros};
 use crate::figures;
@@ -22,7 +22,7 @@ pub(crate) struct Bound {
 
 /// A chart over days, in the form that `chart.html` draws.
 #[derive(Debug)]
-pub(crate) struct Panel {
+pub(crate) struct DayChart {
     pub(crate) title: &'static str,
     /// Unit of the axis.
     pub(crate) unit: &'static str,
@@ -45,13 +45,13 @@ pub(crate) struct Point {
     pub(crate) label: String,
 }
 
-impl Panel {
-    /// A panel of rates from 0 to 100 percent.
+impl DayChart {
+    /// A chart of rates from 0 to 100 percent.
     pub(crate) fn from_percent(title: &'static str, values: &[DayValue]) -> Self {
         Self::new(title, "percent", values, &[], Scale { max: 100.0 })
     }
 
-    /// A panel of non-negative values; the scale includes the first bound.
+    /// A chart of non-negative values; the scale includes the first bound.
     pub(crate) fn from_zero(
         title: &'static str,
         unit: &'static str,
@@ -75,11 +75,11 @@ impl Panel {
             .first()
             .zip(values.last())
             .map(|(first, last)| (first.day, last.day));
-        let place = |value: &DayValue| x(value.day, span);
+        let day_x = |value: &DayValue| x(value.day, span);
         let points: Vec<Point> = values
             .iter()
             .map(|value| Point {
-                x: figures::one_decimal(place(value)),
+                x: figures::one_decimal(day_x(value)),
                 y: figures::one_decimal(scale.y(value.value)),
                 interval: value
                     .interval
@@ -101,7 +101,7 @@ impl Panel {
             days: day_ticks(span),
             bounds: shown
                 .map(|bound| Tick {
-                    at: figures::one_decimal(scale.y(bound.value)),
+                    position: figures::one_decimal(scale.y(bound.value)),
                     label: bound.name.to_owned(),
                 })
                 .collect(),
@@ -133,7 +133,7 @@ fn day_ticks(span: Option<(Date, Date)>) -> Vec<Tick> {
     days.dedup();
     days.into_iter()
         .map(|day| Tick {
-            at: figures::one_decimal(x(day, span)),
+            position: figures::one_decimal(x(day, span)),
             label: day.to_string(),
         })
         .collect()
@@ -181,32 +181,33 @@ mod tests {
 
     #[test]
     fn days_follow_the_calendar_and_values_the_scale() {
-        let panel = Panel::from_percent("Score", &[value(1, 0.0), value(2, 50.0), value(5, 100.0)]);
-        let places: Vec<_> = panel.points.iter().map(|point| point.x.as_str()).collect();
+        let chart =
+            DayChart::from_percent("Score", &[value(1, 0.0), value(2, 50.0), value(5, 100.0)]);
+        let places: Vec<_> = chart.points.iter().map(|point| point.x.as_str()).collect();
         assert_eq!(places, ["46.0", "119.0", "338.0"], "a quarter of the way");
-        let heights: Vec<_> = panel.points.iter().map(|point| point.y.as_str()).collect();
+        let heights: Vec<_> = chart.points.iter().map(|point| point.y.as_str()).collect();
         assert_eq!(heights, ["140.0", "76.0", "12.0"]);
         assert_eq!(
-            panel.points[0].interval,
+            chart.points[0].interval,
             Some(["140.0", "127.2"].map(str::to_owned)),
             "values outside the scale are clamped"
         );
-        assert_eq!(panel.path, "M46.0 140.0L119.0 76.0L338.0 12.0");
-        let days: Vec<_> = panel.days.iter().map(|tick| tick.label.as_str()).collect();
+        assert_eq!(chart.path, "M46.0 140.0L119.0 76.0L338.0 12.0");
+        let days: Vec<_> = chart.days.iter().map(|tick| tick.label.as_str()).collect();
         assert_eq!(days, ["2026-03-01", "2026-03-05"]);
         assert!(
-            panel.description.contains("2026-03-05: 100 (90 – 110)"),
+            chart.description.contains("2026-03-05: 100 (90 – 110)"),
             "{}",
-            panel.description
+            chart.description
         );
     }
 
     #[test]
     fn single_day_is_centred_and_missing_days_are_described() {
-        let panel = Panel::from_percent("Score", &[value(1, 50.0)]);
-        assert_eq!((panel.points.len(), panel.days.len()), (1, 1));
-        assert_eq!(panel.points[0].x, "192.0");
-        let empty = Panel::from_percent("Score", &[]);
+        let chart = DayChart::from_percent("Score", &[value(1, 50.0)]);
+        assert_eq!((chart.points.len(), chart.days.len()), (1, 1));
+        assert_eq!(chart.points[0].x, "192.0");
+        let empty = DayChart::from_percent("Score", &[]);
         assert!(empty.points.is_empty() && empty.path.is_empty());
         assert!(empty.description.contains("no day"));
     }
@@ -223,7 +224,7 @@ mod tests {
                 value: 1.5,
             },
         ];
-        let low = Panel::from_zero("Points", "per episode", &[value(1, 0.1)], &bounds);
+        let low = DayChart::from_zero("Points", "per episode", &[value(1, 0.1)], &bounds);
         let words: Vec<_> = low.bounds.iter().map(|tick| tick.label.as_str()).collect();
         assert_eq!(
             words,
@@ -231,7 +232,7 @@ mod tests {
             "the other bound is outside the scale"
         );
         assert_eq!(low.grid.last().map(|tick| tick.label.as_str()), Some("0.8"));
-        let high = Panel::from_zero("Points", "per episode", &[value(1, 3.0)], &bounds);
+        let high = DayChart::from_zero("Points", "per episode", &[value(1, 3.0)], &bounds);
         assert_eq!(high.bounds.len(), 2);
     }
 }

@@ -1,4 +1,4 @@
-//! Success rates as bars.
+//! A chart of success rates as bars.
 
 use super::scale::{BOTTOM, LEFT, RIGHT, Scale, Tick};
 use crate::figures;
@@ -18,7 +18,7 @@ pub(crate) struct LabelledRate {
 
 /// Rates as bars, in the form that `chart.html` draws.
 #[derive(Debug)]
-pub(crate) struct Bars {
+pub(crate) struct RateChart {
     pub(crate) title: &'static str,
     pub(crate) grid: Vec<Tick>,
     pub(crate) bars: Vec<Bar>,
@@ -26,6 +26,7 @@ pub(crate) struct Bars {
     pub(crate) description: String,
 }
 
+/// Texts and coordinates of a bar; `low_y` and `high_y` are the ends of the interval.
 #[derive(Debug)]
 pub(crate) struct Bar {
     pub(crate) class: &'static str,
@@ -41,7 +42,7 @@ pub(crate) struct Bar {
     pub(crate) label: String,
 }
 
-impl Bars {
+impl RateChart {
     pub(crate) fn new(title: &'static str, rates: &[LabelledRate]) -> Self {
         let scale = Scale { max: 100.0 };
         let step = (RIGHT - LEFT) / rates.len().max(1) as f64;
@@ -98,16 +99,16 @@ mod tests {
             percent,
             interval: [percent / 2.0, 100.0],
         };
-        let bars = Bars::new("Hit", &[rate("one", 25.0), rate("two", 100.0)]);
-        let first = &bars.bars[0];
+        let chart = RateChart::new("Hit", &[rate("one", 25.0), rate("two", 100.0)]);
+        let first = &chart.bars[0];
         assert_eq!((&*first.y, &*first.height), ("108.0", "32.0"));
         assert_eq!((&*first.middle, &*first.x), ("115.0", "101.0"));
         assert_eq!((&*first.low_y, &*first.high_y), ("124.0", "12.0"));
-        assert_eq!(bars.bars[1].middle, "269.0");
+        assert_eq!(chart.bars[1].middle, "269.0");
         assert!(
-            bars.description.contains("one 25, two 100"),
+            chart.description.contains("one 25, two 100"),
             "{}",
-            bars.description
+            chart.description
         );
     }
 }

@@ -1,3 +1,5 @@
+// The picture of a replay, in 3-D or flat.
+
 import { h, setText } from "../controls/dom";
 import { FlatView } from "../flat/view";
 import { View3D } from "../view3d/view";
@@ -6,67 +8,71 @@ import type { Palette } from "./palette";
 import type { FrameState, View } from "./frame-state";
 
 /** The picture, in 3-D or flat, with texts on it. */
-export class Stage {
+export class Picture {
   readonly element: HTMLElement;
-  private readonly field: HTMLElement;
-  readonly solid: View3D | null;
+  private readonly canvasArea: HTMLElement;
+  readonly view3d: View3D | null;
   /** Why 3-D is not available; null if it is. */
   unavailable: string | null = null;
-  private readonly plane = new FlatView();
-  private readonly note = h("p", { class: "stage-note", attributes: { hidden: "" } });
-  private readonly state = h("p", { class: "stage-state", attributes: { hidden: "" } });
-  private readonly outcome = h("p", { class: "stage-outcome", attributes: { hidden: "" } });
-  private readonly score = h("p", { class: "stage-score", attributes: { hidden: "" } });
+  private readonly flatView = new FlatView();
+  private readonly note = h("p", { class: "picture-note", attributes: { hidden: "" } });
+  private readonly state = h("p", { class: "picture-state", attributes: { hidden: "" } });
+  private readonly outcome = h("p", { class: "picture-outcome", attributes: { hidden: "" } });
+  private readonly score = h("p", { class: "picture-score", attributes: { hidden: "" } });
   private wantsFlat = false;
   private ratio = 1;
 
   /** `changed`: called when the picture must be redrawn; `switched`: called after a change of the view. */
   constructor(
     title: string,
-    still: boolean,
+    prefersReducedMotion: boolean,
     changed: () => void,
     private readonly switched: () => void,
   ) {
-    this.solid = this.openSolid(still, changed);
-    this.field = h(
+    this.view3d = this.openView3d(prefersReducedMotion, changed);
+    this.canvasArea = h(
       "div",
-      { class: "stage", attributes: { tabindex: "0", role: "group", "aria-label": `Picture: ${title}` } },
-      this.plane.canvas,
+      {
+        class: "canvas-area",
+        attributes: { tabindex: "0", role: "group", "aria-label": `Picture: ${title}` },
+      },
+      this.flatView.canvas,
     );
-    if (this.solid !== null) this.field.prepend(this.solid.canvas);
+    if (this.view3d !== null) this.canvasArea.prepend(this.view3d.canvas);
     this.element = h(
       "div",
       { class: "picture" },
-      this.field,
+      this.canvasArea,
       this.score,
       this.state,
       this.outcome,
       this.note,
     );
-    for (const canvas of this.field.querySelectorAll("canvas")) canvas.setAttribute("aria-hidden", "true");
+    for (const canvas of this.canvasArea.querySelectorAll("canvas"))
+      canvas.setAttribute("aria-hidden", "true");
     new ResizeObserver(() => {
       this.resize();
       changed();
-    }).observe(this.field);
-    this.choose();
+    }).observe(this.canvasArea);
+    this.updateShownView();
   }
 
-  get flat(): boolean {
+  get isFlat(): boolean {
     return this.wantsFlat || this.unavailable !== null;
   }
 
   setFlat(flat: boolean): void {
     this.wantsFlat = flat;
-    this.choose();
+    this.updateShownView();
   }
 
   setCamera(camera: Camera): void {
-    this.solid?.orbit.preset(camera);
+    this.view3d?.orbit.preset(camera);
   }
 
   paint(palette: Palette): void {
-    this.plane.paint(palette);
-    this.solid?.paint(palette);
+    this.flatView.paint(palette);
+    this.view3d?.paint(palette);
   }
 
   draw(frame: FrameState): number {
@@ -75,14 +81,14 @@ export class Stage {
 
   /** Sets the texts on the picture; empty texts are hidden. */
   setTexts(texts: { state: string; outcome: string; good: boolean; score: string }): void {
-    write(this.state, texts.state);
-    write(this.score, texts.score);
-    write(this.outcome, texts.outcome);
+    showText(this.state, texts.state);
+    showText(this.score, texts.score);
+    showText(this.outcome, texts.outcome);
     this.outcome.classList.toggle("good", texts.good);
   }
 
   /** The current picture as PNG. */
-  picture(frame: FrameState): Promise<Blob | null> {
+  toPng(frame: FrameState): Promise<Blob | null> {
     const view = this.view();
     // WebGL keeps the drawing only until the browser has shown it: draw and read in the same task.
     view.draw(frame);
@@ -92,20 +98,20 @@ export class Stage {
   }
 
   private view(): View {
-    return this.flat || this.solid === null ? this.plane : this.solid;
+    return this.isFlat || this.view3d === null ? this.flatView : this.view3d;
   }
 
-  private openSolid(still: boolean, changed: () => void): View3D | null {
+  private openView3d(prefersReducedMotion: boolean, changed: () => void): View3D | null {
     try {
-      const view = new View3D(still, changed);
+      const view = new View3D(prefersReducedMotion, changed);
       view.canvas.addEventListener("webglcontextlost", (event) => {
         event.preventDefault();
         this.unavailable = "3-D was stopped by the browser: the flat view is shown.";
-        this.choose();
+        this.updateShownView();
       });
       view.canvas.addEventListener("webglcontextrestored", () => {
         this.unavailable = null;
-        this.choose();
+        this.updateShownView();
       });
       return view;
     } catch {
@@ -114,23 +120,23 @@ export class Stage {
     }
   }
 
-  private choose(): void {
-    this.plane.canvas.hidden = !this.flat;
-    if (this.solid !== null) this.solid.canvas.hidden = this.flat;
-    this.element.classList.toggle("flat", this.flat);
-    write(this.note, this.unavailable ?? "");
+  private updateShownView(): void {
+    this.flatView.canvas.hidden = !this.isFlat;
+    if (this.view3d !== null) this.view3d.canvas.hidden = this.isFlat;
+    this.element.classList.toggle("flat", this.isFlat);
+    showText(this.note, this.unavailable ?? "");
     this.switched();
   }
 
   private resize(): void {
-    const { clientWidth, clientHeight } = this.field;
+    const { clientWidth, clientHeight } = this.canvasArea;
     this.ratio = Math.min(devicePixelRatio, 2);
-    this.plane.resize(clientWidth, clientHeight, this.ratio);
-    this.solid?.resize(clientWidth, clientHeight, this.ratio);
+    this.flatView.resize(clientWidth, clientHeight, this.ratio);
+    this.view3d?.resize(clientWidth, clientHeight, this.ratio);
   }
 }
 
-function write(element: HTMLElement, text: string): void {
+function showText(element: HTMLElement, text: string): void {
   setText(element, text);
   if (element.hidden !== (text === "")) element.hidden = text === "";
 }

@@ -1,11 +1,11 @@
-//! OpenAPI schemas as text, with links to named schemas.
+//! Types of the API as text, from their OpenAPI schemas, with links to named schemas.
 
 use super::super::markdown::{self, Prose};
 use serde_json::Value;
 
 /// A part of the description of a type.
 #[derive(Debug, PartialEq, Eq)]
-pub(in crate::docs) enum Part {
+pub(in crate::docs) enum TypePart {
     Text(String),
     Code(String),
     /// A link to a named schema.
@@ -16,13 +16,13 @@ pub(in crate::docs) enum Part {
 #[derive(Debug)]
 pub(in crate::docs) struct Field {
     pub(in crate::docs) name: String,
-    pub(in crate::docs) shape: Vec<Part>,
+    pub(in crate::docs) type_parts: Vec<TypePart>,
     pub(in crate::docs) is_required: bool,
-    pub(in crate::docs) about: Prose,
+    pub(in crate::docs) description: Prose,
 }
 
 /// Describes a type: `integer (uint32)`, `list of Seed`.
-pub(super) fn shape(schema: &Value) -> Vec<Part> {
+pub(super) fn describe_type(schema: &Value) -> Vec<TypePart> {
     let mut parts = Vec::new();
     write(schema, &mut parts);
     parts
@@ -31,21 +31,22 @@ pub(super) fn shape(schema: &Value) -> Vec<Part> {
 /// The fields of an object.
 pub(super) fn fields(schema: &Value) -> Vec<Field> {
     let required = schema["required"].as_array();
-    let is_required =
-        |name: &str| required.is_some_and(|names| names.iter().any(|one| one == name));
+    let is_required = |name: &str| {
+        required.is_some_and(|names| names.iter().any(|required_name| required_name == name))
+    };
     let fields = schema["properties"].as_object().into_iter().flatten();
     fields
         .map(|(name, field)| Field {
             name: name.clone(),
-            shape: shape(field),
+            type_parts: describe_type(field),
             is_required: is_required(name),
-            about: about(field),
+            description: description(field),
         })
         .collect()
 }
 
 /// The description of a schema; for a nullable schema, the description of the other variant.
-pub(super) fn about(schema: &Value) -> Prose {
+pub(super) fn description(schema: &Value) -> Prose {
     let own = schema["description"].as_str();
     let variant_description = || {
         let variants = schema["oneOf"].as_array().into_iter().flatten();
@@ -56,18 +57,18 @@ pub(super) fn about(schema: &Value) -> Prose {
     markdown::render_prose(own.or_else(variant_description).unwrap_or_default())
 }
 
-fn write(schema: &Value, parts: &mut Vec<Part>) {
+fn write(schema: &Value, parts: &mut Vec<TypePart>) {
     if let Some(name) = schema["$ref"].as_str() {
         let name = name.rsplit('/').next().unwrap_or_default();
-        parts.push(Part::Schema(name.to_owned()));
+        parts.push(TypePart::Schema(name.to_owned()));
     } else if let Some(variants) = schema["oneOf"].as_array() {
         write_alternatives(variants, parts);
     } else if let Some(values) = schema["enum"].as_array() {
-        for (at, value) in values.iter().enumerate() {
-            if at > 0 {
+        for (index, value) in values.iter().enumerate() {
+            if index > 0 {
                 parts.push(text(" or "));
             }
-            parts.push(Part::Code(value.to_string()));
+            parts.push(TypePart::Code(value.to_string()));
         }
     } else {
         write_type(schema, parts);
@@ -78,7 +79,7 @@ fn write(schema: &Value, parts: &mut Vec<Part>) {
             if default.to_string().len() > MAX_DEFAULT_LENGTH => {}
         default => {
             parts.push(text("; default: "));
-            parts.push(Part::Code(default.to_string()));
+            parts.push(TypePart::Code(default.to_string()));
         }
     }
 }
@@ -86,14 +87,14 @@ fn write(schema: &Value, parts: &mut Vec<Part>) {
 /// Longer defaults are omitted; the schema of the value lists them.
 const MAX_DEFAULT_LENGTH: usize = 60;
 
-fn write_type(schema: &Value, parts: &mut Vec<Part>) {
+fn write_type(schema: &Value, parts: &mut Vec<TypePart>) {
     let names: Vec<&str> = match &schema["type"] {
         Value::String(name) => vec![name],
         Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
         _ => vec!["any value"],
     };
-    for (at, name) in names.iter().enumerate() {
-        if at > 0 {
+    for (index, name) in names.iter().enumerate() {
+        if index > 0 {
             parts.push(text(" or "));
         }
         match *name {
@@ -121,14 +122,14 @@ fn write_type(schema: &Value, parts: &mut Vec<Part>) {
     }
 }
 
-fn write_object(schema: &Value, parts: &mut Vec<Part>) {
+fn write_object(schema: &Value, parts: &mut Vec<TypePart>) {
     if let Some(fields) = schema["properties"].as_object() {
         parts.push(text("object with "));
-        for (at, (name, field)) in fields.iter().enumerate() {
-            if at > 0 {
+        for (index, (name, field)) in fields.iter().enumerate() {
+            if index > 0 {
                 parts.push(text(", "));
             }
-            parts.push(Part::Code(name.clone()));
+            parts.push(TypePart::Code(name.clone()));
             parts.push(text(" ("));
             write(field, parts);
             parts.push(text(")"));
@@ -154,17 +155,17 @@ fn bounds(schema: &Value, min: &str, max: &str) -> String {
     }
 }
 
-fn write_alternatives(schemas: &[Value], parts: &mut Vec<Part>) {
-    for (at, schema) in schemas.iter().enumerate() {
-        if at > 0 {
+fn write_alternatives(schemas: &[Value], parts: &mut Vec<TypePart>) {
+    for (index, schema) in schemas.iter().enumerate() {
+        if index > 0 {
             parts.push(text(" or "));
         }
         write(schema, parts);
     }
 }
 
-fn text(text: &str) -> Part {
-    Part::Text(text.to_owned())
+fn text(text: &str) -> TypePart {
+    TypePart::Text(text.to_owned())
 }
 
 #[cfg(test)]
@@ -172,12 +173,12 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn description(schema: Value) -> String {
-        let parts = shape(&schema);
+    fn type_text(schema: Value) -> String {
+        let parts = describe_type(&schema);
         let parts = parts.iter().map(|part| match part {
-            Part::Text(text) => text.clone(),
-            Part::Code(code) => format!("`{code}`"),
-            Part::Schema(name) => format!("[{name}]"),
+            TypePart::Text(text) => text.clone(),
+            TypePart::Code(code) => format!("`{code}`"),
+            TypePart::Schema(name) => format!("[{name}]"),
         });
         parts.collect()
     }
@@ -221,13 +222,13 @@ mod tests {
             ),
             (json!({}), "any value"),
         ] {
-            assert_eq!(description(schema.clone()), expected, "{schema}");
+            assert_eq!(type_text(schema.clone()), expected, "{schema}");
         }
     }
 
     #[test]
     fn nullable_schema_has_the_description_of_its_variant() {
         let schema = json!({ "oneOf": [{ "type": "null" }, { "description": "A `seed`.", "type": "string" }] });
-        assert_eq!(about(&schema).html, "<p>A <code>seed</code>.</p>\n");
+        assert_eq!(description(&schema).html, "<p>A <code>seed</code>.</p>\n");
     }
 }
