@@ -17,20 +17,9 @@ mkdir -p "$target"
 target=$(cd "$target" && pwd)
 python=${PYTHON:-python3}
 
-# An environment with the requirements of a file, created again only when the file has changed.
-environment() {
-    wanted=$(cksum < "$2")
-    if [ "$(cat "$1/made-of" 2>/dev/null)" != "$wanted" ]; then
-        rm -rf "$1"
-        "$python" -m venv "$1"
-        "$1/bin/python" -m pip install --quiet --disable-pip-version-check -r "$2"
-        echo "$wanted" > "$1/made-of"
-    fi
-}
-
 # Builds a wheel in a folder; the other arguments are maturin's.
 wheel() {
-    environment "$target/python-build" "$here/requirements-build.txt"
+    "$root/tests/python-environment.sh" "$target/python-build" "$here/requirements-build.txt"
     out=$1
     shift
     rm -rf "$out"
@@ -47,9 +36,9 @@ case ${1:-} in
     test)
         shift
         wheel "$target/wheels-of-this-host" --features as-in-the-workspace
-        environment "$target/python-test" "$here/requirements-test.txt"
+        "$root/tests/python-environment.sh" "$target/python-test" "$here/requirements-test.txt"
         "$target/python-test/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
-            "$target"/wheels-of-this-host/*.whl
+            --no-compile "$target"/wheels-of-this-host/*.whl
         # Not in the sources' folder, because they would be imported instead of the installed wheel.
         cd "$target"
         "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$here/python/faceoff"
@@ -62,7 +51,7 @@ case ${1:-} in
     learning)
         shift
         wheel "$target/wheels-of-this-host" --release
-        environment "$target/python-learning" "$here/tests_learning/requirements.txt"
+        "$root/tests/python-environment.sh" "$target/python-learning" "$here/tests_learning/requirements.txt"
         "$target/python-learning/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
             "$target"/wheels-of-this-host/*.whl
         cd "$target"

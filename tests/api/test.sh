@@ -10,15 +10,8 @@ root=$(cd "$here/../.." && pwd)
 target=${TARGET_DIR:-$root/target}
 mkdir -p "$target"
 target=$(cd "$target" && pwd)
-python=${PYTHON:-python3}
 
-required=$(cksum < "$here/requirements.txt")
-if [ "$(cat "$target/api-test/made-of" 2>/dev/null)" != "$required" ]; then
-    rm -rf "$target/api-test"
-    "$python" -m venv "$target/api-test"
-    "$target/api-test/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
-    echo "$required" > "$target/api-test/made-of"
-fi
+"$root/tests/python-environment.sh" "$target/api-test" "$here/requirements.txt"
 # The TypeScript client is generated, checked and run in the folder of its packages. They are installed again when their list changes.
 required=$(cat "$here/typescript/package.json" "$here/typescript/package-lock.json" | cksum)
 if [ "$(cat "$target/api-typescript/made-of" 2>/dev/null)" != "$required" ]; then

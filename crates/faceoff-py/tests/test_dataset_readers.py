@@ -59,16 +59,13 @@ print(len(steps))
 def python() -> Path:
     """The interpreter of the environment with the old readers."""
     folder = Path(os.environ.get("FACEOFF_OLD_READERS", ROOT / "target" / "python" / "old-readers"))
-    interpreter, mark = folder / "bin" / "python", folder / "installed.txt"
-    if mark.exists() and mark.read_text() == REQUIREMENTS.read_text():
-        return interpreter
     base = sys.executable if sys.version_info[:2] == (3, 11) else shutil.which("python3.11")
     if base is None:
         pytest.skip("pyarrow 12 has no wheel for this Python, and there is no python3.11 here")
-    subprocess.run([base, "-m", "venv", "--clear", folder], check=True)
-    subprocess.run([interpreter, "-m", "pip", "install", "-q", "-r", REQUIREMENTS], check=True)
-    mark.write_text(REQUIREMENTS.read_text())
-    return interpreter
+    subprocess.run(
+        [ROOT / "tests" / "python-environment.sh", folder, REQUIREMENTS], env={**os.environ, "PYTHON": base}, check=True
+    )
+    return folder / "bin" / "python"
 
 
 def run(*arguments: object) -> str:
