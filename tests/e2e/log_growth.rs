@@ -15,8 +15,8 @@ use std::{
 /// The server's limit for the log, plus what may be written while it truncates the log.
 pub(crate) const LOG_LIMIT_BYTES: u64 = (16 + 4) << 20;
 
-/// Number of writes that exceed the limit more than twice: each takes about 20 KB of log.
-const TEAMS: u32 = 2000;
+/// Number of writes that exceed the limit more than twice: each takes about 100 KB of log.
+const WRITES: u32 = 400;
 
 const CONFIG: &str = concat!(
     include_str!("../patient.toml"),
@@ -27,11 +27,11 @@ fn log_bytes(data_dir: &Path) -> u64 {
     fs::metadata(data_dir.join("faceoff.sqlite3-wal")).map_or(0, |file| file.len())
 }
 
-/// One write: a team and its event.
-fn create_team(server: &Server, number: u32) {
-    let new = json!({ "name": format!("Team {number}") });
+/// One write: new terms, as long as they may be, of characters of four bytes each.
+fn publish_terms(server: &Server) {
+    let new = json!({ "text": "\u{1d7d8}".repeat(20_000) });
     loop {
-        let answer = server.post("/api/v1/teams", &server.admin_token, &new);
+        let answer = server.post("/api/v1/terms", &server.admin_token, &new);
         // On a busy machine the server may time out with 503; a client tries again.
         match answer.status().as_u16() {
             503 => thread::sleep(Duration::from_millis(200)),
@@ -69,13 +69,13 @@ fn log_stays_bounded_under_continuous_reads() {
                 }
             });
         }
-        let after_each = (0..TEAMS).map(|number| {
-            create_team(&server, number);
+        let after_each = (0..WRITES).map(|_| {
+            publish_terms(&server);
             log_bytes(&data_dir)
         });
         after_each.max()
     });
-    let longest = longest.expect("there are teams");
+    let longest = longest.expect("there are writes");
     assert!(longest < LOG_LIMIT_BYTES, "{longest} bytes");
 }
 
@@ -93,7 +93,7 @@ fn long_read_delays_no_write_and_log_shrinks_afterwards() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let server = Server::start(&data_dir, CONFIG);
-    create_team(&server, u32::MAX);
+    publish_terms(&server);
     let mut reader = Command::new("python3")
         .args(["-c", LONG_READER])
         .arg(data_dir.join("faceoff.sqlite3"))
@@ -108,11 +108,11 @@ fn long_read_delays_no_write_and_log_shrinks_afterwards() {
         .expect("a pipe can be read");
     assert_eq!(line.trim(), "reading");
 
-    let mut number = 0;
+    let mut writes = 1;
     while log_bytes(&data_dir) <= LOG_LIMIT_BYTES {
-        create_team(&server, number);
-        number += 1;
-        assert!(number < 20 * TEAMS, "the reader holds the log");
+        publish_terms(&server);
+        writes += 1;
+        assert!(writes < 20 * WRITES, "the reader holds the log");
     }
     assert_eq!(
         server.log().matches("log cannot be emptied").count(),
@@ -130,8 +130,7 @@ fn long_read_delays_no_write_and_log_shrinks_afterwards() {
             "{} bytes",
             log_bytes(&data_dir)
         );
-        create_team(&server, number);
-        number += 1;
+        publish_terms(&server);
     }
     server.wait_for_log("log is emptied", 1);
 }

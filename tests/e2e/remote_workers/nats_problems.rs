@@ -22,7 +22,7 @@ use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, 
 use serde_json::json;
 use std::{
     fs,
-    path::Path,
+    path::{Path, PathBuf},
     thread,
     time::{Duration, Instant},
 };
@@ -139,9 +139,20 @@ fn result_waits_while_stream_is_full() {
     );
 }
 
-/// Many episodes in one shard, so that its result is the only message over the limit.
+/// Many episodes in one shard, so that its result is the only message over the limit. All may end with an agent fault.
 fn with_large_result(config: &str) -> String {
-    with_episodes(config, 60, 60).replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]")
+    with_episodes(config, 60, 60).replace(
+        "[evaluation]",
+        "[evaluation]\ntasks = [\"hit\"]\nmax_faults = 60",
+    )
+}
+
+/// An agent that passes the validation. Later it ends each episode at once, with an agent fault.
+fn failing_agent(scratch: &Path) -> PathBuf {
+    let source = bundle::python_agent(
+        "seen = globals().setdefault('seen', [0])\nseen[0] += 1\nsay(hold if seen[0] <= 1500 else {})",
+    );
+    bundle::python_bundle(scratch, "failing", &source)
 }
 
 #[test]
@@ -153,7 +164,7 @@ fn oversized_result_is_platform_fault_and_evaluation_is_rerun() {
     let server = Server::start(&scratch.path().join("data"), &config);
     files.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
-    let agent = bundle::reference("striker", scratch.path());
+    let agent = failing_agent(scratch.path());
     let submission = team.submit(&server, &agent);
     let evaluation = team.evaluate(&server, &submission);
     let _worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
@@ -187,7 +198,7 @@ fn oversized_result_waits_until_limit_is_raised() {
     let server = Server::start(&scratch.path().join("data"), &config);
     files.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
-    let agent = bundle::reference("striker", scratch.path());
+    let agent = failing_agent(scratch.path());
     let submission = team.submit(&server, &agent);
     let evaluation = team.evaluate(&server, &submission);
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));

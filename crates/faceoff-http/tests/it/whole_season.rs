@@ -1,4 +1,4 @@
-//! A season of three months with forty teams in one test. The clock is set from cutoff to cutoff. Requests, database,
+//! A season of three months with twenty teams in one test. The clock is set from cutoff to cutoff. Requests, database,
 //! schedule and clean-up are real; a fake worker commits random outcomes without running agents.
 
 mod fake_worker;
@@ -9,11 +9,11 @@ use season::{DAYS, Season};
 use serde_json::json;
 
 /// The largest size of the database during a season, without datasets and archives.
-const MAX_BYTES: u64 = 50 << 20;
+const MAX_BYTES: u64 = 25 << 20;
 
 #[tokio::test]
 #[expect(clippy::print_stdout, reason = "the test prints its measurements")]
-async fn database_stays_small_with_forty_teams_and_ninety_days() {
+async fn database_stays_small_with_twenty_teams_and_ninety_days() {
     let mut season = Season::start().await;
     let (mut largest, mut evaluations) = (0, 0);
     for day in 0..DAYS {

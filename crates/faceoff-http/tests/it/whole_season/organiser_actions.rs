@@ -12,6 +12,8 @@ const VOIDED_DAY: i32 = 25;
 const DISQUALIFICATION: i32 = 30;
 const REINSTATEMENT: i32 = 37;
 const OVERFULL_DAY: i32 = 40;
+/// Evaluations of the overfull day that finish before its deadline, of those of all teams.
+const FINISHED_BEFORE_DEADLINE: usize = 12;
 const FREEZE: i32 = 45;
 const UNFREEZE: i32 = 48;
 const RULE_CHANGE: i32 = 52;
@@ -26,7 +28,7 @@ pub fn is_down_at_cutoff(day: i32) -> bool {
 
 /// The number of evaluations that finish before the deadline of the day, if not all.
 pub fn finished_evaluations(day: i32) -> Option<usize> {
-    (day == OVERFULL_DAY).then_some(25)
+    (day == OVERFULL_DAY).then_some(FINISHED_BEFORE_DEADLINE)
 }
 
 fn reason(why: &str) -> Value {
@@ -209,13 +211,13 @@ impl Season {
         let (finished, not_played, all) = states(self).await;
         assert_eq!(
             (finished, not_played),
-            (25, 0),
+            (FINISHED_BEFORE_DEADLINE, 0),
             "it may continue until the next cutoff"
         );
         self.site
             .set_time(at(day + 1, 18) - jiff::SignedDuration::from_millis(1));
         start_due(&self.site.store, self.site.now()).await.unwrap();
-        assert_eq!(states(self).await, (25, 0, all));
+        assert_eq!(states(self).await, (FINISHED_BEFORE_DEADLINE, 0, all));
         // The cutoff in the evening ends it.
         self.site.set_time(at(day + 1, 10));
         assert_eq!(self.teams_on_board(day).await.len(), self.active_teams());
@@ -229,7 +231,7 @@ impl Season {
             .json(200);
         let overdue = self.evaluations(OVERFULL_DAY).await;
         let not_played = overdue.iter().filter(|one| one["state"] == "not_played");
-        assert_eq!(not_played.count(), overdue.len() - 25);
+        assert_eq!(not_played.count(), overdue.len() - FINISHED_BEFORE_DEADLINE);
     }
 
     async fn unfreeze(&mut self) {

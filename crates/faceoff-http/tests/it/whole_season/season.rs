@@ -13,11 +13,11 @@ use std::{
 };
 
 pub const DAYS: i32 = 90;
-const TEAMS: usize = 40;
+const TEAMS: usize = 20;
 /// The number of teams on the first day. Of the others, one joins each day.
-const FIRST_TEAMS: usize = 30;
+const FIRST_TEAMS: usize = 12;
 const DAYS_PER_SUBMISSION: usize = 10;
-/// A tenth of a real stage's, and the bound of the database is scaled likewise.
+/// A tenth of a real stage's. The bound of the database is scaled by that, and by the number of teams (here 20, there 40).
 const EPISODES: u32 = 100;
 /// One shard per task. A real stage has smaller shards, but the rows that stay do not depend on that.
 const EPISODES_PER_SHARD: u32 = EPISODES;
