@@ -139,7 +139,7 @@ fn duplicate_keys_and_non_finite_numbers_are_refused() {
     assert_invalid(&agents);
 }
 
-/// Only the task in which the actions are extreme.
+/// A configuration with the one task in which the actions are extreme.
 fn prepare_only() -> String {
     CONFIG.replace("[evaluation]", "[evaluation]\ntasks = [\"prepare\"]")
 }
@@ -184,10 +184,10 @@ fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
 
 #[test]
 fn extreme_valid_actions_are_simulated_and_verified() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let server = Server::start(&scratch.path().join("data"), &prepare_only());
     for (name, interpolation, action) in EXTREME_ACTIONS {
-        let team = Team::create(&server, name);
+        let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+        let server = Server::start(&scratch.path().join("data"), &prepare_only());
+        let team = Team::create(&server, "Alpha");
         // The agent holds still during the validation run.
         let held = match interpolation {
             "None" => "[[held, [0.0] * 7, [0.0] * 7]] * 20",
@@ -197,13 +197,13 @@ fn extreme_valid_actions_are_simulated_and_verified() {
         };
         let on_step = format!(
             "s = 1e4 if message['step'] % 2 else -1e4\n\
-             hold['action'] = {action} if resets > 1 else {held}\n\
+             hold['action'] = {action} if task == 'prepare' and resets > 1 else {held}\n\
              say(hold)"
         );
         let source = agent(interpolation, &on_step)
             .replace(
                 "    if kind == \"hello\":\n",
-                "    if kind == \"hello\":\n        resets = 0\n",
+                "    if kind == \"hello\":\n        task, resets = message[\"task\"], 0\n",
             )
             .replace(
                 "    elif kind == \"reset\":\n",

@@ -23,7 +23,7 @@ const RECORD_STREAMS: &str = "
     };
     const later = window.setTimeout;
     window.setTimeout = (callback, ms, ...args) => {
-        if (callback.name === 'follow') window.waits.push(ms);
+        if (callback.name === 'followStream') window.waits.push(ms);
         return later(callback, ms, ...args);
     };
 ";

@@ -15,8 +15,8 @@ use std::{
 /// The server's limit for the log, plus what may be written while it truncates the log.
 pub(crate) const LOG_LIMIT_BYTES: u64 = (16 + 4) << 20;
 
-/// Number of writes that exceed the limit more than twice: each takes about 100 KB of log.
-const WRITES: u32 = 400;
+/// Number of writes that exceed the limit more than twice: each takes about 70 KB of log.
+const WRITES: u32 = 600;
 
 const CONFIG: &str = concat!(
     include_str!("../patient.toml"),
@@ -27,9 +27,9 @@ fn log_bytes(data_dir: &Path) -> u64 {
     fs::metadata(data_dir.join("faceoff.sqlite3-wal")).map_or(0, |file| file.len())
 }
 
-/// One write: new terms, as long as they may be, of characters of four bytes each.
-fn publish_terms(server: &Server) {
-    let new = json!({ "text": "\u{1d7d8}".repeat(20_000) });
+/// One write: new terms, about as long as they may be, of characters of three bytes each.
+fn publish_terms(server: &Server, version: u32) {
+    let new = json!({ "text": format!("{version}{}", "\u{2460}".repeat(19_990)) });
     loop {
         let answer = server.post("/api/v1/terms", &server.admin_token, &new);
         // On a busy machine the server may time out with 503; a client tries again.
@@ -69,8 +69,8 @@ fn log_stays_bounded_under_continuous_reads() {
                 }
             });
         }
-        let after_each = (0..WRITES).map(|_| {
-            publish_terms(&server);
+        let after_each = (0..WRITES).map(|version| {
+            publish_terms(&server, version);
             log_bytes(&data_dir)
         });
         after_each.max()
@@ -93,7 +93,7 @@ fn long_read_delays_no_write_and_log_shrinks_afterwards() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let server = Server::start(&data_dir, CONFIG);
-    publish_terms(&server);
+    publish_terms(&server, 0);
     let mut reader = Command::new("python3")
         .args(["-c", LONG_READER])
         .arg(data_dir.join("faceoff.sqlite3"))
@@ -110,7 +110,7 @@ fn long_read_delays_no_write_and_log_shrinks_afterwards() {
 
     let mut writes = 1;
     while log_bytes(&data_dir) <= LOG_LIMIT_BYTES {
-        publish_terms(&server);
+        publish_terms(&server, writes);
         writes += 1;
         assert!(writes < 20 * WRITES, "the reader holds the log");
     }
@@ -130,7 +130,8 @@ fn long_read_delays_no_write_and_log_shrinks_afterwards() {
             "{} bytes",
             log_bytes(&data_dir)
         );
-        publish_terms(&server);
+        publish_terms(&server, writes);
+        writes += 1;
     }
     server.wait_for_log("log is emptied", 1);
 }

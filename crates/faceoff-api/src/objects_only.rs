@@ -1,7 +1,7 @@
 //! Refuses JSON arrays in place of objects.
 //!
-//! Structs with a derived `Deserialize` also accept an array, field by position. The API document does not promise
-//! that, positions change with the code, and `[null, null]` would pass as a request that changes nothing.
+//! Structs with a derived `Deserialize` also accept an array, whose items are the fields by position. The OpenAPI document
+//! does not promise this, positions change with the code, and `[null, null]` would pass as a request that changes nothing.
 
 use serde::{
     Deserialize,
@@ -14,17 +14,21 @@ use serde::{
 use serde_json::{Error, Map, Value, map};
 use std::slice;
 
-/// Refuses a value that fits `T` except that it has an array in place of an object, at any depth.
+/// Checks that a value, which deserialises as `T`, has no array in place of an object, at any depth.
+///
+/// # Errors
+/// The path of the first such array.
 pub fn check<'de, T: Deserialize<'de>>(
     value: &'de Value,
 ) -> Result<(), serde_path_to_error::Error<Error>> {
-    serde_path_to_error::deserialize::<_, T>(Objects(value)).map(drop)
+    serde_path_to_error::deserialize::<_, T>(ObjectsOnly(value)).map(drop)
 }
 
+/// A deserializer like that of [`Value`], except that it accepts only objects for structs.
 #[derive(Clone, Copy)]
-struct Objects<'de>(&'de Value);
+struct ObjectsOnly<'de>(&'de Value);
 
-impl<'de> IntoDeserializer<'de, Error> for Objects<'de> {
+impl<'de> IntoDeserializer<'de, Error> for ObjectsOnly<'de> {
     type Deserializer = Self;
 
     fn into_deserializer(self) -> Self {
@@ -32,7 +36,7 @@ impl<'de> IntoDeserializer<'de, Error> for Objects<'de> {
     }
 }
 
-impl<'de> Deserializer<'de> for Objects<'de> {
+impl<'de> Deserializer<'de> for ObjectsOnly<'de> {
     type Error = Error;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
@@ -89,6 +93,7 @@ impl<'de> Deserializer<'de> for Objects<'de> {
     }
 }
 
+/// The items of an array that remain to be read.
 struct Items<'de>(slice::Iter<'de, Value>);
 
 impl<'de> SeqAccess<'de> for Items<'de> {
@@ -98,7 +103,10 @@ impl<'de> SeqAccess<'de> for Items<'de> {
         &mut self,
         seed: S,
     ) -> Result<Option<S::Value>, Error> {
-        let next = self.0.next().map(|item| seed.deserialize(Objects(item)));
+        let next = self
+            .0
+            .next()
+            .map(|item| seed.deserialize(ObjectsOnly(item)));
         next.transpose()
     }
 
@@ -107,15 +115,16 @@ impl<'de> SeqAccess<'de> for Items<'de> {
     }
 }
 
+/// The fields of an object: those that remain to be read, and the value of the last name that was read.
 struct Fields<'de> {
-    rest: map::Iter<'de>,
+    remaining: map::Iter<'de>,
     value: &'de Value,
 }
 
 impl<'de> Fields<'de> {
     fn new(fields: &'de Map<String, Value>) -> Self {
         Self {
-            rest: fields.iter(),
+            remaining: fields.iter(),
             value: &Value::Null,
         }
     }
@@ -128,7 +137,7 @@ impl<'de> MapAccess<'de> for Fields<'de> {
         &mut self,
         seed: S,
     ) -> Result<Option<S::Value>, Error> {
-        let Some((name, value)) = self.rest.next() else {
+        let Some((name, value)) = self.remaining.next() else {
             return Ok(None);
         };
         self.value = value;
@@ -137,11 +146,11 @@ impl<'de> MapAccess<'de> for Fields<'de> {
     }
 
     fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Error> {
-        seed.deserialize(Objects(self.value))
+        seed.deserialize(ObjectsOnly(self.value))
     }
 }
 
-/// Externally tagged: the variant's name is the only field.
+/// An externally tagged enum: the variant's name is the object's only field.
 impl<'de> EnumAccess<'de> for Fields<'de> {
     type Error = Error;
     type Variant = Self;
@@ -162,11 +171,11 @@ impl<'de> VariantAccess<'de> for Fields<'de> {
     }
 
     fn newtype_variant_seed<S: DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, Error> {
-        seed.deserialize(Objects(self.value))
+        seed.deserialize(ObjectsOnly(self.value))
     }
 
     fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, Error> {
-        Objects(self.value).deserialize_seq(visitor)
+        ObjectsOnly(self.value).deserialize_seq(visitor)
     }
 
     fn struct_variant<V: Visitor<'de>>(
@@ -174,7 +183,7 @@ impl<'de> VariantAccess<'de> for Fields<'de> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Error> {
-        Objects(self.value).deserialize_struct("", fields, visitor)
+        ObjectsOnly(self.value).deserialize_struct("", fields, visitor)
     }
 }
 
@@ -208,30 +217,30 @@ mod tests {
 
     #[test]
     fn array_in_place_of_object_is_refused_at_any_depth() {
-        let fits = [
+        let valid = [
             json!({"inner": {"name": "a"}, "pair": [1, 2.5], "kind": "plain"}),
             json!({"inner": null, "pair": [1, 2], "kind": {"counted": 3}}),
             json!({"pair": [1, 2], "kind": {"named": {"name": "a"}}}),
         ];
-        for value in fits {
+        for value in valid {
             check::<Outer>(&value).unwrap();
         }
-        let is_refused = |value: Value, place: &str| {
-            // The derived implementation accepts it; otherwise this check would not be needed.
+        let assert_refused = |value: Value, path: &str| {
+            // The derived implementation accepts the value; otherwise this check would not be needed.
             serde_json::from_value::<Outer>(value.clone()).unwrap();
             let error = check::<Outer>(&value).unwrap_err();
-            assert_eq!(error.path().to_string(), place, "{error}");
+            assert_eq!(error.path().to_string(), path, "{error}");
         };
-        is_refused(json!([{"name": "a"}, [1, 2], "plain"]), ".");
-        is_refused(
+        assert_refused(json!([{"name": "a"}, [1, 2], "plain"]), ".");
+        assert_refused(
             json!({"inner": ["a"], "pair": [1, 2], "kind": "plain"}),
             "inner",
         );
-        is_refused(
+        assert_refused(
             json!({"pair": [1, 2], "kind": {"named": ["a"]}}),
             "kind.named",
         );
-        is_refused(
+        assert_refused(
             json!({"pair": [1, 2], "kind": {"plain": null}}),
             "kind.plain",
         );

@@ -1,4 +1,4 @@
-//! Paths of API resources, for links in responses.
+//! Paths of API resources, for links in responses, and of the liveness probe.
 
 use faceoff_types::{EvaluationId, GameId, SubmissionId, TournamentId};
 

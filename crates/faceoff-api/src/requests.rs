@@ -1,4 +1,7 @@
-//! Request bodies and query parameters of the API.
+//! Request bodies and query parameters of the API. Documentation of their fields is part of the OpenAPI document.
+//!
+//! A *stage* is a period of the season with rules and boards of its own. Changed rules begin a new *revision*. A *cutoff* is
+//! the moment at which each team's active submission is fixed, and an *evaluation day* is all evaluations of one cutoff.
 
 mod boards;
 mod double_option;
@@ -44,7 +47,7 @@ pub struct NewTeam {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct ComparisonQuery {
-    /// Also return which episodes both agents, one of them, or neither solved.
+    /// Whether to return also which episodes both agents, one of them, or neither solved.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
     pub episodes: bool,
@@ -164,7 +167,7 @@ pub struct NewStage {
     /// Weight of each task's success rate in the overall score.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<TaskWeights>,
-    /// Highest penalty points per episode of each tier.
+    /// For each tier, the most penalty points per episode that it allows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tier_bounds: Option<TierBounds>,
     /// Magnitudes of the perturbations that the profile switches on. Fields that are left out have the ruleset's
@@ -194,7 +197,7 @@ pub struct NewStage {
     /// ablation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ablation_episodes: Option<u32>,
-    /// Episodes per job.
+    /// Episodes per shard, which is the part of a task that one job runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
     /// Until when the evaluations of a day may run: "next_cut" (the next cutoff), "never" or {"hours":30}. Default: the
@@ -202,7 +205,7 @@ pub struct NewStage {
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
-        deserialize_with = "deadline"
+        deserialize_with = "deserialize_deadline"
     )]
     pub day_deadline: Option<DayDeadline>,
     /// Whether only organisers see its scores. Default: false.
@@ -255,7 +258,7 @@ pub struct StageChange {
     /// Weight of each task's success rate in the overall score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<TaskWeights>,
-    /// Highest penalty points per episode of each tier.
+    /// For each tier, the most penalty points per episode that it allows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tier_bounds: Option<TierBounds>,
     /// Magnitudes of the perturbations that the profile switches on. Replaces all of them: fields that are left out get
@@ -288,12 +291,15 @@ pub struct StageChange {
     /// Episodes per task and profile of the ablation that a scheduled day starts for each submission; 0: no ablation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ablation_episodes: Option<u32>,
-    /// Episodes per job.
+    /// Episodes per shard, which is the part of a task that one job runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
     /// Until when the evaluations of a day may run: "next_cut" (the next cutoff), "never" or {"hours":30}. Applies to
     /// running days, too.
-    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "deadline")]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "deserialize_deadline"
+    )]
     pub day_deadline: Option<DayDeadline>,
     /// `false` reveals the scores of a blind stage, also after it has closed; once there are scores this is final.
     /// `true` only before the stage has scores.
@@ -316,7 +322,9 @@ pub struct StageChange {
 }
 
 /// Deserialises by way of a JSON value, so that a wrong deadline is reported as a wrong value and not as invalid JSON.
-fn deadline<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<DayDeadline>, D::Error> {
+fn deserialize_deadline<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<DayDeadline>, D::Error> {
     let value = Option::<serde_json::Value>::deserialize(deserializer)?;
     let Some(value) = value else { return Ok(None) };
     objects_only::check::<DayDeadline>(&value).map_err(serde::de::Error::custom)?;
@@ -324,7 +332,7 @@ fn deadline<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<DayDead
     parsed.map(Some).map_err(serde::de::Error::custom)
 }
 
-/// A trial to start: an evaluation that does not count.
+/// A trial to start: evaluations that do not count.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trial {
@@ -345,7 +353,7 @@ pub struct NewProposal {
     /// The date of a day; proposes all of its evaluations that count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub day: Option<Date>,
-    /// Use the stage's newest rules, and add the results to the board of that revision. Only with `day`.
+    /// Whether to use the stage's newest rules, and add the results to the board of these rules. Only with `day`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub new_rules: bool,
     /// Public once the proposal is applied. 1 to 500 characters.

@@ -1,7 +1,7 @@
-//! Tokens, session cookies and invitation codes.
+//! Secrets of API clients and users: tokens, session cookies and invitation codes.
 //!
-//! Each is 256 random bits behind a readable prefix. The server stores only the BLAKE3 hash. 2^256 values cannot be
-//! tried out, so a slow, salted hash as for passwords would only slow every request down.
+//! Each is 256 random bits behind a readable prefix. The server stores only the BLAKE3 hash. Trying out 2^256 values is impossible,
+//! so a slow, salted hash, which passwords need, would only slow every request down.
 
 use std::fmt;
 

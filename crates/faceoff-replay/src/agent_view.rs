@@ -6,17 +6,17 @@ use faceoff_sim::{JOINTS, model::CONTROL_STEP_S, table::geometry::TABLE};
 use faceoff_types::Interpolation;
 use std::f64::consts::PI;
 
-const POSITION: f64 = 1e-4;
-/// rad.
-const ANGLE: f64 = 1e-3;
-const COMMAND: f64 = 1e-4;
-const TIME: f64 = 1e-5;
+// Resolutions: values are stored as multiples of these.
+const POSITION_RESOLUTION_M: f64 = 1e-4;
+const ANGLE_RESOLUTION_RAD: f64 = 1e-3;
+const COMMAND_RESOLUTION_RAD: f64 = 1e-4;
+const TIME_RESOLUTION_S: f64 = 1e-5;
 
-// Indices of the columns.
-const OBSERVED_PUCK: usize = 0;
-const COMMANDED: usize = 3;
-const COMPUTATION_TIME: usize = COMMANDED + JOINTS;
-const HOST_TIME: usize = COMPUTATION_TIME + 1;
+// Indices of columns. The observed puck has three (x, y, yaw), the commands one for each joint.
+const OBSERVED_PUCK_COLUMN: usize = 0;
+const COMMAND_COLUMN: usize = 3;
+const COMPUTATION_TIME_COLUMN: usize = COMMAND_COLUMN + JOINTS;
+const HOST_TIME_COLUMN: usize = COMPUTATION_TIME_COLUMN + 1;
 
 /// The samples of one side.
 #[derive(Debug)]
@@ -31,14 +31,17 @@ impl AgentView {
     /// The columns of a side, 0 or 1.
     pub fn new(side: u32) -> Self {
         let mut columns = vec![
-            Column::new("seen_x", "m", POSITION, 1),
-            Column::new("seen_y", "m", POSITION, 1),
-            Column::new("seen_yaw", "rad", ANGLE, 1),
+            Column::new("seen_x", "m", POSITION_RESOLUTION_M, 1),
+            Column::new("seen_y", "m", POSITION_RESOLUTION_M, 1),
+            Column::new("seen_yaw", "rad", ANGLE_RESOLUTION_RAD, 1),
         ];
-        columns.extend(joints("command", "rad", COMMAND, 2).map(|column| column.beginning_at(1)));
+        columns.extend(
+            joints("command", "rad", COMMAND_RESOLUTION_RAD, 2)
+                .map(|column| column.beginning_at(1)),
+        );
         columns.extend(
             ["computation_time", "host_time"]
-                .map(|name| Column::new(name, "s", TIME, 0).beginning_at(1)),
+                .map(|name| Column::new(name, "s", TIME_RESOLUTION_S, 0).beginning_at(1)),
         );
         Self {
             side,
@@ -62,23 +65,29 @@ impl AgentView {
                 if yaw > 0.0 { yaw - PI } else { yaw + PI },
             ],
         };
-        for (column, value) in self.columns[OBSERVED_PUCK..].iter_mut().zip(position) {
+        for (column, value) in self.columns[OBSERVED_PUCK_COLUMN..]
+            .iter_mut()
+            .zip(position)
+        {
             column.push(value);
         }
     }
 
     /// Number of observations so far.
     pub fn observations(&self) -> usize {
-        self.columns[OBSERVED_PUCK].counts.len()
+        self.columns[OBSERVED_PUCK_COLUMN].counts.len()
     }
 
     /// Adds the answer that led to a sample.
     pub fn answer(&mut self, sample: u32, action: &[f64], timing: &AnswerTiming, puck_lost: bool) {
-        for (column, value) in self.columns[COMMANDED..].iter_mut().zip(commanded(action)) {
+        for (column, value) in self.columns[COMMAND_COLUMN..]
+            .iter_mut()
+            .zip(commanded(action))
+        {
             column.push(*value);
         }
-        self.columns[COMPUTATION_TIME].push(timing.computation_time_s);
-        self.columns[HOST_TIME].push(timing.host_time_s);
+        self.columns[COMPUTATION_TIME_COLUMN].push(timing.computation_time_s);
+        self.columns[HOST_TIME_COLUMN].push(timing.host_time_s);
         if timing.computation_time_s > CONTROL_STEP_S {
             self.late.push(sample);
         }
@@ -95,8 +104,12 @@ impl AgentView {
 
     /// The columns, the late samples, and the tracking gaps.
     pub fn take(mut self) -> (Vec<Column>, Vec<u32>, Vec<TrackingGap>) {
-        if self.columns[HOST_TIME].counts.iter().all(|time| *time == 0) {
-            self.columns.truncate(HOST_TIME);
+        if self.columns[HOST_TIME_COLUMN]
+            .counts
+            .iter()
+            .all(|time| *time == 0)
+        {
+            self.columns.truncate(HOST_TIME_COLUMN);
         }
         (self.columns, self.late, self.gaps)
     }

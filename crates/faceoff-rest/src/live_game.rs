@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// Streams a live game (server-sent events).
 ///
 /// The first event is `snapshot`, the current state. Then follow all `happening` events (goals, fouls and the like) in
-/// chronological order, and `position` (of puck and robots) at most ten times a second, always the newest. While the game
+/// chronological order, and `position` (of puck and mallets) at most ten times a second, always the newest. While the game
 /// waits to be run, `waiting` is sent once. At the end `over` is sent, and the stream ends.
 ///
 /// The id of a `happening` is `ATTEMPT.NUMBER`; a game that is run again has a new attempt. A client that reconnects with

@@ -1,5 +1,5 @@
-//! Webhooks: URLs of a team, or of the organisers, to which the server delivers events. A webhook is *dead* once its
-//! deliveries have failed for too long.
+//! Webhooks: URLs of a team, or of the organisers, to which the server delivers events. A webhook is *dead* once the server
+//! has stopped its deliveries because of failures.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{

@@ -6,7 +6,7 @@
 
 use crate::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
-    dynamics::path::LanePath,
+    dynamics::simd_level::SimdLevel,
     episode::{Episode, StepOutcome},
     episode_step::step_episodes_on,
     robot::plant::Plant,
@@ -40,7 +40,7 @@ pub struct Batch {
     worlds: Vec<World>,
     observations: Vec<f64>,
     outcomes: Vec<BatchOutcome>,
-    path: LanePath,
+    simd_level: SimdLevel,
 }
 
 #[derive(Debug, Clone)]
@@ -95,14 +95,14 @@ impl Batch {
             setup,
             worlds,
             observations,
-            path: LanePath::fastest(),
+            simd_level: SimdLevel::fastest(),
         }
     }
 
     /// The same batch, computed with another instruction set. All of them give the same bits.
     #[must_use]
-    pub fn with_path(mut self, path: LanePath) -> Self {
-        self.path = path;
+    pub fn with_simd_level(mut self, simd_level: SimdLevel) -> Self {
+        self.simd_level = simd_level;
         self
     }
 
@@ -137,7 +137,7 @@ impl Batch {
             "expected an action of {action_len} numbers for each of {} worlds",
             self.worlds.len()
         );
-        let (setup, path) = (&self.setup, self.path);
+        let (setup, simd_level) = (&self.setup, self.simd_level);
         let worlds = self.worlds.par_chunks_mut(WORLDS_PER_CHUNK);
         let actions = actions.par_chunks(WORLDS_PER_CHUNK * action_len);
         let observations = self
@@ -154,7 +154,7 @@ impl Batch {
                 let mut episodes: Vec<&mut Episode> =
                     worlds.iter_mut().map(|world| &mut world.episode).collect();
                 let actions: Vec<&[f64]> = actions.chunks_exact(action_len).collect();
-                step_episodes_on(path, &mut episodes, &actions, steps);
+                step_episodes_on(simd_level, &mut episodes, &actions, steps);
                 let rows = observations.chunks_exact_mut(observation_len);
                 for (((world, step), row), outcome) in
                     worlds.iter_mut().zip(steps).zip(rows).zip(outcomes)

@@ -5,7 +5,7 @@
 //! and are computed at once, for any tasks, plants and step numbers.
 
 use crate::{
-    dynamics::path::LanePath,
+    dynamics::simd_level::SimdLevel,
     episode::{Episode, StepOutcome},
     world::World,
 };
@@ -20,7 +20,7 @@ pub fn step_episodes(
     actions: &[&[f64]],
     outcomes: &mut [StepOutcome],
 ) {
-    step_episodes_on(LanePath::fastest(), episodes, actions, outcomes);
+    step_episodes_on(SimdLevel::fastest(), episodes, actions, outcomes);
 }
 
 /// As [`step_episodes`], with a given instruction set. All of them give the same bits.
@@ -28,7 +28,7 @@ pub fn step_episodes(
 /// # Panics
 /// If the three slices differ in length.
 pub fn step_episodes_on(
-    path: LanePath,
+    simd_level: SimdLevel,
     episodes: &mut [&mut Episode],
     actions: &[&[f64]],
     outcomes: &mut [StepOutcome],
@@ -53,8 +53,11 @@ pub fn step_episodes_on(
             .filter(|episode| episode.world().robots() == robots)
             .peekable();
         while same_size.peek().is_some() {
-            let worlds = same_size.by_ref().take(path.worlds_at_once(robots));
-            World::control_step_all(path, worlds.map(|episode| episode.world_and_air_force()));
+            let worlds = same_size.by_ref().take(simd_level.worlds_at_once(robots));
+            World::control_step_all(
+                simd_level,
+                worlds.map(|episode| episode.world_and_air_force()),
+            );
         }
     }
     for (episode, outcome) in episodes.iter_mut().zip(outcomes) {

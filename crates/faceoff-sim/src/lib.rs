@@ -32,7 +32,7 @@ pub mod world;
 
 pub use batch::{Batch, BatchOutcome, BatchSetup};
 pub use channel::Command;
-pub use dynamics::path::LanePath;
+pub use dynamics::simd_level::SimdLevel;
 pub use episode::{
     EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
     constraints::ConstraintValues,

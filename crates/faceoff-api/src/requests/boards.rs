@@ -1,4 +1,4 @@
-//! Queries of boards and of their history.
+//! Queries of boards, which rank the teams of a stage, and of their history.
 
 use faceoff_types::{CountingResult, DivisionName, StageId, Task};
 use jiff::civil::Date;
@@ -26,7 +26,7 @@ pub struct BoardQuery {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub by: Option<BoardBy>,
-    /// Include evaluations that finished after the boards were frozen. For organisers only.
+    /// Whether to include evaluations that finished after the boards were frozen. For organisers only.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
     pub live: bool,
@@ -83,7 +83,7 @@ pub struct BoardPageQuery {
     /// See [`BoardQuery::live`].
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub live: bool,
-    /// The column that sorts the rows. Default: board order, tier by tier.
+    /// The column that sorts the rows. Default: board order, which is by tier, then by score.
     pub sort: Option<BoardSort>,
 }
 
@@ -108,7 +108,7 @@ impl BoardPageQuery {
 pub struct BoardSort {
     /// The column that sorts the rows.
     pub column: BoardColumn,
-    /// The worst value comes first.
+    /// Whether the worst value comes first.
     pub is_reversed: bool,
 }
 
@@ -212,7 +212,7 @@ pub struct HistoryQuery {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub by: Option<BoardBy>,
-    /// Include evaluations that finished after the boards were frozen. For organisers only.
+    /// Whether to include evaluations that finished after the boards were frozen. For organisers only.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
     pub live: bool,

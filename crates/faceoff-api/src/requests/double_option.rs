@@ -1,6 +1,8 @@
+//! Serialisation of optional fields in change requests: null removes a value, and a field that is left out does not change.
+
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Distinguishes null (`Some(None)`) from a field that is left out (`None`).
+/// Deserialises a field that is present: `Some(None)` for null. With `serde(default)`, a field that is left out is `None`.
 pub(super) fn deserialize_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<Option<Option<T>>, D::Error> {
@@ -11,6 +13,7 @@ pub(super) fn deserialize_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     clippy::option_option,
     reason = "null differs from a field that is left out"
 )]
+/// Serialises a field that is present: null for `Some(None)`.
 pub(super) fn serialize_option<S: Serializer, T: Serialize>(
     value: &Option<Option<T>>,
     serializer: S,

@@ -1,4 +1,4 @@
-//! Filter of an evaluation's episodes.
+//! Filter of an evaluation's episodes, for the page that lists them.
 
 use faceoff_replay::{EpisodeLine, Group};
 use faceoff_types::{EpisodeEnd, Task};
@@ -14,7 +14,8 @@ pub struct EpisodesQuery {
     /// `success` or `failure`.
     #[serde(default, alias = "went", skip_serializing_if = "String::is_empty")]
     pub outcome: String,
-    /// The limit that the episode exceeds: `any`, `ee`, `link`, `joint_pos`, `joint_vel` or `late`.
+    /// The limit that the episode exceeds: a constraint on the end effector (`ee`), a robot link (`link`), a joint position
+    /// (`joint_pos`) or a joint velocity (`joint_vel`), `any` of these, or the time of an answer (`late`).
     #[serde(default, alias = "broke", skip_serializing_if = "String::is_empty")]
     pub violated: String,
     /// How the episode ended.
@@ -45,7 +46,7 @@ pub enum BrokenLimit {
     Any,
     /// A constraint of this group.
     One(Group),
-    /// The time for an answer, one control step.
+    /// The time limit of an answer, which is one control step.
     Late,
 }
 
@@ -78,7 +79,7 @@ impl EpisodesQuery {
                 "" => None,
                 "any" => Some(BrokenLimit::Any),
                 "late" => Some(BrokenLimit::Late),
-                one => parse_field(one, "violated")?.map(BrokenLimit::One),
+                group => parse_field(group, "violated")?.map(BrokenLimit::One),
             },
             end: parse_field(&self.end, "end")?,
         })

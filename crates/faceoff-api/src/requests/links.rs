@@ -1,3 +1,5 @@
+//! Requests about signed links, which download a file without a token.
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 

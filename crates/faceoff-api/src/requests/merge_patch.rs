@@ -1,3 +1,5 @@
+//! OpenAPI schemas of JSON merge patches, which change some fields of an object.
+
 use std::{borrow::Cow, marker::PhantomData};
 use utoipa::{
     PartialSchema, ToSchema,

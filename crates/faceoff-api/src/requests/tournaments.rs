@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
 
-// Aliases: the macro does not parse type arguments in `value_type`.
+// These aliases are needed because the macro `ToSchema` does not parse type arguments in `value_type`.
 type RulesPatch = MergePatch<TournamentRules>;
 type SettingsPatch = MergePatch<TournamentSettings>;
 
@@ -94,8 +94,8 @@ pub struct NewDeparture {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NewTestGames {
-    /// From an organiser: names of the teams that get a test game. Default: all entrants. A team gets one for itself
-    /// only.
+    /// Names of the teams that get a test game, if an organiser requests them. Default: all entrants. A team can request a
+    /// test game only for itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub teams: Option<Vec<TeamName>>,
 }

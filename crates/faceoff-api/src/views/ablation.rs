@@ -1,4 +1,4 @@
-//! Ablations: what each perturbation costs an agent.
+//! Ablations: what each perturbation of the simulator (such as noise) costs an agent.
 
 use crate::views::evaluation::Progress;
 use faceoff_scoring::ProfileEffect;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// An ablation: a submission evaluated under each perturbation alone.
+/// An ablation: a submission evaluated without perturbations, with each perturbation alone, and with all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AblationView {
     /// The evaluated submission.
@@ -28,7 +28,7 @@ pub struct AblationView {
 pub enum AblationStatus {
     /// Waiting behind evaluations that count, or running.
     Open {
-        /// Over all profiles and tasks.
+        /// Episodes done and in total, over all profiles and tasks.
         progress: Progress,
     },
     /// All profiles are evaluated.

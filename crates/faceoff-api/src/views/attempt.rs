@@ -1,4 +1,4 @@
-//! Attempts at a game: each start on a slot, apart from the game's result.
+//! Attempts at a game. Each start on a slot (a place of a worker in which one job runs) is an attempt, whatever its outcome.
 
 use faceoff_types::deprecated_names;
 use jiff::Timestamp;

@@ -1,4 +1,5 @@
-//! Baselines on a board: reference agents of the organisers, shown unranked.
+//! Baselines on a board: reference agents of the organisers, shown unranked. If the stage counts the mean of several days, a
+//! row shows a mean of several evaluations.
 
 use crate::views::task::TaskView;
 use faceoff_types::{EvaluationId, Profile, Seed, Task, TeamId, TeamName, Tier, deprecated_names};

@@ -1,4 +1,5 @@
-//! Boards: ranks of the teams, and their statistical uncertainty.
+//! Boards: ranks of a stage's teams, and their statistical uncertainty. If the stage counts the mean of several days, a row
+//! shows a mean of several evaluations.
 
 use crate::views::{
     baseline::BaselineRow, ruling::RulingView, sign_off::SignOffView, task::TaskView,
@@ -30,7 +31,7 @@ pub struct BoardView {
     pub ruleset: String,
     /// Weight of each task's success rate in the overall score.
     pub weights: TaskWeights,
-    /// Highest penalty points per episode of each tier.
+    /// For each tier, the most penalty points per episode that it allows.
     pub tier_bounds: TierBounds,
     /// Magnitudes of the perturbations that the profile switches on; absent if they have the ruleset's values.
     #[serde(default, skip_serializing_if = "Option::is_none")]

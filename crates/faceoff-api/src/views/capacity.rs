@@ -1,4 +1,5 @@
-//! Capacity forecast: whether the evaluations of a day fit into the slots and the time available.
+//! Capacity forecast: whether the evaluations of a day will finish on the available slots (each runs one job at a time)
+//! before the day's deadline.
 
 use faceoff_types::{StageId, StageName};
 use jiff::{Timestamp, civil::Date};
@@ -38,7 +39,7 @@ pub struct DayLoad {
     pub deadline_at: Option<Timestamp>,
     /// Hours from now, or from the day's cutoff, to the deadline; null: no deadline.
     pub hours_until_deadline: Option<f64>,
-    /// Whether the day fits.
+    /// Whether the day's evaluations finish before its deadline.
     pub fit: Fit,
     /// The forecast in words, with advice.
     pub summary: String,

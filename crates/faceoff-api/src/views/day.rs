@@ -1,4 +1,5 @@
-//! An evaluation day after its cutoff, and the next cutoff.
+//! Evaluation days. A day's *cutoff* is the moment at which each team's active submission is fixed; the day is all
+//! evaluations of this cutoff.
 
 use crate::views::{evaluation::EvaluationView, exclusion::ExcludedTeam, team::TeamView};
 use faceoff_types::{StageId, StageName, Zone, deprecated_names};

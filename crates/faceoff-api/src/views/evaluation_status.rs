@@ -215,10 +215,10 @@ mod tests {
 
     #[test]
     fn next_step_is_described_for_each_evaluation_state() {
-        let at = Timestamp::UNIX_EPOCH;
+        let finished_at = Timestamp::UNIX_EPOCH;
         let reason = || "a reason".to_owned();
         let finished = EvaluationStatus::Finished {
-            finished_at: at,
+            finished_at,
             result: Some(Box::new(ResultView {
                 ruleset: String::new(),
                 profile: Profile::Evaluation,
@@ -234,20 +234,20 @@ mod tests {
             dataset_blake3: None,
         };
         let agent_failed = EvaluationStatus::AgentFailed {
-            finished_at: at,
+            finished_at,
             faults: None,
             log: None,
         };
         let platform_failed = EvaluationStatus::PlatformFailed {
-            finished_at: at,
+            finished_at,
             reason: reason(),
         };
         let not_played = EvaluationStatus::NotPlayed {
-            finished_at: at,
+            finished_at,
             reason: reason(),
         };
         let cancelled = EvaluationStatus::Cancelled {
-            finished_at: at,
+            finished_at,
             reason: reason(),
         };
         for (status, released, voided, words) in [

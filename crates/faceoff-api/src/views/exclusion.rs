@@ -1,4 +1,5 @@
-//! Exclusions: submissions whose runtime a stage does not accept.
+//! Exclusions: submissions that a stage does not evaluate, because it does not accept their runtime (the environment in which
+//! their agent runs).
 
 use faceoff_types::{StageId, StageName, SubmissionId, TeamId, TeamName};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,5 @@
-//! Games between two submissions: purpose, state and result.
+//! Games between two submissions: purpose, state and result. A *meeting* is a pairing of two teams in a round. With mirrored
+//! pairs it has two games, with the same seed and swapped sides.
 
 use faceoff_scoring::tournament::{Forfeit, ResultReason};
 use faceoff_types::{
@@ -62,7 +63,7 @@ pub enum PurposeView {
         round: RoundNumber,
         /// From 1; the games of a matchday can run in parallel.
         matchday: u32,
-        /// Number of the meeting in the round's draw, from 1.
+        /// Number of the meeting (the pairing of the two teams) in the round's draw, from 1.
         meeting: u32,
         /// Whether it is the second game of a mirrored pair, with sides swapped.
         second_half: bool,

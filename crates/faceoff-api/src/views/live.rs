@@ -1,4 +1,4 @@
-//! Control events of a live game's stream, beside its game events and positions.
+//! Events of a live game's stream that say that the game waits or has ended. The other events are about the play.
 
 use faceoff_types::GameId;
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ pub enum LiveEndState {
     Cancelled,
 }
 
-/// The game waits for a slot.
+/// The game waits for a slot, a place in which one job runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct LiveWait {
     /// Id of the game.

@@ -41,7 +41,7 @@ pub mod violations;
 pub mod webhook;
 pub mod workers;
 
-/// Text that an agent or a user wrote, with control characters removed. Rows of older versions may contain any.
+/// Text that an agent or a user wrote, with control characters escaped. Text that older versions stored may contain any.
 #[must_use]
 pub fn printable(text: String) -> String {
     faceoff_types::escape_unprintable(&text).into_owned()

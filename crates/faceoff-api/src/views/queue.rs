@@ -1,4 +1,4 @@
-//! Positions in the queue.
+//! Positions of evaluations and validation runs in the queue of jobs.
 
 use faceoff_types::deprecated_names;
 use jiff::Timestamp;

@@ -1,4 +1,4 @@
-//! Decisions of organisers.
+//! Rulings: decisions of organisers, with time and reason.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,5 @@
-//! Runtimes and resource limits of agents, for the server and for each stage and tournament.
+//! Runtimes, the environments in which agents run, and the resource limits of agents, for the server and for each stage and
+//! tournament.
 
 use crate::views::stage::PhaseView;
 use faceoff_types::{

@@ -39,7 +39,8 @@ pub struct SeasonView {
     pub terms_version: Option<u32>,
     /// The season secret, 64 hexadecimal digits; null until the season is closed.
     pub secret: Option<Seed>,
-    /// The seed of the season's model mismatch; null until the season is closed.
+    /// The seed of the season's model mismatch, the difference between the evaluator's simulator and the one that teams have;
+    /// null until the season is closed.
     pub mismatch_seed: Option<Seed>,
     /// The current date in the time zone of the open stage.
     pub today: Date,

@@ -1,4 +1,4 @@
-//! Submissions and the verdicts of their validation runs.
+//! Submissions, and the verdicts of their validation runs, which check whether an upload can be evaluated.
 
 use crate::views::{exclusion::StageExclusion, queue::QueueView, ruling::RulingView};
 use faceoff_types::{SubmissionId, TeamId, ValidationTiming, deprecated_names};

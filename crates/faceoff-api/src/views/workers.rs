@@ -1,4 +1,4 @@
-//! Remote workers and their slots.
+//! Remote workers, which are processes on other machines that run jobs, and their slots, each of which runs one job at a time.
 
 use faceoff_types::{EvaluationId, GameId, deprecated_names};
 use jiff::Timestamp;
@@ -19,7 +19,7 @@ pub struct WorkersView {
     /// Problems that keep remote workers from working; empty without problems.
     #[schema(example = json!([]))]
     pub problems: Vec<String>,
-    /// Jobs that run for conspicuously long; empty without such jobs.
+    /// Jobs that have been running for unusually long, in words; empty without such jobs.
     #[serde(default)]
     #[schema(example = json!([]))]
     pub alarms: Vec<String>,
@@ -62,9 +62,9 @@ pub struct WorkerView {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(example = json!(["lab 3"]))]
     pub labels: Vec<String>,
-    /// First contact since this server process started.
+    /// Time of the first contact since this server process started.
     pub first_at: Timestamp,
-    /// Last contact.
+    /// Time of the last contact.
     pub last_at: Timestamp,
     /// Its state.
     pub state: WorkerState,

@@ -1,4 +1,5 @@
-//! Ablations: started by the organiser and shown on public pages. They affect neither evaluations nor the board.
+//! Tests of ablations, which evaluate a submission without perturbations of the simulator, with each alone, and with all (six
+//! *profiles*). Organisers start them, public pages show them, and they affect neither evaluations nor the board.
 
 use crate::{
     clips,
@@ -9,6 +10,9 @@ use faceoff_store::{Artifacts, ShardCommit};
 use faceoff_types::{Profile, SubmissionId};
 use scraper::{Html, Selector};
 use serde_json::json;
+
+/// Pairs of a task and a profile; an ablation has a result for each.
+const TASK_PROFILES: u32 = 3 * 6;
 
 /// Runs `shards` shards of the next ablation. All episodes succeed in `ideal`, none with tracking loss, and every second
 /// one in the other profiles.
@@ -39,6 +43,7 @@ async fn run_shards(site: &Site, shards: u32) {
     }
 }
 
+/// A team with a valid submission. Returns also the path of the submission's ablation in the API, and that of its page.
 async fn team_with_submission(site: &Site) -> (TestTeam, String, String) {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
@@ -61,7 +66,7 @@ async fn ablation_results_are_shown_to_team_and_visitors() {
     assert_eq!(started["state"], "open");
     assert_eq!(
         started["progress"],
-        json!({ "episodes_done": 0, "episodes_total": 8 * 18 })
+        json!({ "episodes_done": 0, "episodes_total": 8 * TASK_PROFILES })
     );
     site.post(&api, Some(ADMIN), &request)
         .await
@@ -73,18 +78,20 @@ async fn ablation_results_are_shown_to_team_and_visitors() {
             .contains("0 of 144 episodes")
     );
 
-    run_shards(&site, 2 * 18).await;
+    run_shards(&site, 2 * TASK_PROFILES).await;
     let view = site.get(&api, Some(&team.token)).await.json(200);
     assert_eq!(view["state"], "finished");
     let hit = view["tasks"]["hit"].as_array().unwrap();
     assert_eq!((hit.len(), &hit[0]["profile"]), (6, &json!("ideal")));
-    let loss = &hit[4];
-    assert_eq!(loss["profile"], "tracking_loss");
+    let tracking_loss = &hit[4];
+    assert_eq!(tracking_loss["profile"], "tracking_loss");
     assert_eq!(
-        (&loss["difference"], &loss["lost"]),
+        (&tracking_loss["difference"], &tracking_loss["lost"]),
         (&json!(-1.0), &json!(8))
     );
-    assert!((loss["p_value"].as_f64().unwrap() - 2.0 / 256.0).abs() < 1e-12);
+    // Eight paired episodes with the same difference: twice the probability 1/2^8.
+    let p_value = tracking_loss["p_value"].as_f64().unwrap();
+    assert!((p_value - 2.0 / 256.0).abs() < 1e-12);
 
     let html = Html::parse_document(&site.get(&page, None).await.body);
     let count = |selector: &str| html.select(&Selector::parse(selector).unwrap()).count();
@@ -106,8 +113,8 @@ async fn ablation_results_are_shown_to_team_and_visitors() {
     }
     let table = site.get(&format!("{page}.csv"), None).await;
     assert_eq!(table.body.lines().count(), 1 + 18, "{}", table.body);
-    let loss = table.body.lines().nth(5).unwrap();
-    assert!(loss.starts_with("hit,tracking_loss,8,0,0,"), "{loss}");
+    let line = table.body.lines().nth(5).unwrap();
+    assert!(line.starts_with("hit,tracking_loss,8,0,0,"), "{line}");
 }
 
 #[tokio::test]
@@ -121,8 +128,8 @@ async fn ablation_is_started_by_organiser_and_hidden_from_other_teams() {
         .problem(422, "invalid-content", &["episodes_per_task"]);
     let started = site.post(&api, Some(ADMIN), &json!({})).await.json(201);
     assert_eq!(started["episodes_per_task"], 100);
-    let other = site.team("Beta").await;
-    site.get(&api, Some(&other.token))
+    let other_team = site.team("Beta").await;
+    site.get(&api, Some(&other_team.token))
         .await
         .problem(404, "not-found", &[]);
 }
@@ -134,13 +141,13 @@ async fn ablation_is_no_evaluation_but_is_linked_from_it() {
     site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 1 }))
         .await
         .json(201);
-    run_shards(&site, 18).await;
+    run_shards(&site, TASK_PROFILES).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"], json!([]));
     let submission = api.replace("/ablation", "");
     let evaluation = site.evaluate(&team, &submission).await;
-    let shown = site.get(&evaluation.replace("/api/v1", ""), None).await;
-    assert!(shown.body.contains(&format!("href=\"{page}\"")));
+    let evaluation_page = site.get(&evaluation.replace("/api/v1", ""), None).await;
+    assert!(evaluation_page.body.contains(&format!("href=\"{page}\"")));
 }
 
 /// The stored summary is changed to one success more than the outcomes have. A response that shows it was made from the
@@ -152,9 +159,9 @@ async fn ablation_outcomes_are_summarised_once() {
     site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 4 }))
         .await
         .json(201);
-    run_shards(&site, 18).await;
-    let first = site.get(&api, Some(ADMIN)).await.json(200);
-    assert_eq!(first["tasks"]["hit"][4]["successes"], 0);
+    run_shards(&site, TASK_PROFILES).await;
+    let first_view = site.get(&api, Some(ADMIN)).await.json(200);
+    assert_eq!(first_view["tasks"]["hit"][4]["successes"], 0);
 
     let submission: SubmissionId = api.split('/').nth(4).unwrap().parse().unwrap();
     let ablation = site.store.newest_ablation(submission).await.unwrap();
@@ -164,6 +171,7 @@ async fn ablation_outcomes_are_summarised_once() {
     let stored = site.store.episode_summaries(&ids, version).await.unwrap();
     assert_eq!(stored.len(), Profile::ABLATION.len());
     let run = runs[&Profile::TrackingLoss];
+    // `words` are the bits of the episodes' successes.
     let marked = stored[&run].replacen(r#""words":[0]"#, r#""words":[1]"#, 1);
     assert_ne!(marked, stored[&run]);
     let stored_summary = site
@@ -173,7 +181,7 @@ async fn ablation_outcomes_are_summarised_once() {
 
     let again = site.get(&api, Some(ADMIN)).await.json(200);
     assert_eq!(
-        again, first,
+        again, first_view,
         "the cached summary is not read from the database again"
     );
     site.restart().await;
@@ -189,12 +197,14 @@ async fn perturbed_episode_is_shown_beside_the_ideal_one() {
     let (team, api, page) = team_with_submission(&site).await;
     let request = json!({ "episodes_per_task": 1 });
     site.post(&api, Some(ADMIN), &request).await.json(201);
-    run_shards(&site, 18).await;
-    let without = site.get(&page, None).await;
+    run_shards(&site, TASK_PROFILES).await;
+    let page_without_clips = site.get(&page, None).await;
     assert!(
-        !without.body.contains("Episodes with another outcome"),
+        !page_without_clips
+            .body
+            .contains("Episodes with another outcome"),
         "{}",
-        without.body
+        page_without_clips.body
     );
 
     let submission = api.split('/').nth(4).unwrap().parse().unwrap();
@@ -205,14 +215,14 @@ async fn perturbed_episode_is_shown_beside_the_ideal_one() {
         let key = Artifacts::ablation_clips_key(ablation.as_ref().unwrap().id, profile);
         site.store.artifacts().put_file(&key, &pack).await.unwrap();
     }
-    let pair = format!("{page}/tracking_loss/prepare/0");
-    let shown = site.get(&page, None).await;
-    assert!(shown.body.contains(&pair), "{}", shown.body);
-    assert!(!shown.body.contains("/noise/"), "{}", shown.body);
+    let pair_page = format!("{page}/tracking_loss/prepare/0");
+    let answer = site.get(&page, None).await;
+    assert!(answer.body.contains(&pair_page), "{}", answer.body);
+    assert!(!answer.body.contains("/noise/"), "{}", answer.body);
 
-    let shown = site.get(&pair, None).await;
-    assert_eq!(shown.status, 200, "{}", shown.body);
-    let html = Html::parse_document(&shown.body);
+    let answer = site.get(&pair_page, None).await;
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    let html = Html::parse_document(&answer.body);
     assert!(html.errors.is_empty(), "{:?}", html.errors);
     let replays = Selector::parse("section.replay").unwrap();
     let motions: Vec<_> = html
@@ -226,10 +236,13 @@ async fn perturbed_episode_is_shown_beside_the_ideal_one() {
         assert_eq!(site.get(motion, None).await.status, 200, "{motion}");
         let observed = motion.replace("/motion", "/observed");
         assert_eq!(site.get(&observed, None).await.status, 401);
-        let other = site.team(&format!("Beta {}", motion.len())).await;
-        assert_eq!(site.get(&observed, Some(&other.token)).await.status, 403);
-        for own in [&*team.token, ADMIN] {
-            assert_eq!(site.get(&observed, Some(own)).await.status, 200);
+        let other_team = site.team(&format!("Beta {}", motion.len())).await;
+        assert_eq!(
+            site.get(&observed, Some(&other_team.token)).await.status,
+            403
+        );
+        for token in [&*team.token, ADMIN] {
+            assert_eq!(site.get(&observed, Some(token)).await.status, 200);
         }
     }
     for missing in [

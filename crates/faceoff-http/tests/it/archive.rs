@@ -1,4 +1,5 @@
-//! The archive of a season, and a server that shows an imported one.
+//! Tests of the season archive, a file with the data of a season, and of a server that shows an imported archive. The public
+//! edition has what visitors can see; the organiser's edition has everything except passwords and tokens.
 
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, outcome, string};
 use faceoff_archive::{Entry, Manifest, unpack};
@@ -13,8 +14,9 @@ use tempfile::TempDir;
 struct Season {
     site: Site,
     alpha: TestTeam,
+    /// Evaluations of the first day, Alpha's and Beta's.
     evaluations: [EvaluationId; 2],
-    /// A description and the bytes of data that must not be in a public archive.
+    /// A description and the bytes of each piece of data that must not be in a public archive.
     secrets: Vec<(&'static str, Vec<u8>)>,
 }
 
@@ -29,6 +31,7 @@ fn weak_outcome(task: Task, episode: u32) -> EpisodeOutcome {
     }
 }
 
+/// Posts as an organiser. The request must succeed.
 async fn post(site: &Site, path: &str, body: Value) -> Value {
     let answer = site.post(path, Some(ADMIN), &body).await;
     assert!(answer.status.is_success(), "{path}: {answer:?}");
@@ -55,13 +58,13 @@ impl Season {
             token: string(&replaced["token"]),
         };
         let joined = {
-            let made = post(
+            let invitation = post(
                 &site,
                 "/api/v1/invitations",
                 json!({ "role": "member", "team": id, "note": "for Ada Lovelace" }),
             )
             .await;
-            let join = json!({ "code": made["code"], "name": "Ada Lovelace", "password": "correct horse battery" });
+            let join = json!({ "code": invitation["code"], "name": "Ada Lovelace", "password": "correct horse battery" });
             let joined = site.post("/api/v1/invitations/accept", None, &join).await;
             joined.json(201)
         };
@@ -132,8 +135,8 @@ impl Season {
         season
     }
 
-    /// Two more days by other rules. On the first one agent fails, and another one has one fault, which is
-    /// allowed. On the second day one evaluation is still open. Returns its id.
+    /// Adds two more days by other rules. On the first of them, one agent fails, and the other has one fault, which is
+    /// allowed. On the second, one evaluation is still open. Returns its id.
     async fn add_unfinished_day(&mut self) -> EvaluationId {
         let site = &self.site;
         let path = format!("/api/v1/stages/{}", site.stage().await);
@@ -157,7 +160,7 @@ impl Season {
             .as_array()
             .unwrap()
             .iter()
-            .find(|one| one["state"] == "queued");
+            .find(|evaluation| evaluation["state"] == "queued");
         string(&open.unwrap()["id"]).parse().unwrap()
     }
 }
@@ -179,25 +182,26 @@ pub async fn export(site: &Site, edition: &str) -> (TempDir, Manifest) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("season.tar.zst");
     std::fs::write(&file, bytes).unwrap();
-    let into = folder.path().join("archive");
-    std::fs::create_dir(&into).unwrap();
-    let manifest = unpack(&file, &into).unwrap();
+    let unpacked = folder.path().join("archive");
+    std::fs::create_dir(&unpacked).unwrap();
+    let manifest = unpack(&file, &unpacked).unwrap();
     (folder, manifest)
 }
 
 /// Imports an unpacked archive and serves it.
 pub async fn import((folder, _): (TempDir, Manifest)) -> Site {
-    let rest = folder.path().join("archive");
-    let target = folder.path().join("faceoff.sqlite3");
-    std::fs::rename(rest.join("database.sqlite3"), target).unwrap();
-    if rest.join("artifacts").exists() {
-        std::fs::rename(rest.join("artifacts"), folder.path().join("artifacts")).unwrap();
+    let unpacked = folder.path().join("archive");
+    let database = folder.path().join("faceoff.sqlite3");
+    std::fs::rename(unpacked.join("database.sqlite3"), database).unwrap();
+    if unpacked.join("artifacts").exists() {
+        std::fs::rename(unpacked.join("artifacts"), folder.path().join("artifacts")).unwrap();
     }
     let now = "2027-01-01T00:00:00Z".parse().unwrap();
     Store::import(folder.path(), now).await.unwrap();
     Site::open_archive(folder).await
 }
 
+/// The text of a file in an unpacked archive.
 pub fn read_file(folder: &TempDir, path: &str) -> String {
     let file = folder.path().join("archive").join(path);
     std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
@@ -248,7 +252,7 @@ async fn imported_archive_is_shown_byte_for_byte() {
         let day: Value = serde_json::from_str(&day).unwrap();
         assert_eq!(day.as_array().unwrap().len(), 2);
 
-        let shown = import(exported).await;
+        let imported = import(exported).await;
         let [a, b] = season.evaluations;
         let mut compared: Vec<String> = [
             "/board",
@@ -274,7 +278,10 @@ async fn imported_archive_is_shown_byte_for_byte() {
             ]);
         }
         for path in compared {
-            let (before, after) = (site.get(&path, token).await, shown.get(&path, token).await);
+            let (before, after) = (
+                site.get(&path, token).await,
+                imported.get(&path, token).await,
+            );
             assert_eq!(before.status, 200, "{path}: {before:?}");
             assert_eq!(after.body, before.body, "{edition}: {path}");
         }
@@ -287,14 +294,14 @@ async fn imported_archive_is_shown_byte_for_byte() {
             "only organisers see the forecast"
         );
         assert_eq!(
-            shown.get(&path, token).await.json(200),
+            imported.get(&path, token).await.json(200),
             before,
             "an archive forecasts no day"
         );
-        let all = shown.get("/api/v1/stages", token).await.json(200);
-        assert_eq!(all, json!([before]));
+        let stages = imported.get("/api/v1/stages", token).await.json(200);
+        assert_eq!(stages, json!([before]));
         let mut seasons = Vec::new();
-        for site in [site, &shown] {
+        for site in [site, &imported] {
             let mut season = site.get("/api/v1/season", token).await.json(200);
             let archived = season.as_object_mut().unwrap().remove("archived");
             for stage in season["stages"].as_array_mut().unwrap() {
@@ -318,14 +325,14 @@ async fn imported_archive_is_shown_byte_for_byte() {
             &format!("/evaluations/{a}"),
             "/announcements",
         ] {
-            let page = shown.get(page, None).await;
+            let page = imported.get(page, None).await;
             assert_eq!(page.status, 200, "{page:?}");
             assert!(page.body.contains("Archived season as of 2026-03-01"));
         }
         assert!(!site.get("/", None).await.body.contains("Archived season"));
-        // An archive of the imported archive shows the same time.
-        let again = self::export(&shown, "public").await;
-        let board = shown.get("/api/v1/board", None).await;
+        // An archive of the imported season has the same board.
+        let again = self::export(&imported, "public").await;
+        let board = imported.get("/api/v1/board", None).await;
         assert_eq!(
             read_file(&again.0, "results/1-qualifying/board.json"),
             board.body
@@ -342,13 +349,13 @@ async fn public_archive_has_no_private_data() {
         .map(|id| format!("artifacts/datasets/{id}.zip"));
 
     let (folder, manifest) = export(&season.site, "organiser").await;
-    let named = paths(&manifest);
+    let listed = paths(&manifest);
     assert!(
-        hidden.iter().all(|path| named.contains(&path.as_str())),
-        "{named:?}"
+        hidden.iter().all(|path| listed.contains(&path.as_str())),
+        "{listed:?}"
     );
     assert_eq!(
-        named
+        listed
             .iter()
             .filter(|path| path.starts_with("artifacts/bundles/"))
             .count(),
@@ -373,8 +380,8 @@ async fn public_archive_has_no_private_data() {
         );
     }
     for (description, part) in &season.secrets {
-        let is_key = matches!(*description, "a password" | "a token's hash" | "the secret");
-        if is_key {
+        let is_credential = matches!(*description, "a password" | "a token's hash" | "the secret");
+        if is_credential {
             assert!(
                 !is_found(part),
                 "{description} is in the organiser's archive"
@@ -401,10 +408,10 @@ async fn public_archive_has_no_private_data() {
     }
 
     let (folder, manifest) = export(&season.site, "public").await;
-    let named = paths(&manifest);
+    let listed = paths(&manifest);
     assert!(
-        named.iter().all(|path| !path.starts_with("artifacts/")),
-        "the stage is open: {named:?}"
+        listed.iter().all(|path| !path.starts_with("artifacts/")),
+        "the stage is open: {listed:?}"
     );
     for file in files_of(&folder.path().join("archive")) {
         let content = std::fs::read(&file).unwrap();
@@ -450,9 +457,12 @@ async fn public_archive_has_no_private_data() {
         days.contains("2026-03-02.csv") && !days.contains("2026-03-03"),
         "{days}"
     );
-    let shown = import((folder, manifest)).await;
+    let imported = import((folder, manifest)).await;
     let original = season.site.get("/api/v1/board", None).await;
-    assert_eq!(shown.get("/api/v1/board", None).await.body, original.body);
+    assert_eq!(
+        imported.get("/api/v1/board", None).await.body,
+        original.body
+    );
 }
 
 #[tokio::test]
@@ -464,7 +474,7 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
         site.request(Method::PATCH, &path, Some(ADMIN)).json(&body)
     };
     let blinded = request(json!({ "blind": true, "publishes": "at_release" }));
-    let blinded = Answer::of(blinded.send().await.unwrap()).await;
+    let blinded = Answer::read(blinded.send().await.unwrap()).await;
     assert_eq!(blinded.status, 200, "{blinded:?}");
     let before = site.run_day(3, [("Alpha", &good_outcome)]).await[0];
     let (folder, manifest) = export(&site, "public").await;
@@ -481,20 +491,20 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
             .iter()
             .all(|path| !path.starts_with("artifacts"))
     );
-    let shown = import((folder, manifest)).await;
-    let board = shown.get("/api/v1/board", Some(ADMIN)).await.json(200);
+    let imported = import((folder, manifest)).await;
+    let board = imported.get("/api/v1/board", Some(ADMIN)).await.json(200);
     assert_eq!(
         (&board["blind"], &board["rows"]),
         (&json!(true), &json!([]))
     );
-    let days = shown.get("/api/v1/season", Some(ADMIN)).await.json(200);
+    let days = imported.get("/api/v1/season", Some(ADMIN)).await.json(200);
     assert_eq!(
         days["days"][0]["seed"],
         Value::Null,
         "the seed of a blind day is hidden"
     );
 
-    let opened = Answer::of(request(json!({ "blind": false })).send().await.unwrap()).await;
+    let opened = Answer::read(request(json!({ "blind": false })).send().await.unwrap()).await;
     assert_eq!(opened.status, 200, "{opened:?}");
     let freeze = format!("/api/v1/stages/{stage}/freeze");
     post(&site, &freeze, json!({ "reason": "the ceremony" })).await;
@@ -502,20 +512,18 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
     post(&site, "/api/v1/days", json!({})).await;
     let after = site.run_evaluation(weak_outcome).await;
     let (folder, manifest) = export(&site, "public").await;
-    let named = paths(&manifest).join("\n");
+    let listed = paths(&manifest).join("\n");
     assert!(
-        named.contains(&before.to_string()) && !named.contains(&after.to_string()),
-        "{named}"
+        listed.contains(&before.to_string()) && !listed.contains(&after.to_string()),
+        "{listed}"
     );
-    let shown = import((folder, manifest)).await;
-    let (original, imported) = (
-        site.get("/api/v1/board", None).await,
-        shown.get("/api/v1/board", Some(ADMIN)).await,
-    );
-    assert_eq!(imported.body, original.body);
+    let imported = import((folder, manifest)).await;
+    let original_board = site.get("/api/v1/board", None).await;
+    let imported_board = imported.get("/api/v1/board", Some(ADMIN)).await;
+    assert_eq!(imported_board.body, original_board.body);
     let dataset = format!("/api/v1/evaluations/{before}/dataset");
     assert_eq!(
-        shown.get(&dataset, None).await.body,
+        imported.get(&dataset, None).await.body,
         site.get(&dataset, None).await.body
     );
 }
@@ -523,8 +531,8 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
 #[tokio::test]
 async fn archived_season_is_read_only_for_all_roles() {
     let season = Season::start().await;
-    let shown = import(export(&season.site, "organiser").await).await;
-    let document = shown.get("/api/v1/openapi.json", None).await.json(200);
+    let imported = import(export(&season.site, "organiser").await).await;
+    let document = imported.get("/api/v1/openapi.json", None).await.json(200);
     let mut refused = 0;
     for (path, item) in document["paths"].as_object().unwrap() {
         let path = path.replace("{id}", &season.evaluations[0].to_string());
@@ -534,8 +542,10 @@ async fn archived_season_is_read_only_for_all_roles() {
                 continue;
             }
             for token in [None, Some(ADMIN), Some(season.alpha.token.as_str())] {
-                let request = shown.request(method.clone(), &path, token).json(&json!({}));
-                let answer = Answer::of(request.send().await.unwrap()).await;
+                let request = imported
+                    .request(method.clone(), &path, token)
+                    .json(&json!({}));
+                let answer = Answer::read(request.send().await.unwrap()).await;
                 let problem =
                     answer.problem(403, "read-only", &["archive of a season", "2026-03-01"]);
                 assert_eq!(
@@ -548,50 +558,56 @@ async fn archived_season_is_read_only_for_all_roles() {
     }
     assert!(refused > 100, "{refused}");
     for page in ["/sign-in", "/sign-out", "/register", "/join/fo_invite_x"] {
-        let request = shown
+        let request = imported
             .request(Method::POST, page, None)
             .header("accept", "text/html");
-        let answer = Answer::of(request.send().await.unwrap()).await;
+        let answer = Answer::read(request.send().await.unwrap()).await;
         assert_eq!(answer.status, 403, "{answer:?}");
         assert!(answer.body.contains("The season is archived"), "{answer:?}");
     }
     // The store itself refuses changes, too.
-    let error = shown
+    let error = imported
         .store
-        .name_season(faceoff_store::Actor::Server, "x", shown.now())
+        .name_season(faceoff_store::Actor::Server, "x", imported.now())
         .await;
     assert!(error.unwrap_err().to_string().contains("archived"));
     // Tokens of the original server are not valid.
-    shown
+    imported
         .get("/api/v1/me", Some(&season.alpha.token))
         .await
         .problem(401, "unauthenticated", &["unknown"]);
     assert_eq!(
-        shown.get("/api/v1/health", None).await.json(200)["status"],
+        imported.get("/api/v1/health", None).await.json(200)["status"],
         "ok"
     );
-    assert_eq!(shown.get("/api/v1/events", Some(ADMIN)).await.status, 200);
+    assert_eq!(
+        imported.get("/api/v1/events", Some(ADMIN)).await.status,
+        200
+    );
 }
 
 #[tokio::test]
 async fn public_archive_hides_organiser_data_from_organisers() {
     let season = Season::start().await;
-    let shown = import(export(&season.site, "public").await).await;
-    let response = shown.get("/api/v1/season/archive", Some(ADMIN)).await;
+    let imported = import(export(&season.site, "public").await).await;
+    let response = imported.get("/api/v1/season/archive", Some(ADMIN)).await;
     response.problem(409, "conflict", &["ask for the public edition"]);
     let dataset = format!("/api/v1/evaluations/{}/dataset", season.evaluations[0]);
-    let response = shown.get(&dataset, Some(ADMIN)).await;
+    let response = imported.get(&dataset, Some(ADMIN)).await;
     response.problem(410, "gone", &["does not contain this dataset"]);
-    shown
+    imported
         .get(&dataset, None)
         .await
         .problem(401, "unauthenticated", &[]);
-    let questions = shown.get("/api/v1/questions", Some(ADMIN)).await.json(200);
+    let questions = imported
+        .get("/api/v1/questions", Some(ADMIN))
+        .await
+        .json(200);
     assert_eq!(questions[0]["text"], "a public question");
     assert_eq!(questions[0].get("team"), None, "questions are anonymous");
     assert_eq!(questions.as_array().unwrap().len(), 1);
     for list in ["people", "registrations", "proposals"] {
-        let found = shown
+        let found = imported
             .get(&format!("/api/v1/{list}"), Some(ADMIN))
             .await
             .json(200);
@@ -603,11 +619,12 @@ async fn public_archive_hides_organiser_data_from_organisers() {
 async fn archive_is_made_one_at_a_time_and_dropped_when_unread() {
     let season = Season::start().await;
     let site = &season.site;
-    // More than the buffers between sender and reader hold.
+    // The file is larger than all buffers between sender and reader, and cannot be compressed.
+    const LARGE_BYTES: usize = 48 << 20;
     let large = site.folder.path().join("large");
     let noise: Vec<u8> = {
         let mut reader = blake3::Hasher::new().finalize_xof();
-        let mut noise = vec![0; 48 << 20];
+        let mut noise = vec![0; LARGE_BYTES];
         reader.fill(&mut noise);
         noise
     };
@@ -615,12 +632,12 @@ async fn archive_is_made_one_at_a_time_and_dropped_when_unread() {
     let key = format!("datasets/{}.zip", season.evaluations[0]);
     site.store.artifacts().put_file(&key, &large).await.unwrap();
 
-    let under_way = download(site, "organiser").await;
+    let unread_download = download(site, "organiser").await;
     let second = site.get("/api/v1/season/archive", Some(ADMIN)).await;
     second.problem(503, "busy", &["only one"]);
     assert_eq!(second.header("retry-after"), "60");
-    drop(under_way);
-    // The file does not match its hash any more, so the archive ends with an error.
+    drop(unread_download);
+    // The large file does not match the dataset's stored hash, so the archive ends with an error.
     let broken = loop {
         let path = "/api/v1/season/archive?edition=organiser";
         let response = site
@@ -631,10 +648,13 @@ async fn archive_is_made_one_at_a_time_and_dropped_when_unread() {
         if response.status() == 200 {
             break response.bytes().await;
         }
-        // The first sender has not noticed yet that its reader is gone.
+        // The first sender has not noticed yet that its client disconnected.
         tokio::task::yield_now().await;
     };
-    assert!(broken.is_err(), "it must not look whole");
+    assert!(
+        broken.is_err(),
+        "an incomplete archive must not look complete"
+    );
     let public = loop {
         let path = "/api/v1/season/archive?edition=public";
         let response = site
@@ -648,7 +668,7 @@ async fn archive_is_made_one_at_a_time_and_dropped_when_unread() {
         tokio::task::yield_now().await;
     };
     assert!(public.is_ok());
-    // The sender ends after the last byte. It removes its files before the next one may begin.
+    // The sender removes its files after the last byte, and only then may the next archive begin.
     while site
         .get("/api/v1/season/archive?edition=public", Some(ADMIN))
         .await
@@ -689,20 +709,20 @@ async fn archive_of_a_closed_season_has_its_secret() {
     )
     .await;
     let (folder, manifest) = export(&season.site, "public").await;
-    let named = paths(&manifest).join("\n");
+    let listed = paths(&manifest).join("\n");
     assert!(
         season
             .evaluations
             .iter()
-            .all(|id| named.contains(&id.to_string())),
-        "{named}"
+            .all(|id| listed.contains(&id.to_string())),
+        "{listed}"
     );
-    let shown = import((folder, manifest)).await;
-    let season = shown.get("/api/v1/season", None).await.json(200);
+    let imported = import((folder, manifest)).await;
+    let season = imported.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["secret"], closed["secret"]);
     assert_eq!(season["commitment"], closed["commitment"]);
     assert_eq!(
-        shown.store.archived_season().unwrap().edition,
+        imported.store.archived_season().unwrap().edition,
         Edition::Public
     );
 }

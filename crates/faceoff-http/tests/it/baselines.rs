@@ -1,13 +1,13 @@
-//! Baselines: the organisers' reference agents, which are shown beside the ranked teams.
+//! Tests of baselines, the organisers' reference agents, which boards show beside the ranked teams.
 
 use crate::site::{ADMIN, Answer, Site, TestTeam, result, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, team: &TestTeam, token: &str, change: &Value) -> Answer {
+async fn change_team(site: &Site, team: &TestTeam, token: &str, change: &Value) -> Answer {
     let path = format!("/api/v1/teams/{}", team.id);
     let request = site.request(Method::PATCH, &path, Some(token));
-    Answer::of(request.json(change).send().await.unwrap()).await
+    Answer::read(request.json(change).send().await.unwrap()).await
 }
 
 /// Three teams with results; "Reference" is in the middle.
@@ -42,7 +42,7 @@ async fn baseline_takes_no_rank_from_teams() {
     assert_eq!(names(&before)[2], (3, "Beta".to_owned()));
     assert_eq!(before["baselines"], json!([]));
     let mark = json!({ "baseline": true });
-    let marked = change(&site, &reference, ADMIN, &mark).await.json(200);
+    let marked = change_team(&site, &reference, ADMIN, &mark).await.json(200);
     assert_eq!(marked["baseline"], true);
     for path in ["/api/v1/board", "/api/v1/board/hit"] {
         let board = site.get(path, None).await.json(200);
@@ -57,22 +57,22 @@ async fn baseline_takes_no_rank_from_teams() {
         let table = site.get(&format!("{path}?format=csv"), None).await.body;
         let mut lines = csv::Reader::from_reader(table.as_bytes());
         let columns = lines.headers().unwrap().clone();
-        let last = lines.records().last().unwrap().unwrap();
+        let last_line = lines.records().last().unwrap().unwrap();
         let field = |name: &str| {
-            let at = columns.iter().position(|column| column == name).unwrap();
-            last[at].to_owned()
+            let index = columns.iter().position(|column| column == name).unwrap();
+            last_line[index].to_owned()
         };
         let fields = ["rank", "baseline", "would_rank", "team"].map(field);
         assert_eq!(fields, ["", "true", "2", "Reference"]);
     }
     let history = site.get("/api/v1/board/history", None).await.json(200);
-    let last = &history["rows"][2];
+    let last_row = &history["rows"][2];
     assert_eq!(
-        (&last["team"], &last["rank"]),
+        (&last_row["team"], &last_row["rank"]),
         (&json!("Reference"), &Value::Null)
     );
     assert_eq!(
-        (&last["baseline"], &last["would_rank"]),
+        (&last_row["baseline"], &last_row["would_rank"]),
         (&json!(true), &json!(2))
     );
     for page in ["/", "/tasks/hit"] {
@@ -83,11 +83,13 @@ async fn baseline_takes_no_rank_from_teams() {
         );
         assert!(page.contains("(2)"), "{page}");
     }
-    let kind = "/api/v1/events?kind=team_made_baseline";
-    let log = site.get(kind, Some(ADMIN)).await.json(200);
+    let events_path = "/api/v1/events?kind=team_made_baseline";
+    let log = site.get(events_path, Some(ADMIN)).await.json(200);
     assert_eq!(log["events"].as_array().unwrap().len(), 1);
     let unmark = json!({ "baseline": false });
-    let unmarked = change(&site, &reference, ADMIN, &unmark).await.json(200);
+    let unmarked = change_team(&site, &reference, ADMIN, &unmark)
+        .await
+        .json(200);
     assert_eq!(unmarked.get("baseline"), None);
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(names(&board), names(&before));
@@ -98,10 +100,10 @@ async fn baseline_is_set_by_organiser_and_not_entered_in_tournaments() {
     let site = Site::start().await;
     let [alpha, reference, _] = three_teams(&site).await;
     let mark = json!({ "baseline": true });
-    change(&site, &reference, &reference.token, &mark)
+    change_team(&site, &reference, &reference.token, &mark)
         .await
         .problem(403, "forbidden", &[]);
-    change(&site, &reference, ADMIN, &mark).await.json(200);
+    change_team(&site, &reference, ADMIN, &mark).await.json(200);
     let opened = site
         .post(
             "/api/v1/tournaments",
@@ -111,13 +113,15 @@ async fn baseline_is_set_by_organiser_and_not_entered_in_tournaments() {
         .await
         .json(201);
     let entrants = opened["entrants"].as_array().unwrap().iter();
-    let names: Vec<_> = entrants.map(|one| string(&one["team_name"])).collect();
+    let names: Vec<_> = entrants
+        .map(|entrant| string(&entrant["team_name"]))
+        .collect();
     assert_eq!(names, ["Alpha", "Beta"]);
     // A signed-off result does not change any more.
     let stage = format!("/api/v1/stages/{}", site.stage().await);
     let closes = json!({ "closes_at": "2026-03-01T10:01:00Z" });
     let close = site.request(Method::PATCH, &stage, Some(ADMIN));
-    Answer::of(close.json(&closes).send().await.unwrap())
+    Answer::read(close.json(&closes).send().await.unwrap())
         .await
         .json(200);
     site.advance(60);
@@ -130,8 +134,8 @@ async fn baseline_is_set_by_organiser_and_not_entered_in_tournaments() {
     .await
     .json(200);
     for team in [&alpha, &reference] {
-        let other = json!({ "baseline": team.id == alpha.id });
-        change(&site, team, ADMIN, &other).await.problem(
+        let opposite = json!({ "baseline": team.id == alpha.id });
+        change_team(&site, team, ADMIN, &opposite).await.problem(
             409,
             "conflict",
             &["signed off", "cannot be changed any more"],

@@ -1,23 +1,24 @@
-//! Blind stages: results are visible to organisers only, on every page and in the whole API.
+//! Tests of blind stages, whose results only organisers see until they reveal them, on every page and in the whole API.
 
 use crate::site::{ADMIN, Answer, Site, TestTeam, result};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, body: Value) -> Answer {
+/// Changes the first stage as an organiser.
+async fn change_stage(site: &Site, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::of(request.json(&body).send().await.unwrap()).await
+    Answer::read(request.json(&body).send().await.unwrap()).await
 }
 
-/// A blind day of two teams. Returns the paths of their evaluations in the API.
+/// Starts an evaluation day of a blind stage with two teams. Returns the API paths of their evaluations.
 async fn blind_day(site: &Site) -> ([TestTeam; 2], [String; 2]) {
     let teams = [site.team("Alpha").await, site.team("Beta").await];
     let mut submissions = Vec::new();
     for team in &teams {
         submissions.push(site.valid_submission(team, "agent").await);
     }
-    let blind = change(site, json!({ "blind": true })).await.json(200);
+    let blind = change_stage(site, json!({ "blind": true })).await.json(200);
     assert_eq!(blind["blind"], true);
     let paths = [
         site.evaluate(&teams[0], &submissions[0]).await,
@@ -26,7 +27,7 @@ async fn blind_day(site: &Site) -> ([TestTeam; 2], [String; 2]) {
     (teams, paths)
 }
 
-/// Texts that reveal a score.
+/// Texts that reveal a score: names of fields, and numbers of the results that the tests commit.
 const REVEALING: [&str; 12] = [
     "success_rate",
     "successes",
@@ -116,18 +117,21 @@ async fn blind_results_are_visible_to_organisers_only() {
         }
     }
 
-    let own = site.get(&alpha_evaluation, Some(&alpha.token)).await;
-    check_reveals_nothing(&own);
-    let own = own.json(200);
+    let team_view = site.get(&alpha_evaluation, Some(&alpha.token)).await;
+    check_reveals_nothing(&team_view);
+    let team_view = team_view.json(200);
     assert_eq!(
-        (&own["state"], &own["blind"]),
+        (&team_view["state"], &team_view["blind"]),
         (&json!("finished"), &json!(true))
     );
     assert_eq!(
-        own["progress"]["episodes_done"],
-        own["progress"]["episodes_total"]
+        team_view["progress"]["episodes_done"],
+        team_view["progress"]["episodes_total"]
     );
-    assert_eq!((own.get("result"), own.get("dataset")), (None, None));
+    assert_eq!(
+        (team_view.get("result"), team_view.get("dataset")),
+        (None, None)
+    );
     for list in [
         "/api/v1/evaluations",
         "/api/v1/me",
@@ -160,7 +164,7 @@ async fn blind_results_are_visible_to_organisers_only() {
     .await
     .problem(409, "blind", &[]);
 
-    // The organiser sees everything; an invalid organiser token shows nothing.
+    // The organiser sees everything; a request with an invalid organiser's token is refused.
     let board = site.get("/api/v1/board", Some(ADMIN)).await.json(200);
     assert_eq!(
         (&board["blind"], board["rows"].as_array().unwrap().len()),
@@ -179,7 +183,9 @@ async fn blind_results_are_visible_to_organisers_only() {
         .problem(401, "unauthenticated", &[]);
 
     // Once revealed, results cannot be hidden again.
-    let opened = change(&site, json!({ "blind": false })).await.json(200);
+    let opened = change_stage(&site, json!({ "blind": false }))
+        .await
+        .json(200);
     assert_eq!(opened["blind"], false);
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(
@@ -190,19 +196,22 @@ async fn blind_results_are_visible_to_organisers_only() {
         site.get("/api/v1/season", None).await.json(200)["days"][0]["seed"],
         json!(null)
     );
-    let own = site
+    let team_view = site
         .get(&alpha_evaluation, Some(&alpha.token))
         .await
         .json(200);
     assert_eq!(
-        (own.get("blind"), &own["result"]["penalty_points"]),
+        (
+            team_view.get("blind"),
+            &team_view["result"]["penalty_points"]
+        ),
         (None, &json!(777.5))
     );
     let dataset = site
         .get(&format!("{alpha_evaluation}/dataset"), Some(&alpha.token))
         .await;
     assert_eq!(dataset.status, 200);
-    change(&site, json!({ "blind": true })).await.problem(
+    change_stage(&site, json!({ "blind": true })).await.problem(
         409,
         "conflict",
         &["2 evaluations", "that was visible"],
@@ -212,16 +221,19 @@ async fn blind_results_are_visible_to_organisers_only() {
 #[tokio::test]
 async fn faults_of_a_blind_stage_are_hidden() {
     let site = Site::start().await;
-    let ([alpha, _], [alpha_evaluation, beta_evaluation]) = blind_day(&site).await;
+    let ([alpha, _], [alpha_evaluation, _]) = blind_day(&site).await;
     site.run_shards(2).await;
     site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
-    let own = site
+    let team_view = site
         .get(&alpha_evaluation, Some(&alpha.token))
         .await
         .json(200);
-    assert_eq!(own["state"], "agent_failed");
-    assert_ne!(own["released_at"], json!(null));
-    assert_eq!((own.get("faults"), own.get("log")), (None, None));
+    assert_eq!(team_view["state"], "agent_failed");
+    assert_ne!(team_view["released_at"], json!(null));
+    assert_eq!(
+        (team_view.get("faults"), team_view.get("log")),
+        (None, None)
+    );
     let page = site
         .get(&alpha_evaluation.replace("/api/v1", ""), None)
         .await
@@ -232,15 +244,16 @@ async fn faults_of_a_blind_stage_are_hidden() {
     );
     let board = site.get("/", None).await.body;
     assert!(!board.contains("failed"), "{board}");
-    let all = site.get(&alpha_evaluation, Some(ADMIN)).await.json(200);
-    assert_eq!(all["faults"].as_array().unwrap().len(), 2);
-    drop(beta_evaluation);
-    change(&site, json!({ "blind": false })).await.json(200);
-    let own = site
+    let organiser_view = site.get(&alpha_evaluation, Some(ADMIN)).await.json(200);
+    assert_eq!(organiser_view["faults"].as_array().unwrap().len(), 2);
+    change_stage(&site, json!({ "blind": false }))
+        .await
+        .json(200);
+    let team_view = site
         .get(&alpha_evaluation, Some(&alpha.token))
         .await
         .json(200);
-    assert_eq!(own["faults"].as_array().unwrap().len(), 2);
+    assert_eq!(team_view["faults"].as_array().unwrap().len(), 2);
 }
 
 #[tokio::test]
@@ -248,13 +261,13 @@ async fn blind_setting_is_validated_and_for_organisers_only() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let new = json!({ "name": "Final", "blind": true, "publishes": "never", "standings": { "mean_of_last": 3 } });
-    let made = site
+    let created = site
         .post("/api/v1/stages", Some(ADMIN), &new)
         .await
         .json(201);
-    assert_eq!(made["blind"], true);
+    assert_eq!(created["blind"], true);
     assert_eq!(
-        (&made["publishes"], &made["standings"]),
+        (&created["publishes"], &created["standings"]),
         (&json!("never"), &json!({ "mean_of_last": 3 }))
     );
     for (field, wrong) in [
@@ -266,7 +279,7 @@ async fn blind_setting_is_validated_and_for_organisers_only() {
         ("standings", json!({ "mean_of_last": -1 })),
     ] {
         let body = json!({ field: wrong });
-        change(&site, body)
+        change_stage(&site, body)
             .await
             .problem(422, "invalid-content", &[field]);
     }

@@ -1,8 +1,8 @@
-//! The overall board and the task boards, in the API and on pages.
+//! Tests of boards, the rankings of a stage: the overall board and the task boards, in the API and on pages.
 
 use crate::{
     html::{page, texts},
-    site::{Site, result},
+    site::{LEASE_S, Site, result},
 };
 use faceoff_scoring::{
     COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
@@ -10,7 +10,8 @@ use faceoff_scoring::{
 use scraper::Selector;
 use serde_json::json;
 
-/// Five teams of the paper's qualifying table, not in board order.
+/// Five teams of the qualifying table in the challenge's paper, not in board order: name, success rates (hit, defend, prepare)
+/// and penalty points.
 const TEAMS: [(&str, [f64; 3], f64); 5] = [
     ("RL3_polimi", [0.227, 0.616, 0.362], 920.0),
     ("Kalash Jain", [0.0, 0.195, 0.083], 0.0),
@@ -26,6 +27,7 @@ async fn site_with_results() -> Site {
     site
 }
 
+/// Tier and name of the teams in the order of the board.
 const BOARD_ORDER: [(&str, &str); 5] = [
     ("deployable", "AiRLIHockey"),
     ("deployable", "Kalash Jain"),
@@ -104,7 +106,7 @@ async fn board_shows_only_score_and_points_before_the_release() {
     for (_, rates, points) in TEAMS {
         site.finish_evaluation(&result(rates, points)).await;
     }
-    let seed = faceoff_types::Seed::from_number(7).to_string();
+    let seed = result([0.0; 3], 0.0).seed.to_string();
     let details = ["violations", "steps", "computation_time_s"];
     for path in ["/api/v1/board", "/api/v1/board/hit"] {
         let board = site.get(path, None).await.json(200);
@@ -160,7 +162,7 @@ async fn board_shows_only_score_and_points_before_the_release() {
     assert_eq!(texts(&tasks, "td.none").len(), TEAMS.len());
     assert!(!site.get(&evaluation, None).await.body.contains(&seed));
 
-    // With the end of the last evaluation all details become public.
+    // Once the last evaluation ends, the day is released: all details become public.
     site.finish_evaluation(&result([0.1, 0.1, 0.1], 10.0)).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["seed"], seed);
@@ -228,10 +230,12 @@ async fn evaluation_page_shows_results_violations_and_times() {
     assert_eq!(texts(&html, "h1"), ["AiRLIHockey"]);
     assert_eq!(texts(&html, "table caption").len(), 4);
     let tables = texts(&html, "table").join(" ");
+    // Success rate, violations, two computation times in ms, and steps, as `site::result` sets them.
     for part in ["54.9 %", "7 (1 %)", "0.90", "12", "123456"] {
         assert!(tables.contains(part), "{part:?} is not in {tables:?}");
     }
     for part in [
+        // Cells of a row follow each other without a space: count, median, p99 and maximum in ms.
         "before the evaluation2000.0210.0830.420",
         "between episodes30000.0220.09531.200",
     ] {
@@ -265,18 +269,19 @@ async fn board_page_shows_next_steps_and_progress() {
     let submission = site.valid_submission(&team, "striker").await;
     let evaluation = site.evaluate(&team, &submission).await;
     let (claim, ..) = site.claim_shard().await;
+    let episodes_done = 3;
     site.store
-        .heartbeat(&claim, 3, 60, site.now())
+        .heartbeat(&claim, episodes_done, LEASE_S, site.now())
         .await
         .unwrap();
     for day in ["today", "after midnight"] {
         let html = page(&site, "/").await;
         let rows = texts(&html, ".under-way .evaluation-list li");
         assert_eq!(rows, ["Alpha Running 3 of 12"], "{day}");
-        let whole = texts(&html, ".under-way .total-progress").join(" ");
+        let total = texts(&html, ".under-way .total-progress").join(" ");
         assert!(
-            whole.starts_with("3 of 12 episodes; 0 of 1 evaluations done."),
-            "{whole}"
+            total.starts_with("3 of 12 episodes; 0 of 1 evaluations done."),
+            "{total}"
         );
         site.next_day();
     }

@@ -1,6 +1,6 @@
-//! Boards as API clients read them: CSV, ETags, past days and the history.
+//! Tests of boards (the rankings of a stage) as API clients read them: CSV, ETags, past days and the history.
 
-use crate::site::{ADMIN, Answer, Site, TestTeam, result, string};
+use crate::site::{ADMIN, Answer, DATASET, LEASE_S, Site, TestTeam, result, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 use std::{collections::BTreeMap, io::Read};
@@ -11,15 +11,18 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
     site.valid_submission(&teams[0], "plain").await;
     site.valid_submission(&teams[1], "=HYPERLINK(\"http://x\", 1),\n")
         .await;
-    for (at, [alpha, beta]) in [[0.5, 0.4], [0.6, 0.9], [0.7, 0.3]].into_iter().enumerate() {
-        if at > 0 {
+    // Success rates of Alpha and Beta on each day.
+    let daily_rates = [[0.5, 0.4], [0.6, 0.9], [0.7, 0.3]];
+    for (index, rates) in daily_rates.iter().enumerate() {
+        if index > 0 {
             site.next_day();
         }
-        run_day(site, &[alpha, beta]).await;
+        run_day(site, rates).await;
     }
     teams
 }
 
+/// Runs an evaluation day on which the teams have these success rates in all tasks.
 async fn run_day(site: &Site, rates: &[f64]) {
     let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
     started.json(200);
@@ -48,10 +51,11 @@ async fn get_with_headers(
     for (name, value) in headers {
         request = request.header(*name, *value);
     }
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
-fn teams(board: &Value) -> Vec<(String, u64)> {
+/// Name and rank of each team on a board.
+fn ranked_teams(board: &Value) -> Vec<(String, u64)> {
     let rows = board["rows"].as_array().unwrap().iter();
     rows.map(|row| (string(&row["team"]), row["rank"].as_u64().unwrap()))
         .collect()
@@ -62,12 +66,12 @@ async fn board_csv_matches_the_json() {
     let site = Site::start().await;
     three_days(&site).await;
     let board = site.get("/api/v1/board", None).await.json(200);
-    let by_query = csv_rows(&site.get("/api/v1/board?format=csv", None).await);
+    let lines = csv_rows(&site.get("/api/v1/board?format=csv", None).await);
     let accept = [("accept", "text/csv;q=0.9, text/plain")];
     let by_header = csv_rows(&get_with_headers(&site, "/api/v1/board", &accept, None).await);
-    assert_eq!(by_query, by_header);
-    assert_eq!(by_query.len(), 2);
-    for (line, row) in by_query.iter().zip(board["rows"].as_array().unwrap()) {
+    assert_eq!(lines, by_header);
+    assert_eq!(lines.len(), 2);
+    for (line, row) in lines.iter().zip(board["rows"].as_array().unwrap()) {
         let hit = &row["tasks"]["hit"];
         for (column, value) in [
             ("rank", &row["rank"]),
@@ -102,7 +106,7 @@ async fn board_csv_matches_the_json() {
         assert_eq!(line["baseline"], "false");
     }
     // The agent name is escaped, so that spreadsheets do not evaluate it as a formula.
-    let agent = &by_query.iter().find(|line| line["team"] == "Beta").unwrap()["agent"];
+    let agent = &lines.iter().find(|line| line["team"] == "Beta").unwrap()["agent"];
     assert!(
         agent.starts_with("'=HYPERLINK(\"http://x\", 1),"),
         "{agent:?}"
@@ -111,8 +115,8 @@ async fn board_csv_matches_the_json() {
     get_with_headers(&site, "/api/v1/board", &json, None)
         .await
         .json(200);
-    let task = csv_rows(&site.get("/api/v1/board/hit?format=csv", None).await);
-    assert_eq!(task.len(), 2);
+    let task_lines = csv_rows(&site.get("/api/v1/board/hit?format=csv", None).await);
+    assert_eq!(task_lines.len(), 2);
     site.get("/api/v1/board?format=xml", None)
         .await
         .problem(400, "invalid-request", &["format"]);
@@ -132,24 +136,22 @@ async fn unchanged_board_answers_not_modified() {
         assert!(tag.starts_with("W/\"board-"), "{tag}");
         assert_eq!(first.header("cache-control"), "private, no-cache");
         assert_eq!(first.header("vary"), "authorization, cookie, accept");
-        let known = [("if-none-match", tag.as_str())];
-        let again = get_with_headers(&site, path, &known, None).await;
+        let condition = [("if-none-match", tag.as_str())];
+        let again = get_with_headers(&site, path, &condition, None).await;
         assert_eq!((again.status.as_u16(), again.body.as_str()), (304, ""));
         assert_eq!(again.header("etag"), tag);
         assert_eq!(again.header("vary"), "authorization, cookie, accept");
         // A team sees the same board, an organiser may see another one.
-        let team = get_with_headers(&site, path, &known, Some(&alpha.token)).await;
+        let team = get_with_headers(&site, path, &condition, Some(&alpha.token)).await;
         assert_eq!(team.status, 304);
-        let organiser = get_with_headers(&site, path, &known, Some(ADMIN)).await;
+        let organiser = get_with_headers(&site, path, &condition, Some(ADMIN)).await;
         assert_eq!(organiser.status, 200);
-        let other = format!(
+        let other_query = format!(
             "{path}{}revision=1",
             if path.contains('?') { "&" } else { "?" }
         );
-        assert_eq!(
-            get_with_headers(&site, &other, &known, None).await.status,
-            200
-        );
+        let answer = get_with_headers(&site, &other_query, &condition, None).await;
+        assert_eq!(answer.status, 200);
         let head = site.request(Method::HEAD, path, None).send().await.unwrap();
         assert_eq!(head.headers()["etag"], tag.as_str());
         assert_eq!(
@@ -163,14 +165,17 @@ async fn unchanged_board_answers_not_modified() {
     started.json(200);
     let (claim, ..) = site.claim_shard().await;
     let before = site.get("/api/v1/board", None).await;
-    let known = [("if-none-match", before.header("etag"))];
-    let progress = site.store.heartbeat(&claim, 3, 60, site.now());
+    let condition = [("if-none-match", before.header("etag"))];
+    let episodes_done = 3;
+    let progress = site
+        .store
+        .heartbeat(&claim, episodes_done, LEASE_S, site.now());
     assert!(progress.await.unwrap());
     site.store.release(&claim, site.now()).await.unwrap();
-    let again = get_with_headers(&site, "/api/v1/board", &known, None).await;
+    let again = get_with_headers(&site, "/api/v1/board", &condition, None).await;
     assert_eq!(again.status, 304);
     site.finish_evaluation(&result([0.8; 3], 10.0)).await;
-    let changed = get_with_headers(&site, "/api/v1/board", &known, None)
+    let changed = get_with_headers(&site, "/api/v1/board", &condition, None)
         .await
         .json(200);
     let score = changed["rows"][0]["score"].as_f64().unwrap();
@@ -192,13 +197,17 @@ async fn board_of_a_past_day_shows_results_up_to_that_day() {
     ] {
         let board = site.get(&format!("/api/v1/board{query}"), None).await;
         let board = board.json(200);
-        assert_eq!(teams(&board), [row(first, 1), row(second, 2)], "{query}");
-        let by = if query.contains("best") {
+        assert_eq!(
+            ranked_teams(&board),
+            [row(first, 1), row(second, 2)],
+            "{query}"
+        );
+        let expected = if query.contains("best") {
             "best"
         } else {
             "latest"
         };
-        assert_eq!(board["rows_by"], by);
+        assert_eq!(board["rows_by"], expected);
         assert_eq!(board["standings"], "latest");
         let day = query.split("day=").nth(1);
         assert_eq!(board["day"].as_str(), day);
@@ -296,15 +305,15 @@ async fn past_days_and_history_hide_results_after_a_freeze() {
         .problem(401, "unauthenticated", &[]);
     let live = site.get(&live, Some(ADMIN)).await.json(200);
     assert_eq!(live["days"].as_array().unwrap().len(), 4);
-    let day = "/api/v1/board?day=2026-03-04";
-    site.get(day, None)
+    let hidden_day = "/api/v1/board?day=2026-03-04";
+    site.get(hidden_day, None)
         .await
         .problem(404, "not-found", &["2026-03-03"]);
     let live = site
-        .get(&format!("{day}&live=true"), Some(ADMIN))
+        .get(&format!("{hidden_day}&live=true"), Some(ADMIN))
         .await
         .json(200);
-    assert_eq!(teams(&live)[0].0, "Beta");
+    assert_eq!(ranked_teams(&live)[0].0, "Beta");
 }
 
 #[tokio::test]
@@ -347,7 +356,10 @@ async fn texts_are_compressed_on_request_and_files_are_not() {
     let dataset = format!("/api/v1/evaluations/{}/dataset", string(&list[0]["id"]));
     let (headers, body) = get_gzip(&dataset).await;
     assert!(!headers.contains_key("content-encoding"));
-    assert_eq!(&body[..], b"PK the recorded dataset");
+    assert_eq!(&body[..], DATASET.as_bytes());
     let (headers, _) = get_gzip("/api/v1/whoami").await;
-    assert!(!headers.contains_key("content-encoding"), "it is small");
+    assert!(
+        !headers.contains_key("content-encoding"),
+        "small responses are not compressed"
+    );
 }

@@ -1,4 +1,4 @@
-//! Measures how fast the boards are with many teams. Not part of the normal test run:
+//! Measures how long responses with boards (the rankings of a stage) take with many teams. Not part of the normal test run:
 //! `cargo nextest run --release -p faceoff-http --run-ignored only board_load --no-capture`
 
 use crate::site::{OutcomeFn, Site, outcome};
@@ -6,9 +6,10 @@ use faceoff_types::{EpisodeOutcome, Task, Violations};
 use std::time::Instant;
 
 const TEAMS: usize = 50;
+/// Episodes of each task.
 const EPISODES: u32 = 1000;
 
-/// A pseudo-random number below 1000 that depends only on the arguments.
+/// A pseudo-random number below 1000 that depends only on the arguments. Different salts give independent numbers.
 fn pseudo_random(team: u64, task: Task, episode: u32, salt: u8) -> u64 {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&team.to_le_bytes());
@@ -23,6 +24,7 @@ fn pseudo_random(team: u64, task: Task, episode: u32, salt: u8) -> u64 {
 #[expect(clippy::print_stdout, reason = "the test prints its measurements")]
 async fn boards_of_fifty_teams_are_measured() {
     let site = Site::start().await;
+    // Later teams succeed more often, and violate more.
     let outcome_fn = |team: u64| {
         move |task: Task, episode: u32| EpisodeOutcome {
             success: pseudo_random(team, task, episode, 0) < 200 + 12 * team,
@@ -45,7 +47,7 @@ async fn boards_of_fifty_teams_are_measured() {
             let answer = site.get(path, None).await;
             let elapsed = started.elapsed();
             assert_eq!(answer.status, 200);
-            println!("{TEAMS} teams × 3 × {EPISODES}, {round}: {path} {elapsed:?}");
+            println!("{TEAMS} teams × 3 tasks × {EPISODES} episodes, {round}: {path} {elapsed:?}");
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Board pages: changes since the previous day, past days, sorting, ETags and page size.
+//! Tests of board pages, which show the ranking of a stage: changes since the previous day, past days, sorting, ETags and page
+//! size.
 
 use crate::{
     html::{page, texts},
@@ -8,6 +9,7 @@ use reqwest::{Method, header};
 use scraper::{Html, Selector};
 use serde_json::json;
 
+/// The attribute `name` of each element that the selector finds.
 fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
     html.select(&Selector::parse(selector).unwrap())
         .map(|element| element.value().attr(name).unwrap_or_default().to_owned())
@@ -76,23 +78,26 @@ async fn board_page_shows_changes_since_the_previous_day() {
 async fn past_days_are_linked_with_the_same_parameters() {
     let site = Site::start().await;
     two_days(&site).await;
-    let now = page(&site, "/?sort=team").await;
+    let current = page(&site, "/?sort=team").await;
     assert_eq!(
-        attributes(&now, ".days [rel=prev]", "href"),
+        attributes(&current, ".days [rel=prev]", "href"),
         ["/?day=2026-03-01&sort=team"]
     );
-    assert!(attributes(&now, ".days [rel=next]", "href").is_empty());
-    assert_eq!(texts(&now, ".days details a"), ["2026-03-02", "2026-03-01"]);
-    let then = page(&site, "/?day=2026-03-01&sort=team").await;
-    assert!(texts(&then, ".days")[0].starts_with("As of 2026-03-01"));
-    assert_eq!(texts(&then, ".board th.team > a"), ["Alpha", "Beta"]);
+    assert!(attributes(&current, ".days [rel=next]", "href").is_empty());
     assert_eq!(
-        attributes(&then, ".days [rel=next]", "href"),
+        texts(&current, ".days details a"),
+        ["2026-03-02", "2026-03-01"]
+    );
+    let past = page(&site, "/?day=2026-03-01&sort=team").await;
+    assert!(texts(&past, ".days")[0].starts_with("As of 2026-03-01"));
+    assert_eq!(texts(&past, ".board th.team > a"), ["Alpha", "Beta"]);
+    assert_eq!(
+        attributes(&past, ".days [rel=next]", "href"),
         ["/?sort=team"],
         "the newest day is the current board"
     );
     assert_eq!(
-        attributes(&then, ".tabs a", "href"),
+        attributes(&past, ".tabs a", "href"),
         [
             "/?day=2026-03-01",
             "/tasks/hit?day=2026-03-01",
@@ -202,9 +207,13 @@ async fn unchanged_board_page_answers_not_modified() {
 async fn full_board_page_loads_less_than_100_kilobytes() {
     let site = Site::start().await;
     // As many teams as in the paper's qualifying stage, on two days.
-    let names: Vec<String> = (1..=17).map(|at| format!("Team number {at}")).collect();
-    let results: Vec<_> = (1..=17)
-        .map(|at| result([f64::from(at) / 20.0; 3], 100.0 * f64::from(at)))
+    const TEAMS: u32 = 17;
+    let names: Vec<String> = (1..=TEAMS)
+        .map(|number| format!("Team number {number}"))
+        .collect();
+    let results: Vec<_> = (1..=TEAMS)
+        .map(f64::from)
+        .map(|number| result([number / 20.0; 3], 100.0 * number))
         .collect();
     let teams: Vec<_> = names
         .iter()
@@ -219,13 +228,13 @@ async fn full_board_page_loads_less_than_100_kilobytes() {
     }
     for path in ["/", "/tasks/hit"] {
         let html = page(&site, path).await;
-        assert_eq!(texts(&html, ".board td.rank").len(), 17);
+        assert_eq!(texts(&html, ".board td.rank").len(), TEAMS as usize);
         let mut bytes = site.get(path, None).await.body.len();
-        let loaded = [
+        let assets = [
             attributes(&html, "link[rel=stylesheet], link[rel=icon]", "href"),
             attributes(&html, "script, img", "src"),
         ];
-        for asset in loaded.concat() {
+        for asset in assets.concat() {
             let answer = site.get(&asset, None).await;
             assert_eq!(answer.status, 200, "{asset}");
             assert!(answer.header("cache-control").contains("immutable"));

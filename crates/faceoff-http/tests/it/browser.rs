@@ -1,4 +1,4 @@
-//! A browser without scripts: it opens pages, submits forms and keeps one cookie.
+//! A browser for tests of pages and forms. It runs no scripts: it opens pages, submits forms and keeps one cookie.
 
 use crate::site::{ADMIN, Answer, Site, client_builder, string};
 use reqwest::redirect::Policy;
@@ -26,19 +26,21 @@ impl<'a> Browser<'a> {
             Some(cookie) => request.header("cookie", cookie),
             None => request,
         };
-        let answer = Answer::of(request.send().await.unwrap()).await;
-        if let Some(set) = answer.headers.get("set-cookie") {
-            let pair = set.to_str().unwrap().split(';').next().unwrap();
+        let answer = Answer::read(request.send().await.unwrap()).await;
+        if let Some(set_cookie) = answer.headers.get("set-cookie") {
+            let pair = set_cookie.to_str().unwrap().split(';').next().unwrap();
             self.cookie = (!pair.ends_with('=')).then(|| pair.to_owned());
         }
         answer
     }
 
+    /// Opens a page.
     pub async fn open(&mut self, path: &str) -> Answer {
         let request = self.http.get(format!("{}{path}", self.site.url));
         self.send(request.header("accept", "text/html")).await
     }
 
+    /// Submits a form with these fields from a page of the site.
     pub async fn submit(&mut self, path: &str, fields: &[(&str, &str)]) -> Answer {
         let body: Vec<String> = fields
             .iter()
@@ -54,13 +56,13 @@ impl<'a> Browser<'a> {
         self.send(request).await
     }
 
-    /// Uploads an archive as the upload form does.
-    pub async fn upload(&mut self, path: &str, name: &str, archive: &[u8]) -> Answer {
+    /// Uploads a bundle as the upload form does.
+    pub async fn upload(&mut self, path: &str, file_name: &str, bundle: &[u8]) -> Answer {
         let head = format!(
-            "--X\r\nContent-Disposition: form-data; name=\"bundle\"; filename=\"{name}\"\r\n\
+            "--X\r\nContent-Disposition: form-data; name=\"bundle\"; filename=\"{file_name}\"\r\n\
              Content-Type: application/octet-stream\r\n\r\n"
         );
-        let body = [head.as_bytes(), archive, b"\r\n--X--\r\n"].concat();
+        let body = [head.as_bytes(), bundle, b"\r\n--X--\r\n"].concat();
         let request = self
             .http
             .post(format!("{}{path}", self.site.url))
@@ -71,7 +73,8 @@ impl<'a> Browser<'a> {
         self.send(request).await
     }
 
-    /// Submits a form from a foreign page. The cookie is sent along, as an old browser would.
+    /// Submits a form from a page of another site, once with each header by which a server can notice that. The cookie is
+    /// sent along, as an old browser would do.
     pub async fn submit_from_foreign_page(&mut self, form: &Form) -> Vec<Answer> {
         let mut answers = Vec::new();
         for (name, value) in [
@@ -111,6 +114,7 @@ impl<'a> Browser<'a> {
     }
 }
 
+/// The text in form encoding.
 fn encode(text: &str) -> String {
     let encoded = text.bytes().map(|byte| match byte {
         b' ' => "+".to_owned(),
@@ -131,7 +135,7 @@ pub struct Form {
     pub fields: Vec<(String, String)>,
 }
 
-/// The forms of the page at a path.
+/// The forms of a page, which was the answer to a request of `path`.
 pub fn forms(path: &str, answer: &Answer) -> Vec<Form> {
     let page = Html::parse_document(&answer.body);
     let select = |selector: &str| Selector::parse(selector).unwrap();
@@ -153,11 +157,11 @@ pub fn forms(path: &str, answer: &Answer) -> Vec<Form> {
                 match field.value().name() {
                     "select" => {
                         let options: Vec<_> = field.select(&options).collect();
-                        let chosen = options
+                        let selected = options
                             .iter()
                             .find(|option| option.value().attr("selected").is_some())
                             .or(options.first());
-                        chosen.map(|option| (name, value(*option)))
+                        selected.map(|option| (name, value(*option)))
                     }
                     _ if is_checkbox => field
                         .value()
@@ -190,4 +194,5 @@ pub async fn invite(site: &Site, body: serde_json::Value) -> String {
     string(&invited.json(201)["link"])
 }
 
+/// The password of all users in tests.
 pub const PASSWORD: &str = "correct horse battery";

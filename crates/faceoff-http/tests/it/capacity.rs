@@ -1,21 +1,23 @@
-//! The capacity forecast, queue positions and next steps, and warnings about days that do not fit.
+//! Tests of the capacity forecast (will a day's evaluations finish before its deadline?), of queue positions and next steps,
+//! and of warnings about days that do not fit.
 
 use crate::site::{ADMIN, Answer, Site, string};
 use faceoff_store::*;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-pub async fn change(site: &Site, stage: &str, body: Value) -> Answer {
+/// Changes a stage as an organiser.
+pub async fn change_stage(site: &Site, stage: &str, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{stage}");
     let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
-/// Runs the next evaluation. Each shard takes this many seconds.
-pub async fn run_evaluation_slowly(site: &Site, seconds: i64) {
+/// Runs the next evaluation. Each job takes `job_s` seconds.
+pub async fn run_evaluation_slowly(site: &Site, job_s: i64) {
     loop {
         let ClaimedJob { claim, job } = site.claim().await;
-        site.advance(seconds);
+        site.advance(job_s);
         match job {
             Job::Shard { run, shard, .. } => {
                 let commit = ShardCommit {
@@ -31,10 +33,11 @@ pub async fn run_evaluation_slowly(site: &Site, seconds: i64) {
             }
             Job::Scoring { .. } => {
                 let result = crate::site::result([0.5, 0.5, 0.5], 10.0);
-                let hash = blake3::hash(b"d").to_string();
+                let key = "datasets/never-read.zip";
+                let hash = blake3::hash(b"never read").to_string();
                 let finished =
                     site.store
-                        .finish_evaluation(&claim, &result, "d", &hash, site.now());
+                        .finish_evaluation(&claim, &result, key, &hash, site.now());
                 finished.await.unwrap();
                 return;
             }
@@ -53,41 +56,40 @@ async fn forecast_reports_a_day_that_will_not_fit() {
     let path = format!("/api/v1/stages/{stage}/capacity");
     let capacity = async || site.get(&path, Some(ADMIN)).await.json(200);
 
-    let none = capacity().await;
+    let empty = capacity().await;
     assert_eq!(
-        (&none["stage_name"], &none["slots"]),
+        (&empty["stage_name"], &empty["slots"]),
         (&json!("Qualifying"), &json!(2))
     );
-    assert_eq!(none["days"][0]["teams"], 0);
-    assert!(string(&none["days"][0]["summary"]).contains("no team has a valid submission"));
+    assert_eq!(empty["days"][0]["teams"], 0);
+    assert!(string(&empty["days"][0]["summary"]).contains("no team has a valid submission"));
 
     let submission = site.valid_submission(&alpha, "a").await;
-    let unknown = capacity().await["days"][0].clone();
+    let unmeasured = capacity().await["days"][0].clone();
     // 3 tasks × 4 episodes, one shard each. The time is one day: from the next cutoff to the following one.
     assert_eq!(
         (
-            &unknown["day"],
-            &unknown["is_under_way"],
-            &unknown["teams"],
-            &unknown["episodes"]
+            &unmeasured["day"],
+            &unmeasured["is_under_way"],
+            &unmeasured["teams"],
+            &unmeasured["episodes"]
         ),
         (&json!("2026-03-01"), &json!(false), &json!(1), &json!(12))
     );
-    assert_eq!(unknown["deadline_at"], "2026-03-02T12:00:00Z");
-    assert_eq!(unknown["hours_until_deadline"], 24.0);
-    assert_eq!(unknown["expected_hours"], Value::Null);
-    // 3 shards × (125 + 40) + 1 fault × 125 + 12 × 23.2 s on two slots
-    let worst = unknown["worst_case_hours"].as_f64().unwrap();
-    assert!(
-        (worst - (3.0 * 165.0 + 125.0 + 12.0 * 23.2) / 7200.0).abs() < 1e-9,
-        "{worst}"
-    );
-    assert_eq!(unknown["fit"], "surely");
-    change(&site, &stage, json!({ "day_deadline": { "hours": 1 }, "episodes_per_task": 1000, "confirm": "Qualifying" }))
+    assert_eq!(unmeasured["deadline_at"], "2026-03-02T12:00:00Z");
+    assert_eq!(unmeasured["hours_until_deadline"], 24.0);
+    assert_eq!(unmeasured["expected_hours"], Value::Null);
+    // Limits in seconds: 125 for the start and exit of an agent, 40 for the resets of a shard, and 23.2 for an episode. Three
+    // shards, one restart after a fault, and 12 episodes, on two slots.
+    let worst_case = unmeasured["worst_case_hours"].as_f64().unwrap();
+    let expected = (3.0 * (125.0 + 40.0) + 125.0 + 12.0 * 23.2) / (2.0 * 3600.0);
+    assert!((worst_case - expected).abs() < 1e-9, "{worst_case}");
+    assert_eq!(unmeasured["fit"], "surely");
+    change_stage(&site, &stage, json!({ "day_deadline": { "hours": 1 }, "episodes_per_task": 1000, "confirm": "Qualifying" }))
         .await
         .json(200);
     assert_eq!(capacity().await["days"][0]["fit"], "unknown");
-    change(
+    change_stage(
         &site,
         &stage,
         json!({ "episodes_per_task": 4, "confirm": "Qualifying" }),
@@ -98,7 +100,7 @@ async fn forecast_reports_a_day_that_will_not_fit() {
     site.evaluate(&alpha, &submission).await;
     run_evaluation_slowly(&site, 300).await;
     site.next_day();
-    change(
+    change_stage(
         &site,
         &stage,
         json!({ "episodes_per_task": 1000, "confirm": "Qualifying" }),
@@ -168,9 +170,9 @@ async fn forecast_reports_a_day_that_will_not_fit() {
 async fn pending_jobs_show_position_time_and_next_step() {
     let site = Site::start().await;
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
-    let mut agents = Vec::new();
+    let mut submissions = Vec::new();
     for team in [&alpha, &beta] {
-        agents.push(site.valid_submission(team, "a").await);
+        submissions.push(site.valid_submission(team, "a").await);
     }
     let upload = site.upload(&alpha.token, crate::site::GZIP.to_vec()).await;
     let upload = format!("/api/v1/submissions/{}", string(&upload.json(201)["id"]));
@@ -208,8 +210,8 @@ async fn pending_jobs_show_position_time_and_next_step() {
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(me["validating"], json!([]));
 
-    let alpha_evaluation = site.evaluate(&alpha, &agents[0]).await;
-    let beta_evaluation = site.evaluate(&beta, &agents[1]).await;
+    let alpha_evaluation = site.evaluate(&alpha, &submissions[0]).await;
+    let beta_evaluation = site.evaluate(&beta, &submissions[1]).await;
     run_evaluation_slowly(&site, 60).await;
     let mut pending = Vec::new();
     for (team, path) in [(&alpha, &alpha_evaluation), (&beta, &beta_evaluation)] {
@@ -234,7 +236,7 @@ async fn pending_jobs_show_position_time_and_next_step() {
         .as_array()
         .unwrap()
         .iter()
-        .find(|one| one["id"] == view["id"]);
+        .find(|evaluation| evaluation["id"] == view["id"]);
     assert_eq!(listed.unwrap()["queue"], view["queue"]);
     let page = site.get(page, None).await.body;
     assert!(
@@ -271,7 +273,7 @@ async fn capacity_is_for_organisers_and_deadlines_are_validated() {
         (json!(30), "day_deadline"),
     ] {
         let body = json!({ "day_deadline": wrong });
-        change(&site, &stage, body.clone())
+        change_stage(&site, &stage, body.clone())
             .await
             .problem(422, "invalid-content", &[words]);
         let body = json!({ "name": "Final", "day_deadline": wrong });
@@ -280,11 +282,11 @@ async fn capacity_is_for_organisers_and_deadlines_are_validated() {
             .problem(422, "invalid-content", &[words]);
     }
     let body = json!({ "name": "Final", "day_deadline": "never" });
-    let made = site
+    let created = site
         .post("/api/v1/stages", Some(ADMIN), &body)
         .await
         .json(201);
-    assert_eq!(made["day_deadline"], "never");
+    assert_eq!(created["day_deadline"], "never");
     let unchanged = site
         .get(&format!("/api/v1/stages/{stage}"), None)
         .await
@@ -301,11 +303,11 @@ async fn monitor_warns_once_of_each_day_that_does_not_fit() {
     let mut monitor = site.capacity_monitor();
     let set_episodes = async |episodes: u32| {
         let rules = json!({ "episodes_per_task": episodes, "confirm": "Qualifying" });
-        change(&site, &stage, rules).await.json(200)
+        change_stage(&site, &stage, rules).await.json(200)
     };
     let set_deadline = async |hours: u32| {
         let deadline = json!({ "day_deadline": { "hours": hours } });
-        change(&site, &stage, deadline).await.json(200);
+        change_stage(&site, &stage, deadline).await.json(200);
     };
     set_deadline(1).await;
     let changed = set_episodes(1000).await;
@@ -318,10 +320,10 @@ async fn monitor_warns_once_of_each_day_that_does_not_fit() {
     assert!(string(&load["summary"]).contains("nothing measured"));
     assert_eq!(monitor.check().await.unwrap(), []);
     let page = async |token: Option<&str>| site.get("/season", token).await.body;
-    let shown = page(Some(ADMIN)).await;
+    let season_page = page(Some(ADMIN)).await;
     assert!(
-        shown.contains("nothing measured") && !shown.contains("does not fit"),
-        "{shown}"
+        season_page.contains("nothing measured") && !season_page.contains("does not fit"),
+        "{season_page}"
     );
 
     set_episodes(4).await;
@@ -332,7 +334,7 @@ async fn monitor_warns_once_of_each_day_that_does_not_fit() {
     set_episodes(1000).await;
     let warnings = monitor.check().await.unwrap();
     let days = |warnings: &[faceoff_http::CapacityWarning]| -> Vec<(String, bool)> {
-        let days = warnings.iter().map(|one| &one.load);
+        let days = warnings.iter().map(|warning| &warning.load);
         days.map(|load| (load.day.to_string(), load.is_under_way))
             .collect()
     };
@@ -352,17 +354,17 @@ async fn monitor_warns_once_of_each_day_that_does_not_fit() {
             "/api/v1/season" => answer["stages"][0].clone(),
             _ => answer,
         };
-        let seen = stage_view(site.get(&path, Some(ADMIN)).await.json(200));
-        assert_eq!(seen["capacity"][0]["fit"], "not", "{path}");
+        let view = stage_view(site.get(&path, Some(ADMIN)).await.json(200));
+        assert_eq!(view["capacity"][0]["fit"], "not", "{path}");
         for token in [None, Some(alpha.token.as_str())] {
-            let seen = stage_view(site.get(&path, token).await.json(200));
-            assert_eq!(seen.get("capacity"), None, "{path}");
+            let view = stage_view(site.get(&path, token).await.json(200));
+            assert_eq!(view.get("capacity"), None, "{path}");
         }
     }
-    let shown = page(Some(ADMIN)).await;
+    let season_page = page(Some(ADMIN)).await;
     assert!(
-        shown.contains("does not fit") && shown.contains(&warnings[0].load.summary),
-        "{shown}"
+        season_page.contains("does not fit") && season_page.contains(&warnings[0].load.summary),
+        "{season_page}"
     );
     assert!(!page(None).await.contains("id=\"capacity\""));
 

@@ -1,7 +1,7 @@
-//! Warnings in the log about days that do not fit.
+//! Tests of the log's warnings about evaluation days that will not finish before their deadline.
 
 use crate::{
-    capacity::{change, run_evaluation_slowly},
+    capacity::{change_stage, run_evaluation_slowly},
     site::Site,
 };
 use serde_json::json;
@@ -20,19 +20,20 @@ use tracing::{
 struct Warnings(Arc<Mutex<Vec<String>>>);
 
 impl Warnings {
-    fn about_days(&self) -> Vec<String> {
-        let all = self.0.lock().unwrap();
-        let about_days = all.iter().filter(|line| line.contains("does not fit"));
-        about_days.cloned().collect()
+    fn capacity_warnings(&self) -> Vec<String> {
+        let lines = self.0.lock().unwrap();
+        let matching = lines.iter().filter(|line| line.contains("does not fit"));
+        matching.cloned().collect()
     }
 
     async fn wait_for(&self, count: usize) {
-        while self.about_days().len() < count {
+        while self.capacity_warnings().len() < count {
             tokio::task::yield_now().await;
         }
     }
 }
 
+/// Appends the fields of a log event to a text.
 struct FieldWriter<'a>(&'a mut String);
 
 impl Visit for FieldWriter<'_> {
@@ -69,22 +70,22 @@ async fn overfull_day_is_logged_once_and_again_at_its_cutoff() {
     run_evaluation_slowly(&site, 300).await;
     site.next_day();
     let rules = json!({ "episodes_per_task": 1000, "day_deadline": { "hours": 1 }, "confirm": "Qualifying" });
-    change(&site, &stage, rules).await.json(200);
+    change_stage(&site, &stage, rules).await.json(200);
 
     let warnings = Warnings::default();
     let _guard = tracing::subscriber::set_default(warnings.clone());
-    let (end, ended) = tokio::sync::oneshot::channel::<()>();
+    let (shutdown_sender, shutdown_receiver) = tokio::sync::oneshot::channel::<()>();
     let shutdown = async {
-        let _ = ended.await;
+        let _ = shutdown_receiver.await;
     };
-    let watching = tokio::spawn(site.capacity_monitor().run(shutdown));
+    let monitor = tokio::spawn(site.capacity_monitor().run(shutdown));
     warnings.wait_for(1).await;
     // The cutoff triggers a check: it warns of the started day and of the next one.
     site.evaluate(&alpha, &submission).await;
     warnings.wait_for(3).await;
-    drop(end);
-    watching.await.unwrap();
-    let lines = warnings.about_days();
+    drop(shutdown_sender);
+    monitor.await.unwrap();
+    let lines = warnings.capacity_warnings();
     assert_eq!(lines.len(), 3, "{lines:#?}");
     for (line, day) in lines.iter().zip(["2026-03-02", "2026-03-02", "2026-03-03"]) {
         for part in ["stage=Qualifying", &format!("day={day}"), "more slots"] {

@@ -1,4 +1,4 @@
-//! Episodes and their replays, and their visibility.
+//! Tests of an evaluation's episodes, of their clips (the data of the replay viewer), and of who may see them.
 
 use crate::{
     html::texts,
@@ -15,13 +15,17 @@ use std::{fs::File, io::Read, path::PathBuf};
 
 /// Episodes of `prepare`. The agent holds its arm still; in the last episode it sends an invalid answer.
 const EPISODES: u32 = 5;
+/// The invalid answer.
 const AGENT_OUTPUT: &str = "private output of the agent";
 
+/// A day of two teams, of which Alpha's evaluation has clips.
 struct RecordedDay {
     site: Site,
     alpha: TestTeam,
     beta: TestTeam,
+    /// Path of Alpha's evaluation in the API.
     path: String,
+    /// Path of the page that lists the evaluation's episodes.
     page: String,
 }
 
@@ -35,7 +39,8 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
         let interpolation = Some(Interpolation::Cubic);
         let mut running =
             RunningEpisode::begin(&arena, Task::Prepare, episode, interpolation, &mut clips);
-        let action = running.question().unwrap().observation[6..13].to_vec();
+        // Entries 6 to 12 of an observation are the joint positions.
+        let joint_positions = running.question().unwrap().observation[6..13].to_vec();
         let outcome = loop {
             if episode == EPISODES - 1 && running.steps() == 3 {
                 let fault = AgentFaultKind::NotJson {
@@ -43,12 +48,14 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
                 };
                 break running.outcome_after_fault(Phase::Step, fault, None);
             }
+            // The answer of step 2 is late: a control step has 0.02 s.
             let timing = AnswerTiming {
                 computation_time_s: if running.steps() == 2 { 0.03 } else { 0.001 },
                 host_time_s: 0.0,
                 cpu_time_s: None,
             };
-            match running.answer(&[action.clone(), vec![0.0; 7]].concat(), timing) {
+            let action = [joint_positions.clone(), vec![0.0; 7]].concat();
+            match running.answer(&action, timing) {
                 Ok(None) => {}
                 Ok(Some(outcome)) => break outcome,
                 Err(fault) => break running.outcome_after_fault(Phase::Step, fault, None),
@@ -93,10 +100,12 @@ async fn record_day_on(site: Site, is_over: bool) -> RecordedDay {
 }
 
 impl RecordedDay {
+    /// Gets a resource of Alpha's evaluation.
     async fn get(&self, path: &str, token: Option<&str>) -> Answer {
         self.site.get(&format!("{}/{path}", self.path), token).await
     }
 
+    /// Headers and unprocessed body of a resource of Alpha's evaluation.
     async fn bytes(&self, path: &str, encodings: &str) -> (reqwest::header::HeaderMap, Vec<u8>) {
         let path = format!("{}/{path}", self.path);
         let request = self
@@ -109,6 +118,7 @@ impl RecordedDay {
         (headers, answer.bytes().await.unwrap().into())
     }
 
+    /// The page of the evaluation's episodes, or one below it.
     async fn page(&self, path: &str) -> Html {
         let answer = self.site.get(&format!("{}{path}", self.page), None).await;
         assert_eq!(answer.status, 200, "{}", answer.body);
@@ -121,13 +131,13 @@ impl RecordedDay {
 #[tokio::test]
 async fn episodes_are_hidden_before_the_release() {
     let day = record_day(false).await;
-    let own = Some(day.alpha.token.as_str());
+    let alpha = Some(day.alpha.token.as_str());
     for path in [
         "episodes",
         "episodes/prepare/0/motion",
         "episodes/prepare/0/observed",
     ] {
-        for token in [None, own, Some(ADMIN)] {
+        for token in [None, alpha, Some(ADMIN)] {
             let answer = day.get(path, token).await;
             answer.problem(409, "not-yet", &["queued or running"]);
         }
@@ -195,7 +205,7 @@ async fn motion_is_public_and_observations_follow_the_dataset() {
         let column = |name: &str| {
             let mut reader = csv::Reader::from_reader(table.body.as_bytes());
             let headers = reader.headers().unwrap();
-            headers.iter().position(|one| one == name).unwrap()
+            headers.iter().position(|header| header == name).unwrap()
         };
         let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
         assert_eq!(rows.len(), EPISODES as usize);
@@ -207,11 +217,12 @@ async fn motion_is_public_and_observations_follow_the_dataset() {
             .get(&format!("{evaluation}/answer-times.csv"), token)
             .await;
         let page = site.get(evaluation, token).await;
-        assert_eq!(page.body.contains("class=\"shape\""), is_visible);
+        assert_eq!(page.body.contains("class=\"distribution\""), is_visible);
         if is_visible {
             let mut reader = csv::Reader::from_reader(times.body.as_bytes());
-            let counted = reader.records().map(|row| row.unwrap()[3].parse::<u64>());
-            assert_eq!(counted.map(Result::unwrap).sum::<u64>(), steps);
+            // The fourth column is the number of steps.
+            let bin_steps = reader.records().map(|row| row.unwrap()[3].parse::<u64>());
+            assert_eq!(bin_steps.map(Result::unwrap).sum::<u64>(), steps);
         } else {
             assert_eq!(times.status, 401);
         }
@@ -284,10 +295,10 @@ async fn episodes_page_is_filtered_by_its_query() {
     let day = record_day(true).await;
     let view: Value = day.get("episodes", None).await.json(200);
     let lines = view["episodes"].as_array().unwrap();
-    let all = day.page("").await;
+    let unfiltered_page = day.page("").await;
     let rows = |html: &Html| texts(html, ".episodes tbody tr");
-    assert_eq!(rows(&all).len(), EPISODES as usize);
-    for (row, line) in rows(&all).iter().zip(lines) {
+    assert_eq!(rows(&unfiltered_page).len(), EPISODES as usize);
+    for (row, line) in rows(&unfiltered_page).iter().zip(lines) {
         assert!(row.contains(line["why"].as_str().unwrap()), "{row}");
         let verdict = if line["success"] == true {
             "✓"
@@ -299,17 +310,17 @@ async fn episodes_page_is_filtered_by_its_query() {
     let with_fault = day.page("?end=agent_fault").await;
     assert_eq!(rows(&with_fault).len(), 1);
     let failed = lines.iter().filter(|line| line["success"] == false).count();
-    let shown = day.page("?task=prepare&outcome=failure").await;
-    assert_eq!(rows(&shown).len(), failed);
-    let with_foul = lines
+    let failures_page = day.page("?task=prepare&outcome=failure").await;
+    assert_eq!(rows(&failures_page).len(), failed);
+    let with_violation = lines
         .iter()
         .filter(|line| line["broken"].is_array())
         .count();
-    let shown = day.page("?violated=any").await;
-    assert_eq!(rows(&shown).len(), with_foul);
-    let none = day.page("?task=hit").await;
-    assert!(texts(&none, "#table ~ p")[0].contains("No episode matches"));
-    let maps = texts(&all, ".maps figcaption");
+    let violations_page = day.page("?violated=any").await;
+    assert_eq!(rows(&violations_page).len(), with_violation);
+    let empty_page = day.page("?task=hit").await;
+    assert!(texts(&empty_page, "#table ~ p")[0].contains("No episode matches"));
+    let maps = texts(&unfiltered_page, ".maps figcaption");
     assert!(
         maps.iter().any(|map| map.starts_with("prepare:")),
         "{maps:?}"

@@ -1,12 +1,14 @@
-//! Decisions of the organiser that need a confirmation: their preview, effect and visibility.
+//! Tests of an organiser's decisions that need a confirmation: their preview (the description of their effects), their effects,
+//! and who may make and see them.
 
 use crate::site::{ADMIN, GZIP, Site, result};
 use serde_json::{Value, json};
 
+/// The reason of all decisions. It contains HTML, which pages must escape.
 const REASON: &str = "the <table> was tilted";
 
-/// The teams on the board.
-async fn teams(site: &Site) -> Value {
+/// The names of the teams on the board.
+async fn board_teams(site: &Site) -> Value {
     let board = site.get("/api/v1/board", None).await.json(200);
     board["rows"]
         .as_array()
@@ -16,25 +18,26 @@ async fn teams(site: &Site) -> Value {
         .collect()
 }
 
-/// Makes a decision. Without the confirmation nothing is done, and the response describes the effects.
+/// Checks that a decision needs the confirmation `confirm`: without it nothing is done, and the response describes the effects
+/// with `words`. Then makes the decision. Returns the response.
 async fn confirm_decision(site: &Site, path: &str, confirm: &str, words: &[&str]) -> Value {
-    let ask = async |body: Value| site.post(path, Some(ADMIN), &body).await;
+    let post = async |body: Value| site.post(path, Some(ADMIN), &body).await;
     for body in [
         json!({ "reason": REASON }),
         json!({ "reason": REASON, "confirm": "yes" }),
     ] {
-        let problem = ask(body).await.problem(409, "not-confirmed", words);
+        let problem = post(body).await.problem(409, "not-confirmed", words);
         assert_eq!(problem["confirm"], confirm);
     }
     for reason in ["", " ", &"x".repeat(501)] {
-        ask(json!({ "reason": reason, "confirm": confirm }))
+        post(json!({ "reason": reason, "confirm": confirm }))
             .await
             .problem(422, "invalid-content", &["reason", "1 to 500"]);
     }
-    ask(json!({ "confirm": confirm }))
+    post(json!({ "confirm": confirm }))
         .await
         .problem(422, "invalid-content", &["reason"]);
-    ask(json!({ "reason": REASON, "confirm": confirm }))
+    post(json!({ "reason": REASON, "confirm": confirm }))
         .await
         .json(200)
 }
@@ -47,7 +50,7 @@ async fn voided_evaluation_leaves_the_board_with_its_reason() {
     let path = site.evaluate(&team, &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
-    assert_eq!(teams(&site).await, json!(["Alpha"]));
+    assert_eq!(board_teams(&site).await, json!(["Alpha"]));
     let words = ["Alpha", "2026-03-01", "disappear from the boards", "rerun"];
     let voided = confirm_decision(&site, &format!("{path}/void"), "Alpha", &words).await;
     assert_eq!(
@@ -55,7 +58,7 @@ async fn voided_evaluation_leaves_the_board_with_its_reason() {
         json!({ "at": "2026-03-01T10:00:00Z", "reason": REASON })
     );
     assert_eq!(voided["state"], "finished");
-    assert_eq!(teams(&site).await, json!([]));
+    assert_eq!(board_teams(&site).await, json!([]));
     let again = json!({ "reason": REASON, "confirm": "Alpha" });
     site.post(&format!("{path}/void"), Some(ADMIN), &again)
         .await
@@ -89,7 +92,12 @@ async fn voided_day_voids_or_cancels_all_its_evaluations() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| (one["state"].clone(), one["voided"]["reason"].clone()))
+        .map(|evaluation| {
+            (
+                evaluation["state"].clone(),
+                evaluation["voided"]["reason"].clone(),
+            )
+        })
         .collect();
     assert_eq!(
         states,
@@ -126,7 +134,7 @@ async fn disqualified_team_leaves_the_board_with_the_reason() {
     )
     .await;
     assert_eq!(view["disqualified"]["reason"], REASON);
-    assert_eq!(teams(&site).await, json!([]));
+    assert_eq!(board_teams(&site).await, json!([]));
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["disqualified"][0]["name"], "Alpha");
     let page = site.get("/", None).await.body;
@@ -148,11 +156,11 @@ async fn disqualified_team_leaves_the_board_with_the_reason() {
     );
 
     let path = format!("/api/v1/teams/{}/reinstate", team.id);
-    let back = site
+    let reinstated = site
         .post(&path, Some(ADMIN), &json!({ "reason": "a mistake" }))
         .await;
-    assert_eq!(back.json(200).get("disqualified"), None);
-    assert_eq!(teams(&site).await, json!(["Alpha"]));
+    assert_eq!(reinstated.json(200).get("disqualified"), None);
+    assert_eq!(board_teams(&site).await, json!(["Alpha"]));
     site.post(&path, Some(ADMIN), &json!({ "reason": "a mistake" }))
         .await
         .problem(409, "conflict", &["not disqualified"]);
@@ -161,13 +169,13 @@ async fn disqualified_team_leaves_the_board_with_the_reason() {
 #[tokio::test]
 async fn paused_queue_is_shown_and_server_stays_healthy() {
     let site = Site::start().await;
-    let ask = async |path: &str, body: Value| site.post(path, Some(ADMIN), &body).await;
-    ask("/api/v1/queue/pause", json!({ "reason": "" }))
+    let post = async |path: &str, body: Value| site.post(path, Some(ADMIN), &body).await;
+    post("/api/v1/queue/pause", json!({ "reason": "" }))
         .await
         .problem(422, "invalid-content", &["reason"]);
-    let paused = ask("/api/v1/queue/pause", json!({ "reason": REASON })).await;
+    let paused = post("/api/v1/queue/pause", json!({ "reason": REASON })).await;
     assert_eq!(paused.status, 204);
-    ask("/api/v1/queue/pause", json!({ "reason": REASON }))
+    post("/api/v1/queue/pause", json!({ "reason": REASON }))
         .await
         .problem(409, "conflict", &["already"]);
     let pause = json!({ "at": "2026-03-01T10:00:00Z", "reason": REASON });
@@ -189,8 +197,8 @@ async fn paused_queue_is_shown_and_server_stays_healthy() {
             "{page}"
         );
     }
-    assert_eq!(ask("/api/v1/queue/resume", json!({})).await.status, 204);
-    ask("/api/v1/queue/resume", json!({}))
+    assert_eq!(post("/api/v1/queue/resume", json!({})).await.status, 204);
+    post("/api/v1/queue/resume", json!({}))
         .await
         .problem(409, "conflict", &["not paused"]);
     assert_eq!(

@@ -1,30 +1,32 @@
-//! Which evaluations count on a board: the newest, the best, a mean of days, or those of a final day.
+//! Tests of the stage setting `standings`, which says which of a team's evaluations count on the board: the newest, the best, a
+//! mean of several days, or that of a final day.
 
 use crate::site::{ADMIN, Answer, Site, outcome};
 use faceoff_types::{EpisodeOutcome, Task, Violations};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, body: Value) -> Answer {
+/// Changes the first stage as an organiser.
+async fn change_stage(site: &Site, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::of(request.json(&body).send().await.unwrap()).await
+    Answer::read(request.json(&body).send().await.unwrap()).await
 }
 
 /// Sets which evaluations count, in an open stage.
 async fn set_counting(site: &Site, standings: Value) {
     let body = json!({ "standings": standings, "confirm": "Qualifying" });
-    let changed = change(site, body).await.json(200);
+    let changed = change_stage(site, body).await.json(200);
     assert_eq!(changed["standings"], standings);
 }
 
-/// An agent that solves the first `solved` episodes of each task, and has a foul of the end effector (3 points) in the
-/// first `broken` ones.
-fn agent(solved: u32, broken: u32) -> impl Fn(Task, u32) -> EpisodeOutcome {
+/// The outcomes of an agent that solves the first `solved` episodes of each task, and violates the bounds of the end effector
+/// (3 penalty points) in the first `violated` ones.
+fn agent(solved: u32, violated: u32) -> impl Fn(Task, u32) -> EpisodeOutcome {
     move |task, episode| EpisodeOutcome {
         success: episode < solved,
         violations: Violations {
-            ee: episode < broken,
+            ee: episode < violated,
             ..Violations::default()
         },
         ..outcome(task, episode, false)
@@ -40,6 +42,7 @@ async fn run_day(site: &Site, outcome_fn: impl Fn(Task, u32) -> EpisodeOutcome) 
     site.run_evaluation(outcome_fn).await.to_string()
 }
 
+/// The overall board (`path` is empty) or a task's (`/hit`).
 async fn board(site: &Site, path: &str) -> Value {
     site.get(&format!("/api/v1/board{path}"), None)
         .await
@@ -49,10 +52,10 @@ async fn board(site: &Site, path: &str) -> Value {
 #[tokio::test]
 async fn board_rows_are_newest_best_or_mean_as_configured() {
     let site = Site::start().await;
-    let [first] = site.run_day(20, [("Alpha", &agent(10, 0))]).await;
+    let [first_evaluation] = site.run_day(20, [("Alpha", &agent(10, 0))]).await;
     let second = run_day(&site, agent(16, 5)).await;
     let third = run_day(&site, agent(4, 1)).await;
-    let first = first.to_string();
+    let first_evaluation = first_evaluation.to_string();
 
     let newest = board(&site, "").await;
     assert_eq!(
@@ -84,9 +87,9 @@ async fn board_rows_are_newest_best_or_mean_as_configured() {
     let row = &best["rows"][0];
     assert_eq!(
         (&row["evaluation"], &row["score"], &row["tier"]),
-        (&json!(first), &json!(50.0), &json!("deployable"))
+        (&json!(first_evaluation), &json!(50.0), &json!("deployable"))
     );
-    assert_eq!(row["evaluations"], json!([first]));
+    assert_eq!(row["evaluations"], json!([first_evaluation]));
     assert!(
         site.get("/", None)
             .await
@@ -97,7 +100,7 @@ async fn board_rows_are_newest_best_or_mean_as_configured() {
     set_counting(&site, json!({ "mean_of_last": 2 })).await;
     let mean = board(&site, "").await;
     let row = &mean["rows"][0];
-    // 16 and 4 of 20; 15 and 3 points.
+    // The mean of 16 and 4 solved episodes of 20, and of 15 and 3 points.
     assert_eq!(row["evaluations"], json!([second, third]));
     assert_eq!(
         (&row["score"], &row["penalty_points"]),
@@ -127,11 +130,11 @@ async fn board_rows_are_newest_best_or_mean_as_configured() {
     ] {
         assert!(page.contains(words), "{words} is not in {page}");
     }
-    // With fewer days than that, all of them count.
+    // The team has fewer days than the mean allows, so all of them count.
     set_counting(&site, json!({ "mean_of_last": 90 })).await;
     assert_eq!(
         board(&site, "").await["rows"][0]["evaluations"],
-        json!([first, second, third])
+        json!([first_evaluation, second, third])
     );
     let html = scraper::Html::parse_document(&site.get("/tasks/hit", None).await.body);
     assert!(html.errors.is_empty(), "{:?}", html.errors);
@@ -172,7 +175,7 @@ async fn means_of_the_same_days_are_compared_pairwise() {
 #[tokio::test]
 async fn changed_counting_of_an_open_stage_needs_confirmation() {
     let site = Site::start().await;
-    let problem = change(&site, json!({ "standings": "best" })).await;
+    let problem = change_stage(&site, json!({ "standings": "best" })).await;
     let problem = problem.problem(409, "not-confirmed", &["best", "latest", "confirm"]);
     assert_eq!(problem["confirm"], "Qualifying");
     let stages = site.get("/api/v1/stages", None).await.json(200);
@@ -205,7 +208,7 @@ async fn final_day_replaces_the_board_once_it_has_started() {
             .contains("Only the final day counts")
     );
 
-    change(&site, json!({ "closes_at": "2026-03-01T20:00:00Z" }))
+    change_stage(&site, json!({ "closes_at": "2026-03-01T20:00:00Z" }))
         .await
         .json(200);
     site.advance(11 * 3600);
@@ -231,9 +234,12 @@ async fn final_day_replaces_the_board_once_it_has_started() {
         .problem(409, "conflict", &["had its cutoff", "only one"]);
     // Only one team has a result of the final day so far, so the board has one row.
     site.run_evaluation(agent(5, 0)).await;
-    let now = board(&site, "").await;
+    let current = board(&site, "").await;
     assert_eq!(
-        (&now["rows_by"], now["rows"].as_array().unwrap().len()),
+        (
+            &current["rows_by"],
+            current["rows"].as_array().unwrap().len()
+        ),
         (&json!("final"), 1)
     );
     site.run_evaluation(agent(9, 0)).await;
@@ -259,15 +265,15 @@ async fn frozen_board_ignores_the_final_day() {
         .await;
     set_counting(&site, json!("final")).await;
     let path = format!("/api/v1/stages/{}", site.stage().await);
-    change(&site, json!({ "closes_at": "2026-03-01T20:00:00Z" }))
+    change_stage(&site, json!({ "closes_at": "2026-03-01T20:00:00Z" }))
         .await
         .json(200);
     let reason = json!({ "reason": "the finale is a surprise" });
     site.post(&format!("{path}/freeze"), Some(ADMIN), &reason)
         .await
         .json(200);
-    let shown = board(&site, "").await["rows"].clone();
-    assert_eq!(shown.as_array().unwrap().len(), 2);
+    let rows_at_freeze = board(&site, "").await["rows"].clone();
+    assert_eq!(rows_at_freeze.as_array().unwrap().len(), 2);
     site.advance(15 * 3600);
     site.post(&format!("{path}/final"), Some(ADMIN), &json!({}))
         .await
@@ -276,7 +282,7 @@ async fn frozen_board_ignores_the_final_day() {
     let frozen = board(&site, "").await;
     assert_eq!(
         (&frozen["rows"], &frozen["rows_by"]),
-        (&shown, &json!("latest"))
+        (&rows_at_freeze, &json!("latest"))
     );
     let live = site
         .get("/api/v1/board?live=true", Some(ADMIN))

@@ -1,4 +1,5 @@
-//! Starting an evaluation day by hand.
+//! Tests of starting an evaluation day by a request of an organiser, and of the next cutoff (the moment at which each team's
+//! active submission is fixed).
 
 use crate::site::{ADMIN, Answer, Site};
 use reqwest::Method;
@@ -34,12 +35,12 @@ async fn day_starts_once_and_lists_teams_without_submission() {
     // Further attempts fail, with and without a body, although another team has a submission now.
     site.valid_submission(&gamma, "g").await;
     site.advance(3600);
-    for again in [Some(&body), None] {
+    for body in [Some(&body), None] {
         let mut request = site.request(Method::POST, "/api/v1/days", Some(ADMIN));
-        if let Some(body) = again {
+        if let Some(body) = body {
             request = request.json(body);
         }
-        let again = Answer::of(request.send().await.unwrap()).await;
+        let again = Answer::read(request.send().await.unwrap()).await;
         let problem = again.problem(
             409,
             "cutoff-passed",
@@ -85,7 +86,7 @@ async fn next_cutoff_follows_the_schedule() {
         me["next_cutoff"]["at"].clone()
     };
     assert_eq!(next_cutoff().await, "2026-03-01T12:00:00Z");
-    // Started by hand before the scheduled time: the next cutoff of the schedule is on the next day.
+    // The organiser starts the day before the scheduled time, so the next cutoff of the schedule is on the next day.
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .json(200);
@@ -132,7 +133,7 @@ async fn invalid_day_request_starts_nothing() {
     start(json!({ "stage": uuid::Uuid::nil() }))
         .await
         .problem(404, "not-found", &["stage"]);
-    // A day once had its own episodes and profile. Now these are settings of the stage.
+    // Earlier versions accepted a day's number of episodes. Now it is a setting of the stage.
     start(json!({ "episodes_per_task": 5 })).await.problem(
         422,
         "invalid-content",

@@ -1,4 +1,5 @@
-//! Decisions of the organiser in the API: frozen boards, missed days and extra evaluations.
+//! Tests of an organiser's decisions in the API: frozen boards, which show no later results; missed evaluation days, which are
+//! started later; and extra evaluations of one team.
 
 use crate::site::{ADMIN, Site, result, string};
 use serde_json::{Value, json};
@@ -85,11 +86,11 @@ async fn frozen_board_hides_later_results_from_the_public() {
     site.finish_evaluation(&result([0.9, 0.9, 0.9], 20.0)).await;
     site.finish_evaluation(&result([0.8, 0.8, 0.8], 30.0)).await;
 
-    let shown = site.get("/api/v1/board", None).await.json(200);
-    assert_eq!(shown["frozen"]["reason"], REASON);
-    assert_eq!(shown["rows"].as_array().unwrap().len(), 1);
+    let frozen_board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(frozen_board["frozen"]["reason"], REASON);
+    assert_eq!(frozen_board["rows"].as_array().unwrap().len(), 1);
     assert_eq!(
-        shown["rows"][0]["evaluation"],
+        frozen_board["rows"][0]["evaluation"],
         before["rows"][0]["evaluation"]
     );
     let task_board = site.get("/api/v1/board/hit", None).await.json(200);
@@ -109,7 +110,7 @@ async fn frozen_board_hides_later_results_from_the_public() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| string(&one["id"]))
+        .map(|evaluation| string(&evaluation["id"]))
         .collect();
     let page = site
         .get(&format!("/evaluations/{}", ids[0]), None)
@@ -135,9 +136,9 @@ async fn frozen_board_hides_later_results_from_the_public() {
         .await
         .json(200);
     assert_eq!(unfrozen["frozen"], Value::Null);
-    let shown = site.get("/api/v1/board", None).await.json(200);
+    let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(
-        (shown["rows"].as_array().unwrap().len(), &shown["frozen"]),
+        (board["rows"].as_array().unwrap().len(), &board["frozen"]),
         (2, &Value::Null)
     );
     let page = site

@@ -1,4 +1,4 @@
-//! Names of earlier versions: fields, routes and anchors that work until the next minor version.
+//! Tests of old names from earlier versions: fields, routes and anchors that work until the next minor version.
 
 use crate::site::{ADMIN, Site};
 use reqwest::Method;

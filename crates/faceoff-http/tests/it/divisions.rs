@@ -1,13 +1,14 @@
-//! Divisions on boards: shown beside each team, and as boards of their own.
+//! Tests of divisions, which are groups of teams with a ranking of their own, on boards.
 
 use crate::site::{ADMIN, Site, result};
 use reqwest::Method;
 use scraper::{Html, Selector};
 use serde_json::{Value, json};
 
+/// Changes a resource as an organiser. The request must succeed.
 async fn patch(site: &Site, path: &str, body: &Value) -> Value {
     let request = site.request(Method::PATCH, &format!("/api/v1{path}"), Some(ADMIN));
-    crate::site::Answer::of(request.json(body).send().await.unwrap())
+    crate::site::Answer::read(request.json(body).send().await.unwrap())
         .await
         .json(200)
 }
@@ -58,7 +59,7 @@ fn places(board: &Value) -> Vec<(u64, u64, String)> {
     .collect()
 }
 
-fn teams(places: &[(u64, u64, String)]) -> Vec<&str> {
+fn team_names(places: &[(u64, u64, String)]) -> Vec<&str> {
     places.iter().map(|(_, _, team)| team.as_str()).collect()
 }
 
@@ -70,7 +71,8 @@ async fn board_without_divisions_is_unchanged() {
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(places(&board), [(1, 1, "Alpha".to_owned())]);
     assert!(!board.to_string().contains("division"), "{board}");
-    assert!(!site.get("/", None).await.body.contains("ivision"));
+    let page = site.get("/", None).await.body.to_lowercase();
+    assert!(!page.contains("division"));
     for path in ["/api/v1/board", "/api/v1/board/hit"] {
         let refused = site.get(&format!("{path}?division=Open"), None).await;
         let problem = refused.problem(
@@ -85,10 +87,10 @@ async fn board_without_divisions_is_unchanged() {
 #[tokio::test]
 async fn board_of_a_division_ranks_its_teams() {
     let site = season_with_divisions().await;
-    let whole = site.get("/api/v1/board", None).await.json(200);
-    assert_eq!(teams(&places(&whole)), ["A", "B", "C", "D"]);
-    assert!(whole.get("division").is_none());
-    let divisions: Vec<_> = whole["rows"].as_array().unwrap().iter().collect();
+    let all_teams = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(team_names(&places(&all_teams)), ["A", "B", "C", "D"]);
+    assert!(all_teams.get("division").is_none());
+    let divisions: Vec<_> = all_teams["rows"].as_array().unwrap().iter().collect();
     let divisions: Vec<_> = divisions.iter().map(|row| row.get("division")).collect();
     let (open, students) = (json!("Open"), json!("Bachelor students"));
     assert_eq!(
@@ -106,7 +108,7 @@ async fn board_of_a_division_ranks_its_teams() {
         let board = site.get(path, None).await.json(200);
         assert_eq!(board["division"], "Bachelor students", "{path}");
         let places = places(&board);
-        assert_eq!(teams(&places), ["A", "C"], "{path}");
+        assert_eq!(team_names(&places), ["A", "C"], "{path}");
         let ranks: Vec<_> = places.iter().map(|(rank, ..)| *rank).collect();
         assert_eq!(ranks, [1, 2], "{path}");
         assert_eq!(
@@ -134,15 +136,15 @@ async fn board_of_a_division_ranks_its_teams() {
     let ruling = json!({ "reason": "two bundles", "confirm": "C" });
     let path = format!("/api/v1/teams/{id}/disqualify");
     site.post(&path, Some(ADMIN), &ruling).await.json(200);
-    for (division, left, disqualified) in [
+    for (division, remaining, disqualified) in [
         ("Bachelor%20students", &["A"][..], 1),
         ("Open", &["B"][..], 0),
     ] {
         let path = format!("/api/v1/board?division={division}");
         let board = site.get(&path, None).await.json(200);
-        assert_eq!(teams(&places(&board)), left);
-        let named = board["disqualified"].as_array().unwrap();
-        assert_eq!(named.len(), disqualified, "{division}");
+        assert_eq!(team_names(&places(&board)), remaining);
+        let listed = board["disqualified"].as_array().unwrap();
+        assert_eq!(listed.len(), disqualified, "{division}");
     }
 }
 
@@ -164,14 +166,17 @@ async fn board_pages_link_to_divisions() {
         texts.collect()
     };
     for path in ["/", "/tasks/hit"] {
-        let whole = page(path).await;
-        assert_eq!(texts(&whole, ".board th.team > a"), ["A", "B", "C", "D"]);
-        let notes = texts(&whole, ".board th.team .note");
+        let all_teams = page(path).await;
+        assert_eq!(
+            texts(&all_teams, ".board th.team > a"),
+            ["A", "B", "C", "D"]
+        );
+        let notes = texts(&all_teams, ".board th.team .note");
         for (note, division) in notes.iter().zip(["Bachelor students", "Open"]) {
             assert!(note.starts_with(&format!("{division} · ")), "{note}");
         }
         let links = Selector::parse(".lead a").unwrap();
-        let links: Vec<_> = whole.select(&links).collect();
+        let links: Vec<_> = all_teams.select(&links).collect();
         let link_target = |name: &str| {
             let link = links.iter().find(|link| link.text().eq([name]));
             let link = link.unwrap_or_else(|| panic!("no link {name:?}"));

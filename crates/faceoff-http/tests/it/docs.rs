@@ -1,22 +1,26 @@
-//! The documentation on the site: its pages, their links, and the search.
+//! Tests of the documentation on the site: its pages, their links, and the search.
 
 use crate::site::{Answer, Site};
 use reqwest::Method;
 use scraper::{Html, Selector};
 use std::collections::{BTreeMap, BTreeSet};
-/// Bytes of a page before compression. Compressed, a page has about a quarter of them.
+
+/// Longest page before compression. Compressed, a page has about a quarter of its bytes.
 const MAX_PAGE_BYTES: usize = 150_000;
 
-fn all<'a>(page: &'a Html, selector: &str) -> Vec<scraper::ElementRef<'a>> {
+/// All elements that the selector finds.
+fn select_all<'a>(page: &'a Html, selector: &str) -> Vec<scraper::ElementRef<'a>> {
     page.select(&Selector::parse(selector).unwrap()).collect()
 }
 
+/// The attribute `name` of each element that the selector finds and that has it.
 fn attributes(page: &Html, selector: &str, name: &str) -> Vec<String> {
-    let elements = all(page, selector);
+    let elements = select_all(page, selector);
     let values = elements.iter().filter_map(|element| element.attr(name));
     values.map(str::to_owned).collect()
 }
 
+/// The text of an element, with single spaces between words.
 fn text_of(element: scraper::ElementRef<'_>) -> String {
     let texts = element.text().flat_map(str::split_whitespace);
     texts.collect::<Vec<_>>().join(" ")
@@ -32,7 +36,7 @@ async fn fetch_page(site: &Site, path: &str) -> Html {
 async fn search(site: &Site, query: &str) -> Html {
     let parameters = [("q", query)];
     let request = site.request(Method::GET, "/docs/search", None);
-    let answer = Answer::of(request.query(&parameters).send().await.unwrap()).await;
+    let answer = Answer::read(request.query(&parameters).send().await.unwrap()).await;
     assert_eq!(answer.status, 200, "{}", answer.body);
     Html::parse_document(&answer.body)
 }
@@ -40,10 +44,12 @@ async fn search(site: &Site, query: &str) -> Html {
 #[tokio::test]
 async fn documentation_has_no_broken_links() {
     let site = Site::start().await;
-    let mut open = vec!["/docs".to_owned()];
+    let mut unvisited = vec!["/docs".to_owned()];
+    // The ids of elements on each visited page.
     let mut ids: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    // Links with an anchor: the linking page, and the link.
     let mut links: Vec<(String, String)> = Vec::new();
-    while let Some(path) = open.pop() {
+    while let Some(path) = unvisited.pop() {
         if ids.contains_key(&path) {
             continue;
         }
@@ -59,7 +65,7 @@ async fn documentation_has_no_broken_links() {
             answer.body.len()
         );
         let page = Html::parse_document(&answer.body);
-        assert_eq!(all(&page, "h1").len(), 1, "{path}");
+        assert_eq!(select_all(&page, "h1").len(), 1, "{path}");
         // Elements that the content security policy blocks, or that load content of other sites.
         for forbidden in [
             "script:not([src^='/static/live.js?'])",
@@ -68,21 +74,25 @@ async fn documentation_has_no_broken_links() {
             "[onclick]",
             "iframe",
         ] {
-            assert_eq!(all(&page, forbidden).len(), 0, "{path}: {forbidden}");
+            assert_eq!(select_all(&page, forbidden).len(), 0, "{path}: {forbidden}");
         }
         for picture in attributes(&page, "img", "src") {
             assert!(picture.starts_with('/'), "{path}: {picture}");
-            open.push(picture);
+            unvisited.push(picture);
         }
-        let own = attributes(&page, "[id]", "id");
-        let unique: BTreeSet<String> = own.iter().cloned().collect();
-        assert_eq!(unique.len(), own.len(), "{path}: an id twice in {own:?}");
+        let page_ids = attributes(&page, "[id]", "id");
+        let unique: BTreeSet<String> = page_ids.iter().cloned().collect();
+        assert_eq!(
+            unique.len(),
+            page_ids.len(),
+            "{path}: an id twice in {page_ids:?}"
+        );
         for labelled in attributes(&page, "[aria-labelledby]", "aria-labelledby") {
             assert!(unique.contains(&labelled), "{path}: {labelled}");
         }
         // A wide table scrolls in its own region, which can be focused by keyboard.
-        let tables = all(&page, "table").len();
-        let regions = all(&page, r#".wide[role="region"][tabindex="0"] > table"#);
+        let tables = select_all(&page, "table").len();
+        let regions = select_all(&page, r#".wide[role="region"][tabindex="0"] > table"#);
         assert_eq!(regions.len(), tables, "{path}");
         let mut names = attributes(&page, r#"[role="region"]"#, "aria-label");
         names.extend(attributes(&page, r#"[role="region"]"#, "aria-labelledby"));
@@ -93,21 +103,21 @@ async fn documentation_has_no_broken_links() {
             if link.starts_with("http://") || link.starts_with("https://") {
                 continue;
             }
-            let (to, anchor) = link.split_once('#').unwrap_or((&link, ""));
-            let to = if to.is_empty() { &path } else { to };
-            assert!(to.starts_with('/'), "{path}: {link}");
-            // This page requires a signed-in user.
-            if to != "/account" {
-                open.push(to.to_owned());
+            let (target, anchor) = link.split_once('#').unwrap_or((&link, ""));
+            let target = if target.is_empty() { &path } else { target };
+            assert!(target.starts_with('/'), "{path}: {link}");
+            // The account page requires a signed-in user.
+            if target != "/account" {
+                unvisited.push(target.to_owned());
             }
             if !anchor.is_empty() {
-                links.push((path.clone(), format!("{to}#{anchor}")));
+                links.push((path.clone(), format!("{target}#{anchor}")));
             }
         }
     }
-    for (from, link) in links {
-        let (to, anchor) = link.split_once('#').unwrap();
-        assert!(ids[to].contains(anchor), "{from}: nothing is at {link}");
+    for (page, link) in links {
+        let (target, anchor) = link.split_once('#').unwrap();
+        assert!(ids[target].contains(anchor), "{page}: nothing is at {link}");
     }
     // Each file of the documentation folder is on the site.
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs");
@@ -130,11 +140,11 @@ async fn documentation_has_no_broken_links() {
 async fn api_reference_lists_all_operations_and_schemas() {
     let site = Site::start().await;
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
-    let mut shown = BTreeSet::new();
+    let mut operations = BTreeSet::new();
     for tag in document["tags"].as_array().unwrap() {
         let tag = tag["name"].as_str().unwrap();
         let page = fetch_page(&site, &format!("/docs/api-reference/{tag}")).await;
-        shown.extend(all(&page, "h2").into_iter().map(text_of));
+        operations.extend(select_all(&page, "h2").into_iter().map(text_of));
     }
     let mut documented = BTreeSet::new();
     for (path, methods) in document["paths"].as_object().unwrap() {
@@ -142,15 +152,15 @@ async fn api_reference_lists_all_operations_and_schemas() {
             documented.insert(format!("{} {path}", method.to_uppercase()));
         }
     }
-    assert_eq!(shown, documented);
+    assert_eq!(operations, documented);
     let page = fetch_page(&site, "/docs/api-reference/schemas").await;
-    let listed: BTreeSet<String> = all(&page, "dt").into_iter().map(text_of).collect();
+    let listed: BTreeSet<String> = select_all(&page, "dt").into_iter().map(text_of).collect();
     let schemas = document["components"]["schemas"].as_object().unwrap();
     let schemas: BTreeSet<String> = schemas.keys().cloned().collect();
     assert_eq!(listed, schemas);
     // The section of one operation.
     let page = fetch_page(&site, "/docs/api-reference/public").await;
-    let sections = all(&page, ".operation");
+    let sections = select_all(&page, ".operation");
     let board = sections.into_iter().map(text_of);
     let board = board
         .into_iter()
@@ -171,10 +181,10 @@ async fn api_reference_lists_all_operations_and_schemas() {
 async fn search_finds_sections_and_marks_words() {
     let site = Site::start().await;
     let page = search(&site, "Frozen BOARDS").await;
-    let first = all(&page, ".search-results li a")[0];
-    assert_eq!(first.attr("href"), Some("/docs/api#frozen-boards"));
-    assert_eq!(text_of(first), "Frozen boards");
-    let marked: Vec<String> = first
+    let first_result = select_all(&page, ".search-results li a")[0];
+    assert_eq!(first_result.attr("href"), Some("/docs/api#frozen-boards"));
+    assert_eq!(text_of(first_result), "Frozen boards");
+    let marked: Vec<String> = first_result
         .select(&Selector::parse("mark").unwrap())
         .map(text_of)
         .collect();
@@ -185,13 +195,13 @@ async fn search_finds_sections_and_marks_words() {
     assert_eq!(links[0], "/docs/api-reference/schemas/BoardView");
 
     let page = search(&site, "quidditch").await;
-    let message = text_of(all(&page, "main")[0]);
+    let message = text_of(select_all(&page, "main")[0]);
     assert!(
         message.contains("No section contains all words of “quidditch”"),
         "{message}"
     );
     let page = search(&site, "").await;
-    let message = text_of(all(&page, "main")[0]);
+    let message = text_of(select_all(&page, "main")[0]);
     assert!(message.contains("Enter one or more words"), "{message}");
 }
 
@@ -200,9 +210,9 @@ async fn search_query_is_escaped_and_limited() {
     let site = Site::start().await;
     let query = "<script>alert(\"1\")</script>";
     let page = search(&site, query).await;
-    assert_eq!(all(&page, "script:not([src])").len(), 0);
+    assert_eq!(select_all(&page, "script:not([src])").len(), 0);
     assert_eq!(attributes(&page, "#q", "value"), [query]);
-    assert!(text_of(all(&page, "main")[0]).contains(query));
+    assert!(text_of(select_all(&page, "main")[0]).contains(query));
 
     let longest = "ä".repeat(200);
     search(&site, &longest).await;
@@ -243,10 +253,10 @@ async fn unchanged_documentation_answers_not_modified() {
         let answer = site.get(path, None).await;
         let request = site.request(Method::GET, path, None);
         let request = request.header("if-none-match", answer.header("etag"));
-        let known = Answer::of(request.send().await.unwrap()).await;
-        assert_eq!((known.status.as_u16(), &*known.body), (304, ""), "{path}");
+        let again = Answer::read(request.send().await.unwrap()).await;
+        assert_eq!((again.status.as_u16(), &*again.body), (304, ""), "{path}");
         for header in ["etag", "cache-control"] {
-            assert_eq!(known.header(header), answer.header(header), "{path}");
+            assert_eq!(again.header(header), answer.header(header), "{path}");
         }
         assert!(answer.header("cache-control").starts_with("public"));
     }
@@ -277,8 +287,8 @@ async fn pages_have_metadata_for_link_previews() {
         let [picture] = &metadata(&page, "og:image")[..] else {
             panic!("{path} has one picture");
         };
-        let at = picture.strip_prefix("https://faceoff.example.org").unwrap();
-        let answer = site.get(at, None).await;
+        let path = picture.strip_prefix("https://faceoff.example.org").unwrap();
+        let answer = site.get(path, None).await;
         assert_eq!(answer.status, 200);
         assert_eq!(answer.header("content-type"), "image/png");
     }

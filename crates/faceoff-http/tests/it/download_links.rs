@@ -1,13 +1,11 @@
-//! Signed links that download a file without a token.
+//! Tests of signed links, which download a file without a token.
 
 use crate::{
-    site::{ADMIN, Answer, Site, TestTeam, result, string},
+    site::{ADMIN, Answer, DATASET, Site, TestTeam, result, string},
     tournament::cup::{Cup, first_by_name_wins},
 };
 use reqwest::Method;
 use serde_json::json;
-
-const FILE: &str = "PK the recorded dataset";
 
 /// A team with a finished evaluation. Returns the paths of the evaluation and of its submission.
 async fn finished_evaluation(site: &Site, name: &str) -> (TestTeam, String, String) {
@@ -19,10 +17,11 @@ async fn finished_evaluation(site: &Site, name: &str) -> (TestTeam, String, Stri
     (team, path, submission)
 }
 
+/// Creates a link to the file at `path`. Returns the link.
 async fn create_link(site: &Site, path: &str, token: &str) -> String {
     let link = format!("{path}/link");
-    let made = site.post(&link, Some(token), &json!({})).await.json(201);
-    string(&made["url"])
+    let created = site.post(&link, Some(token), &json!({})).await.json(201);
+    string(&created["url"])
 }
 
 #[tokio::test]
@@ -31,18 +30,18 @@ async fn link_needs_no_token_and_expires() {
     let (team, path, submission) = finished_evaluation(&site, "Alpha").await;
     let dataset = format!("{path}/dataset");
     let request = json!({ "expires_in_s": 60 });
-    let made = site
+    let created = site
         .post(&format!("{dataset}/link"), Some(&team.token), &request)
         .await
         .json(201);
-    assert_eq!(made["expires_at"], "2026-03-01T10:01:00Z");
-    let url = string(&made["url"]);
+    assert_eq!(created["expires_at"], "2026-03-01T10:01:00Z");
+    let url = string(&created["url"]);
     assert!(url.starts_with(&format!("{dataset}?expires=")), "{url}");
     assert!(!url.contains(&team.token));
     let downloaded = site.get(&url, None).await;
     assert_eq!(
         (downloaded.status.as_u16(), downloaded.body.as_str()),
-        (200, FILE)
+        (200, DATASET)
     );
     let part = site.request(Method::GET, &url, None);
     let part = part.header("range", "bytes=-7").send().await.unwrap();
@@ -58,11 +57,11 @@ async fn link_needs_no_token_and_expires() {
     assert_eq!(problem["expired_at"], "2026-03-01T10:01:00Z");
 
     // A link without an expiry is valid for an hour.
-    let archive = create_link(&site, &format!("{submission}/bundle"), &team.token).await;
+    let bundle_link = create_link(&site, &format!("{submission}/bundle"), &team.token).await;
     site.advance(3599);
-    assert_eq!(site.get(&archive, None).await.status, 200);
+    assert_eq!(site.get(&bundle_link, None).await.status, 200);
     site.advance(1);
-    assert_eq!(site.get(&archive, None).await.status, 410);
+    assert_eq!(site.get(&bundle_link, None).await.status, 410);
 }
 
 #[tokio::test]
@@ -79,10 +78,10 @@ async fn link_is_for_one_file_and_cannot_be_forged() {
     assert_eq!(site.get(&url, None).await.status, 200);
 
     let (_, query) = url.split_once('?').unwrap();
-    let later = {
+    let prolonged = {
         let (expires, rest) = query.split_once('&').unwrap();
-        let at: i64 = expires.strip_prefix("expires=").unwrap().parse().unwrap();
-        format!("expires={}&{rest}", at + 1)
+        let expires_s: i64 = expires.strip_prefix("expires=").unwrap().parse().unwrap();
+        format!("expires={}&{rest}", expires_s + 1)
     };
     let (_, signature) = query.split_once("signature=").unwrap();
     let reversed: String = signature.chars().rev().collect();
@@ -90,40 +89,44 @@ async fn link_is_for_one_file_and_cannot_be_forged() {
         .get("/api/v1/tokens", Some(&beta.token))
         .await
         .json(200);
-    let other = string(&tokens[0]["id"]);
-    let by = query.split(['&', '=']).nth(3).unwrap();
+    let other_token = string(&tokens[0]["id"]);
+    let creator_token = query.split(['&', '=']).nth(3).unwrap();
     for forged in [
         format!("{beta_evaluation}/dataset?{query}"),
-        format!("{alpha_evaluation}/dataset?{later}"),
+        format!("{alpha_evaluation}/dataset?{prolonged}"),
         url.replace(signature, &reversed),
         url.replace(signature, "abc"),
-        url.replace(by, &other),
-        url.replace(by, "00000000-0000-7000-8000-000000000000"),
+        url.replace(creator_token, &other_token),
+        url.replace(creator_token, "00000000-0000-7000-8000-000000000000"),
     ] {
         let words = ["not valid for this file"];
         let answer = site.get(&forged, None).await;
         answer.problem(403, "link-invalid", &words);
     }
-    for incomplete in ["expires=1", "signature=00", &query[..query.len() - 75]] {
+    let (without_signature, _) = query.split_once("&signature=").unwrap();
+    for incomplete in ["expires=1", "signature=00", without_signature] {
         let answer = site
             .get(&format!("{alpha_evaluation}/dataset?{incomplete}"), None)
             .await;
         answer.problem(400, "invalid-request", &["only some of them"]);
     }
     // Only a caller who may download the file may create a link. It expires after a week at most.
-    let make = format!("{alpha_evaluation}/dataset/link");
+    let link_path = format!("{alpha_evaluation}/dataset/link");
     for (token, status) in [(None, 401), (Some(beta.token.as_str()), 404)] {
-        let refused = site.post(&make, token, &json!({})).await;
+        let refused = site.post(&link_path, token, &json!({})).await;
         assert_eq!(refused.status, status);
     }
     for wrong in [0, 604_801] {
         let request = json!({ "expires_in_s": wrong });
-        let refused = site.post(&make, Some(&alpha.token), &request).await;
+        let refused = site.post(&link_path, Some(&alpha.token), &request).await;
         refused.problem(422, "invalid-content", &["expires_in_s", "604800"]);
     }
     let week = json!({ "expires_in_s": 604_800 });
-    let made = site.post(&make, Some(&alpha.token), &week).await.json(201);
-    assert_eq!(made["expires_at"], "2026-03-09T10:00:00Z");
+    let created = site
+        .post(&link_path, Some(&alpha.token), &week)
+        .await
+        .json(201);
+    assert_eq!(created["expires_at"], "2026-03-09T10:00:00Z");
 }
 
 #[tokio::test]
@@ -137,14 +140,14 @@ async fn link_is_valid_while_its_creator_may_download() {
     );
     let status = async |url: &str| site.get(url, None).await.status.as_u16();
     // Links to a removed file are gone, too.
-    let archive = create_link(&site, &format!("{submission}/bundle"), &team.token).await;
-    assert_eq!(status(&archive).await, 200);
+    let bundle_link = create_link(&site, &format!("{submission}/bundle"), &team.token).await;
+    assert_eq!(status(&bundle_link).await, 200);
     site.valid_submission(&team, "b").await;
     let delete = site
         .request(Method::DELETE, &submission, Some(&team.token))
         .json(&json!({ "confirm": "striker.tar.gz" }));
     assert_eq!(delete.send().await.unwrap().status(), 200);
-    let gone = site.get(&archive, None).await;
+    let gone = site.get(&bundle_link, None).await;
     gone.problem(410, "removed", &["by its team"]);
 
     // A link is invalid once its token is rotated or revoked.
@@ -180,8 +183,8 @@ async fn link_to_an_unfinished_dataset_is_refused() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
     let path = site.evaluate(&team, &submission).await;
-    let make = format!("{path}/dataset/link");
-    site.post(&make, Some(&team.token), &json!({}))
+    let link_path = format!("{path}/dataset/link");
+    site.post(&link_path, Some(&team.token), &json!({}))
         .await
         .problem(409, "conflict", &["not finished"]);
 }

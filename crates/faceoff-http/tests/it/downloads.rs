@@ -1,15 +1,14 @@
-//! Range requests and conditional requests of downloads.
+//! Tests of range requests and conditional requests of downloads.
 
-use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result};
+use crate::site::{ADMIN, Answer, DATASET, GZIP, Site, TestTeam, result};
 use reqwest::Method;
 
-const FILE: &str = "PK the recorded dataset";
-
+/// A finished evaluation, with the paths of two downloads.
 struct FinishedEvaluation {
     site: Site,
     team: TestTeam,
     dataset: String,
-    archive: String,
+    bundle: String,
 }
 
 impl FinishedEvaluation {
@@ -22,7 +21,7 @@ impl FinishedEvaluation {
             .await;
         Self {
             dataset: format!("{path}/dataset"),
-            archive: format!("{submission}/bundle"),
+            bundle: format!("{submission}/bundle"),
             site,
             team,
         }
@@ -33,9 +32,10 @@ impl FinishedEvaluation {
         for (name, value) in headers {
             request = request.header(*name, *value);
         }
-        Answer::of(request.send().await.unwrap()).await
+        Answer::read(request.send().await.unwrap()).await
     }
 
+    /// Gets the dataset.
     async fn get(&self, headers: &[(&str, &str)]) -> Answer {
         self.request(Method::GET, &self.dataset, headers).await
     }
@@ -45,8 +45,8 @@ impl FinishedEvaluation {
 async fn download_resumes_with_range_requests() {
     let evaluation = FinishedEvaluation::start().await;
     let whole = evaluation.get(&[]).await;
-    assert_eq!((whole.status.as_u16(), whole.body.as_str()), (200, FILE));
-    let hash = blake3::hash(FILE.as_bytes()).to_string();
+    assert_eq!((whole.status.as_u16(), whole.body.as_str()), (200, DATASET));
+    let hash = blake3::hash(DATASET.as_bytes()).to_string();
     let tag = format!("\"blake3-{hash}\"");
     assert_eq!(whole.header("etag"), tag);
     assert_eq!(whole.header("x-content-blake3"), hash);
@@ -59,7 +59,7 @@ async fn download_resumes_with_range_requests() {
         ("bytes=16-", "dataset", "bytes 16-22/23"),
         ("bytes=16-999", "dataset", "bytes 16-22/23"),
         ("bytes=-7", "dataset", "bytes 16-22/23"),
-        ("bytes=-999", FILE, "bytes 0-22/23"),
+        ("bytes=-999", DATASET, "bytes 0-22/23"),
     ] {
         let part = evaluation
             .get(&[("range", range), ("if-range", &tag)])
@@ -104,7 +104,7 @@ async fn invalid_or_outdated_range_gets_the_whole_file() {
         let answer = evaluation.get(&headers).await;
         assert_eq!(
             (answer.status.as_u16(), answer.body.as_str()),
-            (200, FILE),
+            (200, DATASET),
             "{headers:?}"
         );
     }
@@ -114,8 +114,8 @@ async fn invalid_or_outdated_range_gets_the_whole_file() {
 async fn download_with_known_etag_answers_not_modified() {
     let evaluation = FinishedEvaluation::start().await;
     let tag = evaluation.get(&[]).await.header("etag").to_owned();
-    for known in [tag.clone(), format!("\"other\", W/{tag}"), "*".to_owned()] {
-        let answer = evaluation.get(&[("if-none-match", &known)]).await;
+    for known_tags in [tag.clone(), format!("\"other\", W/{tag}"), "*".to_owned()] {
+        let answer = evaluation.get(&[("if-none-match", &known_tags)]).await;
         assert_eq!((answer.status.as_u16(), answer.body.as_str()), (304, ""));
         assert_eq!(answer.header("etag"), tag);
         assert_eq!(answer.header("cache-control"), "private, no-cache");
@@ -132,7 +132,7 @@ async fn download_with_known_etag_answers_not_modified() {
 #[tokio::test]
 async fn head_request_has_the_headers_of_the_file() {
     let evaluation = FinishedEvaluation::start().await;
-    for path in [&evaluation.dataset, &evaluation.archive] {
+    for path in [&evaluation.dataset, &evaluation.bundle] {
         let whole = evaluation.request(Method::GET, path, &[]).await;
         // Ranges apply to GET requests only.
         let headers = [("range", "bytes=3-5")];
@@ -153,15 +153,16 @@ async fn head_request_has_the_headers_of_the_file() {
             whole.headers["content-length"].to_str().unwrap()
         );
     }
-    let archive = evaluation
-        .request(Method::GET, &evaluation.archive, &[])
+    let bundle = evaluation
+        .request(Method::GET, &evaluation.bundle, &[])
         .await;
     let hash = blake3::hash(&GZIP).to_string();
-    assert_eq!(archive.header("x-content-blake3"), hash);
+    assert_eq!(bundle.header("x-content-blake3"), hash);
     let part = [("range", "bytes=2-2")];
     let part = evaluation
-        .request(Method::GET, &evaluation.archive, &part)
+        .request(Method::GET, &evaluation.bundle, &part)
         .await;
+    // The third byte of `GZIP`.
     assert_eq!((part.status.as_u16(), part.body.as_str()), (206, "\u{8}"));
     let organiser = evaluation
         .site

@@ -1,6 +1,6 @@
-//! Evaluations in the API: progress, results, faults, cancelling and re-running.
+//! Tests of evaluations in the API: progress, results, faults, cancelling and rerunning.
 
-use crate::site::{ADMIN, Site, result, string};
+use crate::site::{ADMIN, DATASET, LEASE_S, Site, result, string};
 use serde_json::json;
 
 #[tokio::test]
@@ -22,9 +22,10 @@ async fn evaluation_shows_progress_result_and_dataset() {
         .problem(409, "conflict", &["not finished"]);
 
     let (claim, ..) = site.claim_shard().await;
+    let episodes_done = 3;
     assert!(
         site.store
-            .heartbeat(&claim, 3, 60, site.now())
+            .heartbeat(&claim, episodes_done, LEASE_S, site.now())
             .await
             .unwrap()
     );
@@ -51,7 +52,7 @@ async fn evaluation_shows_progress_result_and_dataset() {
     );
     assert_eq!(finished["released_at"], "2026-03-01T10:00:00Z");
     assert_eq!(finished["dataset"], format!("{path}/dataset"));
-    let hash = blake3::hash(b"PK the recorded dataset").to_string();
+    let hash = blake3::hash(DATASET.as_bytes()).to_string();
     assert_eq!(finished["dataset_blake3"], hash);
     let id = finished["id"].as_str().unwrap();
     let page = site.get(&format!("/evaluations/{id}"), None).await;
@@ -61,9 +62,9 @@ async fn evaluation_shows_progress_result_and_dataset() {
 
     let dataset = site.get(&format!("{path}/dataset"), token).await;
     assert_eq!(dataset.status, 200);
-    assert_eq!(dataset.body, "PK the recorded dataset");
+    assert_eq!(dataset.body, DATASET);
     assert_eq!(dataset.header("content-type"), "application/zip");
-    assert_eq!(dataset.header("content-length"), "23");
+    assert_eq!(dataset.header("content-length"), DATASET.len().to_string());
     assert_eq!(
         dataset.header("content-disposition"),
         "attachment; filename=\"faceoff-Alpha-2026-03-01.zip\""
@@ -93,16 +94,16 @@ async fn single_evaluation_cannot_be_started() {
     site.evaluate(&team, &submission).await;
     site.next_day();
     site.evaluate(&team, &submission).await;
-    let own = site
+    let team_evaluations = site
         .get("/api/v1/evaluations", Some(&team.token))
         .await
         .json(200);
-    assert_eq!(own.as_array().unwrap().len(), 2);
-    let first = site
+    assert_eq!(team_evaluations.as_array().unwrap().len(), 2);
+    let first_day = site
         .get("/api/v1/evaluations?day=2026-03-01", Some(&team.token))
         .await
         .json(200);
-    assert_eq!(first.as_array().unwrap().len(), 1);
+    assert_eq!(first_day.as_array().unwrap().len(), 1);
 }
 
 #[tokio::test]

@@ -1,4 +1,5 @@
-//! The event stream over real connections: visibility of events, topics and resumption.
+//! Tests of the event stream (changes of the season as server-sent events) over real connections: visibility of events,
+//! topics and resumption.
 
 use crate::{
     site::{ADMIN, Answer, Site, TestTeam, generous_limits, result, string},
@@ -10,6 +11,7 @@ use serde_json::{Value, json};
 
 const PATH: &str = "/api/v1/events/stream";
 
+/// Publishes an announcement, whose event (kind `announced`) ends the events that a test reads.
 async fn announce(site: &Site) {
     let announcement = json!({ "title": "The end", "text": "of this test" });
     let path = "/api/v1/announcements";
@@ -19,7 +21,7 @@ async fn announce(site: &Site) {
 async fn change_stage(site: &Site, body: Value) {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
-    Answer::of(request.send().await.unwrap()).await.json(200);
+    Answer::read(request.send().await.unwrap()).await.json(200);
 }
 
 /// All events from the beginning of the season until the announcement.
@@ -80,22 +82,22 @@ async fn resumed_stream_has_each_event_once_in_order() {
     let logged = log["events"].as_array().unwrap().iter().rev();
     let ids: Vec<i64> = logged.map(|event| event["id"].as_i64().unwrap()).collect();
     assert!(ids.len() > 20, "{ids:?}");
-    // Three events on each connection.
-    let (mut received, mut last) = (Vec::new(), "0".to_owned());
+    // Each connection reads three events, and the next one resumes after them.
+    let (mut received, mut last_id) = (Vec::new(), "0".to_owned());
     while received.len() < ids.len() {
-        let mut stream = Stream::open(&site, PATH, Some(ADMIN), Some(&last)).await;
+        let mut stream = Stream::open(&site, PATH, Some(ADMIN), Some(&last_id)).await;
         for _ in 0..3.min(ids.len() - received.len()) {
             let event = stream.next().await.unwrap();
-            last = event.id.unwrap();
-            received.push(last.parse::<i64>().unwrap());
+            last_id = event.id.unwrap();
+            received.push(last_id.parse::<i64>().unwrap());
         }
     }
     assert_eq!(received, ids);
-    // The open stream has all events since its first one.
-    let since = ids
+    // The stream that stayed open has all events since it was opened.
+    let ids_since_open = ids
         .iter()
         .filter(|id| **id > now.data["id"].as_i64().unwrap());
-    for id in since {
+    for id in ids_since_open {
         assert_eq!(live.next().await.unwrap().id, Some(id.to_string()));
     }
     announce(&site).await;
@@ -120,14 +122,14 @@ async fn stream_shows_visible_events_without_scores() {
     announce(&site).await;
 
     let visitor_events = events_until_announcement(&site, "", None).await;
-    let seen = kinds(&visitor_events);
+    let visitor_kinds = kinds(&visitor_events);
     for kind in [
         "team_created",
         "day_started",
         "evaluation_finished",
         "day_released",
     ] {
-        assert!(seen.contains(&kind), "{seen:?}");
+        assert!(visitor_kinds.contains(&kind), "{visitor_kinds:?}");
     }
     for hidden in [
         "token_created",
@@ -138,7 +140,10 @@ async fn stream_shows_visible_events_without_scores() {
         "evaluation_begun",
         "asked",
     ] {
-        assert!(!seen.contains(&hidden), "{hidden} in {seen:?}");
+        assert!(
+            !visitor_kinds.contains(&hidden),
+            "{hidden} in {visitor_kinds:?}"
+        );
     }
     let finished = visitor_events
         .iter()
@@ -149,7 +154,7 @@ async fn stream_shows_visible_events_without_scores() {
     assert_eq!(finished.data["day"], "2026-03-01");
     for event in &visitor_events {
         let data = event.data.as_object().unwrap();
-        let known = [
+        let allowed = [
             "id",
             "kind",
             "at",
@@ -160,32 +165,31 @@ async fn stream_shows_visible_events_without_scores() {
             "submission",
         ];
         for key in data.keys() {
-            assert!(known.contains(&key.as_str()), "{event:?}");
+            assert!(allowed.contains(&key.as_str()), "{event:?}");
         }
     }
 
     let alpha_events = events_until_announcement(&site, "", Some(&alpha.token)).await;
-    let seen = kinds(&alpha_events);
+    let alpha_kinds = kinds(&alpha_events);
     for kind in [
         "submission_valid",
         "shard_committed",
         "token_created",
         "asked",
     ] {
-        assert!(seen.contains(&kind), "{kind} is not in {seen:?}");
+        assert!(
+            alpha_kinds.contains(&kind),
+            "{kind} is not in {alpha_kinds:?}"
+        );
     }
-    let beta_subject = format!("team:{}", beta.id);
+    // Alpha sees of Beta what is public.
     let beta_events = alpha_events
         .iter()
         .filter(|event| event.data["teams"] == json!([beta.id]));
     let beta_events: Vec<&str> = beta_events
         .map(|event| event.data["kind"].as_str().unwrap())
         .collect();
-    assert_eq!(
-        beta_events,
-        ["team_created", "evaluation_finished"],
-        "{beta_subject}"
-    );
+    assert_eq!(beta_events, ["team_created", "evaluation_finished"]);
 }
 
 #[tokio::test]
@@ -296,7 +300,7 @@ async fn unknown_topic_or_event_id_is_refused() {
     for wrong in ["seventeen", "-1", "1.17", ""] {
         let request = site.request(Method::GET, PATH, None);
         let request = request.header("last-event-id", wrong);
-        Answer::of(request.send().await.unwrap()).await.problem(
+        Answer::read(request.send().await.unwrap()).await.problem(
             400,
             "invalid-request",
             &["Last-Event-ID", wrong],

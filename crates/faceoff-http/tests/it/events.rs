@@ -1,4 +1,4 @@
-//! The event log.
+//! Tests of the event log, which lists all changes of the season for organisers.
 
 use crate::site::{ADMIN, Site, string};
 use serde_json::{Value, json};
@@ -9,6 +9,7 @@ fn kinds(page: &Value) -> Vec<String> {
     events.iter().map(|event| string(&event["kind"])).collect()
 }
 
+/// A page of the log, as an organiser reads it.
 async fn page(site: &Site, query: &str) -> Value {
     let path = format!("/api/v1/events{query}");
     site.get(&path, Some(ADMIN)).await.json(200)
@@ -19,15 +20,17 @@ async fn events_are_filtered_by_actor_subject_and_kind() {
     let site = Site::start().await;
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
     site.valid_submission(&alpha, "a").await;
-    let fresh = format!("/api/v1/teams/{}/token", beta.id);
-    site.post(&fresh, Some(ADMIN), &json!({})).await.json(200);
+    let new_token = format!("/api/v1/teams/{}/token", beta.id);
+    site.post(&new_token, Some(ADMIN), &json!({}))
+        .await
+        .json(200);
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .json(200);
 
-    let all = page(&site, "").await;
-    assert_eq!(all["next_before"], json!(null));
-    let found = kinds(&all);
+    let whole_log = page(&site, "").await;
+    assert_eq!(whole_log["next_before"], json!(null));
+    let found = kinds(&whole_log);
     assert_eq!(
         found.last().map(String::as_str),
         Some("token_created"),
@@ -60,8 +63,8 @@ async fn events_are_filtered_by_actor_subject_and_kind() {
     assert_eq!(created["actor"], "organiser");
     assert_eq!(created["details"], json!({ "name": "Beta" }));
     assert_eq!(created["subject"], format!("team:{}", beta.id));
-    let by_organiser = format!("?subject=team:{}&actor=schedule", beta.id);
-    assert_eq!(kinds(&page(&site, &by_organiser).await), [""; 0]);
+    let by_schedule = format!("?subject=team:{}&actor=schedule", beta.id);
+    assert_eq!(kinds(&page(&site, &by_schedule).await), [""; 0]);
     assert_eq!(
         kinds(&page(&site, "?kind=team_created&limit=1").await),
         ["team_created"]
@@ -78,7 +81,7 @@ async fn events_are_filtered_by_actor_subject_and_kind() {
             None => break,
         }
     }
-    assert_eq!(json!(paged), all["events"]);
+    assert_eq!(json!(paged), whole_log["events"]);
 }
 
 #[tokio::test]

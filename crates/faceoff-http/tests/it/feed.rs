@@ -1,4 +1,4 @@
-//! The Atom feed of news, parsed by a feed reader's library.
+//! Tests of the Atom feed with the season's news, parsed by a feed reader's library.
 
 use crate::site::{ADMIN, Answer, Site, result};
 use atom_syndication::Feed;
@@ -38,8 +38,9 @@ async fn feed_lists_news_newest_first_with_stable_ids() {
     ])
     .await;
     site.advance(60);
-    let odd = "<b>odd</b> & \"more\" ]]> 🙂";
-    let announcement = json!({ "title": odd, "text": format!("{odd}\n\nand so on") });
+    // Characters that XML and HTML must escape.
+    let special = "<b>odd</b> & \"more\" ]]> 🙂";
+    let announcement = json!({ "title": special, "text": format!("{special}\n\nand so on") });
     let path = "/api/v1/announcements";
     site.post(path, Some(ADMIN), &announcement).await.json(201);
     site.advance(60);
@@ -57,7 +58,7 @@ async fn feed_lists_news_newest_first_with_stable_ids() {
         [
             "Cup: round 1 has begun",
             "The tournament Cup is open",
-            odd,
+            special,
             "Qualifying: the day 2026-03-01 is released",
             "Qualifying is open"
         ]
@@ -70,14 +71,14 @@ async fn feed_lists_news_newest_first_with_stable_ids() {
     assert_eq!(content.content_type(), Some("text"));
     assert_eq!(
         content.value(),
-        Some(format!("{odd}\n\nand so on").as_str())
+        Some(format!("{special}\n\nand so on").as_str())
     );
     assert_eq!(announced.links()[0].href(), "/announcements");
     assert_eq!(feed.updated(), feed.entries()[0].updated());
     for entry in feed.entries() {
         assert!(entry.id().starts_with("urn:uuid:"));
-        let followed = site.get(entry.links()[0].href(), None).await;
-        assert_eq!(followed.status, 200, "{entry:?}");
+        let linked_page = site.get(entry.links()[0].href(), None).await;
+        assert_eq!(linked_page.status, 200, "{entry:?}");
     }
     let mut ids: Vec<&str> = feed.entries().iter().map(|entry| entry.id()).collect();
     ids.sort_unstable();
@@ -97,7 +98,7 @@ async fn unchanged_feed_answers_not_modified() {
     assert_eq!(modified, "Sun, 01 Mar 2026 10:00:00 GMT");
     let get_with_header = async |name: &str, value: &str| {
         let request = site.request(Method::GET, PATH, None).header(name, value);
-        Answer::of(request.send().await.unwrap()).await
+        Answer::read(request.send().await.unwrap()).await
     };
     for (name, value) in [
         ("if-none-match", tag.to_owned()),

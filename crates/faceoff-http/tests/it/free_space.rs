@@ -1,4 +1,4 @@
-//! Low disk space: refused uploads, warnings, and what still works.
+//! Tests of low disk space: the server refuses uploads and warns; requests that need little space still work.
 
 use crate::site::*;
 use faceoff_store::FreeSpace;
@@ -10,7 +10,7 @@ async fn set_min_free_space(site: &mut Site, min_free_bytes: u64) {
     site.restart().await;
 }
 
-fn archive() -> Vec<u8> {
+fn bundle() -> Vec<u8> {
     [&GZIP[..], &[0; 1000]].concat()
 }
 
@@ -20,7 +20,7 @@ async fn low_disk_space_refuses_uploads_and_is_shown() {
     let team = site.team("Alpha").await;
     set_min_free_space(&mut site, u64::MAX).await;
 
-    let refused = site.upload(&team.token, archive()).await;
+    let refused = site.upload(&team.token, bundle()).await;
     refused.problem(507, "storage-full", &["too little free space", "try again"]);
     assert!(refused.headers.contains_key("retry-after"));
     let refused = site.get("/api/v1/season/archive", Some(ADMIN)).await;
@@ -45,7 +45,7 @@ async fn low_disk_space_refuses_uploads_and_is_shown() {
     site.team("Beta").await;
 
     set_min_free_space(&mut site, 1).await;
-    site.upload(&team.token, archive()).await.json(201);
+    site.upload(&team.token, bundle()).await.json(201);
     let health = site.get("/api/v1/health", None).await.json(200);
     assert_eq!(health["waiting"], 1);
     let page = site.get("/", None).await;

@@ -1,4 +1,4 @@
-//! The visibility of results that came after the boards were frozen.
+//! Tests of frozen boards: who sees results that came after the boards of a stage were frozen.
 
 use crate::site::{ADMIN, Answer, Site, TestTeam, result};
 use reqwest::Method;
@@ -6,15 +6,15 @@ use serde_json::{Value, json};
 
 const REASON: &str = "the last week is a surprise";
 
-/// A frozen stage that publishes at the release. Returns two teams, and the paths of three evaluations: the first team's
-/// before and after the freeze, and the second team's after it.
+/// Freezes the boards of a stage whose datasets become public at the release of each day. Returns two teams, and the API paths
+/// of three evaluations: the first team's before and after the freeze, and the second team's after it.
 async fn frozen_stage(site: &Site) -> ([TestTeam; 2], [String; 3]) {
     let teams = [site.team("Alpha").await, site.team("Beta").await];
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN));
     let publishes = json!({ "publishes": "at_release" });
     let changed = request.json(&publishes).send().await.unwrap();
-    Answer::of(changed).await.json(200);
+    Answer::read(changed).await.json(200);
     let alpha_submission = site.valid_submission(&teams[0], "a").await;
     let before = site.evaluate(&teams[0], &alpha_submission).await;
     site.finish_evaluation(&result([0.5, 0.5, 0.5], 10.0)).await;
@@ -42,20 +42,20 @@ async fn frozen_results_are_visible_to_their_team_only() {
     let scores: Vec<_> = list.as_array().unwrap().iter().collect();
     let scores: Vec<_> = scores
         .iter()
-        .map(|one| one["result"]["score"].as_f64())
+        .map(|evaluation| evaluation["result"]["score"].as_f64())
         .collect();
     assert_eq!(scores, [Some(100.0), Some(50.0)]);
-    let own = site.get(&after, Some(&alpha.token)).await.json(200);
+    let team_view = site.get(&after, Some(&alpha.token)).await.json(200);
     assert_eq!(
-        (&own["result"]["score"], &own["public"]),
+        (&team_view["result"]["score"], &team_view["public"]),
         (&json!(100.0), &json!(false))
     );
     assert_eq!(
-        own["result"]["tasks"]["hit"]["violations"]["ee"], 7,
+        team_view["result"]["tasks"]["hit"]["violations"]["ee"], 7,
         "the day is released"
     );
     for (key, expected) in [("rank", Value::Null), ("rank_group", Value::Null)] {
-        assert_eq!(own.get(key).cloned().unwrap_or_default(), expected);
+        assert_eq!(team_view.get(key).cloned().unwrap_or_default(), expected);
     }
     let dataset = site
         .get(&format!("{after}/dataset"), Some(&alpha.token))
@@ -87,8 +87,8 @@ async fn frozen_results_are_visible_to_their_team_only() {
         .await
         .problem(409, "not-yet", &["frozen since", REASON, "published once"]);
     // Comparisons are hidden from all teams.
-    let other = beta_after.rsplit('/').next().unwrap();
-    let compare = format!("{after}/compare/{other}");
+    let beta_id = beta_after.rsplit('/').next().unwrap();
+    let compare = format!("{after}/compare/{beta_id}");
     for token in [None, Some(alpha.token.as_str()), Some(&beta.token)] {
         site.get(&compare, token)
             .await

@@ -1,4 +1,4 @@
-//! Pages, parsed as a browser parses them.
+//! Helpers for tests of pages: they fetch a page, and parse it as a browser does.
 
 use crate::site::Site;
 use scraper::{Html, Selector};
@@ -9,8 +9,8 @@ pub async fn page(site: &Site, path: &str) -> Html {
     assert_eq!(answer.status, 200, "{}", answer.body);
     assert!(!answer.body.contains("style="));
     // The content security policy allows no other script.
-    for (at, _) in answer.body.match_indices("<script") {
-        let script = &answer.body[at..];
+    for (start, _) in answer.body.match_indices("<script") {
+        let script = &answer.body[start..];
         assert!(script.starts_with("<script type=\"module\" src=\"/static/live.js?"));
     }
     let html = Html::parse_document(&answer.body);

@@ -1,4 +1,4 @@
-//! The OpenAPI document.
+//! Tests of the OpenAPI document, and of requests that it does not allow.
 
 use crate::site::{ADMIN, Answer, GZIP, Site};
 use reqwest::Method;
@@ -180,10 +180,10 @@ async fn document_lists_all_operations() {
         );
     }
     let text = document.to_string();
-    let mut rest = text.as_str();
-    while let Some(at) = rest.find("#/components/") {
-        rest = &rest[at + 1..];
-        let pointer = &rest[..rest.find('"').unwrap()];
+    let mut remaining = text.as_str();
+    while let Some(start) = remaining.find("#/components/") {
+        remaining = &remaining[start + 1..];
+        let pointer = &remaining[..remaining.find('"').unwrap()];
         assert!(
             document.pointer(pointer).is_some(),
             "{pointer} is referred to, but missing"
@@ -249,7 +249,8 @@ async fn operations_list_the_responses_of_their_kind() {
         for (method, operation) in item.as_object().unwrap() {
             for (status, response) in operation["responses"].as_object().unwrap() {
                 let target = response["$ref"].as_str().map(|text| &text[1..]);
-                let response = target.map_or(response, |at| document.pointer(at).unwrap());
+                let response =
+                    target.map_or(response, |pointer| document.pointer(pointer).unwrap());
                 let description = response["description"].as_str();
                 assert!(
                     description.is_some_and(|description| !description.is_empty()),
@@ -265,19 +266,20 @@ async fn upload_accepts_all_documented_media_types() {
     let site = Site::start().await;
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
     let upload = &document["paths"]["/api/v1/submissions"]["post"];
-    let named = upload["requestBody"]["content"].as_object().unwrap();
-    assert!(named.len() > 1);
-    for (at, media_type) in named.keys().enumerate() {
-        let team = site.team(&format!("Team {at}")).await;
+    let media_types = upload["requestBody"]["content"].as_object().unwrap();
+    assert!(media_types.len() > 1);
+    for (index, media_type) in media_types.keys().enumerate() {
+        // A team of its own, because the uploads of a team are limited.
+        let team = site.team(&format!("Team {index}")).await;
         let request = site
             .request(Method::POST, "/api/v1/submissions", Some(&team.token))
             .header("content-type", media_type)
             .body(GZIP.to_vec());
-        Answer::of(request.send().await.unwrap()).await.json(201);
+        Answer::read(request.send().await.unwrap()).await.json(201);
     }
 }
 
-/// Serde also reads structs from arrays, by position. `[null, null]` was once accepted as a change of the season.
+/// Serde also reads structs from arrays, by position. An earlier version accepted `[null, null]` as a change of the season.
 #[tokio::test]
 async fn array_instead_of_an_object_is_refused() {
     let site = Site::start().await;
@@ -301,7 +303,7 @@ async fn array_instead_of_an_object_is_refused() {
         ),
     ] {
         let request = site.request(method, path, Some(ADMIN)).json(&body);
-        let answer = Answer::of(request.send().await.unwrap()).await;
+        let answer = Answer::read(request.send().await.unwrap()).await;
         assert_eq!(answer.status, 422, "{path} {body}: {answer:?}");
     }
 }

@@ -1,4 +1,5 @@
-//! The organiser dashboard, as used by a browser without scripts.
+//! Tests of the organiser dashboard (the pages below `/organiser`) with a browser without scripts. Each decision has a page of
+//! its own, which shows its effects and a form.
 
 use crate::{
     browser::{Browser, forms},
@@ -9,28 +10,31 @@ use crate::{
 use reqwest::Method;
 use serde_json::{Value, json};
 
+/// The browser of Grace, an organiser.
 async fn grace(site: &Site) -> Browser<'_> {
     let role = json!({ "role": "organiser", "note": "Grace" });
     Browser::join(site, "Grace", role).await
 }
 
-/// The newest event of a kind.
-async fn newest(site: &Site, kind: &str) -> Value {
+/// The newest event of a kind; null if there is none.
+async fn newest_event(site: &Site, kind: &str) -> Value {
     let path = format!("/api/v1/events?limit=1&kind={kind}");
     site.get(&path, Some(ADMIN)).await.json(200)["events"][0].clone()
 }
 
-/// Opens the decision page that is linked on a page under this label. Returns its path and the page.
-async fn open_decision(grace: &mut Browser<'_>, path: &str, label: &str) -> (String, Answer) {
+/// Opens the first decision page that the page at `path` links to and whose own path contains `decision`. Returns its path and
+/// the page.
+async fn open_decision(grace: &mut Browser<'_>, path: &str, decision: &str) -> (String, Answer) {
     let html = dashboard_page(&grace.open(path).await, 200);
     let found = links(&html, "a[href*='/organiser/decide/']")
         .into_iter()
-        .find(|link| link.contains(&format!("/{label}")));
-    let link = found.unwrap_or_else(|| panic!("no {label} on {path}"));
+        .find(|link| link.contains(&format!("/{decision}")));
+    let link = found.unwrap_or_else(|| panic!("no {decision} on {path}"));
     let page = grace.open(&link).await;
     (link, page)
 }
 
+/// Pages of the organiser dashboard.
 const PAGES: [&str; 10] = [
     "/organiser",
     "/organiser/day",
@@ -78,7 +82,7 @@ async fn organiser_dashboard_is_for_organisers_only() {
     let paused = [("reason", "mine")];
     let refused = ada.submit("/organiser/decide/pause", &paused).await;
     assert_eq!(refused.status, 403);
-    assert_eq!(newest(&site, "queue_paused").await, Value::Null);
+    assert_eq!(newest_event(&site, "queue_paused").await, Value::Null);
     assert_eq!(
         redirect_target(&grace.open("/dashboard").await),
         "/organiser"
@@ -103,7 +107,11 @@ async fn evaluation_is_voided_with_a_reason_and_rerun() {
         texts(&html, "#effects")[0]
             .starts_with("The evaluation of 2026-03-01 by Alpha would disappear")
     );
-    assert_eq!(newest(&site, "evaluation_voided").await, Value::Null, "yet");
+    assert_eq!(
+        newest_event(&site, "evaluation_voided").await,
+        Value::Null,
+        "opening the page voids nothing"
+    );
     let form = forms(&link, &page).remove(0);
     let mut send = async |reason: &str| {
         let fields: Vec<(&str, &str)> = form
@@ -120,7 +128,7 @@ async fn evaluation_is_voided_with_a_reason_and_rerun() {
     assert!(texts(&html, "[role=alert]")[0].contains("1 to 500 characters"));
     let target = redirect_target(&send("the <b>camera</b> fell").await);
     assert!(target.starts_with("/organiser/day?stage=") && target.ends_with("&done=voided"));
-    let event = newest(&site, "evaluation_voided").await;
+    let event = newest_event(&site, "evaluation_voided").await;
     assert_eq!(event["actor_name"], "Grace", "{event}");
     let again = dashboard_page(&send("twice").await, 409);
     assert_eq!(
@@ -140,7 +148,7 @@ async fn evaluation_is_voided_with_a_reason_and_rerun() {
     let cancelled = grace.submit(&link, &[("reason", "later")]).await;
     assert!(redirect_target(&cancelled).ends_with("done=cancelled"));
     assert_eq!(
-        newest(&site, "evaluation_cancelled").await["actor_name"],
+        newest_event(&site, "evaluation_cancelled").await["actor_name"],
         "Grace"
     );
 }
@@ -162,7 +170,10 @@ async fn organiser_starts_and_corrects_days_and_pauses_the_queue() {
         "{effects}"
     );
     assert!(redirect_target(&grace.submit(&link, &[]).await).ends_with("done=started"));
-    assert_eq!(newest(&site, "day_started").await["actor_name"], "Grace");
+    assert_eq!(
+        newest_event(&site, "day_started").await["actor_name"],
+        "Grace"
+    );
     let twice = dashboard_page(&grace.submit(&link, &[]).await, 409);
     assert!(texts(&twice, "[role=alert]")[0].contains("had its cut"));
 
@@ -199,8 +210,8 @@ async fn organiser_starts_and_corrects_days_and_pauses_the_queue() {
     let stage = string(&site.get("/api/v1/stages", None).await.json(200)[0]["id"]);
     let missed = format!("/organiser/day?stage={stage}&day=2026-03-03");
     let (link, _) = open_decision(&mut grace, &missed, "missed-day/").await;
-    let played = grace.submit(&link, &[("reason", "power failure")]).await;
-    assert!(redirect_target(&played).ends_with("done=missed"));
+    let started = grace.submit(&link, &[("reason", "power failure")]).await;
+    assert!(redirect_target(&started).ends_with("done=missed"));
     let html = dashboard_page(&grace.open(&missed).await, 200);
     assert!(texts(&html, "section[aria-labelledby=day]")[0].contains("power failure"));
 }
@@ -279,9 +290,9 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
             assert!(redirect_target(&refused).ends_with("done=refused"));
         }
     }
-    let alpha = site.get("/api/v1/teams", Some(ADMIN)).await.json(200);
-    assert_eq!(alpha.as_array().unwrap().len(), 1);
-    let id = string(&alpha[0]["id"]);
+    let teams = site.get("/api/v1/teams", Some(ADMIN)).await.json(200);
+    assert_eq!(teams.as_array().unwrap().len(), 1);
+    let id = string(&teams[0]["id"]);
     let changes = [("division", "Students"), ("baseline", "on")];
     let changed = grace
         .submit(&format!("/organiser/teams/{id}"), &changes)
@@ -299,7 +310,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
         (&json!("Students"), &json!(true))
     );
     assert_eq!(
-        newest(&site, "team_made_baseline").await["actor_name"],
+        newest_event(&site, "team_made_baseline").await["actor_name"],
         "Grace"
     );
     let unknown_division = [("division", "Masters")];
@@ -316,7 +327,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
     let fields = [("reason", "it read the seed"), ("confirm", "Alpha")];
     assert!(redirect_target(&grace.submit(&link, &fields).await).ends_with("done=disqualified"));
     assert_eq!(
-        newest(&site, "team_disqualified").await["actor_name"],
+        newest_event(&site, "team_disqualified").await["actor_name"],
         "Grace"
     );
     let (link, _) = open_decision(&mut grace, "/organiser/teams", "reinstate/").await;
@@ -326,18 +337,18 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
     let html = dashboard_page(&grace.open("/organiser/access").await, 200);
     assert_eq!(texts(&html, "#role option").len(), 3);
     let founder = [("role", "founder"), ("team", ""), ("note", "Gamma")];
-    let made = grace
+    let created = grace
         .submit("/organiser/access/invitations", &founder)
         .await;
-    let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    let link = texts(&dashboard_page(&created, 201), ".secret code").remove(0);
     assert!(visitor.open(&link).await.body.contains("Create your team"));
     let member = [("role", "member"), ("team", ""), ("note", "Ada")];
     let refused = grace.submit("/organiser/access/invitations", &member).await;
     let html = dashboard_page(&refused, 422);
     assert!(texts(&html, "[role=alert]")[0].contains("choose an entry of the list"));
     let member = [("role", "member"), ("team", id.as_str()), ("note", "Ada")];
-    let made = grace.submit("/organiser/access/invitations", &member).await;
-    let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    let created = grace.submit("/organiser/access/invitations", &member).await;
+    let link = texts(&dashboard_page(&created, 201), ".secret code").remove(0);
     assert!(
         visitor
             .open(&link)
@@ -353,12 +364,15 @@ async fn organiser_creates_changes_freezes_and_signs_off_a_stage() {
     let mut grace = grace(&site).await;
     let stage = string(&site.get("/api/v1/stages", None).await.json(200)[0]["id"]);
     let path = format!("/organiser/stages/{stage}");
+    // The fields of the stage's form on a page, with some values changed.
     let form = |page: &Answer, changes: &[(&str, &str)]| {
-        let all = forms(&path, page);
-        let form = all.iter().find(|form| form.is_post && form.action == path);
+        let forms = forms(&path, page);
+        let form = forms
+            .iter()
+            .find(|form| form.is_post && form.action == path);
         let mut fields = form.unwrap().fields.clone();
         for (name, value) in changes {
-            fields.retain(|(known, _)| known != name);
+            fields.retain(|(field, _)| field != name);
             fields.push(((*name).to_owned(), (*value).to_owned()));
         }
         fields
@@ -397,7 +411,10 @@ async fn organiser_creates_changes_freezes_and_signs_off_a_stage() {
         *schedule,
         json!({ "daily": "06:30:00", "days_off": ["2026-12-24", "2026-12-25"] })
     );
-    assert_eq!(newest(&site, "stage_changed").await["actor_name"], "Grace");
+    assert_eq!(
+        newest_event(&site, "stage_changed").await["actor_name"],
+        "Grace"
+    );
     let page = browser.open(&path).await;
     for (name, value, words) in [
         ("schedule", "25:00", "schedule"),
@@ -413,14 +430,10 @@ async fn organiser_creates_changes_freezes_and_signs_off_a_stage() {
             "{}",
             refused.body
         );
-        let typed = forms(&path, &refused)
+        let mut kept_fields = forms(&path, &refused)
             .into_iter()
             .flat_map(|form| form.fields);
-        assert!(
-            typed
-                .into_iter()
-                .any(|field| field == (name.into(), value.into()))
-        );
+        assert!(kept_fields.any(|field| field == (name.into(), value.into())));
     }
     let cron = form(&page, &[("schedule", "0 6 * * 1-5"), ("days_off", "")]);
     assert!(redirect_target(&send(cron).await).ends_with("done=stage-changed"));
@@ -457,7 +470,7 @@ async fn organiser_creates_changes_freezes_and_signs_off_a_stage() {
     let closing = form(&page, &[("closes_at", "2026-03-01T11:00")]);
     let closing: Vec<_> = closing
         .iter()
-        .map(|(a, b)| (a.as_str(), b.as_str()))
+        .map(|(name, value)| (name.as_str(), value.as_str()))
         .collect();
     assert!(redirect_target(&grace.submit(&path, &closing).await).ends_with("done=stage-changed"));
     site.advance(3600);
@@ -469,7 +482,7 @@ async fn organiser_creates_changes_freezes_and_signs_off_a_stage() {
     assert!(redirect_target(&grace.submit(&link, &confirm).await).ends_with("done=signed-off"));
     assert_eq!(
         get().await["finalised"]["by"],
-        newest(&site, "stage_finalised").await["actor"]
+        newest_event(&site, "stage_finalised").await["actor"]
     );
 
     // A second stage with the settings of the first.
@@ -528,7 +541,7 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
         redirect_target(&answered),
         "/organiser/messages?done=answered"
     );
-    assert_eq!(newest(&site, "answered").await["actor_name"], "Grace");
+    assert_eq!(newest_event(&site, "answered").await["actor_name"], "Grace");
     let ada_page = dashboard_page(&ada.open("/dashboard/questions").await, 200);
     assert!(texts(&ada_page, ".entry")[0].contains("You may."));
     let ben_page = dashboard_page(&ben.open("/dashboard/questions").await, 200);
@@ -583,11 +596,11 @@ async fn organiser_forms_refuse_foreign_origins() {
     let stage = string(&site.get("/api/v1/stages", None).await.json(200)[0]["id"]);
     let mut paths: Vec<String> = PAGES.map(str::to_owned).to_vec();
     paths.push(format!("/organiser/stages/{stage}"));
-    let mut checked = 0;
-    let mut at = 0;
-    while at < paths.len() {
-        let path = paths[at].clone();
-        at += 1;
+    let mut checked_forms = 0;
+    let mut index = 0;
+    while index < paths.len() {
+        let path = paths[index].clone();
+        index += 1;
         let page = grace.open(&path).await;
         let html = dashboard_page(&page, 200);
         for link in links(&html, "a[href^='/organiser/decide/']") {
@@ -601,8 +614,8 @@ async fn organiser_forms_refuse_foreign_origins() {
                 assert_eq!(answer.status, 403, "{form:?}: {}", answer.body);
             }
             let after = site.get("/api/v1/events?limit=1", Some(ADMIN)).await;
-            assert_eq!(before.body, after.body, "{form:?} did something");
-            checked += 1;
+            assert_eq!(before.body, after.body, "{form:?} changed something");
+            checked_forms += 1;
         }
     }
     for decision in [
@@ -616,7 +629,7 @@ async fn organiser_forms_refuse_foreign_origins() {
         let found = paths.iter().any(|path| path.contains(decision));
         assert!(found, "{decision} is not linked: {paths:?}");
     }
-    assert!(checked > 10, "{checked} forms");
+    assert!(checked_forms > 10, "{checked_forms} forms");
 }
 
 #[tokio::test]
@@ -635,8 +648,8 @@ async fn log_entries_link_to_their_kind_and_actor() {
         rows[0].contains("Grace") && rows[0].contains("a test"),
         "{rows:?}"
     );
-    let author = links(&html, "a[href*='actor=person%3A']").remove(0);
-    let html = dashboard_page(&grace.open(&author).await, 200);
+    let actor = links(&html, "a[href*='actor=person%3A']").remove(0);
+    let html = dashboard_page(&grace.open(&actor).await, 200);
     assert!(
         texts(&html, "tbody tr")
             .iter()

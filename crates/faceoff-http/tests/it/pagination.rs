@@ -1,4 +1,4 @@
-//! Paginated lists.
+//! Tests of paginated lists: each page links to the next, and no row is skipped or repeated while rows are added.
 
 use crate::{
     site::{ADMIN, Answer, Site, TestTeam, result, string},
@@ -15,13 +15,13 @@ fn next_page(answer: &Answer) -> Option<String> {
     Some(path.to_owned())
 }
 
-/// The values of a field on all pages. Calls `between` between two pages.
+/// The values of a field on all pages. Between two pages it calls `between_pages` with the number of the page that was read.
 async fn collect_pages(
     site: &Site,
     path: &str,
     token: Option<&str>,
     field: &str,
-    between: impl AsyncFn(usize),
+    between_pages: impl AsyncFn(usize),
 ) -> Vec<String> {
     let mut found = Vec::new();
     let mut path = path.to_owned();
@@ -34,7 +34,7 @@ async fn collect_pages(
             Some(next) => path = next,
             None => break,
         }
-        between(page).await;
+        between_pages(page).await;
     }
     found
 }
@@ -57,7 +57,7 @@ async fn pages_list_each_row_once_while_rows_are_added() {
         site.team(name).await;
     }
     let add = async |page: usize| {
-        // One sorts before the rows that were read, one after them.
+        // One name sorts before the rows that were read, one after them.
         site.team(&format!("A before {page}")).await;
         site.team(&format!("Zeta {page}")).await;
     };
@@ -66,7 +66,10 @@ async fn pages_list_each_row_once_while_rows_are_added() {
     let once: BTreeSet<&String> = found.iter().collect();
     assert_eq!(once.len(), found.len(), "{found:?}");
     for name in names {
-        assert!(found.iter().any(|one| one == name), "{name}: {found:?}");
+        assert!(
+            found.iter().any(|listed| listed == name),
+            "{name}: {found:?}"
+        );
     }
 }
 
@@ -75,25 +78,28 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
     let site = Site::start().await;
     let [alpha, beta]: [TestTeam; 2] = [site.team("Alpha").await, site.team("Beta").await];
     let mut uploaded = Vec::new();
-    // All with the same time stamp.
+    // All submissions have the same time stamp.
     for _ in 0..5 {
         let path = site.valid_submission(&alpha, "a").await;
         uploaded.push(path.rsplit('/').next().unwrap().to_owned());
     }
     site.valid_submission(&beta, "b").await;
     uploaded.reverse();
-    let own = Some(alpha.token.as_str());
+    let alpha_token = Some(alpha.token.as_str());
     let add = async |_| {
         site.valid_submission(&alpha, "a").await;
     };
     let path = "/api/v1/submissions?limit=2";
-    assert_eq!(collect_pages(&site, path, own, "id", add).await, uploaded);
+    assert_eq!(
+        collect_pages(&site, path, alpha_token, "id", add).await,
+        uploaded
+    );
 
     for _ in 0..5 {
         run_day(&site, 2).await;
         site.next_day();
     }
-    let all = site.get("/api/v1/evaluations", own).await;
+    let all = site.get("/api/v1/evaluations", alpha_token).await;
     assert_eq!(next_page(&all), None);
     let all: Vec<String> = all
         .json(200)
@@ -109,10 +115,13 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
         }
     };
     let path = "/api/v1/evaluations?limit=2";
-    assert_eq!(collect_pages(&site, path, own, "id", add).await, all);
+    assert_eq!(
+        collect_pages(&site, path, alpha_token, "id", add).await,
+        all
+    );
     // The link to the next page keeps the other parameters.
     let filtered = "/api/v1/evaluations?day=2026-03-02&limit=1";
-    let alpha_days = collect_pages(&site, filtered, own, "day", no_change).await;
+    let alpha_days = collect_pages(&site, filtered, alpha_token, "day", no_change).await;
     assert_eq!(alpha_days, ["2026-03-02"]);
     let first = site.get(filtered, Some(ADMIN)).await;
     assert!(
@@ -160,21 +169,21 @@ async fn growing_lists_are_paginated() {
         &games,
     ];
     for list in lists {
-        let whole = site.get(list, Some(ADMIN)).await;
-        assert_eq!(next_page(&whole), None, "{list}");
-        let whole: Vec<Value> = serde_json::from_str(&whole.body).unwrap();
-        let whole: Vec<String> = whole.iter().map(|row| string(&row["id"])).collect();
-        assert!(whole.len() > 1, "{list}");
+        let single_page = site.get(list, Some(ADMIN)).await;
+        assert_eq!(next_page(&single_page), None, "{list}");
+        let rows: Vec<Value> = serde_json::from_str(&single_page.body).unwrap();
+        let ids: Vec<String> = rows.iter().map(|row| string(&row["id"])).collect();
+        assert!(ids.len() > 1, "{list}");
         let path = format!("{list}?limit=1");
         let collected = collect_pages(site, &path, Some(ADMIN), "id", no_change).await;
-        assert_eq!(collected, whole, "{list}");
+        assert_eq!(collected, ids, "{list}");
     }
-    let all = lists.into_iter().chain([
+    let all_lists = lists.into_iter().chain([
         "/api/v1/registrations",
         "/api/v1/proposals",
         "/api/v1/evaluations",
     ]);
-    for list in all {
+    for list in all_lists {
         for limit in ["0", "201"] {
             let path = format!("{list}?limit={limit}");
             let refused = site.get(&path, Some(ADMIN)).await;

@@ -1,4 +1,4 @@
-//! Probes: liveness, readiness and metrics.
+//! Tests of the probes for monitoring: liveness, readiness and metrics.
 
 use crate::site::*;
 use faceoff_http::HttpLimits;
@@ -26,7 +26,7 @@ async fn server_that_is_not_ready_is_live() {
     assert_eq!(problem["free_space"], "short");
     site.get("/livez", None).await.json(200);
     site.store.close().await;
-    site.advance(1); // one probe a second
+    site.advance(1); // The database is checked once a second at most.
     let ready = site.get("/readyz", None).await;
     ready.problem(503, "not-ready", &["the database cannot be written"]);
     site.get("/livez", None).await.json(200);
@@ -96,7 +96,7 @@ async fn metrics_follow_events() {
     site.evaluate(&team, &submission).await;
     site.advance(90);
     let during = metrics().await;
-    // No such job was run before, so the duration is unknown.
+    // No job of this kind has run before, so its duration is unknown.
     assert!(metric(&during, "faceoff_queue_expected_seconds").is_nan());
     assert_eq!(metric(&during, "faceoff_remote_long_units"), 0.0);
     assert_eq!(metric(&during, "faceoff_evaluations_open"), 1.0);

@@ -1,4 +1,4 @@
-//! Problem documents and error pages.
+//! Tests of errors: problem documents (RFC 9457) for API clients, and pages for browsers.
 
 use crate::site::{ADMIN, Answer, Site, generous_limits};
 use faceoff_http::HttpLimits;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 async fn send(site: &Site, method: Method, path: &str, accept: &str) -> Answer {
     let request = site.request(method, path, None).header("accept", accept);
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
 #[tokio::test]
@@ -19,11 +19,11 @@ async fn unknown_paths_answer_problems_or_pages() {
     site.get("/nothing", None)
         .await
         .problem(404, "not-found", &["/nothing"]);
-    let api = send(&site, Method::GET, "/api/v1/nothing", "text/html").await;
-    api.problem(404, "not-found", &[]);
-    let method = send(&site, Method::DELETE, "/api/v1/teams", "*/*").await;
-    method.problem(405, "method-not-allowed", &["DELETE", "Allow"]);
-    assert!(method.header("allow").contains("POST"));
+    let api_answer = send(&site, Method::GET, "/api/v1/nothing", "text/html").await;
+    api_answer.problem(404, "not-found", &[]);
+    let refused = send(&site, Method::DELETE, "/api/v1/teams", "*/*").await;
+    refused.problem(405, "method-not-allowed", &["DELETE", "Allow"]);
+    assert!(refused.header("allow").contains("POST"));
     send(&site, Method::PUT, "/api/v1/submissions", "*/*")
         .await
         .problem(405, "method-not-allowed", &["PUT"]);
@@ -53,7 +53,7 @@ async fn invalid_json_is_refused_with_its_position() {
             .request(Method::POST, "/api/v1/teams", Some(ADMIN))
             .header("content-type", content_type)
             .body(body);
-        async move { Answer::of(request.send().await.unwrap()).await }
+        async move { Answer::read(request.send().await.unwrap()).await }
     };
     let json = "application/json";
     post(json, "{\"name\":".into())
@@ -135,7 +135,7 @@ async fn busy_response_has_retry_after() {
         .send()
         .await
         .unwrap();
-    Answer::of(slow)
+    Answer::read(slow)
         .await
         .problem(503, "busy", &["longer than 0.05 s"]);
 }
@@ -147,7 +147,7 @@ async fn store_failure_is_internal_and_hides_its_cause() {
     site.store.close().await;
     let broken = site.get("/api/v1/season", None).await;
     broken.problem(500, "internal", &["x-request-id"]);
-    site.advance(1); // one probe a second
+    site.advance(1); // The database is checked once a second at most.
     let not_ready = site.get("/api/v1/health", None).await;
     not_ready.problem(503, "not-ready", &["the database cannot be written"]);
     for answer in [&broken, &not_ready] {

@@ -1,4 +1,4 @@
-//! Trials and proposed re-evaluations in the API.
+//! Tests of trials, which never count, and of proposed re-evaluations, which count once an organiser applies them, in the API.
 
 use crate::site::{ADMIN, Site, outcome, string};
 use faceoff_types::Task;
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 const REASON: &str = "the camera was dirty";
 
-/// Solves the first `count` of four episodes of each task.
+/// The outcomes of an agent that solves the first `count` of four episodes of each task.
 fn solve_first(count: u32) -> impl Fn(Task, u32) -> faceoff_types::EpisodeOutcome {
     move |task, episode| faceoff_types::EpisodeOutcome {
         success: episode < count,
@@ -16,15 +16,17 @@ fn solve_first(count: u32) -> impl Fn(Task, u32) -> faceoff_types::EpisodeOutcom
 
 /// A released day on which Alpha solved three of four episodes and Beta two. Returns their evaluations.
 async fn run_day(site: &Site) -> [String; 2] {
-    let [three, two] = [solve_first(3), solve_first(2)];
-    let ids = site.run_day(4, [("Alpha", &three), ("Beta", &two)]).await;
+    let [alpha, beta] = [solve_first(3), solve_first(2)];
+    let ids = site.run_day(4, [("Alpha", &alpha), ("Beta", &beta)]).await;
     ids.map(|id| id.to_string())
 }
 
+/// Posts as an organiser.
 async fn post(site: &Site, path: &str, body: Value) -> crate::site::Answer {
     site.post(path, Some(ADMIN), &body).await
 }
 
+/// The names of the teams on the board, in its order.
 async fn ranked_teams(site: &Site) -> Vec<String> {
     let board = site.get("/api/v1/board", None).await.json(200);
     let rows = board["rows"].as_array().unwrap().iter();
@@ -161,14 +163,14 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
     assert_eq!(ranked_teams(&site).await, ["Alpha", "Beta"]);
     let stage = site.stage().await;
     let path = format!("/api/v1/stages/{stage}/proposals");
-    let made = post(
+    let created = post(
         &site,
         &path,
         json!({ "day": "2026-03-01", "reason": REASON }),
     )
     .await
     .json(201);
-    let proposal = format!("/api/v1/proposals/{}", string(&made["id"]));
+    let proposal = format!("/api/v1/proposals/{}", string(&created["id"]));
     let apply = format!("{proposal}/apply");
     post(&site, &apply, json!({ "confirm": "2026-03-01" }))
         .await
@@ -199,7 +201,7 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| string(&one["replaces"]))
+        .map(|evaluation| string(&evaluation["replaces"]))
         .collect();
     assert_eq!(
         replaced,
@@ -238,7 +240,7 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
         (&json!("applied"), &Value::Null)
     );
     assert_eq!(ranked_teams(&site).await, ["Beta", "Alpha"]);
-    let old = site
+    let replaced_view = site
         .get(
             &format!("/api/v1/evaluations/{alpha_evaluation}"),
             Some(ADMIN),
@@ -246,14 +248,17 @@ async fn re_evaluation_previews_and_applies_rank_changes() {
         .await
         .json(200);
     assert_eq!(
-        old["voided"]["reason"],
+        replaced_view["voided"]["reason"],
         format!("evaluated again: {REASON}")
     );
     let board = site.get("/api/v1/board", None).await.json(200);
-    let new = string(&board["rows"][1]["evaluation"]);
-    assert_eq!(json!(new), view["evaluations"][0]["evaluation"]);
+    let new_evaluation = string(&board["rows"][1]["evaluation"]);
+    assert_eq!(json!(new_evaluation), view["evaluations"][0]["evaluation"]);
     let view = site
-        .get(&format!("/api/v1/evaluations/{new}"), Some(ADMIN))
+        .get(
+            &format!("/api/v1/evaluations/{new_evaluation}"),
+            Some(ADMIN),
+        )
         .await
         .json(200);
     assert_eq!(
@@ -323,10 +328,13 @@ async fn invalid_re_evaluation_is_refused_with_the_reason() {
     )
     .await
     .problem(404, "not-found", &["evaluation"]);
-    let other = post(&site, "/api/v1/stages", json!({ "name": "Final" }))
+    let other_stage_view = post(&site, "/api/v1/stages", json!({ "name": "Final" }))
         .await
         .json(201);
-    let other_stage = format!("/api/v1/stages/{}/proposals", string(&other["id"]));
+    let other_stage = format!(
+        "/api/v1/stages/{}/proposals",
+        string(&other_stage_view["id"])
+    );
     post(
         &site,
         &other_stage,
@@ -369,10 +377,10 @@ async fn re_evaluation_by_new_rules_has_its_own_board() {
     assert_eq!(request.json(&rules).send().await.unwrap().status(), 200);
     let path = format!("/api/v1/stages/{stage}/proposals");
     let request = json!({ "day": "2026-03-01", "new_rules": true, "reason": REASON });
-    let made = post(&site, &path, request).await.json(201);
+    let created = post(&site, &path, request).await.json(201);
     site.run_evaluation(solve_first(1)).await;
     site.run_evaluation(solve_first(4)).await;
-    let proposal = format!("/api/v1/proposals/{}", string(&made["id"]));
+    let proposal = format!("/api/v1/proposals/{}", string(&created["id"]));
     let view = site.get(&proposal, Some(ADMIN)).await.json(200);
     let outcome = &view["outcome"];
     let newest = view["revision"].as_u64().unwrap();
@@ -387,10 +395,10 @@ async fn re_evaluation_by_new_rules_has_its_own_board() {
     .await
     .json(200);
     assert_eq!(ranked_teams(&site).await, ["Beta", "Alpha"]);
-    let old = format!("/api/v1/board?stage={stage}&revision={}", newest - 1);
-    let old = site.get(&old, None).await.json(200);
+    let old_board = format!("/api/v1/board?stage={stage}&revision={}", newest - 1);
+    let old_board = site.get(&old_board, None).await.json(200);
     assert_eq!(
-        old["rows"][0]["team"], "Alpha",
+        old_board["rows"][0]["team"], "Alpha",
         "the board of the old rules stays"
     );
 }
@@ -403,13 +411,13 @@ async fn proposal_datasets_are_for_organisers_until_dropped() {
     let gamma = site.team("Gamma").await;
     let path = format!("/api/v1/stages/{stage}/proposals");
     let request = json!({ "day": "2026-03-01", "reason": REASON });
-    let made = post(&site, &path, request).await.json(201);
-    let proposal = format!("/api/v1/proposals/{}", string(&made["id"]));
+    let created = post(&site, &path, request).await.json(201);
+    let proposal = format!("/api/v1/proposals/{}", string(&created["id"]));
     let dataset_of = |proposal: &Value, index: usize| {
         let id = string(&proposal["evaluations"][index]["evaluation"]);
         format!("/api/v1/evaluations/{id}/dataset")
     };
-    let [first, second] = [dataset_of(&made, 0), dataset_of(&made, 1)];
+    let [first, second] = [dataset_of(&created, 0), dataset_of(&created, 1)];
     site.get(&first, Some(ADMIN))
         .await
         .problem(409, "conflict", &["has not finished", &proposal]);
@@ -436,7 +444,7 @@ async fn proposal_datasets_are_for_organisers_until_dropped() {
     site.get(&second, Some(ADMIN))
         .await
         .problem(409, "conflict", &["too many faults"]);
-    // All others get 404, also the team of the submission.
+    // Other teams get 404, even the team of the submission.
     let alpha = string(&view["evaluations"][0]["team"]);
     let token = format!("/api/v1/teams/{alpha}/token");
     let token = post(&site, &token, json!({})).await.json(200);

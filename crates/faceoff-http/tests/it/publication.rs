@@ -1,15 +1,17 @@
-//! The publication of datasets.
+//! Tests of the publication of datasets (recordings of evaluations), by the stage or by their team.
 
 use crate::site::{ADMIN, Answer, Site, TestTeam, result};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-const CLOSES: &str = "2026-03-02T09:00:00Z";
+/// When the stage closes: 23 hours after the start of the test.
+const CLOSES_AT: &str = "2026-03-02T09:00:00Z";
 
-async fn change(site: &Site, body: Value) -> Answer {
+/// Changes the first stage as an organiser.
+async fn change_stage(site: &Site, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::of(request.json(&body).send().await.unwrap()).await
+    Answer::read(request.json(&body).send().await.unwrap()).await
 }
 
 /// A stage with an end, and a day of two teams. The first evaluation is finished, the second one is still queued.
@@ -17,25 +19,26 @@ async fn unfinished_day(site: &Site, publishes: &str) -> ([TestTeam; 2], String)
     let teams = [site.team("Alpha").await, site.team("Beta").await];
     let submission = site.valid_submission(&teams[0], "a").await;
     site.valid_submission(&teams[1], "b").await;
-    let settings = json!({ "publishes": publishes, "closes_at": CLOSES });
-    change(site, settings).await.json(200);
+    let settings = json!({ "publishes": publishes, "closes_at": CLOSES_AT });
+    change_stage(site, settings).await.json(200);
     let path = site.evaluate(&teams[0], &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     (teams, path)
 }
 
+/// Whether an evaluation is public; checks that its dataset is public or not accordingly.
 async fn is_public(site: &Site, path: &str) -> bool {
     let answer = site.get(path, None).await;
     let dataset = site.get(&format!("{path}/dataset"), None).await;
-    let shown_to_organiser = site.get(path, Some(ADMIN)).await.json(200)["public"].clone();
+    let organiser_view = site.get(path, Some(ADMIN)).await.json(200);
     if answer.status == 200 {
         assert_eq!(answer.json(200)["public"], true);
         assert_eq!(
             (dataset.status.as_u16(), dataset.header("content-type")),
             (200, "application/zip")
         );
-        assert_eq!(shown_to_organiser, true);
+        assert_eq!(organiser_view["public"], true);
         return true;
     }
     answer.problem(
@@ -44,7 +47,7 @@ async fn is_public(site: &Site, path: &str) -> bool {
         &["no such public evaluation", "Bearer"],
     );
     dataset.problem(401, "unauthenticated", &[]);
-    assert_eq!(shown_to_organiser, false);
+    assert_eq!(organiser_view["public"], false);
     false
 }
 
@@ -59,12 +62,12 @@ async fn datasets_are_public_when_the_stage_says() {
         let ([alpha, beta], path) = unfinished_day(&site, publishes).await;
         assert!(
             !is_public(&site, &path).await,
-            "others play the same episodes"
+            "another evaluation of the day still runs on the same episodes"
         );
         site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
         assert_eq!(is_public(&site, &path).await, at_release, "{publishes}");
-        let other = site.get(&path, Some(&beta.token)).await.status;
-        assert_eq!(other == 200, at_release, "{publishes}");
+        let other_team_status = site.get(&path, Some(&beta.token)).await.status;
+        assert_eq!(other_team_status == 200, at_release, "{publishes}");
         site.advance(23 * 3600);
         assert_eq!(is_public(&site, &path).await, at_close, "{publishes}");
         let page = site.get(&path.replace("/api/v1", ""), None).await.body;
@@ -137,7 +140,7 @@ async fn published_failure_hides_faults_and_log() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
-    change(&site, json!({ "publishes": "at_release" }))
+    change_stage(&site, json!({ "publishes": "at_release" }))
         .await
         .json(200);
     let path = site.evaluate(&team, &submission).await;

@@ -1,31 +1,33 @@
-//! Rate limits per address and per token. Bursts refill so slowly that no result depends on the duration of the test.
+//! Tests of rate limits per address and per token. The limits refill so slowly that no result depends on the duration of the
+//! test.
 
 use crate::site::*;
 use faceoff_http::{RateLimit, RateLimits};
 use reqwest::Method;
 use std::num::NonZeroU32;
 
-/// A rate with this burst and one request per second: a request takes less time than that.
-fn at_once(burst: u32) -> Option<RateLimit> {
+/// A limit of `burst` requests at once and one per second. A request takes less than a second.
+fn limit_with_burst(burst: u32) -> Option<RateLimit> {
     Some(RateLimit {
         per_s: NonZeroU32::MIN,
         burst: NonZeroU32::new(burst).unwrap(),
     })
 }
 
-/// Sends requests until one is refused. Returns that response.
+/// Sends requests until one is refused. Returns that response. `forwarded` is the client address that a proxy names.
 async fn request_until_refused(
     site: &Site,
     token: Option<&str>,
     forwarded: Option<&str>,
 ) -> Answer {
-    // So many requests take a minute on a slow machine.
-    for _ in 0..100_000 {
+    // On a slow machine this takes a minute.
+    const MAX_REQUESTS: u32 = 100_000;
+    for _ in 0..MAX_REQUESTS {
         let mut request = site.request(Method::GET, "/api/v1/season", token);
         if let Some(address) = forwarded {
             request = request.header("x-forwarded-for", address);
         }
-        let answer = Answer::of(request.send().await.unwrap()).await;
+        let answer = Answer::read(request.send().await.unwrap()).await;
         if answer.status != 200 {
             return answer;
         }
@@ -33,6 +35,7 @@ async fn request_until_refused(
     panic!("nothing was refused");
 }
 
+/// The status of a response to a client with this address.
 async fn request_from(site: &Site, address: &str) -> u16 {
     let request = site.request(Method::GET, "/api/v1/season", None);
     let request = request.header("x-forwarded-for", address);
@@ -42,11 +45,11 @@ async fn request_from(site: &Site, address: &str) -> u16 {
 #[tokio::test]
 async fn rate_limit_applies_per_address() {
     let rates = RateLimits {
-        address: at_once(5),
+        address: limit_with_burst(5),
         token: None,
     };
     let site = Site::start().await.with_rates(rates).await;
-    // The loopback address of the test is a trusted proxy's.
+    // The server trusts the test's loopback address as a proxy.
     let refused = request_until_refused(&site, None, Some("192.0.2.1")).await;
     let problem = refused.problem(429, "too-many-requests", &["5 at once", "wait"]);
     assert_eq!(problem["limit_per_s"], 1);
@@ -70,7 +73,7 @@ async fn rate_limit_applies_per_token() {
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let rates = RateLimits {
         address: None,
-        token: at_once(5),
+        token: limit_with_burst(5),
     };
     let site = site.with_rates(rates).await;
     let refused = request_until_refused(&site, Some(&alpha.token), None).await;

@@ -1,4 +1,4 @@
-//! The log lines of requests.
+//! Tests of the log lines of requests.
 
 use crate::site::*;
 use serde_json::{Value, json};
@@ -14,12 +14,13 @@ use tracing_subscriber::fmt::MakeWriter;
 struct Log(Arc<Mutex<Vec<u8>>>);
 
 impl Log {
+    /// Writes the thread's log lines down to `level` to this log, until the guard is dropped.
     fn capture(&self, level: Level) -> DefaultGuard {
-        let lines = tracing_subscriber::fmt()
+        let subscriber = tracing_subscriber::fmt()
             .json()
             .with_max_level(level)
             .with_writer(self.clone());
-        tracing::subscriber::set_default(lines.finish())
+        tracing::subscriber::set_default(subscriber.finish())
     }
 
     /// The log lines of answered requests.
@@ -54,10 +55,11 @@ async fn changes_are_logged_with_request_id_and_actor() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let beta = json!({ "name": "Beta" });
-    let wrong = site.post("/api/v1/teams", Some(&team.token), &beta).await;
-    wrong.problem(403, "forbidden", &[]);
+    let forbidden = site.post("/api/v1/teams", Some(&team.token), &beta).await;
+    forbidden.problem(403, "forbidden", &[]);
     site.get("/api/v1/board", None).await.json(200);
     site.get("/livez", None).await.json(200);
+    // Reading requests are not logged at this level.
     let answers = log.answers();
     assert_eq!(answers.len(), 2, "{answers:#?}");
     let [created, refused] = [&answers[0], &answers[1]];
@@ -67,7 +69,7 @@ async fn changes_are_logged_with_request_id_and_actor() {
     assert_eq!(created["span"]["path"], "/api/v1/teams");
     assert_eq!(created["span"]["actor"], "organiser");
     assert_eq!(refused["fields"]["status"], 403);
-    assert_eq!(refused["span"]["id"], wrong.header("x-request-id"));
+    assert_eq!(refused["span"]["id"], forbidden.header("x-request-id"));
     assert_eq!(refused["span"]["actor"], format!("team:{}", team.id));
 }
 
@@ -81,6 +83,7 @@ async fn reads_are_logged_at_debug_level() {
     let _guard = log.capture(Level::DEBUG);
     let found = site.get(&evaluation, Some(&team.token)).await;
     site.get("/readyz", None).await.json(200);
+    // Probes are not logged.
     let answers = log.answers();
     assert_eq!(answers.len(), 1, "{answers:#?}");
     let span = &answers[0]["span"];

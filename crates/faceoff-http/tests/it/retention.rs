@@ -1,21 +1,23 @@
-//! Retention of datasets, deleted submissions, and storage usage.
+//! Tests of retention (a stage's rule that says which datasets and bundles are kept), of deleted submissions, and of disk usage.
 
-use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, string};
+use crate::site::{ADMIN, Answer, DATASET, GZIP, Site, TestTeam, result, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, body: Value) -> Answer {
+/// Changes the first stage as an organiser.
+async fn change_stage(site: &Site, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
-async fn stage(site: &Site) -> Value {
+/// The first stage, as visitors see it.
+async fn stage_view(site: &Site) -> Value {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     site.get(&path, None).await.json(200)
 }
 
-/// Runs a day with this submission. Returns the path of its evaluation.
+/// Runs an evaluation day with this submission. Returns the API path of its evaluation. The clock is then on the next day.
 async fn run_day(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]) -> String {
     let evaluation = site.evaluate(team, submission).await;
     site.finish_evaluation(&result(rates, 10.0)).await;
@@ -23,9 +25,10 @@ async fn run_day(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]
     evaluation
 }
 
+/// Deletes a submission.
 async fn delete(site: &Site, submission: &str, token: Option<&str>, body: Value) -> Answer {
     let request = site.request(Method::DELETE, submission, token).json(&body);
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
 #[tokio::test]
@@ -33,14 +36,14 @@ async fn retention_is_confirmed_applied_and_reported() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
-    let mut played = Vec::new();
+    let mut evaluations = Vec::new();
     for rate in [0.9, 0.1, 0.2] {
-        played.push(run_day(&site, &team, &submission, [rate; 3]).await);
+        evaluations.push(run_day(&site, &team, &submission, [rate; 3]).await);
     }
-    let before = stage(&site).await;
+    let before = stage_view(&site).await;
     assert_eq!(before["retention"], json!({}));
     let request = json!({ "retention": { "last": 1 } });
-    let unconfirmed = change(&site, request).await;
+    let unconfirmed = change_stage(&site, request).await;
     let problem = unconfirmed.problem(
         409,
         "not-confirmed",
@@ -48,24 +51,24 @@ async fn retention_is_confirmed_applied_and_reported() {
             "nothing is done yet",
             "the last 1 and the best of each team",
             "1 datasets of 1 teams and 0 bundles",
-            "23 bytes",
+            &format!("{} bytes", DATASET.len()),
         ],
     );
     assert_eq!(problem["confirm"], "Qualifying");
-    assert_eq!(stage(&site).await, before);
+    assert_eq!(stage_view(&site).await, before);
     let confirmed = json!({ "retention": { "last": 1 }, "confirm": "Qualifying" });
-    let changed = change(&site, confirmed).await.json(200);
+    let changed = change_stage(&site, confirmed).await.json(200);
     assert_eq!(changed["retention"], json!({ "last": 1 }));
     assert_eq!(
         changed["revision"], before["revision"],
         "retention is not a rule"
     );
-    let dataset = format!("{}/dataset", played[1]);
+    let dataset = format!("{}/dataset", evaluations[1]);
     site.get(&dataset, Some(&team.token)).await;
     let removed = site.store.apply_retentions(site.now()).await.unwrap();
     assert_eq!(removed.datasets, 1);
 
-    let violations = format!("{}/violations", played[1]);
+    let violations = format!("{}/violations", evaluations[1]);
     let check_removed = async |path: &str, token: &str| {
         let problem = site.get(path, Some(token)).await.problem(
             410,
@@ -81,9 +84,9 @@ async fn retention_is_confirmed_applied_and_reported() {
     for path in [&dataset, &violations] {
         check_removed(path, &team.token).await;
     }
-    // Organisers can still download it while the file exists, since it may be evidence.
+    // Organisers can still download the dataset while the file exists, since it may be evidence.
     assert_eq!(site.get(&dataset, Some(ADMIN)).await.status, 200);
-    for retained in [&played[0], &played[2]] {
+    for retained in [&evaluations[0], &evaluations[2]] {
         let path = format!("{retained}/dataset");
         let answer = site.get(&path, Some(&team.token)).await;
         assert_eq!(answer.status, 200, "{}", answer.body);
@@ -92,13 +95,13 @@ async fn retention_is_confirmed_applied_and_reported() {
     site.get(&dataset, None)
         .await
         .problem(401, "unauthenticated", &[]);
-    let view = site.get(&played[1], Some(&team.token)).await.json(200);
+    let view = site.get(&evaluations[1], Some(&team.token)).await.json(200);
     assert_eq!(view["state"], "finished");
     assert_eq!(view["dataset"], Value::Null);
     assert!(view["result"]["score"].is_number(), "its result stays");
     assert!(string(&view["dataset_removed"]["reason"]).contains("the last 1"));
     assert!(string(&view["next"]).contains("the dataset was removed"));
-    let page = played[1].replace("/api/v1", "");
+    let page = evaluations[1].replace("/api/v1", "");
     let page = site.get(&page, None).await;
     assert_eq!(page.status, 200);
     assert!(
@@ -112,8 +115,10 @@ async fn retention_is_confirmed_applied_and_reported() {
     );
 
     // Keeping more removes nothing, so no confirmation is needed.
-    let all = change(&site, json!({ "retention": {} })).await.json(200);
-    assert_eq!(all["retention"], json!({}));
+    let changed = change_stage(&site, json!({ "retention": {} }))
+        .await
+        .json(200);
+    assert_eq!(changed["retention"], json!({}));
 
     site.next_day();
     let removed = site.store.remove_files_of_removed(site.now()).await;
@@ -124,7 +129,7 @@ async fn retention_is_confirmed_applied_and_reported() {
 #[tokio::test]
 async fn retention_is_set_at_creation_and_after_sign_off() {
     let site = Site::start().await;
-    let made = site
+    let created = site
         .post(
             "/api/v1/stages",
             Some(ADMIN),
@@ -132,12 +137,12 @@ async fn retention_is_set_at_creation_and_after_sign_off() {
         )
         .await
         .json(201);
-    assert_eq!(made["retention"], json!({ "last": 2 }));
+    assert_eq!(created["retention"], json!({ "last": 2 }));
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
     let evaluation = run_day(&site, &team, &submission, [0.5; 3]).await;
     let closes_at = site.now() + jiff::SignedDuration::from_hours(1);
-    change(&site, json!({ "closes_at": closes_at }))
+    change_stage(&site, json!({ "closes_at": closes_at }))
         .await
         .json(200);
     site.advance(3600);
@@ -146,18 +151,21 @@ async fn retention_is_set_at_creation_and_after_sign_off() {
         .await
         .json(200);
     let mut request = json!({ "retention": { "days_after_sign_off": 2 } });
-    change(&site, request.clone()).await.problem(
+    change_stage(&site, request.clone()).await.problem(
         409,
         "not-confirmed",
         &["1 datasets", "not before 2026-03-04 at 11:00 UTC"],
     );
     request["confirm"] = json!("Qualifying");
-    let signed_off = change(&site, request).await.json(200);
+    let signed_off = change_stage(&site, request).await.json(200);
     assert_eq!(signed_off["retention"], json!({ "days_after_sign_off": 2 }));
-    change(&site, json!({ "name": "Other", "retention": {} }))
+    change_stage(&site, json!({ "name": "Other", "retention": {} }))
         .await
         .problem(409, "conflict", &["signed off"]);
-    assert_eq!(stage(&site).await["retention"], signed_off["retention"]);
+    assert_eq!(
+        stage_view(&site).await["retention"],
+        signed_off["retention"]
+    );
     site.next_day();
     site.next_day();
     let removed = site.store.apply_retentions(site.now()).await.unwrap();
@@ -190,13 +198,13 @@ async fn invalid_retention_is_refused_with_valid_values() {
             "one of them at most",
         ),
     ] {
-        let changed = change(&site, json!({ "retention": wrong })).await;
+        let changed = change_stage(&site, json!({ "retention": wrong })).await;
         changed.problem(422, "invalid-content", &[words]);
         let new = json!({ "name": "Other", "retention": wrong });
-        let made = site.post("/api/v1/stages", Some(ADMIN), &new).await;
-        made.problem(422, "invalid-content", &[words]);
+        let refused = site.post("/api/v1/stages", Some(ADMIN), &new).await;
+        refused.problem(422, "invalid-content", &[words]);
     }
-    assert_eq!(stage(&site).await["retention"], json!({}));
+    assert_eq!(stage_view(&site).await["retention"], json!({}));
     let stages = site.get("/api/v1/stages", None).await.json(200);
     assert_eq!(stages.as_array().unwrap().len(), 1);
 }
@@ -207,19 +215,17 @@ async fn deleted_submission_keeps_its_results() {
     let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&team, "a").await;
     let evaluation = run_day(&site, &team, &submission, [0.5; 3]).await;
-    let own = Some(team.token.as_str());
-    let archive = format!("{submission}/bundle");
-    let downloaded = site.get(&archive, own).await;
+    let team_token = Some(team.token.as_str());
+    let bundle = format!("{submission}/bundle");
+    let downloaded = site.get(&bundle, team_token).await;
     assert_eq!(downloaded.status, 200);
-    assert_eq!(downloaded.body.len(), String::from_utf8_lossy(&GZIP).len());
+    assert_eq!(downloaded.body, String::from_utf8_lossy(&GZIP));
     let disposition = downloaded.header("content-disposition");
     assert!(disposition.ends_with(".tar.gz\""), "{disposition}");
 
-    delete(&site, &submission, own, json!({})).await.problem(
-        409,
-        "conflict",
-        &["active", "withdraw"],
-    );
+    delete(&site, &submission, team_token, json!({}))
+        .await
+        .problem(409, "conflict", &["active", "withdraw"]);
     site.valid_submission(&team, "b").await;
     for (wrong, status, slug, words) in [
         (
@@ -253,7 +259,7 @@ async fn deleted_submission_keeps_its_results() {
             ["confirmed", "unknown field"],
         ),
     ] {
-        let refused = delete(&site, &submission, own, wrong).await;
+        let refused = delete(&site, &submission, team_token, wrong).await;
         refused.problem(status, slug, &words);
     }
     let confirm = json!({ "confirm": "striker.tar.gz" });
@@ -263,9 +269,9 @@ async fn deleted_submission_keeps_its_results() {
     delete(&site, &submission, Some(ADMIN), confirm.clone())
         .await
         .problem(422, "invalid-content", &["reason", "1 to 500"]);
-    assert_eq!(site.get(&archive, own).await.status, 200);
+    assert_eq!(site.get(&bundle, team_token).await.status, 200);
 
-    let deleted = delete(&site, &submission, own, confirm.clone())
+    let deleted = delete(&site, &submission, team_token, confirm.clone())
         .await
         .json(200);
     assert_eq!(deleted["state"], "valid");
@@ -274,35 +280,35 @@ async fn deleted_submission_keeps_its_results() {
     assert_eq!(deleted["log"], "ready\n");
     assert!(string(&deleted["blake3"]).len() == 64);
     assert!(string(&deleted["next"]).contains("upload it again"));
-    assert_eq!(site.get(&submission, own).await.json(200), deleted);
-    site.get(&archive, own).await.problem(
+    assert_eq!(site.get(&submission, team_token).await.json(200), deleted);
+    site.get(&bundle, team_token).await.problem(
         410,
         "removed",
         &["the bundle of the submission was removed on", "by its team"],
     );
-    delete(&site, &submission, own, confirm)
+    delete(&site, &submission, team_token, confirm)
         .await
         .problem(409, "conflict", &["was deleted on"]);
-    site.post(&format!("{submission}/activate"), own, &json!({}))
+    site.post(&format!("{submission}/activate"), team_token, &json!({}))
         .await
         .problem(
             409,
             "conflict",
             &["was removed", "cannot be evaluated again"],
         );
-    let view = site.get(&evaluation, own).await.json(200);
+    let view = site.get(&evaluation, team_token).await.json(200);
     assert_eq!(view["state"], "finished");
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["team"], "Alpha");
     let dataset = format!("{evaluation}/dataset");
-    assert_eq!(site.get(&dataset, own).await.status, 200);
+    assert_eq!(site.get(&dataset, team_token).await.status, 200);
 }
 
 #[tokio::test]
 async fn organiser_deletes_with_a_reason_but_not_evidence() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let own = Some(team.token.as_str());
+    let team_token = Some(team.token.as_str());
     let first = site.valid_submission(&team, "a").await;
     let second = site.valid_submission(&team, "b").await;
     site.valid_submission(&team, "c").await;
@@ -317,15 +323,17 @@ async fn organiser_deletes_with_a_reason_but_not_evidence() {
     let disqualify = format!("/api/v1/teams/{}/disqualify", team.id);
     let ruling = json!({ "reason": "it spied", "confirm": "Alpha" });
     site.post(&disqualify, Some(ADMIN), &ruling).await.json(200);
-    for token in [own, Some(ADMIN)] {
+    for token in [team_token, Some(ADMIN)] {
         delete(&site, &second, token, request.clone())
             .await
             .problem(409, "conflict", &["it spied", "kept as evidence"]);
     }
-    // An organiser can still download a recently deleted archive; its team cannot.
-    let archive = format!("{first}/bundle");
-    site.get(&archive, own).await.problem(410, "removed", &[]);
-    for path in [archive, format!("{second}/bundle")] {
+    // An organiser can still download a recently deleted bundle; its team cannot.
+    let bundle = format!("{first}/bundle");
+    site.get(&bundle, team_token)
+        .await
+        .problem(410, "removed", &[]);
+    for path in [bundle, format!("{second}/bundle")] {
         assert_eq!(site.get(&path, Some(ADMIN)).await.status, 200);
     }
     let log = site
@@ -345,29 +353,29 @@ async fn storage_is_shown_to_its_team_and_organisers() {
     let submission = site.valid_submission(&team, "a").await;
     run_day(&site, &team, &submission, [0.5; 3]).await;
     let path = format!("/api/v1/teams/{}/storage", team.id);
-    let own = site.get(&path, Some(&team.token)).await.json(200);
-    assert_eq!(own["team_name"], "Alpha");
-    assert_eq!(own["bundles"], 1);
-    assert_eq!(own["bundle_bytes"], GZIP.len());
-    assert_eq!(own["datasets"], 1);
-    assert_eq!(own["dataset_bytes"], 23);
-    assert_eq!(own["unmeasured_datasets"], 0);
-    assert_eq!(own["proposal_bytes"], Value::Null);
-    assert!(own["quota_bytes"].as_u64().unwrap() > 0);
+    let view = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(view["team_name"], "Alpha");
+    assert_eq!(view["bundles"], 1);
+    assert_eq!(view["bundle_bytes"], GZIP.len());
+    assert_eq!(view["datasets"], 1);
+    assert_eq!(view["dataset_bytes"], DATASET.len());
+    assert_eq!(view["unmeasured_datasets"], 0);
+    assert_eq!(view["proposal_bytes"], Value::Null);
+    assert!(view["quota_bytes"].as_u64().unwrap() > 0);
     site.get(&path, Some(&other.token))
         .await
         .problem(404, "not-found", &[]);
     site.get(&path, None)
         .await
         .problem(401, "unauthenticated", &[]);
-    let all = site.get("/api/v1/storage", Some(ADMIN)).await.json(200);
-    assert_eq!(all[0]["dataset_bytes"], 23);
-    assert_eq!(all[0]["proposal_bytes"], 0);
-    assert_eq!(all[1]["bundles"], 0);
+    let usage = site.get("/api/v1/storage", Some(ADMIN)).await.json(200);
+    assert_eq!(usage[0]["dataset_bytes"], DATASET.len());
+    assert_eq!(usage[0]["proposal_bytes"], 0);
+    assert_eq!(usage[1]["bundles"], 0);
     // The quota of the stage applies.
-    change(&site, json!({ "uploads": { "stored_bytes": 5 } }))
+    change_stage(&site, json!({ "uploads": { "stored_bytes": 5 } }))
         .await
         .json(200);
-    let own = site.get(&path, Some(&team.token)).await.json(200);
-    assert_eq!(own["quota_bytes"], 5);
+    let view = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(view["quota_bytes"], 5);
 }

@@ -1,4 +1,4 @@
-//! Access control: every route of the API with every role.
+//! Tests of access control: every route of the API with every role of callers.
 
 use crate::{
     site::{ADMIN, Answer, GZIP, Site, TestTeam, string},
@@ -19,11 +19,11 @@ const ROLES: [&str; 7] = [
     "the host",
 ];
 
-/// The result of a request by role: `+` allowed (done, or refused for its content), `?` a token is required, `-` forbidden,
-/// `0` not found.
+/// For each route, the result of a request by each role: `+` allowed (done, or refused for its content), `?` a token is
+/// required, `-` forbidden, `0` not found.
 ///
-/// The ids in paths are those of the team, its member, its submission, its evaluation, and so on.
-const TABLE: &[(&str, &str)] = &[
+/// The ids in paths are those of the team Alpha, its member, its submission, its evaluation, and so on.
+const ACCESS_TABLE: &[(&str, &str)] = &[
     ("GET /announcements", "+++++++"),
     ("POST /announcements", "?----++"),
     ("GET /board", "+++++++"),
@@ -186,7 +186,7 @@ const TABLE: &[(&str, &str)] = &[
 ];
 
 /// A body that can be parsed, but changes nothing that affects the requests of the next role.
-fn body(route: &str) -> Value {
+fn harmless_body(route: &str) -> Value {
     match route {
         "POST /announcements" => json!({ "title": "", "text": "" }),
         "POST /days" => json!({ "stage": "00000000-0000-7000-8000-000000000000" }),
@@ -237,8 +237,8 @@ fn body(route: &str) -> Value {
 
 /// Plays a test game of the team against the organisers' baseline. Returns the ids of tournament and game.
 async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
-    let host = site.team("Organisers").await;
-    let baseline = site.valid_submission(&host, "baseline").await;
+    let baseline_team = site.team("Organisers").await;
+    let baseline = site.valid_submission(&baseline_team, "baseline").await;
     let new = json!({ "name": "Cup", "teams": ["Alpha"] });
     let opened = site.post("/api/v1/tournaments", Some(ADMIN), &new).await;
     let path = opened.header("location").to_owned();
@@ -246,7 +246,7 @@ async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     let change = site
         .request(Method::PATCH, &path, Some(ADMIN))
         .json(&baseline);
-    Answer::of(change.send().await.unwrap()).await.json(200);
+    Answer::read(change.send().await.unwrap()).await.json(200);
     let created = site
         .post(&format!("{path}/test-games"), Some(&team.token), &json!({}))
         .await
@@ -257,6 +257,7 @@ async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     [id, string(&created["queued"][0]["id"])]
 }
 
+/// A site with a caller of each role, and the resources that the routes need.
 struct RoleFixture {
     site: Site,
     /// In the order of [`ROLES`].
@@ -269,7 +270,8 @@ impl RoleFixture {
     async fn create() -> Self {
         let site = Site::start().await;
         let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
-        let mut invited = Vec::new();
+        // Tokens by the name of their user, and two ids by the name of their resource.
+        let mut values = Vec::new();
         for (name, role) in [
             (
                 "Ada",
@@ -285,26 +287,26 @@ impl RoleFixture {
                 json!({ "role": "member", "team": alpha.id, "note": "Carl" }),
             ),
         ] {
-            let made = site
+            let invitation = site
                 .post("/api/v1/invitations", Some(ADMIN), &role)
                 .await
                 .json(201);
             if name == "not joined" {
-                invited.push(("invitations", string(&made["id"])));
+                values.push(("invitations", string(&invitation["id"])));
                 continue;
             }
-            let join = json!({ "code": made["code"], "name": name });
+            let join = json!({ "code": invitation["code"], "name": name });
             let joined = site
                 .post("/api/v1/invitations/accept", None, &join)
                 .await
                 .json(201);
-            invited.push((name, string(&joined["secret"])));
+            values.push((name, string(&joined["secret"])));
             if name == "Ada" {
-                invited.push(("people", string(&joined["person"]["id"])));
+                values.push(("people", string(&joined["person"]["id"])));
             }
         }
         let value_of = |key: &str| {
-            let found = invited.iter().find(|(name, _)| *name == key);
+            let found = values.iter().find(|(name, _)| *name == key);
             found.unwrap().1.clone()
         };
         let submission = site.valid_submission(&alpha, "a").await;
@@ -321,24 +323,24 @@ impl RoleFixture {
             .await
             .json(201);
         let tokens = site.get("/api/v1/tokens", Some(ADMIN)).await.json(200);
-        let own = tokens
+        let alpha_token = tokens
             .as_array()
             .unwrap()
             .iter()
             .find(|token| token["team"] == json!(alpha.id));
-        let hook = json!({ "name": "test hook", "url": "https://example.org/faceoff" });
-        let hook = site
-            .post("/api/v1/webhooks", Some(&value_of("Ada")), &hook)
+        let webhook = json!({ "name": "test hook", "url": "https://example.org/faceoff" });
+        let webhook = site
+            .post("/api/v1/webhooks", Some(&value_of("Ada")), &webhook)
             .await
             .json(201);
-        let last = |path: &str| path.rsplit('/').next().unwrap().to_owned();
+        let id_in = |path: &str| path.rsplit('/').next().unwrap().to_owned();
         let ids = BTreeMap::from([
-            ("evaluations", last(&evaluation)),
-            ("submissions", last(&submission)),
+            ("evaluations", id_in(&evaluation)),
+            ("submissions", id_in(&submission)),
             ("teams", alpha.id.clone()),
             ("stages", site.stage().await.to_string()),
             ("questions", string(&question["id"])),
-            ("tokens", string(&own.unwrap()["id"])),
+            ("tokens", string(&alpha_token.unwrap()["id"])),
             ("people", value_of("people")),
             ("invitations", value_of("invitations")),
             (
@@ -346,7 +348,7 @@ impl RoleFixture {
                 "00000000-0000-7000-8000-000000000000".into(),
             ),
             ("proposals", "00000000-0000-7000-8000-000000000000".into()),
-            ("webhooks", string(&hook["id"])),
+            ("webhooks", string(&webhook["id"])),
             ("tournaments", game[0].clone()),
             ("games", game[1].clone()),
         ]);
@@ -362,11 +364,12 @@ impl RoleFixture {
         Self { site, tokens, ids }
     }
 
+    /// The path of a route with all its parameters filled in.
     fn path(&self, route: &str) -> String {
         let (_, path) = route.split_once(' ').unwrap();
         let resource = path.split('/').nth(1).unwrap();
-        let none = String::new();
-        let id = self.ids.get(resource).unwrap_or(&none);
+        let no_id = String::new();
+        let id = self.ids.get(resource).unwrap_or(&no_id);
         let path = path
             .replace("{id}", id)
             .replace("{other}", id)
@@ -381,7 +384,8 @@ impl RoleFixture {
         format!("/api/v1{path}")
     }
 
-    async fn ask(&self, route: &str, role: usize) -> Answer {
+    /// Sends a request as the role with this index in [`ROLES`].
+    async fn send(&self, route: &str, role: usize) -> Answer {
         let (method, _) = route.split_once(' ').unwrap();
         let method: Method = method.parse().unwrap();
         let token = self.tokens[role].as_deref();
@@ -391,7 +395,7 @@ impl RoleFixture {
                 .header("content-type", "text/plain")
                 .body(GZIP.to_vec()),
             _ if method == Method::GET => request,
-            _ => request.json(&body(route)),
+            _ => request.json(&harmless_body(route)),
         };
         let response = request.send().await.unwrap();
         if route == "GET /events/stream" {
@@ -404,10 +408,11 @@ impl RoleFixture {
                 body,
             };
         }
-        Answer::of(response).await
+        Answer::read(response).await
     }
 }
 
+/// The answer as a character of [`ACCESS_TABLE`].
 fn access(route: &str, answer: &Answer) -> char {
     let problem: Value = serde_json::from_str(&answer.body).unwrap_or_default();
     match (answer.status.as_u16(), problem["type"].as_str()) {
@@ -433,23 +438,23 @@ async fn access_to_routes_follows_the_table() {
         }
     }
     routes.sort();
-    let mut listed: Vec<&str> = TABLE.iter().map(|(route, _)| *route).collect();
+    let mut listed: Vec<&str> = ACCESS_TABLE.iter().map(|(route, _)| *route).collect();
     listed.sort_unstable();
     assert_eq!(routes, listed, "the table has a row for every route");
 
     let mut wrong = Vec::new();
-    // Reading changes nothing, so all such routes share one fixture, which is slow to create.
-    let mut unchanged: Option<RoleFixture> = None;
-    for (route, expected) in TABLE {
+    // Reading routes change nothing, so they share one fixture, which is slow to create.
+    let mut shared_fixture: Option<RoleFixture> = None;
+    for (route, expected) in ACCESS_TABLE {
         // After signing out, rotating or revoking, the next role needs a new fixture.
         let is_destructive = ["DELETE", "rotate", "/token", "accept", "withdraw", "retire"]
             .iter()
             .any(|word| route.contains(word));
         let only_reads = route.starts_with("GET ");
-        let mut fixture = match unchanged.take() {
+        let mut fixture = match shared_fixture.take() {
             Some(fixture) if only_reads => fixture,
-            other => {
-                unchanged = other;
+            unused => {
+                shared_fixture = unused;
                 RoleFixture::create().await
             }
         };
@@ -457,7 +462,7 @@ async fn access_to_routes_follows_the_table() {
             if is_destructive && role > 0 {
                 fixture = RoleFixture::create().await;
             }
-            let answer = fixture.ask(route, role).await;
+            let answer = fixture.send(route, role).await;
             let mut access = access(route, &answer);
             // The fixture has none of these resources; a caller with access gets 404.
             if access == '0' && expected == '+' && answer.body.contains("no such") {
@@ -484,7 +489,7 @@ async fn access_to_routes_follows_the_table() {
             }
         }
         if only_reads {
-            unchanged = Some(fixture);
+            shared_fixture = Some(fixture);
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -1,4 +1,4 @@
-//! Runtimes: the environment of agents on this server, and stages that accept some runtimes only.
+//! Tests of runtimes, the environments in which agents run on the server, and of stages that accept only some runtimes.
 
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, string};
 use faceoff_store::Job;
@@ -6,16 +6,20 @@ use faceoff_types::ValidationOutcome;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, body: Value) -> Answer {
+/// Changes the first stage as an organiser.
+async fn change_stage(site: &Site, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::of(request.json(&body).send().await.unwrap()).await
+    Answer::read(request.json(&body).send().await.unwrap()).await
 }
+
+/// The events of excluded submissions.
+const EXCLUSIONS_IN_LOG: &str = "/api/v1/events?kind=submission_not_taken";
 
 /// Limits the first stage to these runtimes; null allows all.
 async fn set_runtimes(site: &Site, runtimes: Value) -> Value {
     let body = json!({ "runtimes": runtimes, "confirm": "Qualifying" });
-    change(site, body).await.json(200)
+    change_stage(site, body).await.json(200)
 }
 
 /// Uploads a submission that is valid and uses this runtime. Returns its path in the API.
@@ -42,11 +46,11 @@ async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
         };
         let texts = runtimes
             .iter()
-            .map(|one| format!("{}: {}", one.stage, one.runtimes));
+            .map(|accepted| format!("{}: {}", accepted.stage, accepted.runtimes));
         texts.collect::<Vec<_>>()
     };
     assert_eq!(sent_runtimes().await, [""; 0]);
-    change(&site, json!({ "runtimes": ["python3"] }))
+    change_stage(&site, json!({ "runtimes": ["python3"] }))
         .await
         .problem(409, "not-confirmed", &["revision 2"]);
     let changed = set_runtimes(&site, json!(["python3", "native", "python3"])).await;
@@ -57,7 +61,8 @@ async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
     let page = site.get("/season", None).await.body;
     assert!(page.contains("only agents with the runtime native or python3"));
 
-    // A new stage copies the settings of the open one, unless it sets others. A stage that is not open yet has no effect.
+    // A new stage copies the settings of the open one, unless the request sets others. A stage that is not open yet does not
+    // affect validation runs.
     let create_stage = async |body: Value| {
         site.post("/api/v1/stages", Some(ADMIN), &body)
             .await
@@ -82,8 +87,11 @@ async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
         "one of the open stages accepts all runtimes"
     );
 
-    let all = set_runtimes(&site, Value::Null).await;
-    assert_eq!((all.get("runtimes"), &all["revision"]), (None, &json!(3)));
+    let changed = set_runtimes(&site, Value::Null).await;
+    assert_eq!(
+        (changed.get("runtimes"), &changed["revision"]),
+        (None, &json!(3))
+    );
 }
 
 #[tokio::test]
@@ -100,10 +108,10 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
         (&json!("native"), None)
     );
     set_runtimes(&site, json!(["python3"])).await;
-    let why = "the stage “Qualifying” takes agents of the runtime python3 only, and this one names native in agent.toml";
-    let excluded_by = json!([{ "stage": stage, "stage_name": "Qualifying", "reason": why }]);
+    let reason = "the stage “Qualifying” takes agents of the runtime python3 only, and this one names native in agent.toml";
+    let excluded_by = json!([{ "stage": stage, "stage_name": "Qualifying", "reason": reason }]);
 
-    // It may stay active: this stage may accept it later, or another stage does.
+    // The submission may stay active: this stage may accept it later, or another stage does.
     let activate = format!("{native}/activate");
     let active = site
         .post(&activate, Some(&alpha.token), &json!({}))
@@ -113,25 +121,25 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
         (&active["active"], &active["excluded_by"]),
         (&json!(true), &excluded_by)
     );
-    assert!(string(&active["next"]).contains(why), "{active}");
+    assert!(string(&active["next"]).contains(reason), "{active}");
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(me["excluded_by"], excluded_by);
     let me = site.get("/api/v1/me", Some(&beta.token)).await.json(200);
     assert_eq!(me.get("excluded_by"), None);
 
-    // A trial of all active submissions skips it. A trial of this submission alone is refused.
+    // A trial of all active submissions skips the submission. A trial of it alone is refused.
     let trial = format!("/api/v1/stages/{stage}/trial");
     let id = native.rsplit('/').next().unwrap();
     let request = json!({ "reason": "?", "submission": id });
     site.post(&trial, Some(ADMIN), &request)
         .await
-        .problem(409, "conflict", &[why]);
-    let tried = site
+        .problem(409, "conflict", &[reason]);
+    let trial_view = site
         .post(&trial, Some(ADMIN), &json!({ "reason": "?" }))
         .await
         .json(201);
-    assert_eq!(tried["evaluations"].as_array().unwrap().len(), 1);
-    let drop = format!("/api/v1/proposals/{}/drop", string(&tried["id"]));
+    assert_eq!(trial_view["evaluations"].as_array().unwrap().len(), 1);
+    let drop = format!("/api/v1/proposals/{}/drop", string(&trial_view["id"]));
     let confirm = json!({ "confirm": "Qualifying" });
     site.post(&drop, Some(ADMIN), &confirm).await.json(200);
 
@@ -147,27 +155,26 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
         list.as_array()
             .unwrap()
             .iter()
-            .map(|one| string(&one[key]))
+            .map(|item| string(&item[key]))
             .collect()
     };
     assert_eq!(names(&day["created"], "team_name"), ["Beta"]);
     assert_eq!(names(&day["without_submission"], "name"), ["Gamma"]);
     assert_eq!(
         day["excluded"],
-        json!([{ "team": alpha.id, "team_name": "Alpha", "submission": id, "reason": why }])
+        json!([{ "team": alpha.id, "team_name": "Alpha", "submission": id, "reason": reason }])
     );
-    let logged = "/api/v1/events?kind=submission_not_taken";
-    let logged = site.get(logged, Some(ADMIN)).await.json(200);
-    assert_eq!(logged["events"][0]["subject"], format!("submission:{id}"));
+    let log = site.get(EXCLUSIONS_IN_LOG, Some(ADMIN)).await.json(200);
+    assert_eq!(log["events"][0]["subject"], format!("submission:{id}"));
     assert_eq!(
-        logged["events"][0]["details"],
-        json!({ "stage": stage, "day": "2026-03-01", "reason": why })
+        log["events"][0]["details"],
+        json!({ "stage": stage, "day": "2026-03-01", "reason": reason })
     );
     let extra = format!("/api/v1/stages/{stage}/days/2026-03-01/extra-evaluation");
     let request = json!({ "team": alpha.id, "reason": "?" });
     site.post(&extra, Some(ADMIN), &request)
         .await
-        .problem(409, "conflict", &[why]);
+        .problem(409, "conflict", &[reason]);
     site.finish_evaluation(&result([0.5; 3], 10.0)).await;
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(
@@ -178,9 +185,9 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
 
     // Rules that accept none of the day's agents allow no re-evaluation.
     set_runtimes(&site, json!(["native"])).await;
-    let again = format!("/api/v1/stages/{stage}/proposals");
+    let proposals = format!("/api/v1/stages/{stage}/proposals");
     let request = json!({ "day": "2026-03-01", "new_rules": true, "reason": "?" });
-    site.post(&again, Some(ADMIN), &request).await.problem(
+    site.post(&proposals, Some(ADMIN), &request).await.problem(
         409,
         "conflict",
         &["not accepted by these rules"],
@@ -208,9 +215,8 @@ async fn day_without_accepted_submission_can_still_be_started() {
                 &["that the stage accepts", "its cutoff is still available"],
             );
     }
-    let logged = "/api/v1/events?kind=submission_not_taken";
-    let logged = site.get(logged, Some(ADMIN)).await.json(200);
-    assert_eq!(logged["events"], json!([]));
+    let log = site.get(EXCLUSIONS_IN_LOG, Some(ADMIN)).await.json(200);
+    assert_eq!(log["events"], json!([]));
     set_runtimes(&site, json!(null)).await;
     let day = site
         .post("/api/v1/days", Some(ADMIN), &json!({}))
@@ -238,7 +244,7 @@ async fn invalid_runtimes_are_refused_by_name() {
         (json!({ "native": true }), &["runtimes"]),
     ] {
         let body = json!({ "runtimes": runtimes, "confirm": "Qualifying" });
-        change(&site, body)
+        change_stage(&site, body)
             .await
             .problem(422, "invalid-content", words);
         let new = json!({ "name": "Final", "runtimes": runtimes });
@@ -279,7 +285,7 @@ async fn agent_environment_is_public() {
         "runtimes": ["python3"], "limits": { "memory_bytes": 536_870_912, "step_s": 0.25 },
         "confirm": "Qualifying",
     });
-    change(&site, settings).await.json(200);
+    change_stage(&site, settings).await.json(200);
     site.team("Alpha").await;
     let rules = json!({ "runtimes": ["native"], "limits": { "pids": 16 } });
     let cup = json!({ "name": "Cup", "teams": ["Alpha"], "rules": rules });
@@ -326,8 +332,8 @@ async fn closed_stage_lists_no_runtimes() {
         view["stages"].as_array().unwrap().len()
     };
     assert_eq!(stages().await, 1);
-    let over = json!({ "closes_at": "2026-03-01T23:00:00Z" });
-    change(&site, over).await.json(200);
+    let closing = json!({ "closes_at": "2026-03-01T23:00:00Z" });
+    change_stage(&site, closing).await.json(200);
     site.next_day();
     assert_eq!(stages().await, 0);
     let page = site.get("/help", None).await.body;

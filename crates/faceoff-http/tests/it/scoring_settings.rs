@@ -1,14 +1,16 @@
-//! Weights, tier bounds and perturbation magnitudes of a stage.
+//! Tests of a stage's scoring settings: weights of the tasks, bounds of the tiers (deployable, improvable), and magnitudes of
+//! the simulator's perturbations.
 
 use crate::site::{ADMIN, Answer, Site, outcome};
 use faceoff_types::{EpisodeOutcome, Task, Violations};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, body: Value) -> Answer {
+/// Changes the first stage as an organiser.
+async fn change_stage(site: &Site, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{}", site.stage().await);
     let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::of(request.json(&body).send().await.unwrap()).await
+    Answer::read(request.json(&body).send().await.unwrap()).await
 }
 
 #[tokio::test]
@@ -21,14 +23,14 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
         "tier_bounds": { "deployable": 0.1, "improvable": 1.6 },
         "perturbations": { "tracking_loss": { "probability": 0.5 } },
     });
-    change(&site, settings.clone()).await.problem(
+    change_stage(&site, settings.clone()).await.problem(
         409,
         "not-confirmed",
         &["revision 2", "empty board"],
     );
     let mut confirmed = settings;
     confirmed["confirm"] = json!("Qualifying");
-    let changed = change(&site, confirmed).await.json(200);
+    let changed = change_stage(&site, confirmed).await.json(200);
     assert_eq!(changed["revision"], 2);
     assert_eq!(
         changed["weights"],
@@ -47,7 +49,7 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .json(200);
-    // Solves half of `hit`, and exceeds the joint velocity limits in each of its four episodes.
+    // The agent solves half of the four episodes of `hit`, and exceeds the joint velocity limits in each of them.
     let outcome_fn = |task: Task, episode| EpisodeOutcome {
         success: task == Task::Hit && episode < 2,
         violations: Violations {
@@ -70,11 +72,11 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
         (&row["score"], &row["tier"]),
         (&json!(37.5), &json!("improvable"))
     );
-    let own = site
+    let evaluation = site
         .get(&format!("/api/v1/evaluations/{id}"), Some(&team.token))
         .await
         .json(200);
-    assert_eq!(own["result"]["weights"]["defend"], 0.25);
+    assert_eq!(evaluation["result"]["weights"]["defend"], 0.25);
     let page = site.get("/", None).await.body;
     for words in [
         "0.75 × hit + 0.25 × defend + 0 × prepare",
@@ -89,9 +91,9 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
     let page = site.get(&format!("/evaluations/{id}"), None).await.body;
     assert!(page.contains("more than 0.1, at most 1.6"), "{page}");
 
-    // An empty object removes the magnitudes. Settings that are not named do not change.
+    // An empty object restores the default magnitudes. Settings that the request does not name do not change.
     let default_magnitudes = json!({ "perturbations": {}, "confirm": "Qualifying" });
-    let changed = change(&site, default_magnitudes).await.json(200);
+    let changed = change_stage(&site, default_magnitudes).await.json(200);
     assert_eq!(
         (changed.get("perturbations"), &changed["weights"]["hit"]),
         (None, &json!(0.75))
@@ -169,7 +171,7 @@ async fn invalid_scoring_settings_are_refused_by_name() {
     ] {
         let mut body = body;
         body["confirm"] = json!("Qualifying");
-        change(&site, body)
+        change_stage(&site, body)
             .await
             .problem(422, "invalid-content", words);
     }

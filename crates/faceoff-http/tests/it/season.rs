@@ -1,9 +1,10 @@
-//! The season: closing it, and the page to verify its seeds.
+//! Tests of the season's end, which reveals the secret from which all seeds derive, and of the page that explains how to verify
+//! the seeds.
 
 use crate::site::{ADMIN, GZIP, Site, result, string};
 use serde_json::{Value, json};
 
-const CLOSE: &str = "/api/v1/season/close";
+const CLOSE_PATH: &str = "/api/v1/season/close";
 
 #[tokio::test]
 async fn closing_the_season_reveals_its_secret() {
@@ -16,13 +17,13 @@ async fn closing_the_season_reveals_its_secret() {
     for field in ["closed_at", "secret", "mismatch_seed"] {
         assert_eq!(open[field], json!(null), "{field}");
     }
-    site.post(CLOSE, Some(&team.token), &confirm)
+    site.post(CLOSE_PATH, Some(&team.token), &confirm)
         .await
         .problem(403, "forbidden", &[]);
-    site.post(CLOSE, Some(ADMIN), &json!({ "confirm": "season" }))
+    site.post(CLOSE_PATH, Some(ADMIN), &json!({ "confirm": "season" }))
         .await
         .problem(422, "invalid-content", &["Test season", "cannot be undone"]);
-    site.post(CLOSE, Some(ADMIN), &confirm).await.problem(
+    site.post(CLOSE_PATH, Some(ADMIN), &confirm).await.problem(
         409,
         "conflict",
         &["1 evaluations", "cancel"],
@@ -30,7 +31,7 @@ async fn closing_the_season_reveals_its_secret() {
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
 
-    let closed = site.post(CLOSE, Some(ADMIN), &confirm).await.json(200);
+    let closed = site.post(CLOSE_PATH, Some(ADMIN), &confirm).await.json(200);
     let season = site.get("/api/v1/season", Some(ADMIN)).await.json(200);
     assert_eq!(closed, season);
     assert_eq!(season["closed_at"], "2026-03-01T10:00:00Z");
@@ -43,24 +44,24 @@ async fn closing_the_season_reveals_its_secret() {
         blake3::hash(&secret).to_hex().as_str(),
         string(&open["commitment"])
     );
-    let child = |parent: &[u8; 32], label: &str, data: &[u8]| {
+    let derive = |parent: &[u8; 32], label: &str, data: &[u8]| {
         let message = [label.as_bytes(), &[0], data].concat();
         blake3::keyed_hash(parent, &message)
     };
     let stage = site.stage().await;
-    let stage_seed = child(&secret, "stage", stage.as_uuid().as_bytes());
-    let day_seed = child(stage_seed.as_bytes(), "day", b"2026-03-01");
+    let stage_seed = derive(&secret, "stage", stage.as_uuid().as_bytes());
+    let day_seed = derive(stage_seed.as_bytes(), "day", b"2026-03-01");
     assert_eq!(season["days"][0]["day"], "2026-03-01");
     assert_eq!(season["days"][0]["finished"], 1);
     assert_eq!(season["days"][0]["cutoff_at"], "2026-03-01T10:00:00Z");
     assert_eq!(season["days"][0]["released_at"], "2026-03-01T10:00:00Z");
     assert_eq!(season["next_cutoff"], json!(null));
     assert_eq!(season["days"][0]["seed"], day_seed.to_hex().as_str());
-    let mismatch = child(&secret, "model_mismatch", b"");
+    let mismatch = derive(&secret, "model_mismatch", b"");
     assert_eq!(season["mismatch_seed"], mismatch.to_hex().as_str());
 
     let closed_words = ["2026-03-01 at 10:00 UTC"];
-    site.post(CLOSE, Some(ADMIN), &confirm)
+    site.post(CLOSE_PATH, Some(ADMIN), &confirm)
         .await
         .problem(409, "season-closed", &closed_words);
     site.upload(&team.token, GZIP.to_vec())
@@ -70,8 +71,8 @@ async fn closing_the_season_reveals_its_secret() {
         .await
         .problem(409, "season-closed", &closed_words);
     site.next_day();
-    let choice = format!("{submission}/activate");
-    site.post(&choice, Some(&team.token), &json!({}))
+    let activate = format!("{submission}/activate");
+    site.post(&activate, Some(&team.token), &json!({}))
         .await
         .problem(409, "season-closed", &closed_words);
     // Results and datasets stay available.
@@ -117,9 +118,13 @@ async fn season_page_explains_how_to_verify_seeds() {
     }
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
-    site.post(CLOSE, Some(ADMIN), &json!({ "confirm": "Test season" }))
-        .await
-        .json(200);
+    site.post(
+        CLOSE_PATH,
+        Some(ADMIN),
+        &json!({ "confirm": "Test season" }),
+    )
+    .await
+    .json(200);
     let closed = site.get("/season", None).await;
     check_html(&closed.body);
     let secret = site.store.season().await.unwrap().secret;

@@ -1,31 +1,31 @@
-//! A day's seed stays secret until its release.
+//! Tests that a day's seed, and everything that depends on its episodes, stays secret until the day's release.
 
 use crate::site::{ADMIN, Site, TestTeam, result};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-/// Everything that a visitor, the team or the organiser can read.
+/// The texts of all responses about an evaluation that a visitor, its team or an organiser can read.
 async fn visible_text(site: &Site, team: &TestTeam, evaluation: &str) -> String {
-    let mut all = String::new();
-    let public = [
+    let mut text = String::new();
+    let public_paths = [
         "/",
         "/tasks/hit",
         "/season",
         "/api/v1/board",
         "/api/v1/season",
     ];
-    for path in public {
-        all += &site.get(path, None).await.body;
+    for path in public_paths {
+        text += &site.get(path, None).await.body;
     }
-    all += &site
+    text += &site
         .get(&evaluation.replace("/api/v1", ""), None)
         .await
         .body;
     for path in [evaluation, "/api/v1/evaluations", "/api/v1/me"] {
-        all += &site.get(path, Some(&team.token)).await.body;
+        text += &site.get(path, Some(&team.token)).await.body;
     }
-    all += &site.get("/api/v1/evaluations", Some(ADMIN)).await.body;
-    all
+    text += &site.get("/api/v1/evaluations", Some(ADMIN)).await.body;
+    text
 }
 
 /// Requests a dataset by HEAD, GET and a range. Returns the statuses.
@@ -53,17 +53,17 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
         site.valid_submission(&teams[1], "s").await,
     ];
     let [first, second] = &teams;
-    let early = site.evaluate(first, &submissions[0]).await;
-    let other = site.evaluate(second, &submissions[1]).await;
+    let first_evaluation = site.evaluate(first, &submissions[0]).await;
+    let second_evaluation = site.evaluate(second, &submissions[1]).await;
     let secret = site.store.season().await.unwrap().secret;
     let today = jiff::civil::date(2026, 3, 1);
     let seed = secret.stage(site.stage().await).day(today);
     let mut score = result([0.5, 0.6, 0.7], 100.0);
     score.seed = seed;
     site.finish_evaluation(&score).await;
-    let dataset = format!("{early}/dataset");
+    let dataset = format!("{first_evaluation}/dataset");
 
-    // The other team's evaluation is queued, then running.
+    // The second team's evaluation is queued in the first iteration, and has been started in the second.
     for _ in 0..2 {
         let events = site.store.events_after(0, 1000).await.unwrap();
         for token in [&*first.token, ADMIN] {
@@ -73,7 +73,7 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
             assert_eq!(refused.header("retry-after"), "30");
             assert_eq!(dataset_statuses(&site, &dataset, token).await, [409; 3]);
         }
-        let visible_text = visible_text(&site, first, &early).await;
+        let visible_text = visible_text(&site, first, &first_evaluation).await;
         for part in [
             seed.to_string().as_str(),
             "computation_time_s",
@@ -83,13 +83,16 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
             assert!(!visible_text.contains(part), "{part}");
         }
         let after = site.store.events_after(0, 1000).await.unwrap();
-        assert_eq!(after, events, "asking changes nothing");
+        assert_eq!(after, events, "reading changes nothing");
         let (claim, ..) = site.claim_shard().await;
         site.store.release(&claim, site.now()).await.unwrap();
     }
     site.finish_evaluation(&score).await;
     // The day is released by the end of its last evaluation, not by a request.
-    let finished = site.get(&early, Some(&first.token)).await.json(200);
+    let finished = site
+        .get(&first_evaluation, Some(&first.token))
+        .await
+        .json(200);
     assert_eq!(finished["result"]["seed"], seed.to_string());
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["seed"], seed.to_string());
@@ -97,10 +100,11 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
         dataset_statuses(&site, &dataset, &first.token).await,
         [200, 200, 206]
     );
-    let compare = format!("{early}/compare/{}", other.rsplit('/').next().unwrap());
+    let second_id = second_evaluation.rsplit('/').next().unwrap();
+    let compare = format!("{first_evaluation}/compare/{second_id}");
     assert_eq!(site.get(&compare, None).await.status, 200);
 
-    // A later upload could use the known episodes, so it is evaluated on the next day, with other seeds.
+    // A later upload could exploit the known episodes, so it is evaluated on the next day, with another seed.
     let late = site.team("Late").await;
     let submission = site.valid_submission(&late, "l").await;
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
@@ -108,11 +112,12 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
         .problem(409, "cutoff-passed", &["2026-03-02"]);
     site.next_day();
     site.evaluate(&late, &submission).await;
-    let tomorrow = secret
+    let next_seed = secret
         .stage(site.stage().await)
         .day(today.tomorrow().unwrap())
         .to_string();
-    assert!(!visible_text(&site, first, &early).await.contains(&tomorrow));
+    let visible_text = visible_text(&site, first, &first_evaluation).await;
+    assert!(!visible_text.contains(&next_seed));
     // Yesterday's dataset stays available while today's evaluations run.
     assert_eq!(
         dataset_statuses(&site, &dataset, &first.token).await,

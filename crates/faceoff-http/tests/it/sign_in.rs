@@ -1,4 +1,4 @@
-//! The pages to join, register and sign in, as a browser uses them.
+//! Tests of the pages to join (by an invitation's link), register and sign in, with a browser without scripts.
 
 use crate::{
     browser::{Browser, PASSWORD, first_text, invite},
@@ -53,8 +53,8 @@ async fn user_joins_by_link_signs_out_and_signs_in() {
     assert_eq!(used.status, 409);
     assert!(used.body.contains("was accepted"), "{}", used.body);
 
-    let out = browser.submit("/sign-out", &[]).await;
-    assert_eq!(out.header("location"), "/");
+    let signed_out = browser.submit("/sign-out", &[]).await;
+    assert_eq!(signed_out.header("location"), "/");
     assert_eq!(browser.cookie, None);
     assert_eq!(
         browser.open("/account").await.header("location"),
@@ -137,12 +137,12 @@ async fn registration_link_shows_its_status() {
     assert_eq!(refused.status, 409);
     assert!(first_text(&refused, "[role=alert]").contains("version 1"));
     let with_terms = [fields[0], fields[1], ("accepted_terms", "1")];
-    let done = browser.submit("/register", &with_terms).await;
-    assert_eq!(done.status, 201);
-    let link = first_text(&done, "section a");
-    let registered = browser.open(&link).await;
+    let registered = browser.submit("/register", &with_terms).await;
+    assert_eq!(registered.status, 201);
+    let link = first_text(&registered, "section a");
+    let status_page = browser.open(&link).await;
     assert_eq!(
-        first_text(&registered, "h1"),
+        first_text(&status_page, "h1"),
         "Alpha is waiting for approval"
     );
     let listed = site
@@ -172,8 +172,8 @@ async fn founder_names_the_team_and_foreign_forms_are_refused() {
     let link = invite(&site, json!({ "role": "founder", "note": "Ada" })).await;
     let mut browser = Browser::new(&site);
     let fields = [("name", "Ada"), ("password", PASSWORD)];
-    let without = browser.submit(&link, &fields).await;
-    assert!(first_text(&without, "[role=alert]").contains("team's name"));
+    let nameless = browser.submit(&link, &fields).await;
+    assert!(first_text(&nameless, "[role=alert]").contains("team's name"));
     let foreign = browser
         .http
         .post(format!("{}{link}", site.url))

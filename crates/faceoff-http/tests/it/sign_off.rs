@@ -1,16 +1,17 @@
-//! Results are provisional until the organiser signs them off.
+//! Tests of the sign-off: the result of a stage is provisional until an organiser signs it off, and does not change after that.
 
 use crate::site::{ADMIN, Answer, Site, result};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, stage: &str, body: Value) -> Answer {
+/// Changes a stage as an organiser.
+async fn change_stage(site: &Site, stage: &str, body: Value) -> Answer {
     let request = site.request(
         Method::PATCH,
         &format!("/api/v1/stages/{stage}"),
         Some(ADMIN),
     );
-    Answer::of(request.json(&body).send().await.unwrap()).await
+    Answer::read(request.json(&body).send().await.unwrap()).await
 }
 
 #[tokio::test]
@@ -21,15 +22,15 @@ async fn signed_off_stage_does_not_change() {
     site.valid_submission(&beta, "b").await;
     let path = site.evaluate(&alpha, &submission).await;
     let stage = site.stage().await.to_string();
-    let sign = format!("/api/v1/stages/{stage}/finalise");
-    let post_sign_off = async |body: Value| site.post(&sign, Some(ADMIN), &body).await;
+    let sign_off_path = format!("/api/v1/stages/{stage}/finalise");
+    let post_sign_off = async |body: Value| site.post(&sign_off_path, Some(ADMIN), &body).await;
     let confirmed = json!({ "confirm": "Qualifying" });
     post_sign_off(confirmed.clone()).await.problem(
         409,
         "conflict",
         &["has not closed", "no end yet"],
     );
-    change(
+    change_stage(
         &site,
         &stage,
         json!({ "closes_at": "2026-03-01T12:00:00Z" }),
@@ -67,12 +68,15 @@ async fn signed_off_stage_does_not_change() {
         .problem(422, "invalid-content", &["name"]);
     for (token, status) in [(None, 401), (Some(alpha.token.as_str()), 403)] {
         assert_eq!(
-            site.post(&sign, token, &confirmed).await.status.as_u16(),
+            site.post(&sign_off_path, token, &confirmed)
+                .await
+                .status
+                .as_u16(),
             status
         );
     }
-    let none = "/api/v1/stages/01890000-0000-7000-8000-000000000000/finalise";
-    site.post(none, Some(ADMIN), &confirmed)
+    let unknown_stage = "/api/v1/stages/01890000-0000-7000-8000-000000000000/finalise";
+    site.post(unknown_stage, Some(ADMIN), &confirmed)
         .await
         .problem(404, "not-found", &["stage"]);
     let board = site.get("/api/v1/board", None).await.json(200);
@@ -81,13 +85,13 @@ async fn signed_off_stage_does_not_change() {
         (&json!(true), &json!(null))
     );
 
-    let done = post_sign_off(confirmed.clone()).await.json(200);
-    let signed = json!({ "at": "2026-03-01T13:00:00Z", "by": "organiser" });
-    assert_eq!(done["finalised"], signed);
+    let signed_off = post_sign_off(confirmed.clone()).await.json(200);
+    let sign_off = json!({ "at": "2026-03-01T13:00:00Z", "by": "organiser" });
+    assert_eq!(signed_off["finalised"], sign_off);
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(
         (&board["provisional"], &board["finalised"]),
-        (&json!(false), &signed)
+        (&json!(false), &sign_off)
     );
     let page = site.get("/", None).await.body;
     assert!(
@@ -114,7 +118,7 @@ async fn signed_off_stage_does_not_change() {
         json!({ "publishes": "at_release" }),
         json!({ "closes_at": null }),
     ] {
-        change(&site, &stage, body)
+        change_stage(&site, &stage, body)
             .await
             .problem(409, "conflict", &words);
     }
@@ -143,22 +147,25 @@ async fn signed_off_stage_does_not_change() {
 async fn season_with_a_blind_stage_cannot_be_closed() {
     let site = Site::start().await;
     let stage = site.stage().await.to_string();
-    change(&site, &stage, json!({ "blind": true }))
+    change_stage(&site, &stage, json!({ "blind": true }))
         .await
         .json(200);
     let close = json!({ "confirm": "Test season" });
     site.post("/api/v1/season/close", Some(ADMIN), &close)
         .await
         .problem(409, "conflict", &["Qualifying", "blind", "open it first"]);
-    change(&site, &stage, json!({ "blind": false }))
+    change_stage(&site, &stage, json!({ "blind": false }))
         .await
         .json(200);
     site.post("/api/v1/season/close", Some(ADMIN), &close)
         .await
         .json(200);
-    let sign = format!("/api/v1/stages/{stage}/finalise");
+    let sign_off_path = format!("/api/v1/stages/{stage}/finalise");
     let confirmed = json!({ "confirm": "Qualifying" });
-    // The stage had no end, so it ended with the season.
-    let done = site.post(&sign, Some(ADMIN), &confirmed).await.json(200);
-    assert_eq!(done["finalised"]["by"], "organiser");
+    // The stage had no end of its own, so it closed with the season.
+    let signed_off = site
+        .post(&sign_off_path, Some(ADMIN), &confirmed)
+        .await
+        .json(200);
+    assert_eq!(signed_off["finalised"]["by"], "organiser");
 }

@@ -1,5 +1,5 @@
-//! A running site: axum on a loopback port, SQLite in a temporary folder, a clock that tests set, and helpers that take
-//! the steps of a worker.
+//! A running server for tests: axum on a loopback port, SQLite in a temporary folder, a clock that tests set, and helpers that
+//! take the steps of a worker (a process that runs jobs): they claim a job and commit its outcome.
 
 use faceoff_api::token::hash_token;
 use faceoff_http::{
@@ -21,8 +21,14 @@ use std::{
 };
 use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
+/// The host's token, which has an organiser's rights.
 pub const ADMIN: &str = "fo_admin_0123456789abcdef";
-pub const MAX_BUNDLE: u64 = 64 * 1024;
+/// Largest bundle that the site accepts.
+pub const MAX_BUNDLE_BYTES: u64 = 64 * 1024;
+/// How long a claimed job is leased.
+pub const LEASE_S: u32 = 60;
+/// The dataset of all evaluations: begins like a zip file.
+pub const DATASET: &str = "PK the recorded dataset";
 /// The first bytes of a gzip stream. The web side checks no more of a bundle.
 pub const GZIP: [u8; 4] = [0x1f, 0x8b, 8, 0];
 
@@ -40,11 +46,14 @@ pub fn no_tls() -> rustls::ClientConfig {
         .with_no_client_auth()
 }
 
+/// A server, its data, and a client of it.
 pub struct Site {
     pub url: String,
     pub store: Store,
+    /// The server's data folder.
     pub folder: tempfile::TempDir,
     config: HttpConfig,
+    /// The time of the server's clock.
     now: Arc<Mutex<Timestamp>>,
     http: reqwest::Client,
     server: JoinHandle<()>,
@@ -72,7 +81,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    pub async fn of(response: Response) -> Self {
+    pub async fn read(response: Response) -> Self {
         let (status, headers) = (response.status(), response.headers().clone());
         let body = response.text().await.unwrap();
         Self {
@@ -90,6 +99,7 @@ impl Answer {
             .unwrap()
     }
 
+    /// Asserts the status, and returns the JSON body.
     #[track_caller]
     pub fn json(&self, status: u16) -> Value {
         assert_eq!(self.status.as_u16(), status, "{}", self.body);
@@ -97,7 +107,7 @@ impl Answer {
         serde_json::from_str(&self.body).unwrap()
     }
 
-    /// Asserts that the body is a problem document of this kind, and that its detail contains all `words`.
+    /// Asserts that the body is a problem document of the kind `slug`, and that its detail contains all `words`.
     #[track_caller]
     pub fn problem(&self, status: u16, slug: &str, words: &[&str]) -> Value {
         assert_eq!(self.status.as_u16(), status, "{}", self.body);
@@ -131,7 +141,7 @@ pub fn generous_limits() -> HttpLimits {
     }
 }
 
-/// Two runtimes that work, and one that is broken.
+/// Two runtimes that work, and one that is broken. A package name contains HTML, which pages must escape.
 fn agent_resources() -> AgentResources {
     let python = PythonInventory {
         implementation: "CPython".into(),
@@ -172,8 +182,8 @@ impl Site {
     }
 
     /// A site whose first stage has a daily schedule. No scheduler runs.
-    pub async fn start_with_schedule(at: &str) -> Self {
-        Self::start_configured(generous_limits(), Some(at.parse().unwrap())).await
+    pub async fn start_with_schedule(daily_at: &str) -> Self {
+        Self::start_configured(generous_limits(), Some(daily_at.parse().unwrap())).await
     }
 
     /// Restarts the server with these rate limits.
@@ -190,6 +200,7 @@ impl Site {
         self
     }
 
+    /// A site with these limits, and without a schedule.
     pub async fn start_with(limits: HttpLimits) -> Self {
         Self::start_configured(limits, None).await
     }
@@ -215,7 +226,7 @@ impl Site {
         let now = Arc::new(Mutex::new(start));
         let clock = Arc::clone(&now);
         let config = HttpConfig {
-            max_bundle_bytes: MAX_BUNDLE,
+            max_bundle_bytes: MAX_BUNDLE_BYTES,
             public_url: None,
             upload_dir,
             clock: Clock::new(move || *clock.lock().unwrap()),
@@ -264,7 +275,7 @@ impl Site {
                 .unwrap()
         );
         let config = HttpConfig {
-            max_bundle_bytes: MAX_BUNDLE,
+            max_bundle_bytes: MAX_BUNDLE_BYTES,
             public_url: None,
             upload_dir,
             clock: Clock::new(move || made_at),
@@ -355,14 +366,15 @@ impl Site {
     }
 
     pub async fn get(&self, path: &str, token: Option<&str>) -> Answer {
-        Answer::of(self.request(Method::GET, path, token).send().await.unwrap()).await
+        Answer::read(self.request(Method::GET, path, token).send().await.unwrap()).await
     }
 
     pub async fn post(&self, path: &str, token: Option<&str>, body: &Value) -> Answer {
         let request = self.request(Method::POST, path, token).json(body);
-        Answer::of(request.send().await.unwrap()).await
+        Answer::read(request.send().await.unwrap()).await
     }
 
+    /// Uploads `body` as the bundle of a submission.
     pub async fn upload(&self, token: &str, body: impl Into<reqwest::Body>) -> Answer {
         let request = self
             .request(
@@ -372,9 +384,10 @@ impl Site {
             )
             .header("content-type", "application/octet-stream")
             .body(body);
-        Answer::of(request.send().await.unwrap()).await
+        Answer::read(request.send().await.unwrap()).await
     }
 
+    /// Creates a team.
     pub async fn team(&self, name: &str) -> TestTeam {
         let answer = self
             .post("/api/v1/teams", Some(ADMIN), &json!({ "name": name }))
@@ -386,12 +399,13 @@ impl Site {
         }
     }
 
-    /// Uploads a bundle and commits a successful validation run of it. Returns the submission's path in the API.
-    pub async fn valid_submission(&self, team: &TestTeam, agent: &str) -> String {
+    /// Uploads a bundle and commits a successful validation run of it, so that it becomes the team's active submission.
+    /// Returns the submission's path in the API.
+    pub async fn valid_submission(&self, team: &TestTeam, agent_name: &str) -> String {
         let submission = self.upload(&team.token, GZIP.to_vec()).await.json(201);
         let outcome = ValidationOutcome::Valid {
             runtime: "native".into(),
-            agent_name: agent.into(),
+            agent_name: agent_name.into(),
             timing: Vec::new(),
             log: "ready\n".into(),
         };
@@ -409,14 +423,16 @@ impl Site {
             .unwrap();
     }
 
+    /// Claims the next job.
     pub async fn claim(&self) -> ClaimedJob {
         self.store
-            .claim("slot 0", 60, self.now())
+            .claim("slot 0", LEASE_S, self.now())
             .await
             .unwrap()
             .expect("a job is queued")
     }
 
+    /// Claims the next job, which must be a shard: some episodes of a task.
     pub async fn claim_shard(&self) -> (JobClaim, Run, Shard) {
         let ClaimedJob { claim, job } = self.claim().await;
         match job {
@@ -425,7 +441,7 @@ impl Site {
         }
     }
 
-    /// Runs the shards of the next evaluation, with `faults` agent faults in each.
+    /// Runs the shards of the next evaluation (one of each task), with `faults` agent faults in each.
     pub async fn run_shards(&self, faults: usize) {
         for _ in Task::ALL {
             let (claim, run, shard) = self.claim_shard().await;
@@ -463,8 +479,8 @@ impl Site {
         self.store.stages().await.unwrap()[0].id
     }
 
-    /// Starts the day with the active submissions of all teams, unless it has started. Returns the path in the API of the
-    /// team's evaluation, which must be of this submission.
+    /// Starts the evaluation day with the active submissions of all teams, unless it has started. Returns the API path of the
+    /// team's evaluation, which must be of `submission`.
     pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
         match self
             .store
@@ -519,7 +535,7 @@ impl Site {
         }
     }
 
-    /// Commits the result of an evaluation with a dataset.
+    /// Commits the result of an evaluation with [`DATASET`] as its dataset.
     pub async fn commit_evaluation(
         &self,
         claim: &JobClaim,
@@ -527,9 +543,8 @@ impl Site {
         result: &EvaluationResult,
     ) {
         let dataset = self.folder.path().join("dataset.zip");
-        let archive = b"PK the recorded dataset";
-        std::fs::write(&dataset, archive).unwrap();
-        let hash = blake3::hash(archive).to_string();
+        std::fs::write(&dataset, DATASET).unwrap();
+        let hash = blake3::hash(DATASET.as_bytes()).to_string();
         let key = format!("datasets/{id}.zip");
         self.store
             .artifacts()
@@ -542,8 +557,8 @@ impl Site {
             .unwrap();
     }
 
-    /// Adds these teams, and evaluates a day with `episodes` of each task. Their functions give the outcomes; older teams use
-    /// the first function. Returns the evaluations of the new teams.
+    /// Adds these teams, and evaluates a day with `episodes` of each task. The function beside a team's name gives its outcomes;
+    /// teams that exist already use the first function. Returns the evaluations of the new teams.
     pub async fn run_day<const N: usize>(
         &self,
         episodes: u32,
@@ -611,7 +626,7 @@ pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> Eva
     )
 }
 
-/// The run plan of the first stage.
+/// The run plan of the first stage: one shard for each task, and one agent fault is allowed.
 fn plan() -> RunPlan {
     RunPlan {
         profile: Profile::Evaluation,
@@ -668,6 +683,7 @@ fn connection_limits() -> ConnectionLimits {
     }
 }
 
+/// Starts a server. Returns its URL, its task, and the sender that shuts it down.
 async fn serve(
     store: &Store,
     config: &HttpConfig,
@@ -675,19 +691,20 @@ async fn serve(
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let site = router(store.clone(), config.clone());
-    let (shutdown, end) = oneshot::channel();
+    let (shutdown_sender, shutdown_receiver) = oneshot::channel();
     let server = tokio::spawn(async move {
-        let until = async move {
+        let shutdown_signal = async move {
             // A sender that is dropped without a signal does not end the server.
-            if end.await.is_err() {
+            if shutdown_receiver.await.is_err() {
                 std::future::pending().await
             }
         };
-        faceoff_http::serve(listener, site, connection_limits(), until).await;
+        faceoff_http::serve(listener, site, connection_limits(), shutdown_signal).await;
     });
-    (url, server, shutdown)
+    (url, server, shutdown_sender)
 }
 
+/// The text of a JSON string.
 pub fn string(value: &Value) -> String {
     value
         .as_str()
@@ -695,6 +712,7 @@ pub fn string(value: &Value) -> String {
         .to_owned()
 }
 
+/// The outcome of an episode that ended with an agent fault or successfully. Steps and times are arbitrary.
 pub fn outcome(task: Task, episode: u32, has_fault: bool) -> EpisodeOutcome {
     let fault = has_fault.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
@@ -723,7 +741,7 @@ pub fn outcome(task: Task, episode: u32, has_fault: bool) -> EpisodeOutcome {
 }
 
 /// A result over 1000 episodes with these success rates (hit, defend, prepare) and these overall penalty points, all of
-/// them from `hit`.
+/// them from `hit`. Tier and score follow by the default bounds and weights; the other numbers are arbitrary.
 pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
     let tier = match penalty_points {
         points if points <= 500.0 => Tier::Deployable,

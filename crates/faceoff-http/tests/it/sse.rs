@@ -1,4 +1,4 @@
-//! Server-sent events, as an API client reads them.
+//! A client of server-sent events for tests: it opens a stream and reads it event by event.
 
 use crate::site::Site;
 use reqwest::{Method, Response};
@@ -15,14 +15,21 @@ pub struct Event {
 /// An open stream that is read event by event.
 pub struct Stream {
     response: Response,
+    /// Received text that is not parsed yet.
     unread: String,
 }
 
 impl Stream {
-    pub async fn open(site: &Site, path: &str, token: Option<&str>, last: Option<&str>) -> Self {
+    /// Opens a stream; `last_event_id` is the id of the last event that a client received before it reconnects.
+    pub async fn open(
+        site: &Site,
+        path: &str,
+        token: Option<&str>,
+        last_event_id: Option<&str>,
+    ) -> Self {
         let mut request = site.request(Method::GET, path, token);
-        if let Some(last) = last {
-            request = request.header("last-event-id", last);
+        if let Some(last_event_id) = last_event_id {
+            request = request.header("last-event-id", last_event_id);
         }
         let response = request.send().await.unwrap();
         assert_eq!(response.status(), 200);

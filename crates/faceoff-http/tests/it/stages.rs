@@ -1,4 +1,4 @@
-//! Stages in the API and on pages.
+//! Tests of stages (periods of the season with rules and boards of their own) in the API and on pages.
 
 use crate::site::{ADMIN, Answer, Site, result};
 use faceoff_store::{Actor, StageChange};
@@ -6,14 +6,14 @@ use faceoff_types::{Ruleset, StageRules};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn create(site: &Site, body: Value) -> Answer {
+async fn create_stage(site: &Site, body: Value) -> Answer {
     site.post("/api/v1/stages", Some(ADMIN), &body).await
 }
 
-async fn change(site: &Site, stage: &Value, body: Value) -> Answer {
+async fn change_stage(site: &Site, stage: &Value, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{}", stage["id"].as_str().unwrap());
     let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::of(request.json(&body).send().await.unwrap()).await
+    Answer::read(request.json(&body).send().await.unwrap()).await
 }
 
 #[tokio::test]
@@ -21,7 +21,7 @@ async fn stage_is_created_changed_and_played() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.valid_submission(&team, "a").await;
-    let created = create(
+    let created = create_stage(
         &site,
         json!({
             "name": "Final",
@@ -49,19 +49,19 @@ async fn stage_is_created_changed_and_played() {
     assert_eq!(created["next_cutoff"]["at"], "2026-03-02T08:00:00Z");
     let path = format!("/api/v1/stages/{}", created["id"].as_str().unwrap());
     assert_eq!(site.get(&path, Some(ADMIN)).await.json(200), created);
-    let all = site.get("/api/v1/stages", Some(ADMIN)).await.json(200);
-    assert_eq!(all.as_array().unwrap().len(), 2);
-    assert_eq!(all[1], created);
+    let stages = site.get("/api/v1/stages", Some(ADMIN)).await.json(200);
+    assert_eq!(stages.as_array().unwrap().len(), 2);
+    assert_eq!(stages[1], created);
     assert_eq!(
         site.get("/api/v1/season", Some(ADMIN)).await.json(200)["stages"],
-        all
+        stages
     );
 
     let start_request = json!({ "stage": created["id"] });
     site.post("/api/v1/days", Some(ADMIN), &start_request)
         .await
         .problem(409, "stage-not-open", &["Final", "2026-03-02 08:00:00 UTC"]);
-    let changed = change(
+    let changed = change_stage(
         &site,
         &created,
         json!({ "schedule": null, "closes_at": null, "name": "Finals" }),
@@ -100,8 +100,9 @@ async fn stage_is_created_changed_and_played() {
         ),
         (&json!("Finals"), 1)
     );
-    let first = format!("/api/v1/board?stage={}", site.stage().await);
-    assert_eq!(site.get(&first, None).await.json(200)["rows"], json!([]));
+    let first_board = format!("/api/v1/board?stage={}", site.stage().await);
+    let first_board = site.get(&first_board, None).await.json(200);
+    assert_eq!(first_board["rows"], json!([]));
 }
 
 #[tokio::test]
@@ -113,8 +114,8 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
-    let harder = json!({ "episodes_per_task": 9 });
-    let problem = change(&site, &stage, harder).await;
+    let new_rules = json!({ "episodes_per_task": 9 });
+    let problem = change_stage(&site, &stage, new_rules).await;
     let problem = problem.problem(
         409,
         "not-confirmed",
@@ -124,8 +125,8 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
     let unchanged = site.get("/api/v1/stages", None).await.json(200);
     assert_eq!(unchanged[0], stage, "nothing was done");
 
-    let harder = json!({ "episodes_per_task": 9, "confirm": "Qualifying" });
-    let changed = change(&site, &stage, harder).await.json(200);
+    let new_rules = json!({ "episodes_per_task": 9, "confirm": "Qualifying" });
+    let changed = change_stage(&site, &stage, new_rules).await.json(200);
     assert_eq!(changed["revision"], 2);
     assert_eq!(changed["configured"], false);
     let revisions: Vec<_> = changed["revisions"]
@@ -156,13 +157,13 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
         page.contains("revision=2"),
         "a link to the other board: {page}"
     );
-    let other = format!("/?stage={}&revision=2", stage["id"].as_str().unwrap());
-    let other = site.get(&other, None).await;
-    assert_eq!(other.status, 200);
+    let new_board = format!("/?stage={}&revision=2", stage["id"].as_str().unwrap());
+    let new_board = site.get(&new_board, None).await;
+    assert_eq!(new_board.status, 200);
     assert!(
-        other.body.contains("No team has a result yet"),
+        new_board.body.contains("No team has a result yet"),
         "{}",
-        other.body
+        new_board.body
     );
 }
 
@@ -170,8 +171,8 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
 async fn stage_keeps_its_ruleset_until_its_rules_change() {
     let site = Site::start().await;
     let stage = site.store.stages().await.unwrap().remove(0);
-    // As a server with the previous ruleset would have stored it.
-    let earlier = StageChange {
+    // The change stores the stage as a server with the previous ruleset would have stored it.
+    let earlier_ruleset = StageChange {
         rules: Some(StageRules {
             ruleset: Ruleset::Second,
             ..stage.rules.rules
@@ -181,7 +182,7 @@ async fn stage_keeps_its_ruleset_until_its_rules_change() {
     let now = site.now();
     let changed = site
         .store
-        .change_stage(Actor::Organiser, stage.id, earlier, now);
+        .change_stage(Actor::Organiser, stage.id, earlier_ruleset, now);
     changed.await.unwrap();
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     for (body, revision, ruleset) in [
@@ -192,7 +193,7 @@ async fn stage_keeps_its_ruleset_until_its_rules_change() {
             "airhockey-2023.3",
         ),
     ] {
-        let changed = change(&site, &stage, body).await.json(200);
+        let changed = change_stage(&site, &stage, body).await.json(200);
         assert_eq!(
             (&changed["revision"], &changed["ruleset"]),
             (&json!(revision), &json!(ruleset))
@@ -203,7 +204,7 @@ async fn stage_keeps_its_ruleset_until_its_rules_change() {
 #[tokio::test]
 async fn pages_show_stages() {
     let site = Site::start_with_schedule("12:00").await;
-    let created = create(
+    let created = create_stage(
         &site,
         json!({ "name": "Final", "opens_at": "2026-03-02T08:00:00Z", "closes_at": "2026-03-09T08:00:00Z" }),
     );
@@ -312,7 +313,7 @@ async fn invalid_stage_is_refused_with_valid_values() {
             &["deadline", "closes_at"],
         ),
     ] {
-        create(&site, body).await.problem(status, slug, words);
+        create_stage(&site, body).await.problem(status, slug, words);
     }
     assert_eq!(
         site.get("/api/v1/stages", None)
@@ -333,11 +334,11 @@ async fn invalid_stage_is_refused_with_valid_values() {
         .await;
     by_visitor.problem(401, "unauthenticated", &[]);
     let missing = json!({ "id": uuid::Uuid::nil() });
-    change(&site, &missing, json!({ "name": "F" }))
+    change_stage(&site, &missing, json!({ "name": "F" }))
         .await
         .problem(404, "not-found", &["stage"]);
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
-    change(&site, &stage, json!({ "opens_at": "2026-03-05T09:00:00Z" }))
+    change_stage(&site, &stage, json!({ "opens_at": "2026-03-05T09:00:00Z" }))
         .await
         .problem(409, "conflict", &["opens_at", "opened"]);
 }

@@ -1,6 +1,6 @@
-//! Uploads and submissions.
+//! Tests of uploads, and of the submissions that they become.
 
-use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, generous_limits, string};
+use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, generous_limits, string};
 use bytes::Bytes;
 use faceoff_http::{HttpLimits, MinTransferRate};
 use faceoff_types::ValidationOutcome;
@@ -8,7 +8,7 @@ use reqwest::{Body, Method};
 use serde_json::{Value, json};
 use std::{convert::Infallible, time::Duration};
 
-/// A bundle of `bytes` bytes, sent in pieces and without a Content-Length.
+/// A bundle of `bytes` bytes, which is sent in pieces of 5000 bytes and without a Content-Length.
 fn chunked_bundle(bytes: usize) -> Body {
     let mut bundle = vec![7; bytes];
     bundle[..4].copy_from_slice(&GZIP);
@@ -19,6 +19,7 @@ fn chunked_bundle(bytes: usize) -> Body {
     Body::wrap_stream(futures::stream::iter(pieces))
 }
 
+/// The number of files in the folder of uploads that are not complete.
 fn temporary_uploads(site: &Site) -> usize {
     std::fs::read_dir(site.folder.path().join("uploads"))
         .unwrap()
@@ -29,13 +30,13 @@ fn temporary_uploads(site: &Site) -> usize {
 async fn upload_is_stored_hashed_and_queued() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let size = MAX_BUNDLE as usize;
+    let size = MAX_BUNDLE_BYTES as usize;
     let answer = site.upload(&team.token, chunked_bundle(size)).await;
     let submission = answer.json(201);
     let path = format!("/api/v1/submissions/{}", string(&submission["id"]));
     assert_eq!(answer.header("location"), path);
     assert_eq!(submission["state"], "validating");
-    assert_eq!(submission["bytes"], MAX_BUNDLE);
+    assert_eq!(submission["bytes"], MAX_BUNDLE_BYTES);
     assert_eq!(submission["file_name"], "striker.tar.gz");
 
     let stored = site
@@ -111,13 +112,16 @@ async fn newest_valid_submission_is_active_until_another_is_chosen() {
     let active = async || {
         let list = site.get("/api/v1/submissions", token).await.json(200);
         let list = list.as_array().unwrap().clone();
-        let active: Vec<_> = list.iter().filter(|one| one["active"] == true).collect();
-        let [one] = active[..] else {
-            panic!("one is active: {list:#?}")
+        let active: Vec<_> = list
+            .iter()
+            .filter(|submission| submission["active"] == true)
+            .collect();
+        let [submission] = active[..] else {
+            panic!("expected one active submission: {list:#?}")
         };
         let me = site.get("/api/v1/me", token).await.json(200);
-        assert_eq!(me["active_submission"], one["id"]);
-        format!("/api/v1/submissions/{}", string(&one["id"]))
+        assert_eq!(me["active_submission"], submission["id"]);
+        format!("/api/v1/submissions/{}", string(&submission["id"]))
     };
     let first = site.valid_submission(&team, "first").await;
     assert_eq!(active().await, first);
@@ -138,17 +142,17 @@ async fn newest_valid_submission_is_active_until_another_is_chosen() {
     assert!(active().await.ends_with(&waiting));
 
     site.advance(1);
-    let chosen = site
+    let activated = site
         .post(&format!("{first}/activate"), token, &json!({}))
         .await;
-    assert_eq!(chosen.json(200)["active"], true);
+    assert_eq!(activated.json(200)["active"], true);
     assert_eq!(active().await, first);
     let evaluation = site.evaluate(&team, &first).await;
-    // A choice after the cutoff applies to the next one.
+    // An activation after the cutoff applies to the next cutoff.
     site.advance(1);
     site.post(&activate, token, &json!({})).await.json(200);
-    let playing = site.get(&evaluation, token).await.json(200);
-    assert!(first.ends_with(&string(&playing["submission"])));
+    let running = site.get(&evaluation, token).await.json(200);
+    assert!(first.ends_with(&string(&running["submission"])));
     site.advance(1);
     let third = site.valid_submission(&team, "third").await;
     assert_eq!(active().await, third);
@@ -157,7 +161,7 @@ async fn newest_valid_submission_is_active_until_another_is_chosen() {
         .problem(403, "forbidden", &[]);
 }
 
-/// Texts stored by earlier versions may contain control characters.
+/// Texts that earlier versions stored may contain control characters.
 #[tokio::test]
 async fn agent_texts_are_escaped() {
     let site = Site::start().await;
@@ -182,7 +186,7 @@ async fn agent_texts_are_escaped() {
 async fn too_large_bundle_is_refused_with_and_without_length() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let limit = MAX_BUNDLE as usize;
+    let limit = MAX_BUNDLE_BYTES as usize;
     let mut with_length = vec![7; limit + 1];
     with_length[..4].copy_from_slice(&GZIP);
     let problem = site.upload(&team.token, with_length).await.problem(
@@ -190,7 +194,7 @@ async fn too_large_bundle_is_refused_with_and_without_length() {
         "too-large",
         &["65536 bytes", "65537", "leave out"],
     );
-    assert_eq!(problem["limit_bytes"], MAX_BUNDLE);
+    assert_eq!(problem["limit_bytes"], MAX_BUNDLE_BYTES);
     for bytes in [limit + 1, 20 * limit] {
         site.upload(&team.token, chunked_bundle(bytes))
             .await
@@ -226,7 +230,7 @@ async fn upload_that_is_no_archive_is_refused() {
         .send()
         .await
         .unwrap();
-    Answer::of(form)
+    Answer::read(form)
         .await
         .problem(415, kind, &["multipart/form-data", "--data-binary"]);
     site.request(
@@ -238,7 +242,7 @@ async fn upload_that_is_no_archive_is_refused() {
     .send()
     .await
     .map(async |response| {
-        Answer::of(response)
+        Answer::read(response)
             .await
             .problem(400, "invalid-request", &["name"])
     })
@@ -298,15 +302,15 @@ async fn submission_of_another_team_is_not_found() {
     let site = Site::start().await;
     let (owner, other) = (site.team("Owner").await, site.team("Other").await);
     let path = site.valid_submission(&owner, "striker").await;
-    let foreign = site.get(&path, Some(&other.token)).await;
+    let refused = site.get(&path, Some(&other.token)).await;
     let missing = site
         .get(
             "/api/v1/submissions/01890000-0000-7000-8000-000000000000",
             Some(&other.token),
         )
         .await;
-    foreign.problem(404, "not-found", &["submission"]);
-    assert_eq!(foreign.body, missing.body);
+    refused.problem(404, "not-found", &["submission"]);
+    assert_eq!(refused.body, missing.body);
     site.post(&format!("{path}/activate"), Some(&other.token), &json!({}))
         .await
         .problem(404, "not-found", &[]);
@@ -332,7 +336,7 @@ async fn team_labels_and_withdraws_its_submission() {
     let path = site.valid_submission(&team, "a").await;
     let describe = async |token: &str, body: Value| {
         let request = site.request(reqwest::Method::PATCH, &path, Some(token));
-        Answer::of(request.json(&body).send().await.unwrap()).await
+        Answer::read(request.json(&body).send().await.unwrap()).await
     };
     let labelled = describe(&team.token, json!({ "label": " baseline " }))
         .await

@@ -1,9 +1,9 @@
-//! The team dashboard, as used by a browser without scripts.
+//! Tests of the team dashboard (the pages below `/dashboard`) with a browser without scripts.
 
 use crate::{
     browser::{Browser, PASSWORD, first_text, forms},
     html::texts,
-    site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, TestTeam, result, string},
+    site::{ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, TestTeam, result, string},
 };
 use faceoff_types::{Task, ValidationOutcome, ValidationTiming};
 use scraper::{Html, Selector};
@@ -39,18 +39,21 @@ pub fn redirect_target(answer: &Answer) -> String {
     answer.header("location").to_owned()
 }
 
+/// The target of each link that the selector finds.
 pub fn links(html: &Html, selector: &str) -> Vec<String> {
     html.select(&Selector::parse(selector).unwrap())
         .map(|element| element.value().attr("href").unwrap().to_owned())
         .collect()
 }
 
+/// The browser of a new member of the team.
 async fn member<'a>(site: &'a Site, team: &TestTeam, name: &str) -> Browser<'a> {
     let role = json!({ "role": "member", "team": team.id, "note": name });
     Browser::join(site, name, role).await
 }
 
-fn valid(log: &str) -> ValidationOutcome {
+/// A successful validation run. The agent's name contains HTML, which pages must escape.
+fn valid_outcome(log: &str) -> ValidationOutcome {
     ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "<b>striker</b>".into(),
@@ -89,7 +92,7 @@ async fn member_uploads_and_selects_the_active_submission() {
     assert_eq!(
         texts(&html, "[data-in-progress]").len(),
         1,
-        "the script follows it"
+        "the page's script follows the validation run"
     );
     let log = site
         .get("/api/v1/events?limit=1", Some(ADMIN))
@@ -97,7 +100,8 @@ async fn member_uploads_and_selects_the_active_submission() {
         .json(200);
     assert_eq!(log["events"][0]["actor_name"], "Ada", "{log}");
 
-    site.finish_validation(valid("ready\n<i>on</i>\n")).await;
+    site.finish_validation(valid_outcome("ready\n<i>on</i>\n"))
+        .await;
     let html = dashboard_page(&ada.open("/dashboard").await, 200);
     assert_eq!(
         texts(&html, ".entry .state"),
@@ -110,17 +114,18 @@ async fn member_uploads_and_selects_the_active_submission() {
     assert_eq!(texts(&html, "pre"), ["ready <i>on</i>"]);
     assert_eq!(
         texts(&html, "[data-live-section=verdict] tbody td"),
+        // Steps, mean, 99th percentile and maximum in ms, and penalty points per episode.
         ["321", "0.50", "1.23", "15.00", "0.5"]
     );
 
     // The newest valid submission is active; an older one can be selected.
     ada.upload("/dashboard/upload", "second.zip", b"PK\x03\x04\x14\x00")
         .await;
-    site.finish_validation(valid("")).await;
+    site.finish_validation(valid_outcome("")).await;
     let html = dashboard_page(&ada.open("/dashboard").await, 200);
     assert_eq!(texts(&html, ".entry[aria-current] .note").len(), 1);
-    let chosen = ada.submit(&format!("{page}/activate"), &[]).await;
-    assert_eq!(chosen.header("location"), "/dashboard?done=activated");
+    let activated = ada.submit(&format!("{page}/activate"), &[]).await;
+    assert_eq!(activated.header("location"), "/dashboard?done=activated");
     let html = dashboard_page(&ada.open("/dashboard?done=activated").await, 200);
     assert_eq!(links(&html, ".entry[aria-current] h3 a").join(" "), page);
     let withdrawn = ada.submit(&format!("{page}/withdraw"), &[]).await;
@@ -161,8 +166,8 @@ async fn invalid_archive_is_refused_on_the_page() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let mut ada = member(&site, &team, "Ada").await;
-    let large = [&GZIP[..], &vec![0; MAX_BUNDLE as usize]].concat();
-    for (name, archive, status, words) in [
+    let large = [&GZIP[..], &vec![0; MAX_BUNDLE_BYTES as usize]].concat();
+    for (file_name, bundle, status, words) in [
         ("large.tar.gz", large.as_slice(), 413, "at most 65536 bytes"),
         (
             "notes.txt",
@@ -173,7 +178,7 @@ async fn invalid_archive_is_refused_on_the_page() {
         ("empty.zip", b"".as_slice(), 400, "got an empty body"),
         ("", b"".as_slice(), 400, "no file was chosen"),
     ] {
-        let refused = ada.upload("/dashboard/upload", name, archive).await;
+        let refused = ada.upload("/dashboard/upload", file_name, bundle).await;
         let html = dashboard_page(&refused, status);
         let alert = &texts(&html, "[role=alert]")[0];
         assert!(alert.contains(words), "{alert}");
@@ -183,10 +188,10 @@ async fn invalid_archive_is_refused_on_the_page() {
             "the form is shown again"
         );
     }
-    // An archive of exactly the maximum size is accepted.
-    let most = [&GZIP[..], &vec![0; MAX_BUNDLE as usize - GZIP.len()]].concat();
+    // A bundle of exactly the maximum size is accepted.
+    let largest = [&GZIP[..], &vec![0; MAX_BUNDLE_BYTES as usize - GZIP.len()]].concat();
     assert_eq!(
-        ada.upload("/dashboard/upload", "most.tgz", &most)
+        ada.upload("/dashboard/upload", "most.tgz", &largest)
             .await
             .status,
         303
@@ -196,9 +201,9 @@ async fn invalid_archive_is_refused_on_the_page() {
     assert_eq!(stored.as_array().unwrap().len(), 1, "{stored}");
     assert_eq!(
         (stored[0]["bytes"].as_u64(), string(&stored[0]["file_name"])),
-        (Some(MAX_BUNDLE), "most.tgz".into())
+        (Some(MAX_BUNDLE_BYTES), "most.tgz".into())
     );
-    let hash = blake3::hash(&most).to_string();
+    let hash = blake3::hash(&largest).to_string();
     assert_eq!(
         string(&stored[0]["blake3"]),
         hash,
@@ -286,8 +291,8 @@ async fn token_is_shown_once_and_can_be_revoked() {
     let team = site.team("Alpha").await;
     let mut ada = member(&site, &team, "Ada").await;
     let fields = [("name", "CI"), ("owner", "team"), ("days", "30")];
-    let made = ada.submit("/dashboard/access/tokens", &fields).await;
-    let html = dashboard_page(&made, 201);
+    let created = ada.submit("/dashboard/access/tokens", &fields).await;
+    let html = dashboard_page(&created, 201);
     let secret = texts(&html, ".secret code").remove(0);
     let me = site.get("/api/v1/whoami", Some(&secret)).await.json(200);
     assert_eq!(me["role"], "team");
@@ -307,10 +312,10 @@ async fn token_is_shown_once_and_can_be_revoked() {
         422,
     );
     assert!(texts(&refused, "[role=alert]")[0].contains("1 to 80 characters"));
-    // A personal token without expiry.
-    let own = [("name", "mine"), ("owner", "me"), ("days", "")];
-    let made = ada.submit("/dashboard/access/tokens", &own).await;
-    let secret = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    // A token of the member, without an expiry.
+    let fields = [("name", "mine"), ("owner", "me"), ("days", "")];
+    let created = ada.submit("/dashboard/access/tokens", &fields).await;
+    let secret = texts(&dashboard_page(&created, 201), ".secret code").remove(0);
     let me = site.get("/api/v1/whoami", Some(&secret)).await.json(200);
     assert_eq!(
         (&me["role"], &me["token"]["expires_at"]),
@@ -323,10 +328,10 @@ async fn member_invites_revokes_an_invitation_and_leaves() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let mut ada = member(&site, &team, "Ada").await;
-    let made = ada
+    let created = ada
         .submit("/dashboard/access/invitations", &[("note", "Ben")])
         .await;
-    let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    let link = texts(&dashboard_page(&created, 201), ".secret code").remove(0);
     let mut ben = Browser::new(&site);
     let fields = [("name", "Ben"), ("password", PASSWORD)];
     assert_eq!(ben.submit(&link, &fields).await.status, 303);
@@ -335,10 +340,10 @@ async fn member_invites_revokes_an_invitation_and_leaves() {
         texts(&html, "section[aria-labelledby=people] tbody th"),
         ["Ada you", "Ben"]
     );
-    let made = ada
+    let created = ada
         .submit("/dashboard/access/invitations", &[("note", "Eve")])
         .await;
-    let link = texts(&dashboard_page(&made, 201), ".secret code").remove(0);
+    let link = texts(&dashboard_page(&created, 201), ".secret code").remove(0);
     let listed = forms("/dashboard/access", &ada.open("/dashboard/access").await);
     let revoke_form = listed
         .iter()
@@ -356,12 +361,12 @@ async fn member_invites_revokes_an_invitation_and_leaves() {
     // Members cannot remove each other, but can leave by confirming their own name.
     let users = site.get("/api/v1/people", Some(ADMIN)).await.json(200);
     let id = |name: &str| {
-        let all = users.as_array().unwrap();
-        string(&all.iter().find(|one| one["name"] == name).unwrap()["id"])
+        let mut users = users.as_array().unwrap().iter();
+        string(&users.find(|user| user["name"] == name).unwrap()["id"])
     };
     let remove = |name: &str| format!("/dashboard/access/people/{}/remove", id(name));
-    let other = ada.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
-    assert_eq!(other.status, 403);
+    let refused = ada.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
+    assert_eq!(refused.status, 403);
     let wrong = ben.submit(&remove("Ben"), &[("confirm", "Ada")]).await;
     assert!(first_text(&wrong, "[role=alert]").contains("nothing is done yet"));
     let left = ben.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
@@ -389,7 +394,11 @@ async fn submission_of_another_team_is_not_found() {
     assert_eq!(ada.open("/dashboard/submissions/none").await.status, 404);
     let mut ben = member(&site, &beta, "Ben").await;
     let html = dashboard_page(&ben.open("/dashboard").await, 200);
-    assert_eq!(texts(&html, ".entry .state").len(), 2, "it is still active");
+    assert_eq!(
+        texts(&html, ".entry .state").len(),
+        2,
+        "the submission is valid and still active"
+    );
 }
 
 #[tokio::test]
@@ -423,7 +432,7 @@ async fn dashboard_forms_refuse_foreign_origins() {
                 assert_eq!(answer.status, 403, "{form:?}: {}", answer.body);
             }
             let after = site.get("/api/v1/events?limit=1", Some(ADMIN)).await;
-            assert_eq!(before.body, after.body, "{form:?} did something");
+            assert_eq!(before.body, after.body, "{form:?} changed something");
             actions.push(form.action);
         }
     }
@@ -467,6 +476,6 @@ async fn dashboard_lists_evaluations_with_their_files() {
         200,
         "authenticated by the session"
     );
-    let archive = links(&html, "a[href$='/bundle']").remove(0);
-    assert_eq!(ada.open(&archive).await.status, 200);
+    let bundle = links(&html, "a[href$='/bundle']").remove(0);
+    assert_eq!(ada.open(&bundle).await.status, 200);
 }

@@ -1,4 +1,4 @@
-//! The page of a team: its days, fouls and submissions.
+//! Tests of a team's page: its results day by day, its violations, and its submissions.
 
 use crate::{
     html::{page, texts},
@@ -14,8 +14,8 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
     for team in &teams {
         site.valid_submission(team, "agent").await;
     }
-    for (at, rate) in [0.5, 0.6, 0.7].into_iter().enumerate() {
-        if at > 0 {
+    for (index, rate) in [0.5, 0.6, 0.7].into_iter().enumerate() {
+        if index > 0 {
             site.next_day();
         }
         site.post("/api/v1/days", Some(ADMIN), &json!({}))
@@ -27,6 +27,7 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
     teams
 }
 
+/// The attribute `name` of each element that the selector finds.
 fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
     html.select(&Selector::parse(selector).unwrap())
         .map(|element| element.value().attr(name).unwrap().to_owned())
@@ -46,20 +47,21 @@ async fn team_page_shows_rank_history_and_fouls() {
     }
     assert_eq!(texts(&html, ".tiles .figure")[0], "2");
     assert_eq!(
-        texts(&html, ".panel figcaption strong"),
+        texts(&html, ".chart figcaption strong"),
         ["Score", "Penalty points", "Hit", "Defend", "Prepare"]
     );
     for panel in 1..=5 {
-        let dots = format!(".panel:nth-of-type({panel}) circle");
+        let dots = format!(".chart:nth-of-type({panel}) circle");
         assert_eq!(texts(&html, &dots).len(), 3, "one point for each day");
     }
-    // 3 percentage points of each task to each side, which weigh 0.4, 0.4 and 0.2: 3 × 0.6.
+    // The interval of each task has 3 percentage points to each side. With the weights 0.4, 0.4 and 0.2, that of the score has
+    // 3 × √(0.4² + 0.4² + 0.2²) = 1.8.
     assert_eq!(
-        texts(&html, ".panel:nth-of-type(1) circle title")[2],
+        texts(&html, ".chart:nth-of-type(1) circle title")[2],
         "2026-03-03: 70 (68.2 – 71.8)"
     );
     assert_eq!(
-        texts(&html, ".panel:nth-of-type(2) text.bound"),
+        texts(&html, ".chart:nth-of-type(2) text.bound"),
         ["limit of deployable"],
         "0.7 points an episode are far below the other bound"
     );
@@ -68,26 +70,27 @@ async fn team_page_shows_rank_history_and_fouls() {
         ["2026-03-03", "2026-03-02", "2026-03-01"]
     );
     let newest = texts(&html, "details tbody tr:first-child td");
-    let shown_cells = [&newest[..3], &newest[6..]].concat();
+    // All cells except those of the three tasks.
+    let overall_cells = [&newest[..3], &newest[6..]].concat();
     let expected = ["2", "▲ Improvable", "70.0 68.2 – 71.8", "700.0", "0.70"];
-    assert_eq!(shown_cells, expected, "{newest:?}");
-    // 7 of 1000 episodes of each task on each day.
-    let fouls = "section[aria-labelledby=broken] tbody";
-    assert_eq!(texts(&html, &format!("{fouls} tr")).len(), 3);
+    assert_eq!(overall_cells, expected, "{newest:?}");
+    // The end effector left its bounds in 7 of 1000 episodes of each task on each day.
+    let violations = "section[aria-labelledby=violations] tbody";
+    assert_eq!(texts(&html, &format!("{violations} tr")).len(), 3);
     assert_eq!(
-        texts(&html, &format!("{fouls} tr:first-child td")),
+        texts(&html, &format!("{violations} tr:first-child td")),
         ["3000", "21 (1 %)", "0", "0", "0", "0"]
     );
 
-    // From board to team to evaluation.
+    // The board links to the team's page, and this page to the evaluations.
     let board = page(&site, "/").await;
     assert_eq!(
         attributes(&board, ".board th.team > a", "href"),
         [&beta, &alpha].map(|team| format!("/teams/{}", team.id))
     );
     let evaluation = &attributes(&html, "details tbody th a", "href")[0];
-    let shown = page(&site, evaluation).await;
-    assert!(texts(&shown, "h1")[0].contains("Alpha"));
+    let evaluation_page = page(&site, evaluation).await;
+    assert!(texts(&evaluation_page, "h1")[0].contains("Alpha"));
     let csv = &attributes(&html, "a[href$=csv]", "href")[0];
     assert!(site.get(csv, None).await.body.contains("Alpha"));
 }
@@ -97,8 +100,11 @@ async fn submissions_are_shown_to_the_team_and_organisers_only() {
     let site = Site::start().await;
     let [alpha, beta] = three_days(&site).await;
     let path = format!("/teams/{}", alpha.id);
-    let own = site.get(&path, Some(&alpha.token)).await.body;
-    assert!(own.contains("active at the next cutoff"), "{own}");
+    let team_view = site.get(&path, Some(&alpha.token)).await.body;
+    assert!(
+        team_view.contains("active at the next cutoff"),
+        "{team_view}"
+    );
     assert!(
         site.get(&path, Some(ADMIN))
             .await
@@ -118,7 +124,7 @@ async fn team_page_without_result_and_of_an_unknown_team() {
     let team = site.team("Gamma").await;
     let html = page(&site, &format!("/teams/{}", team.id)).await;
     assert_eq!(texts(&html, "h2"), ["No result yet in this stage"]);
-    assert!(texts(&html, ".panel").is_empty());
+    assert!(texts(&html, ".chart").is_empty());
     for (path, status) in [
         (
             "/teams/00000000-0000-7000-8000-000000000000".to_owned(),

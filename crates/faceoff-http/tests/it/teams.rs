@@ -1,4 +1,4 @@
-//! Teams and their tokens.
+//! Tests of teams and their tokens.
 
 use crate::site::{ADMIN, Site, string};
 use serde_json::json;
@@ -23,7 +23,7 @@ async fn team_token_is_shown_once_and_stored_as_a_hash() {
             let is_found = bytes
                 .windows(token.len())
                 .any(|window| window == token.as_bytes());
-            assert!(!is_found, "{file} holds the token in the clear");
+            assert!(!is_found, "{file} contains the token in clear text");
         }
     }
 }
@@ -44,7 +44,7 @@ async fn team_token_gives_access_to_its_own_view() {
         (&next["day"], &next["at"]),
         (&json!("2026-03-01"), &json!(null))
     );
-    assert_eq!(me["max_bundle_bytes"], crate::site::MAX_BUNDLE);
+    assert_eq!(me["max_bundle_bytes"], crate::site::MAX_BUNDLE_BYTES);
 }
 
 #[tokio::test]
@@ -52,9 +52,10 @@ async fn new_token_revokes_the_old_one() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let path = format!("/api/v1/teams/{}/token", team.id);
-    let fresh = string(&site.post(&path, Some(ADMIN), &json!({})).await.json(200)["token"]);
-    assert_ne!(fresh, team.token);
-    site.get("/api/v1/me", Some(&fresh)).await.json(200);
+    let replaced = site.post(&path, Some(ADMIN), &json!({})).await.json(200);
+    let new_token = string(&replaced["token"]);
+    assert_ne!(new_token, team.token);
+    site.get("/api/v1/me", Some(&new_token)).await.json(200);
     site.get("/api/v1/me", Some(&team.token)).await.problem(
         401,
         "unauthenticated",
@@ -114,9 +115,13 @@ async fn missing_or_wrong_token_gets_an_explanation() {
     let team = site.team("Alpha").await;
     let new = json!({ "name": "Beta" });
 
-    let none = site.post("/api/v1/teams", None, &new).await;
-    none.problem(401, "unauthenticated", &["Authorization: Bearer"]);
-    assert!(none.header("www-authenticate").starts_with("Bearer"));
+    let without_token = site.post("/api/v1/teams", None, &new).await;
+    without_token.problem(401, "unauthenticated", &["Authorization: Bearer"]);
+    assert!(
+        without_token
+            .header("www-authenticate")
+            .starts_with("Bearer")
+    );
     for wrong in ["fo_team_wrong", "fo_admin_wrong", "x"] {
         site.post("/api/v1/teams", Some(wrong), &new)
             .await
@@ -134,7 +139,7 @@ async fn missing_or_wrong_token_gets_an_explanation() {
         .send()
         .await
         .unwrap();
-    crate::site::Answer::of(basic)
+    crate::site::Answer::read(basic)
         .await
         .problem(401, "unauthenticated", &["Bearer TOKEN"]);
 }

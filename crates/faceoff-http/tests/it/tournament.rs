@@ -1,4 +1,5 @@
-//! Tournaments in the API and on pages. A fake slot plays the games: it commits results to the real store as a slot does.
+//! Tests of tournaments in the API and on pages. A fake slot runs the games: it takes jobs from the real store and commits
+//! made-up results, as a worker's slot does with real ones.
 
 mod archive;
 pub mod cup;

@@ -1,4 +1,4 @@
-//! Limits of one team's uploads: concurrency, daily quota and storage quota.
+//! Tests of the limits of one team's uploads: concurrent uploads, daily quota and storage quota.
 
 use crate::site::{Answer, GZIP, Site, TestTeam, generous_limits, string};
 use bytes::Bytes;
@@ -10,13 +10,14 @@ use serde_json::json;
 use std::{convert::Infallible, time::Duration};
 use tokio::{sync::mpsc, task::JoinHandle};
 
+/// A bundle of this size.
 fn bundle(bytes: usize) -> Vec<u8> {
     let mut bundle = GZIP.to_vec();
     bundle.resize(bytes, 7);
     bundle
 }
 
-/// An upload that does not end before its sender is dropped.
+/// An upload whose beginning is sent, and whose rest is sent only by [`Self::end`].
 struct OpenUpload {
     sender: mpsc::Sender<()>,
     answer: JoinHandle<Answer>,
@@ -34,7 +35,7 @@ impl OpenUpload {
         let request = site
             .request(Method::POST, "/api/v1/submissions", Some(&team.token))
             .body(body);
-        let answer = tokio::spawn(async { Answer::of(request.send().await.unwrap()).await });
+        let answer = tokio::spawn(async { Answer::read(request.send().await.unwrap()).await });
         Self { sender, answer }
     }
 
@@ -44,7 +45,7 @@ impl OpenUpload {
     }
 }
 
-/// Waits until this number of uploads is open and has a file on disk.
+/// Waits until exactly this number of uploads has a temporary file.
 async fn wait_for_uploads(site: &Site, uploads: usize) {
     let folder = site.folder.path().join("uploads");
     while std::fs::read_dir(&folder).unwrap().count() != uploads {

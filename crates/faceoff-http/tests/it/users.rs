@@ -1,6 +1,9 @@
-//! Users in the API: invitations, sessions, removal, tokens, terms, registrations, questions and announcements.
+//! Tests of users in the API: invitations, sessions, removal, tokens, terms, registrations, questions and announcements.
 
-use crate::site::{ADMIN, Answer, Site, string};
+use crate::{
+    browser::PASSWORD,
+    site::{ADMIN, Answer, Site, string},
+};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -13,7 +16,7 @@ async fn send(
 ) -> Answer {
     let path = format!("/api/v1{path}");
     let request = site.request(method, &path, token).json(body);
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
 async fn post(site: &Site, path: &str, token: &str, body: &Value) -> Answer {
@@ -30,13 +33,15 @@ async fn invite(site: &Site, token: &str, body: &Value) -> String {
     string(&post(site, "/invitations", token, body).await.json(201)["code"])
 }
 
+/// A user with a token of theirs.
 struct User {
     id: String,
     token: String,
 }
 
+/// Accepts the invitation with this code.
 async fn join(site: &Site, code: &str, name: &str) -> User {
-    let body = json!({ "code": code, "name": name, "password": "correct horse battery" });
+    let body = json!({ "code": code, "name": name, "password": PASSWORD });
     let joined = send(site, Method::POST, "/invitations/accept", None, &body).await;
     let joined = joined.json(201);
     User {
@@ -61,9 +66,9 @@ async fn member_acts_for_the_team_under_own_name() {
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha.id, "Ada").await;
     assert!(ada.token.starts_with("fo_person_"));
-    let who = get(&site, "/whoami", &ada.token).await;
+    let caller = get(&site, "/whoami", &ada.token).await;
     assert_eq!(
-        (&who["role"], &who["team"]["name"]),
+        (&caller["role"], &caller["team"]["name"]),
         (&json!("member"), &json!("Alpha"))
     );
     assert_eq!(get(&site, "/me", &ada.token).await["team"]["name"], "Alpha");
@@ -73,10 +78,10 @@ async fn member_acts_for_the_team_under_own_name() {
     let log = get(&site, "/events?kind=submission_uploaded", ADMIN).await;
     assert_eq!(log["events"][0]["actor"], format!("person:{}", ada.id));
     assert_eq!(log["events"][0]["actor_name"], "Ada");
-    // A member invites others, into the own team only.
+    // Members can invite others, but only into their own team.
     let beta = site.team("Beta").await;
-    let own = json!({ "role": "member", "note": "Bob" });
-    let code = invite(&site, &ada.token, &own).await;
+    let invitation = json!({ "role": "member", "note": "Bob" });
+    let code = invite(&site, &ada.token, &invitation).await;
     let bob = join(&site, &code, "Bob").await;
     let people = get(&site, "/people", &bob.token).await;
     let names: Vec<_> = people
@@ -123,7 +128,7 @@ async fn member_acts_for_the_team_under_own_name() {
             .await
             .problem(status, slug, &[]);
     }
-    let by_team_token = post(&site, "/invitations", &alpha.token, &own).await;
+    let by_team_token = post(&site, "/invitations", &alpha.token, &invitation).await;
     by_team_token.problem(403, "forbidden", &["cannot invite"]);
 }
 
@@ -137,8 +142,8 @@ async fn organiser_acts_under_own_name_and_can_be_removed() {
     let log = get(&site, "/events?kind=team_created", &linus.token).await;
     assert_eq!(log["events"][0]["actor_name"], "Grace");
     let by_grace = format!("/events?actor=person:{}", grace.id);
-    let own = get(&site, &by_grace, ADMIN).await;
-    assert!(own["events"].as_array().unwrap().len() >= 2, "{own}");
+    let log = get(&site, &by_grace, ADMIN).await;
+    assert!(log["events"].as_array().unwrap().len() >= 2, "{log}");
 
     let remove = format!("/people/{}/remove", grace.id);
     post(&site, &remove, &linus.token, &json!({}))
@@ -161,11 +166,11 @@ async fn tokens_are_created_rotated_and_revoked_at_once() {
     let beta = site.team("Beta").await;
     let ada = member(&site, &alpha.id, "Ada").await;
     let bob = member(&site, &beta.id, "Bob").await;
-    let made = post(&site, "/tokens", &ada.token, &json!({ "name": "laptop" }))
+    let created = post(&site, "/tokens", &ada.token, &json!({ "name": "laptop" }))
         .await
         .json(201);
-    let (id, laptop) = (string(&made["id"]), string(&made["secret"]));
-    get(&site, "/whoami", &laptop).await;
+    let (id, old_secret) = (string(&created["id"]), string(&created["secret"]));
+    get(&site, "/whoami", &old_secret).await;
     let token = format!("/tokens/{id}");
     for other in [&bob.token, &beta.token, &alpha.token] {
         let revoked = send(&site, Method::DELETE, &token, Some(other), &Value::Null).await;
@@ -176,18 +181,32 @@ async fn tokens_are_created_rotated_and_revoked_at_once() {
         .await
         .problem(403, "forbidden", &["only by that user"]);
     let rotated = post(&site, &rotate, &ada.token, &json!({})).await.json(200);
-    let fresh = string(&rotated["secret"]);
+    let new_secret = string(&rotated["secret"]);
     assert_eq!(
         (&rotated["id"], &rotated["name"]),
-        (&made["id"], &made["name"])
+        (&created["id"], &created["name"])
     );
-    let refused = send(&site, Method::GET, "/whoami", Some(&laptop), &Value::Null).await;
+    let refused = send(
+        &site,
+        Method::GET,
+        "/whoami",
+        Some(&old_secret),
+        &Value::Null,
+    )
+    .await;
     refused.problem(401, "unauthenticated", &["unknown"]);
-    get(&site, "/whoami", &fresh).await;
+    get(&site, "/whoami", &new_secret).await;
     send(&site, Method::DELETE, &token, Some(ADMIN), &Value::Null)
         .await
         .json(200);
-    let refused = send(&site, Method::GET, "/whoami", Some(&fresh), &Value::Null).await;
+    let refused = send(
+        &site,
+        Method::GET,
+        "/whoami",
+        Some(&new_secret),
+        &Value::Null,
+    )
+    .await;
     refused.problem(401, "unauthenticated", &["revoked"]);
 
     // A team token cannot create tokens. A member can create one for the team's API clients.
@@ -203,8 +222,8 @@ async fn tokens_are_created_rotated_and_revoked_at_once() {
     assert!(ci_token.starts_with("fo_team_"));
     assert_eq!(get(&site, "/whoami", &ci_token).await["role"], "team");
     site.advance(60);
-    let late = send(&site, Method::GET, "/whoami", Some(&ci_token), &Value::Null).await;
-    late.problem(401, "unauthenticated", &["expired"]);
+    let expired = send(&site, Method::GET, "/whoami", Some(&ci_token), &Value::Null).await;
+    expired.problem(401, "unauthenticated", &["expired"]);
     post(&site, "/tokens", &bob.token, &team_token)
         .await
         .problem(404, "not-found", &[]);
@@ -227,16 +246,16 @@ async fn tokens_are_created_rotated_and_revoked_at_once() {
         .await
         .problem(409, "conflict", &["in the future"]);
 
-    // The last use is recorded, and tokens of others are not listed.
+    // The last use is recorded (a moment later, so the test waits), and tokens of others are not listed.
     let mut last_use = Value::Null;
     while last_use.is_null() {
         let tokens = get(&site, "/tokens", &ada.token).await;
         let tokens = tokens.as_array().unwrap().clone();
         assert!(tokens.iter().all(|token| token["person"] != json!(bob.id)));
-        let own = tokens
+        let first_token = tokens
             .into_iter()
             .find(|token| token["name"] == "first" && token["person"] == json!(ada.id));
-        last_use = own.unwrap()["last_used_at"].clone();
+        last_use = first_token.unwrap()["last_used_at"].clone();
     }
     assert!(
         !get(&site, "/tokens", ADMIN)
@@ -249,24 +268,29 @@ async fn tokens_are_created_rotated_and_revoked_at_once() {
 #[tokio::test]
 async fn host_token_is_replaced_without_a_restart() {
     let site = Site::start().await;
-    let other = post(&site, "/tokens", ADMIN, &json!({ "name": "second" }))
+    let created = post(&site, "/tokens", ADMIN, &json!({ "name": "second" }))
         .await
         .json(201);
-    let other = string(&other["secret"]);
-    assert!(other.starts_with("fo_admin_"));
-    let tokens = get(&site, "/tokens", &other).await;
-    let first = tokens
+    let second_token = string(&created["secret"]);
+    assert!(second_token.starts_with("fo_admin_"));
+    let tokens = get(&site, "/tokens", &second_token).await;
+    let first_token = tokens
         .as_array()
         .unwrap()
         .iter()
         .find(|token| token["name"] == "admin-token");
-    let path = format!("/tokens/{}", string(&first.unwrap()["id"]));
-    send(&site, Method::DELETE, &path, Some(&other), &Value::Null)
-        .await
-        .json(200);
-    let old = send(&site, Method::GET, "/whoami", Some(ADMIN), &Value::Null).await;
-    old.problem(401, "unauthenticated", &["revoked"]);
-    assert_eq!(get(&site, "/whoami", &other).await["role"], "host");
+    let path = format!("/tokens/{}", string(&first_token.unwrap()["id"]));
+    let revoke = send(
+        &site,
+        Method::DELETE,
+        &path,
+        Some(&second_token),
+        &Value::Null,
+    );
+    revoke.await.json(200);
+    let refused = send(&site, Method::GET, "/whoami", Some(ADMIN), &Value::Null).await;
+    refused.problem(401, "unauthenticated", &["revoked"]);
+    assert_eq!(get(&site, "/whoami", &second_token).await["role"], "host");
 }
 
 #[tokio::test]
@@ -278,11 +302,11 @@ async fn session_works_from_pages_of_the_server_only() {
         let body = json!({ "name": name, "password": password });
         send(&site, Method::POST, "/sessions", None, &body).await
     };
-    for (name, password) in [("Ada", "wrong"), ("Unknown", "correct horse battery")] {
+    for (name, password) in [("Ada", "wrong"), ("Unknown", PASSWORD)] {
         let wrong = sign_in(name, password).await;
         wrong.problem(401, "unauthenticated", &["wrong name or password"]);
     }
-    let signed_in = sign_in("ADA", "correct horse battery").await;
+    let signed_in = sign_in("ADA", PASSWORD).await;
     signed_in.json(201);
     let cookie = signed_in.header("set-cookie").to_owned();
     for part in [
@@ -301,7 +325,7 @@ async fn session_works_from_pages_of_the_server_only() {
         if let Some(origin) = origin {
             request = request.header("origin", origin);
         }
-        Answer::of(request.send().await.unwrap()).await
+        Answer::read(request.send().await.unwrap()).await
     };
     assert_eq!(
         with_cookie(Method::GET, "/whoami", None).await.json(200)["role"],
@@ -312,8 +336,8 @@ async fn session_works_from_pages_of_the_server_only() {
         let refused = with_cookie(Method::POST, &return_path, foreign).await;
         refused.problem(403, "forbidden", &["from a page of this server"]);
     }
-    let own = site.url.clone();
-    let allowed = with_cookie(Method::POST, &return_path, Some(&own)).await;
+    let own_origin = site.url.clone();
+    let allowed = with_cookie(Method::POST, &return_path, Some(&own_origin)).await;
     allowed.problem(409, "conflict", &["has not retired"]);
     // A session is no bearer token, and a token no session cookie.
     let secret = session.split_once('=').unwrap().1;
@@ -322,9 +346,9 @@ async fn session_works_from_pages_of_the_server_only() {
     let as_cookie = site
         .request(Method::GET, "/api/v1/whoami", None)
         .header("cookie", format!("faceoff_session={}", ada.token));
-    let answer = Answer::of(as_cookie.send().await.unwrap()).await;
+    let answer = Answer::read(as_cookie.send().await.unwrap()).await;
     answer.problem(401, "unauthenticated", &[]);
-    let ended = with_cookie(Method::DELETE, "/sessions/current", Some(&own)).await;
+    let ended = with_cookie(Method::DELETE, "/sessions/current", Some(&own_origin)).await;
     assert_eq!(ended.status, 204);
     let after = with_cookie(Method::GET, "/whoami", None).await;
     after.problem(401, "unauthenticated", &[]);
@@ -346,36 +370,38 @@ async fn session_expires_and_ends_with_a_new_password() {
         let request = site
             .request(Method::GET, "/api/v1/whoami", None)
             .header("cookie", session);
-        Answer::of(request.send().await.unwrap())
+        Answer::read(request.send().await.unwrap())
             .await
             .status
             .as_u16()
     };
-    let first = sign_in("correct horse battery").await;
-    assert_eq!(whoami(&first).await, 200);
+    let first_session = sign_in(PASSWORD).await;
+    assert_eq!(whoami(&first_session).await, 200);
     let path = format!("/people/{}/password", ada.id);
-    let set =
+    let set_password =
         async |token: &str, body: Value| send(&site, Method::PUT, &path, Some(token), &body).await;
-    let new = json!({ "old": "correct horse battery", "password": "battery horse correct" });
-    set(
+    let new = json!({ "old": PASSWORD, "password": "battery horse correct" });
+    set_password(
         &ada.token,
         json!({ "old": "wrong", "password": "battery horse correct" }),
     )
     .await
     .problem(403, "forbidden", &["old"]);
-    set(
-        &ada.token,
-        json!({ "old": "correct horse battery", "password": "short" }),
-    )
-    .await
-    .problem(422, "invalid-content", &["password", "12"]);
-    set(ADMIN, new.clone())
+    set_password(&ada.token, json!({ "old": PASSWORD, "password": "short" }))
+        .await
+        .problem(422, "invalid-content", &["password", "12"]);
+    set_password(ADMIN, new.clone())
         .await
         .problem(403, "forbidden", &["only the user", "return"]);
-    set(&ada.token, new).await.json(200);
-    assert_eq!(whoami(&first).await, 401, "earlier sessions have ended");
+    set_password(&ada.token, new).await.json(200);
+    assert_eq!(
+        whoami(&first_session).await,
+        401,
+        "earlier sessions have ended"
+    );
     get(&site, "/whoami", &ada.token).await;
     let second = sign_in("battery horse correct").await;
+    // A session lasts two weeks.
     site.advance(14 * 24 * 3600 - 1);
     assert_eq!(whoami(&second).await, 200);
     site.advance(1);
@@ -427,8 +453,8 @@ async fn registered_team_joins_after_its_approval() {
     let (id, code) = (string(&registered["id"]), string(&registered["code"]));
     assert_eq!(registered["join_link"], format!("/join/{code}"));
     let accept = json!({ "code": code, "name": "Ada", "accepted_terms": 1 });
-    let early = send(&site, Method::POST, "/invitations/accept", None, &accept).await;
-    early.problem(409, "invitation-spent", &["is pending"]);
+    let before_approval = send(&site, Method::POST, "/invitations/accept", None, &accept).await;
+    before_approval.problem(409, "invitation-spent", &["is pending"]);
     let listed = get(&site, "/registrations", ADMIN).await;
     assert_eq!(listed[0]["contact"], "ada@example.org");
     assert!(!listed.to_string().contains("fo_invite_"));
@@ -470,11 +496,11 @@ async fn team_is_renamed_and_retired_by_members_only() {
         (&changed["name"], &changed["affiliation"]),
         (&json!("Omega"), &json!("TU"))
     );
-    let less = patch(&ada.token, json!({ "affiliation": null }))
+    let changed = patch(&ada.token, json!({ "affiliation": null }))
         .await
         .json(200);
     assert_eq!(
-        (&less["affiliation"], &less["link"]),
+        (&changed["affiliation"], &changed["link"]),
         (&Value::Null, &json!("https://example.org"))
     );
     patch(&ada.token, json!({ "division": "Open" }))
@@ -565,13 +591,13 @@ async fn public_answers_are_anonymous() {
     )
     .await
     .json(201);
-    let seen_by = async |token: Option<&str>| {
+    let visible_questions = async |token: Option<&str>| {
         let answer = send(&site, Method::GET, "/questions", token, &Value::Null).await;
         answer.json(200).as_array().unwrap().clone()
     };
-    assert_eq!(seen_by(Some(&alpha.token)).await.len(), 1);
-    assert_eq!(seen_by(Some(ADMIN)).await.len(), 1);
-    assert_eq!(seen_by(Some(&beta.token)).await.len(), 0);
+    assert_eq!(visible_questions(Some(&alpha.token)).await.len(), 1);
+    assert_eq!(visible_questions(Some(ADMIN)).await.len(), 1);
+    assert_eq!(visible_questions(Some(&beta.token)).await.len(), 0);
     let path = format!("/questions/{}/answer", string(&asked["id"]));
     let answer =
         async |token: &str, body: Value| send(&site, Method::PUT, &path, Some(token), &body).await;
@@ -584,11 +610,11 @@ async fn public_answers_are_anonymous() {
     answer(ADMIN, json!({ "text": "Yes.", "public": false }))
         .await
         .json(200);
-    assert_eq!(seen_by(None).await.len(), 0);
+    assert_eq!(visible_questions(None).await.len(), 0);
     answer(ADMIN, json!({ "text": "Yes.", "public": true }))
         .await
         .json(200);
-    let public = seen_by(None).await;
+    let public = visible_questions(None).await;
     assert_eq!(public[0]["answer"], "Yes.");
     assert!(public[0].get("team").is_none(), "{public:?}");
     post(&site, "/questions", ADMIN, &json!({ "text": "?" }))

@@ -1,4 +1,4 @@
-//! A webhook receiver on a real port.
+//! A receiver of webhook deliveries on a real port, for tests. It records the requests, and can be made to fail.
 
 use crate::site::string;
 use axum::{
@@ -17,6 +17,7 @@ use std::{
 };
 use tokio::{net::TcpListener, sync::watch, task::JoinHandle};
 
+/// A delivery: its headers `webhook-id`, `webhook-timestamp` and `webhook-signature`, and its body.
 #[derive(Debug, Clone)]
 pub struct ReceivedRequest {
     pub id: String,
@@ -30,7 +31,8 @@ impl ReceivedRequest {
         serde_json::from_str(&self.body).unwrap()
     }
 
-    /// Is the request signed with this secret? Computed from the specification, not by the code under test.
+    /// Whether the request is signed with this secret. The signature is computed here, from the specification of Standard
+    /// Webhooks, and not by the code under test.
     pub fn is_signed_by(&self, secret: &str) -> bool {
         let key = STANDARD
             .decode(secret.strip_prefix("whsec_").unwrap())
@@ -38,22 +40,28 @@ impl ReceivedRequest {
         let mut mac = Hmac::<sha2::Sha256>::new_from_slice(&key).unwrap();
         mac.update(format!("{}.{}.{}", self.id, self.timestamp, self.body).as_bytes());
         let expected = format!("v1,{}", STANDARD.encode(mac.finalize().into_bytes()));
-        self.signature.split(' ').any(|one| one == expected)
+        self.signature
+            .split(' ')
+            .any(|signature| signature == expected)
     }
 }
 
 /// How the receiver answers its next request. By default it answers 204.
 #[derive(Debug, Clone, Copy)]
 pub enum Behaviour {
+    /// Answers with this status.
     Respond(u16),
     /// Redirects to another path of the receiver.
     Redirect,
+    /// Never answers.
     Hang,
 }
 
 #[derive(Clone)]
 struct ReceiverState {
+    /// All received requests.
     requests: watch::Sender<Vec<ReceivedRequest>>,
+    /// Behaviour for the next requests, one each.
     behaviours: Arc<Mutex<VecDeque<Behaviour>>>,
 }
 
@@ -85,7 +93,9 @@ async fn receive(
         signature: header_text("webhook-signature"),
         body: String::from_utf8(body.to_vec()).unwrap(),
     };
-    state.requests.send_modify(|all| all.push(request));
+    state
+        .requests
+        .send_modify(|requests| requests.push(request));
     let behaviour = state.behaviours.lock().unwrap().pop_front();
     match behaviour {
         None => StatusCode::NO_CONTENT.into_response(),
@@ -118,8 +128,9 @@ impl Receiver {
         }
     }
 
-    pub fn set_behaviours(&self, next: &[Behaviour]) {
-        self.state.behaviours.lock().unwrap().extend(next);
+    /// Sets how the next requests are answered, after those whose behaviour is already set.
+    pub fn add_behaviours(&self, behaviours: &[Behaviour]) {
+        self.state.behaviours.lock().unwrap().extend(behaviours);
     }
 
     pub fn requests(&self) -> Vec<ReceivedRequest> {
@@ -130,17 +141,18 @@ impl Receiver {
     pub async fn wait_for(&self, count: usize) -> Vec<ReceivedRequest> {
         let mut requests = self.state.requests.subscribe();
         requests
-            .wait_for(|all| all.len() >= count)
+            .wait_for(|requests| requests.len() >= count)
             .await
             .unwrap()
             .clone()
     }
 
+    /// The field `type` (the kind of the event) of each request.
     pub fn types(&self) -> Vec<String> {
         let requests = self.requests();
         requests
             .iter()
-            .map(|one| string(&one.json()["type"]))
+            .map(|request| string(&request.json()["type"]))
             .collect()
     }
 }

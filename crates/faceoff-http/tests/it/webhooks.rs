@@ -1,4 +1,4 @@
-//! Webhooks, with a receiver on a real port that verifies the signatures.
+//! Tests of webhooks (URLs to which the server delivers events), with a receiver on a real port that verifies the signatures.
 
 use crate::{
     site::{ADMIN, Answer, Site, TestTeam, result, string},
@@ -29,6 +29,7 @@ fn deliverer(site: &Site, rules: WebhookRules) -> Deliverer {
     .unwrap()
 }
 
+/// Makes all deliveries that are due.
 async fn deliver(site: &Site) {
     deliverer(site, rules_for_loopback())
         .deliver_due()
@@ -36,25 +37,28 @@ async fn deliver(site: &Site) {
         .unwrap();
 }
 
+/// Adds a member to the team. Returns the member's token.
 async fn member(site: &Site, team: &TestTeam, name: &str) -> String {
-    let invited = json!({ "role": "member", "team": team.id, "note": name });
+    let invitation = json!({ "role": "member", "team": team.id, "note": name });
     let path = "/api/v1/invitations";
-    let made = site.post(path, Some(ADMIN), &invited).await.json(201);
-    let join = json!({ "code": made["code"], "name": name });
+    let created = site.post(path, Some(ADMIN), &invitation).await.json(201);
+    let join = json!({ "code": created["code"], "name": name });
     let path = "/api/v1/invitations/accept";
     string(&site.post(path, None, &join).await.json(201)["secret"])
 }
 
-/// Creates a webhook. Returns its path and its secret.
+/// Creates a webhook for the events that match one of the filters `about`. Returns its path and its secret.
 async fn create_webhook(site: &Site, token: &str, url: &str, about: &[&str]) -> (String, String) {
     let new = json!({ "name": "test hook", "url": url, "about": about });
-    let made = site.post("/api/v1/webhooks", Some(token), &new).await;
-    let made = made.json(201);
-    let secret = string(&made["secret"]);
+    let created = site.post("/api/v1/webhooks", Some(token), &new).await;
+    let created = created.json(201);
+    let secret = string(&created["secret"]);
     assert!(secret.starts_with("whsec_"));
-    (format!("/api/v1/webhooks/{}", string(&made["id"])), secret)
+    let path = format!("/api/v1/webhooks/{}", string(&created["id"]));
+    (path, secret)
 }
 
+/// Publishes an announcement, which is an event of the kind `announced`.
 async fn announce(site: &Site) {
     let announcement = json!({ "title": "News", "text": "of this test" });
     let path = "/api/v1/announcements";
@@ -63,9 +67,10 @@ async fn announce(site: &Site) {
 
 async fn patch(site: &Site, path: &str, token: &str, body: Value) -> Answer {
     let request = site.request(Method::PATCH, path, Some(token)).json(&body);
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
+/// The deliveries of a webhook, newest first.
 async fn deliveries(site: &Site, path: &str) -> Vec<Value> {
     let path = format!("{path}/deliveries");
     let deliveries = site.get(&path, Some(ADMIN)).await.json(200);
@@ -101,7 +106,7 @@ async fn webhook_gets_the_events_visible_to_its_owner() {
     }
     let finished = types.iter().filter(|kind| *kind == "evaluation_finished");
     assert_eq!(finished.count(), 2, "results of both teams are public");
-    let mut events = Vec::new();
+    let mut event_ids = Vec::new();
     for request in team_receiver.requests() {
         assert!(request.is_signed_by(&secret));
         assert!(!request.is_signed_by("whsec_AAAA"));
@@ -110,12 +115,12 @@ async fn webhook_gets_the_events_visible_to_its_owner() {
         let body = request.json();
         assert_eq!(body["type"], body["data"]["kind"]);
         assert_eq!(body["timestamp"], body["data"]["at"]);
-        events.push(body["data"]["id"].as_i64().unwrap());
+        event_ids.push(body["data"]["id"].as_i64().unwrap());
     }
-    let received = events.len();
-    events.sort_unstable();
-    events.dedup();
-    assert_eq!(events.len(), received, "each event once");
+    let received = event_ids.len();
+    event_ids.sort_unstable();
+    event_ids.dedup();
+    assert_eq!(event_ids.len(), received, "each event once");
     let organiser_types = organiser_receiver.types();
     for (kind, times) in [("submission_uploaded", 2), ("evaluation_queued", 2)] {
         let found = organiser_types
@@ -132,10 +137,15 @@ async fn webhook_gets_the_events_visible_to_its_owner() {
     // Everything was delivered, and nothing is sent twice.
     deliver(&site).await;
     assert_eq!(team_receiver.requests().len(), received);
-    let shown = deliveries(&site, &path).await;
-    assert_eq!(shown.len(), received);
-    assert!(shown.iter().all(|one| one["state"] == "delivered"));
-    assert_eq!(shown[0]["last"]["status"], 204);
+    let listed = deliveries(&site, &path).await;
+    assert_eq!(listed.len(), received);
+    assert!(
+        listed
+            .iter()
+            .all(|delivery| delivery["state"] == "delivered")
+    );
+    assert_eq!(listed[0]["last"]["status"], 204);
+    // Deliveries are kept for two weeks.
     site.advance(15 * 24 * 3600);
     let removed = site.store.delete_old_deliveries(site.now()).await.unwrap();
     assert!(removed as usize >= received);
@@ -147,7 +157,7 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
     let site = Site::start().await;
     let receiver = Receiver::start().await;
     let (path, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
-    receiver.set_behaviours(&[Behaviour::Respond(500)]);
+    receiver.add_behaviours(&[Behaviour::Respond(500)]);
     announce(&site).await;
     deliver(&site).await;
     deliver(&site).await;
@@ -155,17 +165,18 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
     let view = site.get(&path, Some(ADMIN)).await.json(200);
     assert_eq!(view["state"], "failing");
     assert_eq!(view["since"], site.now().to_string());
-    let retry = &deliveries(&site, &path).await[0];
-    assert_eq!(retry["state"], "waiting");
-    assert_eq!(retry["last"]["status"], 500);
+    let delivery = &deliveries(&site, &path).await[0];
+    assert_eq!(delivery["state"], "waiting");
+    assert_eq!(delivery["last"]["status"], 500);
     assert_eq!(
-        retry["last"]["error"],
+        delivery["last"]["error"],
         "it answered 500, expected 200 to 299"
     );
-    let next: jiff::Timestamp = string(&retry["next_at"]).parse().unwrap();
-    assert!((5..=6).contains(&next.duration_since(site.now()).as_secs()));
+    // The first pause has 5 seconds and a random part.
+    let next_at: jiff::Timestamp = string(&delivery["next_at"]).parse().unwrap();
+    assert!((5..=6).contains(&next_at.duration_since(site.now()).as_secs()));
 
-    site.set_time(next);
+    site.set_time(next_at);
     deliver(&site).await;
     let requests = receiver.requests();
     assert_eq!(requests.len(), 2);
@@ -177,18 +188,19 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
     let view = site.get(&path, Some(ADMIN)).await.json(200);
     assert_eq!(view["state"], "alive");
 
-    // A delivery that always fails.
-    receiver.set_behaviours(&[Behaviour::Respond(404); 7]);
+    // A delivery that always fails is attempted seven times. The longest pause between two attempts is shorter than 13 hours.
+    const ATTEMPTS: usize = 7;
+    receiver.add_behaviours(&[Behaviour::Respond(404); ATTEMPTS]);
     announce(&site).await;
-    for _ in 0..7 {
+    for _ in 0..ATTEMPTS {
         deliver(&site).await;
         site.advance(13 * 3600);
     }
     deliver(&site).await;
-    assert_eq!(receiver.requests().len(), 2 + 7);
+    assert_eq!(receiver.requests().len(), 2 + ATTEMPTS);
     let given_up = &deliveries(&site, &path).await[0];
     assert_eq!(given_up["state"], "given_up");
-    assert_eq!(given_up["attempts"], 7);
+    assert_eq!(given_up["attempts"], ATTEMPTS);
 }
 
 #[tokio::test]
@@ -197,23 +209,23 @@ async fn rotated_secret_signs_beside_the_old_one_for_a_day() {
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha, "Ada").await;
     let receiver = Receiver::start().await;
-    let (path, old) = create_webhook(&site, &ada, &receiver.url, &["announced"]).await;
+    let (path, old_secret) = create_webhook(&site, &ada, &receiver.url, &["announced"]).await;
     let rotate = format!("{path}/rotate");
     site.post(&rotate, Some(ADMIN), &json!({}))
         .await
         .problem(403, "forbidden", &["only a member"]);
     let rotated = site.post(&rotate, Some(&ada), &json!({})).await.json(200);
-    let new = string(&rotated["secret"]);
-    assert_ne!(old, new);
+    let new_secret = string(&rotated["secret"]);
+    assert_ne!(old_secret, new_secret);
     announce(&site).await;
     deliver(&site).await;
-    let both = &receiver.requests()[0];
-    assert!(both.is_signed_by(&old) && both.is_signed_by(&new));
+    let first = &receiver.requests()[0];
+    assert!(first.is_signed_by(&old_secret) && first.is_signed_by(&new_secret));
     site.advance(24 * 3600);
     announce(&site).await;
     deliver(&site).await;
-    let one = &receiver.requests()[1];
-    assert!(!one.is_signed_by(&old) && one.is_signed_by(&new));
+    let second = &receiver.requests()[1];
+    assert!(!second.is_signed_by(&old_secret) && second.is_signed_by(&new_secret));
     let view = site.get(&path, Some(&ada)).await;
     assert!(!view.body.contains("secret"), "{}", view.body);
 }
@@ -225,7 +237,7 @@ async fn webhook_that_answers_gone_is_dead_until_revived() {
     let ada = member(&site, &alpha, "Ada").await;
     let receiver = Receiver::start().await;
     let (path, _) = create_webhook(&site, &ada, &receiver.url, &["announced"]).await;
-    receiver.set_behaviours(&[Behaviour::Respond(410)]);
+    receiver.add_behaviours(&[Behaviour::Respond(410)]);
     announce(&site).await;
     deliver(&site).await;
     let dead = site.get(&path, Some(&ada)).await.json(200);
@@ -259,20 +271,21 @@ async fn webhook_that_fails_for_three_days_is_dead() {
     let site = Site::start().await;
     let receiver = Receiver::start().await;
     let (path, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
-    receiver.set_behaviours(&[Behaviour::Respond(503); 40]);
+    // More failures than deliveries in an hour.
+    let failures = [Behaviour::Respond(503); 40];
+    receiver.add_behaviours(&failures);
+    let id = path.strip_prefix("/api/v1/webhooks/").unwrap();
+    // One failing delivery an hour, for three days.
     for _ in 0..72 {
-        assert_eq!(
-            site.get(&path, Some(ADMIN)).await.json(200)["id"],
-            path[17..]
-        );
+        assert_eq!(site.get(&path, Some(ADMIN)).await.json(200)["id"], id);
         announce(&site).await;
         deliver(&site).await;
         site.advance(3600);
-        receiver.set_behaviours(&[Behaviour::Respond(503); 40]);
+        receiver.add_behaviours(&failures);
     }
     let mut view = site.get(&path, Some(ADMIN)).await.json(200);
     assert_eq!(view["state"], "failing");
-    // It dies with the first delivery that is given up. The time of that depends on random pauses.
+    // The webhook is dead once the first delivery is given up. When that happens depends on random pauses.
     for _ in 0..48 {
         deliver(&site).await;
         view = site.get(&path, Some(ADMIN)).await.json(200);
@@ -280,7 +293,7 @@ async fn webhook_that_fails_for_three_days_is_dead() {
             break;
         }
         site.advance(3600);
-        receiver.set_behaviours(&[Behaviour::Respond(503); 40]);
+        receiver.add_behaviours(&failures);
     }
     assert_eq!(view["state"], "dead");
     assert!(string(&view["reason"]).contains("72 hours"), "{view}");
@@ -292,7 +305,7 @@ async fn redirects_are_not_followed_and_responses_not_shown() {
     let site = Site::start().await;
     let receiver = Receiver::start().await;
     let (path, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
-    receiver.set_behaviours(&[Behaviour::Redirect, Behaviour::Respond(418)]);
+    receiver.add_behaviours(&[Behaviour::Redirect, Behaviour::Respond(418)]);
     announce(&site).await;
     deliver(&site).await;
     let redirected = &deliveries(&site, &path).await[0];
@@ -301,9 +314,9 @@ async fn redirects_are_not_followed_and_responses_not_shown() {
     site.advance(10);
     deliver(&site).await;
     assert_eq!(receiver.requests().len(), 2);
-    let shown = site.get(&format!("{path}/deliveries"), Some(ADMIN)).await;
-    assert!(shown.body.contains("418"));
-    assert!(!shown.body.contains("secret response"), "{}", shown.body);
+    let listed = site.get(&format!("{path}/deliveries"), Some(ADMIN)).await;
+    assert!(listed.body.contains("418"));
+    assert!(!listed.body.contains("secret response"), "{}", listed.body);
 }
 
 #[tokio::test]
@@ -322,18 +335,18 @@ async fn private_addresses_are_refused() {
     }
     // A host name is resolved at delivery, so it is refused only then.
     let receiver = Receiver::start().await;
-    let by_name = format!("http://localhost:{}/hook", receiver.port);
-    let (path, _) = create_webhook(&site, ADMIN, &by_name, &["announced"]).await;
-    let (literal, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
+    let url_with_name = format!("http://localhost:{}/hook", receiver.port);
+    let (with_name, _) = create_webhook(&site, ADMIN, &url_with_name, &["announced"]).await;
+    let (with_address, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
     announce(&site).await;
-    let strict = WebhookRules {
+    let strict_rules = WebhookRules {
         enabled: true,
         allow_private: Vec::new(),
         ..rules_for_loopback()
     };
-    deliverer(&site, strict).deliver_due().await.unwrap();
+    deliverer(&site, strict_rules).deliver_due().await.unwrap();
     assert_eq!(receiver.requests().len(), 0);
-    for path in [&path, &literal] {
+    for path in [&with_name, &with_address] {
         let refused = &deliveries(&site, path).await[0];
         assert_eq!(refused["last"]["status"], Value::Null);
         let error = string(&refused["last"]["error"]);
@@ -346,13 +359,13 @@ async fn interrupted_delivery_is_repeated_with_the_same_id() {
     let site = Site::start().await;
     let receiver = Receiver::start().await;
     let (path, secret) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
-    receiver.set_behaviours(&[Behaviour::Hang]);
+    receiver.add_behaviours(&[Behaviour::Hang]);
     announce(&site).await;
-    let killed = deliverer(&site, rules_for_loopback());
-    let killed = tokio::spawn(async move { killed.deliver_due().await });
+    let interrupted = deliverer(&site, rules_for_loopback());
+    let interrupted = tokio::spawn(async move { interrupted.deliver_due().await });
     receiver.wait_for(1).await;
-    killed.abort();
-    assert!(killed.await.unwrap_err().is_cancelled());
+    interrupted.abort();
+    assert!(interrupted.await.unwrap_err().is_cancelled());
     assert_eq!(deliveries(&site, &path).await[0]["attempts"], 0);
     deliver(&site).await;
     let requests = receiver.requests();
@@ -371,7 +384,7 @@ async fn running_deliverer_sends_at_once_and_shuts_down() {
     let receiver = Receiver::start().await;
     let (path, secret) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
     let shutdown = CancellationToken::new();
-    let running = tokio::spawn(deliverer(&site, rules_for_loopback()).run(shutdown.clone()));
+    let deliverer = tokio::spawn(deliverer(&site, rules_for_loopback()).run(shutdown.clone()));
     announce(&site).await;
     assert_eq!(receiver.wait_for(1).await[0].json()["type"], "announced");
     let test = format!("{path}/test");
@@ -381,11 +394,11 @@ async fn running_deliverer_sends_at_once_and_shuts_down() {
     assert_eq!(requests[1].json()["type"], "test");
     assert!(requests[1].is_signed_by(&secret));
     // A receiver that never answers does not delay the shutdown.
-    receiver.set_behaviours(&[Behaviour::Hang]);
+    receiver.add_behaviours(&[Behaviour::Hang]);
     announce(&site).await;
     receiver.wait_for(3).await;
     shutdown.cancel();
-    running.await.unwrap();
+    deliverer.await.unwrap();
 }
 
 #[tokio::test]
@@ -394,21 +407,21 @@ async fn webhooks_are_limited_and_created_by_members_only() {
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha, "Ada").await;
     let new = json!({ "name": "test hook", "url": "https://example.org/faceoff" });
-    let all = "/api/v1/webhooks";
-    site.post(all, Some(&alpha.token), &new)
+    let webhooks = "/api/v1/webhooks";
+    site.post(webhooks, Some(&alpha.token), &new)
         .await
         .problem(403, "forbidden", &["member"]);
     for _ in 0..5 {
         create_webhook(&site, &ada, "https://example.org/faceoff", &[]).await;
     }
-    site.post(all, Some(&ada), &new)
+    site.post(webhooks, Some(&ada), &new)
         .await
         .problem(409, "conflict", &["5 webhooks"]);
-    let listed = site.get(all, Some(&alpha.token)).await.json(200);
-    let first = format!("{all}/{}", string(&listed[0]["id"]));
-    let deleted = site.request(Method::DELETE, &first, Some(&ada));
+    let listed = site.get(webhooks, Some(&alpha.token)).await.json(200);
+    let webhook = format!("{webhooks}/{}", string(&listed[0]["id"]));
+    let deleted = site.request(Method::DELETE, &webhook, Some(&ada));
     assert_eq!(deleted.send().await.unwrap().status(), 204);
-    site.get(&first, Some(&ada))
+    site.get(&webhook, Some(&ada))
         .await
         .problem(404, "not-found", &[]);
     create_webhook(&site, &ada, "https://example.org/faceoff", &["board"]).await;
@@ -417,11 +430,11 @@ async fn webhooks_are_limited_and_created_by_members_only() {
         (json!(vec!["board"; 51]), "50"),
     ] {
         let wrong = json!({ "name": "test hook", "url": "https://example.org/", "about": about });
-        let answer = site.post(all, Some(ADMIN), &wrong).await;
+        let answer = site.post(webhooks, Some(ADMIN), &wrong).await;
         answer.problem(422, "invalid-content", &["about", words]);
     }
     // An organiser sees and renames all webhooks, but cannot change the URL of a team's webhook.
-    let path = format!("{all}/{}", string(&listed[1]["id"]));
+    let path = format!("{webhooks}/{}", string(&listed[1]["id"]));
     let other_url = json!({ "url": "https://example.com/" });
     patch(&site, &path, ADMIN, other_url)
         .await

@@ -1,4 +1,5 @@
-//! File transfer of remote workers: access by the grant of a job, while the worker holds its lease.
+//! Tests of the file transfer of remote workers (processes on other machines that run jobs). The grant of a job gives access to
+//! the job's files while the worker holds the lease, the right to run the job for a time.
 
 use crate::site::{Answer, GZIP, Site};
 use faceoff_store::{ClaimedJob, Job};
@@ -10,12 +11,16 @@ use faceoff_wire::{
 use reqwest::Method;
 use serde_json::json;
 
+/// How long a worker's lease lasts, in seconds.
+const WORKER_LEASE_S: u32 = 30;
+
+/// Sends a request with a grant.
 async fn send(site: &Site, method: Method, path: &str, grant: &str, body: &'static [u8]) -> Answer {
     let request = site
         .request(method, path, None)
         .header("authorization", format!("Grant {grant}"))
         .body(body);
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
 #[tokio::test]
@@ -37,26 +42,28 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
         program: String::new(),
     };
     let sealed = grant.seal(&site.grant_key()).unwrap();
-    let path_of = |bundle: &BundleRef| format!("/work/bundles/{}", bundle.blake3);
+    let bundle_path = |bundle: &BundleRef| format!("/work/bundles/{}", bundle.blake3);
 
-    // Before a worker starts the job, its grant opens nothing: several workers may have received it.
+    // Before a worker starts the job, the grant gives no access: several workers may have received it.
     for (method, path) in [
-        (Method::GET, path_of(&bundle)),
+        (Method::GET, bundle_path(&bundle)),
         (Method::PUT, "/work/files/game.zip".to_owned()),
     ] {
         let answer = send(&site, method, &path, &sealed, b"").await;
         answer.problem(403, "forbidden", &["no worker has started the job"]);
     }
     let start = async |slot: &str| {
-        let transferred = site.store.transfer_lease(&claim, slot, 30, site.now());
+        let transferred = site
+            .store
+            .transfer_lease(&claim, slot, WORKER_LEASE_S, site.now());
         assert!(transferred.await.unwrap());
     };
     start("remote/rack-1/slot-0").await;
-    let fetched = send(&site, Method::GET, &path_of(&bundle), &sealed, b"").await;
+    let fetched = send(&site, Method::GET, &bundle_path(&bundle), &sealed, b"").await;
     assert_eq!(fetched.status, 200, "{}", fetched.body);
     assert_eq!(fetched.header("content-length"), GZIP.len().to_string());
-    let another = format!("/work/bundles/{}", "0".repeat(64));
-    send(&site, Method::GET, &another, &sealed, b"")
+    let other_bundle = format!("/work/bundles/{}", "0".repeat(64));
+    send(&site, Method::GET, &other_bundle, &sealed, b"")
         .await
         .problem(404, "not-found", &["bundle of this job"]);
     let put = async |name: &str, grant: &str| {
@@ -70,16 +77,16 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
         .await
     };
     assert_eq!(put("game.zip", &sealed).await.status, 204);
-    let bytes_of = async || {
+    let stored_bytes = async || {
         let key = "runs/of-this/lease/game.zip";
         site.store.artifacts().size_bytes(key).await.unwrap()
     };
-    assert_eq!(bytes_of().await, Some(4));
+    assert_eq!(stored_bytes().await, Some(b"rows".len() as u64));
     for outside in ["..%2Fanother", ".hidden", "a%20b", "steps.parquet"] {
         put(outside, &sealed).await.problem(404, "not-found", &[]);
     }
 
-    // A grant sealed by another server, one with the seal of another grant, and none at all.
+    // Refused are: a grant sealed by another server, one with the seal of another grant, and no grant.
     let foreign = grant.seal(&GrantKey::from_secret(&[7; 32])).unwrap();
     let (content, _) = sealed.split_once('.').unwrap();
     let (_, other_seal) = foreign.split_once('.').unwrap();
@@ -88,19 +95,19 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
             .await
             .problem(403, "forbidden", &["expected the grant of a job"]);
     }
-    // A grant of another lease of the same job.
-    let earlier = Grant {
+    // Also refused is a grant of another lease of the same job. The nonce identifies the lease.
+    let other_lease = Grant {
         nonce: claim.job,
         ..grant
     };
-    let earlier = earlier.seal(&site.grant_key()).unwrap();
-    put("game.zip", &earlier)
+    let other_lease = other_lease.seal(&site.grant_key()).unwrap();
+    put("game.zip", &other_lease)
         .await
         .problem(403, "forbidden", &["no longer holds the lease"]);
 
     site.store.release(&claim, site.now()).await.unwrap();
     for (method, path) in [
-        (Method::GET, path_of(&bundle)),
+        (Method::GET, bundle_path(&bundle)),
         (Method::PUT, "/work/files/game.zip".to_owned()),
     ] {
         send(&site, method, &path, &sealed, b"").await.problem(
@@ -120,7 +127,9 @@ async fn late_upload_does_not_replace_a_checked_file() {
     site.evaluate(&team, &submission).await;
     let ClaimedJob { claim, .. } = site.claim().await;
     let slot = "remote/rack-1/slot-0";
-    let transferred = site.store.transfer_lease(&claim, slot, 30, site.now());
+    let transferred = site
+        .store
+        .transfer_lease(&claim, slot, WORKER_LEASE_S, site.now());
     assert!(transferred.await.unwrap());
     let grant = Grant {
         job_id: claim.job,
@@ -131,11 +140,11 @@ async fn late_upload_does_not_replace_a_checked_file() {
         program: String::new(),
     };
     let sealed = grant.seal(&site.grant_key()).unwrap();
-    let bytes_of = async |name: &str| {
+    let stored_bytes = async |name: &str| {
         let key = format!("runs/of-this/lease/{name}");
         site.store.artifacts().size_bytes(&key).await.unwrap()
     };
-    // An upload whose headers and first half have arrived.
+    // Starts an upload and sends its first half. Returns a sender for the rest, and the task that gets the answer.
     let start_upload = async |name: &'static str| {
         let (rest, body) = tokio::sync::mpsc::channel::<Result<&'static [u8], std::io::Error>>(1);
         rest.send(Ok(b"forged ")).await.unwrap();
@@ -162,19 +171,19 @@ async fn late_upload_does_not_replace_a_checked_file() {
     );
     rest.send(Ok(b"rows")).await.unwrap();
     drop(rest);
-    let answer = Answer::of(answer.await.unwrap().unwrap()).await;
+    let answer = Answer::read(answer.await.unwrap().unwrap()).await;
     answer.problem(403, "forbidden", &["its files cannot be changed"]);
-    assert_eq!(bytes_of("game.zip").await, None);
+    assert_eq!(stored_bytes("game.zip").await, None);
 
-    // The same after the check has ended and was forgotten.
+    // The same is so after the check has ended, when the lease is over.
     site.store.workers().forget_files(claim.nonce);
     let (rest, answer) = start_upload("game.zip").await;
     site.store.release(&claim, site.now()).await.unwrap();
     rest.send(Ok(b"rows")).await.unwrap();
     drop(rest);
-    let answer = Answer::of(answer.await.unwrap().unwrap()).await;
+    let answer = Answer::read(answer.await.unwrap().unwrap()).await;
     answer.problem(403, "forbidden", &["no longer holds the lease"]);
-    assert_eq!(bytes_of("game.zip").await, None);
+    assert_eq!(stored_bytes("game.zip").await, None);
 }
 
 #[tokio::test]
@@ -197,16 +206,16 @@ async fn banned_worker_loses_access() {
     };
     let sealed = grant.seal(&site.grant_key()).unwrap();
     let path = format!("/work/bundles/{}", bundle.blake3);
-    let transferred = site
-        .store
-        .transfer_lease(&claim, "remote/rack-1/slot-0", 30, site.now());
+    let transferred =
+        site.store
+            .transfer_lease(&claim, "remote/rack-1/slot-0", WORKER_LEASE_S, site.now());
     assert!(transferred.await.unwrap());
     assert_eq!(
         send(&site, Method::GET, &path, &sealed, b"").await.status,
         200
     );
-    let banned = [("rack-1".to_owned(), "it lies".to_owned())];
-    site.store.workers().set_banned(banned);
+    let bans = [("rack-1".to_owned(), "it lies".to_owned())];
+    site.store.workers().set_banned(bans);
     send(&site, Method::GET, &path, &sealed, b"").await.problem(
         403,
         "forbidden",

@@ -1,4 +1,4 @@
-//! Remote workers, as organisers see them.
+//! Tests of remote workers (processes on other machines that run jobs), as organisers see them on pages and in the API.
 
 use crate::{
     browser::Browser,
@@ -10,7 +10,7 @@ use faceoff_store::{SlotReport, WorkerInfo};
 use serde_json::{Value, json};
 use uuid::Uuid;
 
-fn about(version: &str, slots: u32) -> WorkerInfo {
+fn worker_info(version: &str, slots: u32) -> WorkerInfo {
     WorkerInfo {
         version: version.to_owned(),
         slots,
@@ -24,9 +24,12 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     let role = json!({ "role": "organiser", "note": "Grace" });
     let mut grace = Browser::join(&site, "Grace", role).await;
     let worker_list = async || site.get("/api/v1/workers", Some(ADMIN)).await.json(200);
-    let none = worker_list().await;
+    let without_workers = worker_list().await;
     assert_eq!(
-        (&none["own_slots"], &none["leases_jobs"]),
+        (
+            &without_workers["own_slots"],
+            &without_workers["leases_jobs"]
+        ),
         (&json!(2), &json!(false))
     );
     let html = dashboard_page(&grace.open("/organiser/workers").await, 200);
@@ -34,10 +37,10 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
 
     let (workers, job) = (site.store.workers().clone(), Uuid::from_u128(7));
     workers.enable();
-    workers.record_poll("rack-1", about("1.0", 4), None, site.now());
+    workers.record_poll("rack-1", worker_info("1.0", 4), None, site.now());
     workers.record_poll(
         "rack-2",
-        about("0.9", 8),
+        worker_info("0.9", 8),
         Some("the worker runs another <program>"),
         site.now(),
     );
@@ -51,16 +54,19 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
         },
         site.now(),
     );
-    let all = worker_list().await;
-    assert_eq!(all["remote_slots"], 4, "a refused worker runs no jobs");
+    let with_workers = worker_list().await;
+    assert_eq!(
+        with_workers["remote_slots"], 4,
+        "a refused worker runs no jobs"
+    );
     let worker_states = |list: &Value| {
         let workers = list["workers"].as_array().unwrap().iter();
         workers
             .map(|worker| worker["state"].clone())
             .collect::<Vec<_>>()
     };
-    assert_eq!(worker_states(&all), ["working", "refused"]);
-    let busy = &all["workers"][0]["busy"][0];
+    assert_eq!(worker_states(&with_workers), ["working", "refused"]);
+    let busy = &with_workers["workers"][0]["busy"][0];
     assert_eq!(
         (&busy["slot"], &busy["is_long"]),
         (&json!("slot-2"), &json!(false))
@@ -81,7 +87,7 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     assert!(metrics.contains("faceoff_remote_slots 4\n"), "{metrics}");
     assert!(metrics.contains("faceoff_remote_workers 2\n"), "{metrics}");
 
-    // After half a minute without a report they are silent. After an hour the job is reported as long.
+    // After half a minute without contact, the workers are silent. After an hour, the job is reported as long.
     site.advance(30);
     assert_eq!(worker_states(&worker_list().await), ["silent", "silent"]);
     assert_eq!(worker_list().await["remote_slots"], 0);
@@ -91,18 +97,18 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
         problem: Some("the stream is <full>"),
     };
     workers.record_job("rack-1", "slot-2", job, with_problem, site.now());
-    let all = worker_list().await;
-    let busy = &all["workers"][0]["busy"][0];
+    let with_workers = worker_list().await;
+    let busy = &with_workers["workers"][0]["busy"][0];
     assert_eq!(
         (&busy["is_long"], &busy["problem"]),
         (&json!(true), &json!("the stream is <full>"))
     );
-    let named = format!("rack-1/slot-2, job {job} (hit episodes 0 to 49)");
-    let alarm = format!("A job has been running for more than an hour: {named}");
+    let job_name = format!("rack-1/slot-2, job {job} (hit episodes 0 to 49)");
+    let alarm = format!("A job has been running for more than an hour: {job_name}");
     let problem =
-        format!("A worker cannot send the result of a job: {named}: the stream is <full>");
+        format!("A worker cannot send the result of a job: {job_name}: the stream is <full>");
     assert_eq!(
-        (&all["alarms"], &all["problems"]),
+        (&with_workers["alarms"], &with_workers["problems"]),
         (&json!([alarm]), &json!([problem]))
     );
     for path in ["/organiser", "/organiser/workers"] {
@@ -144,7 +150,7 @@ async fn worker_is_banned_and_readmitted_on_page_and_in_the_api() {
     let mut grace = Browser::join(&site, "Grace", role).await;
     let workers = site.store.workers().clone();
     workers.enable();
-    workers.record_poll("rack-1", about("1.0", 4), None, site.now());
+    workers.record_poll("rack-1", worker_info("1.0", 4), None, site.now());
     let html = dashboard_page(&grace.open("/organiser/workers").await, 200);
     assert_eq!(
         links(&html, "a[href='/organiser/decide/ban/rack-1']").len(),

@@ -10,7 +10,7 @@
 mod recorded;
 
 use faceoff_sim::{
-    Batch, BatchSetup, Interpolation, JOINTS, LanePath, PerturbationSettings, Plant, SUBSTEPS,
+    Batch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant, SUBSTEPS, SimdLevel,
     model::INITIAL_Q,
 };
 use faceoff_types::{Factors, Seed, Task};
@@ -52,19 +52,19 @@ fn main() {
 fn compare(name: &str, recorded: &[Recorded]) {
     let variants = [
         ("one by one", None),
-        ("plain", Some(LanePath::PLAIN)),
-        ("avx", LanePath::avx()),
+        ("plain", Some(SimdLevel::PLAIN)),
+        ("avx", SimdLevel::avx()),
     ];
     let mut least = [Duration::MAX; 3];
     for _ in 0..ROUNDS {
-        for (least, (variant, path)) in least.iter_mut().zip(variants) {
-            if path.is_none() && variant == "avx" {
+        for (least, (variant, simd_level)) in least.iter_mut().zip(variants) {
+            if simd_level.is_none() && variant == "avx" {
                 continue;
             }
             let mut worlds = Worlds::new(recorded, WORLDS);
             let start = cpu_time();
             for _ in 0..STEPS {
-                worlds.step(path);
+                worlds.step(simd_level);
             }
             *least = (cpu_time() - start).min(*least);
         }

@@ -1,7 +1,7 @@
 //! Recorded actions of striker in whole episodes, and worlds that replay them.
 
 use faceoff_sim::{
-    Episode, Interpolation, LanePath, PerturbationSettings, Plant, StepOutcome, env_info,
+    Episode, Interpolation, PerturbationSettings, Plant, SimdLevel, StepOutcome, env_info,
     model::INITIAL_Q, step_episodes_on,
 };
 use faceoff_types::{Factors, Seed, Task};
@@ -119,7 +119,7 @@ impl<'r> Worlds<'r> {
     }
 
     /// A control step of all worlds: at once with an instruction set, or one by one.
-    pub fn step(&mut self, path: Option<LanePath>) {
+    pub fn step(&mut self, simd_level: Option<SimdLevel>) {
         let actions = self
             .playing
             .iter()
@@ -128,11 +128,11 @@ impl<'r> Worlds<'r> {
                 let actions = &self.recorded[e].actions;
                 actions[episode.steps() as usize].as_slice()
             });
-        match path {
-            Some(path) => {
+        match simd_level {
+            Some(simd_level) => {
                 let actions: Vec<&[f64]> = actions.collect();
                 let mut episodes: Vec<&mut Episode> = self.episodes.iter_mut().collect();
-                step_episodes_on(path, &mut episodes, &actions, &mut self.outcomes);
+                step_episodes_on(simd_level, &mut episodes, &actions, &mut self.outcomes);
             }
             None => {
                 let actions: Vec<&[f64]> = actions.collect();

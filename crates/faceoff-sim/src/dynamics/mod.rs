@@ -7,5 +7,5 @@ mod avx;
 pub(crate) mod lane_kernel;
 pub mod lanes;
 pub mod ldlt;
-pub mod path;
+pub mod simd_level;
 pub mod spatial;

@@ -11,7 +11,7 @@ use crate::{
     dynamics::{
         lane_kernel::LaneKernel,
         lanes::{Lanes, MAX_LANES},
-        path::LanePath,
+        simd_level::SimdLevel,
     },
     model::SUBSTEPS,
     table::puck::Puck,
@@ -35,7 +35,7 @@ impl World {
     /// Control steps of several worlds at once, with the same bits as [`World::control_step`]: at most four arms share
     /// the lanes of a register. Each world has its own air force.
     pub(crate) fn control_step_all<'a, A: FnMut(&Puck) -> [f64; 2]>(
-        path: LanePath,
+        simd_level: SimdLevel,
         worlds: impl Iterator<Item = (&'a mut Self, A)>,
     ) {
         let mut lane_worlds: Vec<LaneWorld<'_, A>> = Vec::with_capacity(MAX_LANES);
@@ -54,7 +54,7 @@ impl World {
         match lane_worlds.as_mut_slice() {
             [] => {}
             [lane_world] => lane_world.world.control_step(&mut lane_world.air_force),
-            lane_worlds => path.run(first, ControlStep { lane_worlds }),
+            lane_worlds => simd_level.run(first, ControlStep { lane_worlds }),
         }
     }
 

@@ -1,14 +1,14 @@
 //! Episodes stepped at once have the same bits as alone, with every instruction set.
 
 use faceoff_sim::{
-    Bounds, Episode, Interpolation, JOINTS, LanePath, PerturbationSettings, Plant, StepOutcome,
+    Bounds, Episode, Interpolation, JOINTS, PerturbationSettings, Plant, SimdLevel, StepOutcome,
     golden::strike, model::INITIAL_Q, step_episodes, step_episodes_on,
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factor, Factors, Seed, Task};
 
 /// All instruction sets of this machine.
-fn paths() -> Vec<LanePath> {
-    [Some(LanePath::PLAIN), LanePath::avx()]
+fn simd_levels() -> Vec<SimdLevel> {
+    [Some(SimdLevel::PLAIN), SimdLevel::avx()]
         .into_iter()
         .flatten()
         .collect()
@@ -105,7 +105,7 @@ fn snapshot(episode: &Episode) -> (Vec<u64>, String) {
 }
 
 /// Runs all to their ends, at once and each alone; returns the reasons of their ends.
-fn compare(path: LanePath, plays: Vec<Play>) -> Vec<EpisodeEnd> {
+fn compare(simd_level: SimdLevel, plays: Vec<Play>) -> Vec<EpisodeEnd> {
     let mut ends = vec![];
     let mut pairs: Vec<(Play, Play)> = plays.into_iter().map(|p| (p.clone(), p)).collect();
     while !pairs.is_empty() {
@@ -122,10 +122,10 @@ fn compare(path: LanePath, plays: Vec<Play>) -> Vec<EpisodeEnd> {
             .iter_mut()
             .map(|(play, _)| &mut play.episode)
             .collect();
-        step_episodes_on(path, &mut episodes, &actions, &mut at_once);
+        step_episodes_on(simd_level, &mut episodes, &actions, &mut at_once);
         for ((stepped, reference), (a, b)) in pairs.iter().zip(at_once.iter().zip(&alone)) {
             let label = format!(
-                "{path:?}, {:?}, step {}",
+                "{simd_level:?}, {:?}, step {}",
                 stepped.habit,
                 stepped.episode.steps()
             );
@@ -150,14 +150,14 @@ fn compare(path: LanePath, plays: Vec<Play>) -> Vec<EpisodeEnd> {
 #[test]
 fn episodes_with_contacts_are_the_same_at_once() {
     let singles = Factor::ALL.map(|factor| Factors::NONE.with(factor));
-    for path in paths() {
+    for simd_level in simd_levels() {
         for factors in [Factors::NONE, Factors::ALL].into_iter().chain(singles) {
             // Both full and partly filled groups of lanes.
             let plays = (0..13).map(|number| {
                 let task = Task::ALL[number as usize % 3];
                 Play::new(task, number, factors, Habit::Strikes)
             });
-            let ends = compare(path, plays.collect());
+            let ends = compare(simd_level, plays.collect());
             let some = |end: EpisodeEnd| ends.contains(&end);
             assert!(some(EpisodeEnd::CrossedMiddle), "{factors:?}: {ends:?}");
         }
@@ -166,7 +166,7 @@ fn episodes_with_contacts_are_the_same_at_once() {
 
 #[test]
 fn diverging_world_does_not_change_the_others() {
-    for path in paths() {
+    for simd_level in simd_levels() {
         let habits = [
             Habit::Holds,
             Habit::Diverges(7),
@@ -179,7 +179,7 @@ fn diverging_world_does_not_change_the_others() {
             let task = Task::ALL[number as usize / habits.len()];
             Play::new(task, number, Factors::ALL, habit)
         });
-        let ends = compare(path, plays.collect());
+        let ends = compare(simd_level, plays.collect());
         assert!(ends.contains(&EpisodeEnd::AgentFault), "{ends:?}");
         assert!(ends.contains(&EpisodeEnd::Horizon), "{ends:?}");
     }

@@ -1,4 +1,4 @@
-//! A site with a tournament.
+//! A site with a tournament, for tests: helpers that start rounds and run games.
 
 use super::fake_slot::{self, GameOutcome};
 use crate::site::{ADMIN, Answer, Site, TestTeam, string};
@@ -11,16 +11,19 @@ use std::collections::BTreeMap;
 /// A site with a tournament, whose teams all have a valid submission.
 pub struct Cup {
     pub site: Site,
+    /// The teams by name.
     pub teams: BTreeMap<String, TestTeam>,
+    /// Path of the tournament in the API.
     pub path: String,
 }
 
 impl Cup {
-    /// Creates teams with valid submissions, and a tournament of them.
+    /// Creates teams with valid submissions, and a tournament of them. `body` has the other fields of the request.
     pub async fn open(names: &[&str], body: Value) -> Self {
         Self::open_on(Site::start().await, names, body).await
     }
 
+    /// As [`Self::open`], on a given site.
     pub async fn open_on(site: Site, names: &[&str], mut body: Value) -> Self {
         let mut teams = BTreeMap::new();
         for name in names {
@@ -52,9 +55,10 @@ impl Cup {
         self.site.post(&path, Some(ADMIN), &body).await
     }
 
+    /// Changes the tournament as an organiser.
     pub async fn change(&self, body: Value) -> Answer {
         let request = self.site.request(Method::PATCH, &self.path, Some(ADMIN));
-        Answer::of(request.json(&body).send().await.unwrap()).await
+        Answer::read(request.json(&body).send().await.unwrap()).await
     }
 
     /// The tournament's public view.

@@ -1,4 +1,4 @@
-//! Decisions during a tournament: withdrawal, disqualification, voiding, re-running, pausing and closing.
+//! Tests of decisions during a tournament: withdrawal, disqualification, voiding, rerunning, pausing and closing.
 
 use super::{
     cup::{Cup, first_by_name_wins, team_names},
@@ -9,6 +9,7 @@ use faceoff_store::{Actor, TournamentChange};
 use faceoff_types::{Ruleset, TournamentRules};
 use serde_json::{Value, json};
 
+/// The team's row in the standings of a tournament.
 fn row<'a>(view: &'a Value, team: &str) -> &'a Value {
     let rows = view["tables"][0]["standings"].as_array().unwrap();
     rows.iter()
@@ -16,7 +17,8 @@ fn row<'a>(view: &'a Value, team: &str) -> &'a Value {
         .unwrap_or_else(|| panic!("{team} has no row in {view}"))
 }
 
-fn names(view: &Value) -> Vec<String> {
+/// The names of the teams in the order of the standings.
+fn ranked_names(view: &Value) -> Vec<String> {
     let rows = view["tables"][0]["standings"].as_array().unwrap();
     rows.iter().map(|row| string(&row["team"])).collect()
 }
@@ -44,9 +46,13 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
     let mut confirmed = departure;
     confirmed["confirm"] = json!("A");
     let view = cup.post("departures", confirmed.clone()).await.json(200);
-    let left = &view["entrants"][0]["departure"];
+    let shown_departure = &view["entrants"][0]["departure"];
     assert_eq!(
-        [&left["as"], &left["from_round"], &left["reason"]],
+        [
+            &shown_departure["as"],
+            &shown_departure["from_round"],
+            &shown_departure["reason"]
+        ],
         [&json!("withdrawn"), &json!(2), &json!("the arm is sold")]
     );
     assert_eq!(row(&view, "A")["points_per_round"][0], 6);
@@ -54,22 +60,22 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
     let view = cup.view().await;
     assert_eq!(
         view["phase"], "played",
-        "its open games do not block the round"
+        "A's open games do not block the round"
     );
-    // Of round 2 only the game of B and C counts, also if others were played.
+    // Of round 2 only the game of B and C counts, even if games with A were played.
     assert_eq!(row(&view, "A")["points_per_round"], json!([6, 0]));
     assert_eq!(row(&view, "B")["points_per_round"], json!([3, 3]));
     assert_eq!(row(&view, "C")["points_per_round"], json!([0, 0]));
     assert_eq!(row(&view, "A")["left"], "withdrawn");
     assert_eq!(
-        names(&view),
+        ranked_names(&view),
         ["A", "B", "C"],
         "the withdrawn team keeps its rank"
     );
     for game in cup.games().await {
         let (home, away) = team_names(&game);
-        let with_a = [home, away].contains(&"A".to_owned());
-        if game["round"] == 2 && with_a {
+        let is_game_of_a = [home, away].contains(&"A".to_owned());
+        if game["round"] == 2 && is_game_of_a {
             assert_eq!(game["excluded_by"], "A");
             assert_ne!(game["state"], "queued");
         } else {
@@ -89,7 +95,7 @@ async fn disqualified_team_is_last_and_loses_chosen_rounds() {
         cup.start_round().await;
         cup.play(first_by_name_wins).await;
     }
-    let departure = |from: Value| json!({ "team": "A", "as": "disqualified", "reason": "it read the seed", "confirm": "A", "from_round": from });
+    let departure = |from_round: Value| json!({ "team": "A", "as": "disqualified", "reason": "it read the seed", "confirm": "A", "from_round": from_round });
     cup.post("departures", departure(json!(7)))
         .await
         .problem(409, "conflict", &["from_round"]);
@@ -99,7 +105,7 @@ async fn disqualified_team_is_last_and_loses_chosen_rounds() {
         &["from_round", "1 to 100"],
     );
     let view = cup.post("departures", departure(json!(2))).await.json(200);
-    assert_eq!(names(&view), ["B", "C", "A"]);
+    assert_eq!(ranked_names(&view), ["B", "C", "A"]);
     assert_eq!(row(&view, "A")["points_per_round"], json!([6, 0]));
     assert_eq!(row(&view, "B")["points_per_round"], json!([3, 3]));
     assert_eq!(row(&view, "A")["left"], "disqualified");
@@ -128,12 +134,12 @@ async fn team_is_withdrawn_by_a_member_not_by_its_token() {
         .await
         .problem(403, "forbidden", &["departures"]);
     let invitation = json!({ "role": "member", "team": cup.teams["A"].id, "note": "Ada" });
-    let made = cup
+    let created = cup
         .site
         .post("/api/v1/invitations", Some(ADMIN), &invitation)
         .await
         .json(201);
-    let join = json!({ "code": made["code"], "name": "Ada" });
+    let join = json!({ "code": created["code"], "name": "Ada" });
     let joined = cup
         .site
         .post("/api/v1/invitations/accept", None, &join)
@@ -211,13 +217,13 @@ async fn voided_game_is_rerun_on_the_same_seed() {
         .await
         .problem(409, "conflict", &["with a result can be voided"]);
     assert_eq!(post("rerun", &json!({})).await.json(200)["state"], "queued");
-    let (claim, again, rerun_seed) = cup.claim().await.unwrap();
+    let (claim, rerun, rerun_seed) = cup.claim().await.unwrap();
     assert_eq!(
-        (again.id, rerun_seed),
+        (rerun.id, rerun_seed),
         (game.id, seed),
         "the same game on the same seed"
     );
-    cup.commit(&claim, &again, seed, GameOutcome::goals(0, 1))
+    cup.commit(&claim, &rerun, seed, GameOutcome::goals(0, 1))
         .await;
     let played = cup.site.get(&path, None).await.json(200);
     assert_eq!(
@@ -229,16 +235,16 @@ async fn voided_game_is_rerun_on_the_same_seed() {
         .get(&format!("{path}/attempts"), Some(ADMIN))
         .await
         .json(200);
-    let ends: Vec<&Value> = attempts
+    let outcomes: Vec<&Value> = attempts
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| &one["end"])
+        .map(|attempt| &attempt["end"])
         .collect();
     assert_eq!(
-        ends,
+        outcomes,
         [&json!("played"), &json!("played")],
-        "attempts list the voided game, too"
+        "the list also has the attempt whose result was voided"
     );
     cup.start_round().await;
 }
@@ -357,8 +363,8 @@ async fn tournament_keeps_its_ruleset_until_its_rules_change() {
     let cup = Cup::open(&["A", "B"], json!({})).await;
     let store = &cup.site.store;
     let opened = store.tournaments().await.unwrap().remove(0);
-    // As a server with the previous ruleset would have stored it.
-    let earlier = TournamentChange {
+    // The change stores the tournament as a server with the previous ruleset would have stored it.
+    let earlier_ruleset = TournamentChange {
         rules: Some(TournamentRules {
             ruleset: Ruleset::Second,
             ..opened.rules
@@ -367,7 +373,7 @@ async fn tournament_keeps_its_ruleset_until_its_rules_change() {
     };
     let now = cup.site.now();
     store
-        .change_tournament(Actor::Organiser, opened.id, &earlier, now)
+        .change_tournament(Actor::Organiser, opened.id, &earlier_ruleset, now)
         .await
         .unwrap();
     for rules in [
@@ -375,15 +381,17 @@ async fn tournament_keeps_its_ruleset_until_its_rules_change() {
         json!({ "mirrored": false }),
         json!({ "ruleset": "airhockey-2023.2" }),
     ] {
-        let same = cup.change(json!({ "rules": rules })).await.json(200);
-        assert_eq!(same["rules"]["ruleset"], "airhockey-2023.2");
+        let unchanged = cup.change(json!({ "rules": rules })).await.json(200);
+        assert_eq!(unchanged["rules"]["ruleset"], "airhockey-2023.2");
     }
-    let named = json!({ "ruleset": "airhockey-2023.2", "steps": 1500 });
-    cup.change(json!({ "rules": named })).await.problem(
-        422,
-        "invalid-content",
-        &["ruleset", "airhockey-2023.3", "leave it out"],
-    );
+    let with_old_ruleset = json!({ "ruleset": "airhockey-2023.2", "steps": 1500 });
+    cup.change(json!({ "rules": with_old_ruleset }))
+        .await
+        .problem(
+            422,
+            "invalid-content",
+            &["ruleset", "airhockey-2023.3", "leave it out"],
+        );
     let changed = cup.change(json!({ "rules": { "steps": 1500 } })).await;
     assert_eq!(changed.json(200)["rules"]["ruleset"], "airhockey-2023.3");
 }

@@ -1,4 +1,4 @@
-//! Access to the files of games.
+//! Tests of access to the files of games: recordings and logs.
 
 use super::cup::{Cup, first_by_name_wins};
 use crate::site::{ADMIN, string};
@@ -17,7 +17,8 @@ async fn file_statuses(cup: &Cup, game: &str, token: Option<&str>) -> [u16; 4] {
     statuses.try_into().unwrap()
 }
 
-async fn seed(cup: &Cup, game: &str, token: Option<&str>) -> Value {
+/// The game's seed, as the caller sees it; null if it is hidden.
+async fn visible_seed(cup: &Cup, game: &str, token: Option<&str>) -> Value {
     let view = cup
         .site
         .get(&format!("/api/v1/games/{game}"), token)
@@ -28,7 +29,7 @@ async fn seed(cup: &Cup, game: &str, token: Option<&str>) -> Value {
 
 #[tokio::test]
 async fn own_side_is_available_at_once_and_both_once_published() {
-    for (publishes, when_over, when_closed) in [
+    for (publishes, is_public_after_round, is_public_after_closing) in [
         ("at_release", true, true),
         ("at_close", false, true),
         ("never", false, false),
@@ -49,7 +50,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
         );
         let game = cup.play_next(first_by_name_wins).await.unwrap();
         let [home, away] = cup.names(&game).await;
-        let other = ["A", "B", "C"]
+        let third_team = ["A", "B", "C"]
             .into_iter()
             .find(|name| *name != home && *name != away)
             .unwrap();
@@ -65,12 +66,15 @@ async fn own_side_is_available_at_once_and_both_once_published() {
             [403, 403, 200, 403]
         );
         assert_eq!(
-            file_statuses(&cup, &id, Some(cup.token(other))).await,
+            file_statuses(&cup, &id, Some(cup.token(third_team))).await,
             [403; 4]
         );
         assert_eq!(file_statuses(&cup, &id, Some(ADMIN)).await, [200; 4]);
-        assert_eq!(seed(&cup, &id, Some(cup.token(&home))).await, Value::Null);
-        assert_ne!(seed(&cup, &id, Some(ADMIN)).await, Value::Null);
+        assert_eq!(
+            visible_seed(&cup, &id, Some(cup.token(&home))).await,
+            Value::Null
+        );
+        assert_ne!(visible_seed(&cup, &id, Some(ADMIN)).await, Value::Null);
         cup.play(first_by_name_wins).await;
         let public_statuses = |public: bool| {
             if public {
@@ -81,7 +85,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
         };
         assert_eq!(
             file_statuses(&cup, &id, None).await,
-            public_statuses(when_over),
+            public_statuses(is_public_after_round),
             "{publishes}, over"
         );
         cup.post("close", json!({ "confirm": "Cup" }))
@@ -89,16 +93,22 @@ async fn own_side_is_available_at_once_and_both_once_published() {
             .json(200);
         assert_eq!(
             file_statuses(&cup, &id, None).await,
-            public_statuses(when_closed),
+            public_statuses(is_public_after_closing),
             "{publishes}, closed"
         );
-        assert_eq!(seed(&cup, &id, None).await.is_string(), when_closed);
+        assert_eq!(
+            visible_seed(&cup, &id, None).await.is_string(),
+            is_public_after_closing
+        );
         let view = cup
             .site
             .get(&format!("/api/v1/games/{id}"), None)
             .await
             .json(200);
-        assert_eq!(view["result"]["recording"]["public"], when_closed);
+        assert_eq!(
+            view["result"]["recording"]["public"],
+            is_public_after_closing
+        );
         // The log of an agent stays private to its team.
         let log = cup
             .site
@@ -110,7 +120,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
         assert_eq!(log.body, format!("{away} was here\n"));
         assert!(log.header("content-type").starts_with("text/plain"));
         assert_eq!(
-            file_statuses(&cup, &id, Some(cup.token(other))).await[3],
+            file_statuses(&cup, &id, Some(cup.token(third_team))).await[3],
             403
         );
     }

@@ -1,6 +1,7 @@
-//! A fake slot: it claims games and commits given results with files, without running agents.
+//! A fake slot (the place of a worker in which one job runs) for tests: it claims games and commits made-up results with files,
+//! without running agents.
 
-use crate::site::Site;
+use crate::site::{LEASE_S, Site};
 use faceoff_scoring::{
     tier_of,
     tournament::{Forfeit, GameScore, GameTally, SideScore, final_score, judge},
@@ -23,6 +24,7 @@ pub struct GameOutcome {
 }
 
 impl GameOutcome {
+    /// A game with these goals, and without fouls and forfeits.
     pub fn goals(home: u32, away: u32) -> Self {
         Self {
             goals: [home, away],
@@ -32,6 +34,7 @@ impl GameOutcome {
         }
     }
 
+    /// The same outcome with home and away swapped.
     pub fn swapped(mut self) -> Self {
         self.goals.reverse();
         self.fouls.reverse();
@@ -40,8 +43,9 @@ impl GameOutcome {
         self
     }
 
-    /// The score as a slot commits it.
+    /// The score as a slot commits it. Numbers that do not follow from the outcome are arbitrary.
     pub fn score(self, agents: [&str; 2], seed: Seed) -> Value {
+        // A game has 90 windows of 500 control steps, in which penalty points are counted.
         let windows = 90;
         let forfeits = self
             .forfeits
@@ -103,7 +107,7 @@ impl GameOutcome {
 
 /// Claims the next game; `None` if no game is queued.
 pub async fn claim(site: &Site) -> Option<(JobClaim, Game, Seed)> {
-    let claimed = site.store.claim("slot 0", 60, site.now()).await;
+    let claimed = site.store.claim("slot 0", LEASE_S, site.now()).await;
     let ClaimedJob { claim, job } = claimed.unwrap()?;
     let Job::Game { game, seeds, .. } = job else {
         panic!("expected a game, claimed {job:?}");
@@ -142,6 +146,7 @@ pub async fn commit(
     assert_eq!(committed.unwrap(), CommitOutcome::Stored);
 }
 
+/// Stores the recordings of a game: of both sides, and of each side.
 async fn store_files(site: &Site, claim: &JobClaim, game: &Game) -> GameRecording {
     let key = format!("games/{}/{}", game.id, claim.nonce);
     let mut hashes = Vec::new();
@@ -150,8 +155,8 @@ async fn store_files(site: &Site, claim: &JobClaim, game: &Game) -> GameRecordin
         let local = site.folder.path().join(file);
         std::fs::write(&local, &bytes).unwrap();
         let artifacts = site.store.artifacts();
-        let stored_as = format!("{key}/{file}");
-        artifacts.put_file(&stored_as, &local).await.unwrap();
+        let file_key = format!("{key}/{file}");
+        artifacts.put_file(&file_key, &local).await.unwrap();
         hashes.push(blake3::hash(bytes.as_bytes()).to_string());
     }
     let [game_blake3, home, away] = hashes.try_into().unwrap();

@@ -1,4 +1,5 @@
-//! Tournament formats: round robin with byes, groups with a final, Swiss, and mirrored pairs.
+//! Tests of tournament formats: round robin with byes (a team without an opponent on a matchday), groups with a final, Swiss
+//! (each round pairs neighbours of the standings), and mirrored pairs (two games with the same seed and swapped sides).
 
 use super::{
     cup::{Cup, first_by_name_wins, team_names},
@@ -8,12 +9,13 @@ use crate::site::{ADMIN, Site, result, string};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Home and away team of each game of a round.
 fn meetings(games: &[Value], round: u32) -> BTreeSet<(String, String)> {
     let round_games = games.iter().filter(|game| game["round"] == round);
     round_games.map(team_names).collect()
 }
 
-fn turned(pairs: &BTreeSet<(String, String)>) -> BTreeSet<(String, String)> {
+fn with_swapped_sides(pairs: &BTreeSet<(String, String)>) -> BTreeSet<(String, String)> {
     let pairs = pairs.iter().cloned();
     pairs.map(|(home, away)| (away, home)).collect()
 }
@@ -29,19 +31,22 @@ async fn double_round_robin_has_byes_and_swaps_sides() {
         assert_eq!(with_bye, names.map(str::to_owned).into());
         assert_eq!(started["number"], round);
         // Games are played in the order of matchdays.
-        let mut last = 0;
+        let mut last_matchday = 0;
         while let Some(game) = cup.play_next(first_by_name_wins).await {
             let matchday = game.purpose.schedule_entry().unwrap().matchday;
-            assert!(matchday >= last, "{matchday} after {last}");
-            last = matchday;
+            assert!(
+                matchday >= last_matchday,
+                "{matchday} after {last_matchday}"
+            );
+            last_matchday = matchday;
         }
-        assert_eq!(last, 5);
+        assert_eq!(last_matchday, 5);
     }
     let games = cup.games().await;
     assert_eq!(games.len(), 20);
     let (first, second) = (meetings(&games, 1), meetings(&games, 2));
     assert_eq!(first.len(), 10);
-    assert_eq!(second, turned(&first));
+    assert_eq!(second, with_swapped_sides(&first));
     let view = cup.view().await;
     let standings = view["tables"][0]["standings"].as_array().unwrap();
     let points: Vec<&Value> = standings
@@ -77,11 +82,11 @@ async fn game_shows_its_seed_label_but_not_the_seed() {
     assert_eq!(distinct.len(), 6);
     cup.play(first_by_name_wins).await;
     let path = format!("{}/games", cup.path);
-    let organisers = cup.site.get(&path, Some(ADMIN)).await.json(200);
-    let public = cup.site.get(&path, Some(cup.token("A"))).await.body;
-    for game in organisers.as_array().unwrap() {
+    let organiser_list = cup.site.get(&path, Some(ADMIN)).await.json(200);
+    let team_list = cup.site.get(&path, Some(cup.token("A"))).await.body;
+    for game in organiser_list.as_array().unwrap() {
         let seed = string(&game["result"]["recording"]["seed"]);
-        assert!(!public.contains(&seed), "{seed} is in {public}");
+        assert!(!team_list.contains(&seed), "{seed} is in {team_list}");
     }
 }
 
@@ -105,27 +110,26 @@ async fn groups_send_their_best_to_a_final() {
         names.map(string).min().unwrap()
     };
     let finalists: BTreeSet<String> = groups.iter().map(best_of).collect();
-    let last = cup.start_round().await;
-    let entrants_of_final: BTreeSet<String> = last["submissions"]
+    let final_round = cup.start_round().await;
+    let entrants_of_final: BTreeSet<String> = final_round["submissions"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| string(&one["team_name"]))
+        .map(|submission| string(&submission["team_name"]))
         .collect();
     assert_eq!(entrants_of_final, finalists);
-    // In the final the other team wins.
-    let upset =
+    let last_by_name_wins =
         |game: &faceoff_store::Game, names: [&str; 2]| first_by_name_wins(game, names).swapped();
-    assert_eq!(cup.play(upset).await, 1);
+    assert_eq!(cup.play(last_by_name_wins).await, 1);
     let view = cup.view().await;
-    let titles: Vec<&Value> = view["tables"]
+    let table_scopes: Vec<&Value> = view["tables"]
         .as_array()
         .unwrap()
         .iter()
         .map(|table| &table["of"])
         .collect();
     assert_eq!(
-        titles,
+        table_scopes,
         [&json!("final"), &json!({"group": 1}), &json!({"group": 2})]
     );
     assert_eq!(view["champion"], json!(finalists.last().unwrap()));
@@ -139,7 +143,7 @@ async fn swiss_pairs_neighbours_and_gives_points_for_a_bye() {
     let names = ["A", "B", "C", "D", "E"];
     let format = json!({ "kind": "swiss", "rounds": 3 });
     let cup = Cup::open(&names, json!({ "rules": { "format": format } })).await;
-    let mut met = BTreeMap::<BTreeSet<String>, u32>::new();
+    let mut meetings = BTreeMap::<BTreeSet<String>, u32>::new();
     for _ in 0..3 {
         let started = cup.start_round().await;
         assert_eq!(started["progress"]["games"], 2);
@@ -148,9 +152,9 @@ async fn swiss_pairs_neighbours_and_gives_points_for_a_bye() {
     }
     for game in cup.games().await {
         let (home, away) = team_names(&game);
-        *met.entry([home, away].into()).or_default() += 1;
+        *meetings.entry([home, away].into()).or_default() += 1;
     }
-    assert!(met.values().all(|times| *times == 1), "{met:?}");
+    assert!(meetings.values().all(|times| *times == 1), "{meetings:?}");
     let view = cup.view().await;
     let standings = view["tables"][0]["standings"].as_array().unwrap();
     let byes: u64 = standings
@@ -163,8 +167,8 @@ async fn swiss_pairs_neighbours_and_gives_points_for_a_bye() {
         .map(|row| row["points"].as_u64().unwrap())
         .sum();
     assert_eq!(points, 3 * (2 * 3 + 3), "three for each win and each bye");
-    // A wins all its games. But if another team has a bye, the two best teams may not meet, since others would meet
-    // twice. Then goals decide between them, so the champion is not always A.
+    // A wins all its games. But another team with a bye may have as many points, and may not meet A, since other teams would
+    // then meet twice. Goals decide between the two, so the champion is not always A.
     let row_of = |team: &str| standings.iter().find(|row| row["team"] == team).unwrap();
     assert_eq!(row_of("A")["points"], 9);
     assert_eq!(standings[0]["points"], 9);
@@ -176,7 +180,7 @@ async fn mirrored_meeting_is_two_games_with_the_same_seed() {
     let rules = json!({ "mirrored": true, "format": { "kind": "round_robin", "rounds": 1 } });
     let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
     cup.start_round().await;
-    let one = cup.play_next(first_by_name_wins).await.unwrap();
+    let first_game = cup.play_next(first_by_name_wins).await.unwrap();
     assert_eq!(cup.play(first_by_name_wins).await, 5);
     let games = cup.games().await;
     for halves in games.chunks(2) {
@@ -189,7 +193,7 @@ async fn mirrored_meeting_is_two_games_with_the_same_seed() {
         let (home, away) = team_names(&halves[0]);
         assert_eq!(team_names(&halves[1]), (away, home));
     }
-    assert_eq!(one.purpose.schedule_entry().unwrap().pairing, 1);
+    assert_eq!(first_game.purpose.schedule_entry().unwrap().pairing, 1);
     let standings = cup.view().await["tables"][0]["standings"].clone();
     assert_eq!(standings[0]["points"], 12, "each half counts");
     let ratings = cup
@@ -228,7 +232,7 @@ async fn default_entrants_are_ranked_and_deployable_or_improvable() {
             .as_array()
             .unwrap()
             .iter()
-            .map(|one| string(&one["team_name"]))
+            .map(|entrant| string(&entrant["team_name"]))
             .collect();
         assert_eq!(names, ["Deployable", "Improvable"]);
         assert_eq!(opened["stage"], json!(site.stage().await));
@@ -238,7 +242,7 @@ async fn default_entrants_are_ranked_and_deployable_or_improvable() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| &one["number"])
+        .map(|tournament| &tournament["number"])
         .collect();
     assert_eq!(numbers, [&json!(1), &json!(2), &json!(3)]);
 }
@@ -255,9 +259,10 @@ async fn team_without_valid_submission_blocks_the_round() {
         .await
         .problem(409, "conflict", &["Late", "Wait for them"]);
     assert_eq!(cup.view().await["phase"], "open", "nothing was done");
-    // After its withdrawal the round can start.
-    let out = json!({ "team": "Late", "as": "withdrawn", "reason": "no agent", "confirm": "Late" });
-    let view = cup.post("departures", out).await.json(200);
+    // The round can start after the team is withdrawn.
+    let departure =
+        json!({ "team": "Late", "as": "withdrawn", "reason": "no agent", "confirm": "Late" });
+    let view = cup.post("departures", departure).await.json(200);
     assert_eq!(view["entrants"].as_array().unwrap().len(), 2);
     cup.start_round().await;
     assert_eq!(cup.play(|_, _| GameOutcome::goals(1, 1)).await, 1);
@@ -266,11 +271,12 @@ async fn team_without_valid_submission_blocks_the_round() {
 #[tokio::test]
 async fn concurrent_round_starts_create_one_round() {
     let cup = Cup::open(&["A", "B", "C"], json!({})).await;
-    let (one, other) = tokio::join!(cup.post("rounds", json!({})), cup.post("rounds", json!({})));
-    let mut statuses = [one.status.as_u16(), other.status.as_u16()];
+    let (first, second) =
+        tokio::join!(cup.post("rounds", json!({})), cup.post("rounds", json!({})));
+    let mut statuses = [first.status.as_u16(), second.status.as_u16()];
     statuses.sort_unstable();
-    assert_eq!(statuses, [201, 409], "{} {}", one.body, other.body);
-    let refused = if one.status == 409 { one } else { other };
+    assert_eq!(statuses, [201, 409], "{} {}", first.body, second.body);
+    let refused = if first.status == 409 { first } else { second };
     refused.problem(409, "conflict", &[]);
     assert_eq!(cup.games().await.len(), 3);
     cup.post("rounds", json!({})).await.problem(

@@ -1,4 +1,4 @@
-//! The page of a game, and the clips of its replay.
+//! Tests of a game's page, and of the game's clips, which are the data of its replay in parts of 500 control steps.
 
 use super::cup::{Cup, first_by_name_wins};
 use crate::{
@@ -12,6 +12,7 @@ use faceoff_types::{GameLimits, Interpolation, Profile, Seed, Side};
 use scraper::{Html, Selector};
 use serde_json::json;
 
+/// Control steps of the recorded game.
 const STEPS: u32 = 600;
 
 /// The clip file of a short game in which both arms do not move.
@@ -30,6 +31,7 @@ fn record_game_clips() -> Vec<u8> {
         while running.is_in_rally() {
             let actions = Side::BOTH.map(|side| {
                 let question = running.question(side).unwrap().unwrap();
+                // Entries 6 to 12 of an observation are the joint positions.
                 question.observation[6..13].to_vec()
             });
             let timing = AnswerTiming {
@@ -46,6 +48,7 @@ fn record_game_clips() -> Vec<u8> {
     running.finish().sink.finish().unwrap()
 }
 
+/// A tournament in which one game is played and others are queued. `publishes` says when recordings become public.
 async fn play_one_game(publishes: &str) -> (Cup, Game) {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
     let settings = json!({ "publishes": publishes });
@@ -61,17 +64,18 @@ async fn play_one_game(publishes: &str) -> (Cup, Game) {
 
 /// Stores a clip file beside the recording of a game.
 async fn add_clips(cup: &Cup, game: &Game) {
-    let row = cup.site.store.game(game.id).await.unwrap();
-    let faceoff_store::GameState::Played(played) = row.state else {
-        panic!("{row:?}");
+    let stored = cup.site.store.game(game.id).await.unwrap();
+    let faceoff_store::GameState::Played(result) = stored.state else {
+        panic!("{stored:?}");
     };
-    let key = format!("{}/clips", played.recording.unwrap().key);
+    let key = format!("{}/clips", result.recording.unwrap().key);
     let file = cup.site.folder.path().join("clips");
     std::fs::write(&file, record_game_clips()).unwrap();
     let artifacts = cup.site.store.artifacts();
     artifacts.put_file(&key, &file).await.unwrap();
 }
 
+/// The page of a game, as visitors see it.
 async fn page(cup: &Cup, game: &Game) -> Html {
     let answer = cup.site.get(&format!("/games/{}", game.id), None).await;
     assert_eq!(answer.status, 200, "{}", answer.body);
@@ -108,12 +112,9 @@ async fn game_page_shows_result_and_reason() {
             .contains("The replay of this game is no longer stored")
     );
 
-    let waiting = cup.games().await;
-    let waiting = waiting
-        .iter()
-        .find(|game| game["state"] == "queued")
-        .unwrap();
-    let path = format!("/games/{}", string(&waiting["id"]));
+    let games = cup.games().await;
+    let queued = games.iter().find(|game| game["state"] == "queued").unwrap();
+    let path = format!("/games/{}", string(&queued["id"]));
     let html = cup.site.get(&path, None).await;
     assert!(
         html.body.contains("Waiting for a free slot."),
@@ -136,7 +137,11 @@ async fn game_motion_is_public_and_observations_are_not() {
     let replay = Selector::parse("#replay").unwrap();
     let replay = html.select(&replay).next().unwrap();
     let motion = replay.attr("data-chunks").unwrap();
-    assert_eq!(replay.attr("data-observed-chunks"), None, "to a visitor");
+    assert_eq!(
+        replay.attr("data-observed-chunks"),
+        None,
+        "visitors see no observations"
+    );
     for chunk in 0..STEPS.div_ceil(CHUNK_STEPS) {
         let part = motion.replace("{chunk}", &chunk.to_string());
         let request = cup.site.request(reqwest::Method::GET, &part, None);
@@ -155,10 +160,13 @@ async fn game_motion_is_public_and_observations_are_not() {
     beyond_end.problem(404, "not-found", &["no such part"]);
 
     let observed = |side| format!("{path}/sides/{side}/observed/0");
-    for (side, team, other) in [(1, &home, &away), (2, &away, &home)] {
+    for (side, team, opponent) in [(1, &home, &away), (2, &away, &home)] {
         let response = cup.site.get(&observed(side), Some(cup.token(team))).await;
         assert_eq!(response.status, 200, "{}", response.body);
-        let refused = cup.site.get(&observed(side), Some(cup.token(other))).await;
+        let refused = cup
+            .site
+            .get(&observed(side), Some(cup.token(opponent)))
+            .await;
         refused.problem(403, "forbidden", &["the side's team"]);
         let unauthenticated = cup.site.get(&observed(side), None).await;
         unauthenticated.problem(401, "unauthenticated", &["the side's team"]);

@@ -1,4 +1,4 @@
-//! Invalid input, and its documented responses.
+//! Tests of invalid input about tournaments and games, and of the documented responses to it.
 
 use super::{cup::Cup, fake_slot::GameOutcome};
 use crate::site::{ADMIN, Answer, Site};
@@ -227,6 +227,6 @@ async fn forfeit_counts_ten_to_zero() {
     );
     assert_eq!(result["winner"], game["sides"][0]["team_name"]);
     let request = cup.site.request(Method::PUT, &cup.path, Some(ADMIN));
-    let answer = Answer::of(request.send().await.unwrap()).await;
+    let answer = Answer::read(request.send().await.unwrap()).await;
     answer.problem(405, "method-not-allowed", &[]);
 }

@@ -1,4 +1,5 @@
-//! Live streams of games over real connections. The test acts as the slot.
+//! Tests of live streams of games over real connections. The test acts as the slot that runs the game: it reports goals and
+//! positions.
 
 use super::{cup::Cup, fake_slot::GameOutcome};
 use crate::{
@@ -10,9 +11,13 @@ use faceoff_types::{GameEvent, GameId, LiveEvent, LivePosition, Side};
 use reqwest::Method;
 use serde_json::json;
 
-async fn open(cup: &Cup, game: GameId, last: Option<&str>) -> Stream {
+/// Control steps of a game: 15 minutes.
+const GAME_STEPS: u32 = 45_000;
+
+/// Opens the stream of a game; `last_event_id` is the last event that the client received before it reconnects.
+async fn open(cup: &Cup, game: GameId, last_event_id: Option<&str>) -> Stream {
     let path = format!("/api/v1/games/{game}/live");
-    Stream::open(&cup.site, &path, None, last).await
+    Stream::open(&cup.site, &path, None, last_event_id).await
 }
 
 /// The next event other than a position.
@@ -54,6 +59,7 @@ fn position(step: u32) -> LivePosition {
     }
 }
 
+/// A game that a slot has claimed, with its claim and seed.
 async fn running_game() -> (
     Cup,
     faceoff_store::JobClaim,
@@ -70,7 +76,7 @@ async fn running_game() -> (
 async fn live_stream_is_resumed_without_a_gap() {
     let (cup, claim, game, seed) = running_game().await;
     let live = cup.site.store.live_games();
-    live.begin(game.id, 1, 45_000);
+    live.begin(game.id, 1, GAME_STEPS);
     let mut stream = open(&cup, game.id, None).await;
     let first = stream.next().await.unwrap();
     assert_eq!(
@@ -111,7 +117,7 @@ async fn live_stream_is_resumed_without_a_gap() {
         resumed.next().await.unwrap().id,
     ];
     assert_eq!(ids, [Some("1.2".to_owned()), Some("1.3".to_owned())]);
-    live.advance(game.id, 1, vec![ended(45_000, [3, 0])], None);
+    live.advance(game.id, 1, vec![ended(GAME_STEPS, [3, 0])], None);
     let end = next_event(&mut resumed).await.unwrap();
     assert_eq!(
         (end.id.as_deref(), &end.data["kind"]),
@@ -127,9 +133,9 @@ async fn live_stream_is_resumed_without_a_gap() {
     // A stream that is opened after the end has all events at once, and ends.
     cup.commit(&claim, &game, seed, GameOutcome::goals(3, 0))
         .await;
-    let mut late = open(&cup, game.id, None).await;
+    let mut late_stream = open(&cup, game.id, None).await;
     let mut names = Vec::new();
-    while let Some(event) = late.next().await {
+    while let Some(event) = late_stream.next().await {
         names.push(event.name);
     }
     assert_eq!(
@@ -151,11 +157,11 @@ async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
     let live = cup.site.store.live_games();
     let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "waiting");
-    live.begin(game.id, 1, 45_000);
+    live.begin(game.id, 1, GAME_STEPS);
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
     live.advance(game.id, 1, vec![goal(5, [1, 0])], None);
     assert_eq!(stream.next().await.unwrap().id.as_deref(), Some("1.1"));
-    // The slot shuts down, so this attempt is void.
+    // The slot shuts down, so this attempt ends without a result.
     cup.site
         .store
         .release(&claim, cup.site.now())
@@ -165,9 +171,9 @@ async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
     let broken = stream.next().await.unwrap();
     assert_eq!(broken.data["kind"], "broken_off");
     assert_eq!(stream.next().await.unwrap().name, "waiting");
-    let (_, again, _) = cup.claim().await.unwrap();
-    assert_eq!(again.id, game.id);
-    live.begin(game.id, 2, 45_000);
+    let (_, retried, _) = cup.claim().await.unwrap();
+    assert_eq!(retried.id, game.id);
+    live.begin(game.id, 2, GAME_STEPS);
     let restarted = stream.next().await.unwrap();
     assert_eq!(
         (restarted.name.as_str(), &restarted.data["attempt"]),
@@ -176,9 +182,9 @@ async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
     live.advance(game.id, 2, vec![goal(7, [1, 0])], None);
     assert_eq!(stream.next().await.unwrap().id.as_deref(), Some("2.1"));
     // An event id of the previous attempt is ignored: all events of this attempt are sent.
-    let mut other = open(&cup, game.id, Some("1.2")).await;
-    assert_eq!(other.next().await.unwrap().name, "snapshot");
-    assert_eq!(other.next().await.unwrap().id.as_deref(), Some("2.1"));
+    let mut resumed = open(&cup, game.id, Some("1.2")).await;
+    assert_eq!(resumed.next().await.unwrap().name, "snapshot");
+    assert_eq!(resumed.next().await.unwrap().id.as_deref(), Some("2.1"));
 }
 
 #[tokio::test]
@@ -202,7 +208,7 @@ async fn live_stream_of_a_finished_game_has_its_result() {
             None,
         )
         .header("last-event-id", "seventeen");
-    Answer::of(wrong.send().await.unwrap()).await.problem(
+    Answer::read(wrong.send().await.unwrap()).await.problem(
         400,
         "invalid-request",
         &["Last-Event-ID", "seventeen"],
@@ -227,8 +233,8 @@ async fn number_of_live_readers_is_limited() {
     busy.problem(503, "busy", &["1 readers"]);
     assert_eq!(busy.header("retry-after"), "2");
     // The stream of a cancelled game ends.
-    let out = json!({ "team": "A", "as": "withdrawn", "reason": "x", "confirm": "A" });
-    cup.post("departures", out).await.json(200);
+    let departure = json!({ "team": "A", "as": "withdrawn", "reason": "x", "confirm": "A" });
+    cup.post("departures", departure).await.json(200);
     assert_eq!(stream.next().await.unwrap().data["state"], "cancelled");
     assert_eq!(stream.next().await, None);
 }
@@ -236,7 +242,7 @@ async fn number_of_live_readers_is_limited() {
 #[tokio::test]
 async fn shutdown_does_not_wait_for_the_end_of_games() {
     let (mut cup, _, game, _) = running_game().await;
-    cup.site.store.live_games().begin(game.id, 1, 45_000);
+    cup.site.store.live_games().begin(game.id, 1, GAME_STEPS);
     let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
     cup.site.shut_down().await;

@@ -1,4 +1,5 @@
-//! The pages of tournaments, with and without results.
+//! Tests of the pages of tournaments. Visitors can choose to hide results (the cookie `spoilers=hidden`); pages must then
+//! reveal none.
 
 use super::{
     cup::{Cup, first_by_name_wins},
@@ -14,7 +15,7 @@ use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
 use scraper::{Html, Selector};
 use serde_json::{Value, json};
 
-/// A round robin of one round.
+/// The request for a tournament with one round, a round robin.
 fn one_round() -> Value {
     json!({ "rules": { "format": { "kind": "round_robin", "rounds": 1 } } })
 }
@@ -24,6 +25,7 @@ fn path(cup: &Cup) -> String {
     cup.path.replace("/api/v1", "")
 }
 
+/// The target of each link that the selector finds.
 fn links(html: &Html, selector: &str) -> Vec<String> {
     html.select(&Selector::parse(selector).unwrap())
         .map(|link| link.attr("href").unwrap().to_owned())
@@ -51,6 +53,7 @@ fn without_ids(body: &str) -> String {
 /// Numbers of goals that appear nowhere else on a page.
 const UNUSUAL_SCORE: [u32; 2] = [7913, 4421];
 
+/// The team whose name comes last wins by [`UNUSUAL_SCORE`].
 fn unusual_outcome(_: &Game, [home, away]: [&str; 2]) -> GameOutcome {
     let outcome = GameOutcome {
         penalty_points: [1.25, 2.5],
@@ -67,6 +70,7 @@ fn unusual_outcome(_: &Game, [home, away]: [&str; 2]) -> GameOutcome {
 #[track_caller]
 fn check_reveals_nothing(body: &str) {
     let body = without_ids(body);
+    // Goals, their difference, penalty points, and words for results.
     for revealing in [
         "7913",
         "4421",
@@ -86,13 +90,13 @@ fn check_reveals_nothing(body: &str) {
         "the-end-was-odd",
     ] {
         let found = body.find(revealing);
-        let context = found.map(|at| {
-            let from = body[..at]
+        let context = found.map(|position| {
+            let start = body[..position]
                 .char_indices()
                 .rev()
                 .nth(80)
-                .map_or(0, |(at, _)| at);
-            body[from..].chars().take(200).collect::<String>()
+                .map_or(0, |(index, _)| index);
+            body[start..].chars().take(200).collect::<String>()
         });
         assert_eq!(context, None, "{revealing:?} is on the page");
     }
@@ -104,10 +108,10 @@ async fn empty_tournament_list_is_not_linked() {
     let list = page(&site, "/tournaments").await;
     assert_eq!(texts(&list, "h2"), ["No tournament yet"]);
     assert!(!links(&list, "header a").contains(&"/tournaments".to_owned()));
-    let none = site
+    let unknown = site
         .get(&format!("/tournaments/{}", uuid::Uuid::now_v7()), None)
         .await;
-    assert_eq!(none.status, 404);
+    assert_eq!(unknown.status, 404);
 }
 
 #[tokio::test]
@@ -118,9 +122,9 @@ async fn tournament_page_shows_tables_schedule_and_ratings() {
     assert!(texts(&open, "h2").contains(&"No round has started yet".to_owned()));
     cup.start_round().await;
     cup.play_next(first_by_name_wins).await.unwrap();
-    let between = page(&cup.site, &path).await;
-    assert!(texts(&between, ".standings caption")[0].starts_with("Provisional"));
-    assert!(texts(&between, ".games td").contains(&"waiting for a free slot".to_owned()));
+    let running = page(&cup.site, &path).await;
+    assert!(texts(&running, ".standings caption")[0].starts_with("Provisional"));
+    assert!(texts(&running, ".games td").contains(&"waiting for a free slot".to_owned()));
     cup.play(first_by_name_wins).await;
 
     let html = page(&cup.site, &path).await;
@@ -193,7 +197,7 @@ async fn tournament_page_shows_tables_schedule_and_ratings() {
     }
 }
 
-/// The row among `rows` with the same cells except for the last one. The penalty points in it depend on the home side.
+/// The row among `rows` that has the cells of `row` except for the last one, whose penalty points depend on who plays at home.
 fn matching_row(row: &str, rows: &[String]) -> String {
     let head = row.rsplit_once(' ').unwrap().0;
     let found = rows.iter().find(|found| found.starts_with(head));
@@ -229,9 +233,9 @@ async fn excluded_game_names_the_team_that_left() {
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     let [home, _] = cup.names(&game).await;
-    let out =
+    let departure =
         json!({ "team": home, "as": "withdrawn", "reason": "the arm is sold", "confirm": home });
-    cup.post("departures", out).await.json(200);
+    cup.post("departures", departure).await.json(200);
     let words = format!("because {home} left");
     let game_page = page(&cup.site, &format!("/games/{}", game.id)).await;
     assert!(texts(&game_page, ".lead")[0].contains(&words));
@@ -239,7 +243,7 @@ async fn excluded_game_names_the_team_that_left() {
     assert_eq!(
         links(&html, ".cross a.excluded").len(),
         4,
-        "its two games are struck through in both rows"
+        "the team's two games are struck through, each in two rows"
     );
     let results = texts(&html, ".games td:last-child");
     assert!(
@@ -247,8 +251,8 @@ async fn excluded_game_names_the_team_that_left() {
         "{results:?}"
     );
     let teams = texts(&html, "[data-live-region=entrants] th");
-    let left = format!("{home} withdrawn from round 1: the arm is sold");
-    assert!(teams.contains(&left), "{teams:?}");
+    let expected = format!("{home} withdrawn from round 1: the arm is sold");
+    assert!(teams.contains(&expected), "{teams:?}");
 }
 
 #[tokio::test]
@@ -266,13 +270,13 @@ async fn hidden_results_are_on_no_page_until_requested() {
         format!("{}/teams/{ant}/{bee}", path(&cup)),
     ];
     for path in &pages {
-        let open = cup.site.get(path, None).await;
-        assert_eq!(open.status, 200, "{}", open.body);
+        let with_results = cup.site.get(path, None).await;
+        assert_eq!(with_results.status, 200, "{}", with_results.body);
         check_reveals_nothing(&open_without_results(&cup.site, path).await.body);
     }
-    let shown = without_ids(&cup.site.get(&pages[0], None).await.body);
+    let with_results = without_ids(&cup.site.get(&pages[0], None).await.body);
     assert!(
-        shown.contains("7913") && shown.contains("Champion"),
+        with_results.contains("7913") && with_results.contains("Champion"),
         "the page shows results without the setting"
     );
     let teams = Html::parse_document(&open_without_results(&cup.site, &pages[0]).await.body);
@@ -339,8 +343,8 @@ async fn finalists_are_hidden_like_results() {
     let games = cup.games().await;
     let final_game = games.iter().find(|game| game["round"] == 2).unwrap();
     let final_game = format!("/games/{}", string(&final_game["id"]));
-    let open = page(&cup.site, &path(&cup)).await;
-    assert!(links(&open, "main a").contains(&final_game));
+    let with_results = page(&cup.site, &path(&cup)).await;
+    assert!(links(&with_results, "main a").contains(&final_game));
     let hidden_page = open_without_results(&cup.site, &path(&cup)).await;
     check_reveals_nothing(&hidden_page.body);
     let hidden_page = Html::parse_document(&hidden_page.body);
@@ -350,10 +354,10 @@ async fn finalists_are_hidden_like_results() {
         rounds.iter().all(|cell| !cell.contains("rounds 1, 2")),
         "{rounds:?}"
     );
-    let with_result = format!("{}?show=round-2", path(&cup));
-    let with_result = open_without_results(&cup.site, &with_result).await;
-    check_reveals_nothing(&with_result.body);
-    assert!(links(&Html::parse_document(&with_result.body), "main a").contains(&final_game));
+    let with_pairing = format!("{}?show=round-2", path(&cup));
+    let with_pairing = open_without_results(&cup.site, &with_pairing).await;
+    check_reveals_nothing(&with_pairing.body);
+    assert!(links(&Html::parse_document(&with_pairing.body), "main a").contains(&final_game));
 }
 
 #[tokio::test]
@@ -408,6 +412,7 @@ async fn running_game_page_shows_score_and_live_stream() {
     let (claim, game, seed) = cup.claim().await.unwrap();
     let [home, _] = cup.names(&game).await;
     let live = cup.site.store.live_games();
+    // A game has 45,000 control steps: 15 minutes.
     live.begin(game.id, 1, 45_000);
     let goal = LiveEvent {
         step: 3000,

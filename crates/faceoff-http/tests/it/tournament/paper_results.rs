@@ -1,4 +1,5 @@
-//! The tournament of the original challenge on the whole server: two rounds with 36 games give the tables of the paper.
+//! Test that the whole server reproduces the tournament of the original challenge: two rounds with 36 games give the tables of
+//! the paper.
 
 use super::{
     cup::{Cup, team_names},
@@ -8,6 +9,7 @@ use crate::site::{ADMIN, string};
 use faceoff_scoring::tournament::{PlayedGame, head_to_head, rating::rate, score_tournament};
 use serde_json::{Value, json};
 
+/// The games and tables of the paper.
 const GOLDEN: &str = include_str!(concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../tests/golden/tournament.json"
@@ -56,9 +58,9 @@ async fn tournament_of_the_paper_has_its_standings() {
         paper_outcome(&golden, round.get(), names)
     };
     assert_eq!(cup.view().await["phase"], "open");
-    let first = cup.start_round().await;
+    let first_round = cup.start_round().await;
     assert_eq!(
-        (&first["progress"]["games"], &first["matchdays"]),
+        (&first_round["progress"]["games"], &first_round["matchdays"]),
         (&json!(15), &json!(5))
     );
     assert_eq!(cup.view().await["phase"], "round");
@@ -97,27 +99,32 @@ async fn tournament_of_the_paper_has_its_standings() {
 
     let games = cup.games().await;
     assert_eq!(games.len(), 36);
-    let (mut by_tier, mut not_led) = (0, 0);
+    // Games that were won by a better tier, and those of them whose winner did not lead.
+    let (mut won_by_tier, mut won_without_lead) = (0, 0);
     for game in &games {
         let (home, away) = team_names(game);
-        let in_paper = |a: &str, b: &str| {
-            let mut games = golden["games"].as_array().unwrap().iter();
-            games.find(|one| one["round"] == game["round"] && one["home"] == a && one["away"] == b)
+        let find_in_paper = |a: &str, b: &str| {
+            let mut paper_games = golden["games"].as_array().unwrap().iter();
+            paper_games.find(|paper_game| {
+                paper_game["round"] == game["round"]
+                    && paper_game["home"] == a
+                    && paper_game["away"] == b
+            })
         };
-        let winner = in_paper(&home, &away)
-            .or_else(|| in_paper(&away, &home))
+        let paper_game = find_in_paper(&home, &away)
+            .or_else(|| find_in_paper(&away, &home))
             .unwrap();
         let result = &game["result"];
-        assert_eq!(result["winner"], winner["winner"], "{game}");
-        by_tier += u32::from(result["won_by"] == "tier");
-        not_led += u32::from(result["won_by"] == "tier" && result["winner_led"] == false);
-        let led = string(&result["because"]).contains("did not lead");
-        assert_eq!(led, result["winner_led"] == false);
+        assert_eq!(result["winner"], paper_game["winner"], "{game}");
+        won_by_tier += u32::from(result["won_by"] == "tier");
+        won_without_lead += u32::from(result["won_by"] == "tier" && result["winner_led"] == false);
+        let says_not_led = string(&result["because"]).contains("did not lead");
+        assert_eq!(says_not_led, result["winner_led"] == false);
     }
-    assert_eq!((by_tier, not_led), (19, 9));
+    assert_eq!((won_by_tier, won_without_lead), (19, 9));
 
     // The scoring of a file with the same games gives the same standings.
-    let entries: Vec<PlayedGame> = games.iter().map(as_entry).collect();
+    let entries: Vec<PlayedGame> = games.iter().map(played_game).collect();
     let scored = score_tournament(&entries);
     assert_eq!(
         serde_json::to_value(&scored.standings).unwrap(),
@@ -151,7 +158,7 @@ async fn tournament_of_the_paper_has_its_standings() {
 }
 
 /// A game as `faceoff score tournament` reads it.
-fn as_entry(game: &Value) -> PlayedGame {
+fn played_game(game: &Value) -> PlayedGame {
     let (home, away) = team_names(game);
     let result = &game["result"];
     let entry = json!({

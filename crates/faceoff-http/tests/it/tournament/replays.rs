@@ -1,4 +1,4 @@
-//! Certainty of the champion: repetitions of the whole schedule.
+//! Tests of replays of a tournament's whole schedule with other seeds, which show how certain its champion is.
 
 use super::{
     cup::{Cup, first_by_name_wins},
@@ -9,6 +9,7 @@ use faceoff_store::GamePurpose;
 use reqwest::Method;
 use serde_json::{Value, json};
 
+/// How often each team becomes champion in the replays.
 async fn certainty(cup: &Cup) -> Value {
     cup.site
         .get(&format!("{}/certainty", cup.path), None)
@@ -20,9 +21,9 @@ async fn certainty(cup: &Cup) -> Value {
 async fn repeated_schedules_give_the_champion_probabilities() {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
     let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
-    let none = certainty(&cup).await;
+    let without_replays = certainty(&cup).await;
     assert_eq!(
-        (&none["replays"], &none["champions"]),
+        (&without_replays["replays"], &without_replays["champions"]),
         (&json!(0), &json!([]))
     );
     cup.post("replays", json!({ "times": 1 })).await.problem(
@@ -38,7 +39,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
         (&started["replays"], &started["complete"], &started["games"]),
         (&json!(5), &json!(0), &json!(15))
     );
-    // In every second repetition B wins all its games.
+    // In every second replay B wins all its games.
     let outcome = |game: &faceoff_store::Game, names: [&str; 2]| {
         let GamePurpose::Replay { replay, .. } = game.purpose else {
             panic!("expected a replay");
@@ -49,6 +50,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
             _ => first_by_name_wins(game, names),
         }
     };
+    // Four of the five replays, of three games each.
     for _ in 0..12 {
         cup.play_next(outcome).await.unwrap();
     }
@@ -62,26 +64,26 @@ async fn repeated_schedules_give_the_champion_probabilities() {
         &format!("{}/replays", cup.path),
         Some(ADMIN),
     );
-    let cancelled = Answer::of(request.send().await.unwrap()).await.json(200);
+    let cancelled = Answer::read(request.send().await.unwrap()).await.json(200);
     assert_eq!(
         (&cancelled["given_up"], &cancelled["games"]),
         (&json!(1), &json!(12))
     );
     assert!(cup.claim().await.is_none());
-    let all = certainty(&cup).await;
-    let shares: Vec<(String, &Value)> = all["champions"]
+    let final_view = certainty(&cup).await;
+    let shares: Vec<(String, &Value)> = final_view["champions"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|one| (string(&one["team"]), &one["first_places"]))
+        .map(|share| (string(&share["team"]), &share["first_places"]))
         .collect();
     assert_eq!(
         shares,
         [("A".to_owned(), &json!(2)), ("B".to_owned(), &json!(2))]
     );
-    let interval = &all["champions"][0]["share_ci95"];
+    let interval = &final_view["champions"][0]["share_ci95"];
     assert!(interval[0].as_f64().unwrap() < 0.5 && interval[1].as_f64().unwrap() > 0.5);
-    // Repetitions do not count.
+    // Replays do not count.
     assert_eq!(cup.view().await["tables"], before["tables"]);
     assert_eq!(cup.games().await.len(), 3);
     for wrong in [0, 1001] {
@@ -101,9 +103,9 @@ async fn repeated_game_is_public_and_has_no_recording() {
     cup.start_round().await;
     let played = cup.play_next(first_by_name_wins).await.unwrap();
     cup.post("replays", json!({ "times": 1 })).await.json(201);
-    let again = cup.play_next(first_by_name_wins).await.unwrap();
-    assert_ne!(played.seed, again.seed);
-    let path = format!("/api/v1/games/{}", again.id);
+    let replayed = cup.play_next(first_by_name_wins).await.unwrap();
+    assert_ne!(played.seed, replayed.seed);
+    let path = format!("/api/v1/games/{}", replayed.id);
     let view = cup.site.get(&path, None).await.json(200);
     assert_eq!(
         (

@@ -1,11 +1,12 @@
-//! Test games and friendly games: visibility, quotas, and when they are allowed.
+//! Tests of test games (against the organisers' baseline) and friendly games (between two teams): their visibility and quotas,
+//! and when they are allowed.
 
 use super::{cup::Cup, fake_slot::GameOutcome};
 use crate::site::{ADMIN, Answer, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-/// A tournament whose baseline belongs to an additional team.
+/// A tournament whose baseline, the opponent in test games, is a submission of an additional team.
 async fn cup_with_baseline(names: &[&str], settings: Value) -> Cup {
     let mut cup = Cup::open(names, json!({ "settings": settings })).await;
     let body = json!({});
@@ -31,14 +32,16 @@ async fn cup_with_baseline(names: &[&str], settings: Value) -> Cup {
     cup
 }
 
-async fn test_game(cup: &Cup, team: &str) -> Answer {
+/// A team requests a test game.
+async fn request_test_game(cup: &Cup, team: &str) -> Answer {
     let path = format!("{}/test-games", cup.path);
     cup.site
         .post(&path, Some(cup.token(team)), &json!({}))
         .await
 }
 
-async fn friendly(cup: &Cup, team: &str, opponent: &str) -> Answer {
+/// A team requests a friendly game.
+async fn request_friendly_game(cup: &Cup, team: &str, opponent: &str) -> Answer {
     let path = format!("{}/friendly-games", cup.path);
     let body = json!({ "opponent": opponent });
     cup.site.post(&path, Some(cup.token(team)), &body).await
@@ -46,13 +49,13 @@ async fn friendly(cup: &Cup, team: &str, opponent: &str) -> Answer {
 
 async fn delete(cup: &Cup, path: &str, token: &str) -> Answer {
     let request = cup.site.request(Method::DELETE, path, Some(token));
-    Answer::of(request.send().await.unwrap()).await
+    Answer::read(request.send().await.unwrap()).await
 }
 
 #[tokio::test]
 async fn test_game_is_private_and_does_not_count() {
     let cup = cup_with_baseline(&["A", "B"], json!({})).await;
-    let created = test_game(&cup, "A").await.json(201);
+    let created = request_test_game(&cup, "A").await.json(201);
     let game = &created["queued"][0];
     assert_eq!(
         (
@@ -96,7 +99,7 @@ async fn test_game_is_private_and_does_not_count() {
     let view = cup.view().await;
     assert_eq!(view["tables"][0]["standings"], json!([]));
     assert_eq!(cup.games().await, Vec::<Value>::new());
-    let listed = async |token: &str| {
+    let listed_games = async |token: &str| {
         let path = format!("{}/uncounted-games", cup.path);
         cup.site
             .get(&path, Some(token))
@@ -108,9 +111,9 @@ async fn test_game_is_private_and_does_not_count() {
     };
     assert_eq!(
         [
-            listed(cup.token("A")).await,
-            listed(cup.token("B")).await,
-            listed(ADMIN).await
+            listed_games(cup.token("A")).await,
+            listed_games(cup.token("B")).await,
+            listed_games(ADMIN).await
         ],
         [1, 0, 1]
     );
@@ -119,13 +122,13 @@ async fn test_game_is_private_and_does_not_count() {
 #[tokio::test]
 async fn daily_quota_of_test_games_applies_to_teams_only() {
     let cup = cup_with_baseline(&["A", "B"], json!({ "free_games_per_day": 2 })).await;
-    test_game(&cup, "A").await.json(201);
-    let played = friendly(&cup, "A", "B").await;
+    request_test_game(&cup, "A").await.json(201);
+    let created = request_friendly_game(&cup, "A", "B").await;
     assert_eq!(
-        played.header("location"),
-        format!("/api/v1/games/{}", string(&played.json(201)["id"]))
+        created.header("location"),
+        format!("/api/v1/games/{}", string(&created.json(201)["id"]))
     );
-    let refused = test_game(&cup, "A").await;
+    let refused = request_test_game(&cup, "A").await;
     let problem = refused.problem(
         429,
         "daily-game-quota-exceeded",
@@ -135,28 +138,25 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
         (&problem["limit"], &problem["used"]),
         (&json!(2), &json!(2))
     );
-    assert_eq!(
-        refused.header("retry-after"),
-        "50400",
-        "from ten o'clock to midnight"
-    );
-    friendly(&cup, "A", "B")
+    // The time from ten o'clock to midnight.
+    assert_eq!(refused.header("retry-after"), (14 * 3600).to_string());
+    request_friendly_game(&cup, "A", "B")
         .await
         .problem(429, "daily-game-quota-exceeded", &[]);
     // B has its own quota, and organisers have no limit.
-    friendly(&cup, "B", "a").await.json(201);
-    let all = cup.post("test-games", json!({})).await.json(201);
-    assert_eq!(all["queued"].as_array().unwrap().len(), 2);
-    let some = cup
+    request_friendly_game(&cup, "B", "a").await.json(201);
+    let created = cup.post("test-games", json!({})).await.json(201);
+    assert_eq!(created["queued"].as_array().unwrap().len(), 2);
+    let with_baseline_team = cup
         .post("test-games", json!({ "teams": ["A", "Organisers"] }))
         .await;
-    some.problem(
+    with_baseline_team.problem(
         409,
         "conflict",
         &["Organisers", "cannot play against itself"],
     );
     cup.site.next_day();
-    test_game(&cup, "A").await.json(201);
+    request_test_game(&cup, "A").await.json(201);
     // A team cannot start test games of another team.
     let path = format!("{}/test-games", cup.path);
     let body = json!({ "teams": ["B"] });
@@ -170,12 +170,12 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
 async fn team_declines_and_cancels_friendly_games() {
     let cup = cup_with_baseline(&["A", "B"], json!({})).await;
     let invitation = json!({ "role": "member", "team": cup.teams["B"].id, "note": "Bob" });
-    let made = cup
+    let created = cup
         .site
         .post("/api/v1/invitations", Some(ADMIN), &invitation)
         .await
         .json(201);
-    let join = json!({ "code": made["code"], "name": "Bob" });
+    let join = json!({ "code": created["code"], "name": "Bob" });
     let joined = cup
         .site
         .post("/api/v1/invitations/accept", None, &join)
@@ -186,7 +186,7 @@ async fn team_declines_and_cancels_friendly_games() {
     let set_declines = async |declines: bool| {
         let request = cup.site.request(Method::PATCH, &team, Some(&bob));
         let body = json!({ "declines_friendly_games": declines });
-        Answer::of(request.json(&body).send().await.unwrap())
+        Answer::read(request.json(&body).send().await.unwrap())
             .await
             .json(200)
     };
@@ -194,15 +194,17 @@ async fn team_declines_and_cancels_friendly_games() {
         cup.site.get(&team, None).await.json(200)["declines_friendly_games"],
         false
     );
-    let queued = friendly(&cup, "A", "B").await.json(201);
+    let queued = request_friendly_game(&cup, "A", "B").await.json(201);
     assert_eq!(set_declines(true).await["declines_friendly_games"], true);
-    friendly(&cup, "A", "B")
-        .await
-        .problem(409, "conflict", &["B plays no friendly games"]);
+    request_friendly_game(&cup, "A", "B").await.problem(
+        409,
+        "conflict",
+        &["B plays no friendly games"],
+    );
     // B may still request friendly games itself.
-    friendly(&cup, "B", "A").await.json(201);
+    request_friendly_game(&cup, "B", "A").await.json(201);
     assert_eq!(set_declines(false).await["declines_friendly_games"], false);
-    friendly(&cup, "A", "B").await.json(201);
+    request_friendly_game(&cup, "A", "B").await.json(201);
 
     let path = format!("/api/v1/games/{}", string(&queued["id"]));
     delete(&cup, &path, cup.token("B"))
@@ -226,18 +228,21 @@ async fn team_declines_and_cancels_friendly_games() {
 async fn test_games_are_refused_during_a_round() {
     let cup = cup_with_baseline(&["A", "B"], json!({})).await;
     cup.start_round().await;
-    for answer in [test_game(&cup, "A").await, friendly(&cup, "A", "B").await] {
+    for answer in [
+        request_test_game(&cup, "A").await,
+        request_friendly_game(&cup, "A", "B").await,
+    ] {
         answer.problem(409, "conflict", &["a round is under way"]);
     }
-    let round = string(&cup.games().await[0]["id"]);
-    let path = format!("/api/v1/games/{round}");
+    let round_game = string(&cup.games().await[0]["id"]);
+    let path = format!("/api/v1/games/{round_game}");
     delete(&cup, &path, ADMIN)
         .await
         .problem(409, "conflict", &["of the schedule"]);
     cup.play(|_, _| GameOutcome::goals(1, 0)).await;
-    test_game(&cup, "A").await.json(201);
+    request_test_game(&cup, "A").await.json(201);
     // A team that is not in the tournament has no friendly games.
-    friendly(&cup, "Organisers", "A")
+    request_friendly_game(&cup, "Organisers", "A")
         .await
         .problem(409, "conflict", &["not in the tournament"]);
 }

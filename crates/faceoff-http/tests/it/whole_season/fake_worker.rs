@@ -1,7 +1,7 @@
 //! A fake worker: outcomes of episodes are random numbers that depend on the agent's strength. Apart from that it works
 //! like a real worker: it claims jobs, commits results and scores evaluations.
 
-use crate::site::{Site, score_outcomes};
+use crate::site::{LEASE_S, Site, score_outcomes};
 use faceoff_store::{ClaimedJob, Job, RunOwner, ShardCommit};
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationId, RunId, Task, ValidationOutcome,
@@ -9,7 +9,7 @@ use faceoff_types::{
 };
 use std::collections::HashMap;
 
-/// Pseudo-random numbers, the same for the same seed.
+/// Pseudo-random numbers by the algorithm SplitMix64; the same for the same seed.
 struct Random(u64);
 
 impl Random {
@@ -26,8 +26,13 @@ impl Random {
     }
 }
 
-/// The outcome of an episode. Computation times have all digits, so that rows are as long as real ones.
-fn episode(task: Task, episode: u32, solved_per_mille: u64, random: &mut Random) -> EpisodeOutcome {
+/// A random outcome of an episode. Computation times have all digits, so that rows are as long as real ones.
+fn random_outcome(
+    task: Task,
+    episode: u32,
+    solved_per_mille: u64,
+    random: &mut Random,
+) -> EpisodeOutcome {
     let success = random.below(1000) < solved_per_mille;
     let mean_s = 1e-4 + random.below(1 << 40) as f64 * 1e-16;
     EpisodeOutcome {
@@ -56,7 +61,7 @@ fn episode(task: Task, episode: u32, solved_per_mille: u64, random: &mut Random)
 /// A fake worker, with the outcomes of runs that are not scored yet.
 #[derive(Default)]
 pub struct FakeWorker {
-    played: HashMap<RunId, Vec<EpisodeOutcome>>,
+    unscored: HashMap<RunId, Vec<EpisodeOutcome>>,
     /// The number of scored evaluations.
     pub scored: usize,
 }
@@ -66,7 +71,7 @@ impl FakeWorker {
     pub async fn perform_validations(&mut self, site: &Site) {
         while let Some(claimed) = site
             .store
-            .claim("fake-worker", 60, site.now())
+            .claim("fake-worker", LEASE_S, site.now())
             .await
             .unwrap()
         {
@@ -78,13 +83,13 @@ impl FakeWorker {
         }
     }
 
-    /// Performs jobs until the queue is empty, or `at_most` evaluations are scored.
-    pub async fn work(&mut self, site: &Site, at_most: usize) {
-        let target = self.scored + at_most;
+    /// Performs jobs until the queue is empty, or `max_evaluations` evaluations are scored.
+    pub async fn work(&mut self, site: &Site, max_evaluations: usize) {
+        let target = self.scored + max_evaluations;
         while self.scored < target {
             let claimed = site
                 .store
-                .claim("fake-worker", 60, site.now())
+                .claim("fake-worker", LEASE_S, site.now())
                 .await
                 .unwrap();
             let Some(claimed) = claimed else { return };
@@ -116,14 +121,16 @@ impl FakeWorker {
                     !matches!(owner, RunOwner::Ablation(_)),
                     "the test starts no ablation"
                 );
-                // An agent has the same strength every day, but solves other episodes.
-                let strength = 300 + u64::from(bundle.blake3.as_bytes()[0]) * 2;
-                let first = u128::from_le_bytes(*shard.id.as_uuid().as_bytes()) as u64;
-                let mut random = Random(first);
+                // An agent solves about as many episodes every day, but not the same ones.
+                let solved_per_mille = 300 + u64::from(bundle.blake3.as_bytes()[0]) * 2;
+                let seed = u128::from_le_bytes(*shard.id.as_uuid().as_bytes()) as u64;
+                let mut random = Random(seed);
                 let outcomes: Vec<_> = (shard.first_episode..shard.end_episode)
-                    .map(|number| episode(shard.task, number, strength, &mut random))
+                    .map(|episode| {
+                        random_outcome(shard.task, episode, solved_per_mille, &mut random)
+                    })
                     .collect();
-                let run_outcomes = self.played.entry(run.id).or_default();
+                let run_outcomes = self.unscored.entry(run.id).or_default();
                 run_outcomes.extend(outcomes.iter().cloned());
                 let commit = ShardCommit {
                     outcomes,
@@ -143,7 +150,7 @@ impl FakeWorker {
                 ..
             } => {
                 let outcomes = self
-                    .played
+                    .unscored
                     .remove(&run.id)
                     .expect("the shards of the run were performed before");
                 let result = score_outcomes(&run, seeds.episodes, &outcomes);

@@ -1,18 +1,19 @@
-//! Actions of the organiser and of teams on single days, with checks of their effects.
+//! Actions of the organiser and of teams on single days of the season, with checks of their effects.
 
-use super::season::{DAYS, Season, at, date};
+use super::season::{ALL_EVALUATIONS, DAYS, Season, at, date};
 use crate::site::{ADMIN, Answer, string};
 use faceoff_worker::start_due;
 use reqwest::Method;
 use serde_json::{Value, json};
 
+// The days of the actions, counted from 0.
 const RETENTION_SET: i32 = 18;
 const VOIDED_EVALUATION: i32 = 20;
 const VOIDED_DAY: i32 = 25;
 const DISQUALIFICATION: i32 = 30;
 const REINSTATEMENT: i32 = 37;
 const OVERFULL_DAY: i32 = 40;
-/// Evaluations of the overfull day that finish before its deadline, of those of all teams.
+/// How many evaluations of the overfull day finish before its deadline.
 const FINISHED_BEFORE_DEADLINE: usize = 12;
 const FREEZE: i32 = 45;
 const UNFREEZE: i32 = 48;
@@ -21,18 +22,19 @@ const OUTAGE: i32 = 60;
 const EXTRA_EVALUATION: i32 = 66;
 const RETIREMENT: i32 = 80;
 
-/// Is the server down at the cutoff of this day, and for the whole evening?
+/// Whether the server is down at the cutoff of this day, and for the whole evening.
 pub fn is_down_at_cutoff(day: i32) -> bool {
     day == OUTAGE
 }
 
-/// The number of evaluations that finish before the deadline of the day, if not all.
+/// The number of evaluations that finish before the deadline of the day; `None` if all do.
 pub fn finished_evaluations(day: i32) -> Option<usize> {
     (day == OVERFULL_DAY).then_some(FINISHED_BEFORE_DEADLINE)
 }
 
-fn reason(why: &str) -> Value {
-    json!({ "reason": why })
+/// The body of a request with a reason.
+fn reason(text: &str) -> Value {
+    json!({ "reason": text })
 }
 
 impl Season {
@@ -75,7 +77,7 @@ impl Season {
         let path = format!("/api/v1/teams/{}", team.team.id);
         let request = self.site.request(Method::PATCH, &path, Some(ADMIN));
         let body = json!({ "name": "The Mallets" });
-        let renamed = Answer::of(request.json(&body).send().await.unwrap()).await;
+        let renamed = Answer::read(request.json(&body).send().await.unwrap()).await;
         assert_eq!(renamed.json(200)["name"], "The Mallets");
         team.name = "The Mallets".into();
         let names = self.teams_on_board(3).await;
@@ -86,8 +88,8 @@ impl Season {
     /// Withdraws all submissions of a team, which then has no evaluations before its next upload.
     async fn withdraw(&mut self) {
         let token = self.teams[4].team.token.clone();
-        let own = self.site.get("/api/v1/submissions", Some(&token)).await;
-        for submission in own.json(200).as_array().unwrap() {
+        let submissions = self.site.get("/api/v1/submissions", Some(&token)).await;
+        for submission in submissions.json(200).as_array().unwrap() {
             let path = format!("/api/v1/submissions/{}/withdraw", string(&submission["id"]));
             self.site
                 .post(&path, Some(&token), &json!({}))
@@ -97,18 +99,19 @@ impl Season {
         self.teams[4].is_inactive = true;
     }
 
+    /// Pauses the queue, in which no job starts then, and resumes it.
     async fn pause(&mut self) {
         self.upload(4, 12).await;
         self.teams[4].is_inactive = false;
         let paused = self.post("/queue/pause", reason("a fan is changed")).await;
         assert_eq!(paused.status, 204, "{}", paused.body);
-        let before = self.worker.scored;
+        let scored_before = self.worker.scored;
         self.worker.work(&self.site, 1).await;
         let me = self
             .site
             .get("/api/v1/me", Some(&self.teams[4].team.token))
             .await;
-        assert_eq!(before, self.worker.scored);
+        assert_eq!(scored_before, self.worker.scored);
         assert_eq!(
             me.json(200)["active_submission"],
             json!(null),
@@ -122,7 +125,7 @@ impl Season {
     async fn retain_last_five(&mut self) {
         let stage = self.stage_of(RETENTION_SET);
         let changed = self
-            .change(&stage, json!({ "retention": { "last": 5 } }))
+            .change_stage(&stage, json!({ "retention": { "last": 5 } }))
             .await;
         assert_eq!(changed["retention"], json!({ "last": 5 }));
         assert_eq!(changed["revision"], 1, "retention is not a rule");
@@ -139,13 +142,15 @@ impl Season {
         unconfirmed.problem(409, "not-confirmed", &[&name]);
         let confirmed = json!({ "reason": "the table was tilted", "confirm": name });
         self.post(&void, confirmed).await.json(200);
-        let again = self
+        let rerun = self
             .post(&format!("/evaluations/{id}/rerun"), json!({}))
             .await;
-        assert_eq!(again.json(201)["rerun_of"], json!(id));
+        assert_eq!(rerun.json(201)["rerun_of"], json!(id));
         self.worker.work(&self.site, 1).await;
         let evaluations = self.evaluations(VOIDED_EVALUATION).await;
-        let not_voided = evaluations.iter().filter(|one| one["voided"].is_null());
+        let not_voided = evaluations
+            .iter()
+            .filter(|evaluation| evaluation["voided"].is_null());
         assert_eq!(not_voided.count(), self.active_teams());
     }
 
@@ -162,7 +167,7 @@ impl Season {
         assert!(
             evaluations
                 .iter()
-                .all(|one| one["voided"]["reason"] == "a wrong puck")
+                .all(|evaluation| evaluation["voided"]["reason"] == "a wrong puck")
         );
         let board = self.board(VOIDED_DAY).await;
         let rows = board["rows"].as_array().unwrap();
@@ -183,8 +188,7 @@ impl Season {
 
     async fn reinstate(&mut self) {
         let id = self.teams[7].team.id.clone();
-        let why = reason("it did not");
-        self.post(&format!("/teams/{id}/reinstate"), why)
+        self.post(&format!("/teams/{id}/reinstate"), reason("it did not"))
             .await
             .json(200);
         self.teams[7].is_inactive = false;
@@ -198,12 +202,13 @@ impl Season {
     /// The previous day was not finished at the next cutoff, for lack of capacity. That removes no row from the board.
     async fn check_overfull_day(&mut self) {
         let day = OVERFULL_DAY;
+        // The numbers of finished evaluations, of those that were not played, and of all.
         let states = async |season: &Self| {
             let evaluations = season.evaluations(day).await;
             let count = |state: &str| {
                 evaluations
                     .iter()
-                    .filter(|one| one["state"] == state)
+                    .filter(|evaluation| evaluation["state"] == state)
                     .count()
             };
             (count("finished"), count("not_played"), evaluations.len())
@@ -212,36 +217,41 @@ impl Season {
         assert_eq!(
             (finished, not_played),
             (FINISHED_BEFORE_DEADLINE, 0),
-            "it may continue until the next cutoff"
+            "the day may continue until the next cutoff"
         );
         self.site
             .set_time(at(day + 1, 18) - jiff::SignedDuration::from_millis(1));
         start_due(&self.site.store, self.site.now()).await.unwrap();
         assert_eq!(states(self).await, (FINISHED_BEFORE_DEADLINE, 0, all));
-        // The cutoff in the evening ends it.
+        // The next cutoff ends the overfull day. The clock goes back to the morning before it.
         self.site.set_time(at(day + 1, 10));
         assert_eq!(self.teams_on_board(day).await.len(), self.active_teams());
     }
 
     async fn freeze(&mut self) {
         let stage = self.stage_of(FREEZE);
-        let why = reason("the last days are a surprise");
-        self.post(&format!("/stages/{stage}/freeze"), why)
+        let body = reason("the last days are a surprise");
+        self.post(&format!("/stages/{stage}/freeze"), body)
             .await
             .json(200);
-        let overdue = self.evaluations(OVERFULL_DAY).await;
-        let not_played = overdue.iter().filter(|one| one["state"] == "not_played");
-        assert_eq!(not_played.count(), overdue.len() - FINISHED_BEFORE_DEADLINE);
+        let evaluations = self.evaluations(OVERFULL_DAY).await;
+        let not_played = evaluations
+            .iter()
+            .filter(|evaluation| evaluation["state"] == "not_played");
+        assert_eq!(
+            not_played.count(),
+            evaluations.len() - FINISHED_BEFORE_DEADLINE
+        );
     }
 
     async fn unfreeze(&mut self) {
         let frozen = self.board(UNFREEZE).await;
         let stage = self.stage_of(UNFREEZE);
-        let newest = |board: &Value| {
+        let newest_day = |board: &Value| {
             let rows = board["rows"].as_array().unwrap().clone();
             rows.iter().map(|row| string(&row["day"])).max().unwrap()
         };
-        assert!(newest(&frozen) < date(FREEZE).to_string(), "{frozen}");
+        assert!(newest_day(&frozen) < date(FREEZE).to_string(), "{frozen}");
         self.post(&format!("/stages/{stage}/unfreeze"), json!({}))
             .await
             .json(200);
@@ -251,7 +261,7 @@ impl Season {
     async fn change_rules(&mut self) {
         let stage = self.stage_of(RULE_CHANGE);
         let changed = self
-            .change(&stage, json!({ "max_faults": 5, "confirm": "Qualifying" }))
+            .change_stage(&stage, json!({ "max_faults": 5, "confirm": "Qualifying" }))
             .await;
         assert_eq!(changed["revision"], 2, "{changed}");
         assert_eq!(
@@ -273,7 +283,7 @@ impl Season {
             day["created"].as_array().unwrap().len(),
             self.active_teams()
         );
-        self.worker.work(&self.site, usize::MAX / 2).await;
+        self.worker.work(&self.site, ALL_EVALUATIONS).await;
     }
 
     async fn start_extra_evaluation(&mut self) {
@@ -303,8 +313,8 @@ impl Season {
     async fn check_retention(&self) {
         let days = [RETENTION_SET, DAYS - 1].map(async |day| {
             let mut retained = 0;
-            for one in self.evaluations(day).await {
-                let path = format!("/api/v1/evaluations/{}/dataset", string(&one["id"]));
+            for evaluation in self.evaluations(day).await {
+                let path = format!("/api/v1/evaluations/{}/dataset", string(&evaluation["id"]));
                 let answer = self.site.get(&path, Some(ADMIN)).await;
                 match answer.status.as_u16() {
                     200 => retained += 1,
@@ -327,21 +337,21 @@ impl Season {
     pub async fn sign_off(&mut self) {
         self.site.set_time(at(DAYS + 1, 12));
         start_due(&self.site.store, self.site.now()).await.unwrap();
-        let last = self.stage_of(DAYS - 1);
+        let last_stage = self.stage_of(DAYS - 1);
         let hidden = self.board(DAYS - 1).await;
         assert_eq!(
             (&hidden["blind"], &hidden["rows"]),
             (&json!(true), &json!([]))
         );
         let opened = self
-            .change(&last, json!({ "blind": false, "confirm": "Final" }))
+            .change_stage(&last_stage, json!({ "blind": false, "confirm": "Final" }))
             .await;
         assert_eq!(opened["blind"], false);
         self.check_retention().await;
         for stage in self.stages.clone() {
             let path = format!("/stages/{}/finalise", string(&stage["id"]));
-            let signed = self.post(&path, json!({ "confirm": stage["name"] })).await;
-            assert_ne!(signed.json(200)["finalised"], json!(null));
+            let signed_off = self.post(&path, json!({ "confirm": stage["name"] })).await;
+            assert_ne!(signed_off.json(200)["finalised"], json!(null));
         }
         self.post("/season/close", json!({ "confirm": "Test season" }))
             .await

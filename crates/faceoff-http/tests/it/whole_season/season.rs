@@ -1,5 +1,5 @@
-//! The days of the season: new teams and uploads in the morning, the cutoff and its evaluations in the evening, and the
-//! server's clean-up at night.
+//! The days of the tested season: new teams and uploads in the morning; the cutoff (the moment at which each team's active
+//! submission is fixed) and its evaluations in the evening; and the server's clean-up at night.
 
 use super::fake_worker::FakeWorker;
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, string};
@@ -13,13 +13,17 @@ use std::{
 };
 
 pub const DAYS: i32 = 90;
+/// A limit of evaluations that is never reached.
+pub const ALL_EVALUATIONS: usize = usize::MAX / 2;
 const TEAMS: usize = 20;
 /// The number of teams on the first day. Of the others, one joins each day.
 const FIRST_TEAMS: usize = 12;
 const DAYS_PER_SUBMISSION: usize = 10;
-/// A tenth of a real stage's. The bound of the database is scaled by that, and by the number of teams (here 20, there 40).
+/// Episodes per task: a tenth of a real stage's. The bound of the database's size is scaled by that, and by the number of
+/// teams: here 20, in a real season 40.
 const EPISODES: u32 = 100;
-/// One shard per task. A real stage has smaller shards, but the rows that stay do not depend on that.
+/// One shard (the part of a task that one job runs) per task. A real stage has smaller shards, but the rows that stay in the
+/// database do not depend on that.
 const EPISODES_PER_SHARD: u32 = EPISODES;
 /// A time zone with a change to summer time on 2026-03-29.
 const ZONE: &str = "Europe/Berlin";
@@ -27,7 +31,7 @@ const ZONE: &str = "Europe/Berlin";
 pub struct SeasonTeam {
     pub team: TestTeam,
     pub name: String,
-    /// The team has no evaluations at present: it is disqualified or retired, or all its submissions are withdrawn.
+    /// Whether the team has no evaluations at present, because it is disqualified, or all its submissions are withdrawn.
     pub is_inactive: bool,
 }
 
@@ -35,6 +39,7 @@ pub struct Season {
     pub site: Site,
     pub teams: Vec<SeasonTeam>,
     pub worker: FakeWorker,
+    /// The stages as the API returned them at their creation.
     pub stages: Vec<Value>,
 }
 
@@ -64,10 +69,10 @@ impl Season {
             worker: FakeWorker::default(),
             stages: Vec::new(),
         };
-        let first = season.site.stage().await;
+        let first_stage = season.site.stage().await;
         let warm_up = season
-            .change(
-                &first.to_string(),
+            .change_stage(
+                &first_stage.to_string(),
                 json!({
                     "name": "Warm-up", "closes_at": at(14, 12), "zone": ZONE, "schedule": { "daily": "18:00" },
                     "episodes_per_task": EPISODES, "episodes_per_shard": EPISODES_PER_SHARD, "max_faults": 10,
@@ -76,7 +81,7 @@ impl Season {
             )
             .await;
         season.stages.push(warm_up);
-        for (name, opens, closes, more) in [
+        for (name, opening_day, closing_day, settings) in [
             ("Qualifying", 14, 75, json!({ "standings": "best" })),
             (
                 "Final",
@@ -86,34 +91,40 @@ impl Season {
             ),
         ] {
             let mut body = json!({
-                "name": name, "opens_at": at(opens, 12), "closes_at": at(closes, 12), "zone": ZONE,
+                "name": name, "opens_at": at(opening_day, 12), "closes_at": at(closing_day, 12), "zone": ZONE,
                 "schedule": { "daily": "18:00" },
             });
-            for (key, value) in more.as_object().unwrap() {
+            for (key, value) in settings.as_object().unwrap() {
                 body[key] = value.clone();
             }
             let stage = season.post("/stages", body).await.json(201);
-            assert_eq!(stage["episodes_per_task"], EPISODES, "as in the open one");
+            assert_eq!(
+                stage["episodes_per_task"], EPISODES,
+                "copied from the open stage"
+            );
             season.stages.push(stage);
         }
         season
     }
 
+    /// Posts as an organiser.
     pub async fn post(&self, path: &str, body: Value) -> Answer {
         self.site
             .post(&format!("/api/v1{path}"), Some(ADMIN), &body)
             .await
     }
 
+    /// Gets a resource as an organiser.
     pub async fn get(&self, path: &str) -> Value {
         let answer = self.site.get(&format!("/api/v1{path}"), Some(ADMIN)).await;
         answer.json(200)
     }
 
-    pub async fn change(&self, stage: &str, body: Value) -> Value {
+    /// Changes a stage as an organiser.
+    pub async fn change_stage(&self, stage: &str, body: Value) -> Value {
         let path = format!("/api/v1/stages/{stage}");
         let request = self.site.request(Method::PATCH, &path, Some(ADMIN));
-        Answer::of(request.json(&body).send().await.unwrap())
+        Answer::read(request.json(&body).send().await.unwrap())
             .await
             .json(200)
     }
@@ -154,15 +165,16 @@ impl Season {
         self.worker.perform_validations(&self.site).await;
     }
 
+    /// Uploads a submission of the team with this index. Other versions are other bundles.
     pub async fn upload(&self, index: usize, version: usize) -> Value {
-        let mut archive = GZIP.to_vec();
-        archive.extend(format!("agent {index} of day {version}").bytes());
+        let mut bundle = GZIP.to_vec();
+        bundle.extend(format!("agent {index} of day {version}").bytes());
         let path = format!("/api/v1/submissions?file_name=agent-{index}-{version}.tar.gz");
         let request = self
             .site
             .request(Method::POST, &path, Some(&self.teams[index].team.token))
             .header("content-type", "application/octet-stream");
-        Answer::of(request.body(archive).send().await.unwrap())
+        Answer::read(request.body(bundle).send().await.unwrap())
             .await
             .json(201)
     }
@@ -172,13 +184,14 @@ impl Season {
         self.teams.iter().filter(|team| !team.is_inactive).count()
     }
 
-    /// The cutoff, not a millisecond before its time, and the evaluations of the day. Returns the number of scored ones.
+    /// Checks that the day starts at its cutoff and not a millisecond before, and runs its evaluations. Returns the number of
+    /// scored evaluations.
     pub async fn evening(&mut self, day: i32) -> usize {
         let stage = self.stage_of(day);
-        let shown = self.get(&format!("/stages/{stage}")).await;
-        let cutoff: Timestamp = string(&shown["next_cutoff"]["at"]).parse().unwrap();
+        let view = self.get(&format!("/stages/{stage}")).await;
+        let cutoff: Timestamp = string(&view["next_cutoff"]["at"]).parse().unwrap();
         assert_eq!(
-            (cutoff, &shown["next_cutoff"]["day"]),
+            (cutoff, &view["next_cutoff"]["day"]),
             (at(day, 18), &json!(date(day)))
         );
         self.site.set_time(cutoff - SignedDuration::from_millis(1));
@@ -191,18 +204,18 @@ impl Season {
         start_due(&self.site.store, cutoff).await.unwrap();
         let started = self.evaluations(day).await.len();
         assert_eq!(started, self.active_teams(), "day {day}");
-        let before = self.worker.scored;
+        let scored_before = self.worker.scored;
         self.site.advance(1);
-        let evaluations =
-            super::organiser_actions::finished_evaluations(day).unwrap_or(usize::MAX / 2);
-        self.worker.work(&self.site, evaluations).await;
-        self.worker.scored - before
+        let max_evaluations =
+            super::organiser_actions::finished_evaluations(day).unwrap_or(ALL_EVALUATIONS);
+        self.worker.work(&self.site, max_evaluations).await;
+        self.worker.scored - scored_before
     }
 
     /// All evaluations of a day, as the organiser sees them.
     pub async fn evaluations(&self, day: i32) -> Vec<Value> {
-        let all = self.get(&format!("/evaluations?day={}", date(day))).await;
-        all.as_array().unwrap().clone()
+        let evaluations = self.get(&format!("/evaluations?day={}", date(day))).await;
+        evaluations.as_array().unwrap().clone()
     }
 
     /// The server's clean-up.
@@ -219,20 +232,20 @@ impl Season {
         bytes("faceoff.sqlite3") + bytes("faceoff.sqlite3-wal")
     }
 
-    /// Loads the boards of each stage twice. Returns the duration of the second request.
-    pub async fn boards(&self) -> Vec<(String, Duration)> {
-        let mut boards = Vec::new();
+    /// Requests the boards of each stage twice. Returns their descriptions and the durations of the second requests.
+    pub async fn time_boards(&self) -> Vec<(String, Duration)> {
+        let mut durations = Vec::new();
         for stage in &self.stages {
             for task in ["", "/hit"] {
                 let path = format!("/api/v1/board{task}?stage={}", string(&stage["id"]));
                 let first = self.site.get(&path, None).await.json(200);
                 assert_eq!(first["rows"].as_array().unwrap().len(), TEAMS, "{path}");
-                let started = Instant::now();
+                let started_at = Instant::now();
                 self.site.get(&path, None).await.json(200);
                 let name = format!("the board{task} of {}", string(&stage["name"]));
-                boards.push((name, started.elapsed()));
+                durations.push((name, started_at.elapsed()));
             }
         }
-        boards
+        durations
     }
 }

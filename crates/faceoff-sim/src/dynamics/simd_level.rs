@@ -7,7 +7,7 @@ use wide::{f64x2, f64x4};
 
 /// The instruction set that computes four arms at once. All of them give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LanePath(Registers);
+pub struct SimdLevel(Registers);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Registers {
@@ -16,7 +16,7 @@ enum Registers {
     Avx(Avx),
 }
 
-impl LanePath {
+impl SimdLevel {
     /// The baseline registers of the target: two numbers each on x86-64.
     pub const PLAIN: Self = Self(Registers::Plain);
 
