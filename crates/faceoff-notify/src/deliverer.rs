@@ -214,8 +214,8 @@ impl Deliverer {
                 });
                 planned.push(PlannedDeliveries {
                     webhook: webhook.id,
-                    after,
-                    until: page.until,
+                    seen_event: after,
+                    last_event: page.until,
                     bodies: bodies.collect(),
                 });
             }

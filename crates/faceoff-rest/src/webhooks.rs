@@ -108,7 +108,7 @@ pub(crate) async fn create_webhook(
         team: caller.team().map(|team| team.id),
         name: text::single_line("name", &new.name, MAX_NAME_CHARS)?,
         url: checked_url(&app, &new.url)?,
-        about: checked_filter(&new.about)?,
+        topics: checked_filter(&new.about)?,
         secret: secret.bytes(),
     };
     let now = app.config.clock.now();
@@ -169,7 +169,7 @@ pub(crate) async fn change_webhook(
             .map(|name| text::single_line("name", name, MAX_NAME_CHARS))
             .transpose()?,
         url: url.map(|url| checked_url(&app, url)).transpose()?,
-        about: changes.about.as_deref().map(checked_filter).transpose()?,
+        topics: changes.about.as_deref().map(checked_filter).transpose()?,
         enable: changes.state.is_some(),
     };
     let now = app.config.clock.now();

@@ -1,3 +1,7 @@
+//! Artifacts: the files of the season (bundles, recordings, datasets) in an object store. The database names each one by
+//! its key. Two kinds are for replays in the browser: *clips* are the recorded motions of a dataset's episodes, and the
+//! *parts* of an ablation are the clips of its single shards until they are merged.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -22,10 +26,10 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 pub type ArtifactStream = BoxStream<'static, Result<Bytes>>;
 
 /// Suffix of the key of a dataset's clips, which are stored and deleted with the dataset.
-const CLIPS: &str = ".clips";
+const CLIPS_SUFFIX: &str = ".clips";
 
 /// Key prefix of the clips of running ablations.
-const ABLATION_PARTS: &str = "ablation-parts";
+const ABLATION_PARTS_PREFIX: &str = "ablation-parts";
 
 /// Bytes in memory per piece of a copy.
 const PIECE_BYTES: usize = 1 << 20;
@@ -59,11 +63,11 @@ impl Artifacts {
     /// even if the process is killed.
     #[boxed]
     pub async fn put_file(&self, key: &str, file: &Path) -> Result<()> {
-        let failed = |error: std::io::Error| StoreError::artifact(file.display(), &error);
-        let mut source = tokio::fs::File::open(file).await.map_err(failed)?;
+        let io_error = |error: std::io::Error| StoreError::artifact(file.display(), &error);
+        let mut source = tokio::fs::File::open(file).await.map_err(io_error)?;
         let upload = self
             .objects
-            .put_multipart(&parse(key)?)
+            .put_multipart(&parse_key(key)?)
             .await
             .map_err(artifact_error)?;
         let mut upload = WriteMultipart::new_with_chunk_size(upload, PIECE_BYTES);
@@ -74,7 +78,7 @@ impl Artifacts {
                 Ok(read) => read,
                 Err(error) => {
                     upload.abort().await.map_err(artifact_error)?;
-                    return Err(failed(error));
+                    return Err(io_error(error));
                 }
             };
             upload.write(&piece[..read]);
@@ -88,7 +92,7 @@ impl Artifacts {
     /// Stores bytes under `key`, replacing an earlier artifact; they appear whole or not at all.
     #[boxed]
     pub async fn put_bytes(&self, key: &str, bytes: Vec<u8>) -> Result<()> {
-        let key = parse(key)?;
+        let key = parse_key(key)?;
         let put = self.objects.put(&key, bytes.into());
         put.await.map_err(artifact_error)?;
         Ok(())
@@ -106,7 +110,7 @@ impl Artifacts {
     /// The key of the clips for a dataset's replays. Datasets of older versions have none.
     #[must_use]
     pub fn clips_key(dataset: &str) -> String {
-        format!("{dataset}{CLIPS}")
+        format!("{dataset}{CLIPS_SUFFIX}")
     }
 
     /// Removes a dataset and its clips. Missing ones are no error.
@@ -133,52 +137,52 @@ impl Artifacts {
     /// The key prefix of all clips of an ablation's shards.
     #[must_use]
     pub fn ablation_parts_prefix(id: AblationId) -> String {
-        format!("{ABLATION_PARTS}/{id}")
+        format!("{ABLATION_PARTS_PREFIX}/{id}")
     }
 
     /// The key of the clips of a finished ablation's episodes in a profile.
     #[must_use]
     pub fn ablation_clips_key(id: AblationId, profile: Profile) -> String {
-        format!("ablations/{id}/{profile}{CLIPS}")
+        format!("ablations/{id}/{profile}{CLIPS_SUFFIX}")
     }
 
-    /// The ablations that have clips of shards.
+    /// The ablations that have parts (clips of shards).
     #[boxed]
     pub async fn ablations_with_parts(&self) -> Result<Vec<AblationId>> {
-        let folder = parse(ABLATION_PARTS)?;
-        let listed = self.objects.list_with_delimiter(Some(&folder));
-        let folders = listed.await.map_err(artifact_error)?.common_prefixes;
+        let folder = parse_key(ABLATION_PARTS_PREFIX)?;
+        let listing = self.objects.list_with_delimiter(Some(&folder));
+        let folders = listing.await.map_err(artifact_error)?.common_prefixes;
         let ids = folders
             .iter()
             .filter_map(|folder| folder.filename()?.parse().ok());
         Ok(ids.collect())
     }
 
-    /// The clips of an ablation's shards: profile and key of each.
+    /// The parts (clips of shards) of an ablation: profile and key of each.
     #[boxed]
     pub async fn list_ablation_parts(&self, id: AblationId) -> Result<Vec<(Profile, String)>> {
-        let folder = parse(&Self::ablation_parts_prefix(id))?;
-        let listed = self.objects.list_with_delimiter(Some(&folder));
-        let parts = listed.await.map_err(artifact_error)?.objects;
-        let named = parts.iter().filter_map(|part| {
+        let folder = parse_key(&Self::ablation_parts_prefix(id))?;
+        let listing = self.objects.list_with_delimiter(Some(&folder));
+        let parts = listing.await.map_err(artifact_error)?.objects;
+        let parts_with_profile = parts.iter().filter_map(|part| {
             let (profile, _) = part.location.filename()?.split_once('.')?;
             Some((profile.parse().ok()?, part.location.to_string()))
         });
-        Ok(named.collect())
+        Ok(parts_with_profile.collect())
     }
 
     /// Copies an artifact to a new file and flushes it to disk.
     #[boxed]
     pub async fn get_to_file(&self, key: &str, file: &Path) -> Result<()> {
         let (bytes, mut stream) = self.read(key).await?;
-        let failed = |error: std::io::Error| StoreError::artifact(file.display(), &error);
-        let mut target = tokio::fs::File::create(file).await.map_err(failed)?;
+        let io_error = |error: std::io::Error| StoreError::artifact(file.display(), &error);
+        let mut target = tokio::fs::File::create(file).await.map_err(io_error)?;
         let mut written = 0;
         while let Some(piece) = stream.try_next().await? {
-            target.write_all(&piece).await.map_err(failed)?;
+            target.write_all(&piece).await.map_err(io_error)?;
             written += piece.len() as u64;
         }
-        target.flush().await.map_err(failed)?;
+        target.flush().await.map_err(io_error)?;
         if written == bytes {
             Ok(())
         } else {
@@ -193,14 +197,14 @@ impl Artifacts {
     /// # Errors
     /// [`StoreError::Artifacts`] if `key` is not a valid key.
     pub fn local_path(&self, key: &str) -> Result<PathBuf> {
-        Ok(self.folder.join(parse(key)?.as_ref()))
+        Ok(self.folder.join(parse_key(key)?.as_ref()))
     }
 
     /// Length of an artifact, in bytes; `None` if it does not exist.
     #[boxed]
     pub async fn size_bytes(&self, key: &str) -> Result<Option<u64>> {
-        match self.objects.head(&parse(key)?).await {
-            Ok(found) => Ok(Some(found.size)),
+        match self.objects.head(&parse_key(key)?).await {
+            Ok(object) => Ok(Some(object.size)),
             Err(object_store::Error::NotFound { .. }) => Ok(None),
             Err(error) => Err(artifact_error(error)),
         }
@@ -209,31 +213,31 @@ impl Artifacts {
     /// Length and bytes of an artifact, for a download.
     #[boxed]
     pub async fn read(&self, key: &str) -> Result<(u64, ArtifactStream)> {
-        let found = self
+        let object = self
             .objects
-            .get(&parse(key)?)
+            .get(&parse_key(key)?)
             .await
             .map_err(artifact_error)?;
-        let bytes = found.meta.size;
-        Ok((bytes, found.into_stream().map_err(artifact_error).boxed()))
+        let bytes = object.meta.size;
+        Ok((bytes, object.into_stream().map_err(artifact_error).boxed()))
     }
 
     /// A range of an artifact's bytes, for a download. Only these are read.
     #[boxed]
     pub async fn read_range(&self, key: &str, range: Range<u64>) -> Result<ArtifactStream> {
-        let wanted = GetOptions::new().with_range(Some(range));
-        let found = self
+        let options = GetOptions::new().with_range(Some(range));
+        let object = self
             .objects
-            .get_opts(&parse(key)?, wanted)
+            .get_opts(&parse_key(key)?, options)
             .await
             .map_err(artifact_error)?;
-        Ok(found.into_stream().map_err(artifact_error).boxed())
+        Ok(object.into_stream().map_err(artifact_error).boxed())
     }
 
     /// Removes an artifact; one that does not exist is no error, so that a removal can be repeated.
     #[boxed]
     pub async fn delete(&self, key: &str) -> Result<()> {
-        match self.objects.delete(&parse(key)?).await {
+        match self.objects.delete(&parse_key(key)?).await {
             Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
             Err(error) => Err(artifact_error(error)),
         }
@@ -242,9 +246,9 @@ impl Artifacts {
     /// Stores every file directly in `folder` as `prefix/NAME`.
     #[boxed]
     pub async fn put_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
-        let failed = |error: std::io::Error| StoreError::artifact(folder.display(), &error);
-        let mut entries = tokio::fs::read_dir(folder).await.map_err(failed)?;
-        while let Some(entry) = entries.next_entry().await.map_err(failed)? {
+        let io_error = |error: std::io::Error| StoreError::artifact(folder.display(), &error);
+        let mut entries = tokio::fs::read_dir(folder).await.map_err(io_error)?;
+        while let Some(entry) = entries.next_entry().await.map_err(io_error)? {
             let name = entry.file_name();
             let name = name.to_str().ok_or_else(|| {
                 StoreError::Artifacts(format!("{}: not a UTF-8 name", entry.path().display()))
@@ -260,7 +264,7 @@ impl Artifacts {
     pub async fn get_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let listing = self
             .objects
-            .list_with_delimiter(Some(&parse(prefix)?))
+            .list_with_delimiter(Some(&parse_key(prefix)?))
             .await
             .map_err(artifact_error)?;
         if listing.objects.is_empty() {
@@ -278,7 +282,7 @@ impl Artifacts {
     pub(crate) async fn stored_until(&self, prefix: &str, until: Timestamp) -> Result<Vec<String>> {
         let until = until.as_millisecond();
         self.objects
-            .list(Some(&parse(prefix)?))
+            .list(Some(&parse_key(prefix)?))
             .try_filter(|object| {
                 std::future::ready(object.last_modified.timestamp_millis() <= until)
             })
@@ -294,22 +298,26 @@ impl Artifacts {
         self.delete_others(prefix, "").await
     }
 
-    /// Removes every artifact under `prefix/` except the one with the key `kept`, those under `kept/`, and the clips of
-    /// the dataset `kept`.
+    /// Removes every artifact under `prefix/` except the one with the key `kept_key`, those under `kept_key/`, and the
+    /// clips of the dataset `kept_key`.
     #[boxed]
-    pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<()> {
-        let listed: Vec<_> = self
+    pub async fn delete_others(&self, prefix: &str, kept_key: &str) -> Result<()> {
+        let listing: Vec<_> = self
             .objects
-            .list(Some(&parse(prefix)?))
+            .list(Some(&parse_key(prefix)?))
             .map_ok(|object| object.location)
             .try_collect()
             .await
             .map_err(artifact_error)?;
-        for location in listed {
-            let is_kept = location.as_ref().strip_prefix(kept).is_some_and(|rest| {
-                let is_of_it = rest.is_empty() || rest.starts_with('/') || rest == CLIPS;
-                is_of_it && !kept.is_empty()
-            });
+        for location in listing {
+            let is_kept = location
+                .as_ref()
+                .strip_prefix(kept_key)
+                .is_some_and(|rest| {
+                    let belongs_to_kept =
+                        rest.is_empty() || rest.starts_with('/') || rest == CLIPS_SUFFIX;
+                    belongs_to_kept && !kept_key.is_empty()
+                });
             if !is_kept {
                 self.delete(location.as_ref()).await?;
             }
@@ -340,13 +348,13 @@ fn remove_incomplete(folder: &Path, before: SystemTime) -> std::io::Result<usize
             continue;
         }
         let name = entry.file_name();
-        let staged = name
+        let is_incomplete = name
             .to_str()
             .and_then(|name| name.rsplit_once('#'))
             .is_some_and(|(_, number)| {
                 !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
             });
-        if staged && entry.metadata()?.modified()? < before {
+        if is_incomplete && entry.metadata()?.modified()? < before {
             std::fs::remove_file(entry.path())?;
             removed += 1;
         }
@@ -354,7 +362,7 @@ fn remove_incomplete(folder: &Path, before: SystemTime) -> std::io::Result<usize
     Ok(removed)
 }
 
-fn parse(key: &str) -> Result<Key> {
+fn parse_key(key: &str) -> Result<Key> {
     Key::parse(key).map_err(|error| StoreError::Artifacts(format!("key {key:?}: {error}")))
 }
 

@@ -1,14 +1,14 @@
-//! Checkpoints: changes are appended to a write-ahead log (`-wal`) and copied into the database
-//! by checkpoints.
+//! Checkpoints: SQLite appends changes to a write-ahead log (the file `faceoff.sqlite3-wal`); a checkpoint copies
+//! them into the database file.
 //!
-//! SQLite copies automatically every thousand pages, but restarts the log only when no reader uses it.
+//! SQLite does so automatically every thousand pages, but restarts the log only when no reader uses it.
 //! With overlapping readers there is no such moment, and the log would grow without bound. So beyond a
-//! certain size this process blocks its new readers once.
+//! certain size this process blocks its new readers once, to empty the log.
 
 use crate::{
     database::{BUSY_TIMEOUT, Database, READERS},
     error::Result,
-    log::MAX_LOG_BYTES,
+    write_ahead_log::MAX_LOG_BYTES,
 };
 use sqlx::{Sqlite, pool::PoolConnection};
 use std::{
@@ -33,15 +33,15 @@ impl Database {
     /// Called after a write: empties the log in the background if it exceeds its size limit.
     pub(crate) fn empty_log_if_large(&self) {
         if self.log.bytes() >= self.log.due_bytes.load(Ordering::Relaxed)
-            && !self.log.emptying.load(Ordering::Acquire)
+            && !self.log.is_emptying.load(Ordering::Acquire)
         {
             let database = self.clone();
             tokio::spawn(async move { database.empty_log().await });
         }
     }
 
-    /// Called periodically: copies what can be copied without blocking. Empties a log that has stayed
-    /// beyond its limit because of a reader that has ended since.
+    /// Called periodically: copies the changes that can be copied without blocking a reader or a writer. A log beyond its
+    /// limit is emptied instead: the reader that prevented this earlier may have ended.
     pub(crate) async fn checkpoint(&self) -> Result<()> {
         if self.log.bytes() >= MAX_LOG_BYTES {
             self.empty_log().await;
@@ -55,27 +55,27 @@ impl Database {
     }
 
     async fn empty_log(&self) {
-        if self.log.emptying.swap(true, Ordering::AcqRel) {
+        if self.log.is_emptying.swap(true, Ordering::AcqRel) {
             return;
         }
-        let _guard = EmptyingGuard(&self.log.emptying);
-        let before = self.log.bytes();
-        let emptied = self.truncate_log().await;
-        let failed_before = self.log.due_bytes.load(Ordering::Relaxed) > MAX_LOG_BYTES;
-        match emptied {
+        let _guard = EmptyingGuard(&self.log.is_emptying);
+        let bytes_before = self.log.bytes();
+        let outcome = self.truncate_log().await;
+        let had_failed = self.log.due_bytes.load(Ordering::Relaxed) > MAX_LOG_BYTES;
+        match outcome {
             Ok(true) => {
                 self.log.due_bytes.store(MAX_LOG_BYTES, Ordering::Relaxed);
-                if failed_before {
-                    tracing::info!(bytes = before, "the database's log is emptied");
+                if had_failed {
+                    tracing::info!(bytes = bytes_before, "the database's log is emptied");
                 }
             }
             Ok(false) | Err(_) => {
-                let due_bytes = before.saturating_add(MAX_LOG_BYTES / 4);
+                let due_bytes = bytes_before.saturating_add(MAX_LOG_BYTES / 4);
                 self.log.due_bytes.store(due_bytes, Ordering::Relaxed);
-                if !failed_before {
+                if !had_failed {
                     tracing::warn!(
-                        bytes = before,
-                        cause = emptied.err().map_or_else(
+                        bytes = bytes_before,
+                        cause = outcome.err().map_or_else(
                             || "another process reads the database".to_owned(),
                             |error| error.to_string()
                         ),
@@ -89,7 +89,7 @@ impl Database {
     /// Returns false if a reader of another process blocks the checkpoint.
     async fn truncate_log(&self) -> Result<bool> {
         let mut writer = self.write.acquire().await?;
-        // While it holds all of this process's connections, no reader of this process is active.
+        // While this function holds all of this process's read connections, no reader of this process is active.
         let _readers = tokio::time::timeout(READER_TIMEOUT, self.all_readers()).await;
         // Writers are blocked meanwhile, so the wait for another process's reader must be short.
         sqlx::query(sqlx::AssertSqlSafe(busy_timeout(READER_TIMEOUT)))

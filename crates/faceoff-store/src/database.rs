@@ -1,7 +1,9 @@
+//! The SQLite database of a data folder: the pools of its connections, and how they are opened.
+
 use crate::{
     error::{Result, StoreError},
-    log::{Log, MAX_LOG_BYTES},
     schema::{self, MIGRATIONS, Upgrade},
+    write_ahead_log::{MAX_LOG_BYTES, WriteAheadLog},
 };
 use futures::future::BoxFuture;
 use sqlx::{
@@ -14,11 +16,11 @@ use std::{path::Path, sync::Arc, time::Duration};
 /// How long a writer waits for the writer of another process.
 pub(crate) const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Concurrent readers; a board is read in well under a millisecond.
+/// Number of read connections. Few are enough: a query takes well under a millisecond.
 pub(crate) const READERS: u32 = 4;
 
-/// May a released connection be used again? SQLite rolls back automatically when the disk is full. The
-/// library's own rollback then fails, and it believes forever that the transaction is open, so that no
+/// May a released connection be used again? SQLite rolls back automatically when the disk is full. The rollback
+/// of the library sqlx then fails: on that connection sqlx believes forever that the transaction is open, so that no
 /// other can begin. Such a connection is replaced.
 fn is_reusable(
     connection: &mut SqliteConnection,
@@ -34,10 +36,12 @@ fn is_reusable(
 /// The connection pools. Readers see the last committed state and never wait for the writer.
 #[derive(Debug, Clone)]
 pub(crate) struct Database {
+    /// Connections that can only read.
     pub(crate) read: SqlitePool,
+    /// The only connection that can write.
     pub(crate) write: SqlitePool,
     pub(crate) file: Arc<Path>,
-    pub(crate) log: Arc<Log>,
+    pub(crate) log: Arc<WriteAheadLog>,
     /// The migration that was run on opening, if any.
     pub(crate) upgrade: Option<Upgrade>,
 }
@@ -66,24 +70,24 @@ impl Database {
             .after_release(is_reusable)
             .connect_with(options.clone())
             .await?;
-        let before = schema::check_migratable(&mut *write.acquire().await?).await?;
+        let schema_before = schema::check_migratable(&mut *write.acquire().await?).await?;
         MIGRATIONS
             .run(&write)
             .await
             .map_err(|error| StoreError::Database(error.into()))?;
-        let upgrade = schema::record_program(&mut *write.acquire().await?, before).await?;
+        let upgrade = schema::record_program(&mut *write.acquire().await?, schema_before).await?;
         let read = SqlitePoolOptions::new()
             .max_connections(READERS)
             .after_release(is_reusable)
             .connect_with(options.create_if_missing(false).pragma("query_only", "ON"))
             .await?;
-        let mut log = file.as_os_str().to_owned();
-        log.push("-wal");
+        let mut log_file = file.as_os_str().to_owned();
+        log_file.push("-wal");
         Ok(Self {
             read,
             write,
             file: file.into(),
-            log: Arc::new(Log::new(log.into())),
+            log: Arc::new(WriteAheadLog::new(log_file.into())),
             upgrade,
         })
     }
@@ -94,10 +98,10 @@ impl Database {
         Ok(self.write.begin_with("BEGIN IMMEDIATE").await?)
     }
 
-    /// Commits a write to the disk that changes nothing.
+    /// Tests whether the disk can be written: commits a transaction that changes no data.
     pub(crate) async fn probe_write(&self) -> Result<()> {
         let mut transaction = self.begin().await?;
-        // The number is unused; setting it writes a page even if the value is unchanged.
+        // Faceoff does not use this number; setting it writes a page even if the value is unchanged.
         sqlx::query("PRAGMA user_version = 0")
             .execute(&mut *transaction)
             .await?;

@@ -1,3 +1,5 @@
+//! [`StoreError`]: why an operation of the store failed.
+
 use crate::program::Program;
 use faceoff_types::is_full_disk;
 use jiff::{Timestamp, civil::Date};
@@ -10,9 +12,12 @@ pub enum StoreError {
     /// There is no team, submission, evaluation or artifact of this id.
     #[error("{0} not found")]
     NotFound(&'static str),
-    /// The outcomes of an old run were removed; its summary and its dataset remain.
+    /// The outcomes of an old run's single episodes were removed; its summary and its dataset remain.
     #[error("the run's single outcomes were removed at {at}; its dataset has them")]
-    OutcomesRemoved { at: Timestamp },
+    OutcomesRemoved {
+        /// When they were removed.
+        at: Timestamp,
+    },
     /// Names that differ only in case count as the same.
     #[error("a team named {0:?} exists already")]
     TeamNameTaken(String),
@@ -47,13 +52,17 @@ pub enum StoreError {
     /// A disqualified team can neither upload nor compete.
     #[error("the team was disqualified at {at}: {reason}")]
     Disqualified {
+        /// When the team was disqualified.
         at: Timestamp,
         /// Shown publicly.
         reason: String,
     },
     /// The team has withdrawn from the season.
     #[error("the team retired at {at}")]
-    Retired { at: Timestamp },
+    Retired {
+        /// When the team withdrew.
+        at: Timestamp,
+    },
     /// No member of the team has accepted the current terms.
     #[error("no member of the team has accepted version {version} of the terms")]
     TermsNotAccepted { version: u32 },
@@ -90,7 +99,8 @@ pub enum StoreError {
         used_bytes: u64,
         bundle_bytes: u64,
     },
-    /// The request does not fit the entity's state; the text says what does.
+    /// The state of the requested team, evaluation or other resource does not allow the request; the text says why, and
+    /// what to do.
     #[error("{0}")]
     Conflict(String),
     /// A disk is full. The operation was not done, or may not be; it can be repeated once there is space.
@@ -103,9 +113,11 @@ pub enum StoreError {
         program.as_deref().unwrap_or("another"), this.version, this.schema
     )]
     NewerDatabase {
+        /// Number of the newest migration in the database.
         schema: i64,
-        /// The version that opened it last.
+        /// The version that opened the database last.
         program: Option<String>,
+        /// The running version.
         this: Program,
     },
     #[error("database: {0}")]
@@ -113,7 +125,7 @@ pub enum StoreError {
     /// The object store failed.
     #[error("artifacts: {0}")]
     Artifacts(String),
-    /// A stored value is not one that this program writes.
+    /// A stored value does not have the form in which this program writes it.
     #[error("stored value is damaged: {0}")]
     Damaged(String),
 }
@@ -135,6 +147,7 @@ impl From<sqlx::Error> for StoreError {
 
 /// SQLITE_FULL, or SQLITE_IOERR_SHMSIZE: the index of the write-ahead log could not grow.
 fn is_full(error: &dyn DatabaseError) -> bool {
+    /// Result codes of SQLite, as sqlx formats them.
     const CODES: [&str; 2] = ["13", "4874"];
     error
         .code()

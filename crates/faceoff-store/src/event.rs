@@ -157,33 +157,33 @@ pub enum Event {
     SubmissionNotValidated {
         reason: String,
     },
-    /// It became its team's active submission, evaluated from the next cutoff on: the newest valid one, or the team's
-    /// choice.
+    /// The submission became its team's active one, which is evaluated from the next cutoff on. It is the newest valid
+    /// one, or the team's choice.
     SubmissionActivated,
-    /// It was excluded from a day, because the stage does not accept its runtime.
+    /// The submission was excluded from a day, because the stage does not accept its runtime.
     SubmissionNotTaken {
         stage: StageId,
         day: Date,
         /// The runtimes that the stage accepts, and the submission's.
         reason: String,
     },
-    /// Its team withdrew it: it is not evaluated on later days.
+    /// The team withdrew the submission: it is not evaluated on later days.
     SubmissionWithdrawn,
-    /// Its bundle was removed on request; its results stay.
+    /// The submission's bundle was removed on request; its results stay.
     SubmissionDeleted {
         /// Shown to its team.
         reason: String,
     },
-    /// It is not needed any more, and its bundle was removed.
+    /// The submission's bundle was removed, because it is not needed any more.
     ArchiveRemoved {
         reason: String,
     },
-    /// Its team set or removed its label.
+    /// The team set or removed the submission's label.
     SubmissionLabelled {
         /// `None` if the label was removed.
         label: Option<String>,
     },
-    /// Its team changed or removed its note.
+    /// The team changed or removed the submission's note.
     SubmissionNoted,
     /// An evaluation of a submission was queued.
     EvaluationQueued {
@@ -248,7 +248,7 @@ pub enum Event {
     TeamReinstated {
         reason: String,
     },
-    /// An ablation of a submission was requested.
+    /// An ablation of a submission was requested: its evaluation under each perturbation profile.
     AblationOrdered {
         submission: SubmissionId,
         /// Episodes of each task in each profile.
@@ -261,7 +261,8 @@ pub enum Event {
         /// The fault, and whether it is the agent's or the platform's.
         reason: String,
     },
-    /// A trial or a proposed re-evaluation was queued.
+    /// A proposal was queued: a trial, whose results never count, or a re-evaluation, whose results count once an
+    /// organiser applies it.
     ProposalMade {
         stage: StageId,
         evaluations: u32,
@@ -277,7 +278,7 @@ pub enum Event {
     EvaluationApplied {
         proposal: ProposalId,
     },
-    /// A shard was played and the outcomes of its episodes stored.
+    /// A shard (a part of a run's episodes) was played, and the outcomes of its episodes were stored.
     ShardCommitted {
         run: RunId,
         shard: ShardId,
@@ -305,8 +306,8 @@ pub enum Event {
         /// Evaluations that were not complete.
         not_played: u32,
     },
-    /// The day's seed is public: its last evaluation has ended (before there were cutoffs: its first
-    /// dataset was downloaded).
+    /// The day's seed is public, because its last evaluation has ended. In events from before there were cutoffs: because
+    /// its first dataset was downloaded.
     DayReleased,
     /// A day that was missed on its date was started later.
     MissedDayStarted {
@@ -501,7 +502,7 @@ pub enum Event {
     WorkerBanned {
         worker: String,
         reason: String,
-        /// Number of its shards that are repeated.
+        /// Number of shards, run by this worker, that are repeated.
         again: u32,
     },
     /// Results of the remote worker are accepted again.
@@ -521,7 +522,7 @@ pub enum Event {
 pub struct EventRecord {
     /// Rises with every event of the data folder, in the order of the commits.
     pub id: i64,
-    /// By the clock of the process that wrote it.
+    /// When the event was recorded, by the clock of the process that did so.
     pub at: Timestamp,
     pub actor: Actor,
     pub subject: Subject,
@@ -533,8 +534,8 @@ pub struct EventRecord {
 pub enum Change {
     /// A stored event.
     Recorded(Box<EventRecord>),
-    /// A job on the subject has made progress. It is not stored: it comes every second from every
-    /// slot, each one replaces the last, and the shard's commit has the final numbers.
+    /// A job on the subject has made progress. This notification is not stored: it comes every second from every
+    /// slot, each one replaces the last, and the final numbers are stored when the job ends.
     Progress(Subject),
 }
 

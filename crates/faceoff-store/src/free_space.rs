@@ -1,3 +1,5 @@
+//! Supervision of the free disk space that jobs and uploads need.
+
 use rustix::fs::statvfs;
 use std::{
     path::{Path, PathBuf},
@@ -7,14 +9,14 @@ use std::{
 /// Minimum number of free inodes of a file system: one bundle may contain thousands of files.
 const MIN_FREE_FILES: u64 = 1000;
 
-/// The disks that the server writes to, and how much of each must stay free. Below that no job starts and
+/// The disks that the server writes to, and how much of each must stay free. Below this minimum no job starts and
 /// no upload is accepted: a started job must have the space to finish, and a result must never depend on
 /// how full the disk is.
 #[derive(Debug)]
 pub struct FreeSpace {
     folders: Vec<PathBuf>,
     min_free_bytes: u64,
-    /// The last logged state.
+    /// Was space short at the last check? A change is logged.
     is_short: Mutex<bool>,
 }
 
@@ -44,8 +46,8 @@ impl FreeSpace {
     }
 
     /// Is there too little free space? The disks are checked on each call, and a change is logged. Once space
-    /// is short, an eighth more must be free until it is enough again. So temporary files of running jobs
-    /// do not toggle it.
+    /// is short, an eighth more than the minimum must be free before it counts as enough again. So temporary files of
+    /// running jobs do not toggle the answer.
     #[must_use]
     pub fn is_short(&self) -> bool {
         if self.min_free_bytes == 0 {
@@ -53,7 +55,7 @@ impl FreeSpace {
         }
         // a panic of another thread leaves the value consistent
         let mut is_short = self.is_short.lock().unwrap_or_else(PoisonError::into_inner);
-        let wanted_bytes = if *is_short {
+        let needed_bytes = if *is_short {
             self.min_free_bytes.saturating_add(self.min_free_bytes / 8)
         } else {
             self.min_free_bytes
@@ -61,11 +63,11 @@ impl FreeSpace {
         let shortage = self
             .folders
             .iter()
-            .find_map(|folder| Shortage::find(folder, wanted_bytes));
+            .find_map(|folder| Shortage::find(folder, needed_bytes));
         match (&shortage, *is_short) {
             (Some(shortage), false) => tracing::warn!(
                 folder = %shortage.folder.display(),
-                found = shortage.found,
+                found = shortage.description,
                 min_free_bytes = self.min_free_bytes,
                 "too little free disk space: the queue pauses and uploads are refused until there is more"
             ),
@@ -98,16 +100,17 @@ impl DiskSpace {
 /// A disk with too little free space.
 struct Shortage<'a> {
     folder: &'a Path,
-    found: String,
+    /// How much is free, or why this is unknown.
+    description: String,
 }
 
 impl<'a> Shortage<'a> {
-    fn find(folder: &'a Path, wanted_bytes: u64) -> Option<Self> {
-        let found = match statvfs(folder) {
+    fn find(folder: &'a Path, needed_bytes: u64) -> Option<Self> {
+        let description = match statvfs(folder) {
             Ok(disk) => {
                 let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
                 // some file systems do not count their inodes
-                if free_bytes >= wanted_bytes
+                if free_bytes >= needed_bytes
                     && (disk.f_files == 0 || disk.f_favail >= MIN_FREE_FILES)
                 {
                     return None;
@@ -117,7 +120,10 @@ impl<'a> Shortage<'a> {
             // a file system that cannot be read cannot be written either
             Err(error) => format!("it cannot be read: {error}"),
         };
-        Some(Self { folder, found })
+        Some(Self {
+            folder,
+            description,
+        })
     }
 }
 

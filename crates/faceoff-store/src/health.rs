@@ -10,9 +10,9 @@ use crate::{
 use jiff::{SignedDuration, Timestamp};
 use std::sync::atomic::Ordering;
 
-/// The result of a write probe is reused for this time: frequent requests, which need no account, cause
-/// no more writes than this.
-const PROBE_EVERY: SignedDuration = SignedDuration::from_secs(1);
+/// The result of a write probe (a test whether the database can be written) is reused for this time. Requests for the
+/// health need no account; however frequent they are, they cause one write per interval at most.
+const PROBE_INTERVAL: SignedDuration = SignedDuration::from_secs(1);
 
 /// The queue is stuck if a job has waited for longer than this while no job runs and no worker polls.
 const STUCK_AFTER: SignedDuration = SignedDuration::from_secs(60);
@@ -32,30 +32,30 @@ pub enum QueueHealth {
     Running {
         /// Jobs under a valid lease.
         running: u32,
-        /// Jobs that can be claimed.
+        /// Jobs that a worker can claim.
         waiting: u32,
-        /// Jobs that ran out of disk space repeatedly although enough is free: they need more.
+        /// Jobs that ran out of disk space repeatedly although the required minimum was free: they need more than that.
         out_of_space: u32,
     },
     /// No job starts: there is too little [`FreeSpace`](crate::FreeSpace).
     DiskFull {
-        /// Jobs that could be claimed otherwise.
+        /// Jobs that a worker could claim otherwise.
         waiting: u32,
     },
     /// No job starts: an organiser has paused the queue.
     Paused {
         /// Jobs under a valid lease.
         running: u32,
-        /// Jobs that could be claimed otherwise.
+        /// Jobs that a worker could claim otherwise.
         waiting: u32,
         /// Time and reason of the pause.
         ruling: Ruling,
     },
     /// Jobs can be claimed, and no worker polls for them.
     Stuck {
-        /// Jobs that can be claimed.
+        /// Jobs that a worker can claim.
         waiting: u32,
-        /// Since when the first of them can be claimed.
+        /// Since when a worker can claim the first of them.
         since: Timestamp,
     },
     /// The database cannot be read.
@@ -81,19 +81,19 @@ impl Store {
 
     async fn is_writable(&self, now: Timestamp) -> bool {
         // one probe at a time: concurrent callers wait and get its result
-        let mut last = self.probes.last_write.lock().await;
-        if let Some((at, writable)) = *last
-            && now.duration_since(at).abs() < PROBE_EVERY
+        let mut last_write = self.probes.last_write.lock().await;
+        if let Some((probed_at, writable)) = *last_write
+            && now.duration_since(probed_at).abs() < PROBE_INTERVAL
         {
             return writable;
         }
         let outcome = self.database.probe_write().await;
         if let Err(error) = &outcome
-            && !matches!(*last, Some((_, false)))
+            && !matches!(*last_write, Some((_, false)))
         {
             tracing::error!(%error, "the database cannot be written");
         }
-        *last = Some((now, outcome.is_ok()));
+        *last_write = Some((now, outcome.is_ok()));
         outcome.is_ok()
     }
 

@@ -1,3 +1,5 @@
+//! [`HealthProbes`]: what the store remembers between two reports of its health.
+
 use jiff::Timestamp;
 use std::sync::atomic::AtomicI64;
 use tokio::sync::Mutex;

@@ -1,10 +1,11 @@
-//! Persistence of Faceoff: teams, submissions, evaluations, shards and the job queue in SQLite;
-//! bundles, recordings and datasets as artifacts in an object store.
+//! Persistence of Faceoff: teams, submissions, evaluations and the job queue in SQLite;
+//! bundles, recordings and datasets as artifacts (files) in an object store.
 //!
-//! All SQL is in this crate, in three layers. The queue holds jobs without knowing their purpose. The
-//! tables define the rows. The operations are transactions over both. The queries read rows for the API
-//! and the pages. Every change goes through one function, which also appends to the events table and
-//! then wakes listeners. A process killed at any point leaves either the whole change or none of it.
+//! All SQL is in this crate, in four modules. `queue` holds jobs (pieces of work for the workers) without
+//! knowing their purpose. `tables` defines the rows. `operations` are transactions over both. `queries`
+//! reads rows for the API and the pages. Every change goes through the function `Store::write`, which also
+//! appends to the events table and then wakes listeners. A process killed at any point leaves either the
+//! whole change or none of it.
 //! The store runs no agent, computes no score and reads no clock: instants are passed in. Per-step
 //! data never enters the database.
 //!
@@ -28,7 +29,6 @@ mod free_space;
 mod health;
 mod health_probes;
 mod live;
-mod log;
 mod operations;
 mod program;
 mod queries;
@@ -39,6 +39,7 @@ mod store;
 mod tables;
 mod workers;
 mod write;
+mod write_ahead_log;
 
 /// Boxes the futures of public functions. Each crate that awaits an `async fn` compiles its body; boxed, only the store
 /// does. This saves the server, the workers and every test from compiling it. A call costs one allocation.
@@ -50,7 +51,6 @@ pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
 pub use free_space::{DiskSpace, FreeSpace};
 pub use health::{Health, QueueHealth};
 pub use live::{LiveCursor, LiveGames, LiveSubscription, LiveUpdate, MAX_FINISHED_LIVE_GAMES};
-pub use log::MAX_LOG_BYTES;
 pub use operations::{
     announcements::MAX_OPEN_QUESTIONS,
     backup::CheckedDatabase,
@@ -143,3 +143,4 @@ pub use workers::{
     ParseWorkerNameError, SlotReport, SlotStatus, UploadGuard, WORKER_TIMEOUT, WorkerInfo,
     WorkerName, WorkerStatus, Workers,
 };
+pub use write_ahead_log::MAX_LOG_BYTES;

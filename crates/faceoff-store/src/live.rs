@@ -1,4 +1,5 @@
-//! Live games, for viewers. The data is in memory only: the result is stored at the end.
+//! Live state of games that are being played, for viewers in the browser. It is in memory only: the database gets a
+//! game's result when the game ends.
 
 use crate::boxed;
 use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame, LivePosition};
@@ -35,12 +36,12 @@ pub struct LiveSubscription {
     attempt: watch::Receiver<LiveAttempt>,
 }
 
-/// A viewer's position in a game: the attempt, and the number of its events that were read. Later positions are greater.
+/// A viewer's reading position in a game: an attempt and a number of its events. Later positions are greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LiveCursor {
     /// From 1.
     pub attempt: u32,
-    /// Number of events read, which is also the number of the last one, from 1.
+    /// Number of events that were read.
     pub events: u32,
 }
 
@@ -49,7 +50,7 @@ pub struct LiveCursor {
 pub struct LiveUpdate {
     /// The current state of the game.
     pub state: LiveGame,
-    /// The events after the viewer's cursor; all of the attempt if there was none, or one of another attempt.
+    /// The events after the viewer's cursor; all events of the attempt if there was no cursor, or one in another attempt.
     pub events: Vec<LiveEvent>,
     /// The position before the first of these events.
     pub start: LiveCursor,
@@ -60,7 +61,7 @@ pub struct LiveUpdate {
 impl LiveGames {
     /// Starts an attempt at a game; its earlier attempts are forgotten.
     pub fn begin(&self, game: GameId, attempt: u32, steps: u32) {
-        let new = LiveAttempt {
+        let new_attempt = LiveAttempt {
             state: LiveGame {
                 game,
                 attempt,
@@ -73,13 +74,13 @@ impl LiveGames {
             events: Vec::new(),
         };
         let mut games = self.games();
-        let at = games.iter().position(|(known, _)| *known == game);
-        match at.and_then(|at| games.remove(at)) {
+        let index = games.iter().position(|(id, _)| *id == game);
+        match index.and_then(|index| games.remove(index)) {
             Some((_, channel)) => {
-                channel.send_replace(new);
+                channel.send_replace(new_attempt);
                 games.push_back((game, channel));
             }
-            None => games.push_back((game, watch::Sender::new(new))),
+            None => games.push_back((game, watch::Sender::new(new_attempt))),
         }
         remove_oldest_finished(&mut games);
     }
@@ -100,7 +101,7 @@ impl LiveGames {
         });
     }
 
-    /// Ends an attempt. If its last event was not reported, it was broken off.
+    /// Ends an attempt. If its final event was not reported, it is marked as aborted.
     pub fn end_attempt(&self, game: GameId, attempt: u32) {
         self.update(game, attempt, |current| {
             current.record(LiveEvent {
@@ -134,7 +135,7 @@ impl LiveGames {
 
     fn find(&self, game: GameId) -> Option<watch::Sender<LiveAttempt>> {
         let games = self.games();
-        let (_, channel) = games.iter().rfind(|(known, _)| *known == game)?;
+        let (_, channel) = games.iter().rfind(|(id, _)| *id == game)?;
         Some(channel.clone())
     }
 
@@ -177,28 +178,32 @@ impl LiveAttempt {
 }
 
 impl LiveSubscription {
-    /// Everything after the viewer's position `seen`. [`changed`](Self::changed) waits for more.
-    pub fn read_since(&mut self, seen: Option<LiveCursor>) -> LiveUpdate {
+    /// Everything after the viewer's cursor. [`changed`](Self::changed) waits for more.
+    pub fn read_since(&mut self, cursor: Option<LiveCursor>) -> LiveUpdate {
         let current = self.attempt.borrow_and_update();
         let attempt = current.state.attempt;
-        let read = seen
-            .filter(|seen| seen.attempt == attempt)
-            .map_or(0, |seen| seen.events as usize);
-        let events = current.events.get(read..).unwrap_or_default().to_vec();
-        let cursor = |events: usize| LiveCursor {
+        let read_count = cursor
+            .filter(|cursor| cursor.attempt == attempt)
+            .map_or(0, |cursor| cursor.events as usize);
+        let events = current
+            .events
+            .get(read_count..)
+            .unwrap_or_default()
+            .to_vec();
+        let cursor_after = |events: usize| LiveCursor {
             attempt,
             events: u32::try_from(events).unwrap_or(u32::MAX),
         };
         LiveUpdate {
             state: current.state.clone(),
-            start: cursor(current.events.len() - events.len()),
-            end: cursor(current.events.len()),
+            start: cursor_after(current.events.len() - events.len()),
+            end: cursor_after(current.events.len()),
             events,
         }
     }
 
-    /// Waits for an update since the last [`read_since`](Self::read_since). Returns false if the game was forgotten: then
-    /// there will be none. After the end of an attempt another one may start.
+    /// Waits for an update since the last [`read_since`](Self::read_since). Returns false if the game was forgotten, so
+    /// that there will be no update. After the end of an attempt another one may start.
     #[boxed]
     pub async fn changed(&mut self) -> bool {
         self.attempt.changed().await.is_ok()
@@ -210,7 +215,10 @@ mod tests {
     use super::*;
     use faceoff_types::Side;
 
-    fn at(step: u32) -> Option<LivePosition> {
+    /// Length of the games, in control steps.
+    const STEPS: u32 = 500;
+
+    fn position_at(step: u32) -> Option<LivePosition> {
         Some(LivePosition {
             step,
             puck: [0.1, 0.2, 0.3],
@@ -236,14 +244,14 @@ mod tests {
         let live = LiveGames::default();
         let game = GameId::new();
         assert!(live.subscribe(game).is_none());
-        live.begin(game, 1, 500);
+        live.begin(game, 1, STEPS);
         let mut subscription = live.subscribe(game).unwrap();
         let first = subscription.read_since(None);
         assert_eq!((first.end, first.events.len()), (cursor(1, 0), 0));
-        assert_eq!((first.state.steps, first.state.position), (500, None));
+        assert_eq!((first.state.steps, first.state.position), (STEPS, None));
 
-        live.advance(game, 1, vec![event(90, goal([1, 0]))], at(90));
-        live.advance(game, 1, Vec::new(), at(100));
+        live.advance(game, 1, vec![event(90, goal([1, 0]))], position_at(90));
+        live.advance(game, 1, Vec::new(), position_at(100));
         live.advance(
             game,
             1,
@@ -260,7 +268,7 @@ mod tests {
         let second = subscription.read_since(Some(first.end));
         assert_eq!(second.events.len(), 2);
         assert_eq!((second.start, second.end), (cursor(1, 0), cursor(1, 2)));
-        assert_eq!(second.state.position, at(100), "the newest stays");
+        assert_eq!(second.state.position, position_at(100), "the newest stays");
         assert_eq!((second.state.score, second.state.fouls), ([2, 0], [0, 1]));
         // a viewer that falls behind, or returns, continues at its cursor
         assert_eq!(subscription.read_since(Some(cursor(1, 1))).events.len(), 1);
@@ -268,68 +276,70 @@ mod tests {
         assert_eq!(
             subscription.read_since(Some(cursor(1, 9))).events,
             [],
-            "no such cursor"
+            "a cursor beyond the last event"
         );
-        assert_eq!(subscription.read_since(Some(cursor(7, 1))).events.len(), 2);
+        let other_attempt = subscription.read_since(Some(cursor(7, 1)));
+        assert_eq!(other_attempt.events.len(), 2, "all of the current attempt");
     }
 
     #[tokio::test]
     async fn new_attempt_starts_over_and_ignores_earlier_ones() {
         let live = LiveGames::default();
         let game = GameId::new();
-        live.begin(game, 1, 500);
-        live.advance(game, 1, vec![event(90, goal([1, 0]))], at(90));
+        live.begin(game, 1, STEPS);
+        live.advance(game, 1, vec![event(90, goal([1, 0]))], position_at(90));
         let mut subscription = live.subscribe(game).unwrap();
-        let seen = subscription.read_since(None);
+        let first = subscription.read_since(None);
         live.end_attempt(game, 1);
         assert!(subscription.changed().await);
-        let broken = subscription.read_since(Some(seen.end));
-        assert_eq!(broken.events, [event(90, GameEvent::Aborted)]);
-        assert!(broken.state.is_over);
+        let aborted = subscription.read_since(Some(first.end));
+        assert_eq!(aborted.events, [event(90, GameEvent::Aborted)]);
+        assert!(aborted.state.is_over);
 
-        live.begin(game, 2, 500);
-        live.advance(game, 1, vec![event(95, goal([2, 0]))], at(95));
+        live.begin(game, 2, STEPS);
+        live.advance(game, 1, vec![event(95, goal([2, 0]))], position_at(95));
         live.end_attempt(game, 1);
         assert!(subscription.changed().await);
-        let restarted = subscription.read_since(Some(broken.end));
+        let restarted = subscription.read_since(Some(aborted.end));
         assert_eq!((restarted.end, restarted.events.len()), (cursor(2, 0), 0));
         assert_eq!(
             (restarted.state.score, restarted.state.is_over),
             ([0; 2], false)
         );
-        assert!(restarted.end > broken.end);
+        assert!(restarted.end > aborted.end);
 
         let end = GameEvent::Ended {
             score: [3, 1],
             winner: Some(Side::First),
             forfeits: [None; 2],
         };
-        live.advance(game, 2, vec![event(500, end.clone())], at(500));
-        // its end was reported: it was not broken off
+        live.advance(game, 2, vec![event(STEPS, end.clone())], position_at(STEPS));
+        // the attempt reported its end before, so it is not marked as aborted
         live.end_attempt(game, 2);
         let last = subscription.read_since(Some(restarted.end));
-        assert_eq!(last.events, [event(500, end)]);
+        assert_eq!(last.events, [event(STEPS, end)]);
         assert_eq!((last.state.score, last.state.is_over), ([3, 1], true));
     }
 
     #[tokio::test]
     async fn finished_games_are_forgotten_and_running_ones_are_not() {
         let live = LiveGames::default();
+        // all but the second one finish: two more than are kept
         let games: Vec<GameId> = (0..MAX_FINISHED_LIVE_GAMES + 3)
             .map(|_| GameId::new())
             .collect();
-        live.begin(games[0], 1, 10);
-        let mut early = live.subscribe(games[0]).unwrap();
+        live.begin(games[0], 1, STEPS);
+        let mut subscription = live.subscribe(games[0]).unwrap();
         live.end_attempt(games[0], 1);
-        early.read_since(None);
-        live.begin(games[1], 1, 10);
+        subscription.read_since(None);
+        live.begin(games[1], 1, STEPS);
         for game in &games[2..] {
-            live.begin(*game, 1, 10);
+            live.begin(*game, 1, STEPS);
             live.end_attempt(*game, 1);
         }
-        live.begin(GameId::new(), 1, 10);
+        live.begin(GameId::new(), 1, STEPS);
         assert!(live.subscribe(games[0]).is_none());
-        assert!(!early.changed().await, "its subscriptions end");
+        assert!(!subscription.changed().await, "its subscriptions end");
         assert!(live.subscribe(games[1]).is_some(), "it is running");
         assert!(live.subscribe(games[2]).is_none());
         assert!(live.subscribe(games[3]).is_some());

@@ -1,6 +1,6 @@
-//! The version of the program that opens a database.
+//! [`Program`]: the version of Faceoff that opens a database.
 
-/// A version of the program, with the newest migration that it knows.
+/// A version of Faceoff, with the newest migration that it knows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Program {
     /// As in `faceoff --version`.

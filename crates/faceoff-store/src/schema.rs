@@ -1,4 +1,4 @@
-//! The database schema: migrated to this program's version, refused if it is from a later one.
+//! The database schema. An older database is migrated to this program's schema; one of a later version is refused.
 
 use crate::{
     error::{Result, StoreError},
@@ -14,8 +14,9 @@ pub(crate) static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations");
 pub struct Upgrade {
     /// The version that opened the database last; `None` if it did not record itself.
     pub from: Option<String>,
-    /// Its newest migration before the upgrade.
+    /// Number of the newest migration before the upgrade.
     pub from_schema: i64,
+    /// This version.
     pub to: Program,
 }
 
@@ -23,11 +24,12 @@ pub struct Upgrade {
 pub(crate) fn this_program() -> Program {
     Program {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        schema: newest(),
+        schema: newest_migration(),
     }
 }
 
-fn newest() -> i64 {
+/// Number of the newest migration.
+fn newest_migration() -> i64 {
     MIGRATIONS
         .iter()
         .map(|migration| migration.version)
@@ -47,12 +49,14 @@ pub(crate) fn digest() -> blake3::Hash {
 /// State of a database before it is migrated.
 #[derive(Debug)]
 pub(crate) struct SchemaBefore {
+    /// Number of the newest migration that was run; `None` for an empty database.
     applied: Option<i64>,
+    /// The version that opened the database last, if it recorded itself.
     last: Option<Program>,
 }
 
-/// Reads the state of a database before its migration. [`StoreError::NewerDatabase`] if a later version has migrated it:
-/// then nothing may be changed.
+/// Reads the state of a database before its migration. [`StoreError::NewerDatabase`] if a later version has migrated it, so
+/// that nothing may be changed.
 pub(crate) async fn check_migratable(connection: &mut SqliteConnection) -> Result<SchemaBefore> {
     let (applied, last) = (
         newest_applied(connection).await?,
@@ -90,12 +94,12 @@ pub(crate) async fn record_program(
 
 /// The newest migration that was run; `None` for an empty database.
 pub(crate) async fn newest_applied(connection: &mut SqliteConnection) -> Result<Option<i64>> {
-    let found: i64 = sqlx::query_scalar(
+    let table_count: i64 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = '_sqlx_migrations'",
     )
     .fetch_one(&mut *connection)
     .await?;
-    if found == 0 {
+    if table_count == 0 {
         return Ok(None);
     }
     Ok(

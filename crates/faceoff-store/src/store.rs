@@ -1,3 +1,5 @@
+//! [`Store`]: the handle through which all other crates use this one.
+
 use crate::{
     artifacts::Artifacts, boxed, database::Database, error::Result, event::Change,
     free_space::FreeSpace, health_probes::HealthProbes, live::LiveGames, schema::Upgrade,
@@ -14,9 +16,13 @@ pub struct Store {
     pub(crate) signals: Arc<Signals>,
     pub(crate) artifacts: Artifacts,
     pub(crate) free_space: Arc<FreeSpace>,
+    /// Last signs of health.
     pub(crate) probes: Arc<HealthProbes>,
+    /// Games that are being played.
     pub(crate) live: LiveGames,
+    /// Remote workers.
     pub(crate) workers: Workers,
+    /// Set if the season was imported from an archive.
     pub(crate) archive: Option<Arc<ArchivedSeason>>,
 }
 
@@ -68,7 +74,7 @@ impl Store {
         &self.live
     }
 
-    /// Remote workers that this process has heard of.
+    /// Remote workers that have contacted this process.
     #[must_use]
     pub const fn workers(&self) -> &Workers {
         &self.workers
@@ -82,7 +88,8 @@ impl Store {
         self.signals.changes()
     }
 
-    /// How often this process has changed the season so far. While the number is the same, earlier reads are current.
+    /// Number of changes of the season by this process so far. While it is the same, the results of earlier queries are
+    /// current.
     #[must_use]
     pub fn change_count(&self) -> u64 {
         self.signals.commits()

@@ -1,4 +1,5 @@
-//! Remote workers that this process has heard of. The data is in memory only: the queue has the leases.
+//! Remote workers (on other machines) that have contacted this process: their state, failures, bans and uploads. The data is
+//! in memory only; the leases of their jobs are in the queue.
 
 use jiff::{SignedDuration, Timestamp};
 use std::{
@@ -9,9 +10,9 @@ use std::{
 };
 use uuid::Uuid;
 
-/// A worker that was not heard of for this time is offline or disconnected. Idle slots poll every few seconds.
+/// A worker that has not contacted the server for this time is offline or disconnected. Idle slots poll every few seconds.
 pub const WORKER_TIMEOUT: SignedDuration = SignedDuration::from_secs(30);
-/// A worker that was not heard of for this time is forgotten.
+/// A worker that has not contacted the server for this time is forgotten.
 const FORGET_AFTER: SignedDuration = SignedDuration::from_hours(24);
 /// Maximum number of workers in memory.
 const MAX_WORKERS: usize = 10_000;
@@ -44,7 +45,7 @@ impl WorkerName {
         worker.parse().ok()
     }
 
-    /// The worker as a lease holder, and the prefix of its slots as lease holders.
+    /// The name of the worker as a lease holder. Its slots are named `HOLDER/SLOT`.
     #[must_use]
     pub fn holder(&self) -> String {
         format!("{REMOTE_PREFIX}{}", self.0)
@@ -76,11 +77,11 @@ pub struct Workers(Arc<Mutex<WorkersState>>);
 #[derive(Debug, Default)]
 struct WorkersState {
     workers: BTreeMap<String, WorkerStatus>,
-    /// Causes, by the task that the server cannot do.
+    /// Tasks that the server cannot do for remote workers, with the causes.
     problems: BTreeMap<String, String>,
     /// Reasons of bans, by worker.
     banned: BTreeMap<String, String>,
-    /// Files of leased jobs that are being uploaded or are closed, by the nonces of the leases.
+    /// Files of leased jobs that are being uploaded or are closed, by the nonce (unique number) of the lease.
     files: HashMap<Uuid, JobFiles>,
     /// Failures in a row, by worker.
     failing: HashMap<String, Failures>,
@@ -92,11 +93,11 @@ struct WorkersState {
 struct Failures {
     /// Jobs that it failed to run; a job that fails repeatedly counts once.
     jobs: BTreeSet<Uuid>,
-    /// End of its back-off: it gets no job before.
-    until: Option<Timestamp>,
+    /// End of its back-off: before this time it gets no job.
+    backoff_until: Option<Timestamp>,
 }
 
-/// After this number of failed jobs in a row a worker backs off.
+/// After this number of failed jobs in a row a worker backs off: it gets no jobs for a time.
 const MAX_FAILURES: usize = 3;
 /// The first back-off, which doubles with each further failure.
 const BACKOFF: SignedDuration = SignedDuration::from_mins(1);
@@ -105,7 +106,9 @@ const MAX_BACKOFF: SignedDuration = SignedDuration::from_hours(1);
 /// State of the files of a leased job.
 #[derive(Debug, Default)]
 struct JobFiles {
+    /// Number of running uploads.
     uploads: u32,
+    /// True once no upload can begin any more.
     are_closed: bool,
 }
 
@@ -139,16 +142,16 @@ pub struct WorkerInfo {
     pub labels: Vec<String>,
 }
 
-/// State of a remote worker, as last heard.
+/// State of a remote worker, as it last reported it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WorkerStatus {
     pub name: String,
     pub info: WorkerInfo,
-    /// When this process first heard of it.
+    /// When it first contacted this process.
     pub first_seen_at: Timestamp,
-    /// When this process last heard of it.
+    /// When it last contacted this process.
     pub last_seen_at: Timestamp,
-    /// Why it gets no jobs; `None` if it does.
+    /// Why it gets no jobs; `None` if it gets them.
     pub refusal: Option<String>,
     /// The slots that run a job, by name.
     pub busy_slots: BTreeMap<String, SlotStatus>,
@@ -160,7 +163,7 @@ pub struct SlotStatus {
     pub job: Uuid,
     /// Description of the job for people; `None` if it was claimed before this process started.
     pub description: Option<String>,
-    /// When this process first heard of the job.
+    /// When the slot first reported the job to this process.
     pub since: Timestamp,
     /// What prevents the slot from sending its result.
     pub problem: Option<String>,
@@ -193,7 +196,7 @@ impl WorkerStatus {
         self.info.slots.max(busy)
     }
 
-    /// Was the worker heard of within [`WORKER_TIMEOUT`]?
+    /// Has the worker contacted the server within [`WORKER_TIMEOUT`]?
     #[must_use]
     pub fn is_online(&self, now: Timestamp) -> bool {
         now.duration_since(self.last_seen_at) < WORKER_TIMEOUT
@@ -232,8 +235,7 @@ impl Workers {
         worker.last_seen_at = now;
     }
 
-    /// Records that a slot runs a job that is leased to it. A worker that started before this process is first heard of
-    /// here.
+    /// Records that a slot runs a job that is leased to it. A worker that started before this process is added.
     pub fn record_job(
         &self,
         name: &str,
@@ -249,7 +251,7 @@ impl Workers {
         let worker = state.workers.entry(name.to_owned());
         let worker = worker.or_insert_with(|| WorkerStatus::new(name, now));
         worker.last_seen_at = now;
-        let new = SlotStatus {
+        let new_status = SlotStatus {
             job,
             description: report.description.map(str::to_owned),
             since: now,
@@ -258,9 +260,9 @@ impl Workers {
         let busy = worker
             .busy_slots
             .entry(slot.to_owned())
-            .or_insert(new.clone());
+            .or_insert(new_status.clone());
         if busy.job != job {
-            *busy = new;
+            *busy = new_status;
         }
         busy.problem = report.problem.map(str::to_owned);
     }
@@ -286,7 +288,7 @@ impl Workers {
         let doublings = i32::try_from(excess.min(6)).unwrap_or_default();
         let backoff = (BACKOFF * 2_i32.pow(doublings.unsigned_abs())).min(MAX_BACKOFF);
         let until = now.saturating_add(backoff).unwrap_or(Timestamp::MAX);
-        failures.until = Some(until);
+        failures.backoff_until = Some(until);
         Some((count, until))
     }
 
@@ -300,7 +302,7 @@ impl Workers {
     pub fn backoff_reason(&self, name: &str, now: Timestamp) -> Option<String> {
         let state = self.lock();
         let failures = state.failing.get(name)?;
-        let until = failures.until.filter(|until| *until > now)?;
+        let until = failures.backoff_until.filter(|until| *until > now)?;
         Some(format!(
             "its last {} jobs failed, and it gets none before {}: look into its log, and run `faceoff doctor` there",
             failures.jobs.len(),

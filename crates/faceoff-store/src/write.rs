@@ -1,4 +1,4 @@
-//! The only way to change the database.
+//! Write transactions, the only way to change the database. Each stores its events and wakes the listeners.
 
 use crate::{
     column::{Instant, Json},
@@ -14,31 +14,33 @@ use std::ops::{Deref, DerefMut};
 /// An open write transaction. It is the connection for statements, and collects the events to publish.
 pub(crate) struct Tx {
     transaction: Transaction<'static, Sqlite>,
+    /// The time of the change.
     pub(crate) now: Timestamp,
-    recorded: Vec<(Subject, Event)>,
+    events: Vec<(Subject, Event)>,
+    /// Subjects of progress notifications.
     progress: Vec<Subject>,
-    job_added: bool,
+    has_new_job: bool,
 }
 
 impl Tx {
     /// Records an event; it is stored and sent to listeners if the transaction is committed.
     pub(crate) fn record(&mut self, subject: Subject, event: Event) {
-        self.recorded.push((subject, event));
+        self.events.push((subject, event));
     }
 
-    /// Notes progress on a subject, which is sent to listeners and not stored.
+    /// Records progress on a subject, which is sent to listeners and not stored.
     pub(crate) fn record_progress(&mut self, subject: Subject) {
         self.progress.push(subject);
     }
 
-    /// The queue has another job to claim. Only the queue calls this.
+    /// Records that the queue has another job to claim. Only the queue calls this.
     pub(crate) const fn job_added(&mut self) {
-        self.job_added = true;
+        self.has_new_job = true;
     }
 
     async fn append_events(&mut self, actor: &Actor) -> Result<Vec<Change>> {
-        let mut changes = Vec::with_capacity(self.recorded.len() + self.progress.len());
-        for (subject, event) in std::mem::take(&mut self.recorded) {
+        let mut changes = Vec::with_capacity(self.events.len() + self.progress.len());
+        for (subject, event) in std::mem::take(&mut self.events) {
             let id = append(&mut self.transaction, actor, self.now, subject, &event).await?;
             changes.push(Change::Recorded(Box::new(EventRecord {
                 id,
@@ -70,7 +72,7 @@ impl DerefMut for Tx {
 async fn append(
     connection: &mut SqliteConnection,
     actor: &Actor,
-    at: Timestamp,
+    now: Timestamp,
     subject: Subject,
     event: &Event,
 ) -> Result<i64> {
@@ -84,12 +86,12 @@ async fn append(
         Some(Value::String(kind)) => kind,
         _ => return Err(damaged(&"it has no kind")),
     };
-    let (actor, at, payload) = (Text(actor), Instant(at), Json(payload));
+    let (actor, now, payload) = (Text(actor), Instant(now), Json(payload));
     let (subject_kind, subject_id) = subject.columns();
     Ok(sqlx::query_scalar!(
         r#"INSERT INTO events (at, actor, subject_kind, subject_id, kind, payload)
            VALUES (?, ?, ?, ?, ?, ?) RETURNING id AS "id!""#,
-        at,
+        now,
         actor,
         subject_kind,
         subject_id,
@@ -119,8 +121,8 @@ impl Store {
     }
 
     /// Runs `change` as one isolated transaction. Its changes and its events are stored together, and
-    /// then the listeners are woken. Nothing is changed and no listener woken if it fails, or if the
-    /// process dies. After an error of the commit itself it is unknown whether the change is stored.
+    /// then the listeners are woken. If it fails, or if the process dies, nothing is changed and no listener is
+    /// woken. After an error of the commit itself it is unknown whether the change is stored.
     pub(crate) async fn write_even_archived<T>(
         &self,
         actor: Actor,
@@ -130,25 +132,25 @@ impl Store {
         let mut tx = Tx {
             transaction: self.database.begin().await?,
             now,
-            recorded: Vec::new(),
+            events: Vec::new(),
             progress: Vec::new(),
-            job_added: false,
+            has_new_job: false,
         };
-        let done = change(&mut tx).await?;
+        let output = change(&mut tx).await?;
         let changes = tx.append_events(&actor).await?;
         let committed = tx.transaction.commit().await;
-        // Transactions without events change nothing visible: deliveries, leases. After an error the commit may be stored.
+        // Transactions without events (deliveries, leases) change nothing visible. After an error the commit may be stored.
         if committed.is_err() || !changes.is_empty() {
             self.signals.count_commit();
         }
         committed?;
-        if tx.job_added {
+        if tx.has_new_job {
             self.signals.job_added();
         }
         for change in changes {
             self.signals.send(change);
         }
         self.database.empty_log_if_large();
-        Ok(done)
+        Ok(output)
     }
 }

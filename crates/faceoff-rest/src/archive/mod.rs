@@ -102,11 +102,11 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
     drop(snapshot_state);
 
     let mut left_out = Vec::new();
-    if snapshot.under_way > 0 {
+    if snapshot.open_evaluations > 0 {
         left_out.push(format!(
             "{} evaluations that were queued or running, with everything else of their unreleased days and of their \
              proposals",
-            snapshot.under_way
+            snapshot.open_evaluations
         ));
     }
     if edition == Edition::Organiser {

@@ -251,7 +251,7 @@ async fn retention_effect(
         0 => String::new(),
         unmeasured => format!(", without {unmeasured} datasets that are not measured yet"),
     };
-    let time = match removed.later_from {
+    let time = match removed.next_removal_at {
         None => "at once".to_owned(),
         Some(at) => format!(
             "some of it not before {}",

@@ -74,11 +74,11 @@ pub async fn query(
     let stage = requested_stage(app, visibility, (query.stage, query.live)).await?;
     let frozen = visibility.frozen(stage.id).cloned();
     let scope = BoardScope {
-        until: frozen
+        finished_until: frozen
             .as_ref()
             .filter(|_| !query.live)
             .map(|frozen| frozen.at),
-        until_day: query.day,
+        last_day: query.day,
         ..BoardScope::default()
     };
     let revision = match query.revision {
@@ -133,7 +133,9 @@ pub async fn build(
     let mut disqualified = team::all(app).await?;
     match &stage.sign_off {
         None => disqualified.retain(|team| team.disqualified.is_some()),
-        Some(finalised) => disqualified.retain(|team| finalised.without.contains(&team.id)),
+        Some(finalised) => {
+            disqualified.retain(|team| finalised.disqualified_teams.contains(&team.id))
+        }
     }
     disqualified.retain(|team| selection.is_ranked(team.division.as_ref()));
     let variation = revision.rules.variation;
@@ -158,7 +160,7 @@ pub async fn build(
             .then_some(variation.perturbations),
         standings: stage.settings.standings,
         rows_by,
-        day: scope.until_day,
+        day: scope.last_day,
         blind: stage.settings.blind,
         provisional: stage.sign_off.is_none(),
         finalised: stage.sign_off.clone().map(sign_off::view),

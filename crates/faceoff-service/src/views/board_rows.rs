@@ -23,8 +23,8 @@ pub(super) async fn counting_result(
     let final_cutoff = app.store.final_cutoff(stage.id).await?;
     // A board that was frozen before the final day keeps showing the newest results.
     let is_over = final_cutoff.is_some_and(|at| {
-        scope.until.is_none_or(|until| at <= until)
-            && scope.until_day.is_none_or(|day| stage.day(at).date <= day)
+        scope.finished_until.is_none_or(|until| at <= until)
+            && scope.last_day.is_none_or(|day| stage.day(at).date <= day)
     });
     Ok(if is_over {
         CountingResult::Final
@@ -43,7 +43,7 @@ pub(super) async fn rows(
     counting_result: CountingResult,
     task: Option<Task>,
 ) -> Result<Vec<AggregatedRow>, Problem> {
-    let is_plain = scope.without.is_empty() && extra.is_empty();
+    let is_plain = scope.excluded.is_empty() && extra.is_empty();
     let compute = async || load(app, stage, revision, (scope, extra), counting_result, task).await;
     // Reading the newest results is as fast as checking the cache.
     if counting_result == CountingResult::Latest || !is_plain {
@@ -54,8 +54,8 @@ pub(super) async fn rows(
         revision,
         by: counting_result,
         task,
-        until: scope.until,
-        until_day: scope.until_day,
+        until: scope.finished_until,
+        until_day: scope.last_day,
     };
     app.row_cache.get(key, compute).await
 }

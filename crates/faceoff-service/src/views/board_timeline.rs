@@ -63,7 +63,7 @@ impl BoardTimeline {
         }
         let frozen = board.frozen.as_ref().filter(|_| !live);
         let scope = BoardScope {
-            until: frozen.map(|frozen| frozen.at),
+            finished_until: frozen.map(|frozen| frozen.at),
             ..BoardScope::default()
         };
         let days = app.store.board_days(board.stage, board.revision, &scope);
@@ -73,7 +73,7 @@ impl BoardTimeline {
         // The first one is the board's own day.
         if let Some(day) = earlier.nth(1).copied() {
             let scope = BoardScope {
-                until_day: Some(day),
+                last_day: Some(day),
                 ..scope
             };
             timeline.before = Self::before(app, board, scope, day).await?;

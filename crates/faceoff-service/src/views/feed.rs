@@ -122,7 +122,7 @@ fn stage_items(stage: &Stage) -> Vec<NewsItem> {
     if let Some(sign_off) = &stage.sign_off {
         let title = format!("{name}: the result is signed off");
         let key = format!("stage {id} signed off");
-        items.push(item(&key, sign_off.at, title, path));
+        items.push(item(&key, sign_off.signed_off_at, title, path));
     }
     items
 }

@@ -35,7 +35,7 @@ pub async fn query(
     let stage = board::requested_stage(app, visibility, (query.stage, query.live)).await?;
     let frozen = visibility.frozen(stage.id).cloned();
     let scope = BoardScope {
-        until: frozen
+        finished_until: frozen
             .as_ref()
             .filter(|_| !query.live)
             .map(|frozen| frozen.at),

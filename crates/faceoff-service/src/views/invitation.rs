@@ -16,7 +16,7 @@ pub fn view(invitation: Invitation, now: Timestamp) -> InvitationView {
         InvitationRole::PasswordReset(person) => (InvitedRole::Return, None, Some(person)),
     };
     let (state, accepted_by) = match invitation.state {
-        InvitationState::Accepted { by, .. } => ("accepted", Some(by)),
+        InvitationState::Accepted { user, .. } => ("accepted", Some(user)),
         InvitationState::Revoked { .. } => ("revoked", None),
         InvitationState::Open if invitation.expires_at <= now => ("expired", None),
         InvitationState::Open => ("open", None),

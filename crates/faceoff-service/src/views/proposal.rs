@@ -149,7 +149,7 @@ async fn outcome(
         ProposalKind::Trial => {
             // Without the results that count.
             let nothing = BoardScope {
-                until: Some(Timestamp::MIN),
+                finished_until: Some(Timestamp::MIN),
                 ..BoardScope::default()
             };
             let trial_results = (&nothing, played);
@@ -189,7 +189,7 @@ async fn outcome(
         _ => None,
     };
     let scope = BoardScope {
-        without: proposed.iter().filter_map(replaces).collect(),
+        excluded: proposed.iter().filter_map(replaces).collect(),
         ..BoardScope::default()
     };
     let new_scope = (&scope, played);

@@ -5,7 +5,7 @@ use faceoff_store::SignOff;
 
 pub fn view(finalised: SignOff) -> SignOffView {
     SignOffView {
-        at: finalised.at,
-        by: finalised.by.to_string(),
+        at: finalised.signed_off_at,
+        by: finalised.actor.to_string(),
     }
 }

@@ -121,8 +121,8 @@ pub fn view(
         same_as: submission.duplicate_of,
         bundle_removed: submission.bundle_removed.map(ruling::view),
         deleted: submission.deleted.map(|deleted| DeletionView {
-            at: deleted.at,
-            by: deleted.by.to_string(),
+            at: deleted.deleted_at,
+            by: deleted.actor.to_string(),
         }),
         queue: None,
         next,

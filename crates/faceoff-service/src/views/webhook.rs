@@ -35,7 +35,7 @@ pub fn delivery(delivery: Delivery) -> DeliveryView {
         kind: delivery.kind,
         created_at: delivery.created_at,
         attempts: delivery.attempts,
-        last: delivery.last.map(|last| DeliveryAttemptView {
+        last: delivery.last_attempt.map(|last| DeliveryAttemptView {
             at: last.at,
             status: last.status,
             error: last.error,

@@ -1,3 +1,5 @@
+//! [`Actor`]: the person, client or process that caused an event.
+
 use super::parse::ParseEventError;
 use faceoff_types::{TeamId, UserId};
 use std::{fmt, str::FromStr};
@@ -13,6 +15,7 @@ pub enum Actor {
     User(UserId),
     /// A person without an account.
     Visitor,
+    /// The server's schedule, which starts and ends evaluation days.
     Schedule,
     /// A worker's slot, by the name under which it claims jobs.
     Worker(String),

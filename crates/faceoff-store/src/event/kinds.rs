@@ -1,4 +1,4 @@
-//! Names of event kinds.
+//! The kind of an event: the name of its variant in snake case, as it is stored.
 
 use super::Event;
 
@@ -12,7 +12,7 @@ impl Event {
     /// Checks that an event kind of this name exists.
     ///
     /// # Errors
-    /// If not, with the names that exist.
+    /// A text that lists all kinds, if there is none of this name.
     pub fn check_kind(name: &str) -> Result<(), String> {
         let kind_only = serde_json::json!({ "kind": name });
         match serde_json::from_value::<Self>(kind_only) {

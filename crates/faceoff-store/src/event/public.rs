@@ -1,10 +1,11 @@
-//! Which events are public.
+//! Visibility of events: public ones are in the feed that needs no account.
 
 use super::Event;
 
 impl Event {
-    /// Is the event public with all of its fields? Everything public is also on boards, pages of evaluations,
-    /// announcements or the season's page. An event of a single evaluation is public only if the evaluation is.
+    /// Is the event public with all of its fields? The fields of a public event are also shown on a public page: a board,
+    /// an evaluation's page, the announcements or the season's page. An event of a single evaluation is public only if the
+    /// evaluation is.
     #[must_use]
     pub const fn is_public(&self) -> bool {
         match self {
@@ -98,7 +99,7 @@ impl Event {
             | Self::ProposalApplied
             | Self::ProposalDropped
             | Self::ShardCommitted { .. }
-            // These concern test games and friendly games, too.
+            // These also concern test games and friendly games, which are not public.
             | Self::FreeGameQueued { .. }
             | Self::GameBegun { .. }
             | Self::GamePlayed { .. }

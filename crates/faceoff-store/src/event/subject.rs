@@ -1,3 +1,5 @@
+//! [`Subject`]: the entity that an event concerns, and its stored forms.
+
 use super::parse::ParseEventError;
 use faceoff_types::{
     AblationId, AnnouncementId, EvaluationId, GameId, ProposalId, QuestionId, RegistrationId,

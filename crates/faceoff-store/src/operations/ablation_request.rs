@@ -1,3 +1,6 @@
+//! Requests for ablations. An ablation runs a submission under each perturbation profile (none, each factor alone, all of
+//! them), to show which factor costs it points.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -17,7 +20,7 @@ use faceoff_types::{AblationId, Profile, Ruleset, RunId, SeedLabel, SubmissionId
 use jiff::Timestamp;
 
 impl Store {
-    /// Queues an ablation of a valid submission: every task in every ablation profile, otherwise as `plan` says.
+    /// Queues an ablation of a valid submission: every task in every ablation profile. `plan` gives everything else.
     /// [`StoreError::Conflict`] if the submission is not valid, or has an open ablation;
     /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]

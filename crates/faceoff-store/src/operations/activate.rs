@@ -1,3 +1,5 @@
+//! Choice of a team's active submission: the one that is evaluated from the next cutoff on.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -13,7 +15,7 @@ use crate::{
 use faceoff_types::SubmissionId;
 use jiff::Timestamp;
 
-/// Refuses a submission that cannot be evaluated, with what to do about it.
+/// Refuses a submission that cannot be evaluated. The error says what its team can do.
 fn check_valid(submission: &Submission) -> Result<()> {
     Err(StoreError::Conflict(match &submission.state {
         SubmissionState::Valid => return Ok(()),
@@ -46,10 +48,10 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
 }
 
 impl Store {
-    /// Makes a submission its team's active one from the next cutoff on, until a later upload turns
-    /// valid. A withdrawn submission can be chosen too. Days past their cutoff are not affected.
+    /// Makes a submission its team's active one from the next cutoff (the daily start of the evaluations) on, until a
+    /// later upload turns valid. A withdrawn submission can be chosen too. Days past their cutoff are not affected.
     /// [`StoreError::Conflict`] if the submission is not valid (yet), or its bundle was removed;
-    /// [`StoreError::Disqualified`] if its team is;
+    /// [`StoreError::Disqualified`] if its team is disqualified;
     /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn activate_submission(

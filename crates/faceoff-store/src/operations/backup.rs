@@ -1,4 +1,5 @@
-//! A copy of the whole database while servers run, and the artifacts that it needs.
+//! Backup and restore of the database: copying it while servers run, and checking a copy. A copy lists the artifacts
+//! (files in the object store) that its rows refer to.
 
 use crate::{
     boxed,
@@ -20,7 +21,9 @@ use std::path::Path;
 /// A database that passed all checks.
 #[derive(Debug)]
 pub struct CheckedDatabase {
+    /// Name of the season.
     pub season: String,
+    /// Number of the newest migration in the database.
     pub schema: i64,
     /// Artifacts that its rows refer to.
     pub needed: Vec<RequiredArtifact>,
@@ -33,17 +36,17 @@ impl Store {
     /// # Errors
     /// [`StoreError::NotFound`] if there is no database; if it cannot be read, or the copy cannot be written.
     #[boxed]
-    pub async fn copy_database(data_dir: &Path, to: &Path) -> Result<()> {
-        let from = data_dir.join(Self::DATABASE_FILE);
-        let failed = |error| StoreError::artifact(from.display(), &error);
-        if !from.try_exists().map_err(failed)? {
+    pub async fn copy_database(data_dir: &Path, target: &Path) -> Result<()> {
+        let source = data_dir.join(Self::DATABASE_FILE);
+        let unreadable = |error| StoreError::artifact(source.display(), &error);
+        if !source.try_exists().map_err(unreadable)? {
             return Err(StoreError::NotFound("the database faceoff.sqlite3"));
         }
-        copy(&from, to).await
+        copy(&source, target).await
     }
 
-    /// Checks that a database is intact, and of this version or an earlier one. No process may have it open; it is not
-    /// changed. A database of an earlier version is copied to the folder `scratch` and migrated there.
+    /// Checks that a database is intact, and was made by this version of Faceoff or an earlier one. No process may have it
+    /// open; it is not changed. A database of an earlier version is copied to the folder `scratch` and migrated there.
     ///
     /// # Errors
     /// [`StoreError::Damaged`] with the defect, [`StoreError::NewerDatabase`].
@@ -60,8 +63,8 @@ impl Store {
         checked
     }
 
-    /// Raises the next event id far above those of a restored database. Clients that followed the server know ids
-    /// assigned after the copy was made; they must not mistake new events for those.
+    /// Raises the next event id far above the ids in a restored database. Clients that followed the server know ids that
+    /// were assigned after the copy was made. They must not mistake new events for those.
     ///
     /// # Errors
     /// If the database cannot be written. No process may have it open.
@@ -79,18 +82,18 @@ impl Store {
     }
 }
 
-/// More ids than a server assigns between two backups.
-const IDS_SKIPPED: i64 = 100_000_000;
+/// Number of event ids that a restore skips: more than a server assigns between two backups.
+const SKIPPED_EVENT_IDS: i64 = 100_000_000;
 
 async fn skip_ids(connection: &mut SqliteConnection) -> Result<()> {
-    let counted: bool =
+    let has_sequences: bool =
         sqlx::query_scalar("SELECT COUNT(*) FROM sqlite_master WHERE name = 'sqlite_sequence'")
             .fetch_one(&mut *connection)
             .await?;
     // The first versions had no events.
-    if counted {
+    if has_sequences {
         sqlx::query("UPDATE sqlite_sequence SET seq = seq + ? WHERE name = 'events'")
-            .bind(IDS_SKIPPED)
+            .bind(SKIPPED_EVENT_IDS)
             .execute(connection)
             .await?;
     }
@@ -102,12 +105,12 @@ async fn check(
     file: &Path,
     scratch: &Path,
 ) -> Result<CheckedDatabase> {
-    let found: String = sqlx::query_scalar("PRAGMA integrity_check(1)")
+    let verdict: String = sqlx::query_scalar("PRAGMA integrity_check(1)")
         .fetch_one(&mut *connection)
         .await
         .map_err(|error| StoreError::Damaged(format!("the database: {error}")))?;
-    if found != "ok" {
-        return Err(StoreError::Damaged(format!("the database: {found}")));
+    if verdict != "ok" {
+        return Err(StoreError::Damaged(format!("the database: {verdict}")));
     }
     let Some(schema) = schema::newest_applied(connection).await? else {
         return Err(StoreError::Damaged(
@@ -128,6 +131,7 @@ async fn check(
     })
 }
 
+/// The season's name and the needed artifacts.
 async fn read_contents(
     connection: &mut SqliteConnection,
 ) -> Result<(String, Vec<RequiredArtifact>)> {
@@ -137,11 +141,15 @@ async fn read_contents(
     ))
 }
 
-/// The contents of a copy that is migrated to this version and then removed.
-async fn read_migrated_copy(file: &Path, copied: &Path) -> Result<(String, Vec<RequiredArtifact>)> {
-    copy(file, copied).await?;
+/// The season's name and the needed artifacts of a database of an earlier version: read from a copy, which is migrated
+/// to this version and then removed.
+async fn read_migrated_copy(
+    file: &Path,
+    copy_file: &Path,
+) -> Result<(String, Vec<RequiredArtifact>)> {
+    copy(file, copy_file).await?;
     let options = SqliteConnectOptions::new()
-        .filename(copied)
+        .filename(copy_file)
         .foreign_keys(true)
         .journal_mode(SqliteJournalMode::Off)
         .synchronous(SqliteSynchronous::Off);
@@ -152,6 +160,7 @@ async fn read_migrated_copy(file: &Path, copied: &Path) -> Result<(String, Vec<R
         .map_err(|error| StoreError::Database(error.into()))?;
     let contents = read_contents(&mut connection).await;
     connection.close().await?;
-    std::fs::remove_file(copied).map_err(|error| StoreError::artifact(copied.display(), &error))?;
+    std::fs::remove_file(copy_file)
+        .map_err(|error| StoreError::artifact(copy_file.display(), &error))?;
     contents
 }

@@ -1,3 +1,5 @@
+//! Cancellation of an evaluation by an organiser.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -11,7 +13,7 @@ use faceoff_types::EvaluationId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Stops an evaluation that is not over. Workers that run its shards learn of it at their next
+    /// Stops an evaluation that is not over. Workers that run its shards (parts of its episodes) learn of it at their next
     /// heartbeat. If it was the last open one of its day, the day is released.
     #[boxed]
     pub async fn cancel_evaluation(

@@ -1,3 +1,6 @@
+//! Claims of jobs: a worker gets the next job of the queue under a lease, with everything that it needs to run the job. A
+//! job is a validation run of an upload, a shard (a part of a run's episodes), a scoring, or a game.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -24,15 +27,15 @@ use faceoff_types::{EvaluationId, RunId, SubmissionId};
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
-/// Leases of one job after which it is given up although no worker reported a failure: something in
-/// it kills its worker. Far above [`MAX_ATTEMPTS`](crate::MAX_ATTEMPTS): a server that is killed
+/// Number of leases of one job after which it is given up although no worker reported a failure: something in
+/// it kills its worker. The number is far above [`MAX_ATTEMPTS`](crate::MAX_ATTEMPTS): a server that is killed
 /// repeatedly for other reasons must not cost a team its evaluation.
 pub const MAX_LEASES: u32 = 50;
 
 impl Store {
     /// Leases the next job for `lease_s` seconds. Scoring comes first. Validation runs and shards
-    /// of evaluations each get half of the slots; within each half, teams get equal slot time. Shards
-    /// of ablations get what is left. A job with an expired lease is leased again. `None`: there is
+    /// of evaluations each get half of the slots (places for one job); within each half, teams get equal slot time. Shards
+    /// of ablations get the remaining slots. A job with an expired lease is leased again. `None`: there is
     /// no job to run now (see [`Store::job_signal`]), or the queue is paused.
     #[boxed]
     pub async fn claim(
@@ -156,15 +159,18 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
 
 async fn describe_scoring(tx: &mut Tx, evaluation: EvaluationId, id: RunId) -> Result<Job> {
     let (run, seeds) = read_run(tx, id).await?;
-    let of_run = shards::of_run(tx, id).await?;
-    let missing = |defect| StoreError::Damaged(format!("evaluation {evaluation}: {defect}"));
-    let recordings: Option<Vec<_>> = of_run.into_iter().map(|shard| shard.recording).collect();
+    let shards_of_run = shards::of_run(tx, id).await?;
+    let damaged = |defect| StoreError::Damaged(format!("evaluation {evaluation}: {defect}"));
+    let recordings: Option<Vec<_>> = shards_of_run
+        .into_iter()
+        .map(|shard| shard.recording)
+        .collect();
     let agent_name = single_contestant(tx, id).await?.agent_name;
     Ok(Job::Scoring {
         evaluation,
         run,
-        recordings: recordings.ok_or_else(|| missing("a shard without a recording"))?,
-        agent_name: agent_name.ok_or_else(|| missing("an agent without a name"))?,
+        recordings: recordings.ok_or_else(|| damaged("a shard without a recording"))?,
+        agent_name: agent_name.ok_or_else(|| damaged("an agent without a name"))?,
         seeds,
     })
 }
@@ -179,14 +185,14 @@ async fn read_run(tx: &mut Tx, id: RunId) -> Result<(Run, RunSeeds)> {
     Ok((run, seeds))
 }
 
-/// The only contestant of a run of tasks.
+/// The submission that plays a run of tasks alone.
 async fn single_contestant(tx: &mut Tx, run: RunId) -> Result<Submission> {
-    let sides: Vec<SubmissionId> = run_rows::contestants(tx, run).await?;
-    match sides[..] {
+    let contestants: Vec<SubmissionId> = run_rows::contestants(tx, run).await?;
+    match contestants[..] {
         [submission] => submissions::find(tx, submission).await,
         _ => Err(StoreError::Damaged(format!(
-            "run {run}: {} contestants, where its tasks are for one",
-            sides.len()
+            "run {run}: expected one contestant, found {}",
+            contestants.len()
         ))),
     }
 }

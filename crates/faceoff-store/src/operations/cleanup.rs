@@ -1,3 +1,5 @@
+//! Periodic deletion of files that are not needed any more: recordings, dropped datasets and refused bundles.
+
 use crate::{
     boxed,
     error::Result,
@@ -33,36 +35,37 @@ impl JobClaim {
 }
 
 impl Store {
-    /// Deletes the shard recordings of evaluations that ended at least [`RECORDINGS_KEPT_FOR`] ago. A
-    /// finished one has them in its dataset, the others do not need them any more. Returns the number
+    /// Deletes the recordings of evaluations that ended at least [`RECORDINGS_KEPT_FOR`] ago. A finished
+    /// evaluation has them in its dataset, the others do not need them any more. Returns the number
     /// of runs. To be called periodically; an interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_old_recordings(&self, now: Timestamp) -> Result<usize> {
-        let before = now
+        let ended_before = now
             .saturating_sub(RECORDINGS_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        let old = runs::with_old_recordings(&mut connection, before).await?;
+        let runs_to_clean = runs::with_old_recordings(&mut connection, ended_before).await?;
         drop(connection);
-        for run in &old {
+        for run in &runs_to_clean {
             self.artifacts().delete_folder(&recordings_of(*run)).await?;
             self.write(Actor::Server, now, async |tx| {
                 runs::set_recordings_removed(tx, *run, now).await
             })
             .await?;
         }
-        Ok(old.len())
+        Ok(runs_to_clean.len())
     }
 
-    /// Deletes the datasets of proposals that were dropped at least [`RECORDINGS_KEPT_FOR`] ago; their results stay
-    /// readable. Returns how many. An interrupted call is completed by the next one.
+    /// Deletes the datasets of proposals (trials and proposed re-evaluations) that were dropped at least
+    /// [`RECORDINGS_KEPT_FOR`] ago; their results stay readable. Returns the number of datasets. An interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
-        let before = now
+        let ended_before = now
             .saturating_sub(RECORDINGS_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        let dropped = proposed_evaluations::dropped_with_datasets(&mut connection, before).await?;
+        let dropped =
+            proposed_evaluations::dropped_with_datasets(&mut connection, ended_before).await?;
         drop(connection);
         for (id, key) in &dropped {
             self.artifacts().delete_dataset(key).await?;
@@ -74,16 +77,16 @@ impl Store {
         Ok(dropped.len())
     }
 
-    /// Deletes the bundles of rejected submissions: invalid ones at once, those whose validation had a
-    /// platform fault after [`UNCHECKED_KEPT_FOR`]. Reason and log stay. Returns how many. An interrupted
+    /// Deletes the bundles of submissions that did not pass their validation run: at once if they are invalid, and
+    /// [`UNCHECKED_KEPT_FOR`] after a platform fault. Reason and log stay. Returns the number of bundles. An interrupted
     /// call is completed by the next one.
     #[boxed]
     pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
-        let before = now
+        let ended_before = now
             .saturating_sub(UNCHECKED_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        let refused = bundles::refused(&mut connection, before).await?;
+        let refused = bundles::refused(&mut connection, ended_before).await?;
         drop(connection);
         for (id, key) in &refused {
             self.artifacts().delete(key).await?;
@@ -95,12 +98,15 @@ impl Store {
         Ok(refused.len())
     }
 
-    /// Deletes bundles that no submission refers to and that were stored at `before` or earlier. A process
-    /// was killed between storing the bundle and adding its submission. Returns how many.
+    /// Deletes bundles that no submission refers to and that were stored at `stored_before` or earlier: a process
+    /// was killed between storing the bundle and adding its submission. Returns the number of bundles.
     #[boxed]
-    pub async fn remove_orphaned_bundles(&self, before: Timestamp) -> Result<usize> {
-        // In this order: a submission added after the first query has none of the bundles listed by it.
-        let stored = self.artifacts().stored_until("bundles", before).await?;
+    pub async fn remove_orphaned_bundles(&self, stored_before: Timestamp) -> Result<usize> {
+        // In this order: a submission added after the files were listed has none of the listed bundles.
+        let stored = self
+            .artifacts()
+            .stored_until("bundles", stored_before)
+            .await?;
         let in_use = bundles::keys_in_use(&mut *self.database.read.acquire().await?).await?;
         let mut removed = 0;
         for key in stored.iter().filter(|key| !in_use.contains(*key)) {

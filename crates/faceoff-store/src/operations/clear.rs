@@ -1,4 +1,5 @@
-//! Removal of rows that are not needed any more once a run is over.
+//! Clearing of old runs: their shards (rows with the outcomes of a part of the episodes) are removed from the database.
+//! A run's summary and its dataset remain.
 
 use crate::{
     boxed,
@@ -23,11 +24,11 @@ impl Store {
         summary_version: u32,
         now: Timestamp,
     ) -> Result<Vec<ClearableRun>> {
-        let before = now
+        let ended_before = now
             .saturating_sub(RECORDINGS_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        runs::clearable(&mut connection, summary_version, before).await
+        runs::clearable(&mut connection, summary_version, ended_before).await
     }
 
     /// Runs that are over and have no episode summary yet, the oldest first.
@@ -35,8 +36,8 @@ impl Store {
     pub async fn unsummarised_runs(&self, summary_version: u32) -> Result<Vec<RunId>> {
         let mut connection = self.database.read.acquire().await?;
         let over = runs::clearable(&mut connection, summary_version, Timestamp::MAX).await?;
-        let unsummed = over.into_iter().filter(|one| one.needs_summary);
-        Ok(unsummed.map(|one| one.run).collect())
+        let unsummarised = over.into_iter().filter(|run| run.needs_summary);
+        Ok(unsummarised.map(|run| run.run).collect())
     }
 
     /// Removes the shards of a run that have no agent faults, with their jobs and their progress events. Shards with

@@ -1,3 +1,5 @@
+//! Commits: a worker stores the result of its job, at most once per lease. The last shard of a run ends the run.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -18,7 +20,7 @@ use crate::{
 use faceoff_types::RunId;
 use jiff::Timestamp;
 
-/// Result of a commit. After [`StoreError::Database`] it is unknown whether it was stored; after any
+/// Outcome of a commit. After [`StoreError::Database`] it is unknown whether the result was stored; after any
 /// other error nothing was stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CommitOutcome {
@@ -66,7 +68,7 @@ impl Store {
         .await
     }
 
-    /// Stores the results of a shard. Idempotent: a second commit under the same lease, or one under a
+    /// Stores the results of a shard (a part of a run's episodes). Idempotent: a second commit under the same lease, or one under a
     /// lost lease, changes nothing; the outcome reports it. If the run has more agent faults than its
     /// plan allows, an evaluation ends as [`AgentFailed`](crate::EvaluationState::AgentFailed) and an
     /// ablation ends without a result. The last shard of an evaluation queues its scoring. The

@@ -1,4 +1,5 @@
-//! Effects of a run's start and end on its owner, and the other ends of an evaluation.
+//! Start and end of runs and evaluations. A run plays episodes for its owner: an evaluation, a proposed evaluation or an
+//! ablation. When it ends, its owner is scored, finished or failed here; so is an evaluation that ends for another reason.
 
 use crate::{
     error::{Result, StoreError},
@@ -38,7 +39,7 @@ pub(crate) async fn record_run_start(tx: &mut Tx, run: RunId, owner: RunOwner) -
     Ok(())
 }
 
-/// Ends a run, and its owner with it where the owner cannot continue.
+/// Ends a run. Its owner gets the next step (scoring, or its end).
 pub(crate) async fn end_run(
     tx: &mut Tx,
     run: RunId,
@@ -82,7 +83,7 @@ pub(crate) async fn end_run(
 }
 
 async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM).await?;
+    let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT).await?;
     let job = queue::insert(tx, purpose::SCORING, account).await?;
     scorings::insert(tx, id, job).await?;
     tx.record(Subject::Evaluation(id), Event::EvaluationFinalising);
@@ -123,13 +124,13 @@ pub(crate) async fn fail_evaluation(
 
 /// Logs damaged rows instead of failing. A damaged evaluation is not rerun and releases no day, but it must
 /// end: it would block the queue otherwise.
-fn log_damage(id: EvaluationId, done: Result<()>) -> Result<()> {
-    match done {
+fn log_damage(id: EvaluationId, outcome: Result<()>) -> Result<()> {
+    match outcome {
         Err(StoreError::Damaged(defect)) => {
             tracing::error!(evaluation = %id, defect, "ended a damaged evaluation");
             Ok(())
         }
-        done => done,
+        outcome => outcome,
     }
 }
 

@@ -1,5 +1,5 @@
-//! Deadlines of evaluation days. Evaluations that are unfinished at the deadline are ended, so that the day is
-//! released. They count as a lack of server capacity, not as an agent fault.
+//! Deadlines of evaluation days. Evaluations that are unfinished at the deadline are ended, so that the day's results
+//! can be released. They count as a lack of server capacity, not as an agent fault.
 
 use crate::{
     boxed,
@@ -18,15 +18,19 @@ use faceoff_types::StageDay;
 use jiff::Timestamp;
 
 /// Updates the deadlines of a stage's open days after a change of its settings. A deadline in the past is refused;
-/// with `or_stay` the day keeps its old deadline instead.
-pub(crate) async fn update_deadlines(tx: &mut Tx, stage: &Stage, or_stay: bool) -> Result<()> {
+/// with `keeps_if_past` the day keeps its old deadline instead.
+pub(crate) async fn update_deadlines(
+    tx: &mut Tx,
+    stage: &Stage,
+    keeps_if_past: bool,
+) -> Result<()> {
     for day in days::unreleased(tx, stage.id).await? {
         let deadline_at = stage.deadline(day.stage_day.date, day.cutoff_at);
         if deadline_at == day.deadline_at {
             continue;
         }
         match deadline_at {
-            Some(at) if at <= tx.now && or_stay => continue,
+            Some(at) if at <= tx.now && keeps_if_past => continue,
             Some(at) if at <= tx.now => {
                 return Err(StoreError::Conflict(format!(
                     "the deadline of {}, which is under way, would have been at {at}: give it more time, or \
@@ -40,23 +44,24 @@ pub(crate) async fn update_deadlines(tx: &mut Tx, stage: &Stage, or_stay: bool) 
     Ok(())
 }
 
-/// Ends the unfinished evaluations of an overdue day, except those that only wait for scoring. Returns how many.
+/// Ends the unfinished evaluations of an overdue day, except those that only wait for scoring. Returns the number
+/// of those ended.
 async fn end_day(tx: &mut Tx, stage_day: StageDay) -> Result<u32> {
     let zone = stages::find(tx, stage_day.stage).await?.zone;
     let deadline_at = days::find(tx, stage_day)
         .await?
         .deadline_at
         .unwrap_or(tx.now);
-    let there = deadline_at.to_zoned(zone.time_zone());
+    let local_deadline = deadline_at.to_zoned(zone.time_zone());
     let reason = format!(
         "the deadline of its day ({}) passed before all its episodes were run: the server ran out of time, this is no \
          agent fault",
-        there.strftime("%Y-%m-%d at %H:%M:%S %Z")
+        local_deadline.strftime("%Y-%m-%d at %H:%M:%S %Z")
     );
-    let left = counting_evaluations::incomplete_of_day(tx, stage_day).await?;
-    let not_played = u32::try_from(left.len()).unwrap_or(u32::MAX);
+    let unfinished = counting_evaluations::incomplete_of_day(tx, stage_day).await?;
+    let not_played = u32::try_from(unfinished.len()).unwrap_or(u32::MAX);
     tx.record(Subject::Day(stage_day), Event::DayOverdue { not_played });
-    for (evaluation, run) in left {
+    for (evaluation, run) in unfinished {
         completion::fail_evaluation(tx, evaluation, run, Failure::NotPlayed(&reason)).await?;
     }
     Ok(not_played)

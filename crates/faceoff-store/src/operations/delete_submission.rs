@@ -1,4 +1,4 @@
-//! Removal of a submission's bundle on request of its team or an organiser.
+//! Removal of a submission's bundle (the uploaded files) on request of its team or an organiser.
 
 use crate::{
     boxed,
@@ -15,13 +15,13 @@ use crate::{
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
 
-fn conflict<T>(why: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(why.into()))
+fn conflict<T>(reason: impl Into<String>) -> Result<T> {
+    Err(StoreError::Conflict(reason.into()))
 }
 
 /// Refuses to remove evidence against a team, and submissions of a team that an organiser has withdrawn.
 async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
-    let why = match teams::evidence(tx, team).await? {
+    let reason = match teams::evidence(tx, team).await? {
         None => return Ok(()),
         Some(Evidence::Disqualified(ruling)) => format!(
             "the team was disqualified on {} ({}); its submissions and results are kept as evidence while it is",
@@ -34,16 +34,16 @@ async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
             at.strftime("%Y-%m-%d at %H:%M UTC")
         ),
     };
-    conflict(why)
+    conflict(reason)
 }
 
 /// Refuses to remove a bundle that is still needed.
-async fn check_idle(tx: &mut Tx, submission: &Submission) -> Result<()> {
+async fn check_not_needed(tx: &mut Tx, submission: &Submission) -> Result<()> {
     if let Some(deleted) = &submission.deleted {
         return conflict(format!(
             "it was deleted on {} by {}",
-            deleted.at.strftime("%Y-%m-%d at %H:%M UTC"),
-            deleted.by
+            deleted.deleted_at.strftime("%Y-%m-%d at %H:%M UTC"),
+            deleted.actor
         ));
     }
     if let Some(removed) = &submission.bundle_removed {
@@ -103,10 +103,10 @@ impl Store {
     /// [`StoreError::Conflict`] with the reason why it would not.
     #[boxed]
     pub async fn check_deletable(&self, id: SubmissionId, now: Timestamp) -> Result<Submission> {
-        // It writes nothing, but needs one consistent view of several tables.
+        // The check writes nothing, but needs one consistent view of several tables.
         self.write(Actor::Server, now, async |tx| {
             let submission = submissions::find(tx, id).await?;
-            check_idle(tx, &submission).await?;
+            check_not_needed(tx, &submission).await?;
             Ok(submission)
         })
         .await
@@ -125,7 +125,7 @@ impl Store {
     ) -> Result<Submission> {
         self.write(actor.clone(), now, async |tx| {
             let submission = submissions::find(tx, id).await?;
-            check_idle(tx, &submission).await?;
+            check_not_needed(tx, &submission).await?;
             bundles::set_removed(tx, id, reason, now).await?;
             bundles::set_deleted(tx, id, &actor, now).await?;
             let event = Event::SubmissionDeleted {

@@ -1,4 +1,5 @@
-//! An additional evaluation of a day for a team that had none, or that replaces its counting one.
+//! Extra evaluations: an organiser gives a team one more evaluation of a day. The team had none that counts, or the extra
+//! one replaces it.
 
 use crate::{
     boxed,
@@ -37,11 +38,11 @@ async fn rules_of_day(tx: &mut Tx, stage: Stage, stage_day: StageDay) -> Result<
 }
 
 impl Store {
-    /// Queues an additional evaluation of a team's active submission for a day past its cutoff. Before the day's release
-    /// it uses the day's episodes; afterwards these are known, so it gets episodes of its own. With `replaces`, a
+    /// Queues an extra evaluation of a team's active submission for a day past its cutoff. Before the day's release
+    /// it uses the day's episodes; afterwards these are public, so it gets episodes of its own. With `replaces`, a
     /// counting result of the day is voided first. [`StoreError::NotFound`] if the day had no cutoff.
-    /// [`StoreError::Conflict`] if the team has no active submission, or the day's rules exclude it. The same if an
-    /// evaluation of the day is open, or one counts and is not to be replaced. [`StoreError::Disqualified`],
+    /// [`StoreError::Conflict`] if the team has no active submission, the day's rules exclude it, an evaluation of the day
+    /// is open, or one counts and is not to be replaced. [`StoreError::Disqualified`],
     /// [`StoreError::StageNotOpen`], [`StoreError::SeasonClosed`].
     #[boxed]
     pub async fn add_extra_evaluation(
@@ -61,7 +62,7 @@ impl Store {
             teams::find(tx, team).await?;
             teams::check_may_compete(tx, team).await?;
             let active = submissions::active(tx).await?;
-            let Some(active) = active.into_iter().find(|one| one.team == team) else {
+            let Some(active) = active.into_iter().find(|submission| submission.team == team) else {
                 return Err(StoreError::Conflict(
                     "the team has no active submission: it has to upload one, or choose one, first".into(),
                 ));
@@ -69,7 +70,7 @@ impl Store {
             let stage = rules_of_day(tx, stage, stage_day).await?;
             stage
                 .check_accepts(&active)
-                .map_err(|why| stage_runtimes::conflict(&why))?;
+                .map_err(|refusal| stage_runtimes::conflict(&refusal))?;
             for evaluation in counting_evaluations::of_day_and_team(tx, stage_day, team).await? {
                 if evaluation.is_open {
                     return Err(StoreError::Conflict(
@@ -82,8 +83,8 @@ impl Store {
                     ));
                 }
                 if evaluation.counts {
-                    let why = format!("replaced by an extra evaluation: {reason}");
-                    void(tx, evaluation.id, &why).await?;
+                    let void_reason = format!("replaced by an extra evaluation: {reason}");
+                    void(tx, evaluation.id, &void_reason).await?;
                 }
             }
             let id = EvaluationId::new();

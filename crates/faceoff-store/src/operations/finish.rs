@@ -1,3 +1,5 @@
+//! End of a scoring job: an evaluation gets its score and its dataset.
+
 use crate::{
     boxed,
     error::Result,
@@ -30,12 +32,12 @@ impl Store {
         dataset_blake3: &str,
         now: Timestamp,
     ) -> Result<CommitOutcome> {
-        let bytes = self.artifacts().size_bytes(dataset).await?;
+        let dataset_bytes = self.artifacts().size_bytes(dataset).await?;
         self.commit(claim, now, async |tx, purpose| match purpose {
             Purpose::Scoring(id) => {
                 evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
-                if let Some(bytes) = bytes {
-                    retentions::set_measured(tx, id, bytes).await?;
+                if let Some(dataset_bytes) = dataset_bytes {
+                    retentions::set_dataset_bytes(tx, id, dataset_bytes).await?;
                 }
                 let event = Event::EvaluationFinished {
                     score: result.score,
@@ -47,8 +49,8 @@ impl Store {
             Purpose::ProposedScoring { id, proposal, .. } => {
                 proposed_evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now)
                     .await?;
-                if let Some(bytes) = bytes {
-                    retentions::set_measured(tx, id, bytes).await?;
+                if let Some(dataset_bytes) = dataset_bytes {
+                    retentions::set_dataset_bytes(tx, id, dataset_bytes).await?;
                 }
                 proposal_completion::record_if_over(tx, proposal).await
             }

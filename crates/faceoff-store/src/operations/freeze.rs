@@ -1,3 +1,5 @@
+//! Board freezes: an organiser keeps the public boards of a stage as they are, for example before a ceremony.
+
 use crate::{
     boxed,
     error::{Result, StoreError},

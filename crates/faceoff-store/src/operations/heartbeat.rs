@@ -1,3 +1,5 @@
+//! Leases of running jobs: a worker renews its lease by heartbeats, or transfers it to another worker.
+
 use crate::{
     boxed,
     error::Result,
@@ -38,33 +40,33 @@ impl Store {
 
     /// Transfers a lease that `claim.worker` took in advance to the worker that starts the job, extended to `lease_s`
     /// seconds from now. False: the lease was lost, or another worker has started the job. So only one of several workers
-    /// with the same job spec runs it. That worker may repeat the call, since a response can get lost.
+    /// that got the same job runs it. That worker may repeat the call, since a response can get lost.
     #[boxed]
     pub async fn transfer_lease(
         &self,
         claim: &JobClaim,
-        to: &str,
+        new_holder: &str,
         lease_s: u32,
         now: Timestamp,
     ) -> Result<bool> {
-        let actor = Actor::Worker(to.to_owned());
+        let actor = Actor::Worker(new_holder.to_owned());
         self.write(actor, now, async |tx| {
-            if !queue::transfer(tx, claim, to).await? {
+            if !queue::transfer(tx, claim, new_holder).await? {
                 return Ok(false);
             }
             let Some(kind) = queue::renew(tx, claim, 0, lease_s, now).await? else {
                 return Ok(false);
             };
             if let Purpose::Game(id) = purpose::of_job(tx, claim.job, &kind).await? {
-                game_attempts::transfer(tx, id, to).await?;
+                game_attempts::transfer(tx, id, new_holder).await?;
             }
             Ok(true)
         })
         .await
     }
 
-    /// Extends the leases of `holder` and of the holders below it to at least `lease_s` seconds from now. They may have
-    /// expired while heartbeats could not be stored. Returns how many.
+    /// Extends the leases of `holder`, and of every name `holder/…`, to at least `lease_s` seconds from now. They may have
+    /// expired while heartbeats could not be stored. Returns the number of leases.
     #[boxed]
     pub async fn renew_leases_of(&self, holder: &str, lease_s: u32, now: Timestamp) -> Result<u64> {
         self.write(Actor::Server, now, async |tx| {

@@ -1,4 +1,4 @@
-//! Import of a database from an archive, which is untrusted input.
+//! Import of the database of an archive: a whole season in one file, to be shown read-only. It is untrusted input.
 
 use crate::{
     boxed,
@@ -25,8 +25,8 @@ fn database_file(data_dir: &Path) -> PathBuf {
     data_dir.join(Store::DATABASE_FILE)
 }
 
-fn refused(why: impl std::fmt::Display) -> StoreError {
-    StoreError::Conflict(format!("the archive's database is refused: {why}"))
+fn refusal(reason: impl std::fmt::Display) -> StoreError {
+    StoreError::Conflict(format!("the archive's database is refused: {reason}"))
 }
 
 impl Store {
@@ -40,7 +40,7 @@ impl Store {
         }
         let options = SqliteConnectOptions::new().filename(file).read_only(true);
         let mut connection = SqliteConnection::connect_with(&options).await?;
-        let archived = match is_marked(&mut connection).await? {
+        let archived = match has_archive_table(&mut connection).await? {
             true => archive::read(&mut connection).await?,
             false => None,
         };
@@ -63,7 +63,7 @@ impl Store {
             .synchronous(SqliteSynchronous::Full);
         let mut connection = SqliteConnection::connect_with(&options)
             .await
-            .map_err(refused)?;
+            .map_err(refusal)?;
         let checked = check(&mut connection, now).await;
         connection.close().await?;
         checked
@@ -71,28 +71,28 @@ impl Store {
 }
 
 async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<ArchivedSeason> {
-    let found: String = sqlx::query_scalar("PRAGMA quick_check(1)")
+    let verdict: String = sqlx::query_scalar("PRAGMA quick_check(1)")
         .fetch_one(&mut *connection)
         .await
-        .map_err(refused)?;
-    if found != "ok" {
-        return Err(refused(format_args!("it is damaged: {found}")));
+        .map_err(refusal)?;
+    if verdict != "ok" {
+        return Err(refusal(format_args!("it is damaged: {verdict}")));
     }
-    if !is_marked(connection).await? {
-        return Err(refused("it is not that of an archived season"));
+    if !has_archive_table(connection).await? {
+        return Err(refusal("it is not that of an archived season"));
     }
     MIGRATIONS.run(&mut *connection).await.map_err(|error| match error {
-        MigrateError::VersionMissing(version) => refused(format_args!(
+        MigrateError::VersionMissing(version) => refusal(format_args!(
             "a later version of Faceoff made it (its migration {version} is not known here): use that, or a later one"
         )),
-        error => refused(error),
+        error => refusal(error),
     })?;
     check_schema(connection).await?;
-    check_references(connection).await.map_err(refused)?;
+    check_references(connection).await.map_err(refusal)?;
     let archived = match archive::read(connection).await {
         Ok(Some(archived)) => archived,
-        Ok(None) => return Err(refused("its description of the archive is missing")),
-        Err(error) => return Err(refused(error)),
+        Ok(None) => return Err(refusal("its description of the archive is missing")),
+        Err(error) => return Err(refusal(error)),
     };
     let now = Instant(now);
     let mut tx = connection.begin().await?;
@@ -122,8 +122,8 @@ async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<Arch
     })
 }
 
-/// Whether the database has the table that describes an archive.
-async fn is_marked(connection: &mut SqliteConnection) -> Result<bool> {
+/// Does the database have the table that describes an archive?
+async fn has_archive_table(connection: &mut SqliteConnection) -> Result<bool> {
     let found: i64 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'archived'",
     )
@@ -144,7 +144,7 @@ async fn check_schema(connection: &mut SqliteConnection) -> Result<()> {
     reference.close().await?;
     match found.symmetric_difference(&expected).next() {
         None => Ok(()),
-        Some((kind, name, _)) => Err(refused(format_args!(
+        Some((kind, name, _)) => Err(refusal(format_args!(
             "its {kind} {name:?} is not as this program makes it"
         ))),
     }
@@ -157,12 +157,18 @@ async fn schema(connection: &mut SqliteConnection) -> Result<BTreeSet<(String, S
     )
     .fetch_all(connection)
     .await?;
-    let bare = |sql: String| -> String {
+    let without_spaces_and_quotes = |sql: String| -> String {
         let chars = sql.chars();
         chars.filter(|c| !c.is_whitespace() && *c != '"').collect()
     };
     Ok(rows
         .into_iter()
-        .map(|(kind, name, sql)| (kind, name, sql.map(bare).unwrap_or_default()))
+        .map(|(kind, name, sql)| {
+            (
+                kind,
+                name,
+                sql.map(without_spaces_and_quotes).unwrap_or_default(),
+            )
+        })
         .collect())
 }

@@ -1,4 +1,5 @@
-//! Invitations: single-use links with which users join. They are created, revoked and accepted here.
+//! Invitations: single-use links with which users join. Their creation, revocation and acceptance. A link contains a
+//! secret code; the code of a registration of a new team becomes an invitation once organisers have approved it.
 
 use crate::{
     boxed,
@@ -21,7 +22,7 @@ use crate::{
 use faceoff_types::{InvitationId, TeamId, TeamName, UserId, UserName};
 use jiff::Timestamp;
 
-/// Invitations to one team that may be open at a time.
+/// Number of invitations to one team that may be open at a time.
 pub const MAX_OPEN_INVITATIONS: i64 = 20;
 
 /// An invitation to be created. The caller makes the code in the link; only its hash is stored.
@@ -63,7 +64,7 @@ pub struct JoinOutcome {
     pub token: Token,
 }
 
-/// Status of the code in an invitation or registration link.
+/// Status of the code in an invitation link or a registration link.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CodeStatus {
     /// An invitation that can be accepted, with the team's name if it is for a member.
@@ -74,24 +75,24 @@ pub enum CodeStatus {
     Refused(Registration),
 }
 
-fn invalid_invitation<T>(why: impl Into<String>) -> Result<T> {
-    Err(StoreError::InvitationInvalid(why.into()))
+fn invalid_invitation<T>(reason: impl Into<String>) -> Result<T> {
+    Err(StoreError::InvitationInvalid(reason.into()))
 }
 
 fn check_open(invitation: &Invitation, now: Timestamp) -> Result<()> {
-    let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+    let format_time = |time: Timestamp| time.strftime("%Y-%m-%d %H:%M UTC").to_string();
     match invitation.state {
-        InvitationState::Accepted { at, .. } => invalid_invitation(format!(
+        InvitationState::Accepted { accepted_at, .. } => invalid_invitation(format!(
             "the invitation was accepted on {}, and can be used only once; ask for another one",
-            shown(at)
+            format_time(accepted_at)
         )),
-        InvitationState::Revoked { at } => invalid_invitation(format!(
+        InvitationState::Revoked { revoked_at } => invalid_invitation(format!(
             "the invitation was revoked on {}; ask for another one",
-            shown(at)
+            format_time(revoked_at)
         )),
         InvitationState::Open if invitation.expires_at <= now => invalid_invitation(format!(
             "the invitation expired on {}; ask for another one",
-            shown(invitation.expires_at)
+            format_time(invitation.expires_at)
         )),
         InvitationState::Open => Ok(()),
     }
@@ -125,7 +126,7 @@ pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation
     invitations::find(tx, invitation.id).await
 }
 
-/// Refuses if the newest terms of the season were not accepted, or if it has none and some were.
+/// Refuses if the user has not accepted the season's newest terms, or has accepted terms although it has none.
 pub(super) async fn check_terms(tx: &mut Tx, accepted: Option<u32>) -> Result<()> {
     match terms::newest(tx).await? {
         Some(newest) if accepted != Some(newest) => Err(StoreError::Conflict(format!(

@@ -1,4 +1,5 @@
-//! Jobs as workers get them, with everything that is needed to run them.
+//! Jobs as workers get them, with everything that is needed to run them. A job is a validation run of an upload, a shard
+//! (a part of the episodes of a run), a game, or a scoring.
 
 use crate::{
     operations::runs::RunOwner,
@@ -31,7 +32,7 @@ pub enum Job {
         /// accepts its runtime. Empty if a stage accepts any runtime.
         runtimes: Vec<StageRuntimes>,
     },
-    /// Run a range of episodes.
+    /// Run a shard: a range of a run's episodes.
     Shard {
         owner: RunOwner,
         run: Run,
@@ -42,6 +43,7 @@ pub enum Job {
         /// Earlier attempts that ended by a platform fault.
         platform_retries: u32,
     },
+    /// Play a game of a tournament.
     Game {
         game: GameId,
         rules: Box<TournamentRules>,
@@ -72,6 +74,6 @@ pub enum Job {
 pub struct RunSeeds {
     /// Seed of the episodes: that of the day, of ablations, or of a validation run.
     pub episodes: Seed,
-    /// Seed of the season's model mismatch.
+    /// Seed of the season's model mismatch: the deviation of the simulated robot from the model that teams get.
     pub mismatch: Seed,
 }

@@ -1,3 +1,6 @@
+//! Release of leases: a job that a worker does not complete returns to the queue, or is given up. Failures by a platform
+//! fault (a fault of the server or a worker, not of the agent) are counted; other releases are not.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -22,12 +25,12 @@ use jiff::Timestamp;
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
-/// Platform faults after which a job is given up.
+/// Number of platform faults after which a job is given up.
 pub const MAX_ATTEMPTS: u32 = 5;
 
 /// Pause before a job that met a full disk is run again, seconds. Without it a job that needs more disk
 /// space than there is would take up every slot.
-const FULL_DISK_REST_S: u32 = 10;
+const FULL_DISK_DELAY_S: u32 = 10;
 
 /// The subject of a job's events.
 pub(crate) async fn event_subject(
@@ -75,14 +78,14 @@ pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, label: &str, reason: &str) -
 }
 
 /// Puts a leased job back into the queue; the attempt does not count.
-async fn release_held(
+async fn requeue_leased(
     tx: &mut Tx,
     claim: &JobClaim,
     kind: &str,
-    rest_s: u32,
+    delay_s: u32,
     out_of_space: bool,
 ) -> Result<()> {
-    queue::release(tx, claim, rest_s, out_of_space).await?;
+    queue::release(tx, claim, delay_s, out_of_space).await?;
     let purpose = purpose::of_job(tx, claim.job, kind).await?;
     if let Purpose::Game(id) = purpose {
         game_lifecycle::end_attempt(tx, id, AttemptOutcome::Released, None).await?;
@@ -92,12 +95,12 @@ async fn release_held(
     Ok(())
 }
 
-/// Puts all jobs leased by `holder` and the holders below it back into the queue; the attempts do not count. Later
-/// results are those of a lost lease.
-pub(crate) async fn release_all_held(tx: &mut Tx, holder: &str) -> Result<u64> {
+/// Puts all jobs leased by `holder`, and by every name `holder/…`, back into the queue; the attempts do not count. Results
+/// that arrive later are refused, because their lease is lost.
+pub(crate) async fn requeue_leases_of(tx: &mut Tx, holder: &str) -> Result<u64> {
     let leases = queue::leases(tx, holder).await?;
     for (claim, kind) in &leases {
-        release_held(tx, claim, kind, 0, false).await?;
+        requeue_leased(tx, claim, kind, 0, false).await?;
     }
     Ok(u64::try_from(leases.len()).unwrap_or(u64::MAX))
 }
@@ -149,8 +152,8 @@ impl Store {
         self.release_after(claim, 0, false, now).await
     }
 
-    /// Releases a job that was leased in advance and not started: `claim.worker` still holds the lease. False if another
-    /// worker has it, or the lease is lost. The attempt does not count.
+    /// Releases a job that was leased in advance and not started, if `claim.worker` still holds the lease. False if another
+    /// worker holds it, or it is lost. The attempt does not count.
     #[boxed]
     pub async fn release_unstarted(&self, claim: &JobClaim, now: Timestamp) -> Result<bool> {
         let actor = Actor::Worker(claim.worker.clone());
@@ -161,7 +164,7 @@ impl Store {
             if !queue::is_holder(tx, claim).await? {
                 return Ok(false);
             }
-            release_held(tx, claim, &kind, 0, false).await?;
+            requeue_leased(tx, claim, &kind, 0, false).await?;
             Ok(true)
         })
         .await
@@ -173,12 +176,12 @@ impl Store {
     #[boxed]
     pub async fn release_disk_full(&self, claim: &JobClaim, now: Timestamp) -> Result<()> {
         let out_of_space = !self.free_space.is_short();
-        self.release_after(claim, FULL_DISK_REST_S, out_of_space, now)
+        self.release_after(claim, FULL_DISK_DELAY_S, out_of_space, now)
             .await
     }
 
-    /// Extends all leases to `lease_s` seconds from now: they may have expired only because the database
-    /// could not be written.
+    /// Extends all leases to `lease_s` seconds from now. Their holders may have been unable to renew them, because the
+    /// database could not be written.
     #[boxed]
     pub async fn renew_all_leases(&self, lease_s: u32, now: Timestamp) -> Result<()> {
         self.write(Actor::Server, now, async |tx| {
@@ -190,7 +193,7 @@ impl Store {
     async fn release_after(
         &self,
         claim: &JobClaim,
-        rest_s: u32,
+        delay_s: u32,
         out_of_space: bool,
         now: Timestamp,
     ) -> Result<()> {
@@ -198,7 +201,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             match queue::claim_state(tx, claim).await? {
                 ClaimState::Leased { kind } => {
-                    release_held(tx, claim, &kind, rest_s, out_of_space).await
+                    requeue_leased(tx, claim, &kind, delay_s, out_of_space).await
                 }
                 ClaimState::AlreadyDone | ClaimState::Lost => Ok(()),
             }
@@ -206,17 +209,17 @@ impl Store {
         .await
     }
 
-    /// Releases all jobs leased by `holder` and the holders below it, none of which is running them. Returns their
+    /// Releases all jobs leased by `holder` and by every name `holder/…`, none of which is running them. Returns their
     /// number; the attempts do not count.
     #[boxed]
     pub async fn release_leases_of(&self, holder: &str, now: Timestamp) -> Result<u64> {
         let actor = Actor::Worker(holder.to_owned());
-        self.write(actor, now, async |tx| release_all_held(tx, holder).await)
+        self.write(actor, now, async |tx| requeue_leases_of(tx, holder).await)
             .await
     }
 
     /// Ends the leases of a worker that is known to be dead, and of its slots, before they expire:
-    /// `worker` itself and every name `worker/…`. Returns how many. The attempts stay counted.
+    /// `worker` itself and every name `worker/…`. Returns the number of leases. The attempts stay counted.
     #[boxed]
     pub async fn end_leases_of(&self, worker: &str, now: Timestamp) -> Result<u64> {
         let actor = Actor::Worker(worker.to_owned());

@@ -1,4 +1,4 @@
-//! Adds one evaluation to a day: at the cutoff, as a rerun, or as an extra evaluation.
+//! Adds one evaluation (a team's run of all tasks) to a day: at the day's cutoff, as a rerun, or as an extra evaluation.
 
 use crate::{
     error::Result,
@@ -20,6 +20,7 @@ pub(crate) struct NewEvaluation {
     pub(crate) id: EvaluationId,
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
+    /// The earlier evaluation that it repeats.
     pub(crate) rerun_of: Option<EvaluationId>,
 }
 
@@ -33,13 +34,13 @@ pub(crate) struct DaySetup {
     pub(crate) plan: RunPlan,
 }
 
-/// Adds an evaluation of a day and queues its shards, to be run after `rest_s` seconds at the earliest.
+/// Adds an evaluation of a day and queues its shards, to be run after `delay_s` seconds at the earliest.
 /// [`Conflict`](crate::StoreError::Conflict) if the team already has a counting one of that day.
 pub(crate) async fn queue_evaluation(
     tx: &mut Tx,
     requested: NewEvaluation,
     setup: &DaySetup,
-    rest_s: u32,
+    delay_s: u32,
 ) -> Result<EvaluationId> {
     let run = Run {
         id: RunId::new(),
@@ -48,19 +49,19 @@ pub(crate) async fn queue_evaluation(
         seed: setup.seed,
         keeps_recordings: true,
     };
-    // Unreleased days are run in the order of their cutoffs. Evaluations of a released day queue with today's.
+    // Unreleased days are run in the order of their cutoffs. Evaluations of a released day queue as if its cutoff were now.
     let day = days::find(tx, setup.stage_day).await?;
     let queued_as_of = match day.released_at {
         None => day.cutoff_at,
         Some(_) => tx.now,
     };
     let job = NewJob {
-        rest_s,
+        delay_s,
         batch: queued_as_of.as_millisecond(),
         ..purpose::SHARD
     };
     runs::queue_run(tx, &run, &[requested.submission], job, requested.team).await?;
-    let new = Entry {
+    let entry = Entry {
         id: requested.id,
         submission: requested.submission,
         team: requested.team,
@@ -70,17 +71,17 @@ pub(crate) async fn queue_evaluation(
         rerun_of: requested.rerun_of,
     };
     let now = tx.now;
-    entries::insert(tx, &new, now).await?;
+    entries::insert(tx, &entry, now).await?;
     tx.record(
-        Subject::Evaluation(new.id),
+        Subject::Evaluation(entry.id),
         Event::EvaluationQueued {
-            team: new.team,
-            submission: new.submission,
-            stage: Some(new.stage_day.stage),
-            day: new.stage_day.date,
-            run: new.run,
-            rerun_of: new.rerun_of,
+            team: entry.team,
+            submission: entry.submission,
+            stage: Some(entry.stage_day.stage),
+            day: entry.stage_day.date,
+            run: entry.run,
+            rerun_of: entry.rerun_of,
         },
     );
-    Ok(new.id)
+    Ok(entry.id)
 }

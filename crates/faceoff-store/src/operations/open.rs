@@ -1,3 +1,5 @@
+//! Opening of a data folder: its database, its artifacts and the season in it.
+
 use crate::{
     artifacts::Artifacts,
     boxed,
@@ -15,11 +17,12 @@ use std::{fs::File, path::Path, sync::Arc};
 
 impl Store {
     /// Opens `data_dir/faceoff.sqlite3` and `data_dir/artifacts`, creating and migrating them as
-    /// needed. On the first start it draws the season's secret.
+    /// needed. On the first start it draws the season's
+    /// secret, from which all seeds are derived.
     #[boxed]
     pub async fn open(data_dir: &Path) -> Result<Self> {
         // Two processes that start at the same time must not both migrate.
-        let _opening = lock_folder(data_dir.to_owned()).await?;
+        let _folder_lock = lock_folder(data_dir.to_owned()).await?;
         let artifacts = Artifacts::open(&data_dir.join("artifacts"))?;
         let database = Database::open(&data_dir.join(Self::DATABASE_FILE)).await?;
         let mut tx = database.begin().await?;

@@ -1,3 +1,5 @@
+//! Pause of the job queue by an organiser.
+
 use crate::{
     boxed,
     error::{Result, StoreError},

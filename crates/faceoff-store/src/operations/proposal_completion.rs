@@ -1,4 +1,5 @@
-//! Ends of the evaluations of proposals. Unlike counting evaluations, they affect no board and no evaluation day.
+//! End of the evaluations of a proposal: a trial, which never counts, or a re-evaluation, which counts only once an
+//! organiser applies it. Until then they affect no board and no evaluation day.
 
 use crate::{
     error::Result,
@@ -12,7 +13,7 @@ use faceoff_types::{EvaluationId, ProposalId, RunId};
 
 /// Queues the scoring of a proposal's evaluation after its last shard is committed.
 pub(crate) async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM).await?;
+    let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT).await?;
     let job = queue::insert(tx, purpose::SCORING, account).await?;
     proposed_evaluations::insert_scoring(tx, id, job).await
 }

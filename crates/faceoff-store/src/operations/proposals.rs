@@ -1,4 +1,5 @@
-//! Trials, which never count, and proposed re-evaluations, which count once an organiser applies them.
+//! Proposals: evaluations that do not count, or not yet. A trial evaluates submissions on episodes of its own and never
+//! counts. A proposed re-evaluation repeats counting evaluations; its results replace theirs once an organiser applies it.
 
 use crate::{
     boxed,
@@ -51,8 +52,8 @@ struct ProposedRun {
     plan: RunPlan,
 }
 
-fn conflict<T>(why: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(why.into()))
+fn conflict<T>(reason: impl Into<String>) -> Result<T> {
+    Err(StoreError::Conflict(reason.into()))
 }
 
 /// Adds a proposal and queues its evaluations, behind everything that counts.
@@ -64,21 +65,21 @@ async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRu
         ..purpose::PROPOSAL_SHARD
     };
     let count = u32::try_from(proposed.len()).unwrap_or(u32::MAX);
-    for one in proposed {
+    for proposed_run in proposed {
         let run = Run {
             id: RunId::new(),
-            ruleset: one.ruleset,
-            plan: one.plan,
-            seed: one.seed,
+            ruleset: proposed_run.ruleset,
+            plan: proposed_run.plan,
+            seed: proposed_run.seed,
             keeps_recordings: true,
         };
-        runs::queue_run(tx, &run, &[one.submission], job, one.team).await?;
+        runs::queue_run(tx, &run, &[proposed_run.submission], job, proposed_run.team).await?;
         let evaluation = ProposedEvaluation {
             id: EvaluationId::new(),
             proposal: proposal.id,
-            submission: one.submission,
-            team: one.team,
-            replaces: one.replaces,
+            submission: proposed_run.submission,
+            team: proposed_run.team,
+            replaces: proposed_run.replaces,
             run: run.id,
             created_at: now,
             state: EvaluationState::Queued,
@@ -94,7 +95,8 @@ async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRu
     Ok(())
 }
 
-/// Runs that repeat these evaluations, with their own rules or those of `newest`, each with its revision.
+/// Runs that repeat these evaluations, each with the revision of its rules: those of the stage `newest`, if it is given,
+/// or else the evaluation's own.
 async fn runs_to_repeat(
     tx: &mut Tx,
     ids: &[EvaluationId],
@@ -104,17 +106,21 @@ async fn runs_to_repeat(
     for id in ids {
         all.push(entries::find(tx, *id).await?);
     }
-    let is_by_newest =
+    let has_newest_rules =
         |entry: &Entry| newest.is_some_and(|stage| stage.rules.number == entry.revision);
-    let done: HashSet<TeamId> = all
+    let done_teams: HashSet<TeamId> = all
         .iter()
-        .filter(|entry| is_by_newest(entry))
+        .filter(|entry| has_newest_rules(entry))
         .map(|entry| entry.team)
         .collect();
     let mut proposed = Vec::new();
-    for entry in all.into_iter().filter(|entry| !done.contains(&entry.team)) {
+    for entry in all
+        .into_iter()
+        .filter(|entry| !done_teams.contains(&entry.team))
+    {
         let submission = submissions::find(tx, entry.submission).await?;
-        // In a proposal for several teams, one with a deleted bundle is left out. Alone it is refused with the reason.
+        // In a proposal for several teams, a submission with a deleted bundle is left out. A proposal for this submission
+        // alone is refused below, with the reason.
         let is_deleted = ids.len() > 1 && submission.bundle_removed.is_some();
         if is_deleted || newest.is_some_and(|stage| stage.check_accepts(&submission).is_err()) {
             continue;
@@ -124,7 +130,7 @@ async fn runs_to_repeat(
             None => (entry.revision, run.ruleset, run.plan),
             Some(stage) => (stage.rules.number, stage.rules.rules.ruleset, stage.plan()),
         };
-        let one = ProposedRun {
+        let proposed_run = ProposedRun {
             submission: entry.submission,
             team: entry.team,
             replaces: Some(entry.id),
@@ -132,7 +138,7 @@ async fn runs_to_repeat(
             ruleset,
             plan,
         };
-        proposed.push((revision, one));
+        proposed.push((revision, proposed_run));
     }
     Ok(proposed)
 }
@@ -159,7 +165,7 @@ impl Store {
             let active = match submission {
                 None => {
                     let mut active = submissions::active(tx).await?;
-                    active.retain(|one| stage.check_accepts(one).is_ok());
+                    active.retain(|submission| stage.check_accepts(submission).is_ok());
                     active
                 }
                 Some(id) => vec![submissions::find(tx, id).await?],
@@ -171,12 +177,14 @@ impl Store {
             }
             if active
                 .iter()
-                .any(|one| one.state != submissions::SubmissionState::Valid)
+                .any(|submission| submission.state != submissions::SubmissionState::Valid)
             {
                 return conflict("only a valid submission can be tried");
             }
-            for one in &active {
-                stage.check_accepts(one).map_err(|why| stage_runtimes::conflict(&why))?;
+            for submission in &active {
+                stage
+                    .check_accepts(submission)
+                    .map_err(|refusal| stage_runtimes::conflict(&refusal))?;
             }
             let id = ProposalId::new();
             let proposal = Proposal {
@@ -230,10 +238,10 @@ impl Store {
             let counting = counting_evaluations::of_day(tx, stage_day).await?;
             let counting: Vec<EvaluationId> = counting
                 .into_iter()
-                .filter(|one| one.counts)
-                .map(|one| one.id)
+                .filter(|evaluation| evaluation.counts)
+                .map(|evaluation| evaluation.id)
                 .filter(|id| match scope {
-                    Reevaluation::Evaluation(only) => *id == only,
+                    Reevaluation::Evaluation(single) => *id == single,
                     Reevaluation::Day(_) | Reevaluation::Rules(_) => true,
                 })
                 .collect();
@@ -263,9 +271,9 @@ impl Store {
                 created_at: now,
                 outcome: None,
             };
-            // All evaluations of a proposal have the same revision of the rules, that of one board.
+            // All evaluations of a proposal have the same revision of the rules, because each revision has its own board.
             let of_revision = proposed.into_iter().filter(|(number, _)| *number == revision);
-            add_proposal(tx, &proposal, of_revision.map(|(_, one)| one).collect()).await?;
+            add_proposal(tx, &proposal, of_revision.map(|(_, proposed_run)| proposed_run).collect()).await?;
             proposals::find(tx, proposal.id).await
         })
         .await
@@ -370,13 +378,16 @@ async fn apply_evaluation(
     ) {
         let counting =
             counting_evaluations::of_day_and_team(tx, stage_day, evaluation.team).await?;
-        if !counting.iter().any(|one| one.id == replaced && one.counts) {
+        if !counting
+            .iter()
+            .any(|evaluation| evaluation.id == replaced && evaluation.counts)
+        {
             return conflict(format!(
                 "the evaluation {replaced}, which would be replaced, does not count any more: drop the proposal and create another"
             ));
         }
-        let why = format!("evaluated again: {}", proposal.reason);
-        void(tx, replaced, &why).await?;
+        let void_reason = format!("evaluated again: {}", proposal.reason);
+        void(tx, replaced, &void_reason).await?;
     }
     let entry = Entry {
         id: evaluation.id,

@@ -1,3 +1,5 @@
+//! Publication of an evaluation and its dataset by its team, before the stage does it automatically.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -15,7 +17,7 @@ use jiff::Timestamp;
 
 impl Store {
     /// Publishes an evaluation and its dataset earlier than its stage's settings do. This cannot be undone.
-    /// [`StoreError::Conflict`] unless it is finished, its day is released and its stage is not blind.
+    /// [`StoreError::Conflict`] unless it is finished, its day is released and its stage is not blind (its scores are not hidden).
     #[boxed]
     pub async fn publish_evaluation(
         &self,
@@ -24,24 +26,24 @@ impl Store {
         now: Timestamp,
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
-            let found = queries::evaluations::find(tx, id).await?;
-            let stage = stages::find(tx, found.stage_day.stage).await?;
-            let refused = |why: &str| Err(StoreError::Conflict(why.to_owned()));
-            if !matches!(found.state, EvaluationState::Finished { .. }) {
-                return refused("only a finished evaluation has a dataset to publish");
+            let evaluation = queries::evaluations::find(tx, id).await?;
+            let stage = stages::find(tx, evaluation.stage_day.stage).await?;
+            let conflict = |reason: &str| Err(StoreError::Conflict(reason.to_owned()));
+            if !matches!(evaluation.state, EvaluationState::Finished { .. }) {
+                return conflict("only a finished evaluation has a dataset to publish");
             }
             if stage.settings.blind {
-                return refused(
+                return conflict(
                     "the stage is blind: no dataset is published before the organiser opens it",
                 );
             }
-            if found.released_at.is_none() {
-                return refused(
+            if evaluation.released_at.is_none() {
+                return conflict(
                     "other evaluations of the day are still running the same episodes: the dataset can be published \
                      once the day is released",
                 );
             }
-            if found.published_at.is_none() {
+            if evaluation.published_at.is_none() {
                 counting_evaluations::set_published(tx, id, now).await?;
                 tx.record(Subject::Evaluation(id), Event::EvaluationPublished);
             }

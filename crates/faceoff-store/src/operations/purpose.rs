@@ -1,3 +1,6 @@
+//! The purpose of each job of the queue: which row it belongs to, and in which lane it waits. A lane is a share of the
+//! queue: lanes with the smallest urgency number are served first, and those of one urgency get equal shares of the slots.
+
 use crate::{
     error::{Result, StoreError},
     queue::{Lane, NewJob},
@@ -11,7 +14,7 @@ use faceoff_types::{EvaluationId, GameId, ProposalId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
-/// Kind of a job. The queue stores its label.
+/// Kind of a job. The queue stores its label, which may be an earlier version's name of the kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum JobKind {
     Validation,
@@ -37,11 +40,12 @@ impl JobKind {
             kind: self.label(),
             lane,
             batch: 0,
-            rest_s: 0,
+            delay_s: 0,
         }
     }
 }
 
+/// A lane with its stored name. Of two equally served lanes, the one with the smaller `rank` is next.
 const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
     Lane {
         name,
@@ -50,9 +54,9 @@ const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
     }
 }
 
-// Scoring runs no agent, belongs to the platform, and ends an evaluation that has run. Validation runs, shards and games
-// of rounds share the slots equally, so that none delays the others for long. Ablations, trials, proposals and all other
-// games do not count: they get the slots that are left.
+// The lanes, in three levels of urgency. Level 0: scoring, which runs no agent and ends an evaluation. Level 1: validation
+// runs, shards and games of rounds share the slots equally, so that none delays the others for long. Level 2: ablations,
+// proposals and all other games, which do not count, get the remaining slots.
 pub(crate) const SCORING: NewJob = JobKind::Scoring.in_lane(lane("finalise", 0, 0));
 pub(crate) const VALIDATION: NewJob = JobKind::Validation.in_lane(lane("smoke", 1, 0));
 pub(crate) const SHARD: NewJob = JobKind::Shard.in_lane(lane("shard", 1, 1));
@@ -71,7 +75,7 @@ pub enum JobFilter {
 }
 
 impl JobFilter {
-    /// Names of the lanes, as a JSON array.
+    /// Stored names of the lanes, as a JSON array.
     pub(crate) const fn lanes(self) -> &'static str {
         match self {
             Self::All => {
@@ -85,8 +89,8 @@ impl JobFilter {
     }
 }
 
-/// Account of scoring jobs: they belong to no team, and run in the order in which evaluations were run.
-pub(crate) const PLATFORM: &str = "";
+/// Owner of the account of scoring jobs: they belong to no team, and run in the order in which they were queued.
+pub(crate) const PLATFORM_ACCOUNT: &str = "";
 
 /// The submission, game, shard or evaluation that a job is for.
 #[derive(Debug)]

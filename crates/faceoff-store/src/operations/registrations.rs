@@ -1,4 +1,4 @@
-//! Registrations of new teams, and the organisers' decisions on them.
+//! Registrations of new teams without an invitation, and the organisers' decisions on them.
 
 use crate::{
     boxed,
@@ -18,7 +18,7 @@ use crate::{
 use faceoff_types::{DivisionName, RegistrationId, TeamName};
 use jiff::Timestamp;
 
-/// Limit of pending registrations: sending one needs no account, and an organiser reads each of them.
+/// Maximum number of pending registrations: sending one needs no account, and an organiser reads each of them.
 pub const MAX_PENDING_REGISTRATIONS: i64 = 200;
 
 /// A registration to be added. The caller makes the code of its link.
@@ -201,20 +201,23 @@ impl Store {
 }
 
 async fn set_divisions(tx: &mut Tx, names: &[DivisionName]) -> Result<()> {
-    let lower = |name: &DivisionName| name.as_str().to_lowercase();
+    let lowercase = |name: &DivisionName| name.as_str().to_lowercase();
     for (index, name) in names.iter().enumerate() {
-        let is_twice = names[..index]
+        let is_repeated = names[..index]
             .iter()
-            .any(|other| lower(other) == lower(name));
-        if is_twice {
+            .any(|other| lowercase(other) == lowercase(name));
+        if is_repeated {
             return Err(StoreError::Conflict(format!(
                 "divisions: “{name}” is listed twice"
             )));
         }
     }
-    let before = divisions::all(tx).await?;
-    for removed in &before {
-        if names.iter().any(|name| lower(name) == lower(removed)) {
+    let divisions_before = divisions::all(tx).await?;
+    for removed in &divisions_before {
+        if names
+            .iter()
+            .any(|name| lowercase(name) == lowercase(removed))
+        {
             continue;
         }
         let teams = divisions::teams_in(tx, removed).await?;
@@ -228,9 +231,9 @@ async fn set_divisions(tx: &mut Tx, names: &[DivisionName]) -> Result<()> {
     for (position, name) in (0..).zip(names) {
         divisions::insert(tx, name, position).await?;
     }
-    let after = divisions::all(tx).await?;
-    if after != before {
-        tx.record(Subject::Season, Event::DivisionsSet { divisions: after });
+    let divisions = divisions::all(tx).await?;
+    if divisions != divisions_before {
+        tx.record(Subject::Season, Event::DivisionsSet { divisions });
     }
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! Release of a day's seed, datasets and logs: automatic, as soon as no evaluation of the day is open.
+//! Release of an evaluation day, after which its seed, datasets and logs may be public: automatic, as soon as no
+//! evaluation of the day is open.
 
 use crate::{
     error::Result,
@@ -8,9 +9,9 @@ use crate::{
 };
 use faceoff_types::{EvaluationId, StageDay};
 
-/// Releases the day of an evaluation that has just ended, if it was the last open one. In the same transaction.
-pub(crate) async fn release_if_over(tx: &mut Tx, ended: EvaluationId) -> Result<()> {
-    let stage_day = entries::find(tx, ended).await?.stage_day;
+/// Releases the day of an evaluation that has just ended, if it was the last open one, in the same transaction.
+pub(crate) async fn release_if_over(tx: &mut Tx, evaluation: EvaluationId) -> Result<()> {
+    let stage_day = entries::find(tx, evaluation).await?.stage_day;
     release_unless_open(tx, stage_day).await
 }
 

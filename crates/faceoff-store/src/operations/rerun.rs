@@ -20,40 +20,40 @@ use faceoff_types::EvaluationId;
 use jiff::Timestamp;
 
 /// Pauses before the first and the second automatic rerun after platform faults, seconds. There is no
-/// third, so a day ends even if the fault persists.
+/// third rerun, so a day ends even if the fault persists.
 pub const RERUN_PAUSES_S: [u32; 2] = [60, 600];
 
-async fn queue_rerun(tx: &mut Tx, failed: Entry, rest_s: u32) -> Result<EvaluationId> {
-    let run = runs::find(tx, failed.run).await?;
+async fn queue_rerun(tx: &mut Tx, entry: Entry, delay_s: u32) -> Result<EvaluationId> {
+    let run = runs::find(tx, entry.run).await?;
     let new = NewEvaluation {
         id: EvaluationId::new(),
-        submission: failed.submission,
-        team: failed.team,
-        rerun_of: Some(failed.id),
+        submission: entry.submission,
+        team: entry.team,
+        rerun_of: Some(entry.id),
     };
     let setup = DaySetup {
-        stage_day: failed.stage_day,
-        revision: failed.revision,
+        stage_day: entry.stage_day,
+        revision: entry.revision,
         seed: run.seed,
         ruleset: run.ruleset,
         plan: run.plan,
     };
-    let id = queue_evaluation(tx, new, &setup, rest_s).await?;
-    entries::copy_extra(tx, id, failed.id).await?;
+    let id = queue_evaluation(tx, new, &setup, delay_s).await?;
+    entries::copy_extra(tx, id, entry.id).await?;
     Ok(id)
 }
 
 /// Queues a rerun of an evaluation that has just ended by a platform fault. Does nothing if its day is released or
 /// past its deadline, or after the last automatic rerun.
 pub(crate) async fn rerun_after_platform_fault(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let failed = entries::find(tx, id).await?;
-    let day = days::find(tx, failed.stage_day).await?;
+    let entry = entries::find(tx, id).await?;
+    let day = days::find(tx, entry.stage_day).await?;
     if day.released_at.is_some() || day.deadline_at.is_some_and(|at| at <= tx.now) {
         return Ok(());
     }
-    let times = evaluations::count_platform_failed(tx, failed.team, failed.stage_day).await?;
-    if let Some(rest_s) = RERUN_PAUSES_S.get(times.saturating_sub(1)) {
-        queue_rerun(tx, failed, *rest_s).await?;
+    let failures = evaluations::count_platform_failed(tx, entry.team, entry.stage_day).await?;
+    if let Some(delay_s) = RERUN_PAUSES_S.get(failures.saturating_sub(1)) {
+        queue_rerun(tx, entry, *delay_s).await?;
     }
     Ok(())
 }
@@ -62,7 +62,7 @@ impl Store {
     /// Queues a rerun: the same submission on the same episodes, whether the day is released or not. The evaluation must
     /// have been cancelled, voided, not run in time, or ended by a platform fault. [`StoreError::Conflict`] if it ended
     /// otherwise, the team has another counting evaluation of the day, or the stage is signed off.
-    /// [`StoreError::Disqualified`] if the team is; [`StoreError::SeasonClosed`] once the season is over.
+    /// [`StoreError::Disqualified`] if the team is disqualified; [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn rerun_evaluation(
         &self,
@@ -72,24 +72,24 @@ impl Store {
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let found = queries::evaluations::find(tx, id).await?;
+            let evaluation = queries::evaluations::find(tx, id).await?;
             let ended_without_result = matches!(
-                found.state,
+                evaluation.state,
                 EvaluationState::PlatformFailed { .. }
                     | EvaluationState::Cancelled { .. }
                     | EvaluationState::NotPlayed { .. }
             );
-            if !ended_without_result && found.voided.is_none() {
+            if !ended_without_result && evaluation.voided.is_none() {
                 return Err(StoreError::Conflict(
                     "only an evaluation that was cancelled or voided, was not run in time, or failed because of a \
                      platform fault can be rerun"
                         .into(),
                 ));
             }
-            let failed = entries::find(tx, id).await?;
-            sign_offs::check_not_signed_off(tx, failed.stage_day.stage).await?;
-            teams::check_may_compete(tx, failed.team).await?;
-            let id = queue_rerun(tx, failed, 0).await?;
+            let entry = entries::find(tx, id).await?;
+            sign_offs::check_not_signed_off(tx, entry.stage_day.stage).await?;
+            teams::check_may_compete(tx, entry.team).await?;
+            let id = queue_rerun(tx, entry, 0).await?;
             queries::evaluations::find(tx, id).await
         })
         .await

@@ -1,4 +1,5 @@
-//! Retention of a stage's large files: the organiser sets it, the server applies it automatically.
+//! Retention of a stage's large files (datasets and bundles): the organiser sets how long they are kept, and the server
+//! removes them automatically afterwards.
 
 use crate::{
     boxed,
@@ -23,20 +24,21 @@ use std::collections::{BTreeMap, BTreeSet};
 /// backup whose database still refers to it.
 pub const FILES_KEPT_FOR: SignedDuration = RECORDINGS_KEPT_FOR;
 
-/// Numbers and sizes of files that a retention removes or has removed.
+/// Number and size of the files that a retention removes or has removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RemovalSummary {
+    /// Number of datasets.
     pub datasets: u32,
-    /// Teams that these datasets belong to.
+    /// Number of teams that these datasets belong to.
     pub teams: u32,
-    /// Bundles of submissions that are not used any more.
+    /// Number of bundles of submissions that are not used any more.
     pub bundles: u32,
     /// Total size of the measured datasets and bundles.
     pub bytes: u64,
-    /// Datasets whose size has not been measured yet.
+    /// Number of datasets whose size has not been measured yet.
     pub unmeasured: u32,
-    /// When the files that are kept until a date are removed; `None` if there are none.
-    pub later_from: Option<Timestamp>,
+    /// When files that are kept until a date will be removed; `None` if there are no such files.
+    pub next_removal_at: Option<Timestamp>,
 }
 
 impl RemovalSummary {
@@ -48,7 +50,7 @@ impl RemovalSummary {
 
 /// Files that a retention removes, and the reason shown for it.
 #[derive(Debug, Default)]
-struct Plan {
+struct RemovalPlan {
     reason: String,
     datasets: Vec<EvaluationId>,
     bundles: Vec<SubmissionId>,
@@ -56,20 +58,21 @@ struct Plan {
 }
 
 /// End of the period after sign-off for which the retention keeps the files of a stage.
-fn kept_after_sign_off(retention: &Retention, stage: &Stage) -> Option<Timestamp> {
-    let at = stage.sign_off.as_ref()?.at;
+fn sign_off_period_end(retention: &Retention, stage: &Stage) -> Option<Timestamp> {
+    let signed_off_at = stage.sign_off.as_ref()?.signed_off_at;
     let period = SignedDuration::from_hours(24 * i64::from(retention.days_after_sign_off?));
-    at.saturating_add(period).ok()
+    signed_off_at.saturating_add(period).ok()
 }
 
-/// Whether the retention keeps nothing of the stage any more at `now`.
+/// Is the period over for which the retention keeps the stage's files?
 fn has_ended(retention: &Retention, stage: &Stage, is_over: bool, now: Timestamp) -> bool {
-    let by_date = retention.until.is_some_and(|until| until <= now);
-    let by_sign_off = kept_after_sign_off(retention, stage).is_some_and(|until| until <= now);
-    by_date && is_over || by_sign_off
+    let is_date_past = retention.until.is_some_and(|until| until <= now);
+    let is_sign_off_period_past =
+        sign_off_period_end(retention, stage).is_some_and(|end| end <= now);
+    is_date_past && is_over || is_sign_off_period_past
 }
 
-/// Whether all files of a stage are still needed. Results can change while evaluations, days or proposals are open,
+/// Are all files of a stage still needed? Results can change while evaluations, days or proposals are open,
 /// and while the stage is blind no team can have downloaded its datasets.
 async fn is_in_use(connection: &mut SqliteConnection, stage: &Stage) -> Result<bool> {
     Ok(stage.settings.blind
@@ -78,42 +81,42 @@ async fn is_in_use(connection: &mut SqliteConnection, stage: &Stage) -> Result<b
         || retentions::count_proposals(connection, stage.id).await? > 0)
 }
 
-/// Evaluations of a team that are older than its `last` newest counting ones, without its best one of each revision.
-/// `evaluations` has the newest first.
-fn older_than_last(evaluations: &[ScoredEvaluation], last: u32) -> Vec<&ScoredEvaluation> {
+/// Evaluations of a team that are older than its `kept_count` newest counting ones, without its best one of each revision
+/// of the rules. `evaluations` has the newest first.
+fn older_than_newest(evaluations: &[ScoredEvaluation], kept_count: u32) -> Vec<&ScoredEvaluation> {
     let mut best: BTreeMap<u32, &ScoredEvaluation> = BTreeMap::new();
-    for one in evaluations.iter().filter(|one| one.counts) {
-        let best_so_far = best.entry(one.revision).or_insert(one);
-        if one.compare_rank(best_so_far).is_lt() {
-            *best_so_far = one;
+    for evaluation in evaluations.iter().filter(|evaluation| evaluation.counts) {
+        let best_so_far = best.entry(evaluation.revision).or_insert(evaluation);
+        if evaluation.compare_rank(best_so_far).is_lt() {
+            *best_so_far = evaluation;
         }
     }
-    let is_best = |one: &ScoredEvaluation| {
-        one.counts
+    let is_best = |evaluation: &ScoredEvaluation| {
+        evaluation.counts
             && best
-                .get(&one.revision)
-                .is_some_and(|best| best.id == one.id)
+                .get(&evaluation.revision)
+                .is_some_and(|best| best.id == evaluation.id)
     };
     let mut newer = 0;
     let mut older = Vec::new();
-    for one in evaluations {
-        if newer >= last && !is_best(one) {
-            older.push(one);
+    for evaluation in evaluations {
+        if newer >= kept_count && !is_best(evaluation) {
+            older.push(evaluation);
         }
-        newer += u32::from(one.counts);
+        newer += u32::from(evaluation.counts);
     }
     older
 }
 
 /// Files that the retention removes at `now`, provided that the stage is not [in use](is_in_use).
-async fn plan(
+async fn plan_removal(
     connection: &mut SqliteConnection,
     stage: &Stage,
     retention: &Retention,
     now: Timestamp,
-) -> Result<Plan> {
+) -> Result<RemovalPlan> {
     if retention.keeps_all() {
-        return Ok(Plan::default());
+        return Ok(RemovalPlan::default());
     }
     let is_over = stage.phase(now) == StagePhase::Closed
         || season::read(connection).await?.closed_at.is_some();
@@ -121,21 +124,22 @@ async fn plan(
     let scored = retentions::scored_evaluations(connection, stage.id).await?;
     let removable: Vec<&ScoredEvaluation> = match retention.last {
         _ if ended => scored.iter().collect(),
-        Some(last) => scored
-            .chunk_by(|one, other| one.team == other.team)
-            .flat_map(|evaluations| older_than_last(evaluations, last))
+        Some(kept_count) => scored
+            .chunk_by(|first, second| first.team == second.team)
+            .flat_map(|evaluations| older_than_newest(evaluations, kept_count))
             .collect(),
-        None => return Ok(Plan::default()),
+        None => return Ok(RemovalPlan::default()),
     };
-    let is_removable = |one: &&&ScoredEvaluation| one.has_dataset && !one.is_evidence;
+    let is_removable =
+        |evaluation: &&&ScoredEvaluation| evaluation.has_dataset && !evaluation.is_evidence;
     let removable: Vec<&ScoredEvaluation> =
         removable.iter().filter(is_removable).copied().collect();
-    let datasets: Vec<EvaluationId> = removable.iter().map(|one| one.id).collect();
+    let datasets: Vec<EvaluationId> = removable.iter().map(|evaluation| evaluation.id).collect();
     let bundles = retentions::idle_bundles(connection, stage.id, &datasets).await?;
-    let teams: BTreeSet<TeamId> = removable.iter().map(|one| one.team).collect();
+    let teams: BTreeSet<TeamId> = removable.iter().map(|evaluation| evaluation.team).collect();
     let count = |len: usize| u32::try_from(len).unwrap_or(u32::MAX);
     let bundle_bytes = bundles.iter().map(|(_, bytes)| bytes).sum::<u64>();
-    Ok(Plan {
+    Ok(RemovalPlan {
         reason: format!(
             "by the retention of the stage {:?}, which keeps {retention}",
             stage.name.as_str()
@@ -144,9 +148,18 @@ async fn plan(
             datasets: count(datasets.len()),
             teams: count(teams.len()),
             bundles: count(bundles.len()),
-            bytes: removable.iter().filter_map(|one| one.bytes).sum::<u64>() + bundle_bytes,
-            unmeasured: count(removable.iter().filter(|one| one.bytes.is_none()).count()),
-            later_from: None,
+            bytes: removable
+                .iter()
+                .filter_map(|evaluation| evaluation.bytes)
+                .sum::<u64>()
+                + bundle_bytes,
+            unmeasured: count(
+                removable
+                    .iter()
+                    .filter(|evaluation| evaluation.bytes.is_none())
+                    .count(),
+            ),
+            next_removal_at: None,
         },
         datasets,
         bundles: bundles.into_iter().map(|(id, _)| id).collect(),
@@ -175,8 +188,8 @@ impl Store {
         retentions::of_stage(&mut *self.database.read.acquire().await?, stage).await
     }
 
-    /// Preview, as of `now`, of the files that this retention would remove from a stage. Includes those that go
-    /// immediately (or once nothing of the stage is open, undecided or blind), and those that go on a known date.
+    /// Preview, as of `now`, of the files that this retention would remove from a stage: immediately (or once nothing of
+    /// the stage is open, undecided or blind), and on a known date.
     #[boxed]
     pub async fn preview_removal(
         &self,
@@ -186,62 +199,64 @@ impl Store {
     ) -> Result<RemovalSummary> {
         let mut connection = self.database.read.acquire().await?;
         let stage = stages::find(&mut connection, stage).await?;
-        let immediate = plan(&mut connection, &stage, retention, now).await?.removed;
-        let dates = [retention.until, kept_after_sign_off(retention, &stage)];
-        let Some(later) = dates.into_iter().flatten().filter(|at| *at > now).min() else {
+        let immediate = plan_removal(&mut connection, &stage, retention, now)
+            .await?
+            .removed;
+        let dates = [retention.until, sign_off_period_end(retention, &stage)];
+        let Some(next_date) = dates.into_iter().flatten().filter(|at| *at > now).min() else {
             return Ok(immediate);
         };
-        let eventual = plan(&mut connection, &stage, retention, later).await?;
-        let later_from = (eventual.removed != immediate).then_some(later);
+        let eventual = plan_removal(&mut connection, &stage, retention, next_date).await?;
+        let next_removal_at = (eventual.removed != immediate).then_some(next_date);
         Ok(RemovalSummary {
-            later_from,
+            next_removal_at,
             ..eventual.removed
         })
     }
 
     /// Applies the retentions of all stages. Datasets and bundles are first marked as removed, with the reason; their
-    /// files are deleted [`FILES_KEPT_FOR`] later. Returns what was marked. To be called periodically; an interrupted call
+    /// files are deleted [`FILES_KEPT_FOR`] later. Returns a summary of the marked files. To be called periodically; an interrupted call
     /// is completed by the next one.
     #[boxed]
     pub async fn apply_retentions(&self, now: Timestamp) -> Result<RemovalSummary> {
-        let mut all = RemovalSummary::default();
+        let mut total = RemovalSummary::default();
         let mut connection = self.database.read.acquire().await?;
-        let bounded = retentions::stages_with_removals(&mut connection).await?;
-        let mut due = Vec::new();
-        for id in bounded {
+        let stages_with_removals = retentions::stages_with_removals(&mut connection).await?;
+        let mut due_stages = Vec::new();
+        for id in stages_with_removals {
             let stage = stages::find(&mut connection, id).await?;
             if is_in_use(&mut connection, &stage).await? {
                 continue;
             }
             let retention = retentions::of_stage(&mut connection, id).await?;
-            let plan = plan(&mut connection, &stage, &retention, now).await?;
+            let plan = plan_removal(&mut connection, &stage, &retention, now).await?;
             if !plan.removed.is_empty() {
-                due.push(id);
+                due_stages.push(id);
             }
         }
         drop(connection);
-        for id in due {
+        for id in due_stages {
             let removed = self
                 .write(Actor::Server, now, async |tx| mark_removed(tx, id).await)
                 .await?;
-            all.datasets += removed.datasets;
-            all.teams += removed.teams;
-            all.bundles += removed.bundles;
-            all.bytes += removed.bytes;
-            all.unmeasured += removed.unmeasured;
+            total.datasets += removed.datasets;
+            total.teams += removed.teams;
+            total.bundles += removed.bundles;
+            total.bytes += removed.bytes;
+            total.unmeasured += removed.unmeasured;
         }
         self.remove_files_of_removed(now).await?;
-        Ok(all)
+        Ok(total)
     }
 
     /// Deletes the files of datasets and bundles that were removed at least [`FILES_KEPT_FOR`] ago, by a retention or on
-    /// request. Evidence is kept. Returns how many.
+    /// request. Evidence is kept. Returns the number of deleted files.
     #[boxed]
     pub async fn remove_files_of_removed(&self, now: Timestamp) -> Result<usize> {
-        let before = now.saturating_sub(FILES_KEPT_FOR).unwrap_or(Timestamp::MIN);
+        let removed_before = now.saturating_sub(FILES_KEPT_FOR).unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        let datasets = retentions::deletable_datasets(&mut connection, before).await?;
-        let bundles = bundles::deletable(&mut connection, before).await?;
+        let datasets = retentions::deletable_datasets(&mut connection, removed_before).await?;
+        let bundles = bundles::deletable(&mut connection, removed_before).await?;
         drop(connection);
         for (id, key) in &datasets {
             self.artifacts().delete_dataset(key).await?;
@@ -260,7 +275,7 @@ impl Store {
         Ok(datasets.len() + bundles.len())
     }
 
-    /// Measures datasets stored by versions that did not record sizes. Returns how many.
+    /// Measures datasets stored by versions that did not record sizes. Returns the number of datasets.
     #[boxed]
     pub async fn measure_datasets(&self, now: Timestamp) -> Result<usize> {
         let mut connection = self.database.read.acquire().await?;
@@ -270,7 +285,7 @@ impl Store {
             // A lost dataset takes no space.
             let bytes = self.artifacts().size_bytes(key).await?.unwrap_or(0);
             self.write(Actor::Server, now, async |tx| {
-                retentions::set_measured(tx, *id, bytes).await
+                retentions::set_dataset_bytes(tx, *id, bytes).await
             })
             .await?;
         }
@@ -287,7 +302,7 @@ async fn mark_removed(tx: &mut Tx, id: StageId) -> Result<RemovalSummary> {
         return Ok(RemovalSummary::default());
     }
     let retention = retentions::of_stage(tx, id).await?;
-    let plan = plan(tx, &stage, &retention, now).await?;
+    let plan = plan_removal(tx, &stage, &retention, now).await?;
     let reason = plan.reason;
     for id in plan.datasets {
         retentions::set_dataset_removed(tx, id, &reason, now).await?;

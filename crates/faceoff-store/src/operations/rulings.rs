@@ -1,4 +1,5 @@
-//! Organisers' decisions on results and teams. They take effect at once and have a reason.
+//! Rulings: organisers' decisions on results and teams (voiding, disqualification), which take effect at once and have a
+//! reason.
 
 use crate::{
     boxed,
@@ -44,10 +45,10 @@ async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()
     };
     for tournament in tournaments::all(tx).await? {
         let entrants = entrants::all(tx, tournament.id).await?;
-        let is_in = entrants
+        let takes_part = entrants
             .iter()
-            .any(|one| one.team == team && one.departure.is_none());
-        if tournament.closed_at.is_none() && is_in {
+            .any(|entrant| entrant.team == team && entrant.departure.is_none());
+        if tournament.closed_at.is_none() && takes_part {
             remove_entrant(tx, tournament.id, &departure).await?;
         }
     }
@@ -83,8 +84,8 @@ impl Store {
         .await
     }
 
-    /// Voids all counting evaluations of a day and cancels the open ones, so that the day is released. Returns the number
-    /// of both. [`StoreError::NotFound`] if the day has had no cutoff, [`StoreError::Conflict`] if none counts or is open,
+    /// Voids all counting evaluations of a day and cancels the open ones, so that the day is released. Returns the total
+    /// number. [`StoreError::NotFound`] if the day has had no cutoff, [`StoreError::Conflict`] if none counts or is open,
     /// or the stage is signed off.
     #[boxed]
     pub async fn void_day(
@@ -145,11 +146,12 @@ impl Store {
                 reason: reason.to_owned(),
             };
             teams::set_disqualified(tx, id, Some(&ruling)).await?;
-            let why = format!("the team is disqualified: {reason}");
+            let cancellation_reason = format!("the team is disqualified: {reason}");
             for (evaluation, run) in counting_evaluations::open_of_team(tx, id).await? {
-                completion::fail_evaluation(tx, evaluation, run, Failure::Cancelled(&why)).await?;
+                let cancelled = Failure::Cancelled(&cancellation_reason);
+                completion::fail_evaluation(tx, evaluation, run, cancelled).await?;
             }
-            leave_tournaments(tx, id, &why).await?;
+            leave_tournaments(tx, id, &cancellation_reason).await?;
             let reason = ruling.reason;
             tx.record(Subject::Team(id), Event::TeamDisqualified { reason });
             teams::find(tx, id).await

@@ -1,4 +1,5 @@
-//! Runs: their division into shards, their owners and their stop. The same for all kinds of owners.
+//! Runs: the playing of a plan of episodes for an owner, which is an evaluation or an ablation. A run is divided into
+//! shards, each of which is one job.
 
 use crate::{
     error::{Result, StoreError},
@@ -14,7 +15,7 @@ use crate::{
 use faceoff_types::{AblationId, EvaluationId, ProposalId, RunId, ShardId, SubmissionId, TeamId};
 use sqlx::SqliteConnection;
 
-/// The evaluation or ablation that a run belongs to.
+/// The evaluation, proposed evaluation or ablation that a run belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunOwner {
     Evaluation(EvaluationId),
@@ -62,20 +63,20 @@ pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Resu
         .ok_or_else(|| StoreError::Damaged(format!("run {run}: it has no owner")))
 }
 
-/// Adds a run, divides it into shards in (task, first episode) order, and queues them. Their slot time is
-/// charged to `team`. [`StoreError::Conflict`] if the bundle of a contestant was removed.
+/// Adds a run, divides it into shards in the order of tasks and episodes, and queues a job like `job` for each. Their slot
+/// time is charged to `team`. [`StoreError::Conflict`] if the bundle of a contestant was removed.
 pub(crate) async fn queue_run(
     tx: &mut Tx,
     run: &Run,
     contestants: &[SubmissionId],
-    new: NewJob,
+    job: NewJob,
     team: TeamId,
 ) -> Result<()> {
     for contestant in contestants {
         bundles::check_available(tx, *contestant).await?;
     }
     runs::insert(tx, run, contestants).await?;
-    let account = queue::account(tx, new.lane, &team.to_string()).await?;
+    let account = queue::account(tx, job.lane, &team.to_string()).await?;
     let mut tasks = run.plan.tasks.clone();
     tasks.sort_unstable();
     let mut position = 0;
@@ -93,8 +94,8 @@ pub(crate) async fn queue_run(
                 end_episode,
                 recording: None,
             };
-            let job = queue::insert(tx, new, account).await?;
-            shards::insert(tx, run.id, &shard, position, job).await?;
+            let job_id = queue::insert(tx, job, account).await?;
+            shards::insert(tx, run.id, &shard, position, job_id).await?;
             position += 1;
             first_episode = end_episode;
         }

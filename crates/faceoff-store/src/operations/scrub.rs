@@ -1,5 +1,6 @@
-//! Removal of everything from a copied database that its archive must not contain. Triggers are off meanwhile, and
-//! references are checked at the end.
+//! Scrubbing: removal of everything from a copied database that its archive must not contain. An archive has two
+//! editions: the public one, and one for the organisers. Triggers are off meanwhile, and references between rows are
+//! checked at the end.
 
 use crate::{
     error::{Result, StoreError},
@@ -9,8 +10,8 @@ use crate::{
 use serde_json::Value;
 use sqlx::{AssertSqlSafe, SqliteConnection};
 
-/// Tables that the public archive has rows of. All others are emptied for it. So a new table is private until it is
-/// added here.
+/// Tables with rows in the public edition. All others are emptied for it, so a new table is private until it is added
+/// here.
 const PUBLIC_TABLES: [&str; 29] = [
     "_sqlx_migrations",
     "ablation_runs",
@@ -43,14 +44,14 @@ const PUBLIC_TABLES: [&str; 29] = [
     "tournaments",
 ];
 
-/// Editions of the archive that a step applies to.
+/// Editions of the archive that a step of the scrubbing applies to.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Scope {
     Both,
     Public,
 }
 
-/// In this order: first the results, then the rows that belong to removed ones.
+/// The statements that scrub a copy, in this order: first results are removed, then the rows that belong to removed results.
 const STEPS: &[(Scope, &str)] = &[
     // Open evaluations are no results, and days are secret until their release.
     (Scope::Both, "DELETE FROM evaluations WHERE state = 'open' OR NOT EXISTS
@@ -165,7 +166,7 @@ pub(crate) async fn scrub(connection: &mut SqliteConnection, edition: Edition) -
         run(connection, format!("DROP TRIGGER {name}")).await?;
     }
     if edition == Edition::Public {
-        check_summed_up(connection).await?;
+        check_summarised(connection).await?;
         forget_lifted_rulings(connection).await?;
         keep_public_events(connection).await?;
     }
@@ -202,7 +203,7 @@ async fn run(connection: &mut SqliteConnection, sql: String) -> Result<()> {
     Ok(())
 }
 
-/// Removes the events whose kind is not public; one event of each kind is parsed to find out.
+/// Removes the events whose kind is not public. One event of each kind is parsed to find out whether the kind is public.
 async fn keep_public_events(connection: &mut SqliteConnection) -> Result<()> {
     let kinds: Vec<(String, String)> =
         sqlx::query_as("SELECT kind, payload FROM events GROUP BY kind")
@@ -224,8 +225,9 @@ async fn keep_public_events(connection: &mut SqliteConnection) -> Result<()> {
     Ok(())
 }
 
-/// Refuses to remove the episodes of a result that has no summary yet: its boards could not be shown without.
-async fn check_summed_up(connection: &mut SqliteConnection) -> Result<()> {
+/// Refuses to remove the episodes of a result that has no summary yet: with neither, its board could not be
+/// shown.
+async fn check_summarised(connection: &mut SqliteConnection) -> Result<()> {
     let unsummarised: u32 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM runs r
            WHERE r.state = 'played' AND r.cleared_at IS NULL

@@ -1,3 +1,5 @@
+//! Name and end of the season.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -29,36 +31,38 @@ impl Store {
     pub async fn close_season(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let under_way = evaluations::count_open(tx, None).await?;
-            let proposed = proposed_evaluations::count_open(tx, None).await?;
-            if proposed > 0 {
+            let open_evaluations = evaluations::count_open(tx, None).await?;
+            let open_proposed = proposed_evaluations::count_open(tx, None).await?;
+            if open_proposed > 0 {
                 return Err(StoreError::Conflict(format!(
-                    "{proposed} evaluations of trials and proposed re-evaluations are queued or running: wait until they \
+                    "{open_proposed} evaluations of trials and proposed re-evaluations are queued or running: wait until they \
                      are over, or drop them"
                 )));
             }
-            let games = games::count_open(tx).await?;
-            if games > 0 {
+            let open_games = games::count_open(tx).await?;
+            if open_games > 0 {
                 return Err(StoreError::Conflict(format!(
-                    "{games} games are queued or running, and closing the season publishes their seeds: wait until they \
+                    "{open_games} games are queued or running, and closing the season publishes their seeds: wait until they \
                      are over, or cancel them"
                 )));
             }
-            let open = tournaments::all(tx).await?;
-            if let Some(open) = open.iter().find(|one| one.closed_at.is_none()) {
+            let tournaments = tournaments::all(tx).await?;
+            if let Some(open) = tournaments
+                .iter()
+                .find(|tournament| tournament.closed_at.is_none()) {
                 return Err(StoreError::Conflict(format!(
                     "the tournament {:?} is not closed, and a closed season has no games: close it first",
                     open.name.as_str()
                 )));
             }
-            if under_way > 0 {
+            if open_evaluations > 0 {
                 return Err(StoreError::Conflict(format!(
-                    "{under_way} evaluations are queued or running, and closing the season publishes \
+                    "{open_evaluations} evaluations are queued or running, and closing the season publishes \
                      their seeds: wait until they are over, or cancel them"
                 )));
             }
             for stage in stages::all(tx).await? {
-                let why = if stage.settings.blind {
+                let obstacle = if stage.settings.blind {
                     "is blind, and closing the season publishes the seeds that its scores follow from: open it first"
                 } else if is_final_day_pending(tx, &stage).await? {
                     "is decided by a final day that has not been evaluated, and a closed season has no evaluations: start \
@@ -67,7 +71,7 @@ impl Store {
                     continue;
                 };
                 return Err(StoreError::Conflict(format!(
-                    "the stage {:?} {why}",
+                    "the stage {:?} {obstacle}",
                     stage.name.as_str()
                 )));
             }

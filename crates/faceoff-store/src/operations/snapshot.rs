@@ -1,4 +1,4 @@
-//! A copy of the database for an archive, made while the server runs.
+//! Snapshots: a copy of the database for an archive (the season in one file), made while the server runs.
 
 use crate::{
     boxed,
@@ -26,20 +26,20 @@ use std::{
     sync::Arc,
 };
 
-/// The season at one instant, with the contents of one edition of the archive.
+/// The season at one instant, with the contents of one edition of the archive (the public or the organisers').
 #[derive(Debug)]
 pub struct Snapshot {
     store: Store,
     file: PathBuf,
-    /// Queued or running evaluations, in the organiser's edition with those of proposals. They are left out, as are
-    /// their proposals and all unreleased days.
-    pub under_way: u32,
+    /// Number of queued or running evaluations; in the organisers' edition, those of proposals are included. These
+    /// evaluations are left out of the archive, as are their proposals and all unreleased days.
+    pub open_evaluations: u32,
 }
 
 impl Store {
     /// Copies the database as it is now into `folder`, without credentials, open jobs and the secret of a running
-    /// season. The public edition also lacks users, bundles, logs, and hidden scores. `program` is recorded in it. Takes
-    /// disk space and time in proportion to the database; writers are not blocked. [`StoreError::Conflict`] if a public
+    /// season. The public edition also lacks users, bundles, logs, and hidden scores. `program`, the name and version of
+    /// this program, is recorded in the copy. Takes disk space and time in proportion to the database; writers are not blocked. [`StoreError::Conflict`] if a public
     /// archive is asked for the organiser's edition.
     #[boxed]
     pub async fn snapshot(
@@ -69,11 +69,11 @@ impl Store {
             .journal_mode(SqliteJournalMode::Off)
             .synchronous(SqliteSynchronous::Off);
         let mut connection = SqliteConnection::connect_with(&options).await?;
-        let mut under_way = evaluations::count_open(&mut connection, None).await?;
+        let mut open_evaluations = evaluations::count_open(&mut connection, None).await?;
         if edition == Edition::Organiser {
-            under_way += proposed_evaluations::count_open(&mut connection, None).await?;
+            open_evaluations += proposed_evaluations::count_open(&mut connection, None).await?;
         }
-        mark(&mut connection, edition, program, now).await?;
+        describe_archive(&mut connection, edition, program, now).await?;
         scrub(&mut connection, edition).await?;
         connection.close().await?;
         let database = Database::open(&file).await?;
@@ -91,7 +91,7 @@ impl Store {
         Ok(Snapshot {
             store,
             file,
-            under_way,
+            open_evaluations,
         })
     }
 }
@@ -120,22 +120,23 @@ impl Snapshot {
 }
 
 /// Copies a database with everything committed, and without its unused pages.
-pub(crate) async fn copy(from: &Path, to: &Path) -> Result<()> {
-    let to = to
+pub(crate) async fn copy(source: &Path, target: &Path) -> Result<()> {
+    let target = target
         .to_str()
-        .ok_or_else(|| StoreError::Artifacts(format!("{}: not a UTF-8 path", to.display())))?;
-    let options = SqliteConnectOptions::new().filename(from).read_only(true);
+        .ok_or_else(|| StoreError::Artifacts(format!("{}: not a UTF-8 path", target.display())))?;
+    let options = SqliteConnectOptions::new().filename(source).read_only(true);
     let mut connection = SqliteConnection::connect_with(&options).await?;
     sqlx::query("VACUUM INTO ?")
-        .bind(to)
+        .bind(target)
         .execute(&mut connection)
         .await?;
     connection.close().await?;
     Ok(())
 }
 
-/// Writes the description of the archive, and the seeds of released days, whose secret it will not contain.
-async fn mark(
+/// Writes the description of the archive, and the seeds of released days: they follow from the season's secret, which the
+/// archive does not contain.
+async fn describe_archive(
     connection: &mut SqliteConnection,
     edition: Edition,
     program: &str,
@@ -143,7 +144,7 @@ async fn mark(
 ) -> Result<()> {
     let season = season::read(connection).await?;
     if let Some(archived) = archive::read(connection).await? {
-        // An archive of an archive is of the same instant.
+        // An archive made from an imported archive shows the season at the same instant.
         let archived = ArchivedSeason {
             edition,
             imported_at: None,

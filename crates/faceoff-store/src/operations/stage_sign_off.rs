@@ -1,4 +1,5 @@
-//! The steps after a stage has closed: its final day, if it has one, and the sign-off of its results.
+//! The steps after a stage (a part of the season with its own rules) has closed: its final day, if it has one, and the
+//! sign-off, after which its results are final.
 
 use crate::{
     boxed,
@@ -16,8 +17,8 @@ use crate::{
 use faceoff_types::{CountingResult, StageId};
 use jiff::Timestamp;
 
-fn conflict<T>(why: String) -> Result<T> {
-    Err(StoreError::Conflict(why))
+fn conflict<T>(reason: String) -> Result<T> {
+    Err(StoreError::Conflict(reason))
 }
 
 /// Refuses a step that requires a closed stage; `requirement` is the rule that the error quotes.
@@ -25,17 +26,17 @@ fn check_closed(stage: &Stage, now: Timestamp, requirement: &str) -> Result<()> 
     if stage.phase(now) == StagePhase::Closed {
         return Ok(());
     }
-    let closes = match stage.closes_at {
+    let closing_time = match stage.closes_at {
         Some(at) => format!("it closes on {}", at.strftime("%Y-%m-%d at %H:%M:%S UTC")),
         None => "it has no end yet: give it one".to_owned(),
     };
     conflict(format!(
-        "the stage {:?} has not closed, and {requirement}; {closes}",
+        "the stage {:?} has not closed, and {requirement}; {closing_time}",
         stage.name.as_str()
     ))
 }
 
-/// Whether the stage's standings need a final day that has not started. A stage without any score needs none.
+/// Do the stage's standings need a final day that has not started? A stage without any score needs none.
 pub(crate) async fn is_final_day_pending(tx: &mut Tx, stage: &Stage) -> Result<bool> {
     Ok(stage.settings.standings == CountingResult::Final
         && stage.sign_off.is_none()
@@ -50,10 +51,10 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
     if season::read(tx).await?.closed_at.is_none() {
         check_closed(stage, tx.now, "only a closed stage can be signed off")?;
     }
-    let under_way = sign_offs::count_open(tx, stage.id).await?;
-    if under_way > 0 {
+    let open_evaluations = sign_offs::count_open(tx, stage.id).await?;
+    if open_evaluations > 0 {
         return conflict(format!(
-            "{under_way} evaluations of the stage {:?} are queued or running: wait until they are over, or \
+            "{open_evaluations} evaluations of the stage {:?} are queued or running: wait until they are over, or \
              cancel them",
             stage.name.as_str()
         ));
@@ -72,7 +73,8 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
         ));
     }
     let proposals = proposals::all(tx).await?.into_iter();
-    let proposals = proposals.filter(|one| one.stage == stage.id && one.outcome.is_none());
+    let proposals =
+        proposals.filter(|proposal| proposal.stage == stage.id && proposal.outcome.is_none());
     let proposals = proposals.count();
     if proposals > 0 {
         return conflict(format!(
@@ -96,7 +98,7 @@ impl Store {
     /// [`StoreError::Conflict`] with the reason why it would not.
     #[boxed]
     pub async fn check_can_sign_off(&self, id: StageId, now: Timestamp) -> Result<Stage> {
-        // It writes nothing, but needs one consistent view of several tables.
+        // The check writes nothing, but needs one consistent view of several tables.
         self.write(Actor::Server, now, async |tx| {
             let stage = stages::find(tx, id).await?;
             check_ready_for_sign_off(tx, &stage).await?;

@@ -1,4 +1,5 @@
-//! Stages: creation, permitted changes, and synchronisation with the configuration file.
+//! Stages: the parts of a season, each with its own rules. Their creation, permitted changes, and synchronisation with the
+//! configuration file.
 
 use crate::{
     boxed,
@@ -51,30 +52,30 @@ pub struct StageChange {
 }
 
 impl StageChange {
-    /// Whether anything but the retention differs from `stage`.
-    fn changes(&self, stage: &Stage) -> bool {
-        fn other<T: PartialEq>(wanted: Option<&T>, is: &T) -> bool {
-            wanted.is_some_and(|wanted| wanted != is)
+    /// Does anything but the retention differ from `stage`?
+    fn changes_more_than_retention(&self, stage: &Stage) -> bool {
+        fn differs<T: PartialEq>(new: Option<&T>, current: &T) -> bool {
+            new.is_some_and(|new| new != current)
         }
-        other(self.name.as_ref(), &stage.name)
-            || other(self.opens_at.as_ref(), &stage.opens_at)
-            || other(self.closes_at.as_ref(), &stage.closes_at)
-            || other(self.zone.as_ref(), &stage.zone)
-            || other(self.rules.as_ref(), &stage.rules.rules)
-            || other(self.settings.as_ref(), &stage.settings)
+        differs(self.name.as_ref(), &stage.name)
+            || differs(self.opens_at.as_ref(), &stage.opens_at)
+            || differs(self.closes_at.as_ref(), &stage.closes_at)
+            || differs(self.zone.as_ref(), &stage.zone)
+            || differs(self.rules.as_ref(), &stage.rules.rules)
+            || differs(self.settings.as_ref(), &stage.settings)
     }
 }
 
 /// The name of a season's first stage.
-const FIRST: &str = "Qualifying";
+const FIRST_STAGE_NAME: &str = "Qualifying";
 
-fn conflict<T>(why: String) -> Result<T> {
-    Err(StoreError::Conflict(why))
+fn conflict<T>(reason: String) -> Result<T> {
+    Err(StoreError::Conflict(reason))
 }
 
 /// Truncated to milliseconds, the resolution of the database.
-fn stored(at: Timestamp) -> Timestamp {
-    Timestamp::from_millisecond(at.as_millisecond()).unwrap_or(at)
+fn truncate(instant: Timestamp) -> Timestamp {
+    Timestamp::from_millisecond(instant.as_millisecond()).unwrap_or(instant)
 }
 
 fn check_times(opens_at: Timestamp, closes_at: Option<Timestamp>, now: Timestamp) -> Result<()> {
@@ -109,7 +110,7 @@ async fn create(tx: &mut Tx, stage: &Stage) -> Result<()> {
     Ok(())
 }
 
-/// Whether the change only opens a blind stage, or publishes datasets earlier.
+/// Does the change only open a blind stage (one with hidden scores), or publish datasets earlier?
 fn only_increases_visibility(stage: &Stage, changed: &Stage) -> bool {
     let more_visible = Stage {
         settings: StageSettings {
@@ -124,14 +125,19 @@ fn only_increases_visibility(stage: &Stage, changed: &Stage) -> bool {
         && changed.settings.publishes >= stage.settings.publishes
 }
 
-/// Origin of a change.
+/// Origin of a change of a stage.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum ChangeSource {
     Organiser,
     Configuration,
 }
 
-async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: ChangeSource) -> Result<()> {
+async fn change(
+    tx: &mut Tx,
+    stage: &Stage,
+    change: StageChange,
+    source: ChangeSource,
+) -> Result<()> {
     let now = tx.now;
     let mut changed = Stage {
         name: change.name.unwrap_or_else(|| stage.name.clone()),
@@ -187,9 +193,9 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: ChangeSourc
         }
     }
     check_rules(&rules, &changed.settings)?;
-    // An organiser's change is not reverted by the configuration at the next start.
+    // At the next start the configuration file must not revert an organiser's change.
     let new_values = (&rules, &changed.settings, &changed.zone);
-    let by_hand = by == ChangeSource::Organiser
+    let is_manual = source == ChangeSource::Organiser
         && new_values != (&stage.rules.rules, &stage.settings, &stage.zone);
     if changed != *stage {
         let event = Event::StageChanged {
@@ -201,10 +207,10 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: ChangeSourc
         };
         tx.record(Subject::Stage(stage.id), event);
     }
-    changed.configured = stage.configured && !by_hand;
+    changed.configured = stage.configured && !is_manual;
     stages::update(tx, &changed).await?;
     if changed.settings != stage.settings {
-        deadlines::update_deadlines(tx, &changed, by == ChangeSource::Configuration).await?;
+        deadlines::update_deadlines(tx, &changed, source == ChangeSource::Configuration).await?;
     }
     set_rules(tx, &changed, rules).await
 }
@@ -253,7 +259,7 @@ impl Store {
     ) -> Result<Stage> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let opens_at = stored(new.opens_at.max(now));
+            let opens_at = truncate(new.opens_at.max(now));
             check_times(opens_at, new.closes_at, now)?;
             check_rules(&new.rules, &new.settings)?;
             let stage = Stage {
@@ -280,32 +286,32 @@ impl Store {
     }
 
     /// Changes a stage within the permitted limits; new rules of an open stage create another revision.
-    /// [`StoreError::Conflict`] names what cannot be changed; [`StoreError::SeasonClosed`] once the season is over.
+    /// [`StoreError::Conflict`] names the field that cannot be changed; [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
     pub async fn change_stage(
         &self,
         actor: Actor,
         id: StageId,
-        wanted: StageChange,
+        request: StageChange,
         now: Timestamp,
     ) -> Result<Stage> {
         self.write(actor, now, async |tx| {
             let stage = stages::find(tx, id).await?;
-            if let Some(retention) = wanted.retention {
+            if let Some(retention) = request.retention {
                 retention::change(tx, id, retention).await?;
-                if !wanted.changes(&stage) {
+                if !request.changes_more_than_retention(&stage) {
                     return Ok(stage);
                 }
             }
             season::check_open(tx).await?;
-            change(tx, &stage, wanted, ChangeSource::Organiser).await?;
+            change(tx, &stage, request, ChangeSource::Organiser).await?;
             stages::find(tx, id).await
         })
         .await
     }
 
-    /// Creates the season's first stage from the configuration, or updates the stage that follows it; new rules create
-    /// another revision. A stage that an organiser has changed, that has closed, or whose season is closed stays
+    /// Creates the season's first stage from the configuration file, or updates the stage that follows this file; new rules
+    /// create another revision. A stage that an organiser has changed, that has closed, or whose season is closed stays
     /// unchanged. [`StoreError::Conflict`] if the zone changes after the first day.
     #[boxed]
     pub async fn configure_stage(
@@ -323,16 +329,16 @@ impl Store {
                 }
                 let first = Stage {
                     id: StageId::new(),
-                    name: FIRST
-                        .parse()
-                        .map_err(|error| StoreError::Damaged(format!("{FIRST}: {error}")))?,
-                    opens_at: stored(now),
+                    name: FIRST_STAGE_NAME.parse().map_err(|error| {
+                        StoreError::Damaged(format!("{FIRST_STAGE_NAME}: {error}"))
+                    })?,
+                    opens_at: truncate(now),
                     closes_at: None,
                     zone,
                     settings,
                     rules: Revision {
                         number: 1,
-                        since: stored(now),
+                        since: truncate(now),
                         rules,
                     },
                     names_seeds: true,
@@ -355,13 +361,13 @@ impl Store {
             if season_is_closed || stage.phase(now) == StagePhase::Closed {
                 return Ok(());
             }
-            let wanted = StageChange {
+            let request = StageChange {
                 zone: Some(zone),
                 rules: Some(rules),
                 settings: Some(settings),
                 ..StageChange::default()
             };
-            change(tx, &stage, wanted, ChangeSource::Configuration).await
+            change(tx, &stage, request, ChangeSource::Configuration).await
         })
         .await
     }

@@ -1,4 +1,4 @@
-//! The cutoff: starts a day of a stage with each team's active submission.
+//! The cutoff: the moment at which an evaluation day of a stage starts, with each team's active submission.
 
 use crate::{
     boxed,
@@ -45,8 +45,8 @@ pub(crate) enum CutoffDate<'a> {
     },
 }
 
-/// Adds a day that is evaluated with the submissions active now.
-async fn insert(tx: &mut Tx, stage: &Stage, cutoff: CutoffDate<'_>) -> Result<StageDay> {
+/// Adds a day. Its evaluations, with the submissions that are active now, are queued afterwards.
+async fn insert_day(tx: &mut Tx, stage: &Stage, cutoff: CutoffDate<'_>) -> Result<StageDay> {
     let now = tx.now;
     let today = stage.day(now);
     match cutoff {
@@ -99,7 +99,7 @@ pub(crate) async fn start(
     cutoff: CutoffDate<'_>,
 ) -> Result<(StageDay, Vec<Evaluation>)> {
     stage.plan().check()?;
-    let stage_day = insert(tx, stage, cutoff).await?;
+    let stage_day = insert_day(tx, stage, cutoff).await?;
     let setup = DaySetup {
         stage_day,
         revision: stage.rules.number,
@@ -109,11 +109,11 @@ pub(crate) async fn start(
     };
     let mut started = Vec::new();
     for submission in submissions::active(tx).await? {
-        if let Err(why) = stage.check_accepts(&submission) {
+        if let Err(refusal) = stage.check_accepts(&submission) {
             let event = Event::SubmissionNotTaken {
                 stage: stage_day.stage,
                 day: stage_day.date,
-                reason: why.to_string(),
+                reason: refusal.to_string(),
             };
             tx.record(Subject::Submission(submission.id), event);
             continue;

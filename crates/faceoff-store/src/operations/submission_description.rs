@@ -1,3 +1,5 @@
+//! Label and note with which a team describes a submission for itself.
+
 use crate::{
     error::Result,
     event::{Actor, Event, Subject},
@@ -9,9 +11,9 @@ use jiff::Timestamp;
 
 /// A team's label and note of a submission: `None` leaves a text unchanged, `Some(None)` removes it.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct SubmissionDescription<'w> {
-    pub label: Option<Option<&'w str>>,
-    pub note: Option<Option<&'w str>>,
+pub struct SubmissionDescription<'a> {
+    pub label: Option<Option<&'a str>>,
+    pub note: Option<Option<&'a str>>,
 }
 
 impl Store {
@@ -20,19 +22,19 @@ impl Store {
         &self,
         actor: Actor,
         id: SubmissionId,
-        words: SubmissionDescription<'_>,
+        description: SubmissionDescription<'_>,
         now: Timestamp,
     ) -> Result<Submission> {
         self.write(actor, now, async |tx| {
             let submission = submissions::find(tx, id).await?;
-            if let Some(label) = words.label
+            if let Some(label) = description.label
                 && submission.label.as_deref() != label
             {
                 submissions::set_label(tx, id, label).await?;
                 let label = label.map(str::to_owned);
                 tx.record(Subject::Submission(id), Event::SubmissionLabelled { label });
             }
-            if let Some(note) = words.note
+            if let Some(note) = description.note
                 && submission.note.as_deref() != note
             {
                 submissions::set_note(tx, id, note).await?;

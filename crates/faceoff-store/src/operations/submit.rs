@@ -1,3 +1,5 @@
+//! Upload of a submission: it is added, and its validation run (a check of the bundle) is queued.
+
 use crate::{
     boxed,
     error::Result,
@@ -16,21 +18,26 @@ use faceoff_types::{BundleRef, SubmissionId, TeamId};
 use jiff::{Timestamp, tz::TimeZone};
 
 /// Beginning of the UTC day of an instant.
-fn day_of(now: Timestamp) -> Timestamp {
+fn start_of_utc_day(now: Timestamp) -> Timestamp {
     let day = now.to_zoned(TimeZone::UTC).start_of_day();
     // Fails only for the first representable day, which may begin before the minimum.
-    day.map_or(Timestamp::MIN, |began| began.timestamp())
+    day.map_or(Timestamp::MIN, |start| start.timestamp())
 }
 
 impl Store {
     /// A team's use of its upload quota by `now`.
     #[boxed]
     pub async fn upload_usage(&self, team: TeamId, now: Timestamp) -> Result<UploadUsage> {
-        bundles::usage(&mut *self.database.read.acquire().await?, team, day_of(now)).await
+        bundles::usage(
+            &mut *self.database.read.acquire().await?,
+            team,
+            start_of_utc_day(now),
+        )
+        .await
     }
 
     /// Adds a submission whose bundle is stored as an artifact already, and queues its validation run.
-    /// [`StoreError::Disqualified`](crate::StoreError::Disqualified) if the team is;
+    /// [`StoreError::Disqualified`](crate::StoreError::Disqualified) if the team is disqualified;
     /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
     /// [`DailyQuotaExceeded`](crate::StoreError::DailyQuotaExceeded) or
     /// [`StorageQuotaExceeded`](crate::StoreError::StorageQuotaExceeded) beyond the team's quota.
@@ -46,7 +53,10 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             teams::check_may_compete(tx, team).await?;
-            quota.check(bundles::usage(tx, team, day_of(now)).await?, bundle.bytes)?;
+            quota.check(
+                bundles::usage(tx, team, start_of_utc_day(now)).await?,
+                bundle.bytes,
+            )?;
             let id = SubmissionId::new();
             submissions::insert(tx, id, team, &bundle, now).await?;
             let account = queue::account(tx, purpose::VALIDATION.lane, &team.to_string()).await?;

@@ -1,3 +1,5 @@
+//! Episode summaries: statistics of a run's episodes for its board row, which stay after the episodes are removed.
+
 use crate::{boxed, error::Result, event::Actor, store::Store, tables::episode_summaries};
 use faceoff_types::RunId;
 use jiff::Timestamp;

@@ -1,3 +1,5 @@
+//! Teams: their creation, tokens, changes and retirement.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -19,14 +21,14 @@ use faceoff_types::{TeamId, TeamName};
 use jiff::Timestamp;
 
 /// Name of the token that is created with a team.
-const FIRST: &str = "first";
+const FIRST_TOKEN_NAME: &str = "first";
 
-async fn give_token(tx: &mut Tx, team: TeamId, hash: [u8; 32]) -> Result<()> {
+async fn add_team_token(tx: &mut Tx, team: TeamId, hash: [u8; 32]) -> Result<()> {
     let token = NewToken {
         hash,
         kind: TokenKind::ApiToken,
         owner: TokenOwner::Team(team),
-        name: FIRST.to_owned(),
+        name: FIRST_TOKEN_NAME.to_owned(),
         expires_at: None,
     };
     add_token(tx, token).await?;
@@ -39,13 +41,13 @@ pub struct TeamChange {
     pub name: Option<TeamName>,
     /// Replaces the whole profile.
     pub profile: Option<TeamProfile>,
-    /// Whether it is a reference agent of the organisers, which is not ranked.
+    /// Is the team a baseline: a reference agent of the organisers, which is not ranked?
     pub baseline: Option<bool>,
 }
 
 impl Store {
     /// Creates a team. `token_hash` is the hash of its bearer token; the token itself is never
-    /// stored. [`StoreError::TeamNameTaken`](crate::StoreError::TeamNameTaken) if the name exists, whatever its case.
+    /// stored. [`StoreError::TeamNameTaken`](crate::StoreError::TeamNameTaken) if the name exists, ignoring case.
     #[boxed]
     pub async fn create_team(
         &self,
@@ -56,7 +58,7 @@ impl Store {
     ) -> Result<Team> {
         self.write(actor, now, async |tx| {
             let id = add_team(tx, name.clone(), TeamProfile::default()).await?;
-            give_token(tx, id, token_hash).await?;
+            add_team_token(tx, id, token_hash).await?;
             teams::find(tx, id).await
         })
         .await
@@ -74,7 +76,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             teams::find(tx, id).await?;
             revoke_all(tx, TokenOwner::Team(id), None).await?;
-            give_token(tx, id, token_hash).await?;
+            add_team_token(tx, id, token_hash).await?;
             tx.record(Subject::Team(id), Event::TokenReplaced);
             Ok(())
         })
@@ -143,7 +145,7 @@ impl Store {
     #[boxed]
     pub async fn retire_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor.clone(), now, async |tx| {
-            let by_organiser = match actor {
+            let is_by_organiser = match actor {
                 Actor::Organiser => true,
                 Actor::User(user) => users::find(tx, user).await?.team.is_none(),
                 _ => false,
@@ -151,7 +153,7 @@ impl Store {
             if teams::find(tx, id).await?.retired_at.is_some() {
                 return Err(StoreError::Conflict("the team has retired already".into()));
             }
-            teams::set_retired(tx, id, Some(now), by_organiser).await?;
+            teams::set_retired(tx, id, Some(now), is_by_organiser).await?;
             tx.record(Subject::Team(id), Event::TeamRetired);
             teams::find(tx, id).await
         })

@@ -1,4 +1,4 @@
-//! An empty database, ready to be copied.
+//! An empty database with the current schema, which tests copy instead of running all migrations.
 
 use crate::{
     boxed,
@@ -29,14 +29,14 @@ impl Store {
         if template.exists() {
             return Ok(template);
         }
-        let failed = |error: io::Error| StoreError::Database(sqlx::Error::Io(error));
-        fs::create_dir_all(folder).map_err(failed)?;
-        // Several processes may create it concurrently, and none may see an incomplete file.
+        let io_error = |error: io::Error| StoreError::Database(sqlx::Error::Io(error));
+        fs::create_dir_all(folder).map_err(io_error)?;
+        // Several processes may create the file concurrently, and none may see an incomplete one.
         let unfinished = folder.join(format!("{}.sqlite3", Uuid::now_v7()));
         let database = Database::open(&unfinished).await?;
         // Closing the last connection writes the log back into the file.
         database.close().await;
-        fs::rename(&unfinished, &template).map_err(failed)?;
+        fs::rename(&unfinished, &template).map_err(io_error)?;
         Ok(template)
     }
 }

@@ -1,4 +1,5 @@
-//! Tokens of API clients and sessions of browsers: creation, verification, rotation and revocation.
+//! Tokens of API clients and sessions of browsers: creation, verification, rotation (replacement of the secret) and
+//! revocation. The host's token belongs to the operator of the server, who can read its file in the data folder.
 
 use crate::{
     boxed,
@@ -16,7 +17,7 @@ use faceoff_types::TokenId;
 use jiff::{SignedDuration, Timestamp};
 use sqlx::SqliteConnection;
 
-/// Valid tokens and sessions that one team or user may have at a time.
+/// Number of valid tokens and sessions that one team or user may have at a time.
 pub const MAX_TOKENS: i64 = 50;
 /// Minimum interval between two updates of a token's last use.
 pub const LAST_USE_INTERVAL: SignedDuration = SignedDuration::from_mins(1);
@@ -56,7 +57,7 @@ pub struct NewToken {
 }
 
 /// Name of the host token that is kept in a file of the data folder.
-const HOST_FILE: &str = "admin-token";
+const HOST_TOKEN_NAME: &str = "admin-token";
 
 const fn subject(owner: TokenOwner) -> Subject {
     match owner {
@@ -104,14 +105,14 @@ pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
     tokens::find(tx, token.id).await
 }
 
-/// Revokes all tokens and sessions of an owner but `except`.
+/// Revokes all tokens and sessions of an owner, except `kept`.
 pub(crate) async fn revoke_all(
     tx: &mut Tx,
     owner: TokenOwner,
-    except: Option<TokenId>,
+    kept: Option<TokenId>,
 ) -> Result<()> {
     let now = tx.now;
-    tokens::revoke_others(tx, owner, except, now).await
+    tokens::revoke_others(tx, owner, kept, now).await
 }
 
 async fn principal_of(
@@ -161,9 +162,9 @@ pub enum TokenRejection {
     Unknown,
     /// A token was sent as a cookie, or a session in the header.
     WrongKind,
-    /// Time of the revocation, or of the check if the owner has left.
+    /// The token is revoked since this time, or its owner has left: then this is the time of the check.
     Revoked(Timestamp),
-    /// Time of the expiry.
+    /// The token has expired at this time.
     Expired(Timestamp),
 }
 
@@ -218,16 +219,16 @@ impl Store {
     #[boxed]
     pub async fn create_token(&self, actor: Actor, new: NewToken, now: Timestamp) -> Result<Token> {
         self.write(actor, now, async |tx| {
-            if let Ok(long_ago) = now.checked_sub(SESSION_LISTED_FOR) {
-                tokens::delete_old_sessions(tx, long_ago).await?;
+            if let Ok(listed_since) = now.checked_sub(SESSION_LISTED_FOR) {
+                tokens::delete_old_sessions(tx, listed_since).await?;
             }
             add_token(tx, new).await
         })
         .await
     }
 
-    /// Replaces the secret of a token; the old one is invalid from now on. [`StoreError::Conflict`] if it is a session,
-    /// is expired or revoked, or is the host's file token, whose file would still have the old secret.
+    /// Replaces the secret of a token; the old secret is invalid from now on. [`StoreError::Conflict`] if the token is a
+    /// session, is expired or revoked, or is the host's, whose file would still have the old secret.
     #[boxed]
     pub async fn rotate_token(
         &self,
@@ -244,7 +245,7 @@ impl Store {
                         .into(),
                 ));
             }
-            if token.owner == TokenOwner::Host && token.name == HOST_FILE {
+            if token.owner == TokenOwner::Host && token.name == HOST_TOKEN_NAME {
                 return Err(StoreError::Conflict(
                     "the host's token is a file in the server's data folder (admin-token), which would keep the old one: \
                      revoke it, and the server writes a new one at its next start"
@@ -285,21 +286,20 @@ impl Store {
         .await
     }
 
-    /// Makes the token with this hash the host's file token, and revokes the previous one. False if it is revoked or
-    /// expired: the host needs a new one.
+    /// Makes the token with this hash the host's token, and revokes the previous one. False if the token is revoked or
+    /// expired, so that the host needs a new one.
     #[boxed]
     pub async fn set_host_token(&self, hash: [u8; 32], now: Timestamp) -> Result<bool> {
         self.write_even_archived(Actor::Server, now, async |tx| {
-            let known = tokens::by_hash(tx, hash).await?;
-            if let Some(known) = known {
-                return Ok(known.owner == TokenOwner::Host && known.is_valid(now));
+            if let Some(existing) = tokens::by_hash(tx, hash).await? {
+                return Ok(existing.owner == TokenOwner::Host && existing.is_valid(now));
             }
-            let before = tokens::all(tx).await?.into_iter().filter(|token| {
+            let previous = tokens::all(tx).await?.into_iter().filter(|token| {
                 token.owner == TokenOwner::Host
-                    && token.name == HOST_FILE
+                    && token.name == HOST_TOKEN_NAME
                     && token.revoked_at.is_none()
             });
-            for token in before {
+            for token in previous {
                 tokens::revoke(tx, token.id, now).await?;
                 let (token, name) = (token.id, token.name);
                 tx.record(Subject::Season, Event::TokenRevoked { token, name });
@@ -308,7 +308,7 @@ impl Store {
                 hash,
                 kind: TokenKind::ApiToken,
                 owner: TokenOwner::Host,
-                name: HOST_FILE.to_owned(),
+                name: HOST_TOKEN_NAME.to_owned(),
                 expires_at: None,
             };
             add_token(tx, new).await?;

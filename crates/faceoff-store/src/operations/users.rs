@@ -39,20 +39,20 @@ impl Store {
         users::find_with_password(&mut *self.database.read.acquire().await?, name).await
     }
 
-    /// Sets a user's password, as a PHC string. All tokens and sessions of the user are revoked except the one used
-    /// for this request (`by`).
+    /// Sets a user's password, as a PHC string (a hash with its parameters). All tokens and sessions of the user are
+    /// revoked, except `used_token`, which authenticated this request.
     #[boxed]
     pub async fn set_password(
         &self,
         actor: Actor,
         id: UserId,
         password: &str,
-        by: TokenId,
+        used_token: TokenId,
         now: Timestamp,
     ) -> Result<User> {
         self.write(actor, now, async |tx| {
             users::set_password(tx, id, password).await?;
-            revoke_all(tx, TokenOwner::User(id), Some(by)).await?;
+            revoke_all(tx, TokenOwner::User(id), Some(used_token)).await?;
             tx.record(Subject::User(id), Event::PasswordSet);
             users::find(tx, id).await
         })
@@ -60,8 +60,8 @@ impl Store {
     }
 
     /// Removes a user: all tokens and sessions are revoked at once. The name stays in the log.
-    /// [`StoreError::Conflict`] if the user has left, or is the last who can organise: no other organiser, and no
-    /// valid host token.
+    /// [`StoreError::Conflict`] if the user has left, or if no one could organise the season afterwards: there is no other
+    /// organiser and no valid host token.
     #[boxed]
     pub async fn remove_user(&self, actor: Actor, id: UserId, now: Timestamp) -> Result<User> {
         self.write(actor, now, async |tx| {

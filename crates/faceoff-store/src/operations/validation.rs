@@ -1,3 +1,5 @@
+//! Outcome of a validation run: the check whether an uploaded agent can be evaluated.
+
 use crate::{
     boxed,
     error::Result,
@@ -17,9 +19,8 @@ use faceoff_types::ValidationOutcome;
 use jiff::Timestamp;
 
 impl Store {
-    /// Stores the outcome of a validation run. If valid, the team's newest submission becomes its active one. Not
-    /// if the team has chosen another one since the upload, or has withdrawn it. Idempotent, as
-    /// [`Store::commit_shard`] is.
+    /// Stores the outcome of a validation run. A valid submission becomes its team's active one, unless the team has
+    /// withdrawn it, or has uploaded or chosen another one since. Idempotent, as [`Store::commit_shard`] is.
     #[boxed]
     pub async fn commit_validation(
         &self,
@@ -39,8 +40,8 @@ impl Store {
                     timing,
                     log,
                 } => {
-                    let named = (agent_name.as_str(), runtime.as_str());
-                    submissions::set_valid(tx, id, named, &timing, &log).await?;
+                    let name_and_runtime = (agent_name.as_str(), runtime.as_str());
+                    submissions::set_valid(tx, id, name_and_runtime, &timing, &log).await?;
                     tx.record(subject, Event::SubmissionValid { agent_name });
                     let Submission {
                         team,
@@ -61,8 +62,9 @@ impl Store {
                     timing,
                     log,
                 } => {
-                    let named = (agent_name.as_deref(), runtime.as_deref());
-                    submissions::set_invalid(tx, id, named, &reason, &timing, &log).await?;
+                    let name_and_runtime = (agent_name.as_deref(), runtime.as_deref());
+                    submissions::set_invalid(tx, id, name_and_runtime, &reason, &timing, &log)
+                        .await?;
                     tx.record(subject, Event::SubmissionInvalid { reason });
                 }
             }

@@ -1,4 +1,4 @@
-//! Webhooks with their deliveries and delivery attempts.
+//! Webhooks: addresses to which messages about events are sent. Each message is a delivery, with one or more attempts.
 
 use crate::{
     boxed,
@@ -15,13 +15,13 @@ use crate::{
 use faceoff_types::{DeliveryId, TeamId, WebhookId};
 use jiff::{SignedDuration, Timestamp};
 
-/// Webhooks that a team may have.
+/// Number of webhooks that a team may have.
 pub const MAX_TEAM_WEBHOOKS: i64 = 5;
-/// Webhooks that the organisers may have.
+/// Number of webhooks that the organisers may have.
 pub const MAX_ORGANISER_WEBHOOKS: i64 = 20;
 /// Approximate limit of a webhook's pending deliveries. Later events are turned into deliveries once it falls below.
 pub const MAX_PENDING_DELIVERIES: u32 = 100;
-/// Time for which a replaced secret still signs.
+/// Time for which messages are also signed with a replaced secret.
 pub const OLD_SECRET_VALID_FOR: SignedDuration = SignedDuration::from_hours(24);
 /// Time of continuous failure after which a webhook is disabled.
 pub const DISABLED_AFTER: SignedDuration = SignedDuration::from_hours(3 * 24);
@@ -37,7 +37,7 @@ pub struct NewWebhook {
     /// Address of the receiver; the caller has checked that it is allowed.
     pub url: String,
     /// Topics, subjects and event kinds that are sent; empty: all.
-    pub about: Vec<String>,
+    pub topics: Vec<String>,
     /// Key that signs the messages.
     pub secret: [u8; 32],
 }
@@ -47,19 +47,19 @@ pub struct NewWebhook {
 pub struct WebhookChange {
     pub name: Option<String>,
     pub url: Option<String>,
-    pub about: Option<Vec<String>>,
+    pub topics: Option<Vec<String>>,
     /// Enables a disabled webhook again, for events from now on.
     pub enable: bool,
 }
 
-/// Deliveries of one webhook that were made from a range of events.
+/// Deliveries of one webhook for a range of events.
 #[derive(Debug, Clone)]
 pub struct PlannedDeliveries {
     pub webhook: WebhookId,
-    /// Last event that the webhook had seen when they were planned.
-    pub after: i64,
-    /// Last event of the range.
-    pub until: i64,
+    /// Id of the last event that the webhook had seen when the deliveries were planned: the one before the range.
+    pub seen_event: i64,
+    /// Id of the last event of the range.
+    pub last_event: i64,
     /// Event id, event kind and message body of each delivery.
     pub bodies: Vec<(i64, String, String)>,
 }
@@ -99,7 +99,7 @@ fn new_delivery(
         body,
         created_at: now,
         attempts: 0,
-        last: None,
+        last_attempt: None,
         state: DeliveryState::Pending { next_at: now },
     }
 }
@@ -163,7 +163,7 @@ impl Store {
                 team: new.team,
                 name: new.name,
                 url: new.url,
-                topics: new.about,
+                topics: new.topics,
                 created_at: now,
                 seen: events::newest_id(tx).await?,
                 failing_since: None,
@@ -191,21 +191,21 @@ impl Store {
         now: Timestamp,
     ) -> Result<Webhook> {
         self.write(actor, now, async |tx| {
-            let before = webhooks::find(tx, id).await?;
-            let mut webhook = before.clone();
+            let current = webhooks::find(tx, id).await?;
+            let mut webhook = current.clone();
             webhook.name = change.name.unwrap_or(webhook.name);
             webhook.url = change.url.unwrap_or(webhook.url);
-            if webhook.url != before.url {
+            if webhook.url != current.url {
                 // Failures of the old address do not count for the new one.
                 webhook.failing_since = None;
             }
-            webhook.topics = change.about.unwrap_or(webhook.topics);
+            webhook.topics = change.topics.unwrap_or(webhook.topics);
             if change.enable && webhook.disabled.is_some() {
                 webhook.disabled = None;
                 webhook.failing_since = None;
                 webhook.seen = events::newest_id(tx).await?;
             }
-            if webhook != before {
+            if webhook != current {
                 webhooks::update(tx, &webhook).await?;
                 let name = webhook.name.clone();
                 tx.record(
@@ -270,7 +270,7 @@ impl Store {
         webhooks::with_new_events(&mut connection, newest, MAX_PENDING_DELIVERIES).await
     }
 
-    /// Adds planned deliveries. A plan is skipped if the webhook's events were planned otherwise meanwhile.
+    /// Adds planned deliveries. The plan of a webhook is skipped if another call has planned deliveries of it meanwhile.
     #[boxed]
     pub async fn plan_deliveries(
         &self,
@@ -280,23 +280,23 @@ impl Store {
         self.write(Actor::Server, now, async |tx| {
             for PlannedDeliveries {
                 webhook,
-                after,
-                until,
+                seen_event,
+                last_event,
                 bodies,
             } in planned
             {
-                let found = match webhooks::find(tx, webhook).await {
+                let current = match webhooks::find(tx, webhook).await {
                     Err(StoreError::NotFound(_)) => continue,
                     found => found?,
                 };
-                if found.seen != after || found.disabled.is_some() {
+                if current.seen != seen_event || current.disabled.is_some() {
                     continue;
                 }
                 for (event, kind, body) in bodies {
                     let delivery = new_delivery(webhook, Some(event), kind, body, now);
                     deliveries::insert(tx, &delivery).await?;
                 }
-                webhooks::set_seen(tx, webhook, until).await?;
+                webhooks::set_seen(tx, webhook, last_event).await?;
             }
             Ok(())
         })
@@ -323,8 +323,9 @@ impl Store {
                 )));
             }
             let newest = deliveries::of_webhook(tx, id, MAX_PENDING_DELIVERIES).await?;
-            let is_pending = newest.iter().filter(|one| one.event.is_none()).any(|one| {
-                matches!(one.state, DeliveryState::Pending { .. })
+            // Only test messages have no event.
+            let is_pending = newest.iter().any(|delivery| {
+                delivery.event.is_none() && matches!(delivery.state, DeliveryState::Pending { .. })
             });
             if is_pending {
                 return Err(StoreError::Conflict(
@@ -333,7 +334,7 @@ impl Store {
             }
             let delivery = new_delivery(id, None, kind.to_owned(), body.to_owned(), now);
             deliveries::insert(tx, &delivery).await?;
-            // There is no event, but the deliverer must wake up.
+            // A test message has no event, but the task that sends deliveries must wake up.
             tx.record_progress(Subject::Season);
             deliveries::find(tx, delivery.id).await
         })
@@ -407,14 +408,16 @@ impl Store {
                     )
                     .await
                 }
-                // Only after a message failed in all its attempts: a single failure after a quiet time means little.
+                // Only after a message has failed in all its attempts: a single failure after a time without messages
+                // means little.
                 (DeliveryOutcome::Failed { retry_at: None }, Some(since))
                     if now.duration_since(since) >= DISABLED_AFTER =>
                 {
-                    let why = attempt.error.unwrap_or_default();
+                    let last_error = attempt.error.unwrap_or_default();
                     let hours = DISABLED_AFTER.as_hours();
-                    let reason =
-                        format!("it has accepted no message for {hours} hours; last error: {why}");
+                    let reason = format!(
+                        "it has accepted no message for {hours} hours; last error: {last_error}"
+                    );
                     disable(tx, webhook, reason).await
                 }
                 _ => Ok(()),
@@ -423,14 +426,14 @@ impl Store {
         .await
     }
 
-    /// Deletes deliveries that ended at least [`DELIVERIES_KEPT_FOR`] ago. Returns how many.
+    /// Deletes deliveries that ended at least [`DELIVERIES_KEPT_FOR`] ago. Returns the number of deliveries.
     #[boxed]
     pub async fn delete_old_deliveries(&self, now: Timestamp) -> Result<u64> {
-        let before = now
+        let ended_before = now
             .saturating_sub(DELIVERIES_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         self.write(Actor::Server, now, async |tx| {
-            deliveries::delete_settled(tx, before).await
+            deliveries::delete_ended(tx, ended_before).await
         })
         .await
     }

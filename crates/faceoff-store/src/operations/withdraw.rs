@@ -1,4 +1,4 @@
-//! Withdrawal of a submission.
+//! Withdrawal of a submission by its team, after which it is not evaluated any more.
 
 use crate::{
     boxed,

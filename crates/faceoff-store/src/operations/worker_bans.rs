@@ -1,10 +1,10 @@
-//! Bans of remote workers whose results are not trusted.
+//! Bans of remote workers (on other machines) whose results are not trusted.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::lease_release::release_all_held,
+    operations::lease_release::requeue_leases_of,
     queue,
     store::Store,
     tables::{
@@ -16,8 +16,8 @@ use crate::{
 use jiff::Timestamp;
 
 impl Store {
-    /// Bans a worker. Its running jobs return to the queue at once, and the shards that it committed in unfinished runs
-    /// are run again; returns the number of those shards. Finished results stay, for organisers to review
+    /// Bans a worker. Its running jobs return to the queue at once. The shards (parts of runs) that it committed in
+    /// unfinished runs are run again; returns the number of those shards. Finished results stay, for organisers to review
     /// ([`results_of_worker`](Self::results_of_worker)). [`StoreError::Conflict`] if it is banned already.
     #[boxed]
     pub async fn ban_worker(
@@ -42,27 +42,27 @@ impl Store {
                         "the worker {worker} is banned already"
                     )));
                 }
-                // Also pending results: they come from a worker that is not trusted.
-                release_all_held(tx, &holder).await?;
-                let played = shards::committed_by(tx, &holder).await?;
-                for shard in &played {
+                // Results of these jobs that are not accepted yet are refused from now on.
+                requeue_leases_of(tx, &holder).await?;
+                let discarded = shards::committed_by_worker(tx, &holder).await?;
+                for shard in &discarded {
                     shards::clear_result(tx, shard.id).await?;
                     queue::requeue(tx, shard.job).await?;
                 }
                 let event = Event::WorkerBanned {
                     worker: ban.worker,
                     reason: ban.reason,
-                    again: u32::try_from(played.len()).unwrap_or(u32::MAX),
+                    again: u32::try_from(discarded.len()).unwrap_or(u32::MAX),
                 };
                 tx.record(Subject::Season, event);
-                Ok(played)
+                Ok(discarded)
             })
             .await?;
         self.workers().ban(worker.as_str(), reason);
         let count = u32::try_from(discarded.len()).unwrap_or(u32::MAX);
         for key in discarded.into_iter().filter_map(|shard| shard.recording) {
             if let Err(error) = self.artifacts().delete_folder(&key).await {
-                // It is deleted together with its run's recordings.
+                // The recording is deleted later, together with all recordings of its run.
                 tracing::warn!(key, %error, "could not delete a recording of a banned worker");
             }
         }

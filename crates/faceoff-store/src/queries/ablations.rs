@@ -1,3 +1,5 @@
+//! Queries of ablations: runs of a submission under each perturbation profile.
+
 use crate::{
     boxed,
     error::Result,
@@ -35,9 +37,9 @@ async fn from_row(connection: &mut SqliteConnection, row: AblationRow) -> Result
     let state = match (row.finished_at, row.reason) {
         (None, _) => {
             let runs: Vec<_> = run_by_profile.values().copied().collect();
-            let done = progress::of_runs(connection, &runs).await?;
+            let episodes_done = progress::of_runs(connection, &runs).await?;
             AblationState::Open {
-                episodes_done: done.into_values().sum(),
+                episodes_done: episodes_done.into_values().sum(),
                 episodes_total,
             }
         }

@@ -1,3 +1,5 @@
+//! Queries of boards: the ranked results of a stage's teams. A row shows the team's newest evaluation that counts.
+
 use crate::{
     boxed,
     column::{Instant, Json},
@@ -38,7 +40,7 @@ pub struct BoardRecord {
 }
 
 /// A row of the statements that read boards.
-pub(super) struct Row {
+pub(super) struct BoardRow {
     pub(super) team: Text<TeamId>,
     pub(super) name: Text<TeamName>,
     pub(super) invited_at: Instant,
@@ -59,8 +61,8 @@ pub(super) struct Row {
     pub(super) result: Json<EvaluationResult>,
 }
 
-impl From<Row> for BoardRecord {
-    fn from(row: Row) -> Self {
+impl From<BoardRow> for BoardRecord {
+    fn from(row: BoardRow) -> Self {
         Self {
             team: Team {
                 id: row.team.0,
@@ -93,7 +95,7 @@ impl From<Row> for BoardRecord {
 macro_rules! select_board {
     ($name:literal, $tail:literal, $($argument:expr),* $(,)?) => {
         sqlx::query_as!(
-            crate::queries::board::Row,
+            crate::queries::board::BoardRow,
             $name + r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
                       t.created_at AS "invited_at: Instant", t.affiliation, t.link,
                       t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
@@ -110,19 +112,19 @@ macro_rules! select_board {
 }
 pub(super) use select_board;
 
-/// Which of a stage's results a board leaves out.
+/// Limits of the results on a board.
 #[derive(Debug, Clone, Default)]
 pub struct BoardScope {
     /// Evaluations that finished later are left out; `None`: no limit.
-    pub until: Option<Timestamp>,
+    pub finished_until: Option<Timestamp>,
     /// Evaluations of later days are left out; `None`: no limit.
-    pub until_day: Option<Date>,
+    pub last_day: Option<Date>,
     /// These evaluations are left out.
-    pub without: Vec<EvaluationId>,
+    pub excluded: Vec<EvaluationId>,
 }
 
 impl Store {
-    /// The newest revision of a stage's rules under which an evaluation has finished; the current one if none has.
+    /// The newest revision of a stage's rules under which an evaluation has finished; the current revision if none has.
     #[boxed]
     pub async fn board_revision(&self, stage: &Stage) -> Result<u32> {
         self.board_revision_within(stage, &BoardScope::default())
@@ -132,15 +134,15 @@ impl Store {
     /// As [`board_revision`](Self::board_revision), of the evaluations within the time limits of `scope`.
     #[boxed]
     pub async fn board_revision_within(&self, stage: &Stage, scope: &BoardScope) -> Result<u32> {
-        let (id, until) = (Text(stage.id), scope.until.map(Instant));
-        let until_day = scope.until_day.map(Text);
+        let (id, finished_until) = (Text(stage.id), scope.finished_until.map(Instant));
+        let last_day = scope.last_day.map(Text);
         let newest = sqlx::query_scalar!(
             r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
                WHERE stage_id = ?1 AND state = 'finished' AND voided_at IS NULL
                  AND (?2 IS NULL OR finished_at <= ?2) AND (?3 IS NULL OR day <= ?3)"#,
             id,
-            until,
-            until_day,
+            finished_until,
+            last_day,
         );
         let newest = newest.fetch_one(&self.database.read).await?;
         Ok(newest.unwrap_or(stage.rules.number))
@@ -155,8 +157,8 @@ impl Store {
         revision: u32,
         scope: &BoardScope,
     ) -> Result<Vec<Date>> {
-        let (stage, until) = (Text(stage), scope.until.map(Instant));
-        let until_day = scope.until_day.map(Text);
+        let (stage, finished_until) = (Text(stage), scope.finished_until.map(Instant));
+        let last_day = scope.last_day.map(Text);
         let days = sqlx::query_scalar!(
             r#"SELECT DISTINCT day AS "day: Text<Date>" FROM evaluations
                WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
@@ -164,8 +166,8 @@ impl Store {
                ORDER BY day"#,
             stage,
             revision,
-            until,
-            until_day,
+            finished_until,
+            last_day,
         );
         let days = days.fetch_all(&self.database.read).await?;
         Ok(days.into_iter().map(|day| day.0).collect())
@@ -188,9 +190,9 @@ impl Store {
         revision: u32,
         scope: &BoardScope,
     ) -> Result<Vec<BoardRecord>> {
-        let (stage, until) = (Text(stage), scope.until.map(Instant));
-        let without = Json(&scope.without);
-        let until_day = scope.until_day.map(Text);
+        let (stage, finished_until) = (Text(stage), scope.finished_until.map(Instant));
+        let excluded = Json(&scope.excluded);
+        let last_day = scope.last_day.map(Text);
         let rows = select_board!(
             "/* board */ ",
             r#"FROM teams t
@@ -210,9 +212,9 @@ impl Store {
                ORDER BY t.name"#,
             stage,
             revision,
-            until,
-            without,
-            until_day,
+            finished_until,
+            excluded,
+            last_day,
         );
         let rows = rows.fetch_all(&self.database.read).await?;
         Ok(rows.into_iter().map(BoardRecord::from).collect())

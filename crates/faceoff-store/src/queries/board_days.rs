@@ -1,3 +1,5 @@
+//! Queries of boards that are computed from several evaluation days of each team.
+
 use crate::{
     boxed,
     column::{Instant, Json},
@@ -15,13 +17,14 @@ use sqlx::types::Text;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BoardDays {
     All,
-    /// The given number of last days on which a team has a result.
+    /// For each team, this number of the last days on which it has a result.
     Last(u32),
+    /// The final day, which a stage can have after its end.
     Final,
 }
 
 impl Store {
-    /// The cutoff of a stage's final day; `None` before it.
+    /// The cutoff (the start of the evaluations) of a stage's final day; `None` before it.
     #[boxed]
     pub async fn final_cutoff(&self, stage: StageId) -> Result<Option<Timestamp>> {
         crate::tables::sign_offs::final_cutoff(&mut *self.database.read.acquire().await?, stage)
@@ -37,10 +40,10 @@ impl Store {
         days: BoardDays,
         scope: &BoardScope,
     ) -> Result<Vec<BoardRecord>> {
-        let (stage, until) = (Text(stage), scope.until.map(Instant));
-        let without = Json(&scope.without);
-        let until_day = scope.until_day.map(Text);
-        let (last, only_final) = match days {
+        let (stage, finished_until) = (Text(stage), scope.finished_until.map(Instant));
+        let excluded = Json(&scope.excluded);
+        let last_day = scope.last_day.map(Text);
+        let (max_days, only_final_day) = match days {
             BoardDays::All => (u32::MAX, false),
             BoardDays::Last(days) => (days, false),
             BoardDays::Final => (u32::MAX, true),
@@ -64,11 +67,11 @@ impl Store {
                ORDER BY t.name, e.day"#,
             stage,
             revision,
-            last,
-            only_final,
-            until,
-            without,
-            until_day,
+            max_days,
+            only_final_day,
+            finished_until,
+            excluded,
+            last_day,
         );
         let rows = rows.fetch_all(&self.database.read).await?;
         Ok(rows.into_iter().map(BoardRecord::from).collect())

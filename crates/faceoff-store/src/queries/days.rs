@@ -1,3 +1,5 @@
+//! Queries of evaluation days. A day starts with its cutoff, and is released when its last evaluation has ended.
+
 use crate::{
     boxed,
     error::Result,

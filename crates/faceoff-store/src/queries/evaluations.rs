@@ -1,3 +1,5 @@
+//! Queries of evaluations: a team's runs of all tasks on a day, with their progress.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -14,15 +16,12 @@ async fn with_progress(
     connection: &mut SqliteConnection,
     rows: Vec<EvaluationRow>,
 ) -> Result<Vec<Evaluation>> {
-    let running: Vec<_> = rows
-        .iter()
-        .filter_map(EvaluationRow::run_under_way)
-        .collect();
-    let done = progress::of_runs(connection, &running).await?;
+    let running: Vec<_> = rows.iter().filter_map(EvaluationRow::open_run).collect();
+    let episodes_done = progress::of_runs(connection, &running).await?;
     rows.into_iter()
         .map(|row| {
-            let run = row.run_under_way();
-            let done = run.and_then(|run| done.get(&run).copied());
+            let run = row.open_run();
+            let done = run.and_then(|run| episodes_done.get(&run).copied());
             row.into_evaluation(done.unwrap_or(0))
         })
         .collect()
@@ -38,17 +37,18 @@ pub(crate) async fn find(
     evaluations.pop().ok_or(StoreError::NotFound("evaluation"))
 }
 
-/// Selects the evaluations of a list.
+/// The evaluations that a list contains, and their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EvaluationFilter {
-    /// The evaluations of a team, on one date or on all, the newest first.
+    /// The evaluations of a team, on one date or on all dates, the newest first.
     Team(TeamId, Option<Date>),
     /// The evaluations of all stages on a date, in the order in which they were queued.
     Day(Date),
 }
 
 impl Store {
-    /// One page of a list: its beginning, or what follows the evaluation `after`. `None` if `after` is unknown.
+    /// One page of a list: its first evaluations, or those that follow the evaluation `after`. `None` if there is no
+    /// evaluation `after`.
     #[boxed]
     pub async fn evaluations_after(
         &self,

@@ -1,3 +1,5 @@
+//! Queries of events: the record of all changes.
+
 use crate::{
     boxed,
     error::Result,

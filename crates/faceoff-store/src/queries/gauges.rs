@@ -3,18 +3,18 @@
 use crate::{boxed, error::Result, queue, store::Store};
 use jiff::Timestamp;
 
-/// Numbers of running and waiting jobs.
+/// Current numbers of jobs and evaluations.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Gauges {
     /// Jobs under a valid lease.
     pub running: u32,
-    /// Jobs that can be claimed.
+    /// Jobs that a worker can claim.
     pub waiting: u32,
-    /// Since when the first of them can be claimed.
+    /// Since when a worker can claim the first of them.
     pub waiting_since: Option<Timestamp>,
     /// Jobs that ran out of disk space repeatedly.
     pub out_of_space: u32,
-    /// An organiser has paused the queue.
+    /// Has an organiser paused the queue?
     pub paused: bool,
     /// Evaluations that have not ended.
     pub open_evaluations: u32,

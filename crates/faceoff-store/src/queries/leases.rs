@@ -1,4 +1,4 @@
-//! Holders of leases.
+//! Queries of leases: the right of a worker to run a job for a time. The nonce is unique to each lease.
 
 use crate::{boxed, error::Result, queue, store::Store, workers::WorkerName};
 use uuid::Uuid;

@@ -1,11 +1,11 @@
-//! Progress of runs.
+//! Progress of runs: the number of episodes that are done.
 
 use crate::{column::Json, error::Result};
 use faceoff_types::RunId;
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::HashMap;
 
-/// Episodes done of each of these runs, as reported by the workers, in one query.
+/// Number of episodes done in each of these runs, as reported by the workers, in one query.
 pub(crate) async fn of_runs(
     connection: &mut SqliteConnection,
     runs: &[RunId],

@@ -1,3 +1,5 @@
+//! Queries of proposals: trials and proposed re-evaluations, which do not count (yet).
+
 use crate::{
     boxed,
     error::Result,
@@ -18,10 +20,10 @@ pub(crate) async fn evaluations_of_proposal(
 ) -> Result<Vec<ProposedEvaluation>> {
     let rows = proposed_evaluations::of_proposal(connection, proposal).await?;
     let runs: Vec<_> = rows.iter().map(|row| row.run.0).collect();
-    let done = progress::of_runs(connection, &runs).await?;
+    let progress_by_run = progress::of_runs(connection, &runs).await?;
     rows.into_iter()
         .map(|row| {
-            let episodes_done = done.get(&row.run.0).copied().unwrap_or(0);
+            let episodes_done = progress_by_run.get(&row.run.0).copied().unwrap_or(0);
             row.into_evaluation(episodes_done)
         })
         .collect()
@@ -34,7 +36,7 @@ impl Store {
         proposals::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// An evaluation of a proposal or a trial, with the proposal. [`StoreError::NotFound`](crate::StoreError::NotFound)
+    /// An evaluation of a proposal, with the proposal. [`StoreError::NotFound`](crate::StoreError::NotFound)
     /// for other evaluations.
     #[boxed]
     pub async fn proposed_evaluation(
@@ -44,8 +46,8 @@ impl Store {
         let mut tx = self.database.read.begin().await?;
         let row = proposed_evaluations::find(&mut tx, id).await?;
         let proposal = proposals::find(&mut tx, row.proposal.0).await?;
-        let done = progress::of_runs(&mut tx, &[row.run.0]).await?;
-        let episodes_done = done.get(&row.run.0).copied().unwrap_or(0);
+        let progress_by_run = progress::of_runs(&mut tx, &[row.run.0]).await?;
+        let episodes_done = progress_by_run.get(&row.run.0).copied().unwrap_or(0);
         Ok((proposal, row.into_evaluation(episodes_done)?))
     }
 

@@ -1,5 +1,6 @@
-//! Queue positions and expected ends of waiting jobs. The queue's own rule is simulated with the recent durations of
-//! similar jobs. Jobs of a kind that was never measured get no expected end.
+//! Forecast of the queue: positions and expected ends of waiting submissions, evaluations and games. The order in which
+//! the queue serves jobs is simulated, with the recent durations of similar jobs. There is no expected end if no similar
+//! job was measured.
 
 use crate::{
     boxed,
@@ -17,12 +18,12 @@ use jiff::{SignedDuration, Timestamp};
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::{BTreeMap, HashMap};
 
-/// Position of an entity in the queue, among those of its kind.
+/// Position of a submission, evaluation or game in the queue, among those of its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QueuePosition {
     /// From 1: rank by expected end.
     pub position: u32,
-    /// Number of open entities of its kind.
+    /// Number of those that are open.
     pub total: u32,
     /// Expected end; `None` while the queue is paused, and if it depends on an unknown duration.
     pub expected_at: Option<Timestamp>,
@@ -31,16 +32,16 @@ pub struct QueuePosition {
 /// Queue positions of all open submissions, evaluations and games.
 #[derive(Debug, Clone, Default)]
 pub struct QueueForecast {
-    /// They end with their validation runs.
+    /// A submission ends with its validation run.
     pub submissions: HashMap<SubmissionId, QueuePosition>,
-    /// They end with their scores.
+    /// An evaluation ends with its score.
     pub evaluations: HashMap<EvaluationId, QueuePosition>,
-    /// They end with their results; games of paused tournaments are left out.
+    /// A game ends with its result; games of paused tournaments are left out.
     pub games: HashMap<GameId, QueuePosition>,
 }
 
 impl QueueForecast {
-    /// The expected end of the last one: `now` if nothing is open, `None` if it depends on an unknown duration.
+    /// When the last of them is expected to end: `now` if nothing is open, `None` if it depends on an unknown duration.
     #[must_use]
     pub fn completed_at(&self, now: Timestamp) -> Option<Timestamp> {
         let positions = self
@@ -65,21 +66,28 @@ pub struct EvaluationBacklog {
     pub shards: u32,
     /// The evaluation ends without a score after more agent faults than this.
     pub max_faults: u32,
-    /// Slot time that they will take, in milliseconds, by recent durations; `None` if none was measured.
+    /// Slot time that these episodes will take, in milliseconds, by recent durations; `None` if none was measured.
     pub expected_ms: Option<f64>,
 }
 
 /// An open job with its purpose.
 struct OpenJob {
     account: i64,
+    /// Within an account, jobs of a smaller batch come first; within a batch, those with a smaller `queue_no`.
     batch: i64,
     queue_no: i64,
     is_leased: bool,
+    /// For a leased job: when its lease expires.
     claimable_at: Instant,
+    /// Slot time charged to the account so far, including the rest of the lease.
     charged_ms: i64,
+    /// Number of episodes done.
     progress: u32,
+    /// Urgency of its lane: smaller ones are served first.
     urgency: u32,
+    /// Number of episodes of a shard.
     episodes: Option<u32>,
+    /// Owner of the account: a team, a tournament, or empty for the platform.
     holder: String,
     run: Option<Text<RunId>>,
     validation_of: Option<Text<SubmissionId>>,
@@ -122,8 +130,8 @@ async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, Acc
     Ok(rows
         .into_iter()
         .map(|row| {
-            let known = lanes.iter().position(|lane| *lane == row.lane);
-            let lane = known.unwrap_or_else(|| {
+            let index = lanes.iter().position(|lane| *lane == row.lane);
+            let lane = index.unwrap_or_else(|| {
                 lanes.push(row.lane);
                 lanes.len() - 1
             });
@@ -140,14 +148,14 @@ async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, Acc
         .collect())
 }
 
-/// The entity that a job group belongs to.
+/// The submission, evaluation or game that a group of jobs belongs to.
 #[derive(Clone, Copy, PartialEq)]
 enum GroupTarget {
     Submission(SubmissionId),
     Evaluation(EvaluationId),
     Game(GameId),
-    /// An ablation, a trial or a proposal: it only matters for the slots that it occupies.
-    Uncounted,
+    /// Jobs that get no position, such as those of an ablation or a proposal: they only occupy slots.
+    WithoutPosition,
 }
 
 /// Greatest urgency value of the lanes that the forecast covers: validation runs, scoring, shards and games that count.
@@ -156,43 +164,52 @@ const MAX_URGENCY: u32 = 1;
 /// Urgency of the lane of scoring jobs.
 const SCORING_URGENCY: u32 = 0;
 
-/// Duration of an episode of an open evaluation: the mean of its committed shards, else of its team's recent episodes.
-fn episode_ms(open: &OpenEvaluation, durations: &JobDurations) -> Option<f64> {
-    let (episodes, ms) = open.done;
+/// Mean duration of an episode of an open evaluation, in milliseconds: in its committed shards, or else in its team's
+/// recent episodes.
+fn episode_ms(evaluation: &OpenEvaluation, durations: &JobDurations) -> Option<f64> {
+    let (episodes, ms) = evaluation.done;
     match episodes {
-        0 => durations.episode_ms_of(open.team),
+        0 => durations.episode_ms_of(evaluation.team),
         _ => Some(ms as f64 / f64::from(episodes)),
     }
 }
 
+/// The groups of jobs that end together, for the forecast.
 struct JobGroups<'a> {
     durations: &'a JobDurations,
     /// The first groups are those of these evaluations.
-    open: &'a [OpenEvaluation],
+    evaluations: &'a [OpenEvaluation],
     /// Index of the evaluation's group, by run.
-    by_run: HashMap<RunId, usize>,
+    index_by_run: HashMap<RunId, usize>,
     groups: Vec<(GroupTarget, JobGroup)>,
 }
 
 impl<'a> JobGroups<'a> {
-    fn of_evaluations(open: &'a [OpenEvaluation], durations: &'a JobDurations) -> Self {
+    fn of_evaluations(evaluations: &'a [OpenEvaluation], durations: &'a JobDurations) -> Self {
         let follow_up = Some(durations.scoring_ms);
-        let group =
-            |open: &OpenEvaluation| (GroupTarget::Evaluation(open.id), JobGroup { follow_up });
+        let group = |evaluation: &OpenEvaluation| {
+            (
+                GroupTarget::Evaluation(evaluation.id),
+                JobGroup { follow_up },
+            )
+        };
         Self {
             durations,
-            open,
-            by_run: (0..).zip(open).map(|(at, open)| (open.run, at)).collect(),
-            groups: open.iter().map(group).collect(),
+            evaluations,
+            index_by_run: (0..)
+                .zip(evaluations)
+                .map(|(index, evaluation)| (evaluation.run, index))
+                .collect(),
+            groups: evaluations.iter().map(group).collect(),
         }
     }
 
-    /// The group of a job, which is added if it is new, and the whole duration of the job.
+    /// Adds a job. Returns the index of its group, and the whole duration of the job.
     fn add_job(&mut self, job: &OpenJob) -> (usize, DurationMs) {
-        let group_of_run = |run: &Text<RunId>| self.by_run.get(&run.0).copied();
+        let group_of_run = |run: &Text<RunId>| self.index_by_run.get(&run.0).copied();
         if let Some(group) = job.run.as_ref().and_then(group_of_run) {
-            let each_ms = episode_ms(&self.open[group], self.durations);
-            let duration = job.episodes.zip(each_ms);
+            let mean_ms = episode_ms(&self.evaluations[group], self.durations);
+            let duration = job.episodes.zip(mean_ms);
             return (
                 group,
                 duration.map(|(episodes, ms)| f64::from(episodes) * ms),
@@ -215,14 +232,14 @@ impl<'a> JobGroups<'a> {
         let (target, duration) = match &job.validation_of {
             Some(id) => (GroupTarget::Submission(id.0), self.durations.validation_ms),
             None if job.urgency == SCORING_URGENCY => {
-                (GroupTarget::Uncounted, self.durations.scoring_ms)
+                (GroupTarget::WithoutPosition, self.durations.scoring_ms)
             }
             None => {
                 let team: Option<TeamId> = job.holder.parse().ok();
-                let each_ms = team.and_then(|team| self.durations.episode_ms_of(team));
-                let duration = job.episodes.zip(each_ms);
+                let mean_ms = team.and_then(|team| self.durations.episode_ms_of(team));
+                let duration = job.episodes.zip(mean_ms);
                 let duration = duration.map(|(episodes, ms)| f64::from(episodes) * ms);
-                (GroupTarget::Uncounted, duration)
+                (GroupTarget::WithoutPosition, duration)
             }
         };
         (self.push(target), duration)
@@ -235,7 +252,8 @@ impl<'a> JobGroups<'a> {
 }
 
 impl OpenJob {
-    /// The remaining duration of a running job: by the episodes that it has reported, else by the time since its claim.
+    /// The remaining duration of a running job, from the share of it that is done: by the episodes that it has reported,
+    /// or else by the time since its claim.
     fn remaining_ms(&self, duration: DurationMs, now: Timestamp) -> DurationMs {
         let duration_ms = duration?;
         let share_done = match self.episodes {
@@ -243,8 +261,8 @@ impl OpenJob {
                 f64::from(self.progress) / f64::from(episodes)
             }
             _ => {
-                let rest_ms = self.claimable_at.0.as_millisecond() - now.as_millisecond();
-                (self.charged_ms - rest_ms).max(0) as f64 / duration_ms.max(1.0)
+                let lease_rest_ms = self.claimable_at.0.as_millisecond() - now.as_millisecond();
+                (self.charged_ms - lease_rest_ms).max(0) as f64 / duration_ms.max(1.0)
             }
         };
         Some((duration_ms * (1.0 - share_done)).max(0.0))
@@ -252,7 +270,7 @@ impl OpenJob {
 }
 
 impl Store {
-    /// Queue positions and expected ends, if this number of slots works and no job is added.
+    /// Queue positions and expected ends, provided that this number of slots runs jobs and no job is added.
     #[boxed]
     pub async fn queue_forecast(&self, slots: u32, now: Timestamp) -> Result<QueueForecast> {
         let mut tx = self.database.read.begin().await?;
@@ -260,13 +278,13 @@ impl Store {
         if open_jobs.is_empty() {
             return Ok(QueueForecast::default());
         }
-        let open = job_durations::open_evaluations(&mut tx).await?;
-        let durations = job_durations::recent(&mut tx, &open, now).await?;
+        let evaluations = job_durations::open_evaluations(&mut tx).await?;
+        let durations = job_durations::recent(&mut tx, &evaluations, now).await?;
         let is_paused = season::is_paused(&mut tx).await?;
         let mut accounts = accounts(&mut tx).await?;
         drop(tx);
 
-        let mut groups = JobGroups::of_evaluations(&open, &durations);
+        let mut groups = JobGroups::of_evaluations(&evaluations, &durations);
         let mut running = Vec::new();
         for job in &open_jobs {
             let is_running = job.is_leased && job.claimable_at.0 > now;
@@ -277,11 +295,11 @@ impl Store {
             if is_running {
                 running.push((job.remaining_ms(duration, now), group));
             } else if let Some(account) = accounts.get_mut(&job.account) {
-                let rest_ms = job.claimable_at.0.as_millisecond() - now.as_millisecond();
+                let delay_ms = job.claimable_at.0.as_millisecond() - now.as_millisecond();
                 account.waiting.push_back(QueuedJob {
                     batch: job.batch,
                     queue_no: job.queue_no,
-                    from_ms: rest_ms.max(0) as f64,
+                    claimable_in_ms: delay_ms.max(0) as f64,
                     duration,
                     group,
                 });
@@ -337,42 +355,42 @@ fn positions(
     let games = count(|target| matches!(target, GroupTarget::Game(_)));
     let mut forecast = QueueForecast::default();
     let expected_at = |end: &GroupEnd| {
-        let in_ms = end.in_ms.filter(|_| !is_paused)?;
-        let in_ms = SignedDuration::try_from_secs_f64(in_ms / 1000.0).ok()?;
-        now.checked_add(in_ms).ok()
+        let remaining_ms = end.remaining_ms.filter(|_| !is_paused)?;
+        let duration = SignedDuration::try_from_secs_f64(remaining_ms / 1000.0).ok()?;
+        now.checked_add(duration).ok()
     };
-    let mut last = [0, 0, 0];
+    let (mut last_submission, mut last_evaluation, mut last_game) = (0, 0, 0);
     for (target, end) in by_end {
         let expected_at = expected_at(end);
         match target {
             GroupTarget::Submission(id) => {
-                last[0] += 1;
+                last_submission += 1;
                 let position = QueuePosition {
-                    position: last[0],
+                    position: last_submission,
                     total: submissions,
                     expected_at,
                 };
                 forecast.submissions.insert(*id, position);
             }
             GroupTarget::Evaluation(id) => {
-                last[1] += 1;
+                last_evaluation += 1;
                 let position = QueuePosition {
-                    position: last[1],
+                    position: last_evaluation,
                     total: evaluations,
                     expected_at,
                 };
                 forecast.evaluations.insert(*id, position);
             }
             GroupTarget::Game(id) => {
-                last[2] += 1;
+                last_game += 1;
                 let position = QueuePosition {
-                    position: last[2],
+                    position: last_game,
                     total: games,
                     expected_at,
                 };
                 forecast.games.insert(*id, position);
             }
-            GroupTarget::Uncounted => {}
+            GroupTarget::WithoutPosition => {}
         }
     }
     forecast

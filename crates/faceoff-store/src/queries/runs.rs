@@ -1,3 +1,5 @@
+//! Queries of runs: their shards (parts of the episodes), outcomes and agent faults.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -29,18 +31,18 @@ impl Store {
         shards::of_run(&mut *self.database.read.acquire().await?, run).await
     }
 
-    /// In what a run's rules differ from its ruleset.
+    /// The deviations of a run's rules from its ruleset.
     #[boxed]
     pub async fn run_variation(&self, run: RunId) -> Result<Variation> {
         let row = run_rows::find(&mut *self.database.read.acquire().await?, run).await?;
         Ok(row.plan.variation)
     }
 
-    /// The outcomes of a run's committed shards, by task and episode: all that scoring needs,
-    /// without opening a recording. [`StoreError::OutcomesRemoved`] if the run was cleared.
+    /// The outcomes of the episodes in a run's committed shards, by task and episode. Scoring needs nothing else, in
+    /// particular no recording. [`StoreError::OutcomesRemoved`] if the run was cleared (its shards were removed).
     #[boxed]
     pub async fn outcomes(&self, run: RunId) -> Result<Vec<EpisodeOutcome>> {
-        // In one transaction: a run that is cleared between two reads would seem to have no outcomes.
+        // Both reads are in one transaction: a run that is cleared between them would seem to have no outcomes.
         let mut tx = self.database.read.begin().await?;
         match run_rows::cleared_at(&mut tx, run).await? {
             None => shards::outcomes(&mut tx, run).await,
@@ -51,11 +53,11 @@ impl Store {
     /// The agent faults of a run, with the agent's standard error.
     #[boxed]
     pub async fn run_faults(&self, run: RunId) -> Result<RunFaults> {
-        let faulty =
+        let faulty_shards =
             shards::with_agent_faults(&mut *self.database.read.acquire().await?, run).await?;
         let mut faults = Vec::new();
         let mut log = String::new();
-        for shard in faulty {
+        for shard in faulty_shards {
             let outcomes = shard.outcomes.0.into_iter();
             faults.extend(outcomes.filter_map(|outcome| outcome.fault));
             if !shard.log.is_empty() {
@@ -72,9 +74,9 @@ impl Store {
     }
 }
 
-/// The last `bytes` bytes of a text, or slightly fewer, so that no character is split.
-fn tail(text: &str, bytes: usize) -> &str {
-    let mut start = text.len().saturating_sub(bytes);
+/// The last `max_bytes` bytes of a text, or slightly fewer, so that no character is split.
+fn tail(text: &str, max_bytes: usize) -> &str {
+    let mut start = text.len().saturating_sub(max_bytes);
     while !text.is_char_boundary(start) {
         start += 1;
     }

@@ -1,3 +1,5 @@
+//! Queries of the season, and of the seeds that follow from its secret.
+
 use crate::{
     boxed,
     error::Result,
@@ -18,7 +20,7 @@ impl Store {
         season::read(&mut *self.database.read.acquire().await?).await
     }
 
-    /// The known seeds of these days of these stages. An archive of a season that was not closed has only those of
+    /// The known seeds of these days of these stages. An archive of a season that was not closed has only the seeds of
     /// released days, and no secret.
     pub async fn day_seeds(
         &self,

@@ -1,3 +1,5 @@
+//! Queries of stages: the parts of the season, each with its own rules.
+
 use crate::{
     boxed,
     error::Result,
@@ -20,8 +22,8 @@ impl Store {
         stages::find(&mut *self.database.read.acquire().await?, id).await
     }
 
-    /// The current stage at `now`: of the open ones the one that opened last, else the one that closed last, else the
-    /// next to open. `None` before the server has created one.
+    /// The current stage at `now`: the open one that opened last; if none is open, the one that closed last; if none has
+    /// closed, the next to open. `None` before the server has created one.
     #[boxed]
     pub async fn current_stage(&self, now: Timestamp) -> Result<Option<Stage>> {
         let stages = self.stages().await?;

@@ -1,3 +1,5 @@
+//! Queries of the disk usage of teams.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -11,14 +13,14 @@ use sqlx::types::Text;
 pub struct TeamStorage {
     pub team: TeamId,
     pub name: TeamName,
-    /// Stored bundles; they count towards the quota.
+    /// Number of stored bundles; they count towards the quota.
     pub bundles: u32,
     pub bundle_bytes: u64,
-    /// Stored datasets of evaluations.
+    /// Number of stored datasets of evaluations.
     pub datasets: u32,
-    /// Size of those datasets that have been measured.
+    /// Total size of the measured datasets.
     pub dataset_bytes: u64,
-    /// Stored datasets that have not been measured yet.
+    /// Number of stored datasets that have not been measured yet.
     pub unmeasured: u32,
     /// Size of the datasets of trials and proposals with the team's submissions.
     pub proposal_bytes: u64,
@@ -33,7 +35,8 @@ pub enum StorageScope {
     Released,
 }
 
-struct Row {
+/// A row of the statement. Bundles were called archives when its columns were named.
+struct StorageRow {
     team: Text<TeamId>,
     name: Text<TeamName>,
     archives: u32,
@@ -44,9 +47,9 @@ struct Row {
     proposal_bytes: i64,
 }
 
-impl TryFrom<Row> for TeamStorage {
+impl TryFrom<StorageRow> for TeamStorage {
     type Error = StoreError;
-    fn try_from(row: Row) -> Result<Self> {
+    fn try_from(row: StorageRow) -> Result<Self> {
         let bytes = |sum: i64| {
             u64::try_from(sum).map_err(|_| StoreError::Damaged(format!("files of {sum} bytes")))
         };
@@ -69,11 +72,11 @@ impl Store {
     pub async fn storage(
         &self,
         team: Option<TeamId>,
-        counted: StorageScope,
+        scope: StorageScope,
     ) -> Result<Vec<TeamStorage>> {
-        let (team, all) = (team.map(Text), counted == StorageScope::All);
+        let (team, all) = (team.map(Text), scope == StorageScope::All);
         let rows = sqlx::query_as!(
-            Row,
+            StorageRow,
             r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
                       (SELECT COUNT(*) FROM submissions s WHERE s.team_id = t.id AND s.bundle_removed_at IS NULL)
                       AS "archives!: u32",

@@ -48,13 +48,12 @@ pub enum SubjectContext {
     Game {
         tournament: TournamentId,
         teams: [TeamId; 2],
-        /// True for games of rounds and of replays of the schedule; test games and friendly games are private to their
-        /// teams.
+        /// True for games of rounds and their replays; test games and friendly games are private to their teams.
         is_public: bool,
     },
     /// A team's question to the organisers.
     Question {
-        /// `None` in a public archive, which leaves it out.
+        /// `None` in a public archive, which leaves the team out.
         team: Option<TeamId>,
     },
     /// Visible to organisers only: registrations, proposals, and deleted entities.
@@ -187,16 +186,20 @@ impl Store {
             Subject::DayWithoutStage(_) | Subject::Registration(_) | Subject::Proposal(_) => {
                 SubjectContext::Organisers
             }
-            Subject::Evaluation(id) => evaluation_context(&mut *self.read().await?, id).await?,
-            Subject::Submission(id) => submission_context(&mut *self.read().await?, id).await?,
-            Subject::Ablation(id) => ablation_context(&mut *self.read().await?, id).await?,
-            Subject::Game(id) => game_context(&mut *self.read().await?, id).await?,
-            Subject::User(id) => user_context(&mut *self.read().await?, id).await?,
-            Subject::Question(id) => question_context(&mut *self.read().await?, id).await?,
+            Subject::Evaluation(id) => {
+                evaluation_context(&mut *self.connection().await?, id).await?
+            }
+            Subject::Submission(id) => {
+                submission_context(&mut *self.connection().await?, id).await?
+            }
+            Subject::Ablation(id) => ablation_context(&mut *self.connection().await?, id).await?,
+            Subject::Game(id) => game_context(&mut *self.connection().await?, id).await?,
+            Subject::User(id) => user_context(&mut *self.connection().await?, id).await?,
+            Subject::Question(id) => question_context(&mut *self.connection().await?, id).await?,
         })
     }
 
-    async fn read(&self) -> Result<sqlx::pool::PoolConnection<sqlx::Sqlite>> {
+    async fn connection(&self) -> Result<sqlx::pool::PoolConnection<sqlx::Sqlite>> {
         Ok(self.database.read.acquire().await?)
     }
 }

@@ -1,3 +1,5 @@
+//! Queries of submissions: the agents that teams have uploaded.
+
 use crate::{
     boxed,
     error::Result,
@@ -20,8 +22,8 @@ impl Store {
         submissions::of_team(&mut *self.database.read.acquire().await?, team).await
     }
 
-    /// One page of a team's submissions: the newest, or those that follow the submission `after`. `None` if `after` is
-    /// unknown.
+    /// One page of a team's submissions, the newest first: the first ones, or those that follow the submission `after`.
+    /// `None` if there is no submission `after`.
     #[boxed]
     pub async fn submissions_after(
         &self,
@@ -48,7 +50,7 @@ impl Store {
         submissions::active(&mut *self.database.read.acquire().await?).await
     }
 
-    /// The tail of the agent's standard error in its validation run; `None` until that is over, and if
+    /// The tail of the agent's standard error in its validation run; `None` until the run is over, and if
     /// a platform fault ended it.
     #[boxed]
     pub async fn submission_log(&self, id: SubmissionId) -> Result<Option<String>> {

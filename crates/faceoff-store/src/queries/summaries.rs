@@ -1,3 +1,5 @@
+//! Queries of episode summaries: statistics of a run's episodes for its board row.
+
 use crate::{boxed, error::Result, store::Store, tables::episode_summaries};
 use faceoff_types::RunId;
 use std::collections::HashMap;

@@ -1,3 +1,5 @@
+//! Queries of teams.
+
 use crate::{
     boxed,
     error::Result,

@@ -1,3 +1,5 @@
+//! Queries of tournaments, in which submissions play games against each other in rounds.
+
 use crate::{
     boxed,
     error::Result,
@@ -13,7 +15,7 @@ use crate::{
 };
 use faceoff_types::{GameId, Side, TeamId, TournamentId};
 
-/// Selects the games of a list.
+/// The games that a list contains, and their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GameFilter {
     /// Games of the rounds, in the order of play.
@@ -24,7 +26,7 @@ pub enum GameFilter {
     Replays,
 }
 
-/// A snapshot of a tournament with everything that counts.
+/// A tournament with everything that its results depend on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TournamentRecord {
     pub tournament: Tournament,

@@ -1,4 +1,4 @@
-//! Banned workers, and the results to which a worker has contributed.
+//! Queries of banned remote workers (on other machines), and of the results to which a worker has contributed.
 
 use crate::{
     boxed,
@@ -26,7 +26,7 @@ impl Store {
         worker_bans::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// The counting results of a remote worker, at most `limit` of each kind.
+    /// The counting results to which a remote worker has contributed, at most `limit` of each kind.
     #[boxed]
     pub async fn results_of_worker(
         &self,

@@ -1,3 +1,5 @@
+//! Jobs in the queue: their insertion, their claim by workers, and their removal.
+
 use crate::{
     column::Instant,
     error::Result,
@@ -19,21 +21,21 @@ pub(crate) struct NewJob {
     /// Within a lane, jobs of a smaller batch are claimed first, regardless of their account.
     pub(crate) batch: i64,
     /// Delay before it can be claimed, in seconds.
-    pub(crate) rest_s: u32,
+    pub(crate) delay_s: u32,
 }
 
-/// Queues a job, claimable after its delay. The account must be one of its lane. Within the account, jobs of a
+/// Queues a job, which can be claimed after its delay. The account must be one of its lane. Within the account, jobs of a
 /// batch are claimed in the order in which they were queued.
 pub(crate) async fn insert(tx: &mut Tx, job: NewJob, account: Account) -> Result<Uuid> {
     let id = Uuid::now_v7();
-    let (id_text, from) = (Text(id), Instant(seconds_later(tx.now, job.rest_s)));
+    let (id_text, claimable_at) = (Text(id), Instant(seconds_later(tx.now, job.delay_s)));
     sqlx::query!(
         "INSERT INTO jobs (id, kind, account_no, batch, state, claimable_at) VALUES (?, ?, ?, ?, 'queued', ?)",
         id_text,
         job.kind,
         account.0,
         job.batch,
-        from,
+        claimable_at,
     )
     .execute(&mut **tx)
     .await?;
@@ -54,7 +56,7 @@ pub(crate) struct LeasedJob {
 }
 
 /// Claims the next job of `lanes` (a JSON array of their names) in one statement; jobs with expired leases can be claimed,
-/// too. The whole lease is charged at once. So the owner of a running job is no longer the least served account when the
+/// too. The time of the whole lease is charged to the account at once. So the owner of a running job is no longer the least served account when the
 /// next slot becomes free.
 pub(crate) async fn claim_next(
     connection: &mut SqliteConnection,
@@ -64,7 +66,7 @@ pub(crate) async fn claim_next(
     lease_s: u32,
     now: Timestamp,
 ) -> Result<Option<LeasedJob>> {
-    let (nonce, until, now) = (
+    let (nonce, lease_until, now) = (
         Text(nonce),
         Instant(seconds_later(now, lease_s)),
         Instant(now),
@@ -88,7 +90,7 @@ pub(crate) async fn claim_next(
            RETURNING id AS "id!: Text<Uuid>", kind AS "kind!", attempts AS "attempts!: u32""#,
         worker,
         nonce,
-        until,
+        lease_until,
         lease_ms,
         now,
         lanes,
@@ -97,7 +99,7 @@ pub(crate) async fn claim_next(
     .await?)
 }
 
-/// Removes jobs that are not done from the queue; their workers lose the lease.
+/// Removes jobs that are not done from the queue; workers that run them lose the lease.
 pub(crate) async fn drop_jobs(tx: &mut Tx, jobs: &[Uuid]) -> Result<()> {
     let now = Instant(tx.now);
     for job in jobs {
@@ -117,7 +119,7 @@ pub(crate) async fn drop_jobs(tx: &mut Tx, jobs: &[Uuid]) -> Result<()> {
 }
 
 /// Ends the leases of `worker` and of every name `worker/…`, and returns their number. The attempts stay counted. The
-/// slot time does not: a process of the platform died.
+/// slot time is not charged, because a process of the platform died.
 pub(crate) async fn end_leases(tx: &mut Tx, worker: &str) -> Result<u64> {
     let now = Instant(tx.now);
     let ended = sqlx::query!(
@@ -151,21 +153,22 @@ pub(crate) async fn requeue(tx: &mut Tx, job: Uuid) -> Result<()> {
     Ok(())
 }
 
-/// Numbers of running and waiting jobs.
+/// Current numbers of running and waiting jobs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct QueueGauges {
     /// Jobs under a valid lease.
     pub(crate) running: u32,
-    /// Jobs that can be claimed.
+    /// Jobs that a worker can claim.
     pub(crate) waiting: u32,
-    /// Since when the first of them can be claimed.
+    /// Since when a worker can claim the first of them.
     pub(crate) waiting_since: Option<Timestamp>,
-    /// Open jobs that ran out of disk space at least [`OUT_OF_SPACE_TIMES`] although enough was free.
+    /// Open jobs that ran out of disk space at least [`MIN_OUT_OF_SPACE_COUNT`] times although the required minimum was
+    /// free.
     pub(crate) out_of_space: u32,
 }
 
-/// From this number on, lack of disk space is not a momentary condition.
-const OUT_OF_SPACE_TIMES: i64 = 3;
+/// From this number of times on, lack of disk space is not a momentary condition.
+const MIN_OUT_OF_SPACE_COUNT: i64 = 3;
 
 /// Gauges of the queue at `now`.
 pub(crate) async fn gauges(
@@ -180,7 +183,7 @@ pub(crate) async fn gauges(
                   COUNT(*) FILTER (WHERE without_room >= ?2) AS "without_room!: u32"
            FROM jobs WHERE state IN ('queued', 'leased')"#,
         now,
-        OUT_OF_SPACE_TIMES,
+        MIN_OUT_OF_SPACE_COUNT,
     )
     .fetch_one(connection)
     .await?;

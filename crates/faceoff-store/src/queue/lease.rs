@@ -1,11 +1,11 @@
-//! Leases of jobs: a worker renews, releases or completes them.
+//! Leases: the right of a worker to run a job for a time. A worker renews its leases, and releases or completes their jobs.
 
 use crate::{column::Instant, error::Result, write::Tx};
 use jiff::{SignedDuration, Timestamp};
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
 
-/// Proof of a lease.
+/// A claim: the proof that a worker has the lease of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobClaim {
     pub job: Uuid,
@@ -48,8 +48,8 @@ pub(crate) async fn claim_state(
     })
 }
 
-/// Extends the lease to `lease_s` seconds from now and stores the progress. Returns the job's kind, or
-/// `None` if the lease is lost. The extension is charged.
+/// Extends the lease to `lease_s` seconds from now and stores the progress (the number of episodes done). Returns the job's
+/// kind, or `None` if the lease is lost. The extension is charged to the job's account.
 pub(crate) async fn renew(
     connection: &mut SqliteConnection,
     claim: &JobClaim,
@@ -82,20 +82,20 @@ pub(crate) async fn is_leased(
     nonce: Uuid,
 ) -> Result<bool> {
     let (job, nonce) = (Text(job), Text(nonce));
-    let held = sqlx::query_scalar!(
+    let leased = sqlx::query_scalar!(
         r#"SELECT state = 'leased' AS "held!: bool" FROM jobs WHERE id = ? AND nonce = ?"#,
         job,
         nonce,
     )
     .fetch_optional(connection)
     .await?;
-    Ok(held.unwrap_or_default())
+    Ok(leased.unwrap_or_default())
 }
 
 /// Is `claim.worker` still the lease holder, so that the lease was not transferred?
 pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<bool> {
     let (id, nonce) = (Text(claim.job), Text(claim.nonce));
-    let found = sqlx::query_scalar!(
+    let is_same_worker = sqlx::query_scalar!(
         r#"SELECT worker = ? AS "is_holder!: bool" FROM jobs WHERE id = ? AND nonce = ? AND state = 'leased'"#,
         claim.worker,
         id,
@@ -103,7 +103,7 @@ pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &JobClai
     )
     .fetch_optional(connection)
     .await?;
-    Ok(found.unwrap_or_default())
+    Ok(is_same_worker.unwrap_or_default())
 }
 
 /// The lease holder of the job, if it is leased under this nonce.
@@ -146,17 +146,17 @@ pub(crate) async fn leases(tx: &mut Tx, holder: &str) -> Result<Vec<(JobClaim, S
     Ok(leases.collect())
 }
 
-/// Transfers the lease to another holder. False if neither `claim.worker` nor the other holds it.
+/// Transfers the lease to another holder. False if neither `claim.worker` nor `new_holder` has it.
 pub(crate) async fn transfer(
     connection: &mut SqliteConnection,
     claim: &JobClaim,
-    to: &str,
+    new_holder: &str,
 ) -> Result<bool> {
     let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let transferred = sqlx::query!(
         "UPDATE jobs SET worker = ?1
          WHERE id = ?2 AND nonce = ?3 AND worker IN (?4, ?1) AND state = 'leased'",
-        to,
+        new_holder,
         id,
         nonce,
         claim.worker,
@@ -199,8 +199,8 @@ pub(crate) async fn mark_done(tx: &mut Tx, claim: &JobClaim, progress: u32) -> R
 }
 
 /// Counts a failure of a leased job and queues it again, with a delay that grows with the failures.
-/// Returns their number. No worker is woken: there is nothing to claim yet. Slot time lost by a platform
-/// fault is not charged.
+/// Returns the number of failures. No worker is woken, because the job cannot be claimed yet. Slot time lost by a
+/// platform fault is not charged.
 pub(crate) async fn requeue_failed(
     connection: &mut SqliteConnection,
     claim: &JobClaim,
@@ -215,10 +215,10 @@ pub(crate) async fn requeue_failed(
     )
     .fetch_one(&mut *connection)
     .await?;
-    let again_at = Instant(seconds_later(now, backoff_s(failures)));
+    let claimable_at = Instant(seconds_later(now, backoff_s(failures)));
     sqlx::query!(
         "UPDATE jobs SET claimable_at = ? WHERE id = ?",
-        again_at,
+        claimable_at,
         id
     )
     .execute(connection)
@@ -244,22 +244,22 @@ pub(crate) async fn renew_all_leases(
     Ok(())
 }
 
-/// Queues a leased job again, claimable after a delay. Neither the attempt nor its slot time counts. It does count if the
-/// job ran out of disk space although enough was free.
+/// Queues a leased job again, to be claimed after a delay. Neither the attempt nor its slot time counts. With
+/// `out_of_space`, the release itself is counted: the job ran out of disk space although the required minimum was free.
 pub(crate) async fn release(
     tx: &mut Tx,
     claim: &JobClaim,
-    rest_s: u32,
-    without_room: bool,
+    delay_s: u32,
+    out_of_space: bool,
 ) -> Result<()> {
-    let (id, from) = (Text(claim.job), Instant(seconds_later(tx.now, rest_s)));
+    let (id, claimable_at) = (Text(claim.job), Instant(seconds_later(tx.now, delay_s)));
     sqlx::query!(
         "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                           charged_ms = 0, attempts = attempts - 1, claimable_at = ?,
                           without_room = without_room + ?
          WHERE id = ?",
-        from,
-        without_room,
+        claimable_at,
+        out_of_space,
         id,
     )
     .execute(&mut **tx)
@@ -276,7 +276,7 @@ pub(crate) async fn park(tx: &mut Tx, job: Uuid) -> Result<()> {
         "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0,
                           attempts = attempts - 1, claimable_at = ?
          WHERE id = ?",
-        PARKED,
+        PARKED_UNTIL_MS,
         id,
     )
     .execute(&mut **tx)
@@ -291,7 +291,7 @@ pub(crate) async fn unpark(tx: &mut Tx, job: Uuid) -> Result<()> {
         "UPDATE jobs SET claimable_at = ? WHERE id = ? AND state = 'queued' AND claimable_at = ?",
         now,
         id,
-        PARKED,
+        PARKED_UNTIL_MS,
     )
     .execute(&mut **tx)
     .await?;
@@ -299,8 +299,8 @@ pub(crate) async fn unpark(tx: &mut Tx, job: Uuid) -> Result<()> {
     Ok(())
 }
 
-/// Claimable time of parked jobs: the year 9999, in milliseconds since 1970.
-const PARKED: i64 = 253_402_207_200_000;
+/// When parked jobs can be claimed: in the year 9999, in milliseconds since 1970.
+const PARKED_UNTIL_MS: i64 = 253_402_207_200_000;
 
 /// An instant some seconds later.
 pub(crate) fn seconds_later(now: Timestamp, seconds: u32) -> Timestamp {
@@ -308,7 +308,8 @@ pub(crate) fn seconds_later(now: Timestamp, seconds: u32) -> Timestamp {
         .unwrap_or(Timestamp::MAX)
 }
 
-/// Delay after the n-th failure of a job, in seconds: a full disk, for example, is not freed at once.
+/// Delay after a number of failures of a job, in seconds: 2, 4, 8 and so on, at most 60. A full disk, for example, is not
+/// freed at once.
 const fn backoff_s(failures: u32) -> u32 {
     let doubled = if failures < 6 { 1 << failures } else { 60 };
     if doubled < 60 { doubled } else { 60 }

@@ -1,4 +1,4 @@
-//! The job queue. A job is claimed with a lease of seconds, which is renewed until the job is released or
+//! The job queue. A worker claims a job and gets a lease of some seconds, which it renews until the job is released or
 //! done. The purpose of a job is in the tables that refer to it. To the queue, its kind and the owner of
 //! its account are opaque labels.
 

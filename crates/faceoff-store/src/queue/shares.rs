@@ -1,5 +1,6 @@
-//! Fair shares of the slots. The least served lane comes first, in it the smallest batch, and of that the least served
-//! account. The database charges the slot time of a lease to both (`slot_time_is_charged`), however the job ends.
+//! Fair shares of the slots (the places in which workers run jobs). The least served lane is next; in this lane the jobs of
+//! the smallest batch, and of these the jobs of the least served account. A trigger of the database
+//! (`slot_time_is_charged`) charges the slot time of a lease to the lane and the account, however the job ends.
 
 use crate::{column::Instant, error::Result, write::Tx};
 
@@ -14,14 +15,15 @@ pub(crate) struct Lane {
     pub(crate) rank: u32,
 }
 
-/// The owner of jobs in one lane. Slot time of a lane is divided equally among the accounts with waiting jobs.
+/// Number of an account: the jobs of one owner in one lane. Slot time of a lane is divided equally among the accounts with
+/// waiting jobs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Account(pub(crate) i64);
 
-/// Opens the account of `holder` in `lane`, to queue jobs. An account that returns after a pause starts level with the
-/// least served one that has waiting jobs, or else with the most served one. So unused time is no credit, and time used
-/// while no other account waited is no debt. The same holds for lanes. The charged rest of a running lease does not
-/// count as used.
+/// Opens the account of `holder` (the owner) in `lane`, to queue jobs. An account that returns after a pause starts with
+/// the served time of the least served account that has waiting jobs, or else of the most served one. So unused time is no
+/// credit, and time used while no other account waited is no debt. The same holds for lanes. The charged rest of a running
+/// lease does not count as used.
 pub(crate) async fn account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<Account> {
     let now = Instant(tx.now);
     sqlx::query!(

@@ -1,3 +1,5 @@
+//! The tables of ablations and their runs. An ablation shows which perturbation costs a submission points.
+
 use crate::{
     column::Instant,
     error::{Result, StoreError},
@@ -7,12 +9,12 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::BTreeMap;
 
-/// An ablation evaluates a submission with each perturbation alone: one run per profile, on the same episodes.
+/// An ablation: runs of a submission on the same episodes without any perturbation, with each one alone, and with all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ablation {
     pub id: AblationId,
     pub submission: SubmissionId,
-    /// One run for each of [`Profile::ABLATION`], with otherwise the same plan.
+    /// One run for each profile of [`Profile::ABLATION`]; the rest of their plans is the same.
     pub runs: BTreeMap<Profile, RunId>,
     /// Episodes of each task and profile.
     pub episodes_per_task: u32,

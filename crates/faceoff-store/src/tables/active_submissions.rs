@@ -1,4 +1,4 @@
-//! The active submission of each team, which is evaluated at the next cutoff.
+//! The table of active submissions: for each team the one that is evaluated at the next cutoff.
 
 use crate::{column::Instant, error::Result};
 use faceoff_types::{SubmissionId, TeamId};
@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
 /// Makes a submission that passed its validation its team's active one. Returns false if the team has a newer
-/// one, or has chosen one since this upload.
+/// submission, or has chosen one since this upload.
 pub(crate) async fn put_newest(
     connection: &mut SqliteConnection,
     team: TeamId,

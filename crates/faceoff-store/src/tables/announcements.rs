@@ -1,3 +1,5 @@
+//! The table of announcements.
+
 use crate::{column::Instant, error::Result};
 use faceoff_types::AnnouncementId;
 use jiff::Timestamp;
@@ -7,6 +9,7 @@ use sqlx::{SqliteConnection, types::Text};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Announcement {
     pub id: AnnouncementId,
+    /// When it was published.
     pub at: Timestamp,
     pub title: String,
     pub text: String,

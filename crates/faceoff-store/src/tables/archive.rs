@@ -1,4 +1,4 @@
-//! Metadata of an archive's database.
+//! Tables in the database of an archive (a season in one file): its description and the seeds of its days.
 
 use crate::{
     column::{Bytes32, Instant},
@@ -43,7 +43,7 @@ impl FromStr for Edition {
     }
 }
 
-/// A read-only season: the database is an archive's.
+/// Description of an archive; a season that was imported from one is read-only.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArchivedSeason {
     /// Which part of the season the archive contains.
@@ -58,7 +58,7 @@ pub struct ArchivedSeason {
     pub imported_at: Option<Timestamp>,
 }
 
-/// `None` if the season is not an archive's.
+/// Reads the description; `None` if the database is not that of an archive.
 pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Option<ArchivedSeason>> {
     let row = sqlx::query!(
         r#"SELECT edition AS "edition: Text<Edition>", made_at AS "made_at: Instant", program, commitment,
@@ -76,7 +76,7 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Option<Arc
     }))
 }
 
-/// Marks the database as an archive's.
+/// Marks the database as that of an archive.
 pub(crate) async fn put(
     connection: &mut SqliteConnection,
     archived: &ArchivedSeason,
@@ -145,7 +145,7 @@ pub struct ArchivedArtifact {
     pub owner: ArtifactOwner,
 }
 
-/// The entity that an artifact belongs to.
+/// The submission, evaluation or game that an artifact belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArtifactOwner {
     /// A submission's bundle.
@@ -167,7 +167,7 @@ pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<A
     )
     .fetch_all(&mut *connection)
     .await?;
-    let proposed = sqlx::query!(
+    let datasets = sqlx::query!(
         r#"SELECT id AS "id: Text<EvaluationId>", dataset AS "dataset!", dataset_blake3 AS "dataset_blake3!"
            FROM proposed_evaluations WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
              AND id NOT IN (SELECT id FROM evaluations)
@@ -200,10 +200,10 @@ pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<A
         blake3: row.bundle_blake3,
         owner: ArtifactOwner::Bundle(row.id.0),
     });
-    let proposed = proposed.into_iter().map(|row| ArchivedArtifact {
+    let datasets = datasets.into_iter().map(|row| ArchivedArtifact {
         key: row.dataset,
         blake3: row.dataset_blake3,
         owner: ArtifactOwner::ProposedEvaluation(row.id.0),
     });
-    Ok(bundles.chain(proposed).chain(games).collect())
+    Ok(bundles.chain(datasets).chain(games).collect())
 }

@@ -1,11 +1,11 @@
-//! Stored bundles: quotas of the teams, and bundles that can be deleted. The data are columns of the
+//! Bundles (uploaded agents): quotas of the teams, and bundles that can be deleted. The data are columns of the table of
 //! submissions.
 
 use crate::{
     column::Instant,
     error::{Result, StoreError},
     event::Actor,
-    tables::submissions::REFUSED,
+    tables::submissions::VALIDATION_FAILED,
 };
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
@@ -33,7 +33,7 @@ impl Default for UploadQuota {
 /// A team's use of its quota, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct UploadUsage {
-    /// Uploaded on the UTC day. Rejected bundles count; those whose validation ended by a platform fault do not.
+    /// Uploaded on the UTC day. Invalid bundles count; those whose validation ended by a platform fault do not.
     pub day_bytes: u64,
     /// Bundles that are stored.
     pub stored_bytes: u64,
@@ -72,20 +72,20 @@ impl UploadQuota {
     }
 }
 
-/// A team's use of its quota on the UTC day that began at `day`.
+/// A team's use of its quota on the UTC day that began at `day_start`.
 pub(crate) async fn usage(
     connection: &mut SqliteConnection,
     team: TeamId,
-    day: Timestamp,
+    day_start: Timestamp,
 ) -> Result<UploadUsage> {
-    let (team, day) = (Text(team), Instant(day));
+    let (team, day_start) = (Text(team), Instant(day_start));
     let row = sqlx::query!(
         r#"SELECT COALESCE(SUM(CASE WHEN created_at >= ? AND state <> 'validation_error'
                                     THEN bundle_bytes ELSE 0 END), 0) AS "day_bytes!: i64",
                   COALESCE(SUM(CASE WHEN bundle_removed_at IS NULL
                                     THEN bundle_bytes ELSE 0 END), 0) AS "stored_bytes!: i64"
            FROM submissions WHERE team_id = ?"#,
-        day,
+        day_start,
         team,
     )
     .fetch_one(connection)
@@ -99,14 +99,14 @@ pub(crate) async fn usage(
     })
 }
 
-/// Rejected submissions whose bundles are stored, with their keys. These are invalid ones, and those uploaded until
-/// `before` whose validation ended by a platform fault. Bundles of runs, of usable submissions and of teams under
-/// investigation are left out.
+/// Submissions that did not pass their validation and whose bundles are stored, with their keys. These are invalid ones,
+/// and those uploaded until `uploaded_until` whose validation ended by a platform fault. Bundles that are used by a run or
+/// another submission, and those of teams under investigation, are left out.
 pub(crate) async fn refused(
     connection: &mut SqliteConnection,
-    before: Timestamp,
+    uploaded_until: Timestamp,
 ) -> Result<Vec<(SubmissionId, String)>> {
-    let before = Instant(before);
+    let uploaded_until = Instant(uploaded_until);
     let rows = sqlx::query!(
         r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_key FROM submissions s
            WHERE s.bundle_removed_at IS NULL AND s.state IN ('invalid', 'validation_error')
@@ -117,7 +117,7 @@ pub(crate) async fn refused(
              AND NOT EXISTS (SELECT 1 FROM submissions o
                              WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
                                AND o.state IN ('validating', 'valid'))"#,
-        before,
+        uploaded_until,
     )
     .fetch_all(connection)
     .await?;
@@ -171,18 +171,18 @@ pub(crate) async fn set_removed(
     Ok(())
 }
 
-/// Notes who requested the removal of a submission's bundle.
+/// Records the actor that requested the removal of a submission's bundle.
 pub(crate) async fn set_deleted(
     connection: &mut SqliteConnection,
     id: SubmissionId,
-    by: &Actor,
+    actor: &Actor,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, by, now) = (Text(id), Text(by), Instant(now));
+    let (id, actor, now) = (Text(id), Text(actor), Instant(now));
     sqlx::query!(
         "UPDATE submissions SET deleted_at = ?, deleted_by = ? WHERE id = ?",
         now,
-        by,
+        actor,
         id,
     )
     .execute(connection)
@@ -190,13 +190,13 @@ pub(crate) async fn set_deleted(
     Ok(())
 }
 
-/// Bundles that were marked as removed until `before` and whose files still exist, with their keys. Bundles that another
-/// submission shares, and those that are evidence, are left out.
+/// Bundles that were marked as removed until `removed_until` and whose files still exist, with their keys. Bundles that
+/// another submission shares, and those that are evidence, are left out.
 pub(crate) async fn deletable(
     connection: &mut SqliteConnection,
-    before: Timestamp,
+    removed_until: Timestamp,
 ) -> Result<Vec<(SubmissionId, String)>> {
-    let before = Instant(before);
+    let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
         r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_key FROM submissions s
            JOIN teams t ON t.id = s.team_id
@@ -205,7 +205,7 @@ pub(crate) async fn deletable(
              AND NOT EXISTS (SELECT 1 FROM submissions o
                              WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
                                AND o.bundle_removed_at IS NULL)"#,
-        before
+        removed_until
     )
     .fetch_all(connection)
     .await?;
@@ -215,7 +215,7 @@ pub(crate) async fn deletable(
         .collect())
 }
 
-/// Notes that the file of a removed bundle was deleted.
+/// Records that the file of a removed bundle was deleted.
 pub(crate) async fn set_file_deleted(
     connection: &mut SqliteConnection,
     id: SubmissionId,
@@ -245,7 +245,7 @@ pub(crate) async fn check_available(
         Some(row) => Err(StoreError::Conflict(format!(
             "the bundle of the submission {id} was removed on {} {}, so it cannot be evaluated again",
             row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
-            row.reason.as_deref().unwrap_or(REFUSED),
+            row.reason.as_deref().unwrap_or(VALIDATION_FAILED),
         ))),
     }
 }
@@ -253,13 +253,13 @@ pub(crate) async fn check_available(
 /// Why a submission's bundle is still needed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BundleUses {
-    /// It is the team's active submission.
+    /// Is it the team's active submission?
     pub(crate) is_active: bool,
     /// Number of its open evaluations and ablations.
     pub(crate) open: u32,
     /// Number of its evaluations on unreleased days.
     pub(crate) unreleased: u32,
-    /// Number of trials and proposals with it that are neither applied nor dropped.
+    /// Number of proposals with it that are neither applied nor dropped.
     pub(crate) proposed: u32,
 }
 

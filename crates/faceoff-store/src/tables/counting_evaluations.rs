@@ -1,4 +1,5 @@
-//! Open, counting and voided evaluations of a day or a team, as needed for rulings.
+//! Evaluations of a day or a team with the part of their state that organisers' rulings depend on: whether they are open,
+//! count or are voided.
 
 use crate::{column::Instant, error::Result, tables::rulings::Ruling};
 use faceoff_types::{EvaluationId, RunId, StageDay, TeamId};
@@ -11,7 +12,7 @@ pub(crate) struct EvaluationStatus {
     pub(crate) id: EvaluationId,
     pub(crate) run: RunId,
     pub(crate) is_open: bool,
-    /// It finished, or failed by agent faults, and was not voided.
+    /// True if it finished, or failed by agent faults, and was not voided.
     pub(crate) counts: bool,
 }
 

@@ -1,3 +1,5 @@
+//! The table of evaluation days. A day starts with its cutoff and is released after its last evaluation.
+
 use crate::{
     column::Instant,
     error::{Result, StoreError},
@@ -15,8 +17,8 @@ pub struct Day {
     pub cutoff_at: Timestamp,
     /// Evaluations that are incomplete at this time are ended; `None`: no deadline.
     pub deadline_at: Option<Timestamp>,
-    /// When the day was released after its last evaluation. Since then its seed is public, and the teams
-    /// can download their datasets and logs. `None` before.
+    /// When the day was released; `None` before that. Since the release its seed is public, and the teams can download
+    /// their datasets and logs.
     pub released_at: Option<Timestamp>,
 }
 
@@ -92,7 +94,7 @@ pub(crate) async fn newest(
     }))
 }
 
-/// [`StoreError::NotFound`] if the day's cutoff has not passed.
+/// The day; [`StoreError::NotFound`] if its cutoff has not passed.
 pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
     let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
     let row = sqlx::query!(
@@ -173,14 +175,14 @@ pub(crate) async fn set_deadline(
     stage_day: StageDay,
     deadline_at: Option<Timestamp>,
 ) -> Result<()> {
-    let (stage, day, at) = (
+    let (stage, day, deadline_at) = (
         Text(stage_day.stage),
         Text(stage_day.date),
         deadline_at.map(Instant),
     );
     sqlx::query!(
         "UPDATE days SET deadline_at = ? WHERE stage_id = ? AND day = ?",
-        at,
+        deadline_at,
         stage,
         day
     )
@@ -201,8 +203,8 @@ pub(crate) async fn exists(connection: &mut SqliteConnection, stage_day: StageDa
     .await?)
 }
 
-/// Adds a day whose cutoff is now. [`StoreError::CutoffPassed`] if the day, or a later one, exists, so that a clock that
-/// was set back starts nothing.
+/// Adds a day whose cutoff is now. [`StoreError::CutoffPassed`] if the day, or a later one, exists: no day is started twice
+/// after a clock was set back.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     stage_day: StageDay,

@@ -1,4 +1,4 @@
-//! Deliveries of events to webhooks, with their attempts.
+//! The table of deliveries: messages about events to webhooks. A delivery is attempted until it succeeds or is given up.
 
 use crate::{
     column::Instant,
@@ -22,8 +22,8 @@ pub struct Delivery {
     pub created_at: Timestamp,
     /// Number of attempts so far.
     pub attempts: u32,
-    /// Result of the last attempt.
-    pub last: Option<DeliveryAttempt>,
+    /// Result of the last attempt, if there was one.
+    pub last_attempt: Option<DeliveryAttempt>,
     pub state: DeliveryState,
 }
 
@@ -32,13 +32,16 @@ pub struct Delivery {
 pub enum DeliveryState {
     /// It will be sent, or sent again.
     Pending {
+        /// When the next attempt is due.
         next_at: Timestamp,
     },
     Delivered {
+        /// When the receiver accepted it.
         at: Timestamp,
     },
     /// It will not be sent any more.
     GivenUp {
+        /// When it was given up.
         at: Timestamp,
     },
 }
@@ -46,6 +49,7 @@ pub enum DeliveryState {
 /// Result of a delivery attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeliveryAttempt {
+    /// When it was made.
     pub at: Timestamp,
     /// HTTP status of the response, if there was one.
     pub status: Option<u16>,
@@ -53,7 +57,7 @@ pub struct DeliveryAttempt {
     pub error: Option<String>,
 }
 
-struct Row {
+struct DeliveryRow {
     id: Text<DeliveryId>,
     webhook_id: Text<WebhookId>,
     event_id: Option<i64>,
@@ -69,10 +73,10 @@ struct Row {
     last_error: Option<String>,
 }
 
-impl TryFrom<Row> for Delivery {
+impl TryFrom<DeliveryRow> for Delivery {
     type Error = StoreError;
 
-    fn try_from(row: Row) -> Result<Self> {
+    fn try_from(row: DeliveryRow) -> Result<Self> {
         let state = match (row.next_at, row.settled_at) {
             (Some(next_at), None) => DeliveryState::Pending { next_at: next_at.0 },
             (None, Some(at)) if row.is_delivered => DeliveryState::Delivered { at: at.0 },
@@ -90,7 +94,7 @@ impl TryFrom<Row> for Delivery {
             body: row.body,
             created_at: row.created_at.0,
             attempts: row.attempts,
-            last: row.last_at.map(|at| DeliveryAttempt {
+            last_attempt: row.last_at.map(|at| DeliveryAttempt {
                 at: at.0,
                 status: row.last_status,
                 error: row.last_error,
@@ -104,7 +108,7 @@ impl TryFrom<Row> for Delivery {
 macro_rules! select_deliveries {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            DeliveryRow,
             r#"SELECT id AS "id: Text<DeliveryId>", webhook_id AS "webhook_id: Text<WebhookId>", event_id, kind, body,
                       created_at AS "created_at: Instant", attempts AS "attempts: u32", next_at AS "next_at: Instant",
                       state = 'delivered' AS "is_delivered!: bool", settled_at AS "settled_at: Instant",
@@ -115,11 +119,11 @@ macro_rules! select_deliveries {
     };
 }
 
-fn all_of(rows: Vec<Row>) -> Result<Vec<Delivery>> {
+fn parse_all(rows: Vec<DeliveryRow>) -> Result<Vec<Delivery>> {
     rows.into_iter().map(Delivery::try_from).collect()
 }
 
-/// The longest due delivery of each enabled webhook, the longest due first.
+/// The due delivery of each enabled webhook that has waited longest, in the order in which they became due.
 pub(crate) async fn due(
     connection: &mut SqliteConnection,
     now: Timestamp,
@@ -133,7 +137,7 @@ pub(crate) async fn due(
          ORDER BY next_at",
         now
     );
-    all_of(rows.fetch_all(connection).await?)
+    parse_all(rows.fetch_all(connection).await?)
 }
 
 /// When the next waiting delivery is due.
@@ -158,7 +162,7 @@ pub(crate) async fn of_webhook(
         webhook,
         limit
     );
-    all_of(rows.fetch_all(connection).await?)
+    parse_all(rows.fetch_all(connection).await?)
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: DeliveryId) -> Result<Delivery> {
@@ -171,7 +175,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: DeliveryId) -> R
 
 /// Adds a delivery that is due at once.
 pub(crate) async fn insert(connection: &mut SqliteConnection, delivery: &Delivery) -> Result<()> {
-    let (id, webhook, at) = (
+    let (id, webhook, created_at) = (
         Text(delivery.id),
         Text(delivery.webhook),
         Instant(delivery.created_at),
@@ -184,7 +188,7 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, delivery: &Deliver
         delivery.event,
         delivery.kind,
         delivery.body,
-        at,
+        created_at,
     )
     .execute(connection)
     .await?;
@@ -224,13 +228,13 @@ pub(crate) async fn set_attempt(
 pub(crate) async fn give_up(
     connection: &mut SqliteConnection,
     webhook: WebhookId,
-    at: Timestamp,
+    now: Timestamp,
 ) -> Result<()> {
-    let (webhook, at) = (Text(webhook), Instant(at));
+    let (webhook, now) = (Text(webhook), Instant(now));
     sqlx::query!(
         "UPDATE webhook_deliveries SET state = 'given_up', next_at = NULL, settled_at = ?
          WHERE webhook_id = ? AND state = 'waiting'",
-        at,
+        now,
         webhook,
     )
     .execute(connection)
@@ -238,15 +242,15 @@ pub(crate) async fn give_up(
     Ok(())
 }
 
-/// Deletes the deliveries that were settled before an instant, and returns their number.
-pub(crate) async fn delete_settled(
+/// Deletes the deliveries that ended (were delivered or given up) before an instant, and returns their number.
+pub(crate) async fn delete_ended(
     connection: &mut SqliteConnection,
-    before: Timestamp,
+    ended_before: Timestamp,
 ) -> Result<u64> {
-    let before = Instant(before);
+    let ended_before = Instant(ended_before);
     let deleted = sqlx::query!(
         "DELETE FROM webhook_deliveries WHERE state <> 'waiting' AND settled_at < ?",
-        before
+        ended_before
     )
     .execute(connection)
     .await?;

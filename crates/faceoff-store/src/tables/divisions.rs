@@ -1,3 +1,5 @@
+//! The table of divisions: the categories of teams, each with its own ranking.
+
 use crate::error::{Result, StoreError};
 use faceoff_types::DivisionName;
 use sqlx::{SqliteConnection, types::Text};
@@ -17,13 +19,16 @@ pub(crate) async fn check(
     connection: &mut SqliteConnection,
     name: &DivisionName,
 ) -> Result<DivisionName> {
-    let all = all(connection).await?;
-    let wanted = name.as_str().to_lowercase();
-    let found = all
+    let divisions = all(connection).await?;
+    let lowercase_name = name.as_str().to_lowercase();
+    let found = divisions
         .iter()
-        .find(|division| division.as_str().to_lowercase() == wanted);
+        .find(|division| division.as_str().to_lowercase() == lowercase_name);
     found.cloned().ok_or_else(|| {
-        let names: Vec<_> = all.iter().map(|division| format!("“{division}”")).collect();
+        let names: Vec<_> = divisions
+            .iter()
+            .map(|division| format!("“{division}”"))
+            .collect();
         StoreError::Conflict(match names.is_empty() {
             true => format!("division: this season has no divisions, so leave out “{name}”"),
             false => format!("division: expected {}, got “{name}”", names.join(" or ")),

@@ -1,4 +1,4 @@
-//! The teams of a tournament.
+//! The table of entrants: the teams that take part in a tournament.
 
 use crate::{
     column::Instant,
@@ -25,11 +25,13 @@ pub struct Departure {
     pub kind: DepartureKind,
     /// The first round in which its games do not count.
     pub from_round: RoundNumber,
+    /// When the team left.
     pub at: Timestamp,
     /// Public.
     pub reason: String,
 }
 
+/// The stored name of a kind of departure.
 const fn label(kind: DepartureKind) -> &'static str {
     match kind {
         DepartureKind::Withdrawn => "withdrawn",
@@ -68,8 +70,8 @@ pub(crate) async fn all(
                             "entrant {team}: left as {left_as:?} from round {from_round}"
                         ))
                     };
-                    let known = [DepartureKind::Withdrawn, DepartureKind::Disqualified];
-                    let left_as = known.into_iter().find(|one| label(*one) == left_as);
+                    let kinds = [DepartureKind::Withdrawn, DepartureKind::Disqualified];
+                    let left_as = kinds.into_iter().find(|kind| label(*kind) == left_as);
                     Some(Departure {
                         kind: left_as.ok_or_else(damaged)?,
                         from_round: from_round.try_into().map_err(|_| damaged())?,

@@ -1,4 +1,4 @@
-//! Entries of evaluations: which team is evaluated on which day, regardless of the result.
+//! Entries of evaluations: the submission, team and day of each, without its state and result.
 
 use crate::{
     column::Instant,
@@ -15,8 +15,10 @@ pub(crate) struct Entry {
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
     pub(crate) stage_day: StageDay,
+    /// Revision of the stage's rules.
     pub(crate) revision: u32,
     pub(crate) run: RunId,
+    /// The earlier evaluation that it repeats.
     pub(crate) rerun_of: Option<EvaluationId>,
 }
 
@@ -48,15 +50,16 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) ->
     })
 }
 
-/// Adds a queued evaluation. [`StoreError::Conflict`] if the team has another one on the day that counts.
+/// Adds a queued evaluation. [`StoreError::Conflict`] if the team has another evaluation on that day which counts or is
+/// open.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
-    new: &Entry,
+    entry: &Entry,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, submission, team) = (Text(new.id), Text(new.submission), Text(new.team));
-    let (stage, day) = (Text(new.stage_day.stage), Text(new.stage_day.date));
-    let (run, now, rerun_of) = (Text(new.run), Instant(now), new.rerun_of.map(Text));
+    let (id, submission, team) = (Text(entry.id), Text(entry.submission), Text(entry.team));
+    let (stage, day) = (Text(entry.stage_day.stage), Text(entry.stage_day.date));
+    let (run, now, rerun_of) = (Text(entry.run), Instant(now), entry.rerun_of.map(Text));
     sqlx::query!(
         "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at, state,
                                   rerun_of)
@@ -66,7 +69,7 @@ pub(crate) async fn insert(
         team,
         stage,
         day,
-        new.revision,
+        entry.revision,
         run,
         now,
         rerun_of,
@@ -77,7 +80,7 @@ pub(crate) async fn insert(
         if StoreError::is_duplicate(&error, "evaluations.day") {
             StoreError::Conflict(format!(
                 "the team has another evaluation on {} that counts or is running",
-                new.stage_day.date
+                entry.stage_day.date
             ))
         } else {
             error.into()

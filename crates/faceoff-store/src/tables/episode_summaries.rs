@@ -1,11 +1,12 @@
-//! Summaries of runs' episodes, for boards and comparisons. They are derived data and can be recomputed.
+//! The table of episode summaries: statistics of a run's episodes, for boards and comparisons. They are derived data and
+//! can be recomputed.
 
 use crate::{column::Json, error::Result};
 use faceoff_types::RunId;
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::HashMap;
 
-/// The summaries of these runs that were stored under `version`.
+/// The summaries of these runs that have the format `version`.
 pub(crate) async fn of_runs(
     connection: &mut SqliteConnection,
     runs: &[RunId],

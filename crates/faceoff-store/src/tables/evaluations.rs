@@ -1,3 +1,5 @@
+//! The table of evaluations: their state from the queue to the result.
+
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
@@ -31,7 +33,7 @@ pub struct Evaluation {
     pub plan: RunPlan,
     /// When it was queued.
     pub created_at: Timestamp,
-    /// The reason of an extra evaluation; `None` for the team's regular one of the day.
+    /// The reason of an extra evaluation; `None` for the team's regular evaluation of the day.
     pub extra_for: Option<String>,
     /// Set if it was voided and does not count.
     pub voided: Option<Ruling>,
@@ -135,7 +137,7 @@ pub(crate) struct EvaluationRow {
 
 impl EvaluationRow {
     /// The run, if it is running: its progress is part of the evaluation's state.
-    pub(crate) fn run_under_way(&self) -> Option<RunId> {
+    pub(crate) fn open_run(&self) -> Option<RunId> {
         (self.state == "open" && self.run_state == RunState::Running).then_some(self.run_id.0)
     }
 
@@ -300,22 +302,24 @@ pub(crate) async fn created_at(
     Ok(at.fetch_optional(connection).await?.map(|at| at.0))
 }
 
-/// One page of a team's evaluations, on one date or on all, the newest first. It follows the given time and id.
+/// One page of a team's evaluations, on one date or on all dates, the newest first: those that follow the evaluation with
+/// this time of queueing and this id.
 pub(crate) async fn of_team_after(
     connection: &mut SqliteConnection,
     team: TeamId,
     date: Option<Date>,
-    (at, id): (Timestamp, Option<EvaluationId>),
+    (queued_at, id): (Timestamp, Option<EvaluationId>),
     limit: u32,
 ) -> Result<Vec<EvaluationRow>> {
-    let (team, day, at, id) = (Text(team), date.map(Text), Instant(at), id.map(Text));
+    let (team, day) = (Text(team), date.map(Text));
+    let (queued_at, id) = (Instant(queued_at), id.map(Text));
     Ok(select_evaluations!(
         "WHERE e.team_id = ?1 AND (?2 IS NULL OR e.day = ?2)
            AND e.created_at <= ?3 AND (e.created_at < ?3 OR ?4 IS NULL OR e.id < ?4)
          ORDER BY e.created_at DESC, e.id DESC LIMIT ?5",
         team,
         day,
-        at,
+        queued_at,
         id,
         limit
     )
@@ -323,20 +327,20 @@ pub(crate) async fn of_team_after(
     .await?)
 }
 
-/// One page of the evaluations of all stages on a date, in the order in which they were queued. It follows the given time
-/// and id.
+/// One page of the evaluations of all stages on a date, in the order in which they were queued: those that follow the
+/// evaluation with this time of queueing and this id.
 pub(crate) async fn on_date_after(
     connection: &mut SqliteConnection,
     date: Date,
-    (at, id): (Timestamp, Option<EvaluationId>),
+    (queued_at, id): (Timestamp, Option<EvaluationId>),
     limit: u32,
 ) -> Result<Vec<EvaluationRow>> {
-    let (day, at, id) = (Text(date), Instant(at), id.map(Text));
+    let (day, queued_at, id) = (Text(date), Instant(queued_at), id.map(Text));
     Ok(select_evaluations!(
         "WHERE e.day = ?1 AND e.created_at >= ?2 AND (e.created_at > ?2 OR ?3 IS NULL OR e.id > ?3)
          ORDER BY e.created_at, e.id LIMIT ?4",
         day,
-        at,
+        queued_at,
         id,
         limit
     )
@@ -414,7 +418,7 @@ pub(crate) async fn set_finished(
     now: Timestamp,
 ) -> Result<()> {
     let (id, result, now) = (Text(id), Json(result), Instant(now));
-    // An old proposal's run may have been cleared before it was applied: then its slot time is unknown.
+    // The slot time is unknown if the evaluation comes from a proposal whose run was cleared before it was applied.
     sqlx::query!(
         "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
                                 slot_ms = (SELECT SUM(j.charged_ms) FROM shards s JOIN jobs j ON j.id = s.job_id
@@ -435,12 +439,13 @@ pub(crate) async fn set_finished(
 /// Why an evaluation ended without a score.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Failure<'a> {
+    /// The agent had too many faults.
     Agent,
-    /// By platform faults; with the cause.
+    /// It was given up after platform faults, with this cause.
     Platform(&'a str),
-    /// By an organiser; with the reason.
+    /// An organiser cancelled it, for this reason.
     Cancelled(&'a str),
-    /// By its day's deadline; with a text for the team.
+    /// Its day's deadline passed. The text is shown to the team.
     NotPlayed(&'a str),
 }
 
@@ -470,7 +475,7 @@ pub(crate) async fn set_failed(
     Ok(())
 }
 
-/// Number of open evaluations, of one day or of all.
+/// Number of open evaluations, of one day or of all days.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
     stage_day: Option<StageDay>,

@@ -1,4 +1,4 @@
-//! The events table. Only [`write`](crate::write) adds rows, and rows are never changed. Events about the progress of a
+//! The table of events: the record of all changes. Only [`write`](crate::write) adds rows, and rows are never changed. Events about the progress of a
 //! run are deleted with its shards.
 
 use crate::{
@@ -10,7 +10,7 @@ use faceoff_types::RunId;
 use serde_json::{Map, Value};
 use sqlx::{SqliteConnection, types::Text};
 
-/// Selects events; `None` matches any.
+/// Selects events; a field with `None` matches any event.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EventFilter {
     /// Only events before the one with this id.
@@ -22,7 +22,7 @@ pub struct EventFilter {
     pub kind: Option<String>,
 }
 
-struct Row {
+struct EventRow {
     id: i64,
     at: Instant,
     actor: Text<Actor>,
@@ -32,10 +32,10 @@ struct Row {
     payload: Json<Map<String, Value>>,
 }
 
-impl TryFrom<Row> for EventRecord {
+impl TryFrom<EventRow> for EventRecord {
     type Error = StoreError;
 
-    fn try_from(row: Row) -> Result<Self> {
+    fn try_from(row: EventRow) -> Result<Self> {
         let damaged = |error: &dyn std::fmt::Display| {
             StoreError::Damaged(format!("event {}: {error}", row.id))
         };
@@ -60,7 +60,7 @@ pub(crate) async fn after(
     limit: u32,
 ) -> Result<Vec<EventRecord>> {
     let rows = sqlx::query_as!(
-        Row,
+        EventRow,
         r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
                   kind, payload AS "payload: Json<Map<String, Value>>"
            FROM events WHERE id > ? ORDER BY id LIMIT ?"#,
@@ -81,8 +81,8 @@ pub(crate) async fn newest_change(connection: &mut SqliteConnection) -> Result<i
     Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
 }
 
-/// The id of the newest event; 0 if there is none. No deleted event was newer: a run's progress is deleted after the event
-/// of the run's end.
+/// The id of the newest event; 0 if there is none. No deleted event had a greater id: events about a run's progress are
+/// deleted only after the run's end, which has a later event.
 pub(crate) async fn newest_id(connection: &mut SqliteConnection) -> Result<i64> {
     let newest = sqlx::query_scalar!(r#"SELECT id AS "id!" FROM events ORDER BY id DESC LIMIT 1"#);
     Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
@@ -126,7 +126,7 @@ pub(crate) async fn newest(
         Some(subject) => {
             let (subject_kind, subject_id) = subject.columns();
             sqlx::query_as!(
-                Row,
+                EventRow,
                 r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
                           kind, payload AS "payload: Json<Map<String, Value>>"
                    FROM events
@@ -146,7 +146,7 @@ pub(crate) async fn newest(
         }
         None => {
             sqlx::query_as!(
-                Row,
+                EventRow,
                 r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
                           kind, payload AS "payload: Json<Map<String, Value>>"
                    FROM events

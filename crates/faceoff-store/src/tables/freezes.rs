@@ -1,4 +1,4 @@
-//! Frozen boards.
+//! The table of board freezes: while a stage has one, its public boards do not show new results.
 
 use crate::{column::Instant, error::Result, tables::rulings::Ruling};
 use faceoff_types::StageId;

@@ -1,4 +1,4 @@
-//! Types of games: purpose, state and result.
+//! Games of a tournament: the types of their purpose, state and result.
 
 use faceoff_types::{GameId, GameSeedLabel, RoundNumber, SubmissionId, TeamId, TournamentId};
 use jiff::Timestamp;
@@ -23,6 +23,7 @@ pub struct Game {
 /// The purpose of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GamePurpose {
+    /// A game of a round, which counts.
     Round(ScheduleEntry),
     /// A test game against the organisers' baseline, which is the away side.
     Test {
@@ -34,7 +35,7 @@ pub enum GamePurpose {
         /// The team that requested it; it counts towards this team's quota.
         asked_by: TeamId,
     },
-    /// A game of a replay of the schedule, which measures how certain the champion is.
+    /// A game of a replay: all games of all rounds are repeated, to measure how certain the winner is.
     Replay {
         /// Number of the replay, from 1.
         replay: u32,
@@ -47,7 +48,7 @@ pub enum GamePurpose {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ScheduleEntry {
     pub round: RoundNumber,
-    /// From 1.
+    /// Number of the matchday in the round, from 1.
     pub matchday: u32,
     /// Number of the pairing, from 1, in the order in which the round was drawn.
     pub pairing: u32,
@@ -62,23 +63,27 @@ pub enum GameState {
     Running {
         /// From 1.
         attempt: u32,
+        /// When the attempt started.
         since: Timestamp,
     },
     /// The game has a result.
     Played(Box<GameResultRow>),
     /// Given up after platform faults: it has no result until it is repeated.
     PlatformFailed {
+        /// When it was given up.
         at: Timestamp,
         reason: String,
     },
     /// Its result was voided: it has none until it is repeated.
     Void {
+        /// When it was voided.
         at: Timestamp,
         /// Public.
         reason: String,
     },
     /// It is not played: a team left the tournament, or it does not count and was cancelled.
     Cancelled {
+        /// When it was cancelled.
         at: Timestamp,
         /// Public.
         reason: String,
@@ -102,7 +107,7 @@ pub struct GameResultRow {
     pub at: Timestamp,
     /// A game's `results.json`, as computed by the scoring.
     pub score: Value,
-    /// Its stored files; `None` for a replay of the schedule.
+    /// Its stored files; `None` for a game of a replay.
     pub recording: Option<GameRecording>,
 }
 
@@ -122,7 +127,7 @@ pub struct GameRecording {
 pub struct GameCommit {
     /// A game's `results.json`, as computed by the scoring.
     pub score: Value,
-    /// Files that were uploaded before; `None` exactly for a replay of the schedule.
+    /// Files that are stored already; `None` exactly for a game of a replay.
     pub recording: Option<GameRecording>,
     /// The tails of both agents' standard errors, with their faults.
     pub logs: [String; 2],

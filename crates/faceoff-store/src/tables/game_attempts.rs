@@ -1,4 +1,4 @@
-//! Attempts at games, including those without a result.
+//! The table of attempts at games. A game is attempted until an attempt has a result, or the game is given up.
 
 use crate::{
     column::{Instant, Json},
@@ -9,7 +9,7 @@ use faceoff_types::{GameId, Side};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// An attempt of a slot at a game.
+/// An attempt of a worker's slot at a game.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GameAttempt {
     /// From 1.
@@ -23,9 +23,10 @@ pub struct GameAttempt {
 /// The end of an attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttemptEnd {
+    /// When the attempt ended.
     pub at: Timestamp,
     pub outcome: AttemptOutcome,
-    /// Why it failed, was cancelled or its result voided; a text for the teams.
+    /// Why it failed, was cancelled, or its result was voided; a text for the teams.
     pub reason: Option<String>,
 }
 
@@ -68,11 +69,14 @@ pub(crate) async fn all(
             number: row.number,
             worker: row.worker,
             begun_at: row.begun_at.0,
-            end: row.ended_at.zip(row.outcome).map(|(at, how)| AttemptEnd {
-                at: at.0,
-                outcome: how,
-                reason: row.reason,
-            }),
+            end: row
+                .ended_at
+                .zip(row.outcome)
+                .map(|(at, outcome)| AttemptEnd {
+                    at: at.0,
+                    outcome,
+                    reason: row.reason,
+                }),
         })
         .collect())
 }
@@ -118,7 +122,7 @@ pub(crate) async fn transfer(
 pub(crate) async fn end(
     connection: &mut SqliteConnection,
     game: GameId,
-    how: AttemptOutcome,
+    outcome: AttemptOutcome,
     reason: Option<&str>,
     now: Timestamp,
 ) -> Result<()> {
@@ -126,7 +130,7 @@ pub(crate) async fn end(
     sqlx::query!(
         "UPDATE game_attempts SET ended_at = ?, outcome = ?, reason = ? WHERE game_id = ? AND ended_at IS NULL",
         now,
-        how,
+        outcome,
         reason,
         id,
     )
@@ -135,7 +139,7 @@ pub(crate) async fn end(
     Ok(())
 }
 
-/// Notes why the result of an attempt was voided.
+/// Stores the reason why the result of an attempt was voided.
 pub(crate) async fn set_voided(
     connection: &mut SqliteConnection,
     game: GameId,
@@ -163,11 +167,12 @@ pub(crate) async fn commit(
 ) -> Result<u32> {
     let (id, now, score) = (Text(game), Instant(now), Json(&commit.score));
     let recording = commit.recording.as_ref();
-    let (key, whole) = (
+    let (key, game_blake3) = (
         recording.map(|recording| &recording.key),
         recording.map(|recording| &recording.game_blake3),
     );
-    let [home, away] = [0, 1].map(|side| recording.map(|recording| &recording.side_blake3[side]));
+    let [home_blake3, away_blake3] =
+        [0, 1].map(|side| recording.map(|recording| &recording.side_blake3[side]));
     let [home_log, away_log] = &commit.logs;
     sqlx::query_scalar!(
         r#"UPDATE game_attempts
@@ -177,9 +182,9 @@ pub(crate) async fn commit(
         now,
         score,
         key,
-        whole,
-        home,
-        away,
+        game_blake3,
+        home_blake3,
+        away_blake3,
         home_log,
         away_log,
         id,

@@ -1,4 +1,4 @@
-//! State transitions of games.
+//! Transitions of a game's state: queued, running, played, or ended without a result.
 
 use crate::{column::Instant, error::Result};
 use faceoff_types::GameId;
@@ -73,7 +73,9 @@ pub(crate) async fn set_played(
 /// Why a game has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NoResult {
+    /// It was given up after platform faults.
     PlatformFailed,
+    /// Its result was voided.
     Void,
     Cancelled,
 }
@@ -82,11 +84,11 @@ pub(crate) enum NoResult {
 pub(crate) async fn set_without_result(
     connection: &mut SqliteConnection,
     id: GameId,
-    why: NoResult,
+    cause: NoResult,
     reason: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let state = match why {
+    let state = match cause {
         NoResult::PlatformFailed => "broken",
         NoResult::Void => "void",
         NoResult::Cancelled => "cancelled",

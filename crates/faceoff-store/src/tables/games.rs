@@ -1,4 +1,4 @@
-//! The table of games.
+//! The table of games of tournaments. The types of a game are in [`game`](super::game).
 
 pub use super::game::{
     Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, ScheduleEntry,
@@ -13,7 +13,7 @@ use serde_json::Value;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
 
-struct Row {
+struct GameRow {
     id: Text<GameId>,
     tournament: Text<TournamentId>,
     purpose: String,
@@ -41,7 +41,7 @@ struct Row {
     away_blake3: Option<String>,
 }
 
-impl Row {
+impl GameRow {
     fn purpose(&self) -> Option<GamePurpose> {
         let asked_by = self.asked_by.as_ref().map(|team| team.0);
         let entry = || {
@@ -106,11 +106,11 @@ impl Row {
     }
 }
 
-impl TryFrom<Row> for Game {
+impl TryFrom<GameRow> for Game {
     type Error = StoreError;
 
-    fn try_from(mut row: Row) -> Result<Self> {
-        let damaged = |row: &Row, field| {
+    fn try_from(mut row: GameRow) -> Result<Self> {
+        let damaged = |row: &GameRow, field| {
             StoreError::Damaged(format!("game {}: {field} {:?}", row.id.0, row.state))
         };
         let purpose = row.purpose().ok_or_else(|| damaged(&row, "purpose"))?;
@@ -132,7 +132,7 @@ impl TryFrom<Row> for Game {
 macro_rules! select_games {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            GameRow,
             r#"SELECT g.id AS "id: Text<GameId>", g.tournament_id AS "tournament: Text<TournamentId>", g.purpose,
                       g.round AS "round: u32", g.matchday AS "matchday: u32", g.pairing AS "pairing: u32",
                       g.second_half AS "second_half: bool", g.replay AS "replay: u32",
@@ -150,7 +150,7 @@ macro_rules! select_games {
     };
 }
 
-fn games(rows: Vec<Row>) -> Result<Vec<Game>> {
+fn parse_all(rows: Vec<GameRow>) -> Result<Vec<Game>> {
     rows.into_iter().map(Game::try_from).collect()
 }
 
@@ -173,7 +173,7 @@ pub(crate) async fn of_rounds(
         "WHERE g.tournament_id = ? AND g.purpose = 'round' ORDER BY g.round, g.pairing, g.second_half",
         id
     );
-    games(rows.fetch_all(connection).await?)
+    parse_all(rows.fetch_all(connection).await?)
 }
 
 /// A game of a round that has no result and can still get one, because neither team has left.
@@ -210,7 +210,7 @@ pub(crate) async fn pending(
     pending.collect()
 }
 
-/// The games of the schedule's replays, in order.
+/// The games of all replays of the schedule, in order.
 pub(crate) async fn of_replays(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -221,10 +221,10 @@ pub(crate) async fn of_replays(
          ORDER BY g.replay, g.round, g.pairing, g.second_half",
         id
     );
-    games(rows.fetch_all(connection).await?)
+    parse_all(rows.fetch_all(connection).await?)
 }
 
-/// Test games and friendly games, the newest first; of one team or of all.
+/// Test games and friendly games, the newest first; of one team or of all teams.
 pub(crate) async fn test_and_friendly(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -238,10 +238,10 @@ pub(crate) async fn test_and_friendly(
         id,
         team
     );
-    games(rows.fetch_all(connection).await?)
+    parse_all(rows.fetch_all(connection).await?)
 }
 
-/// All queued and running games.
+/// All queued and running games of a tournament.
 pub(crate) async fn open(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -251,7 +251,7 @@ pub(crate) async fn open(
         "WHERE g.tournament_id = ? AND g.state IN ('queued', 'running') ORDER BY g.game_no",
         id
     );
-    games(rows.fetch_all(connection).await?)
+    parse_all(rows.fetch_all(connection).await?)
 }
 
 /// The game that a job plays.
@@ -290,11 +290,11 @@ pub(crate) async fn insert(
     let (id, tournament, purpose) = (Text(game.id), Text(game.tournament), game.purpose.label());
     let (round, matchday, pairing, second_half) = match game.purpose.schedule_entry() {
         None => (None, None, None, None),
-        Some(place) => (
-            Some(place.round.get()),
-            Some(place.matchday),
-            Some(place.pairing),
-            Some(place.second_half),
+        Some(entry) => (
+            Some(entry.round.get()),
+            Some(entry.matchday),
+            Some(entry.pairing),
+            Some(entry.second_half),
         ),
     };
     let (replay, asked_by) = match game.purpose {

@@ -1,3 +1,5 @@
+//! The table of invitations: links with which users join, or get access to their account again.
+
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
@@ -47,8 +49,13 @@ impl InvitationRole {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InvitationState {
     Open,
-    Accepted { by: UserId, at: Timestamp },
-    Revoked { at: Timestamp },
+    Accepted {
+        user: UserId,
+        accepted_at: Timestamp,
+    },
+    Revoked {
+        revoked_at: Timestamp,
+    },
 }
 
 /// An invitation link, which can be used once.
@@ -64,7 +71,7 @@ pub struct Invitation {
     pub state: InvitationState,
 }
 
-struct Row {
+struct InvitationRow {
     id: Text<InvitationId>,
     role: String,
     team_id: Option<Text<TeamId>>,
@@ -77,12 +84,15 @@ struct Row {
     revoked_at: Option<Instant>,
 }
 
-impl TryFrom<Row> for Invitation {
+impl TryFrom<InvitationRow> for Invitation {
     type Error = StoreError;
-    fn try_from(row: Row) -> Result<Self> {
+    fn try_from(row: InvitationRow) -> Result<Self> {
         let state = match (row.accepted_at, row.accepted_by, row.revoked_at) {
-            (Some(at), Some(by), None) => InvitationState::Accepted { by: by.0, at: at.0 },
-            (_, _, Some(at)) => InvitationState::Revoked { at: at.0 },
+            (Some(at), Some(user), None) => InvitationState::Accepted {
+                user: user.0,
+                accepted_at: at.0,
+            },
+            (_, _, Some(at)) => InvitationState::Revoked { revoked_at: at.0 },
             _ => InvitationState::Open,
         };
         Ok(Self {
@@ -100,7 +110,7 @@ impl TryFrom<Row> for Invitation {
 macro_rules! select_invitations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            InvitationRow,
             r#"SELECT id AS "id: Text<InvitationId>", role, team_id AS "team_id: Text<TeamId>",
                       person_id AS "person_id: Text<UserId>", note, created_at AS "created_at: Instant",
                       expires_at AS "expires_at: Instant", accepted_at AS "accepted_at: Instant",
@@ -189,14 +199,14 @@ pub(crate) async fn insert(
 pub(crate) async fn set_accepted(
     connection: &mut SqliteConnection,
     id: InvitationId,
-    by: UserId,
-    at: Timestamp,
+    user: UserId,
+    accepted_at: Timestamp,
 ) -> Result<()> {
-    let (id, by, at) = (Text(id), Text(by), Instant(at));
+    let (id, user, accepted_at) = (Text(id), Text(user), Instant(accepted_at));
     sqlx::query!(
         "UPDATE invitations SET accepted_at = ?, accepted_by = ? WHERE id = ?",
-        at,
-        by,
+        accepted_at,
+        user,
         id
     )
     .execute(connection)
@@ -207,11 +217,15 @@ pub(crate) async fn set_accepted(
 pub(crate) async fn set_revoked(
     connection: &mut SqliteConnection,
     id: InvitationId,
-    at: Timestamp,
+    revoked_at: Timestamp,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(at));
-    sqlx::query!("UPDATE invitations SET revoked_at = ? WHERE id = ?", at, id)
-        .execute(connection)
-        .await?;
+    let (id, revoked_at) = (Text(id), Instant(revoked_at));
+    sqlx::query!(
+        "UPDATE invitations SET revoked_at = ? WHERE id = ?",
+        revoked_at,
+        id
+    )
+    .execute(connection)
+    .await?;
     Ok(())
 }

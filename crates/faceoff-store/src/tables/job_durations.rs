@@ -1,4 +1,4 @@
-//! Recent durations of jobs, as charged by the queue.
+//! Recent durations of jobs: the slot time (time for which a worker's slot was occupied) that the queue has charged.
 
 use crate::{column::Instant, error::Result};
 use faceoff_types::{EvaluationId, RunId, StageDay, StageId, TeamId};
@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp, civil::Date, tz::TimeZone};
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::HashMap;
 
-/// The measured period: a week has the current agents and all days of the week.
+/// Length of the measured period: a week has the current agents and all days of the week.
 const PERIOD: SignedDuration = SignedDuration::from_hours(7 * 24);
 
 /// Mean slot time of recent jobs, in milliseconds; `None` or absent if none was measured.
@@ -25,7 +25,7 @@ pub struct JobDurations {
 }
 
 impl JobDurations {
-    /// An episode of this team, else of any team.
+    /// Mean slot time of an episode of this team; of any team if none of this team was measured.
     #[must_use]
     pub fn episode_ms_of(&self, team: TeamId) -> Option<f64> {
         self.episode_ms.get(&team).copied().or(self.mean_episode_ms)
@@ -39,9 +39,9 @@ pub(crate) struct OpenEvaluation {
     pub(crate) team: TeamId,
     pub(crate) stage_day: StageDay,
     pub(crate) run: RunId,
-    /// Episodes of its committed shards, and their slot time in milliseconds.
+    /// Number of episodes in its committed shards, and their slot time in milliseconds.
     pub(crate) done: (u32, i64),
-    /// Episodes of its other shards.
+    /// Number of episodes in its other shards.
     pub(crate) episodes_left: u32,
     /// Number of its other shards.
     pub(crate) shards_left: u32,
@@ -90,37 +90,42 @@ pub(crate) async fn open_evaluations(
 /// The durations of the week until `now`, including those of open evaluations.
 pub(crate) async fn recent(
     connection: &mut SqliteConnection,
-    open: &[OpenEvaluation],
+    open_evaluations: &[OpenEvaluation],
     now: Timestamp,
 ) -> Result<JobDurations> {
     let since = now.saturating_sub(PERIOD).unwrap_or(Timestamp::MIN);
     // A stage's date may differ by a day from the UTC date.
-    let first = since.to_zoned(TimeZone::UTC).date();
-    let (first, since) = (Text(first.yesterday().unwrap_or(first)), Instant(since));
+    let first_day = since.to_zoned(TimeZone::UTC).date();
+    let (first_day, since) = (
+        Text(first_day.yesterday().unwrap_or(first_day)),
+        Instant(since),
+    );
     let rows = sqlx::query!(
         r#"SELECT e.team_id AS "team!: Text<TeamId>", SUM(e.slot_ms) AS "slot_ms!: i64",
                   SUM(r.episodes_per_task * json_array_length(r.tasks)) AS "episodes!: i64"
            FROM evaluations e JOIN runs r ON r.id = e.run_id
            WHERE e.day >= ? AND e.finished_at >= ? AND e.state = 'finished' AND e.slot_ms > 0 GROUP BY +e.team_id"#,
-        first,
+        first_day,
         since
     )
     .fetch_all(&mut *connection)
     .await?;
-    let running = open
-        .iter()
-        .map(|open| (open.team, open.done.1, i64::from(open.done.0)));
+    let running = open_evaluations.iter().map(|evaluation| {
+        let (episodes, ms) = evaluation.done;
+        (evaluation.team, ms, i64::from(episodes))
+    });
     let finished = rows
         .into_iter()
         .map(|row| (row.team.0, row.slot_ms, row.episodes));
+    // Slot time in milliseconds and number of episodes.
     let mut by_team: HashMap<TeamId, (i64, i64)> = HashMap::new();
     for (team, ms, episodes) in finished.chain(running).filter(|(_, _, count)| *count > 0) {
         let sum = by_team.entry(team).or_default();
         *sum = (sum.0 + ms, sum.1 + episodes);
     }
-    let all = by_team
+    let total = by_team
         .values()
-        .fold((0, 0), |all, team| (all.0 + team.0, all.1 + team.1));
+        .fold((0, 0), |total, team| (total.0 + team.0, total.1 + team.1));
     let validation_ms = sqlx::query_scalar!(
         r#"SELECT AVG(j.charged_ms) AS "ms: f64"
            FROM submissions s JOIN validation_runs r ON r.submission_id = s.id JOIN jobs j ON j.id = r.job_id
@@ -133,7 +138,7 @@ pub(crate) async fn recent(
         r#"SELECT AVG(j.charged_ms) AS "ms: f64"
            FROM evaluations e JOIN scorings s ON s.evaluation_id = e.id JOIN jobs j ON j.id = s.job_id
            WHERE e.day >= ? AND e.finished_at >= ? AND j.state = 'done' AND j.charged_ms > 0"#,
-        first,
+        first_day,
         since
     )
     .fetch_one(&mut *connection)
@@ -148,16 +153,17 @@ pub(crate) async fn recent(
     .await?;
     Ok(JobDurations {
         game_step_ms,
-        mean_episode_ms: mean(all),
+        mean_episode_ms: mean_ms(total),
         episode_ms: by_team
             .into_iter()
-            .filter_map(|(team, sum)| Some((team, mean(sum)?)))
+            .filter_map(|(team, sum)| Some((team, mean_ms(sum)?)))
             .collect(),
         validation_ms,
         scoring_ms,
     })
 }
 
-fn mean((ms, episodes): (i64, i64)) -> Option<f64> {
+/// Mean slot time of an episode; `None` if there are no episodes.
+fn mean_ms((ms, episodes): (i64, i64)) -> Option<f64> {
     (episodes > 0).then(|| ms as f64 / episodes as f64)
 }

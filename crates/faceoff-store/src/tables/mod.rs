@@ -1,5 +1,5 @@
 //! The tables: types of rows, and changes of single rows. The operations decide when a row may change,
-//! and what changes with it.
+//! and which other rows change with it.
 
 pub(crate) mod ablations;
 pub(crate) mod active_submissions;

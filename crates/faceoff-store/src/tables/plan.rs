@@ -1,16 +1,18 @@
+//! [`RunPlan`]: the episodes and rules of a run.
+
 use crate::error::{Result, StoreError};
 use faceoff_types::{Profile, StageLimits, Task, Variation};
 
 /// The episodes and rules of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunPlan {
-    /// Selects the enabled perturbations.
+    /// The perturbation profile, which selects the enabled perturbations.
     pub profile: Profile,
     /// At least one, without duplicates.
     pub tasks: Vec<Task>,
     /// Episodes of each task; at least one.
     pub episodes_per_task: u32,
-    /// Episodes of one shard; at least one. Scores do not depend on it.
+    /// Episodes of one shard (a part of the run that is one job); at least one. Scores do not depend on it.
     pub episodes_per_shard: u32,
     /// The run ends without a score after more agent faults than this in all its shards.
     pub max_faults: u32,
@@ -35,8 +37,8 @@ impl RunPlan {
                 "a plan plays at least one episode".into(),
             ));
         }
-        let magnitudes = self.variation.perturbations.check();
-        magnitudes.map_err(|error| StoreError::Conflict(format!("perturbations.{error}")))
+        let checked = self.variation.perturbations.check();
+        checked.map_err(|error| StoreError::Conflict(format!("perturbations.{error}")))
     }
 
     /// Number of episodes of all tasks.

@@ -1,4 +1,4 @@
-//! The versions of the program that have opened the database.
+//! The table of versions of Faceoff that have opened the database.
 
 use crate::{error::Result, program::Program};
 use sqlx::SqliteConnection;
@@ -6,12 +6,12 @@ use sqlx::SqliteConnection;
 /// The last version that opened the database; `None` if older versions did, which did not record it. The query is not
 /// checked at compile time, because the table may be missing or from a later version.
 pub(crate) async fn last(connection: &mut SqliteConnection) -> Result<Option<Program>> {
-    let found: i64 = sqlx::query_scalar(
+    let table_count: i64 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'programs'",
     )
     .fetch_one(&mut *connection)
     .await?;
-    if found == 0 {
+    if table_count == 0 {
         return Ok(None);
     }
     let row: Option<(String, i64)> =

@@ -1,4 +1,4 @@
-//! Trials and proposed re-evaluations, which do not count unless they are applied.
+//! The table of proposals: trials, which never count, and proposed re-evaluations, which count only if they are applied.
 
 use crate::{
     column::Instant,
@@ -24,7 +24,7 @@ pub struct Proposal {
     pub outcome: Option<ProposalOutcome>,
 }
 
-/// The evaluations of a proposal.
+/// The evaluations that a proposal consists of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProposalKind {
     /// A trial of the currently active submissions on separate episodes. It never counts.
@@ -76,7 +76,7 @@ pub enum ProposalOutcome {
     Dropped(Timestamp),
 }
 
-struct Row {
+struct ProposalRow {
     id: Text<ProposalId>,
     stage: Text<StageId>,
     revision: u32,
@@ -88,13 +88,13 @@ struct Row {
     outcome: Option<String>,
 }
 
-impl TryFrom<Row> for Proposal {
+impl TryFrom<ProposalRow> for Proposal {
     type Error = StoreError;
-    fn try_from(row: Row) -> Result<Self> {
+    fn try_from(row: ProposalRow) -> Result<Self> {
         let damaged =
             |problem: &str| StoreError::Damaged(format!("proposal {}: {problem}", row.id.0));
         let kind = ProposalKind::from_columns(&row.kind, row.day.as_ref().map(|day| day.0));
-        let settled = match (row.outcome.as_deref(), row.settled_at) {
+        let outcome = match (row.outcome.as_deref(), row.settled_at) {
             (None, None) => None,
             (Some("applied"), Some(at)) => Some(ProposalOutcome::Applied(at.0)),
             (Some("dropped"), Some(at)) => Some(ProposalOutcome::Dropped(at.0)),
@@ -107,15 +107,16 @@ impl TryFrom<Row> for Proposal {
             kind: kind.ok_or_else(|| damaged("unknown kind"))?,
             reason: row.reason,
             created_at: row.created_at.0,
-            outcome: settled,
+            outcome,
         })
     }
 }
 
+/// `SELECT` of whole proposals; the argument is the SQL after `FROM proposals`.
 macro_rules! select_proposals {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            ProposalRow,
             r#"SELECT id AS "id: Text<ProposalId>", stage_id AS "stage: Text<StageId>", revision AS "revision: u32",
                       kind, day AS "day: Text<Date>", reason, created_at AS "created_at: Instant",
                       settled_at AS "settled_at: Instant", outcome
@@ -141,18 +142,22 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: ProposalId) -> R
         .try_into()
 }
 
-pub(crate) async fn insert(connection: &mut SqliteConnection, new: &Proposal) -> Result<()> {
-    let (id, stage, kind) = (Text(new.id), Text(new.stage), new.kind.label());
-    let (day, created_at) = (new.kind.day().map(Text), Instant(new.created_at));
+pub(crate) async fn insert(connection: &mut SqliteConnection, proposal: &Proposal) -> Result<()> {
+    let (id, stage, kind) = (
+        Text(proposal.id),
+        Text(proposal.stage),
+        proposal.kind.label(),
+    );
+    let (day, created_at) = (proposal.kind.day().map(Text), Instant(proposal.created_at));
     sqlx::query!(
         "INSERT INTO proposals (id, stage_id, revision, kind, day, reason, created_at)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
         id,
         stage,
-        new.revision,
+        proposal.revision,
         kind,
         day,
-        new.reason,
+        proposal.reason,
         created_at,
     )
     .execute(connection)
@@ -163,17 +168,17 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, new: &Proposal) ->
 pub(crate) async fn set_outcome(
     connection: &mut SqliteConnection,
     id: ProposalId,
-    settled: ProposalOutcome,
+    outcome: ProposalOutcome,
 ) -> Result<()> {
-    let (outcome, at) = match settled {
+    let (label, decided_at) = match outcome {
         ProposalOutcome::Applied(at) => ("applied", at),
         ProposalOutcome::Dropped(at) => ("dropped", at),
     };
-    let (id, at) = (Text(id), Instant(at));
+    let (id, decided_at) = (Text(id), Instant(decided_at));
     sqlx::query!(
         "UPDATE proposals SET outcome = ?, settled_at = ? WHERE id = ?",
-        outcome,
-        at,
+        label,
+        decided_at,
         id,
     )
     .execute(connection)

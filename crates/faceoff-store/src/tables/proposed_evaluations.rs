@@ -1,4 +1,5 @@
-//! Evaluations of trials and proposals. If a proposal is applied, they become regular evaluations with the same ids.
+//! The table of proposed evaluations: those of a proposal (a trial or a proposed re-evaluation). If the proposal is applied,
+//! they become regular evaluations with the same ids.
 
 use crate::{
     column::{Instant, Json},
@@ -13,7 +14,7 @@ use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
 
-/// An evaluation of a trial or a proposal; it does not count.
+/// An evaluation of a proposal; it does not count.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProposedEvaluation {
     /// Also the id of the regular evaluation that it becomes if it is applied.
@@ -122,8 +123,8 @@ pub(crate) async fn find(
     id: EvaluationId,
 ) -> Result<ProposedEvaluationRow> {
     let id = Text(id);
-    let found = select_proposed_evaluations!("WHERE d.id = ?", id).fetch_optional(connection);
-    found.await?.ok_or(StoreError::NotFound("evaluation"))
+    let row = select_proposed_evaluations!("WHERE d.id = ?", id).fetch_optional(connection);
+    row.await?.ok_or(StoreError::NotFound("evaluation"))
 }
 
 /// The evaluations of a proposal, in the order in which they were queued.
@@ -175,11 +176,19 @@ pub(crate) async fn of_job(
 
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
-    new: &ProposedEvaluation,
+    evaluation: &ProposedEvaluation,
 ) -> Result<()> {
-    let (id, proposal, submission) = (Text(new.id), Text(new.proposal), Text(new.submission));
-    let (team, replaces, run) = (Text(new.team), new.replaces.map(Text), Text(new.run));
-    let created_at = Instant(new.created_at);
+    let (id, proposal, submission) = (
+        Text(evaluation.id),
+        Text(evaluation.proposal),
+        Text(evaluation.submission),
+    );
+    let (team, replaces, run) = (
+        Text(evaluation.team),
+        evaluation.replaces.map(Text),
+        Text(evaluation.run),
+    );
+    let created_at = Instant(evaluation.created_at);
     sqlx::query!(
         "INSERT INTO proposed_evaluations
              (id, proposal_id, submission_id, team_id, replaces, run_id, created_at, state)
@@ -197,7 +206,7 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Notes which job scores a proposed evaluation.
+/// Stores which job scores a proposed evaluation.
 pub(crate) async fn insert_scoring(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -277,7 +286,7 @@ pub(crate) async fn set_failed(
     Ok(())
 }
 
-/// Number of open evaluations, of one proposal or of all.
+/// Number of open evaluations, of one proposal or of all proposals.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
     proposal: Option<ProposalId>,
@@ -292,17 +301,18 @@ pub(crate) async fn count_open(
     .await?)
 }
 
-/// Evaluations of proposals that were dropped until `before` and whose datasets are still stored.
+/// Evaluations of proposals that were dropped until `dropped_until` and whose datasets are still stored, with the keys of
+/// these datasets.
 pub(crate) async fn dropped_with_datasets(
     connection: &mut SqliteConnection,
-    before: Timestamp,
+    dropped_until: Timestamp,
 ) -> Result<Vec<(EvaluationId, String)>> {
-    let before = Instant(before);
+    let dropped_until = Instant(dropped_until);
     let rows = sqlx::query!(
         r#"SELECT d.id AS "id: Text<EvaluationId>", d.dataset AS "dataset!"
            FROM proposals p JOIN proposed_evaluations d ON d.proposal_id = p.id
            WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND d.dataset IS NOT NULL AND d.dataset_removed_at IS NULL"#,
-        before
+        dropped_until
     )
     .fetch_all(connection)
     .await?;

@@ -1,3 +1,5 @@
+//! The table of questions: teams ask the organisers, who answer.
+
 use crate::{
     column::Instant,
     error::{Result, StoreError},
@@ -9,6 +11,7 @@ use sqlx::{SqliteConnection, types::Text};
 /// The organisers' answer to a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
+    /// When it was given.
     pub at: Timestamp,
     pub text: String,
     /// Are question and answer public? The team that asked is never shown.
@@ -21,12 +24,13 @@ pub struct Question {
     pub id: QuestionId,
     /// The team that asked; `None` in a public archive.
     pub team: Option<TeamId>,
+    /// When it was asked.
     pub at: Timestamp,
     pub text: String,
     pub answer: Option<Reply>,
 }
 
-struct Row {
+struct QuestionRow {
     id: Text<QuestionId>,
     team_id: Option<Text<TeamId>>,
     asked_at: Instant,
@@ -36,8 +40,8 @@ struct Row {
     public: bool,
 }
 
-impl From<Row> for Question {
-    fn from(row: Row) -> Self {
+impl From<QuestionRow> for Question {
+    fn from(row: QuestionRow) -> Self {
         let is_public = row.public;
         let answer = row.answer.zip(row.answered_at);
         Self {
@@ -57,7 +61,7 @@ impl From<Row> for Question {
 /// All questions, the newest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Question>> {
     let rows = sqlx::query_as!(
-        Row,
+        QuestionRow,
         r#"SELECT id AS "id: Text<QuestionId>", team_id AS "team_id: Text<TeamId>", asked_at AS "asked_at: Instant",
                   text, answer, answered_at AS "answered_at: Instant", public AS "public: bool"
            FROM questions ORDER BY asked_at DESC, id DESC"#
@@ -68,8 +72,8 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Questio
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: QuestionId) -> Result<Question> {
-    let all = all(connection).await?;
-    let found = all.into_iter().find(|question| question.id == id);
+    let questions = all(connection).await?;
+    let found = questions.into_iter().find(|question| question.id == id);
     found.ok_or(StoreError::NotFound("question"))
 }
 

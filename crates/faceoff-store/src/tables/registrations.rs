@@ -1,3 +1,5 @@
+//! The table of registrations: requests of new teams to take part, on which the organisers decide.
+
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
@@ -11,9 +13,14 @@ use sqlx::{SqliteConnection, types::Text};
 pub enum RegistrationState {
     /// An organiser has to decide.
     Pending,
-    /// The team was created; the registration's code now invites its first member.
-    Approved { at: Timestamp, team: TeamId },
+    /// The team was created; the code in the registration's link now invites its first member.
+    Approved {
+        /// When it was approved.
+        at: Timestamp,
+        team: TeamId,
+    },
     Refused {
+        /// When it was refused.
         at: Timestamp,
         /// Shown to the person who registered.
         reason: String,
@@ -23,7 +30,7 @@ pub enum RegistrationState {
 /// A request to add a team to the season.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Registration {
-    /// Not secret: the code cannot be derived from it.
+    /// Not secret: the code in the link cannot be derived from it.
     pub id: RegistrationId,
     /// The requested name.
     pub team_name: TeamName,
@@ -39,7 +46,7 @@ pub struct Registration {
     pub state: RegistrationState,
 }
 
-struct Row {
+struct RegistrationRow {
     id: Text<RegistrationId>,
     team_name: Text<TeamName>,
     affiliation: Option<String>,
@@ -53,8 +60,8 @@ struct Row {
     team_id: Option<Text<TeamId>>,
 }
 
-impl From<Row> for Registration {
-    fn from(row: Row) -> Self {
+impl From<RegistrationRow> for Registration {
+    fn from(row: RegistrationRow) -> Self {
         let state = match (row.decided_at, row.team_id, row.reason) {
             (Some(at), Some(team), _) => RegistrationState::Approved {
                 at: at.0,
@@ -81,7 +88,7 @@ impl From<Row> for Registration {
 macro_rules! select_registrations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            RegistrationRow,
             r#"SELECT id AS "id: Text<RegistrationId>", team_name AS "team_name: Text<TeamName>", affiliation, link,
                       division AS "division: Text<DivisionName>", contact, accepted_terms AS "accepted_terms: u32",
                       created_at AS "created_at: Instant", decided_at AS "decided_at: Instant", reason,
@@ -123,7 +130,7 @@ pub(crate) async fn by_code(
     Ok(row.map(Registration::from))
 }
 
-/// The hash of the code that the person who registered has.
+/// The hash of the code in the link that the person who registered has.
 pub(crate) async fn code_hash(
     connection: &mut SqliteConnection,
     id: RegistrationId,
@@ -190,12 +197,12 @@ pub(crate) async fn set_approved(
     connection: &mut SqliteConnection,
     id: RegistrationId,
     team: TeamId,
-    at: Timestamp,
+    approved_at: Timestamp,
 ) -> Result<()> {
-    let (id, team, at) = (Text(id), Text(team), Instant(at));
+    let (id, team, approved_at) = (Text(id), Text(team), Instant(approved_at));
     sqlx::query!(
         "UPDATE registrations SET state = 'approved', decided_at = ?, team_id = ? WHERE id = ?",
-        at,
+        approved_at,
         team,
         id
     )
@@ -208,12 +215,12 @@ pub(crate) async fn set_refused(
     connection: &mut SqliteConnection,
     id: RegistrationId,
     reason: &str,
-    at: Timestamp,
+    refused_at: Timestamp,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(at));
+    let (id, refused_at) = (Text(id), Instant(refused_at));
     sqlx::query!(
         "UPDATE registrations SET state = 'refused', decided_at = ?, reason = ? WHERE id = ?",
-        at,
+        refused_at,
         reason,
         id
     )

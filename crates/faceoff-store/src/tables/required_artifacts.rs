@@ -1,4 +1,4 @@
-//! Artifacts that the database refers to, and that a complete backup must therefore contain.
+//! Artifacts (files in the object store) that the database refers to. A complete backup must contain them.
 
 use crate::error::Result;
 use sqlx::SqliteConnection;
@@ -15,7 +15,8 @@ pub enum RequiredArtifact {
     Folder { key: String },
 }
 
-/// All required artifacts. A bundle that is not validated yet is left out: it may be rejected and removed at any time.
+/// All required artifacts. A bundle that is not validated yet is left out: it may turn out
+/// invalid and be removed at any time.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<RequiredArtifact>> {
     let mut required = Vec::new();
     let bundles = sqlx::query!(

@@ -1,4 +1,5 @@
-//! Retention of a stage's large files, and their removal.
+//! The table of retentions, which say how long a stage's large files (datasets and bundles) are kept, and queries for their
+//! removal.
 
 use crate::{
     column::{Instant, Json},
@@ -72,7 +73,7 @@ pub(crate) struct ScoredEvaluation {
     pub(crate) counts: bool,
     /// Is its dataset stored?
     pub(crate) has_dataset: bool,
-    /// All files of its team are kept as evidence for the organisers.
+    /// Are all files of its team kept as evidence for the organisers?
     pub(crate) is_evidence: bool,
     /// Size of the dataset; `None` if it has not been measured.
     pub(crate) bytes: Option<u64>,
@@ -127,7 +128,7 @@ pub(crate) async fn scored_evaluations(
         .collect())
 }
 
-/// Number of trials and proposals of a stage that are neither applied nor dropped.
+/// Number of proposals of a stage that are neither applied nor dropped.
 pub(crate) async fn count_proposals(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -142,14 +143,14 @@ pub(crate) async fn count_proposals(
 }
 
 /// Stored bundles, with their sizes, of submissions that were evaluated in a stage and are not needed any more. None is
-/// active or has open jobs, and all their datasets are removed or in `going`. None can be evaluated again, because their
-/// stages are signed off.
+/// active or has open jobs, and all their datasets are removed or in `removable`. None can be evaluated again, because
+/// their stages are signed off.
 pub(crate) async fn idle_bundles(
     connection: &mut SqliteConnection,
     stage: StageId,
-    going: &[EvaluationId],
+    removable: &[EvaluationId],
 ) -> Result<Vec<(SubmissionId, u64)>> {
-    let (stage, going) = (Text(stage), Json(going));
+    let (stage, removable) = (Text(stage), Json(removable));
     let rows = sqlx::query!(
         r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_bytes AS "bytes: u64"
            FROM submissions s JOIN teams t ON t.id = s.team_id
@@ -174,7 +175,7 @@ pub(crate) async fn idle_bundles(
              AND NOT EXISTS (SELECT 1 FROM games g WHERE g.home_submission_id = s.id AND g.state IN ('queued', 'running'))
              AND NOT EXISTS (SELECT 1 FROM games g WHERE g.away_submission_id = s.id AND g.state IN ('queued', 'running'))"#,
         stage,
-        going,
+        removable,
     )
     .fetch_all(connection)
     .await?;
@@ -207,19 +208,19 @@ pub(crate) async fn set_dataset_removed(
     Ok(())
 }
 
-/// Datasets that were marked as removed until `before` and whose files still exist, with their keys. Evidence is left
+/// Datasets that were marked as removed until `removed_until` and whose files still exist, with their keys. Evidence is left
 /// out.
 pub(crate) async fn deletable_datasets(
     connection: &mut SqliteConnection,
-    before: Timestamp,
+    removed_until: Timestamp,
 ) -> Result<Vec<(EvaluationId, String)>> {
-    let before = Instant(before);
+    let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
         r#"SELECT e.id AS "id: Text<EvaluationId>", e.dataset AS "dataset!" FROM evaluations e
            JOIN teams t ON t.id = e.team_id
            WHERE e.dataset_removed_at IS NOT NULL AND e.dataset_removed_at <= ? AND e.dataset_gone = 0
              AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0"#,
-        before
+        removed_until
     )
     .fetch_all(connection)
     .await?;
@@ -229,7 +230,7 @@ pub(crate) async fn deletable_datasets(
         .collect())
 }
 
-/// Notes that the file of a removed dataset was deleted.
+/// Records that the file of a removed dataset was deleted.
 pub(crate) async fn set_dataset_file_deleted(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -262,7 +263,7 @@ pub(crate) async fn unmeasured(
 }
 
 /// Stores the size of the dataset of an evaluation, or of the proposed evaluation with this id.
-pub(crate) async fn set_measured(
+pub(crate) async fn set_dataset_bytes(
     connection: &mut SqliteConnection,
     id: EvaluationId,
     bytes: u64,

@@ -1,4 +1,4 @@
-//! The rounds of a tournament, with their draws.
+//! The table of rounds of a tournament, with their draws: the pairs of teams that play each other.
 
 use crate::{
     column::{Instant, Json},
@@ -14,13 +14,13 @@ use std::collections::BTreeMap;
 pub struct TournamentRound {
     /// From 1.
     pub number: RoundNumber,
-    /// Its submissions are fixed since then.
+    /// When it started; its submissions are fixed since then.
     pub started_at: Timestamp,
     /// When all of its games had ended for the first time.
     pub over_at: Option<Timestamp>,
     /// The teams of each group; empty if there are no groups.
     pub groups: Vec<Vec<TeamId>>,
-    /// By matchday.
+    /// Teams without an opponent, by matchday.
     pub byes: Vec<RoundBye>,
     /// The submission of each team in this round.
     pub submissions: Vec<(TeamId, SubmissionId)>,
@@ -154,7 +154,7 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Notes that all games of a round have ended; false if that was noted before.
+/// Records that all games of a round have ended; false if that was recorded before.
 pub(crate) async fn set_ended(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
@@ -162,7 +162,7 @@ pub(crate) async fn set_ended(
     now: Timestamp,
 ) -> Result<bool> {
     let (id, number, now) = (Text(tournament), round.get(), Instant(now));
-    let over = sqlx::query!(
+    let updated = sqlx::query!(
         "UPDATE rounds SET over_at = ? WHERE tournament_id = ? AND number = ? AND over_at IS NULL",
         now,
         id,
@@ -170,5 +170,5 @@ pub(crate) async fn set_ended(
     )
     .execute(connection)
     .await?;
-    Ok(over.rows_affected() == 1)
+    Ok(updated.rows_affected() == 1)
 }

@@ -1,3 +1,5 @@
+//! The table of runs. A run plays episodes for an evaluation or an ablation, and is divided into shards.
+
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
@@ -9,12 +11,12 @@ use faceoff_types::{
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// A finished run whose shards can be deleted.
+/// A finished run whose shards (with the outcomes of their episodes) can be deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClearableRun {
     pub run: RunId,
-    /// The run is complete and has no episode summary of the requested version. It must be computed from the outcomes
-    /// before they are deleted.
+    /// Is the run complete, without an episode summary of the requested version? Then the summary must be computed from
+    /// the outcomes before they are deleted.
     pub needs_summary: bool,
 }
 
@@ -170,18 +172,18 @@ pub(crate) async fn set_stopped(connection: &mut SqliteConnection, id: RunId) ->
     Ok(())
 }
 
-/// The runs whose recordings are stored although their evaluation ended at `before` or earlier.
+/// The runs whose recordings are stored although their evaluation ended at `ended_until` or earlier.
 pub(crate) async fn with_old_recordings(
     connection: &mut SqliteConnection,
-    before: Timestamp,
+    ended_until: Timestamp,
 ) -> Result<Vec<RunId>> {
-    let before = Instant(before);
+    let ended_until = Instant(ended_until);
     let runs = sqlx::query_scalar!(
         r#"SELECT r.id AS "id: Text<RunId>"
            FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
            WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL
              AND COALESCE(e.finished_at, d.finished_at) <= ?"#,
-        before,
+        ended_until,
     )
     .fetch_all(connection)
     .await?;
@@ -204,13 +206,13 @@ pub(crate) async fn set_recordings_removed(
     Ok(())
 }
 
-/// The runs whose shards are stored although their owner ended at `before` or earlier, the oldest first.
+/// The runs whose shards are stored although their owner ended at `ended_until` or earlier, the oldest first.
 pub(crate) async fn clearable(
     connection: &mut SqliteConnection,
     summary_version: u32,
-    before: Timestamp,
+    ended_until: Timestamp,
 ) -> Result<Vec<ClearableRun>> {
-    let before = Instant(before);
+    let ended_until = Instant(ended_until);
     let rows = sqlx::query!(
         r#"SELECT r.id AS "run!: Text<RunId>",
                   r.state = 'played'
@@ -221,7 +223,7 @@ pub(crate) async fn clearable(
            WHERE r.cleared_at IS NULL AND COALESCE(e.finished_at, d.finished_at, a.finished_at) <= ?
            ORDER BY COALESCE(e.finished_at, d.finished_at, a.finished_at), r.id"#,
         summary_version,
-        before,
+        ended_until,
     )
     .fetch_all(connection)
     .await?;

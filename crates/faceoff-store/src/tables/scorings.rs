@@ -1,4 +1,4 @@
-//! Scoring jobs: they score evaluations whose shards are all committed.
+//! The table of scoring jobs: they score evaluations whose episodes have all been run.
 
 use crate::error::Result;
 use faceoff_types::EvaluationId;

@@ -1,3 +1,5 @@
+//! The table of the season, which has one row.
+
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
@@ -43,7 +45,7 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
         name: row.name,
         secret: Seed::from_bytes(row.secret.0),
         commitment: match (row.archived_commitment, row.closed_at) {
-            // an archive without the secret
+            // an archive of a season that was not closed has no secret
             (Some(commitment), None) => commitment,
             _ => blake3::hash(&row.secret.0).to_string(),
         },

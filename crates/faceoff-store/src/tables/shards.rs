@@ -1,3 +1,5 @@
+//! The table of shards: parts of a run's episodes, each of which is one job.
+
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
@@ -16,8 +18,8 @@ pub struct Shard {
     pub first_episode: u32,
     /// One past the last episode.
     pub end_episode: u32,
-    /// Artifact key prefix of its recording, once committed, if its run is recorded. The artifacts
-    /// are removed some time after the end of the run's owner.
+    /// Artifact key prefix of its recording, if it is committed and its run is recorded. The artifacts
+    /// are removed some time after the end of the evaluation.
     pub recording: Option<String>,
 }
 
@@ -36,9 +38,9 @@ pub struct ShardCommit {
     pub outcomes: Vec<EpisodeOutcome>,
     /// Tail of the agent's standard error.
     pub log: String,
-    /// The agent's faults in this shard exceeded the plan's limit.
+    /// Was the shard stopped because the agent's faults in it exceeded the plan's limit?
     pub stopped_by_faults: bool,
-    /// Artifact key prefix of the recording, uploaded before; `None` exactly if the run is not recorded.
+    /// Artifact key prefix of the recording, which is stored already; `None` exactly if the run is not recorded.
     pub recording: Option<String>,
 }
 
@@ -46,14 +48,14 @@ impl ShardCommit {
     /// Refuses a commit that does not cover its shard: the score would be based on fewer episodes.
     pub(crate) fn check(&self, shard: &Shard, keeps_recordings: bool) -> Result<()> {
         let episodes = shard.first_episode..shard.end_episode;
-        let in_order = self
+        let is_in_order = self
             .outcomes
             .iter()
             .zip(episodes.clone())
             .all(|(outcome, episode)| outcome.task == shard.task && outcome.episode == episode);
-        let complete = self.outcomes.len() == episodes.len()
+        let is_complete = self.outcomes.len() == episodes.len()
             || (self.stopped_by_faults && self.outcomes.len() < episodes.len());
-        if !(in_order && complete) {
+        if !(is_in_order && is_complete) {
             return Err(StoreError::Conflict(format!(
                 "the outcomes do not cover {} episodes {} to {}",
                 shard.task,
@@ -137,8 +139,8 @@ pub(crate) struct CommittedShard {
     pub(crate) recording: Option<String>,
 }
 
-/// The shards of running runs that a remote worker (`holder`: `remote/WORKER`) has committed.
-pub(crate) async fn committed_by(
+/// The shards of running runs that a remote worker has committed; as lease holder (`holder`) it is named `remote/WORKER`.
+pub(crate) async fn committed_by_worker(
     connection: &mut SqliteConnection,
     holder: &str,
 ) -> Result<Vec<CommittedShard>> {
@@ -252,7 +254,7 @@ pub(crate) async fn commit(
 /// Sums over a run's shards.
 pub(crate) struct ShardSums {
     pub(crate) agent_faults: i64,
-    /// Shards that are not committed.
+    /// Number of shards that are not committed.
     pub(crate) open: i64,
 }
 

@@ -1,4 +1,4 @@
-//! Sign-offs of stages, and their final days.
+//! Sign-offs of stages, after which results are final, and the final days of stages.
 
 use crate::{
     column::{Instant, Json},
@@ -12,23 +12,23 @@ use sqlx::{SqliteConnection, types::Text};
 /// An organiser's sign-off of a stage's result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SignOff {
-    pub at: Timestamp,
-    pub by: Actor,
-    /// The teams that were disqualified at the sign-off: exactly these are left out of its boards from then on.
-    pub without: Vec<TeamId>,
+    pub signed_off_at: Timestamp,
+    pub actor: Actor,
+    /// The teams that were disqualified at the sign-off. Exactly these are left out of the stage's boards from then on.
+    pub disqualified_teams: Vec<TeamId>,
 }
 
 impl SignOff {
-    /// Reads it from its columns, which are set together.
+    /// Reads a sign-off from its columns, which are set together.
     pub(crate) fn from_columns(
-        at: Option<Instant>,
-        by: Option<Text<Actor>>,
-        without: Option<Json<Vec<TeamId>>>,
+        signed_off_at: Option<Instant>,
+        actor: Option<Text<Actor>>,
+        disqualified_teams: Option<Json<Vec<TeamId>>>,
     ) -> Option<Self> {
         Some(Self {
-            at: at?.0,
-            by: by?.0,
-            without: without?.0,
+            signed_off_at: signed_off_at?.0,
+            actor: actor?.0,
+            disqualified_teams: disqualified_teams?.0,
         })
     }
 }
@@ -39,14 +39,14 @@ pub(crate) async fn check_not_signed_off(
     stage: StageId,
 ) -> Result<()> {
     let id = Text(stage);
-    let found = sqlx::query!(
+    let sign_off = sqlx::query!(
         r#"SELECT name, finalised_at AS "at!: Instant", finalised_by AS "by!: String"
            FROM stages WHERE id = ? AND finalised_at IS NOT NULL"#,
         id
     )
     .fetch_optional(connection)
     .await?;
-    match found {
+    match sign_off {
         None => Ok(()),
         Some(row) => Err(StoreError::Conflict(format!(
             "the stage {:?} was signed off on {} by {}: it cannot be changed any more",
@@ -60,16 +60,16 @@ pub(crate) async fn check_not_signed_off(
 pub(crate) async fn sign_off(
     connection: &mut SqliteConnection,
     stage: StageId,
-    by: &Actor,
+    actor: &Actor,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, by, now) = (Text(stage), Text(by), Instant(now));
+    let (id, actor, now) = (Text(stage), Text(actor), Instant(now));
     sqlx::query!(
         "UPDATE stages SET finalised_at = ?, finalised_by = ?,
                 finalised_without = (SELECT json_group_array(id) FROM teams WHERE disqualified_at IS NOT NULL)
          WHERE id = ?",
         now,
-        by,
+        actor,
         id,
     )
     .execute(connection)
@@ -114,7 +114,7 @@ pub(crate) async fn final_cutoff(
     Ok(cutoff_at.map(|at| at.0))
 }
 
-/// Marks a new day as its stage's final one.
+/// Marks a new day as the final day of its stage.
 pub(crate) async fn set_final_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,

@@ -1,4 +1,4 @@
-//! The agent runtimes that a stage accepts.
+//! The runtimes (environments that agents run in, such as a version of Python) that a stage accepts.
 
 use crate::{
     error::StoreError,
@@ -23,15 +23,16 @@ impl Stage {
     /// Checks whether the stage accepts a submission.
     ///
     /// # Errors
-    /// If the stage does not accept its runtime, or the runtime is unknown.
+    /// [`RuntimeRefused`] if the stage does not accept its runtime, or the runtime is unknown.
     pub fn check_accepts(&self, submission: &Submission) -> Result<(), RuntimeRefused> {
-        self.runtimes()
-            .map_or(Ok(()), |taken| taken.check(submission.runtime.as_deref()))
+        self.runtimes().map_or(Ok(()), |accepted| {
+            accepted.check(submission.runtime.as_deref())
+        })
     }
 }
 
-/// The stages of which at least one must accept an upload at `now`: the open ones, else the current one. Empty if one of
-/// them accepts all runtimes.
+/// The runtimes of the stages of which at least one must accept an upload at `now`: the open stages, or the current one if
+/// none is open. Empty if one of them accepts all runtimes.
 pub(crate) fn required_runtimes(all: &[Stage], now: Timestamp) -> Vec<StageRuntimes> {
     let is_open = |stage: &&Stage| stage.phase(now) == StagePhase::Open;
     let mut stages: Vec<&Stage> = all.iter().filter(is_open).collect();
@@ -43,6 +44,6 @@ pub(crate) fn required_runtimes(all: &[Stage], now: Timestamp) -> Vec<StageRunti
 }
 
 /// The error for a request with a submission whose runtime is not accepted.
-pub(crate) fn conflict(why: &RuntimeRefused) -> StoreError {
-    StoreError::Conflict(why.to_string())
+pub(crate) fn conflict(refusal: &RuntimeRefused) -> StoreError {
+    StoreError::Conflict(refusal.to_string())
 }

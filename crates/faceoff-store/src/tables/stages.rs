@@ -1,3 +1,5 @@
+//! The table of stages: the parts of the season, each with its own rules, days and boards.
+
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
@@ -17,9 +19,9 @@ pub struct Stage {
     pub id: StageId,
     /// Unique regardless of case.
     pub name: StageName,
-    /// Its days can start from then on, and its rules are fixed.
+    /// From then on its days can start, and its rules are fixed.
     pub opens_at: Timestamp,
-    /// None of its days starts from then on; `None`: no end is set.
+    /// From then on none of its days can start; `None`: no end is set.
     pub closes_at: Option<Timestamp>,
     /// Time zone of its dates.
     pub zone: Zone,
@@ -29,9 +31,9 @@ pub struct Stage {
     pub rules: Revision,
     /// Do the seeds of its days derive from its id? False if they began before there were stages.
     pub names_seeds: bool,
-    /// Does it take rules and settings from the server's configuration?
+    /// Does it take its rules and settings from the server's configuration file?
     pub configured: bool,
-    /// Set once the stage is signed off: then it cannot be changed.
+    /// Set once the stage is signed off, so that it cannot be changed.
     pub sign_off: Option<SignOff>,
 }
 
@@ -75,33 +77,34 @@ impl Stage {
         }
     }
 
-    /// The stage's next day, if it has one, and its scheduled cutoff, which may be due already. `newest` is the date of
-    /// the newest day so far. Without a schedule it is the earliest day that an organiser can start.
+    /// The date of the stage's next day, if it has one, and its scheduled cutoff, which may be due already. `newest_day` is
+    /// the date of the newest day so far. Without a schedule it is the earliest day that an organiser can start.
     #[must_use]
     pub fn next_cutoff(
         &self,
-        newest: Option<Date>,
+        newest_day: Option<Date>,
         now: Timestamp,
     ) -> Option<(Date, Option<Timestamp>)> {
         let earliest = self.zone.date(now.max(self.opens_at));
-        let from = match newest {
+        let first_date = match newest_day {
             Some(newest) if newest >= earliest => newest.tomorrow().ok()?,
             _ => earliest,
         };
-        let is_closed_at = |at: Timestamp| self.closes_at.is_some_and(|closes_at| closes_at <= at);
+        let is_closed_at =
+            |instant: Timestamp| self.closes_at.is_some_and(|closes_at| closes_at <= instant);
         if self.phase(now) == StagePhase::Closed {
             return None;
         }
         let Some(schedule) = &self.settings.schedule else {
-            let midnight = from.to_zoned(self.zone.time_zone()).ok()?.timestamp();
-            return (!is_closed_at(midnight)).then_some((from, None));
+            let midnight = first_date.to_zoned(self.zone.time_zone()).ok()?.timestamp();
+            return (!is_closed_at(midnight)).then_some((first_date, None));
         };
-        let (date, at) = schedule.next(from, self.opens_at, &self.zone)?;
-        (!is_closed_at(at)).then_some((date, Some(at)))
+        let (date, cutoff_at) = schedule.next(first_date, self.opens_at, &self.zone)?;
+        (!is_closed_at(cutoff_at)).then_some((date, Some(cutoff_at)))
     }
 
-    /// Deadline of the stage's day of this date with this cutoff; `None`: there is none. The closing of the stage ends
-    /// no day.
+    /// Deadline of the stage's day of this date with this cutoff; `None`: there is none. A day continues when the stage
+    /// closes.
     #[must_use]
     pub fn deadline(&self, date: Date, cutoff_at: Timestamp) -> Option<Timestamp> {
         match self.settings.day_deadline {
@@ -111,10 +114,12 @@ impl Stage {
                 .ok(),
             DayDeadline::NextCut => {
                 let schedule = self.settings.schedule.as_ref()?;
-                let from = date.tomorrow().ok()?;
+                let next_date = date.tomorrow().ok()?;
                 // A missed day may start at the same time at which another day is due.
-                let after = cutoff_at.checked_add(SignedDuration::from_secs(1)).ok()?;
-                schedule.next(from, after, &self.zone).map(|(_, at)| at)
+                let earliest = cutoff_at.checked_add(SignedDuration::from_secs(1)).ok()?;
+                schedule
+                    .next(next_date, earliest, &self.zone)
+                    .map(|(_, deadline_at)| deadline_at)
             }
         }
     }
@@ -148,7 +153,7 @@ impl Stage {
     }
 }
 
-struct Row {
+struct StageRow {
     id: Text<StageId>,
     name: Text<StageName>,
     opens_at: Instant,
@@ -165,8 +170,8 @@ struct Row {
     rules: Json<StageRules>,
 }
 
-impl From<Row> for Stage {
-    fn from(row: Row) -> Self {
+impl From<StageRow> for Stage {
+    fn from(row: StageRow) -> Self {
         Self {
             id: row.id.0,
             name: row.name.0,
@@ -193,7 +198,7 @@ impl From<Row> for Stage {
 /// All stages, by opening time. A stage without rules is left out: its creation is not complete.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>> {
     let rows = sqlx::query_as!(
-        Row,
+        StageRow,
         r#"SELECT s.id AS "id: Text<StageId>", s.name AS "name: Text<StageName>", s.opens_at AS "opens_at: Instant",
                   s.closes_at AS "closes_at: Instant", s.zone AS "zone: Text<Zone>",
                   s.settings AS "settings: Json<StageSettings>", s.names_seeds AS "names_seeds: bool",
@@ -210,8 +215,8 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>>
     Ok(rows.into_iter().map(Stage::from).collect())
 }
 
-/// The current stage at `now`: of the open ones the one that opened last, else the one that closed last, else the next to
-/// open.
+/// The current stage at `now`: the open one that opened last; if none is open, the one that closed last; if none has closed,
+/// the next to open.
 pub(crate) fn current(stages: &[Stage], now: Timestamp) -> Option<&Stage> {
     let in_phase = |phase| stages.iter().filter(move |stage| stage.phase(now) == phase);
     in_phase(StagePhase::Open)
@@ -259,7 +264,7 @@ pub(crate) async fn find_configured(connection: &mut SqliteConnection) -> Result
     Ok(id.map(|id| id.0))
 }
 
-/// Adds a stage with its first rules. [`StoreError::StageNameTaken`] if another has its name.
+/// Adds a stage with its first rules. [`StoreError::StageNameTaken`] if another stage has its name.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     stage: &Stage,
@@ -283,7 +288,7 @@ pub(crate) async fn insert(
     )
     .execute(&mut *connection)
     .await
-    .map_err(|error| name_taken(error, &stage.name))?;
+    .map_err(|error| name_error(error, &stage.name))?;
     insert_revision(connection, stage.id, &stage.rules).await
 }
 
@@ -324,7 +329,7 @@ pub(crate) async fn replace_revision(
     Ok(())
 }
 
-/// Stores everything of a stage except its rules. [`StoreError::StageNameTaken`] if another has its name.
+/// Stores everything of a stage except its rules. [`StoreError::StageNameTaken`] if another stage has its name.
 pub(crate) async fn update(connection: &mut SqliteConnection, stage: &Stage) -> Result<()> {
     let (id, name, opens_at) = (Text(stage.id), stage.name.as_str(), Instant(stage.opens_at));
     let (closes_at, zone) = (stage.closes_at.map(Instant), Text(&stage.zone));
@@ -342,11 +347,11 @@ pub(crate) async fn update(connection: &mut SqliteConnection, stage: &Stage) -> 
     )
     .execute(connection)
     .await
-    .map_err(|error| name_taken(error, &stage.name))?;
+    .map_err(|error| name_error(error, &stage.name))?;
     Ok(())
 }
 
-fn name_taken(error: sqlx::Error, name: &StageName) -> StoreError {
+fn name_error(error: sqlx::Error, name: &StageName) -> StoreError {
     if StoreError::is_duplicate(&error, "stages.name") {
         StoreError::StageNameTaken(name.to_string())
     } else {
@@ -360,16 +365,17 @@ mod tests {
     use faceoff_types::{Profile, Ruleset, Schedule, Task};
     use jiff::civil::date;
 
-    fn at(text: &str) -> Timestamp {
+    fn time(text: &str) -> Timestamp {
         text.parse().unwrap()
     }
 
+    /// A stage in Berlin (UTC+1) that is open from 2 March to 5 March.
     fn stage(schedule: Option<Schedule>) -> Stage {
         Stage {
             id: StageId::new(),
             name: "Final".parse().unwrap(),
-            opens_at: at("2026-03-02T10:00:00Z"),
-            closes_at: Some(at("2026-03-05T10:00:00Z")),
+            opens_at: time("2026-03-02T10:00:00Z"),
+            closes_at: Some(time("2026-03-05T10:00:00Z")),
             zone: "Europe/Berlin".parse().unwrap(),
             settings: StageSettings {
                 schedule,
@@ -377,7 +383,7 @@ mod tests {
             },
             rules: Revision {
                 number: 1,
-                since: at("2026-03-02T10:00:00Z"),
+                since: time("2026-03-02T10:00:00Z"),
                 rules: StageRules {
                     runtimes: None,
                     ruleset: Ruleset::CURRENT,
@@ -400,15 +406,22 @@ mod tests {
         // 06:00 in Berlin is 05:00 UTC.
         let stage = stage(Some(Schedule::daily("06:00".parse().unwrap())));
         let next = |newest, now: &str| {
-            let (date, starts) = stage.next_cutoff(newest, at(now))?;
-            Some((date, starts.unwrap().to_string()))
+            let (date, cutoff_at) = stage.next_cutoff(newest, time(now))?;
+            Some((date, cutoff_at.unwrap().to_string()))
         };
-        let third = Some((date(2026, 3, 3), "2026-03-03T05:00:00Z".to_owned()));
-        let fourth = Some((date(2026, 3, 4), "2026-03-04T05:00:00Z".to_owned()));
-        assert_eq!(next(None, "2026-02-01T00:00:00Z"), third, "after it opens");
-        assert_eq!(next(None, "2026-03-02T12:00:00Z"), third);
-        assert_eq!(next(None, "2026-03-03T09:00:00Z"), third, "it is due");
-        assert_eq!(next(Some(date(2026, 3, 3)), "2026-03-03T09:00:00Z"), fourth);
+        let on_third = Some((date(2026, 3, 3), "2026-03-03T05:00:00Z".to_owned()));
+        let on_fourth = Some((date(2026, 3, 4), "2026-03-04T05:00:00Z".to_owned()));
+        assert_eq!(
+            next(None, "2026-02-01T00:00:00Z"),
+            on_third,
+            "after it opens"
+        );
+        assert_eq!(next(None, "2026-03-02T12:00:00Z"), on_third);
+        assert_eq!(next(None, "2026-03-03T09:00:00Z"), on_third, "it is due");
+        assert_eq!(
+            next(Some(date(2026, 3, 3)), "2026-03-03T09:00:00Z"),
+            on_fourth
+        );
         assert_eq!(next(Some(date(2026, 3, 5)), "2026-03-05T09:00:00Z"), None);
         assert_eq!(next(None, "2026-03-05T10:00:00Z"), None, "closed");
     }
@@ -417,39 +430,51 @@ mod tests {
     fn day_deadline_is_the_next_cutoff_or_the_configured_time() {
         let scheduled = stage(Some(Schedule::daily("06:00".parse().unwrap())));
         let deadline = |stage: &Stage, day: Date, cutoff_at: &str| {
-            let deadline_at = stage.deadline(day, at(cutoff_at));
+            let deadline_at = stage.deadline(day, time(cutoff_at));
             deadline_at.map(|at| at.to_string())
         };
-        let fourth = Some("2026-03-04T05:00:00Z".to_owned());
+        let fourth_at_six = Some("2026-03-04T05:00:00Z".to_owned());
         let third = date(2026, 3, 3);
-        assert_eq!(deadline(&scheduled, third, "2026-03-03T05:00:00Z"), fourth);
-        // If it is started by hand, early or late, it is still the cutoff of the next date.
-        assert_eq!(deadline(&scheduled, third, "2026-03-03T00:00:00Z"), fourth);
-        assert_eq!(deadline(&scheduled, third, "2026-03-03T22:00:00Z"), fourth);
-        // For a missed day it is the next cutoff, and for the last day the one that would follow.
+        assert_eq!(
+            deadline(&scheduled, third, "2026-03-03T05:00:00Z"),
+            fourth_at_six
+        );
+        // If an organiser starts the day, early or late, its deadline is still the cutoff of the next date.
+        assert_eq!(
+            deadline(&scheduled, third, "2026-03-03T00:00:00Z"),
+            fourth_at_six
+        );
+        assert_eq!(
+            deadline(&scheduled, third, "2026-03-03T22:00:00Z"),
+            fourth_at_six
+        );
+        // The deadline of a missed day is the next cutoff; that of the last day is the cutoff that would follow.
         let missed = deadline(&scheduled, date(2026, 3, 1), "2026-03-03T05:00:00Z");
-        assert_eq!(missed, fourth);
+        assert_eq!(missed, fourth_at_six);
         let last = deadline(&scheduled, date(2026, 3, 5), "2026-03-05T05:00:00Z");
         assert_eq!(last, Some("2026-03-06T05:00:00Z".to_owned()));
         assert_eq!(deadline(&stage(None), third, "2026-03-03T05:00:00Z"), None);
-        let with = |day_deadline| Stage {
+        let with_deadline = |day_deadline| Stage {
             settings: StageSettings {
                 day_deadline,
                 ..scheduled.settings.clone()
             },
             ..scheduled.clone()
         };
-        let never = with(DayDeadline::Never);
+        let never = with_deadline(DayDeadline::Never);
         assert_eq!(deadline(&never, third, "2026-03-03T05:00:00Z"), None);
-        let hours = with(DayDeadline::Hours(30));
-        let next = Some("2026-03-04T11:00:00Z".to_owned());
-        assert_eq!(deadline(&hours, third, "2026-03-03T05:00:00Z"), next);
+        let after_30_hours = with_deadline(DayDeadline::Hours(30));
+        let expected = Some("2026-03-04T11:00:00Z".to_owned());
+        assert_eq!(
+            deadline(&after_30_hours, third, "2026-03-03T05:00:00Z"),
+            expected
+        );
     }
 
     #[test]
     fn next_cutoff_without_schedule_is_the_next_free_date() {
         let stage = stage(None);
-        let next = |newest, now: &str| stage.next_cutoff(newest, at(now)).map(|(date, _)| date);
+        let next = |newest, now: &str| stage.next_cutoff(newest, time(now)).map(|(date, _)| date);
         assert_eq!(next(None, "2026-02-01T00:00:00Z"), Some(date(2026, 3, 2)));
         let second = Some(date(2026, 3, 2));
         assert_eq!(next(second, "2026-03-02T22:59:00Z"), Some(date(2026, 3, 3)));

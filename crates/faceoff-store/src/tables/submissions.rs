@@ -1,3 +1,5 @@
+//! The table of submissions: the agents that teams have uploaded, with the outcome of their validation.
+
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
@@ -8,6 +10,7 @@ use faceoff_types::{BundleRef, SubmissionId, TeamId, ValidationTiming};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
+/// An agent that a team has uploaded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Submission {
     pub id: SubmissionId,
@@ -25,7 +28,7 @@ pub struct Submission {
     pub timing: Vec<ValidationTiming>,
     /// Is it its team's active submission, which is evaluated at the next cutoff?
     pub active: bool,
-    /// When its team withdrew it; it is not evaluated again unless it is chosen again.
+    /// When its team withdrew it; it is not evaluated again unless the team chooses it again.
     pub withdrawn_at: Option<Timestamp>,
     /// A label set by its team.
     pub label: Option<String>,
@@ -42,8 +45,8 @@ pub struct Submission {
 /// The requested removal of a submission's bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Deletion {
-    pub at: Timestamp,
-    pub by: Actor,
+    pub deleted_at: Timestamp,
+    pub actor: Actor,
 }
 
 /// State of a submission's validation. [`Store::submission_log`](crate::Store::submission_log) reads the agent's
@@ -70,8 +73,8 @@ impl SubmissionState {
     }
 }
 
-/// Reason of the removal of a rejected submission's bundle.
-pub(crate) const REFUSED: &str = "because its validation run failed";
+/// Reason of the removal of a bundle that did not pass its validation run.
+pub(crate) const VALIDATION_FAILED: &str = "because its validation run failed";
 
 struct SubmissionRow {
     id: Text<SubmissionId>,
@@ -134,12 +137,17 @@ impl TryFrom<SubmissionRow> for Submission {
             duplicate_of: row.same_as.map(|id| id.0),
             bundle_removed: row.removed_at.map(|at| Ruling {
                 at: at.0,
-                reason: row.removed_for.unwrap_or_else(|| REFUSED.to_owned()),
+                reason: row
+                    .removed_for
+                    .unwrap_or_else(|| VALIDATION_FAILED.to_owned()),
             }),
             deleted: row
                 .deleted_at
                 .zip(row.deleted_by)
-                .map(|(at, by)| Deletion { at: at.0, by: by.0 }),
+                .map(|(at, actor)| Deletion {
+                    deleted_at: at.0,
+                    actor: actor.0,
+                }),
         })
     }
 }
@@ -212,19 +220,20 @@ pub(crate) async fn created_at(
     Ok(at.fetch_optional(connection).await?.map(|at| at.0))
 }
 
-/// One page of a team's submissions, the newest first. It follows the given time and id.
+/// One page of a team's submissions, the newest first: those that follow the submission with this time of the upload and
+/// this id.
 pub(crate) async fn of_team_after(
     connection: &mut SqliteConnection,
     team: TeamId,
-    (at, id): (Timestamp, Option<SubmissionId>),
+    (uploaded_at, id): (Timestamp, Option<SubmissionId>),
     limit: u32,
 ) -> Result<Vec<Submission>> {
-    let (team, at, id) = (Text(team), Instant(at), id.map(Text));
+    let (team, uploaded_at, id) = (Text(team), Instant(uploaded_at), id.map(Text));
     select_submissions!(
         "WHERE s.team_id = ?1 AND s.created_at <= ?2 AND (s.created_at < ?2 OR ?3 IS NULL OR s.id < ?3)
          ORDER BY s.created_at DESC, s.id DESC LIMIT ?4",
         team,
-        at,
+        uploaded_at,
         id,
         limit
     )
@@ -249,8 +258,7 @@ pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Subm
     .collect()
 }
 
-/// The tail of the agent's standard error in the validation run; `None` before its end, or if there was
-/// none.
+/// The tail of the agent's standard error in the validation run; `None` before its end, and after a platform fault.
 pub(crate) async fn log(
     connection: &mut SqliteConnection,
     id: SubmissionId,
@@ -355,12 +363,12 @@ pub(crate) async fn set_validation_error(
 pub(crate) async fn set_withdrawn(
     connection: &mut SqliteConnection,
     id: SubmissionId,
-    at: Option<Timestamp>,
+    withdrawn_at: Option<Timestamp>,
 ) -> Result<()> {
-    let (id, at) = (Text(id), at.map(Instant));
+    let (id, withdrawn_at) = (Text(id), withdrawn_at.map(Instant));
     sqlx::query!(
         "UPDATE submissions SET withdrawn_at = ? WHERE id = ?",
-        at,
+        withdrawn_at,
         id
     )
     .execute(connection)

@@ -160,7 +160,7 @@ async fn season() -> (TestStore, EvaluationId) {
         team: Some(alpha.team),
         name: "hook".into(),
         url: "https://example.org/".into(),
-        about: Vec::new(),
+        topics: Vec::new(),
         secret: [9; 32],
     };
     let webhook = f.store.create_webhook(Actor::Organiser, webhook, f.now);
@@ -350,7 +350,7 @@ async fn snapshot_is_unaffected_by_later_changes() {
         .snapshot(folder.path(), Edition::Organiser, "a test", f.now)
         .await
         .unwrap();
-    assert_eq!(snapshot.under_way, 2);
+    assert_eq!(snapshot.open_evaluations, 2);
     let before = snapshot.store().evaluation(played).await.unwrap();
     f.store
         .void_evaluation(Actor::Organiser, played, "a mistake", f.now)

@@ -49,7 +49,7 @@ async fn frozen_board_omits_later_results() {
     f.evaluate(beta.id, &small()).await;
     f.run_all(2.0).await;
     let scope = BoardScope {
-        until: Some(frozen.at),
+        finished_until: Some(frozen.at),
         ..BoardScope::default()
     };
     let of_stage = f.store.stage(stage).await.unwrap();
@@ -61,11 +61,11 @@ async fn frozen_board_omits_later_results() {
     assert_eq!(scores(&shown), [1.0]);
     assert_eq!(scores(&f.board().await), [2.0, 2.0], "the live board");
     // If a result is excluded, the team's previous one counts.
-    let without = BoardScope {
-        without: vec![f.board().await[0].evaluation],
+    let excluding = BoardScope {
+        excluded: vec![f.board().await[0].evaluation],
         ..BoardScope::default()
     };
-    let shown = f.store.board_within(stage, revision, &without).await;
+    let shown = f.store.board_within(stage, revision, &excluding).await;
     assert_eq!(scores(&shown.unwrap()), [1.0, 2.0]);
 
     let unfreeze = async |f: &TestStore| {

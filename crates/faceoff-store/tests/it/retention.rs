@@ -163,7 +163,7 @@ async fn retention_keeps_last_and_best_of_each_team() {
         bundles: 0,
         bytes: 3000,
         unmeasured: 0,
-        later_from: None,
+        next_removal_at: None,
     };
     assert_eq!(preview, expected);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
@@ -527,8 +527,11 @@ async fn team_can_delete_unneeded_submission() {
     assert_eq!(used.stored_bytes, 20);
     f.store.check_deletable(first.id, f.now).await.unwrap();
     let deleted = delete(&f, first.id).await.unwrap();
-    let by = deleted.deleted.unwrap();
-    assert_eq!((by.at, by.by), (f.now, actor.clone()));
+    let deletion = deleted.deleted.unwrap();
+    assert_eq!(
+        (deletion.deleted_at, deletion.actor),
+        (f.now, actor.clone())
+    );
     assert_eq!(deleted.bundle_removed.unwrap().reason, "by its team");
     assert_eq!(deleted.bundle.blake3, first.bundle.blake3);
     assert_eq!(deleted.agent_name.as_deref(), Some("striker"));

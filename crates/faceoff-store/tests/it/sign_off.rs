@@ -180,9 +180,9 @@ async fn signed_off_stage_cannot_be_changed() {
     assert_eq!(f.store.stage(stage.id).await.unwrap().sign_off, None);
     let done = sign_off(&f, &stage).await.unwrap();
     let expected = SignOff {
-        at: f.now,
-        by: Actor::Organiser,
-        without: vec![beta],
+        signed_off_at: f.now,
+        actor: Actor::Organiser,
+        disqualified_teams: vec![beta],
     };
     assert_eq!(done.sign_off, Some(expected));
     let signed = kinds(&f).await;

@@ -1,3 +1,5 @@
+//! Closing of a tournament, after which its results are final.
+
 use crate::{
     boxed,
     error::{Result, StoreError},

@@ -1,4 +1,4 @@
-//! The teams in a tournament.
+//! The entrants of a tournament: the teams that take part in it.
 
 use crate::{
     error::Result,
@@ -9,7 +9,7 @@ use faceoff_types::TournamentId;
 
 /// Entrants that have not left.
 pub(super) async fn current_entrants(tx: &mut Tx, id: TournamentId) -> Result<Vec<Entrant>> {
-    let mut all = entrants::all(tx, id).await?;
-    all.retain(|entrant| entrant.departure.is_none());
-    Ok(all)
+    let mut entrants = entrants::all(tx, id).await?;
+    entrants.retain(|entrant| entrant.departure.is_none());
+    Ok(entrants)
 }

@@ -1,3 +1,6 @@
+//! Entrants: the teams that take part in a tournament. They are added between rounds, and leave by withdrawal or
+//! disqualification.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -16,12 +19,12 @@ use faceoff_types::{DepartureKind, RoundNumber, TeamId, TournamentFormat, Tourna
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
-/// A team's departure from a tournament, to be carried out.
+/// A request that a team leaves a tournament.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DepartureRequest {
     pub team: TeamId,
     pub kind: DepartureKind,
-    /// First round whose games with the team do not count; `None`: the current round, or the next one between rounds.
+    /// First round whose games with the team do not count; `None`: the current round, or between rounds the next one.
     pub from_round: Option<RoundNumber>,
     /// Public.
     pub reason: String,
@@ -29,8 +32,8 @@ pub struct DepartureRequest {
 
 /// Refuses new entrants while a round is open, or once the groups are drawn.
 async fn check_accepts_entrants(tx: &mut Tx, tournament: &Tournament) -> Result<()> {
-    let is_drawn = rounds::count(tx, tournament.id).await? > 0;
-    if is_drawn && matches!(tournament.rules.format, TournamentFormat::Groups { .. }) {
+    let has_rounds = rounds::count(tx, tournament.id).await? > 0;
+    if has_rounds && matches!(tournament.rules.format, TournamentFormat::Groups { .. }) {
         return Err(StoreError::Conflict(
             "the groups are drawn, so no team can be added: open another tournament".into(),
         ));
@@ -96,26 +99,26 @@ impl Store {
         &self,
         actor: Actor,
         id: TournamentId,
-        new: &[TeamId],
+        added: &[TeamId],
         now: Timestamp,
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
             check_accepts_entrants(tx, &tournament).await?;
-            let all = entrants::all(tx, id).await?;
-            for team in new {
+            let entrants = entrants::all(tx, id).await?;
+            for team in added {
                 let team = teams::find(tx, *team).await?;
-                if let Some(entrant) = all.iter().find(|entrant| entrant.team == team.id) {
-                    let how = match entrant.departure {
+                if let Some(entrant) = entrants.iter().find(|entrant| entrant.team == team.id) {
+                    let obstacle = match entrant.departure {
                         None => "is in the tournament already",
                         Some(_) => "has left the tournament for good",
                     };
-                    return Err(StoreError::Conflict(format!("{} {how}", team.name)));
+                    return Err(StoreError::Conflict(format!("{} {obstacle}", team.name)));
                 }
                 entrants::put(tx, id, team.id, now).await?;
             }
-            let teams = new.to_vec();
+            let teams = added.to_vec();
             tx.record(Subject::Tournament(id), Event::TeamsEntered { teams });
             Ok(())
         })
@@ -123,9 +126,9 @@ impl Store {
     }
 
     /// Removes a team from a tournament for good. Its games without a result are cancelled, and its games do not count
-    /// from the current round on (between rounds: from the next one). A disqualified team can lose earlier rounds, too
-    /// (`from_round`). Before the first round the team is only removed (`None`) and can be added again. A team that
-    /// withdrew can be disqualified later. [`StoreError::Conflict`] if it has left otherwise, is not an entrant, or the
+    /// from the current round on (between rounds: from the next one). The games of a disqualified team can stop counting
+    /// from an earlier round on (`from_round`). Before the first round the team is only removed (`None`) and can be added again. A team that
+    /// withdrew can be disqualified later. [`StoreError::Conflict`] if it has left in another way, is not an entrant, or the
     /// tournament is closed.
     #[boxed]
     pub async fn leave_tournament(
@@ -155,14 +158,14 @@ pub(crate) async fn remove_entrant(
         from_round,
         ref reason,
     } = *request;
-    let all = entrants::all(tx, id).await?;
-    let Some(entrant) = all.iter().find(|entrant| entrant.team == team) else {
+    let entrants = entrants::all(tx, id).await?;
+    let Some(entrant) = entrants.iter().find(|entrant| entrant.team == team) else {
         return Err(StoreError::Conflict(
             "the team is not in the tournament".into(),
         ));
     };
     let cancel_reason = format!("{} has left the tournament", entrant.name);
-    let latest = match (&entrant.departure, kind) {
+    let latest_round = match (&entrant.departure, kind) {
         (None, _) if rounds::count(tx, id).await? == 0 => {
             entrants::remove(tx, id, team).await?;
             cancel_open_games(tx, id, team, &cancel_reason).await?;
@@ -172,8 +175,10 @@ pub(crate) async fn remove_entrant(
         }
         (None, _) => current_round(tx, id).await?,
         // A team cannot avoid disqualification by withdrawing first.
-        (Some(left), DepartureKind::Disqualified) if left.kind == DepartureKind::Withdrawn => {
-            left.from_round
+        (Some(earlier), DepartureKind::Disqualified)
+            if earlier.kind == DepartureKind::Withdrawn =>
+        {
+            earlier.from_round
         }
         (Some(_), _) => {
             return Err(StoreError::Conflict(format!(
@@ -182,13 +187,13 @@ pub(crate) async fn remove_entrant(
             )));
         }
     };
-    let from_round = from_round.unwrap_or(latest);
-    if from_round > latest || kind == DepartureKind::Withdrawn && from_round < latest {
+    let from_round = from_round.unwrap_or(latest_round);
+    if from_round > latest_round || kind == DepartureKind::Withdrawn && from_round < latest_round {
         let expected = match kind {
             DepartureKind::Withdrawn => {
-                format!("{latest}: a team that withdraws keeps its results of earlier rounds")
+                format!("{latest_round}: a team that withdraws keeps its results of earlier rounds")
             }
-            DepartureKind::Disqualified => format!("1 to {latest}"),
+            DepartureKind::Disqualified => format!("1 to {latest_round}"),
         };
         return Err(StoreError::Conflict(format!(
             "from_round: expected {expected}; got {from_round}"

@@ -1,4 +1,4 @@
-//! Lifecycle of a game: queued, started, and ended with or without a result.
+//! Lifecycle of a tournament's game: it is queued, started in one or more attempts, and ended with or without a result.
 
 use crate::{
     boxed,
@@ -24,8 +24,8 @@ use faceoff_types::{BundleRef, GameId, RoundNumber, TournamentId};
 use jiff::Timestamp;
 use uuid::Uuid;
 
-/// The account charged with a game's slot time: that of the tournament, or of the team that requested the game. To be
-/// looked up once for many games, since the lookup reads the whole queue.
+/// The account charged with a game's slot time: that of the tournament, or of the team that requested the game. For many
+/// games it is looked up once, since the lookup reads the whole queue.
 pub(super) async fn account(tx: &mut Tx, game: &Game, job: NewJob) -> Result<Account> {
     let holder = match game.purpose {
         GamePurpose::Round(_)
@@ -39,7 +39,7 @@ pub(super) async fn account(tx: &mut Tx, game: &Game, job: NewJob) -> Result<Acc
     queue::account(tx, job.lane, &holder).await
 }
 
-/// Adds a game's job to the queue. Games of a round are queued matchday by matchday.
+/// Adds a game's job to the queue. Games of a round are queued by matchday (the games that teams play at the same time).
 async fn insert_job(tx: &mut Tx, game: &Game, job: NewJob, account: Account) -> Result<Uuid> {
     for submission in game.submissions {
         bundles::check_available(tx, submission).await?;
@@ -52,7 +52,8 @@ async fn insert_job(tx: &mut Tx, game: &Game, job: NewJob, account: Account) -> 
     queue::insert(tx, NewJob { batch, ..job }, account).await
 }
 
-/// Adds a game and queues it. [`StoreError::Conflict`] if the bundle of a side was removed.
+/// Adds a game and queues it. [`StoreError::Conflict`] if the bundle of one of the
+/// two submissions was removed.
 pub(super) async fn enqueue(tx: &mut Tx, game: &Game, job: NewJob) -> Result<()> {
     let account = account(tx, game, job).await?;
     enqueue_for(tx, game, job, account).await
@@ -138,7 +139,7 @@ pub(crate) async fn give_up(tx: &mut Tx, id: GameId, reason: &str) -> Result<()>
     tx.record(Subject::Game(id), Event::GameBroken { reason });
     match games::find(tx, id).await {
         Ok(game) => end_round_of_game(tx, &game).await,
-        // It must end all the same: it would block the queue otherwise.
+        // A damaged game must end, too: it would block the queue otherwise.
         Err(StoreError::Damaged(defect)) => {
             tracing::error!(game = %id, defect, "ended a damaged game");
             Ok(())

@@ -1,3 +1,5 @@
+//! Tournaments: their opening, changes and pauses.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -24,7 +26,7 @@ use jiff::Timestamp;
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewTournament {
     pub name: StageName,
-    /// Stage whose tiers the entrants were selected by, if any.
+    /// Stage whose results the entrants were selected by, if any.
     pub stage: Option<StageId>,
     /// Rules that results depend on.
     pub rules: TournamentRules,
@@ -47,7 +49,7 @@ pub struct TournamentChange {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "it is mapped over errors")]
-fn invalid(error: InvalidTournament) -> StoreError {
+fn invalid_tournament(error: InvalidTournament) -> StoreError {
     StoreError::Conflict(error.to_string())
 }
 
@@ -72,8 +74,8 @@ impl Store {
         new: &NewTournament,
         now: Timestamp,
     ) -> Result<Tournament> {
-        new.rules.check().map_err(invalid)?;
-        new.settings.check().map_err(invalid)?;
+        new.rules.check().map_err(invalid_tournament)?;
+        new.settings.check().map_err(invalid_tournament)?;
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             if let Some(stage) = new.stage {
@@ -118,47 +120,47 @@ impl Store {
         now: Timestamp,
     ) -> Result<Tournament> {
         if let Some(rules) = &change.rules {
-            rules.check().map_err(invalid)?;
+            rules.check().map_err(invalid_tournament)?;
         }
         if let Some(settings) = &change.settings {
-            settings.check().map_err(invalid)?;
+            settings.check().map_err(invalid_tournament)?;
         }
         self.write(actor, now, async |tx| {
-            let before = tournaments::find_open(tx, id).await?;
-            let mut after = before.clone();
+            let current = tournaments::find_open(tx, id).await?;
+            let mut changed = current.clone();
             if let Some(name) = &change.name {
-                after.name = name.clone();
+                changed.name = name.clone();
             }
             if let Some(rules) = &change.rules {
-                after.rules = rules.clone();
+                changed.rules = rules.clone();
             }
             if let Some(settings) = &change.settings {
-                after.settings = settings.clone();
+                changed.settings = settings.clone();
             }
             if let Some(baseline) = change.baseline {
                 if let Some(baseline) = baseline {
                     check_baseline(tx, baseline).await?;
                 }
-                after.baseline = baseline;
+                changed.baseline = baseline;
             }
-            if after == before {
-                return Ok(before);
+            if changed == current {
+                return Ok(current);
             }
-            if after.rules != before.rules && rounds::count(tx, id).await? > 0 {
+            if changed.rules != current.rules && rounds::count(tx, id).await? > 0 {
                 return Err(StoreError::Conflict(
                     "rules: a round has started, and all rounds must have the same rules: open another tournament"
                         .into(),
                 ));
             }
-            tournaments::update(tx, &after).await?;
+            tournaments::update(tx, &changed).await?;
             let event = Event::TournamentChanged {
-                name: after.name.clone(),
-                rules: Box::new(after.rules.clone()),
-                settings: after.settings.clone(),
-                baseline: after.baseline,
+                name: changed.name.clone(),
+                rules: Box::new(changed.rules.clone()),
+                settings: changed.settings.clone(),
+                baseline: changed.baseline,
             };
             tx.record(Subject::Tournament(id), event);
-            Ok(after)
+            Ok(changed)
         })
         .await
     }

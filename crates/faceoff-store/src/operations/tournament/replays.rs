@@ -1,4 +1,4 @@
-//! Replays of a tournament's whole schedule, which show how certain its winner is.
+//! Replays: all games of a tournament are played again with new seeds, to show how certain its winner is.
 
 use crate::{
     boxed,
@@ -23,19 +23,22 @@ pub const MAX_REPLAYS: u32 = 1000;
 /// Maximum number of games in all replays of a tournament: they are queued at once, and read at once.
 pub const MAX_REPLAYED_GAMES: u32 = 10_000;
 
-/// Games that count: they have a result, and both teams were entrants in that round.
+/// The games that count: they have a result, and neither team had left the tournament by their round.
 async fn counting_games(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> Result<Vec<Game>> {
-    let left: BTreeMap<TeamId, RoundNumber> = entrants::all(tx, id)
+    let departure_rounds: BTreeMap<TeamId, RoundNumber> = entrants::all(tx, id)
         .await?
         .into_iter()
         .filter_map(|entrant| Some((entrant.team, entrant.departure?.from_round)))
         .collect();
     games.retain(|game| {
-        let is_out = |team: &TeamId| {
-            let played = game.purpose.schedule_entry().zip(left.get(team));
-            played.is_some_and(|(fixture, from)| fixture.round >= *from)
+        let had_left = |team: &TeamId| {
+            let entry_and_departure = game
+                .purpose
+                .schedule_entry()
+                .zip(departure_rounds.get(team));
+            entry_and_departure.is_some_and(|(entry, from_round)| entry.round >= *from_round)
         };
-        matches!(game.state, GameState::Played(_)) && !game.teams.iter().any(is_out)
+        matches!(game.state, GameState::Played(_)) && !game.teams.iter().any(had_left)
     });
     Ok(games)
 }
@@ -56,10 +59,10 @@ impl Store {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
             let schedule = games::of_rounds(tx, id).await?;
-            let (started, all) = (rounds::count(tx, id).await?, tournament.rules.format.last_round());
-            if started < all.get() {
+            let (started, rounds) = (rounds::count(tx, id).await?, tournament.rules.format.last_round());
+            if started < rounds.get() {
                 return Err(StoreError::Conflict(format!(
-                    "a schedule can be replayed once all its games are over: {started} of {all} rounds have started"
+                    "a schedule can be replayed once all its games are over: {started} of {rounds} rounds have started"
                 )));
             }
             let pending = games::pending(tx, id).await?.len();
@@ -86,8 +89,8 @@ impl Store {
             }
             let (mut count, mut account) = (0, None);
             for replay in last + 1..=last + times {
-                for played in &schedule {
-                    let Some(original) = played.purpose.schedule_entry() else {
+                for original_game in &schedule {
+                    let Some(original) = original_game.purpose.schedule_entry() else {
                         continue;
                     };
                     let game = Game {
@@ -101,10 +104,10 @@ impl Store {
                         },
                         created_at: now,
                         state: GameState::Queued,
-                        ..played.clone()
+                        ..original_game.clone()
                     };
                     let account = match account {
-                        Some(known) => known,
+                        Some(account) => account,
                         None => *account.insert(game_lifecycle::account(tx, &game, purpose::REPLAY_GAME).await?),
                     };
                     game_lifecycle::enqueue_for(tx, &game, purpose::REPLAY_GAME, account).await?;

@@ -1,3 +1,5 @@
+//! Rounds of a tournament: the start of a round, with its draw, its submissions and its games.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -21,12 +23,12 @@ use faceoff_types::{GameId, GameSeedLabel, SubmissionId, TeamId, TournamentForma
 use jiff::Timestamp;
 use std::collections::{BTreeMap, BTreeSet};
 
-fn conflict<T>(why: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(why.into()))
+fn conflict<T>(reason: impl Into<String>) -> Result<T> {
+    Err(StoreError::Conflict(reason.into()))
 }
 
-/// Whether a tournament accepts the runtime of a submission.
-pub(super) fn takes(tournament: &Tournament, submission: &Submission) -> bool {
+/// Does a tournament accept the runtime of a submission?
+pub(super) fn accepts_runtime(tournament: &Tournament, submission: &Submission) -> bool {
     match (&tournament.rules.runtimes, &submission.runtime) {
         (None, _) => true,
         (Some(accepted), Some(runtime)) => accepted.contains(runtime),
@@ -35,7 +37,11 @@ pub(super) fn takes(tournament: &Tournament, submission: &Submission) -> bool {
 }
 
 /// Refuses a round that is not the next one, or whose predecessor is not over.
-async fn check_next(tx: &mut Tx, tournament: &Tournament, drawn: &DrawnRound) -> Result<()> {
+async fn check_is_next_round(
+    tx: &mut Tx,
+    tournament: &Tournament,
+    drawn: &DrawnRound,
+) -> Result<()> {
     let number = drawn.number;
     let started = rounds::count(tx, tournament.id).await?;
     if number.get() <= started {
@@ -61,59 +67,65 @@ async fn check_next(tx: &mut Tx, tournament: &Tournament, drawn: &DrawnRound) ->
     Ok(())
 }
 
-/// Refuses a draw whose teams differ from the entrants, because a team was added or left meanwhile.
+/// Refuses a draw whose teams differ from the entrants, because a team was added or left meanwhile. Returns the teams that
+/// play; in a round with an odd number of teams one has a bye (no game) on each matchday. In the round after the
+/// groups, only their best teams take part.
 fn check_teams(
     tournament: &Tournament,
     drawn: &DrawnRound,
-    playing: &[Entrant],
+    entrants: &[Entrant],
 ) -> Result<BTreeSet<TeamId>> {
-    let days = &drawn.matchdays;
-    let with_games: BTreeSet<TeamId> = days
+    let matchdays = &drawn.matchdays;
+    let teams_with_games: BTreeSet<TeamId> = matchdays
         .iter()
         .flat_map(|day| day.games.iter().flatten().copied())
         .collect();
-    let byes = days.iter().flat_map(|day| day.byes.iter().copied());
-    let all: BTreeSet<TeamId> = with_games.iter().copied().chain(byes).collect();
+    let teams_with_bye = matchdays.iter().flat_map(|day| day.byes.iter().copied());
+    let drawn_teams: BTreeSet<TeamId> = teams_with_games
+        .iter()
+        .copied()
+        .chain(teams_with_bye)
+        .collect();
     let is_final = matches!(tournament.rules.format, TournamentFormat::Groups { .. })
         && drawn.number.get() > 1;
-    let of_playing: BTreeSet<TeamId> = playing.iter().map(|entrant| entrant.team).collect();
-    let fits = if is_final {
-        all.is_subset(&of_playing)
+    let entrant_teams: BTreeSet<TeamId> = entrants.iter().map(|entrant| entrant.team).collect();
+    let matches_entrants = if is_final {
+        drawn_teams.is_subset(&entrant_teams)
     } else {
-        all == of_playing
+        drawn_teams == entrant_teams
     };
-    if !fits {
+    if !matches_entrants {
         return conflict("the entrants have changed meanwhile: start the round again");
     }
-    if with_games.is_empty() {
+    if teams_with_games.is_empty() {
         return conflict("a round needs at least two teams: add more");
     }
-    Ok(with_games)
+    Ok(teams_with_games)
 }
 
 /// The active submission of each of these teams. An error names the teams without one that the tournament accepts.
-async fn freeze(
+async fn select_submissions(
     tx: &mut Tx,
     tournament: &Tournament,
     teams: &BTreeSet<TeamId>,
-    playing: &[Entrant],
+    entrants: &[Entrant],
 ) -> Result<BTreeMap<TeamId, SubmissionId>> {
     let active: BTreeMap<TeamId, SubmissionId> = submissions::active(tx)
         .await?
         .into_iter()
-        .filter(|submission| takes(tournament, submission))
+        .filter(|submission| accepts_runtime(tournament, submission))
         .map(|submission| (submission.team, submission.id))
         .collect();
-    let unready: Vec<&str> = playing
+    let names_without: Vec<&str> = entrants
         .iter()
         .filter(|entrant| teams.contains(&entrant.team) && !active.contains_key(&entrant.team))
         .map(|entrant| entrant.name.as_str())
         .collect();
-    if !unready.is_empty() {
+    if !names_without.is_empty() {
         return conflict(format!(
             "these teams have no active, valid submission that the tournament accepts: {}. Wait for them, or let them \
              leave the tournament",
-            unready.join(", ")
+            names_without.join(", ")
         ));
     }
     Ok(active
@@ -122,23 +134,23 @@ async fn freeze(
         .collect())
 }
 
-/// Queues the games of a round: one per fixture, or two if the rules are mirrored.
+/// Queues the games of a round: one per pair of teams, or two with exchanged sides if the rules are mirrored.
 async fn queue_games(
     tx: &mut Tx,
     tournament: &Tournament,
     drawn: &DrawnRound,
-    frozen: &BTreeMap<TeamId, SubmissionId>,
+    selected: &BTreeMap<TeamId, SubmissionId>,
 ) -> Result<u32> {
-    let halves: &[bool] = if tournament.rules.mirrored {
+    let half_is_second: &[bool] = if tournament.rules.mirrored {
         &[false, true]
     } else {
         &[false]
     };
-    let (mut pairing, mut count, mut account) = (0, 0, None);
+    let (mut pairing_number, mut count, mut account) = (0, 0, None);
     for (matchday, day) in (1..).zip(&drawn.matchdays) {
         for pair in &day.games {
-            pairing += 1;
-            for second_half in halves.iter().copied() {
+            pairing_number += 1;
+            for second_half in half_is_second.iter().copied() {
                 let mut teams = *pair;
                 if second_half {
                     teams.reverse();
@@ -149,21 +161,21 @@ async fn queue_games(
                     purpose: GamePurpose::Round(ScheduleEntry {
                         round: drawn.number,
                         matchday,
-                        pairing,
+                        pairing: pairing_number,
                         second_half,
                     }),
                     teams,
-                    submissions: teams.map(|team| frozen[&team]),
+                    submissions: teams.map(|team| selected[&team]),
                     seed: GameSeedLabel::Fixture {
                         tournament: tournament.number,
                         round: drawn.number,
-                        meeting: pairing,
+                        meeting: pairing_number,
                     },
                     created_at: tx.now,
                     state: GameState::Queued,
                 };
                 let account = match account {
-                    Some(known) => known,
+                    Some(account) => account,
                     None => *account
                         .insert(game_lifecycle::account(tx, &game, purpose::ROUND_GAME).await?),
                 };
@@ -176,7 +188,7 @@ async fn queue_games(
 }
 
 impl Store {
-    /// Starts a round: freezes each team's active submission for it and queues its games. Of two concurrent calls one
+    /// Starts a round: fixes each team's active submission for it and queues its games. Of two concurrent calls one
     /// succeeds. [`StoreError::Conflict`] in these cases, without any change:
     /// - The round is not the next one, or a game of an earlier round has no result.
     /// - A team has no valid submission that the tournament accepts; the error names the teams.
@@ -192,10 +204,10 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
-            let playing = current_entrants(tx, id).await?;
-            check_next(tx, &tournament, drawn).await?;
-            let teams = check_teams(&tournament, drawn, &playing)?;
-            let frozen = freeze(tx, &tournament, &teams, &playing).await?;
+            let entrants = current_entrants(tx, id).await?;
+            check_is_next_round(tx, &tournament, drawn).await?;
+            let teams = check_teams(&tournament, drawn, &entrants)?;
+            let selected = select_submissions(tx, &tournament, &teams, &entrants).await?;
             let byes = (1..).zip(&drawn.matchdays).flat_map(|(matchday, day)| {
                 day.byes.iter().map(move |team| RoundBye {
                     matchday,
@@ -208,10 +220,10 @@ impl Store {
                 over_at: None,
                 groups: drawn.groups.clone(),
                 byes: byes.collect(),
-                submissions: frozen.iter().map(|(team, id)| (*team, *id)).collect(),
+                submissions: selected.iter().map(|(team, id)| (*team, *id)).collect(),
             };
             rounds::insert(tx, id, &round).await?;
-            let games = queue_games(tx, &tournament, drawn, &frozen).await?;
+            let games = queue_games(tx, &tournament, drawn, &selected).await?;
             let round_started = Event::RoundStarted {
                 round: drawn.number,
                 games,

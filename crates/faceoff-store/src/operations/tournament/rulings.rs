@@ -1,3 +1,5 @@
+//! Rulings on games: an organiser voids a result, or lets a game be played again.
+
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -62,12 +64,12 @@ impl Store {
                         .into(),
                 ));
             }
-            let lane = match game.purpose {
+            let job = match game.purpose {
                 GamePurpose::Round(entry) => {
                     let has_left = |entrant: &Entrant| {
-                        let left = entrant.departure.as_ref();
+                        let departure = entrant.departure.as_ref();
                         game.teams.contains(&entrant.team)
-                            && left.is_some_and(|left| left.from_round <= entry.round)
+                            && departure.is_some_and(|departure| departure.from_round <= entry.round)
                     };
                     if entrants::all(tx, game.tournament).await?.iter().any(has_left) {
                         return Err(StoreError::Conflict(
@@ -83,7 +85,7 @@ impl Store {
                 }
                 GamePurpose::Replay { .. } => purpose::REPLAY_GAME,
             };
-            game_lifecycle::enqueue_again(tx, &game, lane).await?;
+            game_lifecycle::enqueue_again(tx, &game, job).await?;
             tx.record(Subject::Game(id), Event::GameQueuedAgain);
             games::find(tx, id).await
         })

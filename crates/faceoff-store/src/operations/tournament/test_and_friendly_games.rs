@@ -1,4 +1,5 @@
-//! Games that do not count: test games against the baseline, and friendly games.
+//! Games that do not count: test games of a team against the baseline (a submission of the organisers), and friendly games
+//! of two teams.
 
 use crate::{
     boxed,
@@ -22,17 +23,21 @@ use crate::{
 use faceoff_types::{GameId, GameSeedLabel, SubmissionId, TeamId, TournamentId};
 use jiff::{Timestamp, tz::TimeZone};
 
-fn conflict<T>(why: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(why.into()))
+fn conflict<T>(reason: impl Into<String>) -> Result<T> {
+    Err(StoreError::Conflict(reason.into()))
 }
 
 /// The tournament, if test and friendly games of these teams are possible now.
-async fn between_rounds(tx: &mut Tx, id: TournamentId, teams: &[TeamId]) -> Result<Tournament> {
+async fn find_between_rounds(
+    tx: &mut Tx,
+    id: TournamentId,
+    teams: &[TeamId],
+) -> Result<Tournament> {
     season::check_open(tx).await?;
     let tournament = tournaments::find_open(tx, id).await?;
-    let playing = current_entrants(tx, id).await?;
+    let entrants = current_entrants(tx, id).await?;
     for team in teams {
-        if !playing.iter().any(|entrant| entrant.team == *team) {
+        if !entrants.iter().any(|entrant| entrant.team == *team) {
             let team = teams::find(tx, *team).await?;
             return conflict(format!(
                 "{} is not in the tournament: ask an organiser to add it",
@@ -55,10 +60,13 @@ async fn active_submission(
     tournament: &Tournament,
     team: TeamId,
 ) -> Result<SubmissionId> {
-    let active: Option<Submission> = submissions::active(tx)
-        .await?
-        .into_iter()
-        .find(|submission| submission.team == team && rounds::takes(tournament, submission));
+    let active: Option<Submission> =
+        submissions::active(tx)
+            .await?
+            .into_iter()
+            .find(|submission| {
+                submission.team == team && rounds::accepts_runtime(tournament, submission)
+            });
     match active {
         Some(submission) => Ok(submission.id),
         None => {
@@ -73,7 +81,7 @@ async fn active_submission(
 
 /// Refuses a request beyond the team's daily quota.
 async fn check_quota(tx: &mut Tx, tournament: &Tournament, team: TeamId) -> Result<()> {
-    let today = day_begins(tx.now);
+    let today = start_of_utc_day(tx.now);
     let used = games::count_requested(tx, team, today).await?;
     let limit = tournament.settings.free_games_per_day;
     if used >= limit {
@@ -82,7 +90,7 @@ async fn check_quota(tx: &mut Tx, tournament: &Tournament, team: TeamId) -> Resu
     Ok(())
 }
 
-fn day_begins(now: Timestamp) -> Timestamp {
+fn start_of_utc_day(now: Timestamp) -> Timestamp {
     let date = now.to_zoned(TimeZone::UTC).date();
     date.to_zoned(TimeZone::UTC)
         .map_or(now, |midnight| midnight.timestamp())
@@ -102,24 +110,24 @@ impl Store {
         now: Timestamp,
     ) -> Result<Game> {
         self.write(actor, now, async |tx| {
-            let tournament = between_rounds(tx, id, &[team]).await?;
+            let tournament = find_between_rounds(tx, id, &[team]).await?;
             let Some(baseline) = tournament.baseline else {
                 return conflict(
                     "the tournament has no baseline to test against: ask the organisers, or play a friendly game",
                 );
             };
-            if let Some(asking) = asked_by {
-                check_quota(tx, &tournament, asking).await?;
+            if let Some(requesting_team) = asked_by {
+                check_quota(tx, &tournament, requesting_team).await?;
             }
-            let own = active_submission(tx, &tournament, team).await?;
-            let against = submissions::find(tx, baseline).await?;
+            let own_submission = active_submission(tx, &tournament, team).await?;
+            let opponent = submissions::find(tx, baseline).await?;
             let id = GameId::new();
             let game = Game {
                 id,
                 tournament: tournament.id,
                 purpose: GamePurpose::Test { asked_by },
-                teams: [team, against.team],
-                submissions: [own, baseline],
+                teams: [team, opponent.team],
+                submissions: [own_submission, baseline],
                 seed: GameSeedLabel::Standalone(id),
                 created_at: now,
                 state: GameState::Queued,
@@ -153,7 +161,7 @@ impl Store {
             if asked_by == opponent {
                 return conflict("opponent: a team cannot play itself");
             }
-            let tournament = between_rounds(tx, id, &[asked_by, opponent]).await?;
+            let tournament = find_between_rounds(tx, id, &[asked_by, opponent]).await?;
             if friendly_games_declined::declines(tx, opponent).await? {
                 let opponent = teams::find(tx, opponent).await?;
                 return conflict(format!(
@@ -240,6 +248,6 @@ impl Store {
     #[boxed]
     pub async fn requested_games_on_day(&self, team: TeamId, now: Timestamp) -> Result<u32> {
         let mut connection = self.database.read.acquire().await?;
-        games::count_requested(&mut connection, team, day_begins(now)).await
+        games::count_requested(&mut connection, team, start_of_utc_day(now)).await
     }
 }
