@@ -14,15 +14,18 @@ use sqlx::{Connection, SqliteConnection};
 use std::{hint::black_box, path::Path};
 use uuid::Uuid;
 
+/// Number of teams.
 const TEAMS: usize = 200;
+/// Number of days on which each team is evaluated.
 const DAYS: i64 = 120;
+/// Number of days after which a team makes a new submission.
 const DAYS_PER_SUBMISSION: i64 = 10;
 /// Maximum size of the stored standard error of an agent.
 const LOG_BYTES: usize = 64 * 1024;
 /// Size of a stored summary of 3 × 1000 episodes.
 const SUMMARY_BYTES: usize = 1500;
 
-fn result(score: f64) -> EvaluationResult {
+fn evaluation_result(score: f64) -> EvaluationResult {
     let task = TaskResult {
         episodes: 1000,
         successes: 512,
@@ -53,7 +56,7 @@ fn result(score: f64) -> EvaluationResult {
 
 /// Inserts the season by SQL in one transaction; the store's operations would need a hundred thousand
 /// commits.
-async fn fill(folder: &Path, stage: StageId) {
+async fn insert_season(folder: &Path, stage: StageId) {
     let url = format!("sqlite://{}", folder.join("faceoff.sqlite3").display());
     let mut connection = SqliteConnection::connect(&url).await.unwrap();
     let mut tx = connection.begin().await.unwrap();
@@ -126,7 +129,7 @@ async fn fill(folder: &Path, stage: StageId) {
             .execute(&mut *tx)
             .await
             .unwrap();
-            let scored = result(40.0 + team_number as f64 / 10.0);
+            let result = evaluation_result(40.0 + team_number as f64 / 10.0);
             sqlx::query(
                 "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at,
                                           state, finished_at, dataset, dataset_blake3, result)
@@ -140,7 +143,7 @@ async fn fill(folder: &Path, stage: StageId) {
             .bind(&run)
             .bind(day_number)
             .bind(day_number)
-            .bind(serde_json::to_string(&scored).unwrap())
+            .bind(serde_json::to_string(&result).unwrap())
             .execute(&mut *tx)
             .await
             .unwrap();
@@ -181,7 +184,7 @@ fn board(criterion: &mut Criterion) {
             .unwrap();
         let stage = store.stages().await.unwrap().remove(0).id;
         drop(store);
-        fill(folder.path(), stage).await;
+        insert_season(folder.path(), stage).await;
         (Store::open(folder.path()).await.unwrap(), stage)
     });
     let bytes = std::fs::metadata(folder.path().join("faceoff.sqlite3"))

@@ -85,6 +85,7 @@ struct WorkersState {
     files: HashMap<Uuid, JobFiles>,
     /// Failures in a row, by worker.
     failing: HashMap<String, Failures>,
+    /// True if this process gives jobs to remote workers.
     are_enabled: bool,
 }
 
@@ -99,9 +100,11 @@ struct Failures {
 
 /// After this number of failed jobs in a row a worker backs off: it gets no jobs for a time.
 const MAX_FAILURES: usize = 3;
-/// The first back-off, which doubles with each further failure.
+/// The first back-off, which doubles with each further failure up to [`MAX_BACKOFF`].
 const BACKOFF: SignedDuration = SignedDuration::from_mins(1);
 const MAX_BACKOFF: SignedDuration = SignedDuration::from_hours(1);
+/// After this number of doublings the back-off exceeds its maximum.
+const DOUBLINGS_TO_MAX: usize = 6;
 
 /// State of the files of a leased job.
 #[derive(Debug, Default)]
@@ -204,7 +207,7 @@ impl WorkerStatus {
 }
 
 impl Workers {
-    /// Notes that this process gives jobs to remote workers.
+    /// Records that this process gives jobs to remote workers.
     pub fn enable(&self) {
         self.lock().are_enabled = true;
     }
@@ -285,11 +288,11 @@ impl Workers {
         }
         let count = failures.jobs.len();
         let excess = count.checked_sub(MAX_FAILURES)?;
-        let doublings = i32::try_from(excess.min(6)).unwrap_or_default();
+        let doublings = i32::try_from(excess.min(DOUBLINGS_TO_MAX)).unwrap_or_default();
         let backoff = (BACKOFF * 2_i32.pow(doublings.unsigned_abs())).min(MAX_BACKOFF);
-        let until = now.saturating_add(backoff).unwrap_or(Timestamp::MAX);
-        failures.backoff_until = Some(until);
-        Some((count, until))
+        let backoff_until = now.saturating_add(backoff).unwrap_or(Timestamp::MAX);
+        failures.backoff_until = Some(backoff_until);
+        Some((count, backoff_until))
     }
 
     /// Records that a worker has completed a job, which ends its failures in a row.

@@ -1,3 +1,5 @@
+//! The table of teams: the season's participants, each with a unique name. Boards rank them by their agents' evaluations.
+
 use crate::{
     column::Instant,
     error::{Result, StoreError},
@@ -7,6 +9,7 @@ use faceoff_types::{DivisionName, TeamId, TeamName};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
+/// A participant of the season: it submits agents, which are evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Team {
     /// Does not change when the team is renamed or gets another token.
@@ -110,11 +113,11 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Re
     )
     .execute(connection)
     .await
-    .map_err(|error| name_taken(error, &team.name))?;
+    .map_err(|error| name_error(error, &team.name))?;
     Ok(())
 }
 
-/// Renames a team. [`StoreError::TeamNameTaken`] if another has the name, regardless of case.
+/// Renames a team. [`StoreError::TeamNameTaken`] if another team has this name, regardless of case.
 pub(crate) async fn set_name(
     connection: &mut SqliteConnection,
     id: TeamId,
@@ -124,7 +127,7 @@ pub(crate) async fn set_name(
     sqlx::query!("UPDATE teams SET name = ? WHERE id = ?", text, id)
         .execute(connection)
         .await
-        .map_err(|error| name_taken(error, name))?;
+        .map_err(|error| name_error(error, name))?;
     Ok(())
 }
 
@@ -147,19 +150,19 @@ pub(crate) async fn set_profile(
     Ok(())
 }
 
-/// Retires a team, by its own decision or an organiser's, or revokes this.
+/// Retires a team from `retired_at`, by its own decision or an organiser's; `None` revokes its retirement.
 pub(crate) async fn set_retired(
     connection: &mut SqliteConnection,
     id: TeamId,
-    at: Option<Timestamp>,
-    by_organiser: bool,
+    retired_at: Option<Timestamp>,
+    is_by_organiser: bool,
 ) -> Result<()> {
-    let (id, by_organiser) = (Text(id), by_organiser && at.is_some());
-    let at = at.map(Instant);
+    let (id, is_by_organiser) = (Text(id), is_by_organiser && retired_at.is_some());
+    let retired_at = retired_at.map(Instant);
     sqlx::query!(
         "UPDATE teams SET retired_at = ?, retired_by_organiser = ? WHERE id = ?",
-        at,
-        by_organiser,
+        retired_at,
+        is_by_organiser,
         id
     )
     .execute(connection)
@@ -231,18 +234,18 @@ pub(crate) async fn evidence(
     Ok(retired_at.map(|at| Evidence::Retired(at.0)))
 }
 
-/// Disqualifies a team, or reinstates it.
+/// Disqualifies a team by the ruling; `None` reinstates it.
 pub(crate) async fn set_disqualified(
     connection: &mut SqliteConnection,
     id: TeamId,
     ruling: Option<&Ruling>,
 ) -> Result<()> {
     let id = Text(id);
-    let at = ruling.map(|ruling| Instant(ruling.at));
+    let disqualified_at = ruling.map(|ruling| Instant(ruling.at));
     let reason = ruling.map(|ruling| &ruling.reason);
     sqlx::query!(
         "UPDATE teams SET disqualified_at = ?, disqualified_for = ? WHERE id = ?",
-        at,
+        disqualified_at,
         reason,
         id,
     )
@@ -268,7 +271,8 @@ pub(crate) async fn check_may_compete(connection: &mut SqliteConnection, id: Tea
     }
 }
 
-fn name_taken(error: sqlx::Error, name: &TeamName) -> StoreError {
+/// The store's error for a failed write of a team's name.
+fn name_error(error: sqlx::Error, name: &TeamName) -> StoreError {
     if StoreError::is_duplicate(&error, "teams.name") {
         StoreError::TeamNameTaken(name.to_string())
     } else {

@@ -1,3 +1,5 @@
+//! The table of the terms of participation, which the organisers publish and a team's members must accept.
+
 use crate::{column::Instant, error::Result};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
@@ -7,7 +9,7 @@ use sqlx::SqliteConnection;
 pub struct Terms {
     /// From 1; the newest version is in force.
     pub version: u32,
-    /// When it was published.
+    /// When this version was published.
     pub since: Timestamp,
     pub text: String,
 }

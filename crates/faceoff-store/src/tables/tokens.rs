@@ -1,3 +1,5 @@
+//! The table of tokens: the secrets by which API clients and browsers authenticate.
+
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
@@ -91,7 +93,7 @@ impl Token {
     }
 }
 
-struct Row {
+struct TokenRow {
     id: Text<TokenId>,
     is_key: bool,
     team_id: Option<Text<TeamId>>,
@@ -103,8 +105,8 @@ struct Row {
     revoked_at: Option<Instant>,
 }
 
-impl From<Row> for Token {
-    fn from(row: Row) -> Self {
+impl From<TokenRow> for Token {
+    fn from(row: TokenRow) -> Self {
         Self {
             id: row.id.0,
             kind: if row.is_key {
@@ -126,7 +128,7 @@ impl From<Row> for Token {
 macro_rules! select_tokens {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            TokenRow,
             r#"SELECT id AS "id: Text<TokenId>", kind = 'key' AS "is_key!: bool",
                       team_id AS "team_id: Text<TeamId>", person_id AS "person_id: Text<UserId>", name,
                       created_at AS "created_at: Instant", expires_at AS "expires_at: Instant",
@@ -224,7 +226,7 @@ pub(crate) async fn insert(
     )
     .execute(connection)
     .await
-    .map_err(hash_taken)?;
+    .map_err(hash_error)?;
     Ok(())
 }
 
@@ -242,31 +244,35 @@ pub(crate) async fn set_hash(
     )
     .execute(connection)
     .await
-    .map_err(hash_taken)?;
+    .map_err(hash_error)?;
     Ok(())
 }
 
 pub(crate) async fn set_last_used(
     connection: &mut SqliteConnection,
     id: TokenId,
-    at: Timestamp,
+    used_at: Timestamp,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(at));
-    sqlx::query!("UPDATE tokens SET last_used_at = ? WHERE id = ?", at, id)
-        .execute(connection)
-        .await?;
+    let (id, used_at) = (Text(id), Instant(used_at));
+    sqlx::query!(
+        "UPDATE tokens SET last_used_at = ? WHERE id = ?",
+        used_at,
+        id
+    )
+    .execute(connection)
+    .await?;
     Ok(())
 }
 
 pub(crate) async fn revoke(
     connection: &mut SqliteConnection,
     id: TokenId,
-    at: Timestamp,
+    revoked_at: Timestamp,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(at));
+    let (id, revoked_at) = (Text(id), Instant(revoked_at));
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ? WHERE id = ? AND revoked_at IS NULL",
-        at,
+        revoked_at,
         id
     )
     .execute(connection)
@@ -279,14 +285,15 @@ pub(crate) async fn revoke_others(
     connection: &mut SqliteConnection,
     owner: TokenOwner,
     kept: Option<TokenId>,
-    at: Timestamp,
+    revoked_at: Timestamp,
 ) -> Result<()> {
-    let (kind, team, user, at) = (owner.kind(), owner.team(), owner.user(), Instant(at));
+    let (kind, team, user) = (owner.kind(), owner.team(), owner.user());
+    let revoked_at = Instant(revoked_at);
     let kept = kept.map(Text);
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ?
          WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL AND id IS NOT ?",
-        at,
+        revoked_at,
         kind,
         team,
         user,
@@ -297,22 +304,23 @@ pub(crate) async fn revoke_others(
     Ok(())
 }
 
-/// Deletes the sessions that expired or were revoked before an instant. The events still record them.
+/// Deletes the sessions that expired or were revoked before `ended_before`. The events still record them.
 pub(crate) async fn delete_old_sessions(
     connection: &mut SqliteConnection,
-    before: Timestamp,
+    ended_before: Timestamp,
 ) -> Result<()> {
-    let before = Instant(before);
+    let ended_before = Instant(ended_before);
     sqlx::query!(
         "DELETE FROM tokens WHERE kind = 'session' AND (expires_at < ?1 OR revoked_at < ?1)",
-        before
+        ended_before
     )
     .execute(connection)
     .await?;
     Ok(())
 }
 
-fn hash_taken(error: sqlx::Error) -> StoreError {
+/// The store's error for a failed write of a token's hash.
+fn hash_error(error: sqlx::Error) -> StoreError {
     if StoreError::is_duplicate(&error, "tokens.hash") {
         StoreError::Conflict("there is such a token: draw a new one".into())
     } else {

@@ -1,3 +1,5 @@
+//! The table of tournaments: rounds of games among teams, each round with the winners of the round before.
+
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
@@ -19,7 +21,7 @@ pub struct Tournament {
     /// Unique regardless of case.
     pub name: StageName,
     pub created_at: Timestamp,
-    /// The stage whose tiers selected the first entrants, if any.
+    /// The stage whose tiers (grades of its results) selected the first entrants, if any.
     pub stage: Option<StageId>,
     /// Everything that results depend on; fixed from the first round on.
     pub rules: TournamentRules,
@@ -33,7 +35,7 @@ pub struct Tournament {
     pub closed_at: Option<Timestamp>,
 }
 
-struct Row {
+struct TournamentRow {
     id: Text<TournamentId>,
     number: u32,
     name: Text<StageName>,
@@ -47,8 +49,8 @@ struct Row {
     closed_at: Option<Instant>,
 }
 
-impl From<Row> for Tournament {
-    fn from(row: Row) -> Self {
+impl From<TournamentRow> for Tournament {
+    fn from(row: TournamentRow) -> Self {
         Self {
             id: row.id.0,
             number: row.number,
@@ -68,7 +70,7 @@ impl From<Row> for Tournament {
 macro_rules! select_tournaments {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            TournamentRow,
             r#"SELECT id AS "id: Text<TournamentId>", number AS "number: u32", name AS "name: Text<StageName>",
                       created_at AS "created_at: Instant", stage_id AS "stage: Text<StageId>",
                       rules AS "rules: Json<TournamentRules>", settings AS "settings: Json<TournamentSettings>",
@@ -124,7 +126,7 @@ pub(crate) async fn next_number(connection: &mut SqliteConnection) -> Result<u32
     .await?)
 }
 
-/// Adds a tournament. [`StoreError::TournamentNameTaken`] if another has its name.
+/// Adds a tournament. [`StoreError::TournamentNameTaken`] if another tournament has its name.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
@@ -144,11 +146,11 @@ pub(crate) async fn insert(
     )
     .execute(connection)
     .await
-    .map_err(|error| name_taken(error, &tournament.name))?;
+    .map_err(|error| name_error(error, &tournament.name))?;
     Ok(())
 }
 
-/// Stores all changeable fields of a tournament. [`StoreError::TournamentNameTaken`] if another has its name.
+/// Stores all changeable fields of a tournament. [`StoreError::TournamentNameTaken`] if another tournament has its name.
 pub(crate) async fn update(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
@@ -175,11 +177,12 @@ pub(crate) async fn update(
     )
     .execute(connection)
     .await
-    .map_err(|error| name_taken(error, &tournament.name))?;
+    .map_err(|error| name_error(error, &tournament.name))?;
     Ok(())
 }
 
-fn name_taken(error: sqlx::Error, name: &StageName) -> StoreError {
+/// The store's error for a failed write of a tournament's name.
+fn name_error(error: sqlx::Error, name: &StageName) -> StoreError {
     if StoreError::is_duplicate(&error, "tournaments.name") {
         StoreError::TournamentNameTaken(name.to_string())
     } else {

@@ -1,3 +1,5 @@
+//! The table of users (in SQL `people`): the accounts of organisers and of the teams' members.
+
 use crate::{
     column::Instant,
     error::{Result, StoreError},
@@ -24,7 +26,7 @@ pub struct User {
     pub accepted_terms: Option<u32>,
 }
 
-struct Row {
+struct UserRow {
     id: Text<UserId>,
     name: Text<UserName>,
     team_id: Option<Text<TeamId>>,
@@ -34,8 +36,8 @@ struct Row {
     accepted_terms: Option<u32>,
 }
 
-impl From<Row> for User {
-    fn from(row: Row) -> Self {
+impl From<UserRow> for User {
+    fn from(row: UserRow) -> Self {
         Self {
             id: row.id.0,
             name: row.name.0,
@@ -52,7 +54,7 @@ impl From<Row> for User {
 macro_rules! select_users {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            UserRow,
             r#"SELECT id AS "id: Text<UserId>", name AS "name: Text<UserName>",
                       team_id AS "team_id: Text<TeamId>", joined_at AS "joined_at: Instant",
                       left_at AS "left_at: Instant", password IS NOT NULL AS "has_password!: bool",
@@ -159,15 +161,16 @@ pub(crate) async fn set_accepted_terms(
     Ok(())
 }
 
+/// Closes an account: the user's password is removed.
 pub(crate) async fn set_left(
     connection: &mut SqliteConnection,
     id: UserId,
-    at: Timestamp,
+    left_at: Timestamp,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(at));
+    let (id, left_at) = (Text(id), Instant(left_at));
     sqlx::query!(
         "UPDATE people SET left_at = ?, password = NULL WHERE id = ?",
-        at,
+        left_at,
         id
     )
     .execute(connection)

@@ -1,4 +1,4 @@
-//! Validation runs, which check that a submission's agent starts, responds, and meets its time limits.
+//! The table of validation runs, which check that a submission's agent starts, responds, and meets its time limits.
 
 use crate::error::Result;
 use faceoff_types::SubmissionId;

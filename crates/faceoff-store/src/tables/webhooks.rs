@@ -1,4 +1,4 @@
-//! Webhooks: addresses to which events are sent.
+//! The table of webhooks: addresses to which events are sent. The sending of one event to one webhook is a *delivery*.
 
 use crate::{
     column::{Bytes32, Instant, Json},
@@ -33,6 +33,7 @@ pub struct Webhook {
 /// Time and reason of the disabling of a webhook.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DisabledWebhook {
+    /// When it was disabled.
     pub at: Timestamp,
     pub reason: String,
 }
@@ -52,7 +53,7 @@ impl std::fmt::Debug for WebhookSecrets {
     }
 }
 
-struct Row {
+struct WebhookRow {
     id: Text<WebhookId>,
     team_id: Option<Text<TeamId>>,
     name: String,
@@ -66,9 +67,9 @@ struct Row {
     old_secret_until: Option<Instant>,
 }
 
-impl From<Row> for Webhook {
-    fn from(row: Row) -> Self {
-        let dead = row.dead_at.zip(row.dead_for);
+impl From<WebhookRow> for Webhook {
+    fn from(row: WebhookRow) -> Self {
+        let disabled = row.dead_at.zip(row.dead_for);
         Self {
             id: row.id.0,
             team: row.team_id.map(|team| team.0),
@@ -78,7 +79,7 @@ impl From<Row> for Webhook {
             created_at: row.created_at.0,
             seen: row.seen,
             failing_since: row.failing_since.map(|at| at.0),
-            disabled: dead.map(|(at, reason)| DisabledWebhook { at: at.0, reason }),
+            disabled: disabled.map(|(at, reason)| DisabledWebhook { at: at.0, reason }),
             old_secret_until: row.old_secret_until.map(|at| at.0),
         }
     }
@@ -88,7 +89,7 @@ impl From<Row> for Webhook {
 macro_rules! select_webhooks {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
-            Row,
+            WebhookRow,
             r#"SELECT id AS "id: Text<WebhookId>", team_id AS "team_id: Text<TeamId>", name, url,
                       about AS "about: Json<Vec<String>>", created_at AS "created_at: Instant", seen,
                       failing_since AS "failing_since: Instant", dead_at AS "dead_at: Instant", dead_for,
@@ -116,19 +117,19 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: WebhookId) -> Re
         .ok_or(StoreError::NotFound("webhook"))
 }
 
-/// The enabled webhooks for which events up to `newest` have no deliveries yet, with at most `waiting` waiting
+/// The enabled webhooks for which events up to `newest` have no deliveries yet, with at most `max_waiting` waiting
 /// deliveries.
 pub(crate) async fn with_new_events(
     connection: &mut SqliteConnection,
     newest: i64,
-    waiting: u32,
+    max_waiting: u32,
 ) -> Result<Vec<Webhook>> {
     let rows = select_webhooks!(
         "WHERE dead_at IS NULL AND seen < ?1
            AND (SELECT COUNT(*) FROM webhook_deliveries d WHERE d.webhook_id = webhooks.id AND d.state = 'waiting') <= ?2
          ORDER BY seen, id",
         newest,
-        waiting
+        max_waiting
     )
     .fetch_all(connection)
     .await?;
@@ -173,7 +174,7 @@ pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook)
     let (id, about) = (Text(webhook.id), Json(&webhook.topics));
     let failing_since = webhook.failing_since.map(Instant);
     let (dead_at, dead_for) = match &webhook.disabled {
-        Some(dead) => (Some(Instant(dead.at)), Some(dead.reason.clone())),
+        Some(disabled) => (Some(Instant(disabled.at)), Some(disabled.reason.clone())),
         None => (None, None),
     };
     sqlx::query!(
@@ -192,7 +193,7 @@ pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook)
     Ok(())
 }
 
-/// Notes that deliveries exist for all events up to `seen`.
+/// Records that deliveries exist for all events up to `seen`.
 pub(crate) async fn set_seen(
     connection: &mut SqliteConnection,
     id: WebhookId,
@@ -205,17 +206,18 @@ pub(crate) async fn set_seen(
     Ok(())
 }
 
-/// Replaces a webhook's secret; the previous one also signs until `old_until`.
+/// Replaces a webhook's secret; the previous secret also signs until `old_secret_until`.
 pub(crate) async fn set_secret(
     connection: &mut SqliteConnection,
     id: WebhookId,
     secret: [u8; 32],
-    old_until: Timestamp,
+    old_secret_until: Timestamp,
 ) -> Result<()> {
-    let (id, secret, old_until) = (Text(id), Bytes32(secret), Instant(old_until));
+    let (id, secret) = (Text(id), Bytes32(secret));
+    let old_secret_until = Instant(old_secret_until);
     sqlx::query!(
         "UPDATE webhooks SET old_secret = secret, old_secret_until = ?, secret = ? WHERE id = ?",
-        old_until,
+        old_secret_until,
         secret,
         id
     )

@@ -1,4 +1,4 @@
-//! Banned remote workers, whose results are rejected.
+//! The table of banned remote workers (processes on other machines that run jobs), whose results are rejected.
 
 use crate::{column::Instant, error::Result};
 use jiff::Timestamp;
@@ -9,6 +9,7 @@ use sqlx::SqliteConnection;
 pub struct WorkerBan {
     /// Name of the worker.
     pub worker: String,
+    /// When it was imposed.
     pub at: Timestamp,
     /// Shown to organisers.
     pub reason: String,
@@ -32,11 +33,11 @@ impl From<BanRow> for WorkerBan {
 
 /// Adds a ban; false if the worker is banned already.
 pub(crate) async fn insert(connection: &mut SqliteConnection, ban: &WorkerBan) -> Result<bool> {
-    let at = Instant(ban.at);
+    let banned_at = Instant(ban.at);
     let inserted = sqlx::query!(
         "INSERT INTO worker_bans (worker, banned_at, reason) VALUES (?, ?, ?) ON CONFLICT DO NOTHING",
         ban.worker,
-        at,
+        banned_at,
         ban.reason,
     )
     .execute(connection)

@@ -1,11 +1,15 @@
-//! Ablations: they run behind everything that counts.
+//! Ablations: runs of a submission under several profiles (settings of disturbances), in order to see which disturbances
+//! cost it points. They count for no board, so that workers run them after all other jobs.
 
-use crate::fixture::{TestStore, commit, plan};
+use crate::fixture::{TestStore, shard_commit, six_shard_plan};
 use faceoff_store::*;
 use faceoff_types::*;
 
-/// Per profile: three tasks of four episodes in shards of two.
-const SHARDS: u32 = 6;
+/// Number of profiles of an ablation, each of which is a run.
+const PROFILES: u32 = Profile::ABLATION.len() as u32;
+/// Number of shards of a run: three tasks of four episodes, in shards of two episodes.
+const SHARDS_PER_RUN: u32 = 6;
+const EPISODES_PER_SHARD: u32 = 2;
 
 impl TestStore {
     async fn claim_ablation_shard(&self) -> (JobClaim, Run, Shard) {
@@ -32,10 +36,11 @@ impl TestStore {
         }
     }
 
-    async fn request(&self, submission: SubmissionId) -> Ablation {
+    /// Requests an ablation, whose runs end at the second agent fault.
+    async fn request_ablation(&self, submission: SubmissionId) -> Ablation {
         let plan = RunPlan {
             max_faults: 1,
-            ..plan()
+            ..six_shard_plan()
         };
         self.store
             .request_ablation(Actor::Organiser, submission, &plan, self.now)
@@ -43,7 +48,7 @@ impl TestStore {
             .unwrap()
     }
 
-    async fn newest(&self, submission: SubmissionId) -> Ablation {
+    async fn newest_ablation(&self, submission: SubmissionId) -> Ablation {
         let newest = self.store.newest_ablation(submission).await.unwrap();
         newest.expect("an ablation")
     }
@@ -56,31 +61,35 @@ impl TestStore {
     }
 }
 
-fn unrecorded(shard: &Shard, faults: u32) -> ShardCommit {
+/// The commit of a shard without a recording, as for an ablation.
+fn unrecorded_commit(shard: &Shard, faults: u32) -> ShardCommit {
     ShardCommit {
         recording: None,
-        ..commit(shard, faults)
+        ..shard_commit(shard, faults)
     }
 }
 
 #[tokio::test]
 async fn ablation_runs_each_profile_and_task_once() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
+    let submission = f.valid_submission_of("Alpha").await;
     assert_eq!(f.store.newest_ablation(submission.id).await.unwrap(), None);
-    let ablation = f.request(submission.id).await;
+    let ablation = f.request_ablation(submission.id).await;
     let open = |episodes_done| AblationState::Open {
         episodes_done,
-        episodes_total: 6 * 3 * 4,
+        episodes_total: PROFILES * SHARDS_PER_RUN * EPISODES_PER_SHARD,
     };
     assert_eq!(ablation.state, open(0));
     assert_eq!(ablation.episodes_per_task, 4);
     let mut played = Vec::new();
-    for done in 0..6 * SHARDS {
-        assert_eq!(f.newest(submission.id).await.state, open(done * 2));
+    for shards_done in 0..PROFILES * SHARDS_PER_RUN {
+        let expected = open(shards_done * EPISODES_PER_SHARD);
+        assert_eq!(f.newest_ablation(submission.id).await.state, expected);
         let (claim, run, shard) = f.claim_ablation_shard().await;
         for expected in [CommitOutcome::Stored, CommitOutcome::AlreadyStored] {
-            let committed = f.commit_ablation(&claim, unrecorded(&shard, 0)).await;
+            let committed = f
+                .commit_ablation(&claim, unrecorded_commit(&shard, 0))
+                .await;
             assert_eq!(committed, expected);
         }
         assert_eq!(ablation.runs[&run.plan.profile], run.id);
@@ -93,7 +102,7 @@ async fn ablation_runs_each_profile_and_task_once() {
         .collect();
     assert_eq!(played, expected);
     assert!(f.claim().await.is_none());
-    let newest = f.newest(submission.id).await;
+    let newest = f.newest_ablation(submission.id).await;
     assert_eq!(newest.state, AblationState::Finished { finished_at: f.now });
     for run in newest.runs.into_values() {
         let outcomes = f.store.outcomes(run).await.unwrap();
@@ -110,37 +119,38 @@ async fn ablation_runs_each_profile_and_task_once() {
 #[tokio::test]
 async fn ablation_runs_last_and_reaches_no_board() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.request(submission.id).await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
-    for _ in 0..6 {
+    let submission = f.valid_submission_of("Alpha").await;
+    f.request_ablation(submission.id).await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    for _ in 0..SHARDS_PER_RUN {
         let (claim, run, shard) = f.claim_shard().await;
         assert_eq!(run.id, evaluation.run);
         f.commit_shard(&claim, &shard, 0).await;
     }
     f.claim_scoring().await;
     let (claim, _, shard) = f.claim_ablation_shard().await;
-    f.commit_ablation(&claim, unrecorded(&shard, 0)).await;
-    let of_team = f.store.evaluations_of(evaluation.team).await.unwrap();
-    assert_eq!(of_team.len(), 1, "an ablation is no evaluation");
+    f.commit_ablation(&claim, unrecorded_commit(&shard, 0))
+        .await;
+    let evaluations = f.store.evaluations_of(evaluation.team).await.unwrap();
+    assert_eq!(evaluations.len(), 1, "an ablation is no evaluation");
     assert!(f.board().await.is_empty());
 }
 
 #[tokio::test]
 async fn ablation_request_needs_valid_idle_submission() {
     let f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     let submission = f.upload(&team).await;
-    let plan = plan();
-    let request = |id| f.store.request_ablation(Actor::Organiser, id, &plan, f.now);
+    let plan = six_shard_plan();
+    let request_ablation = |id| f.store.request_ablation(Actor::Organiser, id, &plan, f.now);
     assert!(matches!(
-        request(submission.id).await,
+        request_ablation(submission.id).await,
         Err(StoreError::Conflict(_))
     ));
     f.validate().await;
-    request(submission.id).await.unwrap();
+    request_ablation(submission.id).await.unwrap();
     assert!(matches!(
-        request(submission.id).await,
+        request_ablation(submission.id).await,
         Err(StoreError::Conflict(_))
     ));
 }
@@ -148,29 +158,33 @@ async fn ablation_request_needs_valid_idle_submission() {
 #[tokio::test]
 async fn ablation_failure_records_agent_or_platform_fault() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.request(submission.id).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.request_ablation(submission.id).await;
     let (claim, _, shard) = f.claim_ablation_shard().await;
-    f.commit_ablation(&claim, unrecorded(&shard, 2)).await;
-    assert!(f.claim().await.is_none(), "its other shards are dropped");
-    let AblationState::Failed { reason, .. } = f.newest(submission.id).await.state else {
+    f.commit_ablation(&claim, unrecorded_commit(&shard, 2))
+        .await;
+    assert!(
+        f.claim().await.is_none(),
+        "the ablation's other shards are dropped"
+    );
+    let AblationState::Failed { reason, .. } = f.newest_ablation(submission.id).await.state else {
         panic!("expected a failed ablation")
     };
     assert!(reason.contains("more than 1 times with ideal"), "{reason}");
 
-    // Another one can be requested; after a platform fault the shard is retried, then given up.
-    f.later(1);
-    f.request(submission.id).await;
+    // Another ablation can be requested. After a platform fault its shard is retried; after the last attempt the ablation fails.
+    f.advance_clock_s(1);
+    f.request_ablation(submission.id).await;
     for _ in 0..MAX_ATTEMPTS {
         let (claim, ..) = f.claim_ablation_shard().await;
         f.store
             .release_failed(&claim, "the disk is full", f.now)
             .await
             .unwrap();
-        // Until its pause is over; then it is the first in the queue again.
-        f.later(120);
+        // After this delay the shard can be claimed again.
+        f.advance_clock_s(120);
     }
-    let AblationState::Failed { reason, .. } = f.newest(submission.id).await.state else {
+    let AblationState::Failed { reason, .. } = f.newest_ablation(submission.id).await.state else {
         panic!("expected a failed ablation")
     };
     assert_eq!(reason, "the disk is full");
@@ -180,13 +194,14 @@ async fn ablation_failure_records_agent_or_platform_fault() {
 #[tokio::test]
 async fn ablation_commit_with_gap_or_recording_is_refused() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.request(submission.id).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.request_ablation(submission.id).await;
     let (claim, _, shard) = f.claim_ablation_shard().await;
-    let mut short = unrecorded(&shard, 0);
-    short.outcomes.pop();
-    for bad in [short, commit(&shard, 0)] {
-        let refused = f.store.commit_shard(&claim, bad, f.now).await;
-        assert!(matches!(refused, Err(StoreError::Conflict(_))));
+    let mut with_gap = unrecorded_commit(&shard, 0);
+    with_gap.outcomes.pop();
+    let recorded = shard_commit(&shard, 0);
+    for bad in [with_gap, recorded] {
+        let result = f.store.commit_shard(&claim, bad, f.now).await;
+        assert!(matches!(result, Err(StoreError::Conflict(_))));
     }
 }

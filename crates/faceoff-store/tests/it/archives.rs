@@ -1,4 +1,5 @@
-//! Export of the database to an archive, and its import.
+//! Export of the database to an archive, and its import. An archive has two editions: the organisers' edition with all data of
+//! the season, and the public edition without private data.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -93,6 +94,9 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ),
 ];
 
+/// Hash of the code of Ada's invitation.
+const CODE_HASH: [u8; 32] = [7; 32];
+
 async fn open(file: &Path) -> SqliteConnection {
     let url = format!("sqlite://{}", file.display());
     SqliteConnection::connect(&url).await.unwrap()
@@ -109,8 +113,8 @@ async fn exec(file: &Path, sql: &str) {
 
 async fn count(file: &Path, table: &str) -> i64 {
     let sql = format!("SELECT COUNT(*) FROM {table}");
-    let found = sqlx::query_scalar(AssertSqlSafe(sql));
-    found.fetch_one(&mut open(file).await).await.unwrap()
+    let rows = sqlx::query_scalar(AssertSqlSafe(sql));
+    rows.fetch_one(&mut open(file).await).await.unwrap()
 }
 
 /// A folder with the database of an archive of this edition.
@@ -127,8 +131,8 @@ async fn export(f: &TestStore, edition: Edition) -> tempfile::TempDir {
         .unwrap();
     let file = folder.path().join("faceoff.sqlite3");
     snapshot.finish(&file).await.unwrap();
-    let left = std::fs::read_dir(folder.path()).unwrap().count();
-    assert_eq!(left, 1, "the intermediate copy is deleted");
+    let files = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(files, 1, "the intermediate copy is deleted");
     folder
 }
 
@@ -136,14 +140,14 @@ fn database(folder: &tempfile::TempDir) -> std::path::PathBuf {
     folder.path().join("faceoff.sqlite3")
 }
 
-/// A season with a finished day, a user, a webhook and queued jobs.
-async fn season() -> (TestStore, EvaluationId) {
+/// A season with a finished day, a user, a webhook and queued jobs. Returns the finished evaluation.
+async fn season_with_queued_day() -> (TestStore, EvaluationId) {
     let mut f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await;
-    let played = f.evaluate(alpha.id, &small()).await.id;
-    f.run_all(1.0).await;
+    let alpha = f.valid_submission_of("Alpha").await;
+    let finished = f.evaluate(alpha.id, &one_shard_plan()).await.id;
+    f.run_all_with_score(1.0).await;
     let invitation = NewInvitation {
-        code_hash: [7; 32],
+        code_hash: CODE_HASH,
         role: InvitationRole::Member(alpha.team),
         note: "Ada".into(),
         expires_at: f.now + jiff::SignedDuration::from_hours(1),
@@ -153,7 +157,7 @@ async fn season() -> (TestStore, EvaluationId) {
         .await
         .unwrap();
     f.store
-        .join(join_request([7; 32], "Ada"), f.now)
+        .join(join_request(CODE_HASH, "Ada"), f.now)
         .await
         .unwrap();
     let webhook = NewWebhook {
@@ -167,15 +171,15 @@ async fn season() -> (TestStore, EvaluationId) {
     let webhook = webhook.await.unwrap().id;
     let delivery = f.store.test_webhook(webhook, "test", "{}", f.now);
     delivery.await.unwrap();
-    f.later(24 * 3600);
-    f.ready_team("Beta").await;
-    f.evaluate(alpha.id, &small()).await;
-    (f, played)
+    f.advance_clock_s(24 * 3600);
+    f.valid_submission_of("Beta").await;
+    f.evaluate(alpha.id, &one_shard_plan()).await;
+    (f, finished)
 }
 
 #[tokio::test]
 async fn public_archive_has_only_listed_columns() {
-    let (f, _) = season().await;
+    let (f, _) = season_with_queued_day().await;
     let folder = export(&f, Edition::Public).await;
     let mut connection = open(&database(&folder)).await;
     let tables: Vec<String> = sqlx::query_scalar(
@@ -184,12 +188,12 @@ async fn public_archive_has_only_listed_columns() {
     .fetch_all(&mut connection)
     .await
     .unwrap();
-    let known: BTreeMap<&str, &str> = PUBLIC_COLUMNS.iter().copied().collect();
+    let public_columns: BTreeMap<&str, &str> = PUBLIC_COLUMNS.iter().copied().collect();
     for table in tables {
         if table == "_sqlx_migrations" {
             continue;
         }
-        let Some(expected) = known.get(table.as_str()) else {
+        let Some(expected) = public_columns.get(table.as_str()) else {
             assert_eq!(count(&database(&folder), &table).await, 0, "{table}");
             continue;
         };
@@ -204,7 +208,7 @@ async fn public_archive_has_only_listed_columns() {
 
 #[tokio::test]
 async fn archive_omits_open_evaluations_and_credentials() {
-    let (f, played) = season().await;
+    let (f, finished) = season_with_queued_day().await;
     assert_eq!(
         count(&f.folder.path().join("faceoff.sqlite3"), "evaluations").await,
         3
@@ -238,27 +242,34 @@ async fn archive_omits_open_evaluations_and_credentials() {
 
         Store::import(folder.path(), f.now).await.unwrap();
         let imported = Store::open(folder.path()).await.unwrap();
-        let (was, is) = (
+        let (season, imported_season) = (
             f.store.season().await.unwrap(),
             imported.season().await.unwrap(),
         );
-        assert_eq!(is.commitment, was.commitment, "the commitment stays");
+        // The commitment is the published hash of the season's secret.
+        assert_eq!(
+            imported_season.commitment, season.commitment,
+            "the commitment stays"
+        );
         let (stages, days) = (
             imported.stages().await.unwrap(),
             imported.days().await.unwrap(),
         );
         let days: Vec<StageDay> = days.into_iter().map(|(day, _)| day.stage_day).collect();
         let seeds = imported
-            .day_seeds(&is, &stages, days.iter().copied())
+            .day_seeds(&imported_season, &stages, days.iter().copied())
             .await
             .unwrap();
-        let first = days[1];
-        let expected =
-            BTreeMap::from([(first, stages[0].seed_label(first.date).seed(&was.secret))]);
+        // The newest day comes first; only the older one is released.
+        let released = days[1];
+        let expected = BTreeMap::from([(
+            released,
+            stages[0].seed_label(released.date).seed(&season.secret),
+        )]);
         assert_eq!(seeds, expected, "seeds of released days only");
         assert_eq!(
-            imported.evaluation(played).await.unwrap(),
-            f.store.evaluation(played).await.unwrap()
+            imported.evaluation(finished).await.unwrap(),
+            f.store.evaluation(finished).await.unwrap()
         );
     }
 }
@@ -266,15 +277,15 @@ async fn archive_omits_open_evaluations_and_credentials() {
 #[tokio::test]
 async fn public_archive_has_results_without_episodes() {
     let f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(alpha.id, &small()).await;
-    f.run_all(1.0).await;
+    let alpha = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(alpha.id, &one_shard_plan()).await;
+    f.run_all_with_score(1.0).await;
     let public = f
         .store
         .snapshot(f.folder.path(), Edition::Public, "a test", f.now);
     let error = public.await.unwrap_err();
     assert!(
-        matches!(&error, StoreError::Conflict(why) if why.contains("1 results came in")),
+        matches!(&error, StoreError::Conflict(reason) if reason.contains("1 results came in")),
         "{error}"
     );
 
@@ -301,27 +312,32 @@ async fn public_archive_has_results_without_episodes() {
 #[tokio::test]
 async fn public_archive_omits_lifted_rulings_and_private_answers() {
     let f = TestStore::new().await;
-    let (alpha, beta) = (f.ready_team("Alpha").await, f.ready_team("Beta").await);
-    f.evaluate(alpha.id, &small()).await;
-    f.run_all(1.0).await;
-    for (team, why) in [(alpha.team, "it spied"), (beta.team, "it slept")] {
-        let ruling = f.store.disqualify_team(Actor::Organiser, team, why, f.now);
-        ruling.await.unwrap();
+    let (alpha, beta) = (
+        f.valid_submission_of("Alpha").await,
+        f.valid_submission_of("Beta").await,
+    );
+    f.evaluate(alpha.id, &one_shard_plan()).await;
+    f.run_all_with_score(1.0).await;
+    for (team, reason) in [(alpha.team, "it copied"), (beta.team, "it attacked")] {
+        let disqualified = f
+            .store
+            .disqualify_team(Actor::Organiser, team, reason, f.now);
+        disqualified.await.unwrap();
     }
-    let lifted = f
+    let reinstated = f
         .store
-        .reinstate_team(Actor::Organiser, alpha.team, "it did not", f.now);
-    lifted.await.unwrap();
+        .reinstate_team(Actor::Organiser, alpha.team, "it did not copy", f.now);
+    reinstated.await.unwrap();
     for public in [true, false] {
-        let asked = f
+        let question = f
             .store
             .ask(Actor::Team(beta.team), beta.team, "how?", f.now)
             .await
             .unwrap();
-        let answered = f
+        let answer = f
             .store
-            .answer(Actor::Organiser, asked.id, "so", public, f.now);
-        answered.await.unwrap();
+            .answer(Actor::Organiser, question.id, "so", public, f.now);
+        answer.await.unwrap();
     }
     let folder = export(&f, Edition::Public).await;
     Store::import(folder.path(), f.now).await.unwrap();
@@ -335,7 +351,7 @@ async fn public_archive_omits_lifted_rulings_and_private_answers() {
     .unwrap();
     assert_eq!(rulings.len(), 1, "{rulings:?}");
     assert_eq!(rulings[0].0, beta.team.to_string());
-    assert!(rulings[0].1.contains("it slept"));
+    assert!(rulings[0].1.contains("it attacked"));
     let questions = imported.questions().await.unwrap();
     assert_eq!(questions.len(), 1);
     assert_eq!((&*questions[0].text, questions[0].team), ("how?", None));
@@ -343,7 +359,7 @@ async fn public_archive_omits_lifted_rulings_and_private_answers() {
 
 #[tokio::test]
 async fn snapshot_is_unaffected_by_later_changes() {
-    let (f, played) = season().await;
+    let (f, finished) = season_with_queued_day().await;
     let folder = tempfile::tempdir().unwrap();
     let snapshot = f
         .store
@@ -351,31 +367,34 @@ async fn snapshot_is_unaffected_by_later_changes() {
         .await
         .unwrap();
     assert_eq!(snapshot.open_evaluations, 2);
-    let before = snapshot.store().evaluation(played).await.unwrap();
+    let before = snapshot.store().evaluation(finished).await.unwrap();
     f.store
-        .void_evaluation(Actor::Organiser, played, "a mistake", f.now)
+        .void_evaluation(Actor::Organiser, finished, "a mistake", f.now)
         .await
         .unwrap();
-    assert_eq!(snapshot.store().evaluation(played).await.unwrap(), before);
+    assert_eq!(snapshot.store().evaluation(finished).await.unwrap(), before);
     assert_eq!(before.voided, None);
-    let name = snapshot
+    let renamed = snapshot
         .store()
         .name_season(Actor::Server, "x", f.now)
         .await;
-    assert!(matches!(name, Err(StoreError::Archived { .. })), "{name:?}");
+    assert!(
+        matches!(renamed, Err(StoreError::Archived { .. })),
+        "{renamed:?}"
+    );
     let artifacts = snapshot.artifacts_to_archive().await.unwrap();
     assert_eq!(artifacts.len(), 2, "two bundles: {artifacts:?}");
 }
 
 #[tokio::test]
 async fn public_archive_cannot_become_organiser_edition() {
-    let (f, _) = season().await;
+    let (f, _) = season_with_queued_day().await;
     let folder = export(&f, Edition::Public).await;
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
     let other = tempfile::tempdir().unwrap();
-    let asked = imported.snapshot(other.path(), Edition::Organiser, "a test", f.now);
-    let error = asked.await.unwrap_err();
+    let snapshot = imported.snapshot(other.path(), Edition::Organiser, "a test", f.now);
+    let error = snapshot.await.unwrap_err();
     assert!(error.to_string().contains("public archive"), "{error}");
     assert!(
         imported
@@ -391,7 +410,7 @@ async fn archive_detection_leaves_folder_unchanged() {
     let empty = tempfile::tempdir().unwrap();
     assert_eq!(Store::archived_in(empty.path()).await.unwrap(), None);
     assert_eq!(std::fs::read_dir(empty.path()).unwrap().count(), 0);
-    let (f, _) = season().await;
+    let (f, _) = season_with_queued_day().await;
     assert_eq!(Store::archived_in(f.folder.path()).await.unwrap(), None);
     let folder = export(&f, Edition::Public).await;
     let found = Store::archived_in(folder.path()).await.unwrap().unwrap();
@@ -406,11 +425,11 @@ async fn archive_detection_leaves_folder_unchanged() {
 
 #[tokio::test]
 async fn import_refuses_manipulated_database() {
-    let (f, _) = season().await;
+    let (f, _) = season_with_queued_day().await;
     let planted = "CREATE TRIGGER help AFTER UPDATE ON archived BEGIN
         INSERT INTO tokens (id, hash, kind, owner, name, created_at)
         VALUES ('0', zeroblob(32), 'key', 'host', 'mine', 0); END";
-    for (sql, words) in [
+    for (sql, phrase) in [
         (planted, "its trigger \"help\" is not as this program makes it"),
         ("CREATE VIEW notes AS SELECT 1", "its view \"notes\""),
         ("CREATE TABLE more (a)", "its table \"more\""),
@@ -428,10 +447,10 @@ async fn import_refuses_manipulated_database() {
         let folder = export(&f, Edition::Organiser).await;
         exec(&database(&folder), sql).await;
         let error = Store::import(folder.path(), f.now).await.unwrap_err();
-        let StoreError::Conflict(why) = error else {
+        let StoreError::Conflict(reason) = error else {
             panic!("{sql}: {error}");
         };
-        assert!(why.contains(words), "{words:?} is not in {why:?}");
+        assert!(reason.contains(phrase), "{phrase:?} is not in {reason:?}");
     }
     for content in [&b"no database at all"[..], b""] {
         let folder = tempfile::tempdir().unwrap();
@@ -439,7 +458,7 @@ async fn import_refuses_manipulated_database() {
         let error = Store::import(folder.path(), f.now).await.unwrap_err();
         assert!(error.to_string().contains("database is refused"), "{error}");
     }
-    // A file with overwritten pages.
+    // A database with overwritten pages (its page size is 4096 bytes).
     let folder = export(&f, Edition::Organiser).await;
     let mut bytes = std::fs::read(database(&folder)).unwrap();
     let length = bytes.len();
@@ -451,43 +470,43 @@ async fn import_refuses_manipulated_database() {
 
 #[tokio::test]
 async fn import_removes_planted_credentials() {
-    let (f, _) = season().await;
+    let (f, _) = season_with_queued_day().await;
     let folder = export(&f, Edition::Organiser).await;
-    let key = "INSERT INTO tokens (id, hash, kind, owner, name, created_at)
+    let planted = "INSERT INTO tokens (id, hash, kind, owner, name, created_at)
                VALUES ('00000000-0000-7000-8000-000000000000', zeroblob(32), 'key', 'host', 'mine', 0);
                UPDATE people SET password = '$argon2id$v=19$m=19456,t=2,p=1$AAAA$AAAA'";
-    exec(&database(&folder), key).await;
+    exec(&database(&folder), planted).await;
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
     assert!(imported.tokens().await.unwrap().is_empty());
-    let holder = imported
+    let verified = imported
         .verify_token([0; 32], TokenKind::ApiToken, f.now)
         .await
         .unwrap();
-    assert!(holder.is_err(), "{holder:?}");
+    assert!(verified.is_err(), "{verified:?}");
     let passwords = "SELECT COUNT(*) FROM people WHERE password IS NOT NULL";
-    let left: i64 = sqlx::query_scalar(passwords)
+    let count: i64 = sqlx::query_scalar(passwords)
         .fetch_one(&mut open(&database(&folder)).await)
         .await
         .unwrap();
-    assert_eq!(left, 0);
+    assert_eq!(count, 0);
     // The new server's own token works.
     assert!(imported.set_host_token([9; 32], f.now).await.unwrap());
-    let holder = imported
+    let verified = imported
         .verify_token([9; 32], TokenKind::ApiToken, f.now)
         .await
         .unwrap();
-    assert!(matches!(holder.unwrap().principal, Principal::Host));
+    assert!(matches!(verified.unwrap().principal, Principal::Host));
 }
 
 #[tokio::test]
-async fn public_archive_has_counting_games_only() {
+async fn public_archive_has_only_games_that_count() {
     let f = TestStore::new().await;
     let teams = [
-        f.ready_team("Alpha").await.team,
-        f.ready_team("Beta").await.team,
+        f.valid_submission_of("Alpha").await.team,
+        f.valid_submission_of("Beta").await.team,
     ];
-    let new = NewTournament {
+    let tournament = NewTournament {
         name: "Cup".parse().unwrap(),
         stage: None,
         rules: TournamentRules::default(),
@@ -496,7 +515,7 @@ async fn public_archive_has_counting_games_only() {
     };
     let cup = f
         .store
-        .open_tournament(Actor::Organiser, &new, f.now)
+        .open_tournament(Actor::Organiser, &tournament, f.now)
         .await
         .unwrap();
     let friendly =
@@ -505,7 +524,7 @@ async fn public_archive_has_counting_games_only() {
     friendly.await.unwrap();
     run_game(&f).await;
     for number in 1..=2 {
-        let drawn = DrawnRound {
+        let round = DrawnRound {
             number: RoundNumber::try_from(number).unwrap(),
             groups: Vec::new(),
             matchdays: vec![DrawnMatchday {
@@ -514,7 +533,7 @@ async fn public_archive_has_counting_games_only() {
             }],
         };
         f.store
-            .start_round(Actor::Organiser, cup.id, &drawn, f.now)
+            .start_round(Actor::Organiser, cup.id, &round, f.now)
             .await
             .unwrap();
         if number == 1 {
@@ -534,9 +553,9 @@ async fn public_archive_has_counting_games_only() {
         assert_eq!(record.entrants.len(), 2);
         assert_eq!(record.games.len(), 1, "open games are left out");
         assert!(matches!(record.games[0].state, GameState::Played(_)));
-        let games = artifacts
+        let game_artifacts = artifacts
             .iter()
-            .filter(|one| matches!(one.owner, ArtifactOwner::Game(_)))
+            .filter(|artifact| matches!(artifact.owner, ArtifactOwner::Game(_)))
             .count();
         let friendly_games = store
             .games(cup.id, GameFilter::TestAndFriendly(None))
@@ -548,7 +567,8 @@ async fn public_archive_has_counting_games_only() {
             .unwrap();
         match edition {
             Edition::Organiser => {
-                assert_eq!((games, friendly_games.len()), (6, 1));
+                // Three artifacts of each game: the recording of the game and those of its sides.
+                assert_eq!((game_artifacts, friendly_games.len()), (6, 1));
                 assert_eq!(log.as_deref(), Some("home\n"));
             }
             Edition::Public => {

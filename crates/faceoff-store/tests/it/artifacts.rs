@@ -1,3 +1,5 @@
+//! Tests of artifact storage: files (bundles, datasets) and folders (recordings) in the data folder, each under a key.
+
 use crate::fixture::*;
 use faceoff_store::*;
 use futures::TryStreamExt;
@@ -9,8 +11,9 @@ async fn artifact_round_trip_is_exact() {
     let artifacts = f.store.artifacts();
     let scratch = tempfile::tempdir().unwrap();
     let (source, target) = (scratch.path().join("a"), scratch.path().join("b"));
-    // empty, small, and several chunks with an incomplete last one
+    // Empty, small, and several chunks of which the last is incomplete.
     for bytes in [0, 1, (3 << 20) + 17] {
+        // Bytes that do not repeat with a chunk's length.
         let content: Vec<u8> = (0..bytes).map(|i: usize| (i * 31 % 251) as u8).collect();
         fs::write(&source, &content).unwrap();
         artifacts.put_file("bundles/x.zip", &source).await.unwrap();
@@ -43,7 +46,7 @@ async fn missing_artifact_is_not_found_but_deletable() {
 #[tokio::test]
 async fn artifact_keys_cannot_leave_the_folder() {
     let f = TestStore::new().await;
-    let secret = f.folder.path().join("faceoff.sqlite3");
+    let database = f.folder.path().join("faceoff.sqlite3");
     for key in [
         "../faceoff.sqlite3",
         "a/../../faceoff.sqlite3",
@@ -56,7 +59,7 @@ async fn artifact_keys_cannot_leave_the_folder() {
             "{key:?} was read"
         );
         assert!(
-            f.store.artifacts().put_file(key, &secret).await.is_err(),
+            f.store.artifacts().put_file(key, &database).await.is_err(),
             "{key:?} was written"
         );
     }
@@ -91,8 +94,8 @@ async fn artifact_folders_are_complete_and_separate() {
 #[tokio::test]
 async fn recordings_are_deleted_a_day_after_the_evaluation() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     let scratch = tempfile::tempdir().unwrap();
     fs::write(scratch.path().join("steps.parquet"), "steps").unwrap();
@@ -113,10 +116,10 @@ async fn recordings_are_deleted_a_day_after_the_evaluation() {
         .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now)
         .await
         .unwrap();
-    // a backup that started before the end may still read them
-    f.later(RECORDINGS_KEPT_FOR.as_secs() - 1);
+    // A backup that started before the evaluation ended may still read the recordings.
+    f.advance_clock_s(RECORDINGS_KEPT_FOR.as_secs() - 1);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 0);
-    f.later(1);
+    f.advance_clock_s(1);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 1);
     assert!(
         f.store
@@ -134,9 +137,10 @@ async fn partial_artifacts_are_removed_and_others_kept() {
     let artifacts = f.store.artifacts();
     let bundles = f.folder.path().join("artifacts/bundles");
     let source = f.folder.path().join("source");
-    fs::write(&source, "whole").unwrap();
+    fs::write(&source, "complete").unwrap();
     artifacts.put_file("bundles/1", &source).await.unwrap();
-    fs::write(bundles.join("2#1"), "ha").unwrap();
+    // The temporary file of an interrupted write of `bundles/2`.
+    fs::write(bundles.join("2#1"), "comp").unwrap();
     let now = jiff::Timestamp::now();
     let hour = jiff::SignedDuration::from_hours(1);
     assert_eq!(
@@ -149,12 +153,12 @@ async fn partial_artifacts_are_removed_and_others_kept() {
     assert!(artifacts.read("bundles/1").await.is_ok());
     assert!(
         artifacts.put_file("bundles/3#1", &source).await.is_err(),
-        "keys cannot look like a temporary file"
+        "a key cannot look like a temporary file"
     );
 }
 
 #[tokio::test]
-async fn delete_others_keeps_one_artifact() {
+async fn delete_others_keeps_one_artifact_of_a_prefix() {
     let f = TestStore::new().await;
     let artifacts = f.store.artifacts();
     let source = f.folder.path().join("source");

@@ -1,12 +1,12 @@
-//! Storage of bundles, and the upload quota.
+//! Storage and removal of bundles (the archives that teams upload), and the quota of uploads.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
 
-/// An upload whose bundle is stored under a key of its own.
-async fn stored(f: &TestStore, team: &Team, name: &str, bytes: u64) -> Submission {
+/// Stores a bundle under a key with this name, and submits it with this size.
+async fn upload_stored(f: &TestStore, team: &Team, name: &str, bytes: u64) -> Submission {
     let key = format!("bundles/{}/{name}", team.id);
     let file = f.folder.path().join("upload");
     std::fs::write(&file, "an archive").unwrap();
@@ -31,7 +31,8 @@ async fn is_kept(f: &TestStore, submission: &Submission) -> bool {
         .is_ok()
 }
 
-async fn refuse(f: &TestStore) {
+/// Commits the next validation run with the result that the agent is invalid.
+async fn commit_invalid(f: &TestStore) {
     let (claim, _) = f.claim_validation().await;
     let outcome = ValidationOutcome::Invalid {
         runtime: None,
@@ -47,29 +48,29 @@ async fn refuse(f: &TestStore) {
 }
 
 /// Ends the next validation run by platform faults.
-async fn give_up(f: &mut TestStore) {
+async fn fail_validation(f: &mut TestStore) {
     for _ in 0..MAX_ATTEMPTS {
         let (claim, _) = f.claim_validation().await;
         f.store
             .release_failed(&claim, "no disk", f.now)
             .await
             .unwrap();
-        f.later(3600);
+        f.advance_clock_s(3600);
     }
 }
 
 #[tokio::test]
 async fn invalid_bundle_is_deleted_but_reason_and_log_stay() {
     let f = TestStore::new().await;
-    let team = f.team("Alpha").await;
-    let valid = stored(&f, &team, "valid", 100).await;
+    let team = f.create_team("Alpha").await;
+    let valid = upload_stored(&f, &team, "valid", 100).await;
     f.validate().await;
-    let invalid = stored(&f, &team, "invalid", 1000).await;
+    let invalid = upload_stored(&f, &team, "invalid", 1000).await;
     assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
-    refuse(&f).await;
-    let waiting = stored(&f, &team, "waiting", 10).await;
-    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
-    assert_eq!((used.day_bytes, used.stored_bytes), (1110, 1110));
+    commit_invalid(&f).await;
+    let waiting = upload_stored(&f, &team, "waiting", 10).await;
+    let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!((usage.day_bytes, usage.stored_bytes), (1110, 1110));
 
     assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 1);
     assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
@@ -81,34 +82,37 @@ async fn invalid_bundle_is_deleted_but_reason_and_log_stay() {
     );
     let log = f.store.submission_log(invalid.id).await.unwrap();
     assert_eq!(log.as_deref(), Some("its log\n"));
-    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
-    assert_eq!((used.day_bytes, used.stored_bytes), (1110, 110));
+    let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!((usage.day_bytes, usage.stored_bytes), (1110, 110));
 }
 
 #[tokio::test]
 async fn unchecked_bundle_is_kept_a_day_outside_the_quota() {
     let mut f = TestStore::new().await;
-    let team = f.team("Alpha").await;
-    let unchecked = stored(&f, &team, "unchecked", 1000).await;
+    let team = f.create_team("Alpha").await;
+    let unchecked = upload_stored(&f, &team, "unchecked", 1000).await;
     let uploaded_at = f.now;
-    give_up(&mut f).await;
-    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
-    assert_eq!((used.day_bytes, used.stored_bytes), (0, 1000));
+    fail_validation(&mut f).await;
+    let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!((usage.day_bytes, usage.stored_bytes), (0, 1000));
     assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
-    let later = uploaded_at + UNCHECKED_KEPT_FOR;
-    assert_eq!(f.store.remove_refused_bundles(later).await.unwrap(), 1);
+    let removable_at = uploaded_at + UNCHECKED_KEPT_FOR;
+    assert_eq!(
+        f.store.remove_refused_bundles(removable_at).await.unwrap(),
+        1
+    );
     assert!(!is_kept(&f, &unchecked).await);
 }
 
 #[tokio::test]
 async fn shared_bundle_is_not_deleted() {
     let f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     // Two submissions with the same bundle key; real uploads do not create this.
-    let valid = stored(&f, &team, "shared", 100).await;
+    let valid = upload_stored(&f, &team, "shared", 100).await;
     f.validate().await;
-    stored(&f, &team, "shared", 100).await;
-    refuse(&f).await;
+    upload_stored(&f, &team, "shared", 100).await;
+    commit_invalid(&f).await;
     assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
     assert!(is_kept(&f, &valid).await);
 }
@@ -116,24 +120,24 @@ async fn shared_bundle_is_not_deleted() {
 #[tokio::test]
 async fn orphaned_bundle_is_deleted_after_a_delay() {
     let f = TestStore::new().await;
-    let team = f.team("Alpha").await;
-    let named = stored(&f, &team, "named", 100).await;
+    let team = f.create_team("Alpha").await;
+    let submitted = upload_stored(&f, &team, "named", 100).await;
     let orphan = format!("bundles/{}/orphan", team.id);
     let file = f.folder.path().join("upload");
     f.store.artifacts().put_file(&orphan, &file).await.unwrap();
     let hour = SignedDuration::from_hours(1);
-    // File times come from the host's clock.
+    // A file's time of change comes from the host's clock.
     let (before, after) = (Timestamp::now() - hour, Timestamp::now() + hour);
     assert_eq!(f.store.remove_orphaned_bundles(before).await.unwrap(), 0);
     assert_eq!(f.store.remove_orphaned_bundles(after).await.unwrap(), 1);
     assert!(f.store.artifacts().read(&orphan).await.is_err());
-    assert!(is_kept(&f, &named).await);
+    assert!(is_kept(&f, &submitted).await);
 }
 
 #[tokio::test]
 async fn upload_quota_is_per_team_and_checked_on_insert() {
     let mut f = TestStore::new().await;
-    let (one, other) = (f.team("One").await, f.team("Other").await);
+    let (alpha, beta) = (f.create_team("Alpha").await, f.create_team("Beta").await);
     let quota = UploadQuota {
         day_bytes: 1000,
         stored_bytes: 1500,
@@ -144,8 +148,8 @@ async fn upload_quota_is_per_team_and_checked_on_insert() {
             .create_submission(Actor::Team(team.id), team.id, bundle, &quota, f.now)
             .await
     };
-    upload(&f, &one, 600).await.unwrap();
-    let error = upload(&f, &one, 500).await.unwrap_err();
+    upload(&f, &alpha, 600).await.unwrap();
+    let error = upload(&f, &alpha, 500).await.unwrap_err();
     assert!(
         matches!(
             error,
@@ -157,16 +161,16 @@ async fn upload_quota_is_per_team_and_checked_on_insert() {
         ),
         "{error}"
     );
-    upload(&f, &one, 400).await.unwrap();
-    upload(&f, &other, 1000).await.unwrap();
-    let error = upload(&f, &one, u64::MAX).await.unwrap_err();
+    upload(&f, &alpha, 400).await.unwrap();
+    upload(&f, &beta, 1000).await.unwrap();
+    let error = upload(&f, &alpha, u64::MAX).await.unwrap_err();
     assert!(
         matches!(error, StoreError::DailyQuotaExceeded { .. }),
         "{error}"
     );
-    // Midnight, UTC.
-    f.later(14 * 3600);
-    let error = upload(&f, &one, 600).await.unwrap_err();
+    // At midnight UTC the daily quota begins again.
+    f.advance_clock_s(14 * 3600);
+    let error = upload(&f, &alpha, 600).await.unwrap_err();
     assert!(
         matches!(
             error,
@@ -177,5 +181,5 @@ async fn upload_quota_is_per_team_and_checked_on_insert() {
         ),
         "{error}"
     );
-    upload(&f, &one, 500).await.unwrap();
+    upload(&f, &alpha, 500).await.unwrap();
 }

@@ -1,16 +1,21 @@
-//! Removal of the rows of runs that ended long ago.
+//! Clearing of runs that ended long ago: a summary of the episodes is stored, and the rows of the run's shards (groups of
+//! episodes that are run together), of their jobs and of their events are deleted.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::EpisodeOutcome;
 
-const VERSION: u32 = 7;
+/// Version of the summary's format.
+const SUMMARY_VERSION: u32 = 7;
 
-async fn clearable(f: &TestStore) -> Vec<ClearableRun> {
-    f.store.clearable_runs(VERSION, f.now).await.unwrap()
+async fn clearable_runs(f: &TestStore) -> Vec<ClearableRun> {
+    f.store
+        .clearable_runs(SUMMARY_VERSION, f.now)
+        .await
+        .unwrap()
 }
 
-async fn rows(f: &TestStore, table: &str) -> i64 {
+async fn count_rows(f: &TestStore, table: &str) -> i64 {
     let sql = format!("SELECT COUNT(*) FROM {table}");
     sqlx::query_scalar(sqlx::AssertSqlSafe(sql))
         .fetch_one(&mut f.connection().await)
@@ -18,7 +23,7 @@ async fn rows(f: &TestStore, table: &str) -> i64 {
         .unwrap()
 }
 
-async fn kinds(f: &TestStore) -> Vec<String> {
+async fn event_kinds(f: &TestStore) -> Vec<String> {
     let sql = "SELECT kind FROM events ORDER BY id";
     let kinds = sqlx::query_scalar(sql);
     kinds.fetch_all(&mut f.connection().await).await.unwrap()
@@ -34,53 +39,71 @@ async fn outcomes(
 #[tokio::test]
 async fn cleared_run_keeps_summary_and_loses_shards() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let jobs_before = rows(&f, "jobs").await;
-    let evaluation = f.evaluate(submission.id, &small()).await;
-    f.run_all(50.0).await;
-    let (board, outcomes_before) = (f.board().await, outcomes(&f, &evaluation).await.unwrap());
+    let submission = f.valid_submission_of("Alpha").await;
+    let jobs_before = count_rows(&f, "jobs").await;
+    let evaluation = f.evaluate(submission.id, &one_shard_plan()).await;
+    f.run_all_with_score(50.0).await;
+    let (board_before, outcomes_before) =
+        (f.board().await, outcomes(&f, &evaluation).await.unwrap());
     assert!(!outcomes_before.is_empty());
-    f.later(RECORDINGS_KEPT_FOR.as_secs() - 1);
-    assert_eq!(clearable(&f).await, []);
-    f.later(1);
-    let wants = |needs_summary| ClearableRun {
+    f.advance_clock_s(RECORDINGS_KEPT_FOR.as_secs() - 1);
+    assert_eq!(clearable_runs(&f).await, []);
+    f.advance_clock_s(1);
+    let clearable_run = |needs_summary| ClearableRun {
         run: evaluation.run,
         needs_summary,
     };
-    assert_eq!(clearable(&f).await, [wants(true)]);
-    for (version, wanted) in [(VERSION - 1, true), (VERSION, false)] {
-        let keep = f
+    assert_eq!(clearable_runs(&f).await, [clearable_run(true)]);
+    for (version, needs_summary) in [(SUMMARY_VERSION - 1, true), (SUMMARY_VERSION, false)] {
+        let stored = f
             .store
             .store_episode_summary(evaluation.run, version, "{}", f.now);
-        keep.await.unwrap();
-        assert_eq!(clearable(&f).await, [wants(wanted)], "version {version}");
+        stored.await.unwrap();
+        assert_eq!(
+            clearable_runs(&f).await,
+            [clearable_run(needs_summary)],
+            "version {version}"
+        );
     }
-    assert!(kinds(&f).await.contains(&"shard_committed".to_owned()));
-    let change = f.store.newest_change().await.unwrap();
+    assert!(
+        event_kinds(&f)
+            .await
+            .contains(&"shard_committed".to_owned())
+    );
+    let change_before = f.store.newest_change().await.unwrap();
 
     f.store.clear_run(evaluation.run, f.now).await.unwrap();
-    assert_eq!(clearable(&f).await, []);
-    assert_eq!(rows(&f, "shards").await, 0);
+    assert_eq!(clearable_runs(&f).await, []);
+    assert_eq!(count_rows(&f, "shards").await, 0);
     // The evaluation's scoring job stays.
-    assert_eq!(rows(&f, "jobs").await, jobs_before + 1);
-    assert!(!kinds(&f).await.contains(&"shard_committed".to_owned()));
+    assert_eq!(count_rows(&f, "jobs").await, jobs_before + 1);
     assert!(
-        kinds(&f).await.contains(&"evaluation_finished".to_owned()),
+        !event_kinds(&f)
+            .await
+            .contains(&"shard_committed".to_owned())
+    );
+    assert!(
+        event_kinds(&f)
+            .await
+            .contains(&"evaluation_finished".to_owned()),
         "events of results stay"
     );
-    let gone = outcomes(&f, &evaluation).await.unwrap_err();
+    let error = outcomes(&f, &evaluation).await.unwrap_err();
     assert!(
-        matches!(gone, StoreError::OutcomesRemoved { at } if at == f.now),
-        "{gone}"
+        matches!(error, StoreError::OutcomesRemoved { at } if at == f.now),
+        "{error}"
     );
-    let summaries = f.store.episode_summaries(&[evaluation.run], VERSION).await;
+    let summaries = f
+        .store
+        .episode_summaries(&[evaluation.run], SUMMARY_VERSION)
+        .await;
     assert_eq!(summaries.unwrap()[&evaluation.run], "{}");
-    let after = f.board().await;
-    assert_eq!(after.len(), 1);
-    assert_eq!(after[0].result, board[0].result);
+    let board_after = f.board().await;
+    assert_eq!(board_after.len(), 1);
+    assert_eq!(board_after[0].result, board_before[0].result);
     assert_eq!(
         f.store.newest_change().await.unwrap(),
-        change,
+        change_before,
         "boards are not affected"
     );
     // A second call changes nothing.
@@ -90,8 +113,8 @@ async fn cleared_run_keeps_summary_and_loses_shards() {
 #[tokio::test]
 async fn cleared_run_keeps_agent_faults() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
     while !f.state(evaluation.id).await.is_over() {
@@ -100,19 +123,22 @@ async fn cleared_run_keeps_agent_faults() {
     }
     let faults_before = f.store.run_faults(evaluation.run).await.unwrap();
     assert!(!faults_before.faults.is_empty());
-    f.later(RECORDINGS_KEPT_FOR.as_secs());
+    f.advance_clock_s(RECORDINGS_KEPT_FOR.as_secs());
     assert_eq!(
-        clearable(&f).await,
+        clearable_runs(&f).await,
         [ClearableRun {
             run: evaluation.run,
             needs_summary: false
         }],
-        "it has no score, so no board needs a summary"
+        "the run has no score, so no board needs a summary"
     );
-    let before = rows(&f, "shards").await;
+    let shards_before = count_rows(&f, "shards").await;
     f.store.clear_run(evaluation.run, f.now).await.unwrap();
-    let left = rows(&f, "shards").await;
-    assert!(0 < left && left < before, "{left} of {before}");
+    let shards_left = count_rows(&f, "shards").await;
+    assert!(
+        0 < shards_left && shards_left < shards_before,
+        "{shards_left} of {shards_before}"
+    );
     assert_eq!(
         f.store.run_faults(evaluation.run).await.unwrap(),
         faults_before
@@ -122,11 +148,11 @@ async fn cleared_run_keeps_agent_faults() {
 #[tokio::test]
 async fn open_run_is_not_clearable() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
-    f.later(30 * RECORDINGS_KEPT_FOR.as_secs());
-    assert_eq!(clearable(&f).await, []);
+    f.advance_clock_s(30 * RECORDINGS_KEPT_FOR.as_secs());
+    assert_eq!(clearable_runs(&f).await, []);
     assert!(!outcomes(&f, &evaluation).await.unwrap().is_empty());
 }

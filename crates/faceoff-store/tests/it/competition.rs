@@ -1,13 +1,17 @@
-//! From an upload to the board, as the HTTP server and the worker use the store.
+//! A submission's way from the upload to the board, with the operations that the HTTP server and the workers use.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 
+/// Shards of [`six_shard_plan`].
+const SHARDS: u32 = 6;
+const EPISODES_PER_SHARD: u32 = 2;
+
 #[tokio::test]
-async fn submission_travels_from_upload_to_board() {
+async fn submission_reaches_board_after_upload_and_runs() {
     let mut f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     let submission = f.upload(&team).await;
     assert_eq!(submission.state, SubmissionState::Validating);
     assert_eq!(submission.bundle, bundle());
@@ -17,7 +21,11 @@ async fn submission_travels_from_upload_to_board() {
             .await
             .unwrap_err(),
         f.store
-            .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+            .start_day(
+                Actor::Organiser,
+                f.configure_stage(&six_shard_plan()).await,
+                f.now,
+            )
             .await
             .unwrap_err(),
     ] {
@@ -30,32 +38,33 @@ async fn submission_travels_from_upload_to_board() {
     let log = f.store.submission_log(submission.id).await.unwrap();
     assert_eq!(log.as_deref(), Some("hello\n"));
 
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     assert_eq!(evaluation.state, EvaluationState::Queued);
     assert_eq!(evaluation.stage_day.date, jiff::civil::date(2026, 3, 1));
-    assert_eq!(evaluation.plan, plan());
+    assert_eq!(evaluation.plan, six_shard_plan());
 
     let mut played = Vec::new();
-    for index in 0..6 {
-        let (claim, running, shard) = f.claim_shard().await;
-        assert_eq!(running.id, evaluation.run);
-        assert_eq!(running.plan, plan());
+    for shards_done in 0..SHARDS {
+        let (claim, run, shard) = f.claim_shard().await;
+        assert_eq!(run.id, evaluation.run);
+        assert_eq!(run.plan, six_shard_plan());
         assert_eq!(
             f.state(evaluation.id).await,
             EvaluationState::Running {
-                episodes_done: 2 * index,
-                episodes_total: 12
+                episodes_done: EPISODES_PER_SHARD * shards_done,
+                episodes_total: SHARDS * EPISODES_PER_SHARD
             }
         );
+        // The worker reports that it has completed one episode.
         assert!(f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
         assert_eq!(
             f.state(evaluation.id).await,
             EvaluationState::Running {
-                episodes_done: 2 * index + 1,
-                episodes_total: 12
+                episodes_done: EPISODES_PER_SHARD * shards_done + 1,
+                episodes_total: SHARDS * EPISODES_PER_SHARD
             }
         );
-        f.later(1);
+        f.advance_clock_s(1);
         assert_eq!(
             f.commit_shard(&claim, &shard, 0).await,
             CommitOutcome::Stored
@@ -67,15 +76,15 @@ async fn submission_travels_from_upload_to_board() {
         .flat_map(|task| [(task, 0, 2), (task, 2, 4)]);
     assert!(
         played.into_iter().eq(in_order),
-        "shards come in (task, first episode) order"
+        "shards are claimed in the order of task and first episode"
     );
     let outcomes = f.store.outcomes(evaluation.run).await.unwrap();
     let expected = Task::ALL
         .into_iter()
-        .flat_map(|task| (0..4).map(move |e| outcome(task, e, false)));
+        .flat_map(|task| (0..4).map(move |episode| outcome(task, episode, false)));
     assert!(
         outcomes.into_iter().eq(expected),
-        "outcomes come back to the bit"
+        "outcomes are read exactly as they were stored"
     );
 
     assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
@@ -97,8 +106,11 @@ async fn submission_travels_from_upload_to_board() {
     assert_eq!((scored, run.id), (evaluation.id, evaluation.run));
     assert_eq!(agent_name, "striker");
     let shards = f.store.shards(run.id).await.unwrap();
-    let in_order: Vec<_> = shards.into_iter().filter_map(|s| s.recording).collect();
-    assert_eq!((recordings.len(), recordings), (6, in_order));
+    let expected: Vec<_> = shards
+        .into_iter()
+        .filter_map(|shard| shard.recording)
+        .collect();
+    assert_eq!((recordings.len(), recordings), (SHARDS as usize, expected));
     let secret = f.store.season().await.unwrap().secret;
     assert_eq!(
         seeds.episodes,
@@ -107,11 +119,11 @@ async fn submission_travels_from_upload_to_board() {
             .day(evaluation.stage_day.date)
     );
     assert_eq!(seeds.mismatch, secret.model_mismatch());
-    assert!(f.claim().await.is_none(), "it is claimed once");
-    f.later(1);
-    let finished = f.finish(&claim, 51.2, "datasets/x.zip").await;
+    assert!(f.claim().await.is_none(), "the job is claimed only once");
+    f.advance_clock_s(1);
+    let finished = f.finish_scoring(&claim, 51.2, "datasets/x.zip").await;
     assert_eq!(finished, CommitOutcome::Stored);
-    let repeated = f.finish(&claim, 0.0, "datasets/y.zip").await;
+    let repeated = f.finish_scoring(&claim, 0.0, "datasets/y.zip").await;
     assert_eq!(repeated, CommitOutcome::AlreadyStored);
     assert_eq!(
         f.state(evaluation.id).await,

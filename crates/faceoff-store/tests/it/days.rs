@@ -1,10 +1,12 @@
-//! The cutoff of a day: each team's active submission is evaluated.
+//! The start of a day of a stage, its *cutoff*: an evaluation of each team's active submission is queued. A team's newest valid
+//! submission is active, unless the team chooses another or withdraws it.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::{SubmissionId, ValidationOutcome, Zone};
 use jiff::civil::date;
 
+/// The day of the error that a day's cutoff has passed already.
 fn expect_cutoff_passed<T: std::fmt::Debug>(result: Result<T, StoreError>) -> jiff::civil::Date {
     match result {
         Err(StoreError::CutoffPassed { day, .. }) => day,
@@ -15,19 +17,23 @@ fn expect_cutoff_passed<T: std::fmt::Debug>(result: Result<T, StoreError>) -> ji
 #[tokio::test]
 async fn day_has_one_cutoff() {
     let mut f = TestStore::new().await;
-    let first = f.ready_team("Alpha").await;
+    let first = f.valid_submission_of("Alpha").await;
     f.now = "2026-03-01T23:59:59.998Z".parse().unwrap();
     let cutoff_at = f.now;
-    let evaluation = f.evaluate(first.id, &plan()).await;
-    // neither the same nor a new submission, nor another team's, gets a second cutoff
+    let evaluation = f.evaluate(first.id, &six_shard_plan()).await;
+    // There is no second cutoff: neither for the same submission, nor for a new one, nor for another team's.
     f.now = "2026-03-01T23:59:59.999Z".parse().unwrap();
     let team = f.store.team(first.team).await.unwrap();
     f.upload(&team).await;
     let second = f.validate().await;
-    f.ready_team("Beta").await;
+    f.valid_submission_of("Beta").await;
     let repeated = f
         .store
-        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .start_day(
+            Actor::Organiser,
+            f.configure_stage(&six_shard_plan()).await,
+            f.now,
+        )
         .await;
     assert_eq!(expect_cutoff_passed(repeated), date(2026, 3, 1));
     assert_eq!(
@@ -36,7 +42,7 @@ async fn day_has_one_cutoff() {
     );
     let day = f
         .store
-        .newest_day(f.stage(&plan()).await)
+        .newest_day(f.configure_stage(&six_shard_plan()).await)
         .await
         .unwrap()
         .unwrap();
@@ -44,9 +50,9 @@ async fn day_has_one_cutoff() {
         (day.stage_day.date, day.cutoff_at, day.released_at),
         (date(2026, 3, 1), cutoff_at, None)
     );
-    // but the next day comes a millisecond later
+    // The next day comes a millisecond later.
     f.now = "2026-03-02T00:00:00Z".parse().unwrap();
-    let next = f.evaluate(second.id, &plan()).await;
+    let next = f.evaluate(second.id, &six_shard_plan()).await;
     assert_eq!(next.stage_day.date, date(2026, 3, 2));
     assert_eq!(
         f.store
@@ -56,11 +62,15 @@ async fn day_has_one_cutoff() {
             .len(),
         2
     );
-    // and a clock that was set back starts nothing
+    // A clock that was set back starts nothing.
     f.now = "2026-02-27T00:00:00Z".parse().unwrap();
     let repeated = f
         .store
-        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .start_day(
+            Actor::Organiser,
+            f.configure_stage(&six_shard_plan()).await,
+            f.now,
+        )
         .await;
     assert_eq!(expect_cutoff_passed(repeated), date(2026, 3, 2));
 }
@@ -68,9 +78,9 @@ async fn day_has_one_cutoff() {
 #[tokio::test]
 async fn concurrent_day_starts_make_one_cutoff() {
     let f = TestStore::new().await;
-    f.ready_team("Alpha").await;
+    f.valid_submission_of("Alpha").await;
     let other = f.reopen().await;
-    let stage = f.stage(&plan()).await;
+    let stage = f.configure_stage(&six_shard_plan()).await;
     let attempts = (0..20).map(|index| {
         let store = if index % 2 == 0 {
             f.store.clone()
@@ -94,78 +104,99 @@ async fn concurrent_day_starts_make_one_cutoff() {
 #[tokio::test]
 async fn empty_day_keeps_its_cutoff_unless_scheduled() {
     let mut f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     let refused = f
         .store
-        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .start_day(
+            Actor::Organiser,
+            f.configure_stage(&six_shard_plan()).await,
+            f.now,
+        )
         .await;
     assert!(
         matches!(refused, Err(StoreError::Conflict(_))),
         "{refused:?}"
     );
     assert_eq!(
-        f.store.newest_day(f.stage(&plan()).await).await.unwrap(),
+        f.store
+            .newest_day(f.configure_stage(&six_shard_plan()).await)
+            .await
+            .unwrap(),
         None
     );
     let started = f
         .store
-        .start_scheduled_day(f.stage(&plan()).await, f.now)
+        .start_scheduled_day(f.configure_stage(&six_shard_plan()).await, f.now)
         .await;
     assert_eq!(started.unwrap(), Some(Vec::new()));
     let day = f
         .store
-        .newest_day(f.stage(&plan()).await)
+        .newest_day(f.configure_stage(&six_shard_plan()).await)
         .await
         .unwrap()
         .unwrap();
     assert_eq!(day.released_at, Some(f.now), "there is nothing to wait for");
-    // a later submission is evaluated on the next day
+    // A later submission is evaluated on the next day.
     f.upload(&team).await;
     let submission = f.validate().await;
     expect_cutoff_passed(
         f.store
-            .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+            .start_day(
+                Actor::Organiser,
+                f.configure_stage(&six_shard_plan()).await,
+                f.now,
+            )
             .await,
     );
-    f.later(86_400);
-    f.evaluate(submission.id, &plan()).await;
+    f.advance_clock_s(86_400);
+    f.evaluate(submission.id, &six_shard_plan()).await;
 }
 
-async fn active(f: &TestStore, team: &Team) -> SubmissionId {
-    let of_team = f.store.submissions_of(team.id).await.unwrap();
-    let active: Vec<_> = of_team.iter().filter(|one| one.active).collect();
-    assert_eq!(active.len(), 1, "{of_team:?}");
+async fn active_submission(f: &TestStore, team: &Team) -> SubmissionId {
+    let submissions = f.store.submissions_of(team.id).await.unwrap();
+    let active: Vec<_> = submissions
+        .iter()
+        .filter(|submission| submission.active)
+        .collect();
+    assert_eq!(active.len(), 1, "{submissions:?}");
     active[0].id
 }
 
 #[tokio::test]
 async fn valid_upload_becomes_active_unless_superseded() {
     let mut f = TestStore::new().await;
-    let old = f.ready_team("Alpha").await;
+    let old = f.valid_submission_of("Alpha").await;
     let team = f.store.team(old.team).await.unwrap();
-    // Two uploads, the newer of which is valid first.
-    f.later(1);
+    // Two uploads: the validation of the newer one ends first.
+    f.advance_clock_s(1);
     let slow = f.upload(&team).await;
     let (slow_claim, _) = f.claim_validation().await;
-    f.later(1);
+    f.advance_clock_s(1);
     f.upload(&team).await;
     let quick = f.validate().await;
     assert!(quick.active);
-    let valid = || ValidationOutcome::Valid {
+    let valid_outcome = || ValidationOutcome::Valid {
         runtime: "native".into(),
         agent_name: "late".into(),
         timing: Vec::new(),
         log: String::new(),
     };
-    let late = f.store.commit_validation(&slow_claim, valid(), f.now).await;
+    let late = f
+        .store
+        .commit_validation(&slow_claim, valid_outcome(), f.now)
+        .await;
     assert_eq!(late.unwrap(), CommitOutcome::Stored);
-    assert_eq!(active(&f, &team).await, quick.id, "a newer one is active");
+    assert_eq!(
+        active_submission(&f, &team).await,
+        quick.id,
+        "a newer submission is active"
+    );
 
-    // A choice is kept when an earlier upload turns valid.
-    f.later(1);
+    // The team's choice is kept when an upload from before the choice becomes valid.
+    f.advance_clock_s(1);
     f.upload(&team).await;
     let (claim, uploaded_before) = f.claim_validation().await;
-    f.later(1);
+    f.advance_clock_s(1);
     let choose = |id| f.store.activate_submission(Actor::Team(team.id), id, f.now);
     assert!(matches!(
         choose(uploaded_before.id).await,
@@ -173,48 +204,54 @@ async fn valid_upload_becomes_active_unless_superseded() {
     ));
     assert!(choose(old.id).await.unwrap().active);
     f.store
-        .commit_validation(&claim, valid(), f.now)
+        .commit_validation(&claim, valid_outcome(), f.now)
         .await
         .unwrap();
-    assert_eq!(active(&f, &team).await, old.id);
+    assert_eq!(active_submission(&f, &team).await, old.id);
     choose(slow.id).await.unwrap();
-    assert_eq!(active(&f, &team).await, slow.id);
+    assert_eq!(active_submission(&f, &team).await, slow.id);
     // A later upload replaces the choice.
-    f.later(1);
+    f.advance_clock_s(1);
     f.upload(&team).await;
     let newest = f.validate().await;
-    assert_eq!(active(&f, &team).await, newest.id);
-    assert_eq!(f.evaluate(newest.id, &plan()).await.submission, newest.id);
+    assert_eq!(active_submission(&f, &team).await, newest.id);
+    assert_eq!(
+        f.evaluate(newest.id, &six_shard_plan()).await.submission,
+        newest.id
+    );
 }
 
 #[tokio::test]
 async fn choice_after_cutoff_applies_to_next_day() {
     let mut f = TestStore::new().await;
-    let first = f.ready_team("Alpha").await;
+    let first = f.valid_submission_of("Alpha").await;
     let team = f.store.team(first.team).await.unwrap();
-    f.later(1);
+    f.advance_clock_s(1);
     f.upload(&team).await;
     let second = f.validate().await;
-    let today = f.evaluate(second.id, &small()).await;
-    f.later(1);
+    let today = f.evaluate(second.id, &one_shard_plan()).await;
+    f.advance_clock_s(1);
     let choice = f
         .store
         .activate_submission(Actor::Team(team.id), first.id, f.now);
     choice.await.unwrap();
-    f.finish_next().await;
+    f.finish_next_evaluation().await;
     assert_eq!(
         f.store.evaluation(today.id).await.unwrap().submission,
         second.id
     );
-    f.later(86_400);
-    assert_eq!(f.evaluate(first.id, &small()).await.submission, first.id);
+    f.advance_clock_s(86_400);
+    assert_eq!(
+        f.evaluate(first.id, &one_shard_plan()).await.submission,
+        first.id
+    );
 }
 
 #[tokio::test]
 async fn cancelled_evaluation_loses_leases_and_can_be_rerun() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.store
         .cancel_evaluation(
@@ -253,11 +290,11 @@ async fn cancelled_evaluation_loses_leases_and_can_be_rerun() {
 #[tokio::test]
 async fn cutoff_takes_newest_valid_submission_of_each_team() {
     let mut f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await;
-    let beta = f.ready_team("Beta").await;
-    let silent = f.team("Never uploaded").await;
-    let broken = f.team("Broken").await;
-    f.upload(&broken).await;
+    let alpha = f.valid_submission_of("Alpha").await;
+    let beta = f.valid_submission_of("Beta").await;
+    let without_upload = f.create_team("Without upload").await;
+    let invalid = f.create_team("Invalid").await;
+    f.upload(&invalid).await;
     let (claim, _) = f.claim_validation().await;
     let outcome = ValidationOutcome::Invalid {
         runtime: None,
@@ -270,34 +307,47 @@ async fn cutoff_takes_newest_valid_submission_of_each_team() {
         .commit_validation(&claim, outcome, f.now)
         .await
         .unwrap();
-    f.later(1);
+    f.advance_clock_s(1);
     let team = f.store.team(alpha.team).await.unwrap();
     f.upload(&team).await;
     let newer = f.validate().await;
-    f.upload(&team).await; // still validating: the previous one counts
+    f.upload(&team).await; // not validated yet: the previous submission is evaluated
 
     let started = f
         .store
-        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .start_day(
+            Actor::Organiser,
+            f.configure_stage(&six_shard_plan()).await,
+            f.now,
+        )
         .await
         .unwrap();
-    let submissions: Vec<_> = started.iter().map(|e| e.submission).collect();
+    let submissions: Vec<_> = started
+        .iter()
+        .map(|evaluation| evaluation.submission)
+        .collect();
     assert_eq!(
         submissions,
         [beta.id, newer.id],
         "earliest submission first"
     );
-    assert!(f.store.evaluations_of(silent.id).await.unwrap().is_empty());
-    assert!(f.store.evaluations_of(broken.id).await.unwrap().is_empty());
+    assert!(
+        f.store
+            .evaluations_of(without_upload.id)
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    assert!(f.store.evaluations_of(invalid.id).await.unwrap().is_empty());
 }
 
 #[tokio::test]
 async fn scheduled_day_starts_once() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
+    f.valid_submission_of("Alpha").await;
     let started = f
         .store
-        .start_scheduled_day(f.stage(&plan()).await, f.now)
+        .start_scheduled_day(f.configure_stage(&six_shard_plan()).await, f.now)
         .await
         .unwrap()
         .unwrap();
@@ -305,31 +355,35 @@ async fn scheduled_day_starts_once() {
     let other = f.reopen().await;
     assert!(
         other
-            .start_scheduled_day(f.stage(&plan()).await, f.now)
+            .start_scheduled_day(f.configure_stage(&six_shard_plan()).await, f.now)
             .await
             .unwrap()
             .is_none()
     );
     expect_cutoff_passed(
         other
-            .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+            .start_day(
+                Actor::Organiser,
+                f.configure_stage(&six_shard_plan()).await,
+                f.now,
+            )
             .await,
     );
-    f.later(86_400);
+    f.advance_clock_s(86_400);
     assert_eq!(
         other
-            .start_scheduled_day(f.stage(&plan()).await, f.now)
+            .start_scheduled_day(f.configure_stage(&six_shard_plan()).await, f.now)
             .await
             .unwrap()
             .unwrap()
             .len(),
         1
     );
-    // a clock that was set back starts nothing
-    f.later(-86_400);
+    // A clock that was set back starts nothing.
+    f.advance_clock_s(-86_400);
     assert!(
         f.store
-            .start_scheduled_day(f.stage(&plan()).await, f.now)
+            .start_scheduled_day(f.configure_stage(&six_shard_plan()).await, f.now)
             .await
             .unwrap()
             .is_none()
@@ -339,26 +393,26 @@ async fn scheduled_day_starts_once() {
 #[tokio::test]
 async fn empty_plan_is_refused() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let bad = [
+    let submission = f.valid_submission_of("Alpha").await;
+    let refused_plans = [
         RunPlan {
             tasks: vec![],
-            ..plan()
+            ..six_shard_plan()
         },
         RunPlan {
-            tasks: vec![plan().tasks[0]; 2],
-            ..plan()
+            tasks: vec![six_shard_plan().tasks[0]; 2],
+            ..six_shard_plan()
         },
         RunPlan {
             episodes_per_task: 0,
-            ..plan()
+            ..six_shard_plan()
         },
         RunPlan {
             episodes_per_shard: 0,
-            ..plan()
+            ..six_shard_plan()
         },
     ];
-    for plan in bad {
+    for plan in refused_plans {
         let (rules, settings) = rules_and_settings(&plan);
         let error = f
             .store
@@ -379,18 +433,18 @@ async fn empty_plan_is_refused() {
 #[tokio::test]
 async fn board_shows_newest_finished_day_of_each_team() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    f.ready_team("Beta").await;
-    let small = RunPlan {
+    f.valid_submission_of("Alpha").await;
+    f.valid_submission_of("Beta").await;
+    let one_shard = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
         episodes_per_task: 1,
-        ..plan()
+        ..six_shard_plan()
     };
     for (day, score) in [(1, 10.0), (2, 20.0), (3, 30.0)] {
         f.now = format!("2026-03-0{day}T12:00:00Z").parse().unwrap();
         assert_eq!(
             f.store
-                .start_day(Actor::Organiser, f.stage(&small).await, f.now)
+                .start_day(Actor::Organiser, f.configure_stage(&one_shard).await, f.now)
                 .await
                 .unwrap()
                 .len(),
@@ -398,21 +452,21 @@ async fn board_shows_newest_finished_day_of_each_team() {
         );
         for team in 0..2 {
             let (claim, _, shard) = f.claim_shard().await;
-            // on day 3 Beta's agent fails
+            // On day 3 Beta's agent fails.
             let faults = u32::from(day == 3 && team == 1);
-            let mut commit = commit(&shard, faults);
+            let mut commit = shard_commit(&shard, faults);
             commit.stopped_by_faults = faults > 0;
             f.store.commit_shard(&claim, commit, f.now).await.unwrap();
             if faults == 0 {
                 let (claim, _) = f.claim_scoring().await;
-                f.finish(&claim, score, "d").await;
+                f.finish_scoring(&claim, score, DATASET_KEY).await;
             }
         }
     }
     let board = f.board().await;
     let rows: Vec<_> = board
         .iter()
-        .map(|r| (r.team.name.as_str(), r.day, r.result.score))
+        .map(|row| (row.team.name.as_str(), row.day, row.result.score))
         .collect();
     assert_eq!(
         rows,
@@ -426,8 +480,8 @@ async fn board_shows_newest_finished_day_of_each_team() {
 #[tokio::test]
 async fn withdrawn_submission_skips_days_until_chosen_again() {
     let mut f = TestStore::new().await;
-    let team = f.team("Alpha").await;
-    let other = f.ready_team("Beta").await;
+    let team = f.create_team("Alpha").await;
+    let other = f.valid_submission_of("Beta").await;
     f.upload(&team).await;
     let first = f.validate().await;
     let withdraw = async |f: &TestStore, id| {
@@ -435,7 +489,7 @@ async fn withdrawn_submission_skips_days_until_chosen_again() {
             .withdraw_submission(Actor::Team(team.id), id, f.now)
             .await
     };
-    f.evaluate(first.id, &small()).await;
+    f.evaluate(first.id, &one_shard_plan()).await;
     let withdrawn = withdraw(&f, first.id).await.unwrap();
     assert_eq!(
         (withdrawn.active, withdrawn.withdrawn_at),
@@ -446,19 +500,22 @@ async fn withdrawn_submission_skips_days_until_chosen_again() {
         matches!(repeated, Err(StoreError::Conflict(_))),
         "{repeated:?}"
     );
-    // The day past its cutoff continues, the next one excludes it.
-    f.run_all(1.0).await;
+    // The day whose cutoff has passed continues with the submission; the next day excludes it.
+    f.run_all_with_score(1.0).await;
     assert_eq!(f.board().await.len(), 2);
-    f.later(24 * 3600);
-    let stage = f.stage(&small()).await;
+    f.advance_clock_s(24 * 3600);
+    let stage = f.configure_stage(&one_shard_plan()).await;
     let started = f
         .store
         .start_day(Actor::Organiser, stage, f.now)
         .await
         .unwrap();
-    let evaluated: Vec<_> = started.iter().map(|one| one.submission).collect();
+    let evaluated: Vec<_> = started
+        .iter()
+        .map(|evaluation| evaluation.submission)
+        .collect();
     assert_eq!(evaluated, [other.id]);
-    f.run_all(2.0).await;
+    f.run_all_with_score(2.0).await;
 
     // A submission that was withdrawn before its validation does not become active.
     let second = f.upload(&team).await;

@@ -1,20 +1,21 @@
-//! Days that take too long: they continue before later days, until their deadline.
+//! Days that take too long: workers run their evaluations before those of later days, until the day's deadline ends them.
+//! A day starts at its *cutoff* and is *released* (shown on boards) once all its evaluations have ended.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
 
-/// Two shards of one task, so that a day can be half finished.
+/// Two shards of one task, so that an evaluation can be half finished.
 fn two_shards() -> RunPlan {
     RunPlan {
         tasks: vec![Task::Hit],
-        ..plan()
+        ..six_shard_plan()
     }
 }
 
-/// The first stage, with days at 10:00 UTC and this deadline.
-async fn daily(f: &TestStore, day_deadline: DayDeadline) -> StageId {
+/// Configures the first stage with days at 10:00 UTC and this deadline.
+async fn configure_daily_stage(f: &TestStore, day_deadline: DayDeadline) -> StageId {
     let (rules, settings) = rules_and_settings(&two_shards());
     let settings = StageSettings {
         schedule: Some(Schedule::daily("10:00".parse().unwrap())),
@@ -29,7 +30,7 @@ async fn daily(f: &TestStore, day_deadline: DayDeadline) -> StageId {
     f.store.stages().await.unwrap()[0].id
 }
 
-async fn start(f: &TestStore, stage: StageId) -> Vec<Evaluation> {
+async fn start_day(f: &TestStore, stage: StageId) -> Vec<Evaluation> {
     let started = f.store.start_scheduled_day(stage, f.now).await.unwrap();
     started.expect("the day has not started before")
 }
@@ -51,11 +52,11 @@ async fn run_shard(f: &TestStore) -> (String, TeamId) {
     (played.stage_day.date.to_string(), played.team)
 }
 
-fn at(text: &str) -> Timestamp {
+fn time(text: &str) -> Timestamp {
     text.parse().unwrap()
 }
 
-async fn kinds_since(f: &TestStore, id: i64) -> Vec<String> {
+async fn event_kinds_since(f: &TestStore, id: i64) -> Vec<String> {
     let events = f.store.events_after(id, 1000).await.unwrap();
     let kind = |record: &EventRecord| {
         let event = serde_json::to_value(&record.event).unwrap();
@@ -67,10 +68,13 @@ async fn kinds_since(f: &TestStore, id: i64) -> Vec<String> {
 #[tokio::test]
 async fn unfinished_day_runs_before_the_next_one() {
     let mut f = TestStore::new().await;
-    let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
-    let stage = daily(&f, DayDeadline::Hours(30)).await;
-    assert_eq!(start(&f, stage).await.len(), 2);
-    // Alpha's agent is slow: by slot time Beta would be preferred for a long time.
+    let [alpha, beta] = [
+        f.valid_submission_of("Alpha").await,
+        f.valid_submission_of("Beta").await,
+    ];
+    let stage = configure_daily_stage(&f, DayDeadline::Hours(30)).await;
+    assert_eq!(start_day(&f, stage).await.len(), 2);
+    // Alpha's agent is slow: since teams share the workers' time equally, Beta's evaluations would be preferred for a long time.
     let Some(ClaimedJob {
         claim,
         job: Job::Shard { shard, .. },
@@ -78,11 +82,12 @@ async fn unfinished_day_runs_before_the_next_one() {
     else {
         panic!("a shard is queued")
     };
-    f.later(24 * 3600);
+    f.advance_clock_s(24 * 3600);
     f.commit_shard(&claim, &shard, 0).await;
-    let gamma = f.ready_team("Gamma").await;
-    assert_eq!(start(&f, stage).await.len(), 3);
+    let gamma = f.valid_submission_of("Gamma").await;
+    assert_eq!(start_day(&f, stage).await.len(), 3);
 
+    // Dates and teams of the shards, in the order of their runs: 3 of the first day (Alpha's first shard is done), 6 of the second.
     let mut order = Vec::new();
     while order.len() < 9 {
         match f.store.claim("slot 0", LEASE_S, f.now).await.unwrap() {
@@ -90,7 +95,7 @@ async fn unfinished_day_runs_before_the_next_one() {
                 claim,
                 job: Job::Scoring { .. },
             }) => {
-                f.finish(&claim, 1.0, "d").await;
+                f.finish_scoring(&claim, 1.0, DATASET_KEY).await;
             }
             Some(ClaimedJob {
                 claim,
@@ -98,19 +103,19 @@ async fn unfinished_day_runs_before_the_next_one() {
             }) => {
                 f.commit_shard(&claim, &shard, 0).await;
                 let RunOwner::Evaluation(id) = owner else {
-                    panic!("{owner:?}")
+                    panic!("expected a shard of an evaluation, claimed one of {owner:?}")
                 };
                 let played = f.store.evaluation(id).await.unwrap();
                 order.push((played.stage_day.date.to_string(), played.team));
             }
-            other => panic!("{other:?}"),
+            other => panic!("expected a shard or a scoring job, claimed {other:?}"),
         }
     }
     let days: Vec<&str> = order.iter().map(|(day, _)| day.as_str()).collect();
     let (first, second) = ("2026-03-01", "2026-03-02");
     assert_eq!(days[..3], [first; 3], "{order:?}");
     assert_eq!(days[3..], [second; 6]);
-    // On the first day Beta comes first, since its agent used no slot time. On the second day all teams get equal shares.
+    // On the first day Beta comes first, since its agent used no time of workers. On the second day all teams get equal shares.
     assert_eq!(order[0].1, beta.team);
     assert_eq!(order[1].1, beta.team);
     assert_eq!(order[2].1, alpha.team);
@@ -120,16 +125,22 @@ async fn unfinished_day_runs_before_the_next_one() {
 #[tokio::test]
 async fn deadline_ends_open_evaluations_and_releases_the_day() {
     let mut f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await;
-    let stage = daily(&f, DayDeadline::NextCut).await;
-    let of = start(&f, stage).await[0].stage_day;
-    f.run_all(1.0).await;
-    f.later(24 * 3600);
-    let beta = f.ready_team("Beta").await;
-    let second = start(&f, stage).await;
-    let deadline = at("2026-03-03T10:00:00Z");
+    let alpha = f.valid_submission_of("Alpha").await;
+    let stage = configure_daily_stage(&f, DayDeadline::NextCut).await;
+    let first_day = start_day(&f, stage).await[0].stage_day;
+    f.run_all_with_score(1.0).await;
+    f.advance_clock_s(24 * 3600);
+    let beta = f.valid_submission_of("Beta").await;
+    let second = start_day(&f, stage).await;
+    let deadline = time("2026-03-03T10:00:00Z");
     assert_eq!(second[0].deadline_at, Some(deadline));
-    let id_of = |team: TeamId| second.iter().find(|one| one.team == team).unwrap().id;
+    let id_of = |team: TeamId| {
+        second
+            .iter()
+            .find(|evaluation| evaluation.team == team)
+            .unwrap()
+            .id
+    };
     // Beta's evaluation is complete but not scored; Alpha's is half done.
     while f.state(id_of(beta.team)).await != EvaluationState::Finalising {
         let (_, team) = run_shard(&f).await;
@@ -137,7 +148,8 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
             break;
         }
     }
-    let held = loop {
+    // Leaves one shard of Alpha leased.
+    let (alpha_claim, alpha_shard) = loop {
         match f.claim().await.unwrap() {
             ClaimedJob {
                 claim,
@@ -152,14 +164,14 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
                 claim,
                 job: Job::Scoring { .. },
             } => f.store.release(&claim, f.now).await.unwrap(),
-            other => panic!("{other:?}"),
+            other => panic!("expected a shard or a scoring job, claimed {other:?}"),
         }
     };
     while f.state(id_of(beta.team)).await != EvaluationState::Finalising {
         run_shard(&f).await;
     }
-    let before = f.store.events_after(0, 1000).await.unwrap();
-    let before = before.last().unwrap().id;
+    let events = f.store.events_after(0, 1000).await.unwrap();
+    let newest_event = events.last().unwrap().id;
 
     f.now = deadline - jiff::SignedDuration::from_millis(1);
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), []);
@@ -175,26 +187,30 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
         panic!("expected that the evaluation has ended")
     };
     assert_eq!(finished_at, deadline);
-    for words in [
+    for phrase in [
         "2026-03-03 at 10:00:00 UTC",
         "the server ran out of time",
         "no agent fault",
     ] {
-        assert!(reason.contains(words), "{words} is not in {reason}");
+        assert!(reason.contains(phrase), "{phrase} is not in {reason}");
     }
     assert_eq!(
-        f.commit_shard(&held.0, &held.1, 0).await,
+        f.commit_shard(&alpha_claim, &alpha_shard, 0).await,
         CommitOutcome::LeaseLost
     );
     assert_eq!(
-        kinds_since(&f, before).await,
+        event_kinds_since(&f, newest_event).await,
         ["day_overdue", "evaluation_not_played"]
     );
-    assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), [], "once");
+    assert_eq!(
+        f.store.end_overdue_days(f.now).await.unwrap(),
+        [],
+        "the day is ended once"
+    );
     // The complete evaluation is scored, and then the day is released.
     let (claim, scored) = f.claim_scoring().await;
     assert_eq!(scored, id_of(beta.team));
-    f.finish(&claim, 2.0, "d").await;
+    f.finish_scoring(&claim, 2.0, DATASET_KEY).await;
     let days = f.store.days().await.unwrap();
     assert_eq!(days[0].0.stage_day, overdue);
     assert_eq!(days[0].0.released_at, Some(f.now));
@@ -207,18 +223,21 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
         .collect();
     assert_eq!(
         rows,
-        [(alpha.team, of.date, 1.0), (beta.team, overdue.date, 2.0)],
-        "the older row stays"
+        [
+            (alpha.team, first_day.date, 1.0),
+            (beta.team, overdue.date, 2.0)
+        ],
+        "the result of the older day stays"
     );
-    // An organiser can rerun it, without a deadline.
+    // An organiser can rerun the evaluation, without a deadline.
     let rerun = f
         .store
         .rerun_evaluation(Actor::Organiser, id_of(alpha.team), f.now)
         .await
         .unwrap();
-    f.later(3600);
+    f.advance_clock_s(3600);
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), []);
-    f.run_all(3.0).await;
+    f.run_all_with_score(3.0).await;
     assert!(matches!(
         f.state(rerun.id).await,
         EvaluationState::Finished { .. }
@@ -228,27 +247,30 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
 #[tokio::test]
 async fn overdue_day_without_scoring_is_released_at_once() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = daily(&f, DayDeadline::Hours(1)).await;
-    let started = start(&f, stage).await;
+    f.valid_submission_of("Alpha").await;
+    let stage = configure_daily_stage(&f, DayDeadline::Hours(1)).await;
+    let started = start_day(&f, stage).await;
     // An automatic rerun after a platform fault has no time left.
-    let broken = f.fail_next().await;
+    let failed = f.fail_next_evaluation().await;
     let evaluations = f
         .store
         .evaluations_of_day(started[0].stage_day)
         .await
         .unwrap();
     assert_eq!(evaluations.len(), 2, "the rerun is queued");
-    f.later(3600);
+    f.advance_clock_s(3600);
     f.store.end_overdue_days(f.now).await.unwrap();
     let (day, finished) = f.store.days().await.unwrap()[0];
     assert_eq!((day.released_at, finished), (Some(f.now), 0));
     assert!(matches!(
-        f.state(broken).await,
+        f.state(failed).await,
         EvaluationState::PlatformFailed { .. }
     ));
     let evaluations = f.store.evaluations_of_day(day.stage_day).await.unwrap();
-    let not_played = evaluations.iter().find(|one| one.id != broken).unwrap();
+    let not_played = evaluations
+        .iter()
+        .find(|evaluation| evaluation.id != failed)
+        .unwrap();
     assert!(matches!(
         not_played.state,
         EvaluationState::NotPlayed { .. }
@@ -259,37 +281,37 @@ async fn overdue_day_without_scoring_is_released_at_once() {
 #[tokio::test]
 async fn closed_stage_continues_its_day_until_the_deadline() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = daily(&f, DayDeadline::NextCut).await;
+    f.valid_submission_of("Alpha").await;
+    let stage = configure_daily_stage(&f, DayDeadline::NextCut).await;
     let closing = StageChange {
-        closes_at: Some(Some(at("2026-03-01T12:00:00Z"))),
+        closes_at: Some(Some(time("2026-03-01T12:00:00Z"))),
         ..StageChange::default()
     };
-    let closing = f
+    let changed = f
         .store
         .change_stage(Actor::Organiser, stage, closing, f.now);
-    closing.await.unwrap();
-    start(&f, stage).await;
-    f.later(4 * 3600);
+    changed.await.unwrap();
+    start_day(&f, stage).await;
+    f.advance_clock_s(4 * 3600);
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), []);
     run_shard(&f).await;
-    f.later(20 * 3600);
+    f.advance_clock_s(20 * 3600);
     let ended = f.store.end_overdue_days(f.now).await.unwrap();
-    assert_eq!(ended.len(), 1, "its next cutoff would have been now");
+    assert_eq!(ended.len(), 1, "the next cutoff would have been now");
     assert!(f.claim().await.is_none());
-    let none = f.store.start_scheduled_day(stage, f.now).await.unwrap();
-    assert_eq!(none, None);
+    let started = f.store.start_scheduled_day(stage, f.now).await.unwrap();
+    assert_eq!(started, None);
 }
 
 #[tokio::test]
 async fn deadline_follows_settings_but_never_into_the_past() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = daily(&f, DayDeadline::NextCut).await;
-    start(&f, stage).await;
-    let change = async |f: &TestStore, day_deadline| {
+    f.valid_submission_of("Alpha").await;
+    let stage = configure_daily_stage(&f, DayDeadline::NextCut).await;
+    start_day(&f, stage).await;
+    let change_deadline = async |f: &TestStore, day_deadline| {
         let settings = f.store.stage(stage).await.unwrap().settings;
-        let wanted = StageChange {
+        let change = StageChange {
             settings: Some(StageSettings {
                 day_deadline,
                 ..settings
@@ -297,24 +319,24 @@ async fn deadline_follows_settings_but_never_into_the_past() {
             ..StageChange::default()
         };
         f.store
-            .change_stage(Actor::Organiser, stage, wanted, f.now)
+            .change_stage(Actor::Organiser, stage, change, f.now)
             .await
     };
     let deadline =
         async |f: &TestStore| f.store.unreleased_days(stage).await.unwrap()[0].deadline_at;
-    f.later(2 * 3600);
-    change(&f, DayDeadline::Hours(3)).await.unwrap();
-    assert_eq!(deadline(&f).await, Some(at("2026-03-01T13:00:00Z")));
-    let Err(StoreError::Conflict(why)) = change(&f, DayDeadline::Hours(2)).await else {
+    f.advance_clock_s(2 * 3600);
+    change_deadline(&f, DayDeadline::Hours(3)).await.unwrap();
+    assert_eq!(deadline(&f).await, Some(time("2026-03-01T13:00:00Z")));
+    let Err(StoreError::Conflict(reason)) = change_deadline(&f, DayDeadline::Hours(2)).await else {
         panic!("expected a conflict, since the deadline would have passed")
     };
-    assert!(why.contains("2026-03-01T12:00:00Z"), "{why}");
-    assert_eq!(deadline(&f).await, Some(at("2026-03-01T13:00:00Z")));
+    assert!(reason.contains("2026-03-01T12:00:00Z"), "{reason}");
+    assert_eq!(deadline(&f).await, Some(time("2026-03-01T13:00:00Z")));
     // A server that starts with a changed configuration does not end the day.
-    daily(&f, DayDeadline::Hours(2)).await;
-    assert_eq!(deadline(&f).await, Some(at("2026-03-01T13:00:00Z")));
-    change(&f, DayDeadline::Never).await.unwrap();
+    configure_daily_stage(&f, DayDeadline::Hours(2)).await;
+    assert_eq!(deadline(&f).await, Some(time("2026-03-01T13:00:00Z")));
+    change_deadline(&f, DayDeadline::Never).await.unwrap();
     assert_eq!(deadline(&f).await, None);
-    f.later(1000 * 3600);
+    f.advance_clock_s(1000 * 3600);
     assert_eq!(f.store.end_overdue_days(f.now).await.unwrap(), []);
 }

@@ -1,15 +1,17 @@
-//! Events are recorded with the change, and sent to subscribers after it.
+//! Events: each change of the season is recorded as an event in the same transaction, and then sent to subscribers in this
+//! process. The job signal wakes workers when a job can be claimed.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use std::collections::BTreeSet;
 
-async fn recorded(f: &TestStore) -> Vec<EventRecord> {
+/// All events, the oldest first.
+async fn stored_events(f: &TestStore) -> Vec<EventRecord> {
     f.store.events_after(0, 1000).await.unwrap()
 }
 
-/// The variants' names, as they are stored.
-fn kinds(records: &[EventRecord]) -> Vec<String> {
+/// The kinds of events, as they are stored.
+fn event_kinds(records: &[EventRecord]) -> Vec<String> {
     records
         .iter()
         .map(|record| {
@@ -22,13 +24,13 @@ fn kinds(records: &[EventRecord]) -> Vec<String> {
 #[tokio::test]
 async fn events_record_each_step_of_a_submission() {
     let f = TestStore::new().await;
-    let small = RunPlan {
+    let one_task = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
-        ..plan()
+        ..six_shard_plan()
     };
-    f.stage(&small).await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &small).await;
+    f.configure_stage(&one_task).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &one_task).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
     let (claim, ..) = f.claim_shard().await;
@@ -40,12 +42,12 @@ async fn events_record_each_step_of_a_submission() {
         .set_team_token(Actor::Organiser, submission.team, [9; 32], f.now)
         .await
         .unwrap();
-    let mut records = recorded(&f).await;
-    let stage = records.remove(0);
-    assert_eq!(stage.actor, Actor::Organiser);
-    assert!(matches!(stage.event, Event::StageCreated { .. }));
+    let mut records = stored_events(&f).await;
+    let first = records.remove(0);
+    assert_eq!(first.actor, Actor::Organiser);
+    assert!(matches!(first.event, Event::StageCreated { .. }));
     assert_eq!(
-        kinds(&records),
+        event_kinds(&records),
         [
             "team_created",
             "token_created",
@@ -90,51 +92,63 @@ async fn events_record_each_step_of_a_submission() {
             reason: "disk full".into(),
         }
     );
-    // continue from a known id
-    let later = f.store.events_after(records[6].id, 2).await.unwrap();
-    assert_eq!(later, records[7..9]);
+    // Reads at most two events after one that is known.
+    let newer = f.store.events_after(records[6].id, 2).await.unwrap();
+    assert_eq!(newer, records[7..9]);
 }
 
 #[tokio::test]
 async fn events_record_each_end_of_an_evaluation() {
     let mut f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await;
-    let small = RunPlan {
+    let alpha = f.valid_submission_of("Alpha").await;
+    let one_task = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
         episodes_per_task: 1,
         max_faults: 0,
-        ..plan()
+        ..six_shard_plan()
     };
-    // one day for each end
-    for end in 0..4 {
-        f.later(86_400);
-        let evaluation = f.evaluate(alpha.id, &small).await;
+    #[derive(Debug)]
+    enum End {
+        Finished,
+        AgentFailed,
+        Cancelled,
+        PlatformFailed,
+    }
+    // One day for each end.
+    for end in [
+        End::Finished,
+        End::AgentFailed,
+        End::Cancelled,
+        End::PlatformFailed,
+    ] {
+        f.advance_clock_s(86_400);
+        let evaluation = f.evaluate(alpha.id, &one_task).await;
         let (claim, _, shard) = f.claim_shard().await;
         match end {
-            0 => {
+            End::Finished => {
                 f.commit_shard(&claim, &shard, 0).await;
                 let (claim, _) = f.claim_scoring().await;
-                f.finish(&claim, 7.0, "d").await;
+                f.finish_scoring(&claim, 7.0, DATASET_KEY).await;
             }
-            1 => drop(f.commit_shard(&claim, &shard, 1).await),
-            2 => {
-                let stop =
+            End::AgentFailed => drop(f.commit_shard(&claim, &shard, 1).await),
+            End::Cancelled => {
+                let cancelled =
                     f.store
                         .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now);
-                stop.await.unwrap();
+                cancelled.await.unwrap();
             }
-            _ => {
+            End::PlatformFailed => {
                 f.store.release(&claim, f.now).await.unwrap();
                 for _ in 0..MAX_ATTEMPTS {
                     let (claim, ..) = f.claim_shard().await;
-                    let fail = f.store.release_failed(&claim, "no disk", f.now);
-                    fail.await.unwrap();
-                    f.later(60);
+                    let released = f.store.release_failed(&claim, "no disk", f.now);
+                    released.await.unwrap();
+                    f.advance_clock_s(60);
                 }
             }
         }
     }
-    let seen: BTreeSet<_> = kinds(&recorded(&f).await).into_iter().collect();
+    let kinds: BTreeSet<_> = event_kinds(&stored_events(&f).await).into_iter().collect();
     for kind in [
         "evaluation_finalising",
         "evaluation_finished",
@@ -144,36 +158,40 @@ async fn events_record_each_end_of_an_evaluation() {
         "day_started",
         "day_released",
     ] {
-        assert!(seen.contains(kind), "{kind} is not in {seen:?}");
+        assert!(kinds.contains(kind), "{kind} is not in {kinds:?}");
     }
 }
 
 #[tokio::test]
 async fn failed_operation_changes_nothing_and_sends_no_event() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
-    let stop = f
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let cancelled = f
         .store
         .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now);
-    stop.await.unwrap();
+    cancelled.await.unwrap();
     let rerun = || {
         f.store
             .rerun_evaluation(Actor::Organiser, evaluation.id, f.now)
     };
     rerun().await.unwrap();
-    let before = recorded(&f).await;
+    let events_before = stored_events(&f).await;
     let (mut events, mut signal) = (f.store.events(), f.store.job_signal());
     signal.mark_unchanged();
-    // it fails after a run was divided into shards and queued
+    // The second rerun is refused after its run was divided into shards and queued.
     assert!(matches!(rerun().await, Err(StoreError::Conflict(_))));
-    assert_eq!(recorded(&f).await, before);
+    assert_eq!(stored_events(&f).await, events_before);
     assert!(events.try_recv().is_err());
     assert!(!signal.has_changed().unwrap());
+    // The six shards of the first rerun.
     for _ in 0..6 {
         f.claim_shard().await;
     }
-    assert!(f.claim().await.is_none(), "no job of it is queued");
+    assert!(
+        f.claim().await.is_none(),
+        "no job of the refused rerun is queued"
+    );
 }
 
 #[tokio::test]
@@ -181,13 +199,13 @@ async fn signals_report_new_jobs_and_changes() {
     let f = TestStore::new().await;
     let mut signal = f.store.job_signal();
     let mut events = f.store.events();
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     assert!(!signal.has_changed().unwrap());
     let submission = f.upload(&team).await;
     assert!(signal.has_changed().unwrap());
     signal.mark_unchanged();
     f.validate().await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     assert!(signal.has_changed().unwrap());
     let (claim, _, shard) = f.claim_shard().await;
     f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap();
@@ -200,7 +218,7 @@ async fn signals_report_new_jobs_and_changes() {
     assert!(!signal.has_changed().unwrap(), "no new job to claim");
 
     let sent: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).collect();
-    let in_table = recorded(&f).await;
+    let stored = stored_events(&f).await;
     let records: Vec<_> = sent
         .iter()
         .filter_map(|change| match change {
@@ -208,7 +226,7 @@ async fn signals_report_new_jobs_and_changes() {
             Change::Progress(_) => None,
         })
         .collect();
-    assert_eq!(records, in_table, "the stored events are sent");
+    assert_eq!(records, stored, "the stored events are sent");
     let subject = Subject::Evaluation(evaluation.id);
     let progress = sent
         .iter()

@@ -1,4 +1,5 @@
-//! Agent faults, summed over an evaluation's shards.
+//! Agent faults (wrong responses of the agent's process, each of which ends its episode), which are counted over all shards of
+//! an evaluation. Above the plan's maximum, three, the evaluation ends without a score.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,8 +7,9 @@ use faceoff_store::*;
 #[tokio::test]
 async fn evaluation_at_fault_limit_is_scored() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    // Faults of each of the six shards: three in all.
     for faults in [2, 1, 0, 0, 0, 0] {
         let (claim, _, shard) = f.claim_shard().await;
         f.commit_shard(&claim, &shard, faults).await;
@@ -18,12 +20,12 @@ async fn evaluation_at_fault_limit_is_scored() {
 #[tokio::test]
 async fn evaluation_above_fault_limit_ends_without_score() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (first, _, first_shard) = f.claim_shard().await;
     let (running, _, running_shard) = f.claim_shard().await;
     let (third, _, third_shard) = f.claim_shard().await;
-    // committed out of order; the faults are listed in the order of the shards
+    // The third shard is committed before the first; the faults are listed in the order of the shards.
     f.commit_shard(&third, &third_shard, 2).await;
     assert!(!f.state(evaluation.id).await.is_over());
     f.commit_shard(&first, &first_shard, 2).await;
@@ -41,7 +43,7 @@ async fn evaluation_above_fault_limit_ends_without_score() {
     assert_eq!(
         places,
         [&first_shard, &third_shard]
-            .map(|s| [0, 1].map(|i| (s.task.into(), Some(s.first_episode + i))))
+            .map(|shard| [0, 1].map(|index| (shard.task.into(), Some(shard.first_episode + index))))
             .concat()
     );
     assert!(
@@ -77,14 +79,14 @@ async fn evaluation_above_fault_limit_ends_without_score() {
 #[tokio::test]
 async fn shard_stopped_by_faults_ends_the_evaluation() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
+    let submission = f.valid_submission_of("Alpha").await;
     let strict = RunPlan {
         max_faults: 0,
-        ..plan()
+        ..six_shard_plan()
     };
     let evaluation = f.evaluate(submission.id, &strict).await;
     let (claim, _, shard) = f.claim_shard().await;
-    let mut stopped = commit(&shard, 1);
+    let mut stopped = shard_commit(&shard, 1);
     stopped.outcomes.truncate(1);
     stopped.stopped_by_faults = true;
     assert_eq!(

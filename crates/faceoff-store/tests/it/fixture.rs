@@ -1,4 +1,7 @@
-//! A store in a temporary folder, an adjustable clock, and shorthands for the steps of a competition.
+//! [`TestStore`]: a store in a temporary folder with a clock that the test sets, and helpers for the steps of a competition.
+//!
+//! A team submits an agent. A *validation run* checks it, and on each day it is evaluated: workers claim (lease) jobs from
+//! the queue, which are the *shards* of a run (episodes that are run together), and a scoring job at the end.
 
 use faceoff_store::*;
 use faceoff_types::*;
@@ -9,11 +12,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// Duration of the lease of a claimed job.
 pub const LEASE_S: u32 = 15;
+
+/// Key of the dataset (the published archive of an evaluation) where a test does not read it.
+pub const DATASET_KEY: &str = "d";
 
 pub struct TestStore {
     pub store: Store,
+    /// The data folder of the store.
     pub folder: tempfile::TempDir,
+    /// The test's clock, which all operations get as their time.
     pub now: Timestamp,
 }
 
@@ -33,17 +42,18 @@ impl TestStore {
         Store::open(self.folder.path()).await.unwrap()
     }
 
+    /// A connection to the database past the store.
     pub async fn connection(&self) -> SqliteConnection {
         let file = self.folder.path().join("faceoff.sqlite3");
         let url = format!("sqlite://{}", file.display());
         SqliteConnection::connect(&url).await.unwrap()
     }
 
-    pub fn later(&mut self, seconds: i64) {
+    pub fn advance_clock_s(&mut self, seconds: i64) {
         self.now += SignedDuration::from_secs(seconds);
     }
 
-    pub async fn team(&self, name: &str) -> Team {
+    pub async fn create_team(&self, name: &str) -> Team {
         let token_hash = *blake3::hash(name.as_bytes()).as_bytes();
         self.store
             .create_team(
@@ -56,6 +66,7 @@ impl TestStore {
             .unwrap()
     }
 
+    /// Submits [`bundle`] as a team's agent. Its validation run is queued.
     pub async fn upload(&self, team: &Team) -> Submission {
         self.store
             .create_submission(
@@ -69,6 +80,7 @@ impl TestStore {
             .unwrap()
     }
 
+    /// Claims the next job of the queue, as a worker's slot.
     pub async fn claim(&self) -> Option<ClaimedJob> {
         self.store.claim("slot 0", LEASE_S, self.now).await.unwrap()
     }
@@ -89,15 +101,15 @@ impl TestStore {
         self.store.submission(submission.id).await.unwrap()
     }
 
-    /// A team with a valid submission.
-    pub async fn ready_team(&self, name: &str) -> Submission {
-        let team = self.team(name).await;
+    /// Creates a team and its valid submission.
+    pub async fn valid_submission_of(&self, name: &str) -> Submission {
+        let team = self.create_team(name).await;
         self.upload(&team).await;
         self.validate().await
     }
 
-    /// The season's first stage, with this plan from now on.
-    pub async fn stage(&self, plan: &RunPlan) -> StageId {
+    /// Configures the season's first stage with this plan, from now on.
+    pub async fn configure_stage(&self, plan: &RunPlan) -> StageId {
         configure_first_stage(&self.store, plan, self.now).await
     }
 
@@ -112,7 +124,7 @@ impl TestStore {
 
     /// Starts the day unless it has started already. Returns the submission's evaluation.
     pub async fn evaluate(&self, submission: SubmissionId, plan: &RunPlan) -> Evaluation {
-        let stage = self.stage(plan).await;
+        let stage = self.configure_stage(plan).await;
         match self
             .store
             .start_day(Actor::Organiser, stage, self.now)
@@ -122,13 +134,15 @@ impl TestStore {
             Err(error) => panic!("{error}"),
         }
         let today = Zone::UTC.date(self.now);
-        let of_day = self.store.evaluations_on(today).await.unwrap();
-        let found = of_day.into_iter().rfind(|one| one.submission == submission);
-        found.expect("it was active at the cutoff")
+        let evaluations = self.store.evaluations_on(today).await.unwrap();
+        let found = evaluations
+            .into_iter()
+            .rfind(|evaluation| evaluation.submission == submission);
+        found.expect("the submission was active at the day's start")
     }
 
-    /// Runs queued jobs until an evaluation is scored.
-    pub async fn finish_next(&self) -> EvaluationId {
+    /// Runs queued jobs until an evaluation is scored with 1.0. Returns its id.
+    pub async fn finish_next_evaluation(&self) -> EvaluationId {
         loop {
             let ClaimedJob { claim, job } = self.claim().await.expect("a job is queued");
             match job {
@@ -136,7 +150,7 @@ impl TestStore {
                     self.commit_shard(&claim, &shard, 0).await;
                 }
                 Job::Scoring { evaluation, .. } => {
-                    self.finish(&claim, 1.0, "d").await;
+                    self.finish_scoring(&claim, 1.0, DATASET_KEY).await;
                     return evaluation;
                 }
                 Job::Validation { .. } | Job::Game { .. } => {
@@ -146,15 +160,15 @@ impl TestStore {
         }
     }
 
-    /// Runs and scores all queued evaluations.
-    pub async fn run_all(&self, score: f64) {
+    /// Runs all queued evaluations and scores each with `score`.
+    pub async fn run_all_with_score(&self, score: f64) {
         while let Some(ClaimedJob { claim, job }) = self.claim().await {
             match job {
                 Job::Shard { shard, .. } => {
                     self.commit_shard(&claim, &shard, 0).await;
                 }
                 Job::Scoring { .. } => {
-                    self.finish(&claim, score, "d").await;
+                    self.finish_scoring(&claim, score, DATASET_KEY).await;
                 }
                 Job::Validation { .. } | Job::Game { .. } => {
                     panic!("expected no validation run and no game")
@@ -164,8 +178,8 @@ impl TestStore {
     }
 
     /// Reports platform faults until an evaluation with one shard has ended. Returns its id.
-    pub async fn fail_next(&mut self) -> EvaluationId {
-        let mut broken = None;
+    pub async fn fail_next_evaluation(&mut self) -> EvaluationId {
+        let mut failing = None;
         for _ in 0..MAX_ATTEMPTS {
             let Some(ClaimedJob { claim, job }) = self.claim().await else {
                 panic!("a job is queued")
@@ -177,14 +191,15 @@ impl TestStore {
             else {
                 panic!("expected a shard of an evaluation, claimed {job:?}")
             };
-            assert_eq!(*broken.get_or_insert(id), id);
-            let failed = self.store.release_failed(&claim, "disk full", self.now);
-            failed.await.unwrap();
+            assert_eq!(*failing.get_or_insert(id), id);
+            let released = self.store.release_failed(&claim, "disk full", self.now);
+            released.await.unwrap();
             if !self.state(id).await.is_over() {
-                self.later(60);
+                // Past the delay before the next attempt.
+                self.advance_clock_s(60);
             }
         }
-        broken.expect("it was claimed")
+        failing.expect("a shard was claimed")
     }
 
     pub async fn claim_validation(&self) -> (JobClaim, Submission) {
@@ -217,7 +232,13 @@ impl TestStore {
         }
     }
 
-    pub async fn finish(&self, claim: &JobClaim, score: f64, dataset: &str) -> CommitOutcome {
+    /// Commits the evaluation of a claimed scoring job.
+    pub async fn finish_scoring(
+        &self,
+        claim: &JobClaim,
+        score: f64,
+        dataset: &str,
+    ) -> CommitOutcome {
         self.store
             .finish_evaluation(
                 claim,
@@ -230,6 +251,7 @@ impl TestStore {
             .unwrap()
     }
 
+    /// Commits a claimed shard, whose first `faults` episodes ended by an agent fault.
     pub async fn commit_shard(
         &self,
         claim: &JobClaim,
@@ -237,7 +259,7 @@ impl TestStore {
         faults: u32,
     ) -> CommitOutcome {
         self.store
-            .commit_shard(claim, commit(shard, faults), self.now)
+            .commit_shard(claim, shard_commit(shard, faults), self.now)
             .await
             .unwrap()
     }
@@ -247,16 +269,36 @@ impl TestStore {
     }
 }
 
-/// The first stage of the store's season, with this plan from now on.
+/// Expects that the result is a conflict whose reason contains these phrases.
+#[track_caller]
+pub fn assert_conflict<T: std::fmt::Debug>(result: Result<T, StoreError>, phrases: &[&str]) {
+    let Err(StoreError::Conflict(reason)) = result else {
+        panic!("expected a conflict with {phrases:?}: {result:?}");
+    };
+    for phrase in phrases {
+        assert!(reason.contains(phrase), "{phrase:?} is not in {reason:?}");
+    }
+}
+
+/// Expects that the error's text contains these phrases.
+#[track_caller]
+pub fn assert_contains(error: &StoreError, phrases: &[&str]) {
+    let text = error.to_string();
+    for phrase in phrases {
+        assert!(text.contains(phrase), "{phrase:?} is not in {text:?}");
+    }
+}
+
+/// Configures the first stage of the store's season with this plan, from now on.
 pub async fn configure_first_stage(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
     let (rules, settings) = rules_and_settings(plan);
-    // Open for a long time, so that tests can set the clock back.
-    let since = match store.stages().await.unwrap().is_empty() {
+    // A new stage has been open for 90 days, so that tests can set the clock back.
+    let configured_at = match store.stages().await.unwrap().is_empty() {
         true => now - SignedDuration::from_hours(24 * 90),
         false => now,
     };
     store
-        .configure_stage(rules, settings, Zone::UTC, since)
+        .configure_stage(rules, settings, Zone::UTC, configured_at)
         .await
         .unwrap();
     store.stages().await.unwrap()[0].id
@@ -299,6 +341,7 @@ pub fn blake3_of(dataset: &str) -> String {
     blake3::hash(dataset.as_bytes()).to_string()
 }
 
+/// A submitted agent's archive.
 pub fn bundle() -> BundleRef {
     BundleRef {
         key: "bundles/abc".into(),
@@ -308,8 +351,8 @@ pub fn bundle() -> BundleRef {
     }
 }
 
-/// 3 tasks of 4 episodes in shards of 2: six shards.
-pub fn plan() -> RunPlan {
+/// 3 tasks of 4 episodes in shards of 2 episodes: six shards.
+pub fn six_shard_plan() -> RunPlan {
     RunPlan {
         profile: Profile::Evaluation,
         tasks: vec![Task::Prepare, Task::Hit, Task::Defend],
@@ -322,16 +365,16 @@ pub fn plan() -> RunPlan {
 }
 
 /// One shard of one episode.
-pub fn small() -> RunPlan {
+pub fn one_shard_plan() -> RunPlan {
     RunPlan {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
-        ..plan()
+        ..six_shard_plan()
     }
 }
 
 /// Commit of a worker that ran `shard`; its first `faults` episodes ended by an agent fault.
-pub fn commit(shard: &Shard, faults: u32) -> ShardCommit {
+pub fn shard_commit(shard: &Shard, faults: u32) -> ShardCommit {
     let outcomes = (shard.first_episode..shard.end_episode)
         .enumerate()
         .map(|(index, episode)| outcome(shard.task, episode, (index as u32) < faults))
@@ -344,8 +387,9 @@ pub fn commit(shard: &Shard, faults: u32) -> ShardCommit {
     }
 }
 
-pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
-    let fault = faulty.then(|| AgentFault {
+/// Outcome of an episode that ended by an agent fault, or in success. Its times are no short decimals.
+pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
+    let fault = is_faulty.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
         agent_task: task.into(),
         episode: Some(episode),
@@ -356,12 +400,12 @@ pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
         task,
         episode,
         steps: 17,
-        end: if faulty {
+        end: if is_faulty {
             EpisodeEnd::AgentFault
         } else {
             EpisodeEnd::LeftTable
         },
-        success: !faulty,
+        success: !is_faulty,
         violations: Violations {
             ee: true,
             ..Violations::default()
@@ -374,6 +418,7 @@ pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
     }
 }
 
+/// Result of an evaluation. Its penalty points are no short decimal.
 pub fn result(score: f64) -> EvaluationResult {
     EvaluationResult {
         ruleset: RULESET.into(),
@@ -388,7 +433,7 @@ pub fn result(score: f64) -> EvaluationResult {
     }
 }
 
-/// The acceptance of the invitation with this code. The hash of the user's token is the hash of the code's hash.
+/// The request to accept the invitation whose secret code has this hash. The hash of the user's token is the hash of this hash.
 pub fn join_request(code_hash: [u8; 32], name: &str) -> JoinRequest {
     JoinRequest {
         code_hash,

@@ -1,4 +1,5 @@
-//! The database's write-ahead log stays bounded while it is read.
+//! The size of the database's write-ahead log (the file to which SQLite appends changes until a checkpoint copies them into the
+//! database) stays bounded while the database is read.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,7 +7,7 @@ use sqlx::{Executor, SqliteConnection};
 use std::{fs, path::PathBuf, sync::Arc};
 use tokio::{sync::Semaphore, task::JoinSet};
 
-/// Generous bound of what one transaction may add to a log that is being emptied.
+/// More than one transaction adds to the log while a checkpoint empties it.
 const SLACK_BYTES: u64 = 4 << 20;
 
 fn log_file(f: &TestStore) -> PathBuf {
@@ -14,11 +15,11 @@ fn log_file(f: &TestStore) -> PathBuf {
 }
 
 fn log_bytes(f: &TestStore) -> u64 {
-    fs::metadata(log_file(f)).map_or(0, |found| found.len())
+    fs::metadata(log_file(f)).map_or(0, |metadata| metadata.len())
 }
 
-/// Writes half a megabyte, different each time, since SQLite does not write unchanged pages.
-async fn write(f: &TestStore, run: faceoff_types::RunId, number: u8) {
+/// Stores a summary of half a megabyte, different for each `number`, since SQLite does not write unchanged pages.
+async fn write_summary(f: &TestStore, run: faceoff_types::RunId, number: u8) {
     let text = char::from(b'a' + number % 26).to_string();
     let summary = format!("\"{}\"", text.repeat(512 << 10));
     f.store
@@ -27,16 +28,16 @@ async fn write(f: &TestStore, run: faceoff_types::RunId, number: u8) {
         .unwrap();
 }
 
-/// A run to store summaries for.
-async fn run(f: &TestStore) -> faceoff_types::RunId {
-    let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await.run
+/// Creates a run, for which summaries can be stored.
+async fn create_run(f: &TestStore) -> faceoff_types::RunId {
+    let submission = f.valid_submission_of("Alpha").await;
+    f.evaluate(submission.id, &six_shard_plan()).await.run
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn log_stays_bounded_under_constant_reads() {
     let f = TestStore::new().await;
-    let run = run(&f).await;
+    let run = create_run(&f).await;
     let today = f.now.to_zoned(jiff::tz::TimeZone::UTC).date();
     let mut readers = JoinSet::new();
     let reads = Arc::new(Semaphore::new(0));
@@ -50,24 +51,24 @@ async fn log_stays_bounded_under_constant_reads() {
             }
         });
     }
-    let mut longest = 0;
-    // five times the bound
+    let mut max_bytes = 0;
+    // All writes together are five times the bound.
     for number in 0..160 {
-        // there are reads between any two writes
+        // Some of the readers' reads end between any two writes.
         reads.acquire_many(4).await.unwrap().forget();
-        write(&f, run, number).await;
-        longest = longest.max(log_bytes(&f));
+        write_summary(&f, run, number).await;
+        max_bytes = max_bytes.max(log_bytes(&f));
     }
     readers.shutdown().await;
-    assert!(longest > 0, "something was written");
+    assert!(max_bytes > 0, "something was written");
     assert!(
-        longest <= MAX_LOG_BYTES + SLACK_BYTES,
-        "{longest} bytes of log"
+        max_bytes <= MAX_LOG_BYTES + SLACK_BYTES,
+        "{max_bytes} bytes of log"
     );
 }
 
-/// A read transaction as of another process.
-async fn long_reader(f: &TestStore) -> SqliteConnection {
+/// A connection past the store, as of another process, with an open read transaction.
+async fn open_reader(f: &TestStore) -> SqliteConnection {
     let mut reader = f.connection().await;
     reader.execute("BEGIN").await.unwrap();
     reader.execute("SELECT COUNT(*) FROM events").await.unwrap();
@@ -77,22 +78,24 @@ async fn long_reader(f: &TestStore) -> SqliteConnection {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn log_is_emptied_after_a_long_read_transaction() {
     let f = TestStore::new().await;
-    let run = run(&f).await;
-    let mut other = long_reader(&f).await;
+    let run = create_run(&f).await;
+    let mut reader = open_reader(&f).await;
     let mut written = 0;
     while log_bytes(&f) <= MAX_LOG_BYTES {
-        write(&f, run, written).await;
+        write_summary(&f, run, written).await;
         written += 1;
-        assert!(written < 200, "the reader should hold the log");
+        assert!(
+            written < 200,
+            "the read transaction keeps the log from being emptied"
+        );
     }
     f.store.checkpoint().await.unwrap();
     assert!(
         log_bytes(&f) > MAX_LOG_BYTES,
         "the log is in use, and the checkpoint does not wait for it"
     );
-    // the reader ends its transaction
-    other.execute("COMMIT").await.unwrap();
-    // a checkpoint that the last write started may still be running
+    reader.execute("COMMIT").await.unwrap();
+    // A checkpoint that the last write started may still be running.
     while log_bytes(&f) > MAX_LOG_BYTES {
         f.store.checkpoint().await.unwrap();
         tokio::task::yield_now().await;
@@ -110,13 +113,13 @@ async fn artifact_streams_hold_no_read_connection() {
         .await
         .unwrap();
     let mut downloads = Vec::new();
-    // more than the pool has connections
+    // More downloads than the pool has connections.
     for _ in 0..32 {
         downloads.push(f.store.artifacts().read("datasets/a").await.unwrap());
     }
-    let run = run(&f).await;
+    let run = create_run(&f).await;
     for number in 0..64 {
-        write(&f, run, number).await;
+        write_summary(&f, run, number).await;
     }
     f.store.season().await.unwrap();
     assert!(log_bytes(&f) <= MAX_LOG_BYTES + SLACK_BYTES);

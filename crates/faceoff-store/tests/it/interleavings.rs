@@ -1,4 +1,5 @@
-//! For any order of worker actions, every shard ends with exactly one committed result.
+//! For any order of actions of workers, which claim (lease) the jobs of an evaluation: every shard (group of episodes that are
+//! run together) of a finished evaluation has exactly one committed result.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,7 +7,10 @@ use faceoff_types::ShardId;
 use proptest::prelude::*;
 use std::collections::HashMap;
 
-/// Action of a worker; the number picks one of all earlier claims, lost ones included.
+/// Episodes of [`six_shard_plan`].
+const EPISODES: usize = 12;
+
+/// Action of a worker. Its number selects one of all earlier claims, including those whose leases have expired.
 #[derive(Debug, Clone)]
 enum Action {
     Claim,
@@ -14,10 +18,13 @@ enum Action {
     Heartbeat(usize),
     Fail(usize),
     Release(usize),
+    /// Advances the clock by this number of seconds.
     Wait(i64),
+    /// Opens the store again.
     Restart,
 }
 
+/// A random action. The numbers are relative frequencies.
 fn action() -> impl Strategy<Value = Action> {
     prop_oneof![
         6 => Just(Action::Claim),
@@ -30,6 +37,7 @@ fn action() -> impl Strategy<Value = Action> {
     ]
 }
 
+/// What the workers have done.
 #[derive(Default)]
 struct History {
     claims: Vec<ClaimedJob>,
@@ -38,12 +46,13 @@ struct History {
 }
 
 impl History {
-    fn pick(&self, number: usize) -> Option<&ClaimedJob> {
+    /// The claim that this number selects.
+    fn select(&self, number: usize) -> Option<&ClaimedJob> {
         self.claims.get(number.checked_rem(self.claims.len())?)
     }
 
     async fn commit(&mut self, f: &TestStore, number: usize) {
-        let Some(ClaimedJob { claim, job }) = self.pick(number).cloned() else {
+        let Some(ClaimedJob { claim, job }) = self.select(number).cloned() else {
             return;
         };
         match job {
@@ -53,7 +62,7 @@ impl History {
                 }
             }
             Job::Scoring { .. } => {
-                f.finish(&claim, 1.0, "d").await;
+                f.finish_scoring(&claim, 1.0, DATASET_KEY).await;
             }
             Job::Validation { .. } | Job::Game { .. } => {
                 unreachable!("the only validation run is over")
@@ -64,8 +73,8 @@ impl History {
 
 async fn run_actions(actions: Vec<Action>) {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let mut history = History::default();
     for action in actions {
         match action {
@@ -76,12 +85,12 @@ async fn run_actions(actions: Vec<Action>) {
             }
             Action::Commit(number) => history.commit(&f, number).await,
             Action::Heartbeat(number) => {
-                if let Some(ClaimedJob { claim, .. }) = history.pick(number) {
+                if let Some(ClaimedJob { claim, .. }) = history.select(number) {
                     f.store.heartbeat(claim, 1, LEASE_S, f.now).await.unwrap();
                 }
             }
             Action::Fail(number) => {
-                if let Some(ClaimedJob { claim, .. }) = history.pick(number) {
+                if let Some(ClaimedJob { claim, .. }) = history.select(number) {
                     f.store
                         .release_failed(claim, "a platform fault", f.now)
                         .await
@@ -89,16 +98,16 @@ async fn run_actions(actions: Vec<Action>) {
                 }
             }
             Action::Release(number) => {
-                if let Some(ClaimedJob { claim, .. }) = history.pick(number) {
+                if let Some(ClaimedJob { claim, .. }) = history.select(number) {
                     f.store.release(claim, f.now).await.unwrap();
                 }
             }
-            Action::Wait(seconds) => f.later(seconds),
+            Action::Wait(seconds) => f.advance_clock_s(seconds),
             Action::Restart => f.store = f.reopen().await,
         }
     }
-    // a healthy worker ends the evaluation in any case
-    f.later(3600);
+    // A worker without failures ends the evaluation in any case.
+    f.advance_clock_s(3600);
     while let Some(claimed) = f.claim().await {
         history.claims.push(claimed);
         history.commit(&f, history.claims.len() - 1).await;
@@ -111,16 +120,20 @@ async fn run_actions(actions: Vec<Action>) {
                 assert_eq!(history.commits.get(&shard.id), Some(&1), "{shard:?}");
                 assert!(shard.recording.is_some());
             }
-            assert_eq!(f.store.outcomes(evaluation.run).await.unwrap().len(), 12);
-        }
-        EvaluationState::PlatformFailed { .. } => {
-            assert!(
-                shards
-                    .iter()
-                    .all(|s| history.commits.get(&s.id).is_none_or(|n| *n == 1))
+            assert_eq!(
+                f.store.outcomes(evaluation.run).await.unwrap().len(),
+                EPISODES
             );
         }
-        other => panic!("the evaluation is stuck: {other:?}"),
+        EvaluationState::PlatformFailed { .. } => {
+            assert!(shards.iter().all(|shard| {
+                history
+                    .commits
+                    .get(&shard.id)
+                    .is_none_or(|count| *count == 1)
+            }));
+        }
+        other => panic!("the evaluation has not ended: {other:?}"),
     }
 }
 

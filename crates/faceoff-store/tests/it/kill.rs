@@ -1,4 +1,7 @@
-//! `kill -9` during writes: acknowledged writes survive, and no write is partial.
+//! `kill -9` of a process that writes to the store: acknowledged writes survive, and no write is partial.
+//!
+//! The tests start this test program as a child process, which writes and reports each acknowledged write as a line
+//! `OPERATION ID`, and kill it after a number of lines.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -11,55 +14,66 @@ use std::{
     process::{Command, Stdio},
 };
 
-const FOLDER: &str = "FACEOFF_STORE_TEST_FOLDER";
-/// If set, every round ends with file removal, and skips the organiser's operations on results, which take long.
-const CLEARS: &str = "FACEOFF_STORE_TEST_CLEARS";
+/// Size of each recording and dataset: more than one write of a file, so that a kill can interrupt it.
+const ARTIFACT_BYTES: usize = 300_000;
+/// Environment variable with the data folder of the child process.
+const FOLDER_VARIABLE: &str = "FACEOFF_STORE_TEST_FOLDER";
+/// Environment variable of the child process; if set, every round ends with file removal, and skips the organiser's operations on
+/// results, which take long.
+const REMOVES_FILES_VARIABLE: &str = "FACEOFF_STORE_TEST_CLEARS";
 
-/// Writes until it is killed, and prints every acknowledged write. Started by the tests below.
+/// Writes until its process is killed, and prints every acknowledged write. The tests below start it.
 #[tokio::test]
 #[ignore = "the child process of the tests below"]
 async fn child_process_writes_until_killed() {
-    let Ok(folder) = std::env::var(FOLDER) else {
+    let Ok(folder) = std::env::var(FOLDER_VARIABLE) else {
         return;
     };
     let folder = Path::new(&folder);
-    let clears = std::env::var_os(CLEARS).is_some();
+    let removes_files = std::env::var_os(REMOVES_FILES_VARIABLE).is_some();
     let store = Store::open(folder).await.unwrap();
-    // each round has its own day, and leases of earlier processes have expired
+    // Each round has its own day, which is a day later, so that leases of earlier processes have expired.
     let mut now: jiff::Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
-    let small = RunPlan {
+    let small_plan = RunPlan {
         episodes_per_task: 2,
         episodes_per_shard: 1,
-        ..plan()
+        ..six_shard_plan()
     };
-    let stage = configure_first_stage(&store, &small, now).await;
+    let stage = configure_first_stage(&store, &small_plan, now).await;
     if let Some(newest) = store.newest_day(stage).await.unwrap() {
         now = now.max(newest.cutoff_at);
     }
     let file = tempfile::NamedTempFile::new().unwrap();
-    // larger than one write, so that a kill can interrupt it
-    std::fs::write(file.path(), vec![b'x'; 300_000]).unwrap();
-    let report = |text: String| {
+    std::fs::write(file.path(), vec![b'x'; ARTIFACT_BYTES]).unwrap();
+    let report = |line: String| {
         let mut out = std::io::stdout().lock();
-        writeln!(out, "\n{text}")
+        // The test harness may have printed an incomplete line before.
+        writeln!(out, "\n{line}")
             .and_then(|()| out.flush())
             .unwrap();
     };
-    let run = uuid::Uuid::now_v7();
+    // Part of names, so that those of each process are unique.
+    let process = uuid::Uuid::now_v7();
     for round in 0.. {
-        sign_off(&store, &format!("s {} {round}", run.simple()), now, &report).await;
+        sign_off(
+            &store,
+            &format!("s {} {round}", process.simple()),
+            now,
+            &report,
+        )
+        .await;
         let mut token_hash = [0; 32];
         token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
-        let name: TeamName = format!("t {} {round}", run.simple()).parse().unwrap();
+        let name: TeamName = format!("t {} {round}", process.simple()).parse().unwrap();
         let team = store
             .create_team(Actor::Organiser, &name, token_hash, now)
             .await
             .unwrap();
         report(format!("team {}", team.id));
-        // A user joins, and in every second round leaves: each is atomic.
-        let code = *blake3::hash(&token_hash).as_bytes();
+        // A user joins, and leaves in every second round. Each of these operations is atomic.
+        let code_hash = *blake3::hash(&token_hash).as_bytes();
         let invitation = NewInvitation {
-            code_hash: code,
+            code_hash,
             role: InvitationRole::Member(team.id),
             note: "a test".into(),
             expires_at: now + jiff::SignedDuration::from_hours(1),
@@ -69,17 +83,17 @@ async fn child_process_writes_until_killed() {
             .await
             .unwrap();
         let joined = store
-            .join(join_request(code, name.as_str()), now)
+            .join(join_request(code_hash, name.as_str()), now)
             .await
             .unwrap();
         report(format!("joined {}", joined.user.id));
         if round % 2 == 1 {
-            let person = joined.user.id;
+            let user = joined.user.id;
             store
-                .remove_user(Actor::Organiser, person, now)
+                .remove_user(Actor::Organiser, user, now)
                 .await
                 .unwrap();
-            report(format!("left {person}"));
+            report(format!("left {user}"));
         }
         store
             .create_submission(
@@ -118,7 +132,7 @@ async fn child_process_writes_until_killed() {
                     }
                 }
                 Job::Shard { run, shard, .. } => {
-                    let mut commit = commit(&shard, 0);
+                    let mut commit = shard_commit(&shard, 0);
                     let recording = claim.recording_key(run.id);
                     let key = format!("{recording}/steps");
                     commit.recording = Some(recording);
@@ -137,67 +151,67 @@ async fn child_process_writes_until_killed() {
                         .unwrap();
                     assert_eq!(finished, CommitOutcome::Stored);
                     report(format!("finished {evaluation}"));
-                    if clears {
+                    if removes_files {
                         continue;
                     }
                     // The organiser's operations, each of which is atomic.
-                    let Ok(played) = store.evaluation(evaluation).await else {
-                        // It belongs to a trial or a proposal.
-                        apply_played(&store, now, &report).await;
+                    let Ok(scored) = store.evaluation(evaluation).await else {
+                        // The evaluation belongs to a trial or a proposal.
+                        apply_finished_proposals(&store, now, &report).await;
                         continue;
                     };
-                    if played.extra_for.is_some() {
+                    if scored.extra_for.is_some() {
                         continue;
                     }
-                    if played.rerun_of.is_some() {
+                    if scored.rerun_of.is_some() {
                         let scope = Reevaluation::Evaluation(evaluation);
                         let proposed =
-                            store.propose_reevaluation(Actor::Organiser, scope, "why", now);
+                            store.propose_reevaluation(Actor::Organiser, scope, "a test", now);
                         match proposed.await {
                             Ok(proposal) => report(format!("proposal {}", proposal.id)),
-                            // Its day is not released.
+                            // The day of the evaluation is not released.
                             Err(StoreError::Conflict(_)) => {}
                             Err(error) => panic!("{error}"),
                         }
                         continue;
                     }
-                    let team = played.team;
+                    let team = scored.team;
                     let disqualified = store.disqualify_team(Actor::Organiser, team, "a test", now);
                     disqualified.await.unwrap();
                     report(format!("disqualified {team}"));
                     let reinstated = store.reinstate_team(Actor::Organiser, team, "done", now);
                     reinstated.await.unwrap();
-                    let voided = store.void_evaluation(Actor::Organiser, evaluation, "why", now);
+                    let voided = store.void_evaluation(Actor::Organiser, evaluation, "a test", now);
                     voided.await.unwrap();
                     report(format!("voided {evaluation}"));
                     let rerun = store.rerun_evaluation(Actor::Organiser, evaluation, now);
                     report(format!("evaluation {}", rerun.await.unwrap().id));
-                    organise(&store, stage, played.stage_day, now, &report).await;
+                    change_boards_and_days(&store, stage, scored.stage_day, now, &report).await;
                 }
             }
         }
-        if clears {
+        if removes_files {
             remove_files(&store, stage, team.id, now, &report).await;
         }
     }
 }
 
-/// The organiser's operations on boards and days.
-async fn organise(
+/// Does the organiser's operations on boards and days.
+async fn change_boards_and_days(
     store: &Store,
     stage: StageId,
-    of: StageDay,
+    stage_day: StageDay,
     now: jiff::Timestamp,
     report: &impl Fn(String),
 ) {
-    // A killed process may have left them frozen.
+    // A killed process may have left the boards frozen.
     if store.board_freeze(stage).await.unwrap().is_none() {
-        let frozen = store.freeze_boards(Actor::Organiser, stage, "why", now);
+        let frozen = store.freeze_boards(Actor::Organiser, stage, "a test", now);
         frozen.await.unwrap();
     }
     let unfrozen = store.unfreeze_boards(Actor::Organiser, stage, now);
     unfrozen.await.unwrap();
-    let trial = store.propose_trial(Actor::Organiser, stage, None, "why", now);
+    let trial = store.propose_trial(Actor::Organiser, stage, None, "a test", now);
     let trial = trial.await.unwrap().id;
     report(format!("proposal {trial}"));
     store
@@ -205,14 +219,17 @@ async fn organise(
         .await
         .unwrap();
     report(format!("dropped {trial}"));
-    // The day before, if it was missed. Not repeated for a missed day.
+    // Starts the day before, if it was missed, once in a folder.
     if !store.missed_days().await.unwrap().is_empty() {
         return;
     }
-    let date = of.date.checked_sub(jiff::Span::new().days(1)).unwrap();
-    let missed = StageDay { date, ..of };
+    let date = stage_day
+        .date
+        .checked_sub(jiff::Span::new().days(1))
+        .unwrap();
+    let missed = StageDay { date, ..stage_day };
     match store
-        .start_missed_day(Actor::Organiser, missed, "why", now)
+        .start_missed_day(Actor::Organiser, missed, "a test", now)
         .await
     {
         Ok(started) => {
@@ -254,10 +271,10 @@ async fn remove_files(
     }
     // The second submission replaces the first as the active one.
     let quota = UploadQuota::default();
-    let mut uploaded = Vec::new();
+    let mut submissions = Vec::new();
     for _ in 0..2 {
         let upload = store.create_submission(Actor::Organiser, team, bundle(), &quota, now);
-        uploaded.push(upload.await.unwrap().id);
+        submissions.push(upload.await.unwrap().id);
     }
     while let Some(ClaimedJob { claim, job }) = store.claim("child", LEASE_S, now).await.unwrap() {
         let Job::Validation { .. } = job else {
@@ -271,9 +288,9 @@ async fn remove_files(
         };
         store.commit_validation(&claim, outcome, now).await.unwrap();
     }
-    let first = uploaded[0];
+    let first = submissions[0];
     match store
-        .delete_submission(Actor::Organiser, first, "by an organiser: why", now)
+        .delete_submission(Actor::Organiser, first, "by an organiser: a test", now)
         .await
     {
         Ok(_) => report(format!("deleted {first}")),
@@ -281,12 +298,14 @@ async fn remove_files(
         Err(StoreError::Conflict(_)) => {}
         Err(error) => panic!("{error}"),
     }
-    let later = now + FILES_KEPT_FOR;
-    store.remove_files_of_removed(later).await.unwrap();
+    store
+        .remove_files_of_removed(now + FILES_KEPT_FOR)
+        .await
+        .unwrap();
 }
 
 /// Applies finished proposals, and then replaces a counting evaluation by an extra one.
-async fn apply_played(store: &Store, now: jiff::Timestamp, report: &impl Fn(String)) {
+async fn apply_finished_proposals(store: &Store, now: jiff::Timestamp, report: &impl Fn(String)) {
     for (proposal, evaluations) in open_proposals(store).await {
         if !evaluations
             .iter()
@@ -296,7 +315,7 @@ async fn apply_played(store: &Store, now: jiff::Timestamp, report: &impl Fn(Stri
         }
         match store.apply_proposal(Actor::Organiser, proposal, now).await {
             Ok(_) => report(format!("applied {proposal}")),
-            // A trial of a killed process.
+            // The proposal is a trial that a killed process has left.
             Err(StoreError::Conflict(_)) => {
                 let dropped = store.drop_proposal(Actor::Organiser, proposal, now);
                 dropped.await.unwrap();
@@ -305,8 +324,9 @@ async fn apply_played(store: &Store, now: jiff::Timestamp, report: &impl Fn(Stri
             Err(error) => panic!("{error}"),
         }
         let applied = store.evaluation(evaluations[0].id).await.unwrap();
-        let (of, team) = (applied.stage_day, applied.team);
-        let extra = store.add_extra_evaluation(Actor::Organiser, of, team, "why", true, now);
+        let (stage_day, team) = (applied.stage_day, applied.team);
+        let extra =
+            store.add_extra_evaluation(Actor::Organiser, stage_day, team, "a test", true, now);
         report(format!("evaluation {}", extra.await.unwrap().id));
     }
 }
@@ -324,9 +344,9 @@ async fn open_proposals(store: &Store) -> Vec<(ProposalId, Vec<ProposedEvaluatio
 
 /// Creates a stage of one hour without days, and signs it off.
 async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, report: &impl Fn(String)) {
-    let (rules, settings) = rules_and_settings(&small());
+    let (rules, settings) = rules_and_settings(&one_shard_plan());
     let hour = jiff::SignedDuration::from_hours(1);
-    let new = NewStage {
+    let stage = NewStage {
         name: name.parse().unwrap(),
         opens_at: now,
         closes_at: Some(now + hour),
@@ -334,22 +354,23 @@ async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, report: &impl
         rules,
         settings,
     };
-    let made = store
-        .create_stage(Actor::Organiser, new, now)
+    let created = store
+        .create_stage(Actor::Organiser, stage, now)
         .await
         .unwrap();
-    let signed = store.sign_off_stage(Actor::Organiser, made.id, now + hour);
-    report(format!("finalised {}", signed.await.unwrap().id));
+    let signed_off = store.sign_off_stage(Actor::Organiser, created.id, now + hour);
+    report(format!("finalised {}", signed_off.await.unwrap().id));
 }
 
 #[tokio::test]
 async fn store_survives_kill_9() {
-    survive(&[1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30], false).await;
+    // The numbers are chosen such that the kills interrupt different operations.
+    survive_kills(&[1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30], false).await;
 }
 
 #[tokio::test]
 async fn organiser_operations_survive_kill_9() {
-    let acknowledged = survive(&[60, 31, 47, 80], false).await;
+    let acknowledged = survive_kills(&[60, 31, 47, 80], false).await;
     for operation in ["disqualified", "voided", "proposal", "dropped", "applied"] {
         let is_reported = |write: &String| write.starts_with(operation);
         assert!(
@@ -363,8 +384,8 @@ async fn organiser_operations_survive_kill_9() {
 async fn file_removal_survives_kill_9() {
     let mut acknowledged = HashSet::new();
     // The first rounds in a folder are short: these kills interrupt the file removal.
-    for first in [13, 14, 37, 38, 67] {
-        acknowledged.extend(survive(&[first, 25], true).await);
+    for first_kill in [13, 14, 37, 38, 67] {
+        acknowledged.extend(survive_kills(&[first_kill, 25], true).await);
     }
     for operation in ["keeps", "removed", "deleted"] {
         let is_reported = |write: &String| write.starts_with(operation);
@@ -376,14 +397,14 @@ async fn file_removal_survives_kill_9() {
 }
 
 /// Runs processes on the same folder and kills each after the given number of lines. Returns all reported writes.
-async fn survive(kill_after_lines: &[usize], clears: bool) -> HashSet<String> {
+async fn survive_kills(kill_after_lines: &[usize], removes_files: bool) -> HashSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let mut acknowledged = HashSet::new();
-    // the child continues to write when it is killed, each time at another point
+    // The child process writes when it is killed, each time at another point.
     for line_count in kill_after_lines.iter().copied() {
         let mut command = Command::new(std::env::current_exe().unwrap());
-        if clears {
-            command.env(CLEARS, "1");
+        if removes_files {
+            command.env(REMOVES_FILES_VARIABLE, "1");
         }
         let mut child = command
             .args([
@@ -392,7 +413,7 @@ async fn survive(kill_after_lines: &[usize], clears: bool) -> HashSet<String> {
                 "--ignored",
                 "--nocapture",
             ])
-            .env(FOLDER, folder.path())
+            .env(FOLDER_VARIABLE, folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -424,19 +445,19 @@ async fn survive(kill_after_lines: &[usize], clears: bool) -> HashSet<String> {
                     .contains(&operation)
             })
         });
-        let seen: Vec<String> = reports.take(line_count).collect();
+        let reported: Vec<String> = reports.take(line_count).collect();
         child.kill().unwrap();
         child.wait().unwrap();
         assert_eq!(
-            seen.len(),
+            reported.len(),
             line_count,
             "the child ended before it was killed"
         );
-        acknowledged.extend(seen);
+        acknowledged.extend(reported);
 
         let store = Store::open(folder.path()).await.unwrap();
         check_consistency(folder.path(), &store).await;
-        let stored = stored(folder.path()).await;
+        let stored = stored_writes(folder.path()).await;
         for write in &acknowledged {
             assert!(
                 stored.contains(write),
@@ -448,7 +469,7 @@ async fn survive(kill_after_lines: &[usize], clears: bool) -> HashSet<String> {
 }
 
 /// The writes in the database, as the child reports them.
-async fn stored(folder: &Path) -> HashSet<String> {
+async fn stored_writes(folder: &Path) -> HashSet<String> {
     let mut connection = connect(folder).await;
     let rows: Vec<String> = sqlx::query_scalar(
         "SELECT 'team ' || id FROM teams
@@ -492,7 +513,8 @@ async fn check_consistency(folder: &Path, store: &Store) {
         .await
         .unwrap();
     assert!(orphans.is_empty());
-    let rules = [
+    // Each query counts breaches of an invariant.
+    let breaches = [
         ("a submission without its validation run",
          "SELECT COUNT(*) FROM submissions s WHERE NOT EXISTS
               (SELECT 1 FROM validation_runs r JOIN jobs j ON j.id = r.job_id WHERE r.submission_id = s.id)"),
@@ -571,7 +593,7 @@ async fn check_consistency(folder: &Path, store: &Store) {
                - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_uploaded', 'evaluation_queued', 'evaluation_applied',
                                                              'shard_committed', 'evaluation_finished'))"),
     ];
-    for (breach, sql) in rules {
+    for (breach, sql) in breaches {
         let count: i64 = sqlx::query_scalar(sql)
             .fetch_one(&mut connection)
             .await
@@ -606,6 +628,9 @@ async fn check_consistency(folder: &Path, store: &Store) {
             .read(&format!("{recording}/steps"))
             .await
             .unwrap();
-        assert_eq!(bytes, 300_000, "a committed shard's recording is complete");
+        assert_eq!(
+            bytes, ARTIFACT_BYTES as u64,
+            "a committed shard's recording is complete"
+        );
     }
 }

@@ -1,5 +1,10 @@
 //! A data folder of the version before runs and events: rows in every state are migrated, read through
 //! the store, and processed to the end.
+//!
+//! All ids are made from numbers, by [`id`]: a team and its submission have the same number, from 1. An evaluation has the
+//! number of its team × 100, its six shards and their jobs have the next numbers, and its scoring job has its number + 50. An
+//! ablation has the number of its team × 1000. A validation run's job has the number of its team + 900, and the nonce (unique
+//! number) of a job's lease has the job's number + 50000.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -14,14 +19,15 @@ use std::{path::Path, str::FromStr};
 use uuid::Uuid;
 
 /// Migrations of the old program.
-const OLD: [&str; 4] = [
+const OLD_MIGRATIONS: [&str; 4] = [
     "0001_competition.sql",
     "0002_summaries.sql",
     "0003_season_close.sql",
     "0004_ablations.sql",
 ];
-/// 2026-03-01 08:00 UTC.
-const MORNING: i64 = 1_772_352_000_000;
+/// Time of all changes by the old program: 2026-03-01 08:00 UTC, in milliseconds.
+const MORNING_MS: i64 = 1_772_352_000_000;
+/// Secret of the old season.
 const SECRET: [u8; 32] = [5; 32];
 
 fn id<Id: From<Uuid>>(number: u32) -> Id {
@@ -30,31 +36,47 @@ fn id<Id: From<Uuid>>(number: u32) -> Id {
         .into()
 }
 
-fn text(number: u32) -> String {
+fn id_text(number: u32) -> String {
     id::<Uuid>(number).to_string()
 }
 
-/// Writes an old database, row by row.
-struct Old {
+/// Writes a database of the old program, row by row.
+struct OldDatabase {
     connection: SqliteConnection,
 }
 
-/// A job in one of its states; the old program called it a work unit.
+/// State of a job, which the old program called a work unit.
 #[derive(Clone, Copy)]
-enum Unit {
+enum OldJob {
     Queued,
-    /// With this many attempts, failures and episodes.
-    Leased(u32, u32, u32),
-    Done(u32),
+    Leased {
+        attempts: u32,
+        failures: u32,
+        episodes_done: u32,
+    },
+    Done {
+        episodes_done: u32,
+    },
     Dropped,
 }
 
-impl Old {
+impl OldJob {
+    /// A leased job of a worker's first attempt.
+    const fn leased(episodes_done: u32) -> Self {
+        Self::Leased {
+            attempts: 1,
+            failures: 0,
+            episodes_done,
+        }
+    }
+}
+
+impl OldDatabase {
     async fn new(folder: &Path) -> Self {
-        let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
-        let old = tempfile::tempdir().unwrap();
-        for name in OLD {
-            std::fs::copy(all.join(name), old.path().join(name)).unwrap();
+        let migrations = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
+        let old_migrations = tempfile::tempdir().unwrap();
+        for name in OLD_MIGRATIONS {
+            std::fs::copy(migrations.join(name), old_migrations.path().join(name)).unwrap();
         }
         let options = SqliteConnectOptions::new()
             .filename(folder.join("faceoff.sqlite3"))
@@ -62,18 +84,18 @@ impl Old {
             .foreign_keys(true)
             .journal_mode(SqliteJournalMode::Wal);
         let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
-        let migrations = Migrator::new(old.path()).await.unwrap();
-        migrations.run(&mut connection).await.unwrap();
+        let migrator = Migrator::new(old_migrations.path()).await.unwrap();
+        migrator.run(&mut connection).await.unwrap();
         sqlx::query("INSERT INTO season VALUES (1, 'Old season', ?, ?, '2026-03-01', NULL)")
             .bind(&SECRET[..])
-            .bind(MORNING)
+            .bind(MORNING_MS)
             .execute(&mut connection)
             .await
             .unwrap();
         Self { connection }
     }
 
-    async fn run(&mut self, sql: String) {
+    async fn execute(&mut self, sql: String) {
         let executed = sqlx::raw_sql(sqlx::AssertSqlSafe(sql.clone()))
             .execute(&mut self.connection)
             .await;
@@ -82,11 +104,11 @@ impl Old {
         }
     }
 
-    /// A team with a submission of the same number.
-    async fn team(&mut self, number: u32, state: &str, validation: Unit) {
+    /// Inserts a team and its submission in this state, with the job of its validation run.
+    async fn insert_team(&mut self, number: u32, state: &str, validation: OldJob) {
         let hash = blake3::hash(&number.to_le_bytes()).to_hex();
-        let (id, now) = (text(number), MORNING);
-        self.run(format!(
+        let (id, now) = (id_text(number), MORNING_MS);
+        self.execute(format!(
             "INSERT INTO teams VALUES ('{id}', 'Team {number:02}', x'{hash}', {now})"
         ))
         .await;
@@ -96,13 +118,13 @@ impl Old {
             "invalid" => ("'striker'", "'no answer'", "'oops'"),
             _ => ("NULL", "'no cgroup'", "NULL"),
         };
-        self.run(format!(
+        self.execute(format!(
             "INSERT INTO submissions VALUES ('{id}', '{id}', 'bundles/abc', 3, '{}', 'agent.tar.gz',
                                              {now}, {name}, '{state}', {reason}, {log})",
             bundle().blake3
         ))
         .await;
-        self.unit(
+        self.insert_job(
             "smoke",
             validation,
             number,
@@ -113,37 +135,42 @@ impl Old {
         .await;
     }
 
-    async fn unit(
+    /// Inserts a job. `column` is the column that refers to its subject, and `value` is the reference.
+    async fn insert_job(
         &mut self,
         kind: &str,
-        unit: Unit,
+        job: OldJob,
         submission: u32,
         column: &str,
         value: &str,
         number: u32,
     ) {
-        let nonce = text(number + 50_000);
-        let (state, attempts, failures, worker, nonce, episodes) = match unit {
-            Unit::Queued => ("queued", 0, 0, "NULL".into(), "NULL".into(), 0),
-            Unit::Leased(attempts, failures, episodes) => (
+        let nonce = id_text(number + 50_000);
+        let (state, attempts, failures, worker, nonce, episodes_done) = match job {
+            OldJob::Queued => ("queued", 0, 0, "NULL".into(), "NULL".into(), 0),
+            OldJob::Leased {
+                attempts,
+                failures,
+                episodes_done,
+            } => (
                 "leased",
                 attempts,
                 failures,
                 "'old/slot-0'".to_owned(),
                 format!("'{nonce}'"),
-                episodes,
+                episodes_done,
             ),
-            Unit::Done(episodes) => (
+            OldJob::Done { episodes_done } => (
                 "done",
                 1,
                 0,
                 "'old/slot-0'".to_owned(),
                 format!("'{nonce}'"),
-                episodes,
+                episodes_done,
             ),
-            Unit::Dropped => ("dropped", 1, 0, "NULL".into(), "NULL".into(), 0),
+            OldJob::Dropped => ("dropped", 1, 0, "NULL".into(), "NULL".into(), 0),
         };
-        let claimable_at = MORNING + 3_600_000;
+        let claimable_at = MORNING_MS + 3_600_000;
         let columns = match column {
             "submission_id" => String::new(),
             column => format!(", {column}"),
@@ -152,38 +179,38 @@ impl Old {
             "submission_id" => String::new(),
             _ => format!(", {value}"),
         };
-        self.run(format!(
+        self.execute(format!(
             "INSERT INTO work_units (id, kind, submission_id, state, claimable_at, attempts, failures,
                                      worker, nonce, episodes_done{columns})
              VALUES ('{}', '{kind}', '{}', '{state}', {claimable_at}, {attempts}, {failures}, {worker},
-                     {nonce}, {episodes}{values})",
-            text(number),
-            text(submission),
+                     {nonce}, {episodes_done}{values})",
+            id_text(number),
+            id_text(submission),
         ))
         .await;
     }
 
-    /// Evaluation `number` (a multiple of 100, followed by its shards) with the plan of six shards, of team
-    /// `number / 100`. The first shards are committed, with the numbers of faults in `committed`.
-    async fn evaluation(
+    /// Inserts an evaluation with six shards. `end_values` are the values of the columns that describe its end. The first shards
+    /// are committed, with the numbers of faults in `committed_faults`; the jobs of the others are in the state `open`.
+    async fn insert_evaluation(
         &mut self,
         number: u32,
         day: &str,
         state: &str,
-        ends: &str,
-        committed: &[u32],
-        open: Unit,
+        end_values: &str,
+        committed_faults: &[u32],
+        open: OldJob,
     ) {
         let team = number / 100;
-        self.run(format!(
+        self.execute(format!(
             r#"INSERT INTO evaluations (id, submission_id, team_id, day, profile, tasks, episodes_per_task,
                                        episodes_per_shard, max_faults, created_at, state, finished_at,
                                        result, dataset, faults, log, reason)
                VALUES ('{}', '{}', '{}', '{day}', 'evaluation', '["prepare","hit","defend"]', 4, 2, 3,
-                       {MORNING}, '{state}', {ends})"#,
-            text(number),
-            text(team),
-            text(team),
+                       {MORNING_MS}, '{state}', {end_values})"#,
+            id_text(number),
+            id_text(team),
+            id_text(team),
         ))
         .await;
         let ranges = Task::ALL
@@ -197,46 +224,46 @@ impl Old {
                 end_episode: first + 2,
                 recording: None,
             };
-            let (columns, unit) = match committed.get(position as usize) {
+            let (values, job) = match committed_faults.get(position as usize) {
                 Some(faults) => {
-                    let played = commit(&shard, *faults);
-                    let columns = format!(
-                        "{MORNING}, '{}', '{}', {faults}, '{}'",
+                    let played = shard_commit(&shard, *faults);
+                    let values = format!(
+                        "{MORNING_MS}, '{}', '{}', {faults}, '{}'",
                         old_recording(number, position),
                         serde_json::to_string(&played.outcomes).unwrap(),
                         played.log
                     );
-                    (columns, Unit::Done(2))
+                    (values, OldJob::Done { episodes_done: 2 })
                 }
                 None => ("NULL, NULL, NULL, NULL, NULL".to_owned(), open),
             };
-            self.run(format!(
+            self.execute(format!(
                 "INSERT INTO shards VALUES ('{0}', '{1}', {position}, '{task}', {first}, {first} + 2,
-                                            {columns})",
+                                            {values})",
                 shard.id,
-                text(number)
+                id_text(number)
             ))
             .await;
-            let (id, value) = (number + 1 + position, format!("'{}'", shard.id));
-            let with_shard = format!("'{}', {value}", text(number));
-            self.unit(
+            let references = format!("'{}', '{}'", id_text(number), shard.id);
+            self.insert_job(
                 "shard",
-                unit,
+                job,
                 team,
                 "evaluation_id, shard_id",
-                &with_shard,
-                id,
+                &references,
+                number + 1 + position,
             )
             .await;
         }
     }
 
-    async fn scoring(&mut self, evaluation: u32, unit: Unit) {
-        let value = format!("'{}'", text(evaluation));
+    /// Inserts the scoring job of an evaluation.
+    async fn insert_scoring(&mut self, evaluation: u32, job: OldJob) {
+        let value = format!("'{}'", id_text(evaluation));
         let team = evaluation / 100;
-        self.unit(
+        self.insert_job(
             "finalise",
-            unit,
+            job,
             team,
             "evaluation_id",
             &value,
@@ -245,181 +272,224 @@ impl Old {
         .await;
     }
 
-    /// Ablation `number` (a multiple of 1000, followed by its runs) of team `number / 1000`. The first runs
-    /// have the jobs `first`, the others `rest`. Jobs that are done have outcomes, unless `stopped`.
-    async fn ablation(
+    /// Inserts an ablation: a run for each profile and task. Its first runs have the jobs `first`, the others `rest`. Jobs that
+    /// are done have outcomes, unless the ablation was stopped (`is_stopped`) by an agent fault.
+    async fn insert_ablation(
         &mut self,
         number: u32,
-        ends: &str,
-        first: &[Unit],
-        rest: Unit,
-        stopped: bool,
+        end_values: &str,
+        first: &[OldJob],
+        rest: OldJob,
+        is_stopped: bool,
     ) {
         let team = number / 1000;
-        let created_at = MORNING + i64::from(number);
-        self.run(format!(
-            "INSERT INTO ablations VALUES ('{}', '{}', 2, 1, {created_at}, {ends})",
-            text(number),
-            text(team)
+        let created_at = MORNING_MS + i64::from(number);
+        self.execute(format!(
+            "INSERT INTO ablations VALUES ('{}', '{}', 2, 1, {created_at}, {end_values})",
+            id_text(number),
+            id_text(team)
         ))
         .await;
         let runs = Profile::ABLATION
             .into_iter()
             .flat_map(|profile| Task::ALL.map(|task| (profile, task)));
         for (index, (profile, task)) in (0_u32..).zip(runs) {
-            let unit = first.get(index as usize).copied().unwrap_or(rest);
-            let outcomes = match unit {
-                Unit::Done(_) if !stopped => {
+            let job = first.get(index as usize).copied().unwrap_or(rest);
+            let outcomes = match job {
+                OldJob::Done { .. } if !is_stopped => {
                     let outcomes = [outcome(task, 0, true), outcome(task, 1, false)];
                     format!("'{}'", serde_json::to_string(&outcomes).unwrap())
                 }
                 _ => "NULL".to_owned(),
             };
             let run = number + 1 + index;
-            self.run(format!(
+            self.execute(format!(
                 "INSERT INTO ablation_runs VALUES ('{}', '{}', '{profile}', '{task}', {outcomes})",
-                text(run),
-                text(number)
+                id_text(run),
+                id_text(number)
             ))
             .await;
-            let value = format!("'{}'", text(run));
-            self.unit("ablation", unit, team, "ablation_run_id", &value, run + 100)
+            let value = format!("'{}'", id_text(run));
+            self.insert_job("ablation", job, team, "ablation_run_id", &value, run + 100)
                 .await;
         }
     }
 }
 
 fn old_recording(evaluation: u32, position: u32) -> String {
-    format!("recordings/{}/x/{position}", text(evaluation))
+    format!("recordings/{}/x/{position}", id_text(evaluation))
 }
 
-const OPEN_ENDS: &str = "NULL, NULL, NULL, NULL, NULL, NULL";
+/// Values of the columns that describe an evaluation's end (finished_at to reason), while it is open.
+const OPEN_END_VALUES: &str = "NULL, NULL, NULL, NULL, NULL, NULL";
 
 /// A folder of the old program with teams, submissions, evaluations and ablations in all states.
 async fn old_folder(folder: &Path) {
-    let mut old = Old::new(folder).await;
-    let done = Unit::Done(0);
-    old.team(1, "validating", Unit::Queued).await;
-    old.team(2, "validating", Unit::Leased(2, 1, 0)).await;
-    old.team(3, "invalid", done).await;
-    old.team(4, "validation_error", Unit::Dropped).await;
-    for team in 11..=18 {
-        old.team(team, "valid", done).await;
-    }
-    old.evaluation(1100, "2026-03-01", "queued", OPEN_ENDS, &[], Unit::Queued)
+    let mut old = OldDatabase::new(folder).await;
+    let done = OldJob::Done { episodes_done: 0 };
+    old.insert_team(1, "validating", OldJob::Queued).await;
+    old.insert_team(
+        2,
+        "validating",
+        OldJob::Leased {
+            attempts: 2,
+            failures: 1,
+            episodes_done: 0,
+        },
+    )
+    .await;
+    old.insert_team(3, "invalid", done).await;
+    old.insert_team(4, "validation_error", OldJob::Dropped)
         .await;
-    old.evaluation(
+    for team in 11..=18 {
+        old.insert_team(team, "valid", done).await;
+    }
+    old.insert_evaluation(
+        1100,
+        "2026-03-01",
+        "queued",
+        OPEN_END_VALUES,
+        &[],
+        OldJob::Queued,
+    )
+    .await;
+    old.insert_evaluation(
         1200,
         "2026-03-01",
         "running",
-        OPEN_ENDS,
+        OPEN_END_VALUES,
         &[1],
-        Unit::Leased(3, 2, 1),
+        OldJob::Leased {
+            attempts: 3,
+            failures: 2,
+            episodes_done: 1,
+        },
     )
     .await;
-    old.evaluation(
+    old.insert_evaluation(
         1300,
         "2026-03-01",
         "finalising",
-        OPEN_ENDS,
+        OPEN_END_VALUES,
         &[0; 6],
-        Unit::Queued,
+        OldJob::Queued,
     )
     .await;
-    old.scoring(1300, Unit::Leased(1, 0, 0)).await;
+    old.insert_scoring(1300, OldJob::leased(0)).await;
     let scored = serde_json::to_string(&result(42.0)).unwrap();
-    let ends = format!("{MORNING}, '{scored}', 'datasets/old.zip', NULL, NULL, NULL");
-    old.evaluation(1400, "2026-02-28", "finished", &ends, &[0; 6], Unit::Queued)
-        .await;
-    old.scoring(1400, done).await;
-    old.run(format!(
+    let end_values = format!("{MORNING_MS}, '{scored}', 'datasets/old.zip', NULL, NULL, NULL");
+    old.insert_evaluation(
+        1400,
+        "2026-02-28",
+        "finished",
+        &end_values,
+        &[0; 6],
+        OldJob::Queued,
+    )
+    .await;
+    old.insert_scoring(1400, done).await;
+    old.execute(format!(
         "INSERT INTO episode_summaries VALUES ('{}', 7, '{{\"old\":1}}')",
-        text(1400)
+        id_text(1400)
     ))
     .await;
-    let ends = format!("{MORNING}, NULL, NULL, '[]', 'as stored', NULL");
-    old.evaluation(
+    let end_values = format!("{MORNING_MS}, NULL, NULL, '[]', 'as stored', NULL");
+    old.insert_evaluation(
         1500,
         "2026-03-01",
         "agent_failed",
-        &ends,
+        &end_values,
         &[2, 2],
-        Unit::Dropped,
+        OldJob::Dropped,
     )
     .await;
-    let ends = format!("{MORNING}, NULL, NULL, NULL, NULL, 'disk full'");
-    old.evaluation(
+    let end_values = format!("{MORNING_MS}, NULL, NULL, NULL, NULL, 'disk full'");
+    old.insert_evaluation(
         1600,
         "2026-03-01",
         "platform_failed",
-        &ends,
+        &end_values,
         &[0],
-        Unit::Dropped,
+        OldJob::Dropped,
     )
     .await;
-    let ends = format!("{MORNING}, NULL, NULL, NULL, NULL, 'rain'");
-    old.evaluation(
+    let end_values = format!("{MORNING_MS}, NULL, NULL, NULL, NULL, 'rain'");
+    old.insert_evaluation(
         1700,
         "2026-03-01",
         "cancelled",
-        &ends,
+        &end_values,
         &[0; 6],
-        Unit::Queued,
+        OldJob::Queued,
     )
     .await;
-    old.scoring(1700, Unit::Dropped).await;
-    // ablations: open, finished, ended by an agent fault, ended by a platform fault
-    let first = [Unit::Done(2), Unit::Leased(1, 0, 1)];
-    old.ablation(11_000, "NULL, NULL", &first, Unit::Queued, false)
+    old.insert_scoring(1700, OldJob::Dropped).await;
+    // Ablations: open, finished, ended by an agent fault, and ended by a platform fault.
+    let first = [OldJob::Done { episodes_done: 2 }, OldJob::leased(1)];
+    old.insert_ablation(11_000, "NULL, NULL", &first, OldJob::Queued, false)
         .await;
-    let ended = format!("{MORNING} + 9000, NULL");
-    old.ablation(12_000, &ended, &[], Unit::Done(2), false)
+    let end_values = format!("{MORNING_MS} + 9000, NULL");
+    old.insert_ablation(
+        12_000,
+        &end_values,
+        &[],
+        OldJob::Done { episodes_done: 2 },
+        false,
+    )
+    .await;
+    let end_values = format!("{MORNING_MS} + 9000, 'too many faults'");
+    old.insert_ablation(
+        13_000,
+        &end_values,
+        &[OldJob::Done { episodes_done: 2 }],
+        OldJob::Dropped,
+        true,
+    )
+    .await;
+    let end_values = format!("{MORNING_MS} + 9000, 'disk full'");
+    old.insert_ablation(14_000, &end_values, &[], OldJob::Dropped, false)
         .await;
-    let ended = format!("{MORNING} + 9000, 'too many faults'");
-    old.ablation(13_000, &ended, &[Unit::Done(2)], Unit::Dropped, true)
-        .await;
-    let ended = format!("{MORNING} + 9000, 'disk full'");
-    old.ablation(14_000, &ended, &[], Unit::Dropped, false)
-        .await;
-    old.run(format!(
-        "INSERT INTO released_days VALUES ('2026-02-28', {MORNING})"
+    old.execute(format!(
+        "INSERT INTO released_days VALUES ('2026-02-28', {MORNING_MS})"
     ))
     .await;
-    let counts: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM work_units")
+    let job_count: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM work_units")
         .fetch_one(&mut old.connection)
         .await
         .unwrap();
-    assert_eq!(counts, 12 + 7 * 6 + 3 + 4 * 18);
+    // Jobs of 12 validation runs, of the shards of 7 evaluations, of 3 scorings, and of the runs of 4 ablations.
+    assert_eq!(job_count, 12 + 7 * 6 + 3 + 4 * 18);
     old.connection.close().await.unwrap();
 }
 
-async fn migrated() -> TestStore {
+/// The migrated store, half an hour after the old program's last change.
+async fn migrated_store() -> TestStore {
     let folder = tempfile::tempdir().unwrap();
     old_folder(folder.path()).await;
     let store = Store::open(folder.path()).await.unwrap();
     TestStore {
         store,
         folder,
-        // leases of the old program last for another hour
+        // Leases of the old program are valid for another half hour.
         now: "2026-03-01T08:30:00Z".parse().unwrap(),
     }
 }
 
 #[tokio::test]
 async fn migration_keeps_all_old_rows() {
-    let f = migrated().await;
+    let f = migrated_store().await;
     let submission = async |number| f.store.submission(id(number)).await.unwrap();
     assert_eq!(submission(1).await.state, SubmissionState::Validating);
     // The teams' tokens are valid.
     let token = *blake3::hash(&11_u32.to_le_bytes()).as_bytes();
-    let holder = f
+    let verified = f
         .store
         .verify_token(token, TokenKind::ApiToken, f.now)
         .await
         .unwrap();
     let team = f.store.team(id(11)).await.unwrap();
     assert_eq!(
-        holder.map(|holder| holder.principal),
+        verified.map(|token| token.principal),
         Ok(Principal::Team(team))
     );
     let reason = "no answer".to_owned();
@@ -434,12 +504,13 @@ async fn migration_keeps_all_old_rows() {
     assert_eq!(submission(4).await.state, error);
     assert_eq!(submission(11).await.state, SubmissionState::Valid);
 
-    let finished_at = jiff::Timestamp::from_millisecond(MORNING).unwrap();
+    let finished_at = jiff::Timestamp::from_millisecond(MORNING_MS).unwrap();
     let expected = [
         (1100, EvaluationState::Queued),
         (
             1200,
             EvaluationState::Running {
+                // Two of the committed shard, and one of each of the five leased shards.
                 episodes_done: 2 + 5,
                 episodes_total: 12,
             },
@@ -473,9 +544,13 @@ async fn migration_keeps_all_old_rows() {
     for (number, state) in expected {
         let evaluation = f.store.evaluation(id(number)).await.unwrap();
         assert_eq!(evaluation.state, state, "{number}");
-        assert_eq!(evaluation.plan, plan());
-        let day = if number == 1400 { (2, 28) } else { (3, 1) };
-        assert_eq!(evaluation.stage_day.date, date(2026, day.0, day.1));
+        assert_eq!(evaluation.plan, six_shard_plan());
+        let expected_date = if number == 1400 {
+            date(2026, 2, 28)
+        } else {
+            date(2026, 3, 1)
+        };
+        assert_eq!(evaluation.stage_day.date, expected_date);
         assert_eq!(f.store.shards(evaluation.run).await.unwrap().len(), 6);
     }
     let run = f.store.evaluation(id(1400)).await.unwrap().run;
@@ -486,7 +561,7 @@ async fn migration_keeps_all_old_rows() {
     assert_eq!(summaries[&run], "{\"old\":1}");
     let board = f.board().await;
     assert_eq!((board.len(), board[0].evaluation), (1, id(1400)));
-    // faults and log are those of the shards, which are kept
+    // The evaluation's faults and log are those of its shards, which are kept.
     let failed = f.store.evaluation(id(1500)).await.unwrap();
     let RunFaults { faults, log } = f.store.run_faults(failed.run).await.unwrap();
     assert_eq!(faults.len(), 4);
@@ -495,8 +570,8 @@ async fn migration_keeps_all_old_rows() {
         "{log}"
     );
 
-    let days = [date(2026, 2, 28), date(2026, 3, 1)];
-    // each day starts with its first evaluation; one is released, the other has three open evaluations
+    let dates = [date(2026, 2, 28), date(2026, 3, 1)];
+    // A day's cutoff is the time of its first evaluation. The first day is released; the second has three open evaluations.
     let stage = f.store.stages().await.unwrap().remove(0).id;
     let day = |date, released_at| Day {
         stage_day: StageDay { stage, date },
@@ -507,13 +582,16 @@ async fn migration_keeps_all_old_rows() {
     assert_eq!(
         f.store.days().await.unwrap(),
         [
-            (day(days[1], None), 0),
-            (day(days[0], Some(finished_at)), 1)
+            (day(dates[1], None), 0),
+            (day(dates[0], Some(finished_at)), 1)
         ]
     );
     assert_eq!(f.store.season().await.unwrap().name, "Old season");
     for number in [11, 18] {
-        assert!(submission(number).await.active, "the newest valid one");
+        assert!(
+            submission(number).await.active,
+            "the newest valid submission is active"
+        );
     }
     assert!(!submission(3).await.active);
 }
@@ -526,7 +604,7 @@ async fn migration_creates_first_stage_with_revisions() {
     let url = format!("sqlite://{}", file.display());
     let mut connection = SqliteConnection::connect(&url).await.unwrap();
     sqlx::query("UPDATE evaluations SET profile = 'ideal' WHERE id = ?")
-        .bind(text(1400))
+        .bind(id_text(1400))
         .execute(&mut connection)
         .await
         .unwrap();
@@ -537,12 +615,15 @@ async fn migration_creates_first_stage_with_revisions() {
     assert_eq!(stage.name.as_str(), "Qualifying");
     assert_eq!((stage.names_seeds, stage.configured), (false, true));
     let revisions = store.stage_revisions(stage.id).await.unwrap();
-    let found: Vec<_> = revisions
+    let revisions: Vec<_> = revisions
         .iter()
-        .map(|one| (one.number, one.rules.profile, one.rules.ruleset))
+        .map(|revision| {
+            let rules = &revision.rules;
+            (revision.number, rules.profile, rules.ruleset)
+        })
         .collect();
     assert_eq!(
-        found,
+        revisions,
         [
             (1, Profile::Ideal, Ruleset::First),
             (2, Profile::Evaluation, Ruleset::First)
@@ -552,8 +633,8 @@ async fn migration_creates_first_stage_with_revisions() {
     assert_eq!((revision(1400).await, revision(1100).await), (1, 2));
     assert_eq!(store.board(stage.id, 1).await.unwrap().len(), 1);
 
-    // The same configuration as before, but with the ruleset of the new program.
-    let (rules, settings) = rules_and_settings(&plan());
+    // The configuration of before, but with the ruleset of the new program, which is a new revision.
+    let (rules, settings) = rules_and_settings(&six_shard_plan());
     let now = "2026-03-01T08:30:00Z".parse().unwrap();
     let configured = store.configure_stage(rules.clone(), settings, Zone::UTC, now);
     configured.await.unwrap();
@@ -563,9 +644,9 @@ async fn migration_creates_first_stage_with_revisions() {
 
 #[tokio::test]
 async fn migration_splits_old_ablations_into_runs() {
-    let f = migrated().await;
-    let newest = async |team| f.store.newest_ablation(id(team)).await.unwrap().unwrap();
-    let finished_at = jiff::Timestamp::from_millisecond(MORNING + 9000).unwrap();
+    let f = migrated_store().await;
+    let newest_ablation = async |team| f.store.newest_ablation(id(team)).await.unwrap().unwrap();
+    let finished_at = jiff::Timestamp::from_millisecond(MORNING_MS + 9000).unwrap();
     let expected = [
         (
             11,
@@ -591,28 +672,31 @@ async fn migration_splits_old_ablations_into_runs() {
         ),
     ];
     for (team, state) in expected {
-        let ablation = newest(team).await;
+        let ablation = newest_ablation(team).await;
         assert_eq!(ablation.id, id(1000 * team));
         assert_eq!(ablation.state, state);
         assert_eq!(ablation.episodes_per_task, 2);
         assert!(ablation.runs.keys().copied().eq(Profile::ABLATION));
     }
-    for run in newest(12).await.runs.into_values() {
+    for run in newest_ablation(12).await.runs.into_values() {
         let outcomes = f.store.outcomes(run).await.unwrap();
-        let played: Vec<_> = outcomes.iter().map(|o| (o.task, o.episode)).collect();
-        let all: Vec<_> = Task::ALL
-            .into_iter()
-            .flat_map(|t| [(t, 0), (t, 1)])
+        let played: Vec<_> = outcomes
+            .iter()
+            .map(|outcome| (outcome.task, outcome.episode))
             .collect();
-        assert_eq!(played, all);
+        let expected: Vec<_> = Task::ALL
+            .into_iter()
+            .flat_map(|task| [(task, 0), (task, 1)])
+            .collect();
+        assert_eq!(played, expected);
         assert_eq!(f.store.run_faults(run).await.unwrap().faults.len(), 3);
     }
 }
 
 #[tokio::test]
 async fn migration_keeps_leases_and_failure_counts() {
-    let mut f = migrated().await;
-    // the shard of the hit task from episode 2 on is leased, with two failures
+    let mut f = migrated_store().await;
+    // The second shard of evaluation 1200 is leased, with two failures.
     let claim = JobClaim {
         job: id(1202),
         nonce: id(51_202),
@@ -623,7 +707,12 @@ async fn migration_keeps_leases_and_failure_counts() {
     let run = f.store.evaluation(id(1200)).await.unwrap().run;
     assert_eq!(
         claim.recording_key(run),
-        format!("recordings/{}/{}/{}", text(1200), text(1202), text(51_202)),
+        format!(
+            "recordings/{}/{}/{}",
+            id_text(1200),
+            id_text(1202),
+            id_text(51_202)
+        ),
         "the key of the old program"
     );
     let shard = f.store.shards(run).await.unwrap().remove(1);
@@ -637,9 +726,10 @@ async fn migration_keeps_leases_and_failure_counts() {
         nonce: id(51_203),
         ..claim
     };
-    let failures = MAX_ATTEMPTS - 2;
-    for failure in 1..=failures {
-        let repeated = if failure == 1 {
+    // The third shard has two failures, too.
+    let failures_left = MAX_ATTEMPTS - 2;
+    for failure in 1..=failures_left {
+        let shard_claim = if failure == 1 {
             claim.clone()
         } else {
             loop {
@@ -650,10 +740,10 @@ async fn migration_keeps_leases_and_failure_counts() {
             }
         };
         f.store
-            .release_failed(&repeated, "no disk", f.now)
+            .release_failed(&shard_claim, "no disk", f.now)
             .await
             .unwrap();
-        f.later(60);
+        f.advance_clock_s(60);
     }
     assert!(matches!(
         f.state(id(1200)).await,
@@ -663,11 +753,11 @@ async fn migration_keeps_leases_and_failure_counts() {
 
 #[tokio::test]
 async fn migrated_queue_continues() {
-    let mut f = migrated().await;
+    let mut f = migrated_store().await;
     assert!(f.store.end_leases_of("old", f.now).await.unwrap() > 0);
-    f.later(3600);
+    f.advance_clock_s(3600);
     let secret = Seed::from_bytes(SECRET);
-    let (mut validations, mut shards, mut of_ablations) = (0, 0, 0);
+    let (mut validations, mut shards, mut ablation_shards) = (0, 0, 0);
     while let Some(ClaimedJob { claim, job }) = f.claim().await {
         match job {
             Job::Validation { submission, .. } => {
@@ -689,16 +779,16 @@ async fn migrated_queue_continues() {
                 seeds,
                 ..
             } => {
-                let mut played = commit(&shard, 0);
+                let mut played = shard_commit(&shard, 0);
                 match owner {
                     RunOwner::Evaluation(_) => {
                         shards += 1;
-                        assert_eq!(of_ablations, 0, "ablations wait");
+                        assert_eq!(ablation_shards, 0, "ablations run last");
                         assert_eq!(seeds.episodes, secret.day(date(2026, 3, 1)));
                     }
                     RunOwner::ProposedEvaluation { .. } => panic!("there were no proposals"),
                     RunOwner::Ablation(ablation) => {
-                        of_ablations += 1;
+                        ablation_shards += 1;
                         assert_eq!(ablation, id(11_000));
                         assert_eq!(seeds.episodes, secret.ablation());
                         assert_eq!(shard.end_episode, 2);
@@ -713,11 +803,11 @@ async fn migrated_queue_continues() {
             Job::Game { .. } => panic!("no game is queued"),
             Job::Scoring { recordings, .. } => {
                 assert_eq!(recordings.len(), 6);
-                f.finish(&claim, 1.0, "datasets/new.zip").await;
+                f.finish_scoring(&claim, 1.0, "datasets/new.zip").await;
             }
         }
     }
-    assert_eq!((validations, shards, of_ablations), (2, 6 + 5, 17));
+    assert_eq!((validations, shards, ablation_shards), (2, 6 + 5, 17));
     for number in [1100, 1200, 1300] {
         assert!(matches!(
             f.state(id(number)).await,
@@ -727,10 +817,10 @@ async fn migrated_queue_continues() {
     let ablation = f.store.newest_ablation(id(11)).await.unwrap().unwrap();
     assert!(matches!(ablation.state, AblationState::Finished { .. }));
     assert_eq!(f.board().await.len(), 4);
-    // the last evaluation released the day, whose cutoff has passed
+    // The last evaluation released the day, whose cutoff has passed.
     assert_eq!(
         f.store
-            .newest_day(f.stage(&plan()).await)
+            .newest_day(f.configure_stage(&six_shard_plan()).await)
             .await
             .unwrap()
             .unwrap()
@@ -739,7 +829,11 @@ async fn migrated_queue_continues() {
     );
     let repeated = f
         .store
-        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .start_day(
+            Actor::Organiser,
+            f.configure_stage(&six_shard_plan()).await,
+            f.now,
+        )
         .await;
     assert!(
         matches!(repeated, Err(StoreError::CutoffPassed { .. })),
@@ -747,14 +841,22 @@ async fn migrated_queue_continues() {
     );
     let rerun = f.store.rerun_evaluation(Actor::Organiser, id(1600), f.now);
     assert_eq!(rerun.await.unwrap().submission, id(16));
-    // old recordings are deleted a day after the end of their evaluation, like new ones
-    f.later(86_400);
+    // Old recordings are deleted a day after the end of their evaluation, like new ones.
+    f.advance_clock_s(86_400);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 7);
     let started = f
         .store
-        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .start_day(
+            Actor::Organiser,
+            f.configure_stage(&six_shard_plan()).await,
+            f.now,
+        )
         .await;
-    let teams: Vec<_> = started.unwrap().iter().map(|e| e.team).collect();
-    let valid: Vec<TeamId> = [1, 2, 11, 12, 13, 14, 15, 16, 17, 18].map(id).to_vec();
-    assert_eq!(teams, valid);
+    let teams: Vec<_> = started
+        .unwrap()
+        .iter()
+        .map(|evaluation| evaluation.team)
+        .collect();
+    let valid_teams: Vec<TeamId> = [1, 2, 11, 12, 13, 14, 15, 16, 17, 18].map(id).to_vec();
+    assert_eq!(teams, valid_teams);
 }

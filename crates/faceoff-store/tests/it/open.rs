@@ -1,3 +1,5 @@
+//! The opening of a store, and its behaviour when values in its database are damaged.
+
 use crate::fixture::*;
 use faceoff_store::*;
 use sqlx::Connection;
@@ -23,39 +25,48 @@ async fn concurrent_openers_agree_on_one_season() {
     }
     commitments.dedup();
     assert_eq!(commitments.len(), 1);
-    let another = TestStore::new().await.store.season().await.unwrap();
-    assert_ne!(another.commitment, commitments[0], "secrets are random");
+    let other_season = TestStore::new().await.store.season().await.unwrap();
+    assert_ne!(
+        other_season.commitment, commitments[0],
+        "secrets are random"
+    );
 }
 
 #[tokio::test]
 async fn reopened_store_has_all_data() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 1).await;
-    let (held, ..) = f.claim_shard().await;
-    let before = f.store.evaluation(evaluation.id).await.unwrap();
+    let (claim_before, ..) = f.claim_shard().await;
+    let evaluation_before = f.store.evaluation(evaluation.id).await.unwrap();
     let season = f.store.season().await.unwrap();
     f.store.close().await;
     let reopened = f.reopen().await;
-    assert_eq!(reopened.evaluation(evaluation.id).await.unwrap(), before);
+    assert_eq!(
+        reopened.evaluation(evaluation.id).await.unwrap(),
+        evaluation_before
+    );
     assert_eq!(
         reopened.submission(submission.id).await.unwrap(),
         submission
     );
     assert_eq!(reopened.season().await.unwrap().secret, season.secret);
     assert!(
-        reopened.heartbeat(&held, 1, LEASE_S, f.now).await.unwrap(),
-        "leases outlive the process"
+        reopened
+            .heartbeat(&claim_before, 1, LEASE_S, f.now)
+            .await
+            .unwrap(),
+        "leases stay valid in another process"
     );
 }
 
 /// Damages the database with a statement of another connection.
 async fn damage(f: &TestStore, sql: &'static str) {
     let mut connection = f.connection().await;
-    let unchecked = "PRAGMA foreign_keys = OFF";
-    sqlx::raw_sql(unchecked)
+    let without_checks = "PRAGMA foreign_keys = OFF";
+    sqlx::raw_sql(without_checks)
         .execute(&mut connection)
         .await
         .unwrap();
@@ -66,8 +77,8 @@ async fn damage(f: &TestStore, sql: &'static str) {
 #[tokio::test]
 async fn damaged_values_are_reported_without_panic() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let damages = [
         "UPDATE evaluations SET day = 'someday'",
         "UPDATE runs SET profile = 'dream'",
@@ -91,9 +102,9 @@ async fn damaged_values_are_reported_without_panic() {
 #[tokio::test]
 async fn damaged_job_does_not_block_others() {
     let f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await;
-    let beta = f.ready_team("Beta").await;
-    let sound = f.evaluate(beta.id, &plan()).await;
+    let alpha = f.valid_submission_of("Alpha").await;
+    let beta = f.valid_submission_of("Beta").await;
+    let undamaged = f.evaluate(beta.id, &six_shard_plan()).await;
     damage(
         &f,
         "UPDATE runs SET profile = 'dream' WHERE id = (SELECT run_id FROM contestants c
@@ -102,7 +113,7 @@ async fn damaged_job_does_not_block_others() {
     )
     .await;
     let (_, run, _) = f.claim_shard().await;
-    assert_eq!(run.id, sound.run);
+    assert_eq!(run.id, undamaged.run);
     damage(
         &f,
         "UPDATE runs SET profile = 'ideal' WHERE profile = 'dream'",
@@ -114,14 +125,14 @@ async fn damaged_job_does_not_block_others() {
         matches!(state, EvaluationState::PlatformFailed { .. }),
         "{state:?}"
     );
-    assert_eq!(evaluations.len(), 1, "it is not rerun");
+    assert_eq!(evaluations.len(), 1, "the evaluation is not rerun");
 }
 
 #[tokio::test]
-async fn incomplete_states_cannot_be_stored() {
+async fn rows_without_data_of_their_state_are_refused() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.evaluate(submission.id, &six_shard_plan()).await;
     let mut connection = f.connection().await;
     for sql in [
         "UPDATE evaluations SET state = 'finished', finished_at = 1, dataset = 'd'",

@@ -1,4 +1,5 @@
-//! Trials and proposed re-evaluations, which do not count unless they are applied.
+//! Proposals of organisers. A *trial* evaluates the active submissions outside of any day and never counts. A *re-evaluation*
+//! evaluates a day or an evaluation again; its results replace the earlier ones once the proposal is applied.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,23 +7,13 @@ use faceoff_types::*;
 
 const REASON: &str = "the camera was dirty";
 
-#[track_caller]
-fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
-    let Err(StoreError::Conflict(why)) = done else {
-        panic!("expected a conflict with {words:?}: {done:?}");
-    };
-    for word in words {
-        assert!(why.contains(word), "{word:?} is not in {why:?}");
-    }
-}
-
-async fn trial(f: &TestStore, stage: StageId) -> Result<Proposal, StoreError> {
+async fn propose_trial(f: &TestStore, stage: StageId) -> Result<Proposal, StoreError> {
     f.store
         .propose_trial(Actor::Organiser, stage, None, REASON, f.now)
         .await
 }
 
-async fn propose(f: &TestStore, scope: Reevaluation) -> Result<Proposal, StoreError> {
+async fn propose_reevaluation(f: &TestStore, scope: Reevaluation) -> Result<Proposal, StoreError> {
     f.store
         .propose_reevaluation(Actor::Organiser, scope, REASON, f.now)
         .await
@@ -36,11 +27,12 @@ async fn discard(f: &TestStore, id: ProposalId) -> Result<Proposal, StoreError> 
     f.store.drop_proposal(Actor::Organiser, id, f.now).await
 }
 
-async fn evaluations(f: &TestStore, id: ProposalId) -> Vec<ProposedEvaluation> {
+async fn proposed_evaluations(f: &TestStore, id: ProposalId) -> Vec<ProposedEvaluation> {
     f.store.proposal(id).await.unwrap().1
 }
 
-async fn rows(f: &TestStore) -> Vec<(String, f64)> {
+/// Teams and scores of the board.
+async fn board_rows(f: &TestStore) -> Vec<(String, f64)> {
     let board = f.board().await;
     let row = |row: &BoardRecord| (row.team.name.to_string(), row.result.score);
     board.iter().map(row).collect()
@@ -50,70 +42,83 @@ fn row(name: &str, score: f64) -> (String, f64) {
     (name.to_owned(), score)
 }
 
-/// Two teams, each with a result of 1.0 on a released day.
-async fn played_day(f: &TestStore) -> ([Submission; 2], StageDay) {
-    let agents = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
-    let of = f.evaluate(agents[0].id, &small()).await.stage_day;
-    f.run_all(1.0).await;
-    (agents, of)
+/// A released day with a result of 1.0 for each of two teams.
+async fn released_day(f: &TestStore) -> ([Submission; 2], StageDay) {
+    let submissions = [
+        f.valid_submission_of("Alpha").await,
+        f.valid_submission_of("Beta").await,
+    ];
+    let stage_day = f
+        .evaluate(submissions[0].id, &one_shard_plan())
+        .await
+        .stage_day;
+    f.run_all_with_score(1.0).await;
+    (submissions, stage_day)
 }
 
 #[tokio::test]
 async fn trial_runs_last_and_reaches_no_board() {
     let mut f = TestStore::new().await;
-    let agents = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
-    let stage = f.stage(&small()).await;
-    let tried = trial(&f, stage).await.unwrap();
-    assert_eq!((tried.kind, tried.outcome), (ProposalKind::Trial, None));
-    let states: Vec<_> = evaluations(&f, tried.id).await;
-    assert_eq!(states.len(), 2);
+    let submissions = [
+        f.valid_submission_of("Alpha").await,
+        f.valid_submission_of("Beta").await,
+    ];
+    let stage = f.configure_stage(&one_shard_plan()).await;
+    let trial = propose_trial(&f, stage).await.unwrap();
+    assert_eq!((trial.kind, trial.outcome), (ProposalKind::Trial, None));
+    let proposed = proposed_evaluations(&f, trial.id).await;
+    assert_eq!(proposed.len(), 2);
     assert!(
-        states
+        proposed
             .iter()
-            .all(|one| one.state == EvaluationState::Queued)
+            .all(|evaluation| evaluation.state == EvaluationState::Queued)
     );
     assert!(
         f.store.days().await.unwrap().is_empty(),
         "no day has started"
     );
     // The evaluations of the day run first.
-    let day = f.evaluate(agents[0].id, &small()).await;
+    let day = f.evaluate(submissions[0].id, &one_shard_plan()).await;
     for _ in 0..2 {
         let (claim, run, shard) = f.claim_shard().await;
         assert_eq!(run.seed, SeedLabel::StageDay(day.stage_day));
         f.commit_shard(&claim, &shard, 0).await;
         let (claim, _) = f.claim_scoring().await;
-        f.finish(&claim, 1.0, "d").await;
+        f.finish_scoring(&claim, 1.0, DATASET_KEY).await;
     }
     assert!(f.store.days().await.unwrap()[0].0.released_at.is_some());
     for score in [8.0, 9.0] {
         let (claim, run, shard) = f.claim_shard().await;
-        assert_eq!(run.seed, SeedLabel::Trial(tried.id), "episodes of its own");
+        assert_eq!(
+            run.seed,
+            SeedLabel::Trial(trial.id),
+            "the trial has its own episodes"
+        );
         f.commit_shard(&claim, &shard, 0).await;
         let (claim, _) = f.claim_scoring().await;
-        f.finish(&claim, score, "t").await;
+        f.finish_scoring(&claim, score, "t").await;
     }
     assert!(f.claim().await.is_none());
-    let scores: Vec<f64> = evaluations(&f, tried.id)
+    let scores: Vec<f64> = proposed_evaluations(&f, trial.id)
         .await
         .into_iter()
         .map(|evaluation| match evaluation.state {
             EvaluationState::Finished { result, .. } => result.score,
-            state => panic!("{state:?}"),
+            state => panic!("expected a finished evaluation, found {state:?}"),
         })
         .collect();
     assert_eq!(scores, [8.0, 9.0]);
-    assert_eq!(rows(&f).await, [row("Alpha", 1.0), row("Beta", 1.0)]);
-    for agent in &agents {
-        let own = f.store.evaluations_of(agent.team).await.unwrap();
-        assert_eq!(own.len(), 1, "the trial is not visible to its team");
+    assert_eq!(board_rows(&f).await, [row("Alpha", 1.0), row("Beta", 1.0)]);
+    for submission in &submissions {
+        let visible = f.store.evaluations_of(submission.team).await.unwrap();
+        assert_eq!(visible.len(), 1, "the trial is not visible to its team");
     }
-    refused(apply(&f, tried.id).await, &["cannot be applied"]);
-    discard(&f, tried.id).await.unwrap();
-    refused(discard(&f, tried.id).await, &["was dropped at"]);
-    // Its datasets and recordings are deleted a day later, like those of evaluations.
+    assert_conflict(apply(&f, trial.id).await, &["cannot be applied"]);
+    discard(&f, trial.id).await.unwrap();
+    assert_conflict(discard(&f, trial.id).await, &["was dropped at"]);
+    // The trial's datasets and recordings are deleted a day later, like those of evaluations.
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 0);
-    f.later(25 * 3600);
+    f.advance_clock_s(25 * 3600);
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 2);
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 0);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 4);
@@ -122,26 +127,29 @@ async fn trial_runs_last_and_reaches_no_board() {
 #[tokio::test]
 async fn impossible_trial_is_refused() {
     let mut f = TestStore::new().await;
-    let stage = f.stage(&small()).await;
-    refused(trial(&f, stage).await, &["no team has a valid submission"]);
-    let team = f.team("Alpha").await;
+    let stage = f.configure_stage(&one_shard_plan()).await;
+    assert_conflict(
+        propose_trial(&f, stage).await,
+        &["no team has a valid submission"],
+    );
+    let team = f.create_team("Alpha").await;
     let upload = f.upload(&team).await;
-    let one = f
+    let refused = f
         .store
         .propose_trial(Actor::Organiser, stage, Some(upload.id), REASON, f.now);
-    refused(one.await, &["valid"]);
+    assert_conflict(refused.await, &["valid"]);
     f.validate().await;
-    let one = f
+    let proposed = f
         .store
         .propose_trial(Actor::Organiser, stage, Some(upload.id), REASON, f.now);
-    let one = one.await.unwrap();
-    refused(
+    let proposed = proposed.await.unwrap();
+    assert_conflict(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["1", "trials"],
     );
-    // It is dropped while a shard runs, and the worker is notified.
+    // The trial is dropped while a worker runs its shard, and the worker's commit is refused.
     let (claim, _, shard) = f.claim_shard().await;
-    discard(&f, one.id).await.unwrap();
+    discard(&f, proposed.id).await.unwrap();
     assert_eq!(
         f.commit_shard(&claim, &shard, 0).await,
         CommitOutcome::LeaseLost
@@ -151,23 +159,25 @@ async fn impossible_trial_is_refused() {
         closes_at: Some(Some(f.now + jiff::SignedDuration::from_secs(1))),
         ..StageChange::default()
     };
-    let closing = f
+    let changed = f
         .store
         .change_stage(Actor::Organiser, stage, closing, f.now);
-    closing.await.unwrap();
-    f.later(1);
-    refused(trial(&f, stage).await, &["closed"]);
+    changed.await.unwrap();
+    f.advance_clock_s(1);
+    assert_conflict(propose_trial(&f, stage).await, &["closed"]);
     f.store.close_season(Actor::Organiser, f.now).await.unwrap();
 }
 
 #[tokio::test]
 async fn reevaluation_counts_only_once_applied() {
     let mut f = TestStore::new().await;
-    let (agents, of) = played_day(&f).await;
-    let first = f.store.evaluations_of_day(of).await.unwrap();
-    let proposed = propose(&f, Reevaluation::Day(of)).await.unwrap();
-    assert_eq!(proposed.kind, ProposalKind::Day(of.date));
-    refused(apply(&f, proposed.id).await, &["2 of its evaluations"]);
+    let (submissions, stage_day) = released_day(&f).await;
+    let originals = f.store.evaluations_of_day(stage_day).await.unwrap();
+    let proposed = propose_reevaluation(&f, Reevaluation::Day(stage_day))
+        .await
+        .unwrap();
+    assert_eq!(proposed.kind, ProposalKind::Day(stage_day.date));
+    assert_conflict(apply(&f, proposed.id).await, &["2 of its evaluations"]);
     let mut labels = Vec::new();
     let mut score = 2.0;
     while let Some(ClaimedJob { claim, job }) = f.claim().await {
@@ -177,70 +187,87 @@ async fn reevaluation_counts_only_once_applied() {
                 f.commit_shard(&claim, &shard, 0).await;
             }
             _ => {
-                f.finish(&claim, score, "again").await;
+                f.finish_scoring(&claim, score, "again").await;
                 score += 1.0;
             }
         }
     }
-    assert_eq!(labels, [SeedLabel::StageDay(of); 2], "the same episodes");
+    assert_eq!(
+        labels,
+        [SeedLabel::StageDay(stage_day); 2],
+        "the same episodes"
+    );
     let counted = [row("Alpha", 1.0), row("Beta", 1.0)];
-    assert_eq!(rows(&f).await, counted, "not before it is applied");
+    assert_eq!(
+        board_rows(&f).await,
+        counted,
+        "the proposal is not applied yet"
+    );
 
-    f.later(60);
+    f.advance_clock_s(60);
     let frozen = f
         .store
-        .freeze_boards(Actor::Organiser, of.stage, REASON, f.now);
+        .freeze_boards(Actor::Organiser, stage_day.stage, REASON, f.now);
     frozen.await.unwrap();
-    refused(apply(&f, proposed.id).await, &["frozen"]);
-    let live = f.store.unfreeze_boards(Actor::Organiser, of.stage, f.now);
-    live.await.unwrap();
+    assert_conflict(apply(&f, proposed.id).await, &["frozen"]);
+    let unfrozen = f
+        .store
+        .unfreeze_boards(Actor::Organiser, stage_day.stage, f.now);
+    unfrozen.await.unwrap();
     let applied = apply(&f, proposed.id).await.unwrap();
     assert_eq!(applied.outcome, Some(ProposalOutcome::Applied(f.now)));
-    assert_eq!(rows(&f).await, [row("Alpha", 2.0), row("Beta", 3.0)]);
-    for (old, agent) in first.iter().zip(&agents) {
-        let old = f.store.evaluation(old.id).await.unwrap();
-        let why = format!("evaluated again: {REASON}");
-        assert_eq!(old.voided.unwrap().reason, why);
-        let own = f.store.evaluations_of(agent.team).await.unwrap();
-        let new = own.iter().find(|one| one.voided.is_none()).unwrap();
+    assert_eq!(board_rows(&f).await, [row("Alpha", 2.0), row("Beta", 3.0)]);
+    for (original, submission) in originals.iter().zip(&submissions) {
+        let replaced = f.store.evaluation(original.id).await.unwrap();
+        let reason = format!("evaluated again: {REASON}");
+        assert_eq!(replaced.voided.unwrap().reason, reason);
+        let evaluations = f.store.evaluations_of(submission.team).await.unwrap();
+        let new = evaluations
+            .iter()
+            .find(|evaluation| evaluation.voided.is_none())
+            .unwrap();
         assert_eq!(
             (new.rerun_of, new.stage_day, new.submission),
-            (Some(old.id), of, agent.id)
+            (Some(original.id), stage_day, submission.id)
         );
         let EvaluationState::Finished { finished_at, .. } = new.state else {
-            panic!("{new:?}")
+            panic!("expected a finished evaluation, found {new:?}")
         };
-        assert_eq!(finished_at, f.now, "it counts from now on");
+        assert_eq!(finished_at, f.now, "the result counts from now on");
     }
-    refused(apply(&f, proposed.id).await, &["was applied at"]);
-    refused(discard(&f, proposed.id).await, &["was applied at"]);
+    assert_conflict(apply(&f, proposed.id).await, &["was applied at"]);
+    assert_conflict(discard(&f, proposed.id).await, &["was applied at"]);
 }
 
 #[tokio::test]
 async fn proposal_with_voided_original_is_refused_whole() {
     let f = TestStore::new().await;
-    let (agents, of) = played_day(&f).await;
-    let proposed = propose(&f, Reevaluation::Day(of)).await.unwrap();
-    f.run_all(2.0).await;
-    let of_beta = f.store.evaluations_of(agents[1].team).await.unwrap()[0].id;
+    let (submissions, stage_day) = released_day(&f).await;
+    let proposed = propose_reevaluation(&f, Reevaluation::Day(stage_day))
+        .await
+        .unwrap();
+    f.run_all_with_score(2.0).await;
+    let beta_evaluation = f.store.evaluations_of(submissions[1].team).await.unwrap()[0].id;
     let voided = f
         .store
-        .void_evaluation(Actor::Organiser, of_beta, REASON, f.now);
+        .void_evaluation(Actor::Organiser, beta_evaluation, REASON, f.now);
     voided.await.unwrap();
-    refused(apply(&f, proposed.id).await, &["does not count any more"]);
+    assert_conflict(apply(&f, proposed.id).await, &["does not count any more"]);
     assert_eq!(
-        rows(&f).await,
+        board_rows(&f).await,
         [row("Alpha", 1.0)],
-        "it is not applied in part"
+        "the proposal is not applied in part"
     );
-    // A new proposal covers what counts now.
+    // A new proposal evaluates only what counts now.
     discard(&f, proposed.id).await.unwrap();
-    let proposed = propose(&f, Reevaluation::Day(of)).await.unwrap();
-    f.run_all(2.0).await;
+    let proposed = propose_reevaluation(&f, Reevaluation::Day(stage_day))
+        .await
+        .unwrap();
+    f.run_all_with_score(2.0).await;
     apply(&f, proposed.id).await.unwrap();
-    assert_eq!(rows(&f).await, [row("Alpha", 2.0)]);
-    refused(
-        propose(&f, Reevaluation::Evaluation(of_beta)).await,
+    assert_eq!(board_rows(&f).await, [row("Alpha", 2.0)]);
+    assert_conflict(
+        propose_reevaluation(&f, Reevaluation::Evaluation(beta_evaluation)).await,
         &["no result counts"],
     );
 }
@@ -248,73 +275,78 @@ async fn proposal_with_voided_original_is_refused_whole() {
 #[tokio::test]
 async fn reevaluation_replaces_result_by_agent_failure() {
     let mut f = TestStore::new().await;
-    let (agents, _) = played_day(&f).await;
-    let of_alpha = f.store.evaluations_of(agents[0].team).await.unwrap()[0].id;
-    let proposed = propose(&f, Reevaluation::Evaluation(of_alpha))
+    let (submissions, _) = released_day(&f).await;
+    let alpha_evaluation = f.store.evaluations_of(submissions[0].team).await.unwrap()[0].id;
+    let proposed = propose_reevaluation(&f, Reevaluation::Evaluation(alpha_evaluation))
         .await
         .unwrap();
-    assert_eq!(evaluations(&f, proposed.id).await.len(), 1);
+    assert_eq!(proposed_evaluations(&f, proposed.id).await.len(), 1);
     let (claim, _, shard) = f.claim_shard().await;
     let stopped = ShardCommit {
         stopped_by_faults: true,
-        ..commit(&shard, 1)
+        ..shard_commit(&shard, 1)
     };
     f.store.commit_shard(&claim, stopped, f.now).await.unwrap();
-    let state = evaluations(&f, proposed.id).await.remove(0).state;
+    let state = proposed_evaluations(&f, proposed.id).await.remove(0).state;
     assert!(
         matches!(state, EvaluationState::AgentFailed { .. }),
         "{state:?}"
     );
     apply(&f, proposed.id).await.unwrap();
     assert_eq!(
-        rows(&f).await,
+        board_rows(&f).await,
         [row("Beta", 1.0)],
         "Alpha has no result any more"
     );
 
     // Platform faults in a proposal change nothing.
-    let of_beta = f.store.evaluations_of(agents[1].team).await.unwrap()[0].id;
-    let proposed = propose(&f, Reevaluation::Evaluation(of_beta))
+    let beta_evaluation = f.store.evaluations_of(submissions[1].team).await.unwrap()[0].id;
+    let proposed = propose_reevaluation(&f, Reevaluation::Evaluation(beta_evaluation))
         .await
         .unwrap();
     for _ in 0..MAX_ATTEMPTS {
         let claimed = f.claim().await.unwrap();
         let failed = f.store.release_failed(&claimed.claim, "disk full", f.now);
         failed.await.unwrap();
-        f.later(60);
+        f.advance_clock_s(60);
     }
-    let state = evaluations(&f, proposed.id).await.remove(0).state;
+    let state = proposed_evaluations(&f, proposed.id).await.remove(0).state;
     assert!(
         matches!(state, EvaluationState::PlatformFailed { .. }),
         "{state:?}"
     );
     apply(&f, proposed.id).await.unwrap();
-    assert_eq!(rows(&f).await, [row("Beta", 1.0)]);
-    assert_eq!(f.store.evaluation(of_beta).await.unwrap().voided, None);
+    assert_eq!(board_rows(&f).await, [row("Beta", 1.0)]);
+    assert_eq!(
+        f.store.evaluation(beta_evaluation).await.unwrap().voided,
+        None
+    );
 }
 
 #[tokio::test]
 async fn reevaluation_by_new_rules_has_its_own_board() {
     let f = TestStore::new().await;
-    let (_, of) = played_day(&f).await;
-    refused(
-        propose(&f, Reevaluation::Rules(of)).await,
+    let (_, stage_day) = released_day(&f).await;
+    assert_conflict(
+        propose_reevaluation(&f, Reevaluation::Rules(stage_day)).await,
         &["stage's newest rules"],
     );
-    let other = RunPlan {
+    let new_plan = RunPlan {
         max_faults: 9,
-        ..small()
+        ..one_shard_plan()
     };
-    let stage = f.stage(&other).await;
-    let proposed = propose(&f, Reevaluation::Rules(of)).await.unwrap();
+    let stage = f.configure_stage(&new_plan).await;
+    let proposed = propose_reevaluation(&f, Reevaluation::Rules(stage_day))
+        .await
+        .unwrap();
     assert_eq!(proposed.revision, 2);
     let (claim, run, shard) = f.claim_shard().await;
     assert_eq!(
         (run.plan.max_faults, run.seed),
-        (9, SeedLabel::StageDay(of))
+        (9, SeedLabel::StageDay(stage_day))
     );
     f.commit_shard(&claim, &shard, 0).await;
-    f.run_all(5.0).await;
+    f.run_all_with_score(5.0).await;
     apply(&f, proposed.id).await.unwrap();
     let scores = async |revision| -> Vec<f64> {
         let board = f.store.board(stage, revision).await.unwrap();
@@ -326,8 +358,8 @@ async fn reevaluation_by_new_rules_has_its_own_board() {
         "the board of the old rules stays"
     );
     assert_eq!(scores(2).await, [5.0, 5.0]);
-    refused(
-        propose(&f, Reevaluation::Rules(of)).await,
+    assert_conflict(
+        propose_reevaluation(&f, Reevaluation::Rules(stage_day)).await,
         &["stage's newest rules"],
     );
 }
@@ -335,19 +367,22 @@ async fn reevaluation_by_new_rules_has_its_own_board() {
 #[tokio::test]
 async fn open_day_is_not_reevaluated() {
     let f = TestStore::new().await;
-    let agent = f.ready_team("Alpha").await;
-    let of = f.evaluate(agent.id, &small()).await.stage_day;
-    refused(propose(&f, Reevaluation::Day(of)).await, &["not released"]);
-    let none = StageDay {
-        date: of.date.tomorrow().unwrap(),
-        ..of
-    };
-    let no_day = propose(&f, Reevaluation::Day(none)).await;
-    assert!(
-        matches!(no_day, Err(StoreError::NotFound("day"))),
-        "{no_day:?}"
+    let submission = f.valid_submission_of("Alpha").await;
+    let stage_day = f.evaluate(submission.id, &one_shard_plan()).await.stage_day;
+    assert_conflict(
+        propose_reevaluation(&f, Reevaluation::Day(stage_day)).await,
+        &["not released"],
     );
-    let unknown = propose(&f, Reevaluation::Evaluation(EvaluationId::new())).await;
+    let not_started = StageDay {
+        date: stage_day.date.tomorrow().unwrap(),
+        ..stage_day
+    };
+    let result = propose_reevaluation(&f, Reevaluation::Day(not_started)).await;
+    assert!(
+        matches!(result, Err(StoreError::NotFound("day"))),
+        "{result:?}"
+    );
+    let unknown = propose_reevaluation(&f, Reevaluation::Evaluation(EvaluationId::new())).await;
     assert!(
         matches!(unknown, Err(StoreError::NotFound("evaluation"))),
         "{unknown:?}"

@@ -1,4 +1,4 @@
-//! Query plans: tables that grow with the season must not be scanned.
+//! Query plans: no query may scan (read completely) a table that grows with the season.
 
 use crate::fixture::*;
 use sqlx::{Row, SqlSafeStr};
@@ -15,7 +15,7 @@ const LARGE: [&str; 8] = [
     "webhook_deliveries",
 ];
 
-/// Partial indexes of open or still stored rows: a scan of one reads only those.
+/// Partial indexes, which contain few rows of a large table: a scan of such an index reads only these rows.
 const SMALL_INDEXES: [&str; 7] = [
     "jobs_open",
     "evaluations_open",
@@ -28,18 +28,18 @@ const SMALL_INDEXES: [&str; 7] = [
 
 /// Queries that may read a whole index or table, identified by a fragment, each with its reason.
 const MAY_SCAN: [(&str, &str); 4] = [
+    ("/* backup */", "a separate command, which copies all rows"),
     (
-        "/* backup */",
-        "a separate command, which copies everything anyway",
+        "substr(worker, 1",
+        "the query runs once, at a worker's start",
     ),
-    ("substr(worker, 1", "once at a worker's start"),
     (
         "kind NOT IN ('shard_committed'",
-        "one row: it is the last of its own index",
+        "the query reads one row: the last one of the index",
     ),
     (
         "FROM events ORDER BY id DESC LIMIT 1",
-        "one row: it is the last of the table",
+        "the query reads one row: the last one of the table",
     ),
 ];
 
@@ -47,11 +47,11 @@ const MAY_SCAN: [(&str, &str); 4] = [
 async fn queries_do_not_scan_growing_tables() {
     let f = TestStore::new().await;
     let mut connection = f.connection().await;
-    let mut boards = 0;
+    let mut board_queries = 0;
     for (_, data) in query_data() {
         let sql = data["query"].as_str().unwrap().to_owned();
-        boards += usize::from(sql.contains("/* board */"));
-        if MAY_SCAN.iter().any(|(words, _)| sql.contains(words)) {
+        board_queries += usize::from(sql.contains("/* board */"));
+        if MAY_SCAN.iter().any(|(fragment, _)| sql.contains(fragment)) {
             continue;
         }
         let explain = sqlx::AssertSqlSafe(format!("EXPLAIN QUERY PLAN {sql}")).into_sql_str();
@@ -63,19 +63,19 @@ async fn queries_do_not_scan_growing_tables() {
             let step: String = step.get("detail");
             let scanned = step.strip_prefix("SCAN ").map(|rest| {
                 let name = rest.split(' ').next().unwrap();
-                alias(&sql, name)
+                table_of_alias(&sql, name)
             });
-            let small = SMALL_INDEXES.iter().any(|index| step.ends_with(index));
-            if let Some(table) = scanned.filter(|_| !small) {
+            let is_small = SMALL_INDEXES.iter().any(|index| step.ends_with(index));
+            if let Some(table) = scanned.filter(|_| !is_small) {
                 assert!(!LARGE.contains(&table.as_str()), "{step} in {sql}");
             }
         }
     }
-    assert_eq!(boards, 1, "the board query is checked, too");
+    assert_eq!(board_queries, 1, "the board query is checked, too");
 }
 
-/// The table behind an alias of a query (`FROM evaluations e`).
-fn alias(sql: &str, name: &str) -> String {
+/// The table of an alias in a query (`FROM evaluations e`).
+fn table_of_alias(sql: &str, name: &str) -> String {
     let words: Vec<_> = sql.split_whitespace().collect();
     words
         .windows(2)

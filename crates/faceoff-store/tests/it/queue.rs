@@ -1,4 +1,5 @@
-//! Claims, leases, commits and platform faults.
+//! The queue of jobs: a worker claims a job under a lease, renews the lease with heartbeats, and commits the result once. After a
+//! platform fault, for example a full disk, the job is run again.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -8,11 +9,11 @@ use std::collections::HashSet;
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn concurrent_claims_never_share_a_job() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
+    let submission = f.valid_submission_of("Alpha").await;
     let plan = RunPlan {
         episodes_per_task: 20,
         episodes_per_shard: 1,
-        ..plan()
+        ..six_shard_plan()
     };
     f.evaluate(submission.id, &plan).await;
     let other = f.reopen().await;
@@ -38,6 +39,7 @@ async fn concurrent_claims_never_share_a_job() {
     for claimer in claimers {
         jobs.extend(claimer.await.unwrap());
     }
+    // Three tasks of 20 episodes.
     assert_eq!(jobs.len(), 60);
     assert_eq!(jobs.into_iter().collect::<HashSet<_>>().len(), 60);
 }
@@ -45,19 +47,19 @@ async fn concurrent_claims_never_share_a_job() {
 #[tokio::test]
 async fn expired_lease_is_reassigned_and_old_holder_refused() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.evaluate(submission.id, &six_shard_plan()).await;
     let (first, _, shard) = f.claim_shard().await;
-    f.later(i64::from(LEASE_S) - 1);
+    f.advance_clock_s(i64::from(LEASE_S) - 1);
     assert!(f.store.heartbeat(&first, 0, LEASE_S, f.now).await.unwrap());
-    f.later(i64::from(LEASE_S) - 1);
+    f.advance_clock_s(i64::from(LEASE_S) - 1);
     let (other, _, second_shard) = f.claim_shard().await;
-    assert_ne!(shard.id, second_shard.id, "a renewed lease holds");
+    assert_ne!(shard.id, second_shard.id, "the renewed lease is valid");
     assert_ne!(first.job, other.job);
-    f.later(1);
-    let (successor, _, inherited) = f.claim_shard().await;
+    f.advance_clock_s(1);
+    let (successor, _, reassigned_shard) = f.claim_shard().await;
     assert_eq!(
-        (successor.job, &inherited),
+        (successor.job, &reassigned_shard),
         (first.job, &shard),
         "an expired lease is reassigned"
     );
@@ -91,9 +93,9 @@ async fn expired_lease_is_reassigned_and_old_holder_refused() {
 #[tokio::test]
 async fn job_filter_limits_claims() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
-    let team = f.team("Beta").await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let team = f.create_team("Beta").await;
     f.upload(&team).await;
     let claim = async |filter| {
         f.store
@@ -126,21 +128,21 @@ async fn job_filter_limits_claims() {
 #[tokio::test]
 async fn lease_transfer_succeeds_for_one_worker() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.evaluate(submission.id, &six_shard_plan()).await;
     let claimed = f.store.claim("reserved", LEASE_S, f.now).await;
     let ClaimedJob { claim, .. } = claimed.unwrap().unwrap();
-    f.later(i64::from(LEASE_S) - 1);
-    let transfer = async |to: &str| {
+    f.advance_clock_s(i64::from(LEASE_S) - 1);
+    let transfer_to = async |worker: &str| {
         f.store
-            .transfer_lease(&claim, to, LEASE_S, f.now)
+            .transfer_lease(&claim, worker, LEASE_S, f.now)
             .await
             .unwrap()
     };
-    assert!(transfer("one").await);
-    assert!(!transfer("another").await);
+    assert!(transfer_to("worker 1").await);
+    assert!(!transfer_to("worker 2").await);
     assert!(
-        transfer("one").await,
+        transfer_to("worker 1").await,
         "the same worker can repeat the call, since a response can get lost"
     );
     let store = f.store.clone();
@@ -156,7 +158,7 @@ async fn lease_transfer_succeeds_for_one_worker() {
         0,
         "another worker holds the lease"
     );
-    // A started job cannot be released; one that was not started goes to the next claim.
+    // A job that was started cannot be released. A job that was not started is returned to the queue.
     let release_unstarted =
         async |claim: &JobClaim| f.store.release_unstarted(claim, f.now).await.unwrap();
     assert!(!release_unstarted(&claim).await);
@@ -164,17 +166,20 @@ async fn lease_transfer_succeeds_for_one_worker() {
     let claimed = f.store.claim("reserved", LEASE_S, f.now).await;
     let unstarted = claimed.unwrap().unwrap().claim;
     assert!(release_unstarted(&unstarted).await);
-    assert!(!release_unstarted(&unstarted).await, "once");
+    assert!(
+        !release_unstarted(&unstarted).await,
+        "a job is released once"
+    );
     let next = f.claim().await.unwrap().claim;
     assert_eq!(next.job, unstarted.job);
     f.store.release(&next, f.now).await.unwrap();
     // The transfer renewed the lease.
-    f.later(i64::from(LEASE_S) - 1);
-    let mut others = Vec::new();
-    while let Some(other) = f.claim().await {
-        others.push(other.claim.job);
+    f.advance_clock_s(i64::from(LEASE_S) - 1);
+    let mut claimed_jobs = Vec::new();
+    while let Some(claimed) = f.claim().await {
+        claimed_jobs.push(claimed.claim.job);
     }
-    assert!(!others.contains(&claim.job));
+    assert!(!claimed_jobs.contains(&claim.job));
     f.store.release(&claim, f.now).await.unwrap();
     assert!(!is_leased().await);
     assert!(
@@ -186,12 +191,12 @@ async fn lease_transfer_succeeds_for_one_worker() {
 }
 
 #[tokio::test]
-async fn dead_workers_leases_end_at_once() {
+async fn leases_of_killed_worker_end_at_once() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.evaluate(submission.id, &six_shard_plan()).await;
     let mut claims = Vec::new();
-    for worker in ["dead/slot-0", "dead/slot-1", "deadly/slot-0", "dead"] {
+    for worker in ["old/slot-0", "old/slot-1", "older/slot-0", "old"] {
         let claimed = f
             .store
             .claim(worker, LEASE_S, f.now)
@@ -200,8 +205,8 @@ async fn dead_workers_leases_end_at_once() {
             .unwrap();
         claims.push(claimed.claim.clone());
     }
-    assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 3);
-    assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 0);
+    assert_eq!(f.store.end_leases_of("old", f.now).await.unwrap(), 3);
+    assert_eq!(f.store.end_leases_of("old", f.now).await.unwrap(), 0);
     let mut reclaimed = Vec::new();
     while let Some(claimed) = f.claim().await {
         reclaimed.push(claimed.claim.job);
@@ -209,7 +214,7 @@ async fn dead_workers_leases_end_at_once() {
     assert_eq!(
         reclaimed.len(),
         5,
-        "three of the dead worker and two unclaimed ones"
+        "three jobs of the killed worker and two unclaimed ones"
     );
     assert!(!reclaimed.contains(&claims[2].job));
     assert!(
@@ -223,10 +228,10 @@ async fn dead_workers_leases_end_at_once() {
 #[tokio::test]
 async fn late_commit_counts_without_a_new_lease() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.later(3600);
+    f.advance_clock_s(3600);
     assert_eq!(
         f.commit_shard(&claim, &shard, 0).await,
         CommitOutcome::Stored
@@ -236,44 +241,48 @@ async fn late_commit_counts_without_a_new_lease() {
 #[tokio::test]
 async fn second_commit_changes_nothing() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     assert_eq!(
         f.commit_shard(&claim, &shard, 0).await,
         CommitOutcome::Stored
     );
-    let mut other = commit(&shard, 2);
-    other.recording = Some("recordings/other".into());
-    let repeated = f.store.commit_shard(&claim, other, f.now).await.unwrap();
+    let mut different = shard_commit(&shard, 2);
+    different.recording = Some("recordings/other".into());
+    let repeated = f
+        .store
+        .commit_shard(&claim, different, f.now)
+        .await
+        .unwrap();
     assert_eq!(repeated, CommitOutcome::AlreadyStored);
     let stored = f.store.outcomes(evaluation.run).await.unwrap();
-    assert_eq!(stored, commit(&shard, 0).outcomes);
+    assert_eq!(stored, shard_commit(&shard, 0).outcomes);
     let shards = f.store.shards(evaluation.run).await.unwrap();
-    assert_eq!(shards[0].recording, commit(&shard, 0).recording);
+    assert_eq!(shards[0].recording, shard_commit(&shard, 0).recording);
     assert!(!f.store.heartbeat(&claim, 2, LEASE_S, f.now).await.unwrap());
 }
 
 #[tokio::test]
-async fn outcomes_must_cover_tsuccessor_shard() {
+async fn outcomes_must_cover_their_shard() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    let good = commit(&shard, 0);
-    let mut short = good.clone();
-    short.outcomes.pop();
-    let mut swapped = good.clone();
+    let complete = shard_commit(&shard, 0);
+    let mut without_last = complete.clone();
+    without_last.outcomes.pop();
+    let mut swapped = complete.clone();
     swapped.outcomes.swap(0, 1);
-    let mut foreign = good.clone();
-    foreign.outcomes[0].task = Task::Prepare;
-    for bad in [short, swapped, foreign] {
+    let mut of_other_task = complete.clone();
+    of_other_task.outcomes[0].task = Task::Prepare;
+    for bad in [without_last, swapped, of_other_task] {
         let error = f.store.commit_shard(&claim, bad, f.now).await.unwrap_err();
         assert!(matches!(error, StoreError::Conflict(_)), "{error}");
     }
     assert!(f.store.outcomes(evaluation.run).await.unwrap().is_empty());
     assert_eq!(
-        f.store.commit_shard(&claim, good, f.now).await.unwrap(),
+        f.store.commit_shard(&claim, complete, f.now).await.unwrap(),
         CommitOutcome::Stored
     );
 }
@@ -281,19 +290,22 @@ async fn outcomes_must_cover_tsuccessor_shard() {
 #[tokio::test]
 async fn scoring_and_validation_precede_shards() {
     let f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await;
-    let beta = f.ready_team("Beta").await;
-    let small = RunPlan {
+    let alpha = f.valid_submission_of("Alpha").await;
+    let beta = f.valid_submission_of("Beta").await;
+    let one_shard = RunPlan {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
-        ..plan()
+        ..six_shard_plan()
     };
-    let first = f.evaluate(alpha.id, &small).await;
-    f.evaluate(beta.id, &small).await;
+    let first = f.evaluate(alpha.id, &one_shard).await;
+    f.evaluate(beta.id, &one_shard).await;
     let (claim, run, shard) = f.claim_shard().await;
-    assert_eq!(run.id, first.run, "evaluations are run in order");
+    assert_eq!(
+        run.id, first.run,
+        "evaluations are run in the order of their submissions"
+    );
     f.commit_shard(&claim, &shard, 0).await;
-    let team = f.team("Gamma").await;
+    let team = f.create_team("Gamma").await;
     f.upload(&team).await;
     f.claim_scoring().await;
     f.claim_validation().await;
@@ -304,7 +316,7 @@ async fn scoring_and_validation_precede_shards() {
 #[tokio::test]
 async fn job_released_at_shutdown_loses_no_attempt() {
     let f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     let submission = f.upload(&team).await;
     for _ in 0..2 * MAX_LEASES {
         let (claim, _) = f.claim_validation().await;
@@ -317,13 +329,14 @@ async fn job_released_at_shutdown_loses_no_attempt() {
 #[tokio::test]
 async fn platform_faults_pause_shard_then_rerun_evaluation() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
-    let (victim, _, shard) = f.claim_shard().await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let (first_claim, _, shard) = f.claim_shard().await;
     f.store
-        .release_failed(&victim, "disk full", f.now)
+        .release_failed(&first_claim, "disk full", f.now)
         .await
         .unwrap();
+    // The claims of the other five of the six shards.
     let mut open = Vec::new();
     for _ in 1..6 {
         let (claim, _, other) = f.claim_shard().await;
@@ -332,7 +345,7 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
     }
     assert!(f.claim().await.is_none());
     for failure in 2..=MAX_ATTEMPTS {
-        f.later(60);
+        f.advance_clock_s(60);
         for claim in &open {
             assert!(f.store.heartbeat(claim, 0, 1000, f.now).await.unwrap());
         }
@@ -358,12 +371,12 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
         assert!(!f.store.heartbeat(claim, 0, LEASE_S, f.now).await.unwrap());
     }
     assert!(f.claim().await.is_none(), "the rerun pauses");
-    f.later(i64::from(RERUN_PAUSES_S[0]));
+    f.advance_clock_s(i64::from(RERUN_PAUSES_S[0]));
     let (_, run, first) = f.claim_shard().await;
     assert_ne!(run.id, evaluation.run);
     assert_eq!(
         (run.plan, run.seed),
-        (plan(), SeedLabel::StageDay(evaluation.stage_day))
+        (six_shard_plan(), SeedLabel::StageDay(evaluation.stage_day))
     );
     assert_eq!((first.task, first.first_episode), (Task::Hit, 0));
 }
@@ -371,13 +384,13 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
 #[tokio::test]
 async fn failed_scoring_reruns_the_evaluation() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let small = RunPlan {
+    let submission = f.valid_submission_of("Alpha").await;
+    let one_shard = RunPlan {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
-        ..plan()
+        ..six_shard_plan()
     };
-    let evaluation = f.evaluate(submission.id, &small).await;
+    let evaluation = f.evaluate(submission.id, &one_shard).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
     for _ in 0..MAX_ATTEMPTS {
@@ -386,8 +399,11 @@ async fn failed_scoring_reruns_the_evaluation() {
             .release_failed(&claim, "no space left", f.now)
             .await
             .unwrap();
-        assert_eq!(f.finish(&claim, 1.0, "d").await, CommitOutcome::LeaseLost);
-        f.later(60);
+        assert_eq!(
+            f.finish_scoring(&claim, 1.0, DATASET_KEY).await,
+            CommitOutcome::LeaseLost
+        );
+        f.advance_clock_s(60);
     }
     assert!(matches!(
         f.state(evaluation.id).await,
@@ -400,7 +416,7 @@ async fn failed_scoring_reruns_the_evaluation() {
 #[tokio::test]
 async fn failed_validation_run_ends_as_platform_fault() {
     let mut f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     let submission = f.upload(&team).await;
     for _ in 0..MAX_ATTEMPTS {
         let (claim, submission) = f.claim_validation().await;
@@ -409,7 +425,7 @@ async fn failed_validation_run_ends_as_platform_fault() {
             .release_failed(&claim, "no cgroup", f.now)
             .await
             .unwrap();
-        f.later(60);
+        f.advance_clock_s(60);
     }
     let state = f.store.submission(submission.id).await.unwrap().state;
     assert_eq!(
@@ -422,18 +438,18 @@ async fn failed_validation_run_ends_as_platform_fault() {
 }
 
 #[tokio::test]
-async fn job_that_kills_its_workers_is_given_up() {
+async fn job_fails_after_too_many_expired_leases() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let small = RunPlan {
+    let submission = f.valid_submission_of("Alpha").await;
+    let one_shard = RunPlan {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
-        ..plan()
+        ..six_shard_plan()
     };
-    let evaluation = f.evaluate(submission.id, &small).await;
+    let evaluation = f.evaluate(submission.id, &one_shard).await;
     for _ in 0..MAX_LEASES {
         f.claim_shard().await;
-        f.later(i64::from(LEASE_S));
+        f.advance_clock_s(i64::from(LEASE_S));
     }
     assert!(f.claim().await.is_none());
     assert!(matches!(

@@ -9,7 +9,7 @@ use sqlx::{
 use std::path::Path;
 
 /// The first migration that the old version does not have.
-const RENAMES: &str = "0045";
+const RENAMING_MIGRATION: &str = "0045";
 
 /// Old and new names of tables.
 const TABLES: [(&str, &str); 5] = [
@@ -37,15 +37,15 @@ fn new_name<'a>(names: &[(&str, &'a str)], old: &'a str) -> &'a str {
 struct OldDatabase(SqliteConnection);
 
 impl OldDatabase {
-    /// Creates an empty one in `folder`.
+    /// Creates an empty database of the old version in `folder`.
     async fn create(folder: &Path, current: &Path) -> Self {
-        let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
-        let old = tempfile::tempdir().unwrap();
-        for entry in std::fs::read_dir(all).unwrap() {
+        let migrations = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
+        let old_migrations = tempfile::tempdir().unwrap();
+        for entry in std::fs::read_dir(migrations).unwrap() {
             let entry = entry.unwrap();
             let name = entry.file_name().into_string().unwrap();
-            if name.as_str() < RENAMES {
-                std::fs::copy(entry.path(), old.path().join(name)).unwrap();
+            if name.as_str() < RENAMING_MIGRATION {
+                std::fs::copy(entry.path(), old_migrations.path().join(name)).unwrap();
             }
         }
         let options = SqliteConnectOptions::new()
@@ -53,16 +53,16 @@ impl OldDatabase {
             .create_if_missing(true)
             .foreign_keys(false);
         let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
-        let migrations = Migrator::new(old.path()).await.unwrap();
-        migrations.run(&mut connection).await.unwrap();
+        let migrator = Migrator::new(old_migrations.path()).await.unwrap();
+        migrator.run(&mut connection).await.unwrap();
         let mut database = Self(connection);
         database
-            .run(format!("ATTACH '{}' AS current", current.display()))
+            .execute(format!("ATTACH '{}' AS current", current.display()))
             .await;
         database
     }
 
-    async fn run(&mut self, sql: String) {
+    async fn execute(&mut self, sql: String) {
         let executed = sqlx::raw_sql(AssertSqlSafe(sql.clone()))
             .execute(&mut self.0)
             .await;
@@ -71,7 +71,7 @@ impl OldDatabase {
         }
     }
 
-    /// All tables with their columns.
+    /// All tables of the old version with their columns.
     async fn tables(&mut self) -> Vec<(String, Vec<String>)> {
         let names: Vec<String> = sqlx::query_scalar(
             "SELECT name FROM main.sqlite_master
@@ -92,14 +92,14 @@ impl OldDatabase {
         tables
     }
 
-    /// Fills it with the rows of the current database.
+    /// Copies the rows of the current database into the old one.
     async fn fill(&mut self) {
         for (table, columns) in self.tables().await {
-            let old = columns.join(", ");
-            let new = new_columns(&columns);
-            let from = new_name(&TABLES, &table);
-            self.run(format!(
-                "DELETE FROM main.{table}; INSERT INTO main.{table} ({old}) SELECT {new} FROM current.{from}"
+            let old_columns = columns.join(", ");
+            let new_columns = new_columns(&columns);
+            let new_table = new_name(&TABLES, &table);
+            self.execute(format!(
+                "DELETE FROM main.{table}; INSERT INTO main.{table} ({old_columns}) SELECT {new_columns} FROM current.{new_table}"
             ))
             .await;
         }
@@ -117,16 +117,25 @@ fn new_columns(old: &[String]) -> String {
 /// Rows of every renamed table: a validation run, evaluations in all states, a running trial, a tournament.
 async fn filled_store() -> TestStore {
     let mut f = TestStore::new().await;
-    let agents = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
-    let of = f.evaluate(agents[0].id, &small()).await.stage_day;
-    f.run_all(1.0).await;
-    let proposed =
-        f.store
-            .propose_reevaluation(Actor::Organiser, Reevaluation::Day(of), "a reason", f.now);
+    let submissions = [
+        f.valid_submission_of("Alpha").await,
+        f.valid_submission_of("Beta").await,
+    ];
+    let stage_day = f
+        .evaluate(submissions[0].id, &one_shard_plan())
+        .await
+        .stage_day;
+    f.run_all_with_score(1.0).await;
+    let proposed = f.store.propose_reevaluation(
+        Actor::Organiser,
+        Reevaluation::Day(stage_day),
+        "a reason",
+        f.now,
+    );
     proposed.await.unwrap();
-    f.run_all(2.0).await;
-    f.later(24 * 3600);
-    f.evaluate(agents[0].id, &small()).await;
+    f.run_all_with_score(2.0).await;
+    f.advance_clock_s(24 * 3600);
+    f.evaluate(submissions[0].id, &one_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
     let cup = NewTournament {
@@ -134,14 +143,17 @@ async fn filled_store() -> TestStore {
         stage: None,
         rules: TournamentRules::default(),
         settings: TournamentSettings::default(),
-        entrants: agents.iter().map(|agent| agent.team).collect(),
+        entrants: submissions
+            .iter()
+            .map(|submission| submission.team)
+            .collect(),
     };
     let cup = f.store.open_tournament(Actor::Organiser, &cup, f.now);
     let round = DrawnRound {
         number: RoundNumber::FIRST,
         groups: Vec::new(),
         matchdays: vec![DrawnMatchday {
-            games: vec![[agents[0].team, agents[1].team]],
+            games: vec![[submissions[0].team, submissions[1].team]],
             byes: Vec::new(),
         }],
     };
@@ -182,22 +194,22 @@ async fn renamed_tables_keep_their_rows() {
     attached.unwrap();
     for (table, columns) in &tables {
         let (table, columns) = (new_name(&TABLES, table), new_columns(columns));
-        for (one, other) in [("before", "main"), ("main", "before")] {
+        for (schema, other_schema) in [("before", "main"), ("main", "before")] {
             let sql = format!(
-                "SELECT COUNT(*) FROM (SELECT {columns} FROM {one}.{table} EXCEPT SELECT {columns} FROM {other}.{table})"
+                "SELECT COUNT(*) FROM (SELECT {columns} FROM {schema}.{table} EXCEPT SELECT {columns} FROM {other_schema}.{table})"
             );
-            let differ: i64 = sqlx::query_scalar(AssertSqlSafe(sql))
+            let difference: i64 = sqlx::query_scalar(AssertSqlSafe(sql))
                 .fetch_one(&mut connection)
                 .await
                 .unwrap();
-            assert_eq!(differ, 0, "rows of {table} that only {one} has");
+            assert_eq!(difference, 0, "rows of {table} that only {schema} has");
         }
     }
-    let dangling = sqlx::query("PRAGMA main.foreign_key_check")
+    let dangling_references = sqlx::query("PRAGMA main.foreign_key_check")
         .fetch_all(&mut connection)
         .await
         .unwrap();
-    assert!(dangling.is_empty());
+    assert!(dangling_references.is_empty());
 
     // The queue continues: one evaluation waits for its score, the other for its shard, and a game is queued.
     let (mut shards, mut scorings, mut games) = (0, 0, 0);
@@ -209,15 +221,16 @@ async fn renamed_tables_keep_their_rows() {
             }
             Job::Scoring { .. } => {
                 scorings += 1;
-                migrated.finish(&claim, 3.0, "d").await;
+                migrated.finish_scoring(&claim, 3.0, DATASET_KEY).await;
             }
             Job::Game { .. } => games += 1,
             Job::Validation { .. } => panic!("no validation run is queued"),
         }
     }
     assert_eq!((shards, scorings, games), (1, 2, 1));
-    let moved = sqlx::query("UPDATE days SET cutoff_at = 0")
+    // The triggers use the new names: a day's cutoff cannot be changed.
+    let changed = sqlx::query("UPDATE days SET cutoff_at = 0")
         .execute(&mut connection)
         .await;
-    assert!(moved.unwrap_err().to_string().contains("had its cutoff"));
+    assert!(changed.unwrap_err().to_string().contains("had its cutoff"));
 }

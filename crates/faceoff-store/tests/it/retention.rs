@@ -1,4 +1,5 @@
-//! Retention of a stage's files, deletion of submissions, and the protection of evidence.
+//! Retention: for how long the datasets of a stage (published archives of evaluations) and the bundles of its submissions are
+//! kept. Also the deletion of submissions by teams, and the files of disqualified teams, which are kept as evidence.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -7,10 +8,16 @@ use jiff::SignedDuration;
 use sqlx::{Connection, SqliteConnection, migrate::Migrator, sqlite::SqliteConnectOptions};
 
 const DAY_S: i64 = 24 * 3600;
+/// Size of each submission's bundle.
+const BUNDLE_BYTES: usize = 10;
 
-/// Evaluates all teams today, each with a dataset of `bytes` bytes. Returns the evaluations in the order of `scores`.
-async fn run_day(f: &TestStore, scores: &[(&Submission, f64)], bytes: usize) -> Vec<EvaluationId> {
-    let stage = f.stage(&small()).await;
+/// Evaluates all teams today, each with a dataset of `dataset_bytes` bytes. Returns the evaluations in the order of `scores`.
+async fn run_day(
+    f: &TestStore,
+    scores: &[(&Submission, f64)],
+    dataset_bytes: usize,
+) -> Vec<EvaluationId> {
+    let stage = f.configure_stage(&one_shard_plan()).await;
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
     started.unwrap();
     while let Some(ClaimedJob { claim, job }) = f.claim().await {
@@ -20,33 +27,38 @@ async fn run_day(f: &TestStore, scores: &[(&Submission, f64)], bytes: usize) -> 
             }
             Job::Scoring { evaluation, .. } => {
                 let submission = f.store.evaluation(evaluation).await.unwrap().submission;
-                let of_team = scores.iter().find(|(one, _)| one.id == submission);
+                let (_, score) = scores
+                    .iter()
+                    .find(|(evaluated, _)| evaluated.id == submission)
+                    .unwrap();
                 let key = format!("datasets/{evaluation}/1.zip");
-                store_file(f, &key, bytes).await;
-                f.finish(&claim, of_team.unwrap().1, &key).await;
+                store_file(f, &key, dataset_bytes).await;
+                f.finish_scoring(&claim, *score, &key).await;
             }
-            Job::Validation { .. } | Job::Game { .. } => panic!("no upload waits, no game"),
+            Job::Validation { .. } | Job::Game { .. } => {
+                panic!("expected no validation run and no game")
+            }
         }
     }
-    let mut played = Vec::new();
+    let mut evaluations = Vec::new();
     for (submission, _) in scores {
-        let own = f.store.evaluations_of(submission.team).await.unwrap();
-        played.push(own[0].id);
+        let newest_first = f.store.evaluations_of(submission.team).await.unwrap();
+        evaluations.push(newest_first[0].id);
     }
-    played
+    evaluations
 }
 
-/// Closes a stage in an hour, and signs it off then.
+/// Closes a stage in an hour, and signs it off then (declares its results final).
 async fn sign_off(f: &mut TestStore, stage: StageId) {
-    let closes = StageChange {
+    let closing = StageChange {
         closes_at: Some(Some(f.now + SignedDuration::from_hours(1))),
         ..StageChange::default()
     };
     f.store
-        .change_stage(Actor::Organiser, stage, closes, f.now)
+        .change_stage(Actor::Organiser, stage, closing, f.now)
         .await
         .unwrap();
-    f.later(3600);
+    f.advance_clock_s(3600);
     f.store
         .sign_off_stage(Actor::Organiser, stage, f.now)
         .await
@@ -59,19 +71,19 @@ async fn store_file(f: &TestStore, key: &str, bytes: usize) {
     f.store.artifacts().put_file(key, &file).await.unwrap();
 }
 
-/// A team with a valid submission whose bundle is stored.
-async fn stored_team(f: &TestStore, name: &str) -> Submission {
-    let team = f.team(name).await;
-    upload(f, &team).await
+/// Creates a team with a valid submission whose bundle is stored.
+async fn stored_submission_of(f: &TestStore, name: &str) -> Submission {
+    let team = f.create_team(name).await;
+    upload_stored(f, &team).await
 }
 
-/// Another valid submission of a team.
-async fn upload(f: &TestStore, team: &Team) -> Submission {
+/// Creates another valid submission of a team.
+async fn upload_stored(f: &TestStore, team: &Team) -> Submission {
     let key = format!("bundles/{}/{}", team.id, uuid::Uuid::now_v7());
-    store_file(f, &key, 10).await;
+    store_file(f, &key, BUNDLE_BYTES).await;
     let bundle = BundleRef {
         key,
-        bytes: 10,
+        bytes: BUNDLE_BYTES as u64,
         ..bundle()
     };
     let quota = UploadQuota::default();
@@ -82,7 +94,11 @@ async fn upload(f: &TestStore, team: &Team) -> Submission {
     f.validate().await
 }
 
-async fn keep(f: &TestStore, stage: StageId, retention: Retention) -> Result<Stage, StoreError> {
+async fn set_retention(
+    f: &TestStore,
+    stage: StageId,
+    retention: Retention,
+) -> Result<Stage, StoreError> {
     let change = StageChange {
         retention: Some(retention),
         ..StageChange::default()
@@ -92,69 +108,63 @@ async fn keep(f: &TestStore, stage: StageId, retention: Retention) -> Result<Sta
         .await
 }
 
-fn last(last: u32) -> Retention {
+/// Keeps the newest datasets of each team, besides the best.
+fn keep_last(last: u32) -> Retention {
     Retention {
         last: Some(last),
         ..Retention::default()
     }
 }
 
-async fn removal(f: &TestStore, id: EvaluationId) -> Option<String> {
+/// The reason why an evaluation's dataset was removed.
+async fn removal_reason(f: &TestStore, id: EvaluationId) -> Option<String> {
     let removed = f.store.evaluation(id).await.unwrap().dataset_removed;
     removed.map(|removed| removed.reason)
 }
 
-async fn has_datasets(f: &TestStore, evaluations: &[EvaluationId]) -> Vec<bool> {
-    let mut found = Vec::new();
+/// For each evaluation: does its dataset exist?
+async fn datasets_exist(f: &TestStore, evaluations: &[EvaluationId]) -> Vec<bool> {
+    let mut exist = Vec::new();
     for id in evaluations {
-        found.push(removal(f, *id).await.is_none());
+        exist.push(removal_reason(f, *id).await.is_none());
     }
-    found
+    exist
 }
 
 async fn has_file(f: &TestStore, key: &str) -> bool {
     f.store.artifacts().read(key).await.is_ok()
 }
 
-async fn stage_of_season(f: &TestStore) -> StageId {
+async fn first_stage(f: &TestStore) -> StageId {
     f.store.stages().await.unwrap()[0].id
-}
-
-#[track_caller]
-fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
-    let Err(StoreError::Conflict(why)) = done else {
-        panic!("expected a conflict with {words:?}: {done:?}");
-    };
-    for word in words {
-        assert!(why.contains(word), "{word:?} is not in {why:?}");
-    }
 }
 
 #[tokio::test]
 async fn retention_keeps_last_and_best_of_each_team() {
     let mut f = TestStore::new().await;
     let (alpha, beta) = (
-        stored_team(&f, "Alpha").await,
-        stored_team(&f, "Beta").await,
+        stored_submission_of(&f, "Alpha").await,
+        stored_submission_of(&f, "Beta").await,
     );
     let mut days = Vec::new();
     // Alpha's best day is the second, Beta's the last.
-    for (a, b) in [(1.0, 1.0), (9.0, 2.0), (2.0, 3.0), (3.0, 4.0)] {
-        days.push(run_day(&f, &[(&alpha, a), (&beta, b)], 1000).await);
-        f.later(DAY_S);
+    for (alpha_score, beta_score) in [(1.0, 1.0), (9.0, 2.0), (2.0, 3.0), (3.0, 4.0)] {
+        let scores = [(&alpha, alpha_score), (&beta, beta_score)];
+        days.push(run_day(&f, &scores, 1000).await);
+        f.advance_clock_s(DAY_S);
     }
-    let stage = stage_of_season(&f).await;
+    let stage = first_stage(&f).await;
     let revision = f.store.stage(stage).await.unwrap().rules.number;
     assert_eq!(
         f.store.stage_retention(stage).await.unwrap(),
         Retention::default()
     );
-    let all = f.store.apply_retentions(f.now).await.unwrap();
-    assert!(all.is_empty(), "by default everything is kept");
+    let removed = f.store.apply_retentions(f.now).await.unwrap();
+    assert!(removed.is_empty(), "by default all files are kept");
 
     let preview = f
         .store
-        .preview_removal(stage, &last(2), f.now)
+        .preview_removal(stage, &keep_last(2), f.now)
         .await
         .unwrap();
     let expected = RemovalSummary {
@@ -167,13 +177,20 @@ async fn retention_keeps_last_and_best_of_each_team() {
     };
     assert_eq!(preview, expected);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
-    keep(&f, stage, last(2)).await.unwrap();
+    set_retention(&f, stage, keep_last(2)).await.unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap(), expected);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
-    let of = |team: usize| days.iter().map(|day| day[team]).collect::<Vec<_>>();
-    assert_eq!(has_datasets(&f, &of(0)).await, [false, true, true, true]);
-    assert_eq!(has_datasets(&f, &of(1)).await, [false, false, true, true]);
-    let reason = removal(&f, days[0][0]).await.unwrap();
+    let alpha_evaluations: Vec<_> = days.iter().map(|day| day[0]).collect();
+    let beta_evaluations: Vec<_> = days.iter().map(|day| day[1]).collect();
+    assert_eq!(
+        datasets_exist(&f, &alpha_evaluations).await,
+        [false, true, true, true]
+    );
+    assert_eq!(
+        datasets_exist(&f, &beta_evaluations).await,
+        [false, false, true, true]
+    );
+    let reason = removal_reason(&f, days[0][0]).await.unwrap();
     assert!(
         reason.contains("the last 2 and the best of each team"),
         "{reason}"
@@ -181,8 +198,8 @@ async fn retention_keeps_last_and_best_of_each_team() {
     // The result stays, and there is no new revision.
     let state = f.state(days[0][0]).await;
     assert!(matches!(state, EvaluationState::Finished { result, .. } if result.score == 1.0));
-    let now = f.store.stage(stage).await.unwrap();
-    assert_eq!(now.rules.number, revision);
+    let stage_after = f.store.stage(stage).await.unwrap();
+    assert_eq!(stage_after.rules.number, revision);
     let events = f.store.events_after(0, 10_000).await.unwrap();
     let is_removal = |event: &Event| matches!(event, Event::DatasetRemoved { .. });
     assert_eq!(
@@ -193,42 +210,50 @@ async fn retention_keeps_last_and_best_of_each_team() {
         3
     );
 
-    // A voided evaluation is neither one of the last nor the best.
+    // A voided evaluation counts neither as one of the last two nor as the best.
     let voided = f
         .store
-        .void_evaluation(Actor::Organiser, days[1][0], "why", f.now);
+        .void_evaluation(Actor::Organiser, days[1][0], "a test", f.now);
     voided.await.unwrap();
     f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!(has_datasets(&f, &of(0)).await, [false, false, true, true]);
+    assert_eq!(
+        datasets_exist(&f, &alpha_evaluations).await,
+        [false, false, true, true]
+    );
     // A longer retention does not restore removed datasets.
-    keep(&f, stage, Retention::default()).await.unwrap();
+    set_retention(&f, stage, Retention::default())
+        .await
+        .unwrap();
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
-    assert_eq!(has_datasets(&f, &of(1)).await, [false, false, true, true]);
+    assert_eq!(
+        datasets_exist(&f, &beta_evaluations).await,
+        [false, false, true, true]
+    );
 }
 
 #[tokio::test]
 async fn dataset_file_is_deleted_despite_restarts() {
     let mut f = TestStore::new().await;
-    let alpha = stored_team(&f, "Alpha").await;
-    let mut played = Vec::new();
+    let alpha = stored_submission_of(&f, "Alpha").await;
+    let mut evaluations = Vec::new();
     for score in [1.0, 2.0] {
-        played.extend(run_day(&f, &[(&alpha, score)], 10).await);
-        f.later(DAY_S);
+        evaluations.extend(run_day(&f, &[(&alpha, score)], 10).await);
+        f.advance_clock_s(DAY_S);
     }
-    let stage = stage_of_season(&f).await;
-    keep(&f, stage, last(1)).await.unwrap();
-    let key = format!("datasets/{}/1.zip", played[0]);
+    let stage = first_stage(&f).await;
+    set_retention(&f, stage, keep_last(1)).await.unwrap();
+    let key = format!("datasets/{}/1.zip", evaluations[0]);
     f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!(has_datasets(&f, &played).await, [false, true]);
+    assert_eq!(datasets_exist(&f, &evaluations).await, [false, true]);
     assert!(
         has_file(&f, &key).await,
-        "a backup that started before may still read it"
+        "a backup that started before may still read the file"
     );
-    // Another process finds what is to be deleted.
+    // After a restart the file is still to be deleted.
     f.store = f.reopen().await;
-    f.later(FILES_KEPT_FOR.as_secs() - 1);
+    f.advance_clock_s(FILES_KEPT_FOR.as_secs() - 1);
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 0);
-    f.later(1);
+    f.advance_clock_s(1);
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 1);
     assert!(!has_file(&f, &key).await);
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 0);
@@ -239,34 +264,34 @@ async fn dataset_file_is_deleted_despite_restarts() {
         .await
         .unwrap();
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 1);
-    let other = format!("datasets/{}/1.zip", played[1]);
+    let other = format!("datasets/{}/1.zip", evaluations[1]);
     assert!(has_file(&f, &other).await);
 }
 
 #[tokio::test]
 async fn retention_waits_for_open_evaluations_and_trials() {
     let mut f = TestStore::new().await;
-    let alpha = stored_team(&f, "Alpha").await;
+    let alpha = stored_submission_of(&f, "Alpha").await;
     for score in [1.0, 2.0, 3.0] {
         run_day(&f, &[(&alpha, score)], 10).await;
-        f.later(DAY_S);
+        f.advance_clock_s(DAY_S);
     }
-    let stage = stage_of_season(&f).await;
-    keep(&f, stage, last(1)).await.unwrap();
+    let stage = first_stage(&f).await;
+    set_retention(&f, stage, keep_last(1)).await.unwrap();
     let expect_no_removal = async |f: &TestStore| {
         assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
         // The preview still shows what will be removed later.
         let preview = f
             .store
-            .preview_removal(stage, &last(1), f.now)
+            .preview_removal(stage, &keep_last(1), f.now)
             .await
             .unwrap();
         assert_eq!(preview.datasets, 2);
     };
-    // A pending trial.
+    // While a trial (an evaluation on request) is open.
     let trial = f
         .store
-        .propose_trial(Actor::Organiser, stage, None, "why", f.now)
+        .propose_trial(Actor::Organiser, stage, None, "a test", f.now)
         .await
         .unwrap();
     expect_no_removal(&f).await;
@@ -274,8 +299,8 @@ async fn retention_waits_for_open_evaluations_and_trials() {
         .drop_proposal(Actor::Organiser, trial.id, f.now)
         .await
         .unwrap();
-    // An unreleased day.
-    let evaluation = f.evaluate(alpha.id, &small()).await;
+    // While a day is not released.
+    let evaluation = f.evaluate(alpha.id, &one_shard_plan()).await;
     expect_no_removal(&f).await;
     f.store
         .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now)
@@ -287,8 +312,9 @@ async fn retention_waits_for_open_evaluations_and_trials() {
 #[tokio::test]
 async fn retention_keeps_datasets_of_blind_stage() {
     let mut f = TestStore::new().await;
-    let alpha = stored_team(&f, "Alpha").await;
-    let (rules, settings) = rules_and_settings(&small());
+    let alpha = stored_submission_of(&f, "Alpha").await;
+    let (rules, settings) = rules_and_settings(&one_shard_plan());
+    // The results of a blind stage are hidden from teams.
     let blind = StageSettings {
         blind: true,
         ..settings
@@ -297,7 +323,7 @@ async fn retention_keeps_datasets_of_blind_stage() {
         .configure_stage(rules, blind.clone(), Zone::UTC, f.now)
         .await
         .unwrap();
-    let stage = stage_of_season(&f).await;
+    let stage = first_stage(&f).await;
     for score in [1.0, 2.0] {
         f.store
             .start_day(Actor::Organiser, stage, f.now)
@@ -306,18 +332,18 @@ async fn retention_keeps_datasets_of_blind_stage() {
         let (claim, _, shard) = f.claim_shard().await;
         f.commit_shard(&claim, &shard, 0).await;
         let (claim, _) = f.claim_scoring().await;
-        f.finish(&claim, score, "d").await;
-        f.later(DAY_S);
+        f.finish_scoring(&claim, score, DATASET_KEY).await;
+        f.advance_clock_s(DAY_S);
     }
-    keep(&f, stage, last(1)).await.unwrap();
+    set_retention(&f, stage, keep_last(1)).await.unwrap();
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
-    // Their size is hidden, too.
+    // The size of the datasets is hidden, too.
     let storage = f
         .store
         .storage(Some(alpha.team), StorageScope::Released)
         .await;
     assert_eq!(storage.unwrap()[0].datasets, 0);
-    let opened = StageChange {
+    let unblinded = StageChange {
         settings: Some(StageSettings {
             blind: false,
             ..blind
@@ -325,7 +351,7 @@ async fn retention_keeps_datasets_of_blind_stage() {
         ..StageChange::default()
     };
     f.store
-        .change_stage(Actor::Organiser, stage, opened, f.now)
+        .change_stage(Actor::Organiser, stage, unblinded, f.now)
         .await
         .unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 1);
@@ -334,79 +360,87 @@ async fn retention_keeps_datasets_of_blind_stage() {
 #[tokio::test]
 async fn retention_ends_at_its_date_or_after_sign_off() {
     let mut f = TestStore::new().await;
-    let alpha = stored_team(&f, "Alpha").await;
-    let played = run_day(&f, &[(&alpha, 1.0)], 10).await;
-    let stage = stage_of_season(&f).await;
-    let until = Retention {
+    let alpha = stored_submission_of(&f, "Alpha").await;
+    let evaluations = run_day(&f, &[(&alpha, 1.0)], 10).await;
+    let stage = first_stage(&f).await;
+    let ends_now = Retention {
         until: Some(f.now),
         ..Retention::default()
     };
     // The date has passed, but the stage is still open.
-    let removed = f.store.preview_removal(stage, &until, f.now).await.unwrap();
+    let removed = f
+        .store
+        .preview_removal(stage, &ends_now, f.now)
+        .await
+        .unwrap();
     assert!(removed.is_empty());
-    let closes = StageChange {
+    let closing = StageChange {
         closes_at: Some(Some(f.now + SignedDuration::from_hours(1))),
         ..StageChange::default()
     };
     f.store
-        .change_stage(Actor::Organiser, stage, closes, f.now)
+        .change_stage(Actor::Organiser, stage, closing, f.now)
         .await
         .unwrap();
-    f.later(3600);
-    let removed = f.store.preview_removal(stage, &until, f.now).await.unwrap();
+    f.advance_clock_s(3600);
+    let removed = f
+        .store
+        .preview_removal(stage, &ends_now, f.now)
+        .await
+        .unwrap();
     assert_eq!((removed.datasets, removed.teams), (1, 1));
 
-    let days = Retention {
+    let thirty_days = Retention {
         days_after_sign_off: Some(30),
         ..Retention::default()
     };
-    keep(&f, stage, days).await.unwrap();
-    f.later(40 * DAY_S);
+    set_retention(&f, stage, thirty_days).await.unwrap();
+    f.advance_clock_s(40 * DAY_S);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     f.store
         .sign_off_stage(Actor::Organiser, stage, f.now)
         .await
         .unwrap();
-    f.later(30 * DAY_S - 1);
+    f.advance_clock_s(30 * DAY_S - 1);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
-    // The retention can be changed after the sign-off, unlike anything else.
+    // The retention can be changed after the sign-off, unlike the other settings.
     let longer = Retention {
         days_after_sign_off: Some(31),
         ..Retention::default()
     };
-    keep(&f, stage, longer).await.unwrap();
-    f.later(1);
+    set_retention(&f, stage, longer).await.unwrap();
+    f.advance_clock_s(1);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     let renamed = StageChange {
         name: Some("Other".parse().unwrap()),
-        retention: Some(days),
+        retention: Some(thirty_days),
         ..StageChange::default()
     };
-    let both = f
+    let changed = f
         .store
         .change_stage(Actor::Organiser, stage, renamed, f.now);
-    refused(both.await, &["signed off"]);
+    assert_conflict(changed.await, &["signed off"]);
     assert_eq!(
         f.store.stage_retention(stage).await.unwrap(),
         longer,
         "the change is atomic"
     );
-    f.later(DAY_S);
+    f.advance_clock_s(DAY_S);
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 1);
-    let reason = removal(&f, played[0]).await.unwrap();
+    let reason = removal_reason(&f, evaluations[0]).await.unwrap();
     assert!(reason.contains("31 days after the sign-off"), "{reason}");
     // The active submission stays: it may be evaluated in another stage.
-    let own = f.store.submission(alpha.id).await.unwrap();
-    assert_eq!(own.bundle_removed, None);
+    let submission = f.store.submission(alpha.id).await.unwrap();
+    assert_eq!(submission.bundle_removed, None);
 }
 
 #[tokio::test]
 async fn invalid_retention_is_refused() {
     let f = TestStore::new().await;
-    let stage = f.stage(&small()).await;
-    for (wrong, words) in [
-        (last(0), "expected 1 to 1000, got 0"),
-        (last(u32::MAX), "expected 1 to 1000"),
+    let stage = f.configure_stage(&one_shard_plan()).await;
+    for (retention, phrase) in [
+        (keep_last(0), "expected 1 to 1000, got 0"),
+        (keep_last(u32::MAX), "expected 1 to 1000"),
         (
             Retention {
                 days_after_sign_off: Some(0),
@@ -423,23 +457,26 @@ async fn invalid_retention_is_refused() {
             "one of them at most",
         ),
     ] {
-        refused(keep(&f, stage, wrong).await, &["retention", words]);
+        assert_conflict(
+            set_retention(&f, stage, retention).await,
+            &["retention", phrase],
+        );
     }
     assert!(f.store.stage_retention(stage).await.unwrap().keeps_all());
-    let none = keep(&f, StageId::new(), last(1)).await;
-    assert!(matches!(none, Err(StoreError::NotFound("stage"))));
+    let result = set_retention(&f, StageId::new(), keep_last(1)).await;
+    assert!(matches!(result, Err(StoreError::NotFound("stage"))));
 }
 
 #[tokio::test]
 async fn bundle_is_removed_with_its_last_dataset_unless_active() {
     let mut f = TestStore::new().await;
-    let old = stored_team(&f, "Alpha").await;
+    let old = stored_submission_of(&f, "Alpha").await;
     let team = f.store.team(old.team).await.unwrap();
     run_day(&f, &[(&old, 1.0)], 10).await;
-    f.later(DAY_S);
-    let new = upload(&f, &team).await;
+    f.advance_clock_s(DAY_S);
+    let new = upload_stored(&f, &team).await;
     let never_evaluated = {
-        let unused = upload(&f, &team).await;
+        let unused = upload_stored(&f, &team).await;
         let chosen = f
             .store
             .activate_submission(Actor::Team(team.id), new.id, f.now);
@@ -448,15 +485,15 @@ async fn bundle_is_removed_with_its_last_dataset_unless_active() {
     };
     for score in [5.0, 6.0] {
         run_day(&f, &[(&new, score)], 10).await;
-        f.later(DAY_S);
+        f.advance_clock_s(DAY_S);
     }
-    let stage = stage_of_season(&f).await;
-    keep(&f, stage, last(1)).await.unwrap();
+    let stage = first_stage(&f).await;
+    set_retention(&f, stage, keep_last(1)).await.unwrap();
     let removed = f.store.apply_retentions(f.now).await.unwrap();
     assert_eq!(
         (removed.datasets, removed.bundles, removed.bytes),
         (2, 0, 20),
-        "until the sign-off it may have to be rerun"
+        "until the sign-off an evaluation of the submission may be rerun"
     );
     sign_off(&mut f, stage).await;
     let removed = f.store.apply_retentions(f.now).await.unwrap();
@@ -465,34 +502,37 @@ async fn bundle_is_removed_with_its_last_dataset_unless_active() {
     let removed = f.store.submission(old.id).await.unwrap();
     let reason = removed.bundle_removed.unwrap().reason;
     assert!(reason.contains("the last 1 and the best"), "{reason}");
-    assert_eq!(removed.deleted, None, "it was not deleted on request");
+    assert_eq!(
+        removed.deleted, None,
+        "the submission was not deleted on request"
+    );
     for submission in [&new, &never_evaluated] {
         let submission = f.store.submission(submission.id).await.unwrap();
         assert_eq!(submission.bundle_removed, None);
     }
-    f.later(DAY_S);
+    f.advance_clock_s(DAY_S);
     f.store.remove_files_of_removed(f.now).await.unwrap();
     assert!(!has_file(&f, &old.bundle.key).await);
-    // It cannot be evaluated again.
+    // The submission cannot be evaluated again.
     let chosen = f
         .store
         .activate_submission(Actor::Team(team.id), old.id, f.now);
-    refused(
+    assert_conflict(
         chosen.await,
         &["bundle", "was removed", "cannot be evaluated again"],
     );
-    let plan = small();
+    let plan = one_shard_plan();
     let ablation = f
         .store
         .request_ablation(Actor::Organiser, old.id, &plan, f.now);
-    refused(ablation.await, &["was removed"]);
+    assert_conflict(ablation.await, &["was removed"]);
     assert!(f.claim().await.is_none(), "no job is queued");
 }
 
 #[tokio::test]
 async fn team_can_delete_unneeded_submission() {
     let mut f = TestStore::new().await;
-    let first = stored_team(&f, "Alpha").await;
+    let first = stored_submission_of(&f, "Alpha").await;
     let team = f.store.team(first.team).await.unwrap();
     let actor = Actor::Team(team.id);
     let delete = async |f: &TestStore, id: SubmissionId| {
@@ -500,11 +540,11 @@ async fn team_can_delete_unneeded_submission() {
             .delete_submission(Actor::Team(team.id), id, "by its team", f.now)
             .await
     };
-    refused(delete(&f, first.id).await, &["active", "withdraw it"]);
-    let evaluation = f.evaluate(first.id, &small()).await;
-    let second = upload(&f, &team).await;
-    refused(delete(&f, first.id).await, &["being evaluated"]);
-    f.run_all(4.0).await;
+    assert_conflict(delete(&f, first.id).await, &["active", "withdraw it"]);
+    let evaluation = f.evaluate(first.id, &one_shard_plan()).await;
+    let second = upload_stored(&f, &team).await;
+    assert_conflict(delete(&f, first.id).await, &["being evaluated"]);
+    f.run_all_with_score(4.0).await;
     // A trial of the submission.
     let trial = f
         .store
@@ -512,19 +552,19 @@ async fn team_can_delete_unneeded_submission() {
             Actor::Organiser,
             evaluation.stage_day.stage,
             Some(first.id),
-            "why",
+            "a test",
             f.now,
         )
         .await
         .unwrap();
-    refused(delete(&f, first.id).await, &["not decided yet"]);
+    assert_conflict(delete(&f, first.id).await, &["not decided yet"]);
     f.store
         .drop_proposal(Actor::Organiser, trial.id, f.now)
         .await
         .unwrap();
 
-    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
-    assert_eq!(used.stored_bytes, 20);
+    let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!(usage.stored_bytes, 20);
     f.store.check_deletable(first.id, f.now).await.unwrap();
     let deleted = delete(&f, first.id).await.unwrap();
     let deletion = deleted.deleted.unwrap();
@@ -537,47 +577,51 @@ async fn team_can_delete_unneeded_submission() {
     assert_eq!(deleted.agent_name.as_deref(), Some("striker"));
     let log = f.store.submission_log(first.id).await.unwrap();
     assert_eq!(log.as_deref(), Some("hello\n"));
-    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
-    assert_eq!(used.stored_bytes, 10, "the quota is free again at once");
-    assert_eq!(f.board().await[0].result.score, 4.0, "its result stays");
-    refused(delete(&f, first.id).await, &["was deleted on", "team:"]);
+    let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!(usage.stored_bytes, 10, "the quota is free again at once");
+    assert_eq!(
+        f.board().await[0].result.score,
+        4.0,
+        "the submission's result stays"
+    );
+    assert_conflict(delete(&f, first.id).await, &["was deleted on", "team:"]);
 
-    // Its bundle file is deleted later, and is not an orphan meanwhile.
+    // The bundle's file is deleted later. Until then the store does not remove it as an orphan.
     assert!(has_file(&f, &first.bundle.key).await);
-    // (File times come from the host's clock.)
+    // (A file's time of change comes from the host's clock.)
     let hour = SignedDuration::from_hours(1);
     let orphans = f
         .store
         .remove_orphaned_bundles(jiff::Timestamp::now() + hour);
     assert_eq!(orphans.await.unwrap(), 0);
-    f.later(DAY_S);
+    f.advance_clock_s(DAY_S);
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 1);
     assert!(!has_file(&f, &first.bundle.key).await);
     assert!(has_file(&f, &second.bundle.key).await);
-    // It cannot be evaluated again.
+    // The submission cannot be evaluated again.
     let chosen = f.store.activate_submission(actor, first.id, f.now);
-    refused(chosen.await, &["was removed", "by its team"]);
+    assert_conflict(chosen.await, &["was removed", "by its team"]);
     let voided = f
         .store
-        .void_evaluation(Actor::Organiser, evaluation.id, "why", f.now);
+        .void_evaluation(Actor::Organiser, evaluation.id, "a test", f.now);
     voided.await.unwrap();
     let rerun = f
         .store
         .rerun_evaluation(Actor::Organiser, evaluation.id, f.now);
-    refused(rerun.await, &["was removed", "by its team"]);
+    assert_conflict(rerun.await, &["was removed", "by its team"]);
 }
 
 #[tokio::test]
 async fn submission_without_bundle_cannot_be_deleted() {
     let f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     let waiting = f.upload(&team).await;
     let delete = async |id: SubmissionId| {
         f.store
-            .delete_submission(Actor::Organiser, id, "by an organiser: x", f.now)
+            .delete_submission(Actor::Organiser, id, "by an organiser: a mistake", f.now)
             .await
     };
-    refused(
+    assert_conflict(
         delete(waiting.id).await,
         &["validation run is queued or running"],
     );
@@ -593,80 +637,80 @@ async fn submission_without_bundle_cannot_be_deleted() {
         .commit_validation(&claim, outcome, f.now)
         .await
         .unwrap();
-    refused(
+    assert_conflict(
         delete(waiting.id).await,
         &["removes its bundle automatically"],
     );
     f.store.remove_refused_bundles(f.now).await.unwrap();
-    refused(delete(waiting.id).await, &["nothing left to delete"]);
-    let none = delete(SubmissionId::new()).await;
-    assert!(matches!(none, Err(StoreError::NotFound("submission"))));
+    assert_conflict(delete(waiting.id).await, &["nothing left to delete"]);
+    let result = delete(SubmissionId::new()).await;
+    assert!(matches!(result, Err(StoreError::NotFound("submission"))));
 }
 
 #[tokio::test]
 async fn submission_of_unreleased_day_cannot_be_deleted() {
     let f = TestStore::new().await;
-    let alpha = stored_team(&f, "Alpha").await;
-    let beta = stored_team(&f, "Beta").await;
-    f.evaluate(alpha.id, &small()).await;
+    let alpha = stored_submission_of(&f, "Alpha").await;
+    let beta = stored_submission_of(&f, "Beta").await;
+    f.evaluate(alpha.id, &one_shard_plan()).await;
     // One of the two evaluations is over, but the day is not.
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
-    let (claim, done) = f.claim_scoring().await;
-    f.finish(&claim, 1.0, "d").await;
-    let played = f.store.evaluation(done).await.unwrap().submission;
-    assert!([alpha.id, beta.id].contains(&played));
+    let (claim, finished) = f.claim_scoring().await;
+    f.finish_scoring(&claim, 1.0, DATASET_KEY).await;
+    let evaluated = f.store.evaluation(finished).await.unwrap().submission;
+    assert!([alpha.id, beta.id].contains(&evaluated));
     f.store
-        .withdraw_submission(Actor::Organiser, played, f.now)
+        .withdraw_submission(Actor::Organiser, evaluated, f.now)
         .await
         .unwrap();
     let refusal = f
         .store
-        .delete_submission(Actor::Organiser, played, "why", f.now)
+        .delete_submission(Actor::Organiser, evaluated, "a test", f.now)
         .await;
-    refused(refusal, &["a day that is not released"]);
-    f.run_all(2.0).await;
+    assert_conflict(refusal, &["a day that is not released"]);
+    f.run_all_with_score(2.0).await;
     f.store
-        .delete_submission(Actor::Organiser, played, "why", f.now)
+        .delete_submission(Actor::Organiser, evaluated, "a test", f.now)
         .await
         .unwrap();
     // The deleted submission does not prevent a re-evaluation of the other team.
-    let stage = stage_of_season(&f).await;
-    let of = f.store.evaluation(done).await.unwrap().stage_day;
-    assert_eq!(of.stage, stage);
+    let stage = first_stage(&f).await;
+    let stage_day = f.store.evaluation(finished).await.unwrap().stage_day;
+    assert_eq!(stage_day.stage, stage);
     let propose = async |scope| {
         f.store
-            .propose_reevaluation(Actor::Organiser, scope, "why", f.now)
+            .propose_reevaluation(Actor::Organiser, scope, "a test", f.now)
             .await
     };
-    let proposal = propose(Reevaluation::Day(of)).await.unwrap();
+    let proposal = propose(Reevaluation::Day(stage_day)).await.unwrap();
     let evaluations = f.store.proposal(proposal.id).await.unwrap().1;
     assert_eq!(evaluations.len(), 1);
-    assert_ne!(evaluations[0].submission, played);
-    let alone = propose(Reevaluation::Evaluation(done)).await;
-    refused(alone, &["was removed", "cannot be evaluated again"]);
+    assert_ne!(evaluations[0].submission, evaluated);
+    let result = propose(Reevaluation::Evaluation(finished)).await;
+    assert_conflict(result, &["was removed", "cannot be evaluated again"]);
 }
 
 #[tokio::test]
 async fn evidence_is_exempt_from_retention_and_deletion() {
     let mut f = TestStore::new().await;
     let (alpha, beta) = (
-        stored_team(&f, "Alpha").await,
-        stored_team(&f, "Beta").await,
+        stored_submission_of(&f, "Alpha").await,
+        stored_submission_of(&f, "Beta").await,
     );
-    let mut first = Vec::new();
+    let mut first_day = Vec::new();
     for score in [1.0, 2.0] {
-        let played = run_day(&f, &[(&alpha, score), (&beta, score)], 10).await;
-        if first.is_empty() {
-            first = played;
+        let evaluations = run_day(&f, &[(&alpha, score), (&beta, score)], 10).await;
+        if first_day.is_empty() {
+            first_day = evaluations;
         }
-        f.later(DAY_S);
+        f.advance_clock_s(DAY_S);
     }
-    let stage = stage_of_season(&f).await;
+    let stage = first_stage(&f).await;
     let team = f.store.team(alpha.team).await.unwrap();
     // The team deletes a submission before it is disqualified.
-    let deleted_early = upload(&f, &team).await;
-    upload(&f, &team).await;
+    let deleted_early = upload_stored(&f, &team).await;
+    upload_stored(&f, &team).await;
     let delete = async |f: &TestStore, id: SubmissionId| {
         f.store
             .delete_submission(Actor::Team(team.id), id, "by its team", f.now)
@@ -674,36 +718,38 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
     };
     delete(&f, deleted_early.id).await.unwrap();
     f.store
-        .disqualify_team(Actor::Organiser, team.id, "it spied", f.now)
+        .disqualify_team(Actor::Organiser, team.id, "it copied", f.now)
         .await
         .unwrap();
-    keep(&f, stage, last(1)).await.unwrap();
+    set_retention(&f, stage, keep_last(1)).await.unwrap();
     let removed = f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!((removed.datasets, removed.teams), (1, 1), "only Beta's");
-    assert_eq!(has_datasets(&f, &first).await, [true, false]);
-    refused(
+    assert_eq!(
+        (removed.datasets, removed.teams),
+        (1, 1),
+        "only a dataset of Beta"
+    );
+    assert_eq!(datasets_exist(&f, &first_day).await, [true, false]);
+    assert_conflict(
         delete(&f, alpha.id).await,
-        &["disqualified", "it spied", "evidence"],
+        &["disqualified", "it copied", "evidence"],
     );
     // Removed files become evidence, too, as long as they exist.
-    let ruling = async |f: &TestStore| {
-        f.store
-            .disqualify_team(Actor::Organiser, beta.team, "it slept", f.now)
-            .await
-    };
-    ruling(&f).await.unwrap();
-    let EvaluationState::Finished { dataset, .. } = f.state(first[1]).await else {
+    f.store
+        .disqualify_team(Actor::Organiser, beta.team, "it attacked", f.now)
+        .await
+        .unwrap();
+    let EvaluationState::Finished { dataset, .. } = f.state(first_day[1]).await else {
         panic!("expected a finished evaluation")
     };
-    f.later(2 * DAY_S);
+    f.advance_clock_s(2 * DAY_S);
     f.store.remove_files_of_removed(f.now).await.unwrap();
     assert!(
         has_file(&f, &deleted_early.bundle.key).await,
-        "it is evidence"
+        "the bundle is evidence"
     );
     assert!(has_file(&f, &dataset).await);
     f.store
-        .reinstate_team(Actor::Organiser, beta.team, "it did not", f.now)
+        .reinstate_team(Actor::Organiser, beta.team, "a mistake", f.now)
         .await
         .unwrap();
     f.store.remove_files_of_removed(f.now).await.unwrap();
@@ -711,7 +757,7 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
 
     // After the reinstatement the usual rules apply.
     f.store
-        .reinstate_team(Actor::Organiser, team.id, "it did not", f.now)
+        .reinstate_team(Actor::Organiser, team.id, "a mistake", f.now)
         .await
         .unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 1);
@@ -721,18 +767,18 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
 #[tokio::test]
 async fn team_retired_by_organiser_cannot_delete_files() {
     let f = TestStore::new().await;
-    let alpha = stored_team(&f, "Alpha").await;
+    let alpha = stored_submission_of(&f, "Alpha").await;
     let team = f.store.team(alpha.team).await.unwrap();
-    upload(&f, &team).await;
+    upload_stored(&f, &team).await;
     let retire = async |actor: Actor| f.store.retire_team(actor, team.id, f.now).await;
     let delete = async || {
         f.store
             .check_deletable(alpha.id, f.now)
             .await
-            .map(|found| found.id)
+            .map(|submission| submission.id)
     };
     retire(Actor::Organiser).await.unwrap();
-    refused(delete().await, &["an organiser", "kept"]);
+    assert_conflict(delete().await, &["an organiser", "kept"]);
     f.store
         .return_team(Actor::Organiser, team.id, f.now)
         .await
@@ -746,33 +792,33 @@ async fn team_retired_by_organiser_cannot_delete_files() {
 #[tokio::test]
 async fn storage_is_reported_without_reading_files() {
     let mut f = TestStore::new().await;
-    let alpha = stored_team(&f, "Alpha").await;
-    let beta = stored_team(&f, "Beta").await;
+    let alpha = stored_submission_of(&f, "Alpha").await;
+    let beta = stored_submission_of(&f, "Beta").await;
     run_day(&f, &[(&alpha, 1.0), (&beta, 1.0)], 1000).await;
-    f.later(DAY_S);
-    let of = async |f: &TestStore, counted: StorageScope| {
-        let all = f.store.storage(None, counted).await.unwrap();
-        let one = f.store.storage(Some(alpha.team), counted).await.unwrap();
-        assert_eq!(all[0], one[0]);
-        assert_eq!((all.len(), one.len()), (2, 1));
-        one[0].clone()
+    f.advance_clock_s(DAY_S);
+    let storage_of_alpha = async |f: &TestStore, scope: StorageScope| {
+        let all = f.store.storage(None, scope).await.unwrap();
+        let alone = f.store.storage(Some(alpha.team), scope).await.unwrap();
+        assert_eq!(all[0], alone[0]);
+        assert_eq!((all.len(), alone.len()), (2, 1));
+        alone[0].clone()
     };
-    let storage = of(&f, StorageScope::All).await;
+    let storage = storage_of_alpha(&f, StorageScope::All).await;
     assert_eq!(storage.name.as_str(), "Alpha");
     assert_eq!((storage.bundles, storage.bundle_bytes), (1, 10));
     assert_eq!((storage.datasets, storage.dataset_bytes), (1, 1000));
-    assert_eq!(of(&f, StorageScope::Released).await, storage);
+    assert_eq!(storage_of_alpha(&f, StorageScope::Released).await, storage);
 
     // The size of a dataset is hidden from its team until the day is released.
-    f.evaluate(alpha.id, &small()).await;
+    f.evaluate(alpha.id, &one_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
     let (claim, evaluation) = f.claim_scoring().await;
     let owner = f.store.evaluation(evaluation).await.unwrap().team;
     store_file(&f, "datasets/today.zip", 77).await;
-    f.finish(&claim, 1.0, "datasets/today.zip").await;
+    f.finish_scoring(&claim, 1.0, "datasets/today.zip").await;
     let storage_of_owner =
-        async |counted| f.store.storage(Some(owner), counted).await.unwrap()[0].clone();
+        async |scope| f.store.storage(Some(owner), scope).await.unwrap()[0].clone();
     assert_eq!(
         storage_of_owner(StorageScope::All).await.dataset_bytes,
         1077
@@ -782,7 +828,7 @@ async fn storage_is_reported_without_reading_files() {
         1000
     );
 
-    // Datasets of older versions are measured once; a lost one takes no space.
+    // Datasets that older versions stored without their size are measured once. A missing dataset takes no space.
     let mut connection = f.connection().await;
     sqlx::query("UPDATE evaluations SET dataset_bytes = NULL WHERE state = 'finished'")
         .execute(&mut connection)
@@ -799,22 +845,30 @@ async fn storage_is_reported_without_reading_files() {
     assert_eq!(f.store.measure_datasets(f.now).await.unwrap(), 0);
     let measured = storage_of_owner(StorageScope::All).await;
     assert_eq!((measured.dataset_bytes, measured.unmeasured), (1000, 0));
-    let none = f
+    let unknown = f
         .store
         .storage(Some(TeamId::new()), StorageScope::All)
         .await;
-    assert!(none.unwrap().is_empty());
+    assert!(unknown.unwrap().is_empty());
 }
 
-/// A data folder of a version before retentions.
-async fn old_folder(folder: &std::path::Path) {
-    let all = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
-    let old = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(all).unwrap() {
+/// The first migration of retentions.
+const RETENTION_MIGRATION: &str = "0027";
+
+fn old_id(number: u32) -> String {
+    format!("01890000-0000-7000-8000-{number:012}")
+}
+
+/// Creates a data folder of a version before retentions. Team 1 was retired by an organiser, team 2 by itself. Each team has the
+/// valid submission of its number, and an invalid one of its number × 10, whose bundle was removed.
+async fn create_old_folder(folder: &std::path::Path) {
+    let migrations = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
+    let old_migrations = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(migrations).unwrap() {
         let entry = entry.unwrap();
         let name = entry.file_name().into_string().unwrap();
-        if name.as_str() < "0027" {
-            std::fs::copy(entry.path(), old.path().join(name)).unwrap();
+        if name.as_str() < RETENTION_MIGRATION {
+            std::fs::copy(entry.path(), old_migrations.path().join(name)).unwrap();
         }
     }
     let options = SqliteConnectOptions::new()
@@ -822,16 +876,18 @@ async fn old_folder(folder: &std::path::Path) {
         .create_if_missing(true)
         .foreign_keys(true);
     let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
-    let migrations = Migrator::new(old.path()).await.unwrap();
-    migrations.run(&mut connection).await.unwrap();
-    let id = |number: u32| format!("01890000-0000-7000-8000-{number:012}");
+    let migrator = Migrator::new(old_migrations.path()).await.unwrap();
+    migrator.run(&mut connection).await.unwrap();
     let mut sql = String::new();
-    for (number, by) in [(1, "organiser".to_owned()), (2, format!("team:{}", id(2)))] {
-        let team = id(number);
+    for (number, actor) in [
+        (1, "organiser".to_owned()),
+        (2, format!("team:{}", old_id(2))),
+    ] {
+        let team = old_id(number);
         sql.push_str(&format!(
             "INSERT INTO teams (id, name, created_at, retired_at) VALUES ('{team}', 'Team {number}', 5, 9);
              INSERT INTO events (at, actor, subject_kind, subject_id, kind, payload)
-             VALUES (9, '{by}', 'team', '{team}', 'team_retired', '{{}}');
+             VALUES (9, '{actor}', 'team', '{team}', 'team_retired', '{{}}');
              INSERT INTO submissions (id, team_id, bundle_key, bundle_bytes, bundle_blake3, bundle_file_name, created_at,
                                       agent_name, state, reason, log, label, withdrawn_at, bundle_removed_at)
              VALUES ('{team}', '{team}', 'bundles/{number}', 7, 'hash', 'a.zip', 6, 'a', 'valid', NULL, 'its log', 'mine',
@@ -839,7 +895,7 @@ async fn old_folder(folder: &std::path::Path) {
                     ('{}', '{team}', 'bundles/{number}0', 9, 'hash', 'b.zip', 7, NULL, 'invalid', 'why', 'a log', NULL,
                      NULL, 8);
              INSERT INTO active_submissions (team_id, submission_id, since) VALUES ('{team}', '{team}', 8);",
-            id(number * 10)
+            old_id(number * 10)
         ));
     }
     sqlx::raw_sql(sqlx::AssertSqlSafe(sql))
@@ -852,30 +908,29 @@ async fn old_folder(folder: &std::path::Path) {
 #[tokio::test]
 async fn migration_keeps_submissions_and_retirements() {
     let folder = tempfile::tempdir().unwrap();
-    old_folder(folder.path()).await;
+    create_old_folder(folder.path()).await;
     let store = Store::open(folder.path()).await.unwrap();
     let now = "2026-03-01T10:00:00Z".parse().unwrap();
-    let id = |number: u32| format!("01890000-0000-7000-8000-{number:012}");
     for number in [1, 2] {
-        let valid: SubmissionId = id(number).parse().unwrap();
-        let valid = store.submission(valid).await.unwrap();
+        let id: SubmissionId = old_id(number).parse().unwrap();
+        let valid = store.submission(id).await.unwrap();
         assert_eq!(valid.state, SubmissionState::Valid);
         assert_eq!(valid.label.as_deref(), Some("mine"));
         assert!(valid.active && valid.withdrawn_at.is_some());
         assert_eq!((valid.bundle_removed, valid.deleted), (None, None));
         let log = store.submission_log(valid.id).await.unwrap();
         assert_eq!(log.as_deref(), Some("its log"));
-        let refused: SubmissionId = id(number * 10).parse().unwrap();
-        let refused = store.submission(refused).await.unwrap();
-        assert!(refused.bundle_removed.is_some());
-        let used = store.upload_usage(valid.team, now).await.unwrap();
-        assert_eq!(used.stored_bytes, 7);
+        let id: SubmissionId = old_id(number * 10).parse().unwrap();
+        let invalid = store.submission(id).await.unwrap();
+        assert!(invalid.bundle_removed.is_some());
+        let usage = store.upload_usage(valid.team, now).await.unwrap();
+        assert_eq!(usage.stored_bytes, 7);
     }
     // Removed bundles are not deleted again.
     assert_eq!(store.remove_files_of_removed(now).await.unwrap(), 0);
-    // The migration takes from the log who retired a team.
-    let by_organiser = store.check_deletable(id(1).parse().unwrap(), now).await;
-    refused(by_organiser, &["an organiser withdrew the team"]);
-    let by_team = store.check_deletable(id(2).parse().unwrap(), now).await;
-    refused(by_team, &["it is active"]);
+    // The migration reads from the events who retired a team.
+    let retired_by_organiser = store.check_deletable(old_id(1).parse().unwrap(), now).await;
+    assert_conflict(retired_by_organiser, &["an organiser withdrew the team"]);
+    let retired_by_team = store.check_deletable(old_id(2).parse().unwrap(), now).await;
+    assert_conflict(retired_by_team, &["it is active"]);
 }

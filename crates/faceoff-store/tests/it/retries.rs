@@ -1,9 +1,10 @@
-//! A job knows how many earlier attempts ended by a platform fault.
+//! A claimed job tells the worker how many of its earlier attempts ended by a platform fault (a full disk, a killed worker).
 
 use crate::fixture::*;
 use faceoff_store::*;
 
-async fn claimed(f: &TestStore) -> (JobClaim, u32) {
+/// Claims the next shard. Returns its number of retries after platform faults, too.
+async fn claim_shard_and_retries(f: &TestStore) -> (JobClaim, u32) {
     match f.claim().await {
         Some(ClaimedJob {
             claim,
@@ -18,25 +19,25 @@ async fn claimed(f: &TestStore) -> (JobClaim, u32) {
 #[tokio::test]
 async fn platform_faults_count_as_retries_and_shutdowns_do_not() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let whole = RunPlan {
+    let submission = f.valid_submission_of("Alpha").await;
+    let one_shard = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
-        episodes_per_shard: plan().episodes_per_task,
-        ..plan()
+        episodes_per_shard: six_shard_plan().episodes_per_task,
+        ..six_shard_plan()
     };
-    f.evaluate(submission.id, &whole).await;
-    let (claim, retries) = claimed(&f).await;
+    f.evaluate(submission.id, &one_shard).await;
+    let (claim, retries) = claim_shard_and_retries(&f).await;
     assert_eq!(retries, 0);
     f.store.release(&claim, f.now).await.unwrap();
-    let (claim, retries) = claimed(&f).await;
+    let (claim, retries) = claim_shard_and_retries(&f).await;
     assert_eq!(retries, 0, "a shutdown is no fault");
 
     let failed = f.store.release_failed(&claim, "disk full", f.now).await;
     failed.unwrap();
-    f.later(3600);
-    let (_, retries) = claimed(&f).await;
-    assert_eq!(retries, 1, "a fault that was reported");
-    f.later(3600);
-    let (_, retries) = claimed(&f).await;
-    assert_eq!(retries, 2, "a worker that died");
+    f.advance_clock_s(3600);
+    let (_, retries) = claim_shard_and_retries(&f).await;
+    assert_eq!(retries, 1, "the worker reported a fault");
+    f.advance_clock_s(3600);
+    let (_, retries) = claim_shard_and_retries(&f).await;
+    assert_eq!(retries, 2, "the worker's lease expired");
 }

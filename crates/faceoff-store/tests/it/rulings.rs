@@ -1,4 +1,4 @@
-//! Organisers' decisions on results, days, teams and the queue.
+//! Rulings (organisers' decisions with a reason): a void result or day, a disqualified team, a paused queue.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,29 +6,20 @@ use faceoff_types::*;
 
 const REASON: &str = "the table was tilted";
 
-#[track_caller]
-fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
-    let Err(StoreError::Conflict(why)) = done else {
-        panic!("expected a conflict with {words:?}: {done:?}");
-    };
-    for word in words {
-        assert!(why.contains(word), "{word:?} is not in {why:?}");
-    }
-}
-
 async fn void(f: &TestStore, id: EvaluationId) -> Result<Evaluation, StoreError> {
     f.store
         .void_evaluation(Actor::Organiser, id, REASON, f.now)
         .await
 }
 
-async fn on_board(f: &TestStore) -> Vec<(String, f64)> {
+/// Teams and scores of the board.
+async fn board_rows(f: &TestStore) -> Vec<(String, f64)> {
     let board = f.board().await;
     let row = |row: &BoardRecord| (row.team.name.to_string(), row.result.score);
     board.iter().map(row).collect()
 }
 
-async fn kinds_since(f: &TestStore, id: i64) -> Vec<String> {
+async fn event_kinds_since(f: &TestStore, id: i64) -> Vec<String> {
     let events = f.store.events_after(id, 1000).await.unwrap();
     let kind = |record: &EventRecord| {
         let event = serde_json::to_value(&record.event).unwrap();
@@ -37,6 +28,7 @@ async fn kinds_since(f: &TestStore, id: i64) -> Vec<String> {
     events.iter().map(kind).collect()
 }
 
+/// Id of the newest event.
 async fn newest_event(f: &TestStore) -> i64 {
     f.store
         .events_after(0, 1000)
@@ -50,20 +42,20 @@ async fn newest_event(f: &TestStore) -> i64 {
 #[tokio::test]
 async fn voided_result_leaves_board_and_can_be_rerun() {
     let mut f = TestStore::new().await;
-    let agent = f.ready_team("Alpha").await;
-    let first = f.evaluate(agent.id, &small()).await;
-    refused(
+    let submission = f.valid_submission_of("Alpha").await;
+    let first = f.evaluate(submission.id, &one_shard_plan()).await;
+    assert_conflict(
         void(&f, first.id).await,
         &["queued or running", "cancelled"],
     );
-    f.finish_next().await;
-    f.later(24 * 3600);
-    let second = f.evaluate(agent.id, &small()).await;
-    f.run_all(2.0).await;
-    assert_eq!(on_board(&f).await, [("Alpha".to_owned(), 2.0)]);
+    f.finish_next_evaluation().await;
+    f.advance_clock_s(24 * 3600);
+    let second = f.evaluate(submission.id, &one_shard_plan()).await;
+    f.run_all_with_score(2.0).await;
+    assert_eq!(board_rows(&f).await, [("Alpha".to_owned(), 2.0)]);
 
-    let before = newest_event(&f).await;
-    f.later(60);
+    let event_before = newest_event(&f).await;
+    f.advance_clock_s(60);
     let voided = void(&f, second.id).await.unwrap();
     let ruling = Ruling {
         at: f.now,
@@ -72,11 +64,14 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
     assert_eq!(voided.voided, Some(ruling));
     assert!(
         matches!(voided.state, EvaluationState::Finished { .. }),
-        "it stays readable"
+        "the result stays readable"
     );
-    assert_eq!(kinds_since(&f, before).await, ["evaluation_voided"]);
-    // The day before counts again.
-    assert_eq!(on_board(&f).await, [("Alpha".to_owned(), 1.0)]);
+    assert_eq!(
+        event_kinds_since(&f, event_before).await,
+        ["evaluation_voided"]
+    );
+    // The result of the day before counts again.
+    assert_eq!(board_rows(&f).await, [("Alpha".to_owned(), 1.0)]);
     let days = f.store.days().await.unwrap();
     assert_eq!(
         days.iter()
@@ -84,7 +79,7 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
             .collect::<Vec<_>>(),
         [0, 1]
     );
-    refused(void(&f, second.id).await, &["only a counting evaluation"]);
+    assert_conflict(void(&f, second.id).await, &["only a counting evaluation"]);
 
     let rerun = f.store.rerun_evaluation(Actor::Organiser, second.id, f.now);
     let rerun = rerun.await.unwrap();
@@ -92,28 +87,28 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
         (rerun.rerun_of, rerun.stage_day),
         (Some(second.id), second.stage_day)
     );
-    f.run_all(3.0).await;
-    assert_eq!(on_board(&f).await, [("Alpha".to_owned(), 3.0)]);
-    let twice = f
+    f.run_all_with_score(3.0).await;
+    assert_eq!(board_rows(&f).await, [("Alpha".to_owned(), 3.0)]);
+    let repeated = f
         .store
         .rerun_evaluation(Actor::Organiser, second.id, f.now)
         .await;
-    refused(twice, &["counts"]);
+    assert_conflict(repeated, &["counts"]);
 }
 
 #[tokio::test]
-async fn paused_queue_starts_no_job_and_keeps_all() {
+async fn paused_queue_starts_no_job_and_loses_none() {
     let mut f = TestStore::new().await;
-    let agent = f.ready_team("Alpha").await;
+    let submission = f.valid_submission_of("Alpha").await;
     let two_shards = RunPlan {
         tasks: vec![Task::Hit],
-        ..plan()
+        ..six_shard_plan()
     };
-    f.evaluate(agent.id, &two_shards).await;
+    f.evaluate(submission.id, &two_shards).await;
     let (claim, _, shard) = f.claim_shard().await;
     let pause = async |f: &TestStore| f.store.pause_queue(Actor::Organiser, REASON, f.now).await;
     pause(&f).await.unwrap();
-    refused(pause(&f).await, &["paused already"]);
+    assert_conflict(pause(&f).await, &["paused already"]);
     let paused = f.store.season().await.unwrap().paused.unwrap();
     assert_eq!((paused.at, paused.reason.as_str()), (f.now, REASON));
     assert!(f.claim().await.is_none());
@@ -129,9 +124,9 @@ async fn paused_queue_starts_no_job_and_keeps_all() {
         ruling: paused,
     };
     assert_eq!(health.queue, expected);
-    // Days are queued while it lasts, and the queue does not count as stuck.
-    f.later(24 * 3600);
-    f.evaluate(agent.id, &two_shards).await;
+    // While the queue is paused, evaluations of days are queued, and the queue does not count as stuck.
+    f.advance_clock_s(24 * 3600);
+    f.evaluate(submission.id, &two_shards).await;
     assert!(f.claim().await.is_none());
     assert!(matches!(
         f.store.health(f.now).await.queue,
@@ -143,11 +138,11 @@ async fn paused_queue_starts_no_job_and_keeps_all() {
     let resume = async |f: &TestStore| f.store.resume_queue(Actor::Organiser, f.now).await;
     resume(&f).await.unwrap();
     assert!(signal.has_changed().unwrap(), "idle slots are notified");
-    refused(resume(&f).await, &["not paused"]);
-    f.run_all(1.0).await;
-    let states = f.store.evaluations_of(agent.team).await.unwrap();
-    assert_eq!(states.len(), 2);
-    for evaluation in states {
+    assert_conflict(resume(&f).await, &["not paused"]);
+    f.run_all_with_score(1.0).await;
+    let evaluations = f.store.evaluations_of(submission.team).await.unwrap();
+    assert_eq!(evaluations.len(), 2);
+    for evaluation in evaluations {
         assert!(matches!(evaluation.state, EvaluationState::Finished { .. }));
     }
 }
@@ -155,17 +150,23 @@ async fn paused_queue_starts_no_job_and_keeps_all() {
 #[tokio::test]
 async fn voided_day_is_over_at_once() {
     let mut f = TestStore::new().await;
-    let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
-    let of = f.evaluate(alpha.id, &small()).await.stage_day;
-    let under_way = f.evaluate(beta.id, &small()).await.id;
-    let done = f.finish_next().await;
-    let void_day =
-        async |f: &TestStore| f.store.void_day(Actor::Organiser, of, REASON, f.now).await;
-    let before = newest_event(&f).await;
-    f.later(60);
+    let [alpha, beta] = [
+        f.valid_submission_of("Alpha").await,
+        f.valid_submission_of("Beta").await,
+    ];
+    let stage_day = f.evaluate(alpha.id, &one_shard_plan()).await.stage_day;
+    let open = f.evaluate(beta.id, &one_shard_plan()).await.id;
+    let done = f.finish_next_evaluation().await;
+    let void_day = async |f: &TestStore| {
+        f.store
+            .void_day(Actor::Organiser, stage_day, REASON, f.now)
+            .await
+    };
+    let event_before = newest_event(&f).await;
+    f.advance_clock_s(60);
     assert_eq!(void_day(&f).await.unwrap(), 2);
     assert_eq!(
-        kinds_since(&f, before).await,
+        event_kinds_since(&f, event_before).await,
         [
             "evaluation_voided",
             "evaluation_cancelled",
@@ -175,22 +176,25 @@ async fn voided_day_is_over_at_once() {
     );
     assert!(f.store.evaluation(done).await.unwrap().voided.is_some());
     assert!(matches!(
-        f.state(under_way).await,
+        f.state(open).await,
         EvaluationState::Cancelled { .. }
     ));
-    assert_eq!(on_board(&f).await, []);
-    assert!(f.claim().await.is_none(), "no job of it is left");
-    refused(void_day(&f).await, &["no evaluation", "counts"]);
-    let other = StageDay {
-        date: of.date.tomorrow().unwrap(),
-        ..of
+    assert_eq!(board_rows(&f).await, []);
+    assert!(f.claim().await.is_none(), "no job of the day is left");
+    assert_conflict(void_day(&f).await, &["no evaluation", "counts"]);
+    let not_started = StageDay {
+        date: stage_day.date.tomorrow().unwrap(),
+        ..stage_day
     };
-    let none = f
+    let result = f
         .store
-        .void_day(Actor::Organiser, other, REASON, f.now)
+        .void_day(Actor::Organiser, not_started, REASON, f.now)
         .await;
-    assert!(matches!(none, Err(StoreError::NotFound("day"))), "{none:?}");
-    for id in [done, under_way] {
+    assert!(
+        matches!(result, Err(StoreError::NotFound("day"))),
+        "{result:?}"
+    );
+    for id in [done, open] {
         let rerun = f.store.rerun_evaluation(Actor::Organiser, id, f.now);
         rerun.await.unwrap();
     }
@@ -199,15 +203,18 @@ async fn voided_day_is_over_at_once() {
 #[tokio::test]
 async fn disqualified_team_is_excluded_until_reinstated() {
     let mut f = TestStore::new().await;
-    let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
-    f.evaluate(alpha.id, &small()).await;
-    f.run_all(1.0).await;
-    f.later(24 * 3600);
-    let second = f.evaluate(alpha.id, &small()).await;
+    let [alpha, beta] = [
+        f.valid_submission_of("Alpha").await,
+        f.valid_submission_of("Beta").await,
+    ];
+    f.evaluate(alpha.id, &one_shard_plan()).await;
+    f.run_all_with_score(1.0).await;
+    f.advance_clock_s(24 * 3600);
+    let second = f.evaluate(alpha.id, &one_shard_plan()).await;
     let disqualify = async |f: &TestStore| {
-        let why = "another team's bundle";
+        let reason = "another team's bundle";
         f.store
-            .disqualify_team(Actor::Organiser, alpha.team, why, f.now)
+            .disqualify_team(Actor::Organiser, alpha.team, reason, f.now)
             .await
     };
     let team = disqualify(&f).await.unwrap();
@@ -216,11 +223,11 @@ async fn disqualified_team_is_excluded_until_reinstated() {
         panic!("expected a cancelled evaluation");
     };
     assert_eq!(reason, "the team is disqualified: another team's bundle");
-    f.run_all(2.0).await;
-    assert_eq!(on_board(&f).await, [("Beta".to_owned(), 2.0)]);
-    refused(disqualify(&f).await, &["already"]);
+    f.run_all_with_score(2.0).await;
+    assert_eq!(board_rows(&f).await, [("Beta".to_owned(), 2.0)]);
+    assert_conflict(disqualify(&f).await, &["already"]);
 
-    let disqualified = |error: StoreError| {
+    let assert_disqualified = |error: StoreError| {
         assert!(
             matches!(error, StoreError::Disqualified { .. }),
             "{error:?}"
@@ -231,25 +238,28 @@ async fn disqualified_team_is_excluded_until_reinstated() {
     let upload = f
         .store
         .create_submission(Actor::Team(team.id), team.id, bundle(), &quota, f.now);
-    disqualified(upload.await.unwrap_err());
+    assert_disqualified(upload.await.unwrap_err());
     let choice = f
         .store
         .activate_submission(Actor::Team(team.id), alpha.id, f.now);
-    disqualified(choice.await.unwrap_err());
+    assert_disqualified(choice.await.unwrap_err());
     let rerun = f.store.rerun_evaluation(Actor::Organiser, second.id, f.now);
-    disqualified(rerun.await.unwrap_err());
-    f.later(24 * 3600);
-    let stage = f.stage(&small()).await;
+    assert_disqualified(rerun.await.unwrap_err());
+    f.advance_clock_s(24 * 3600);
+    let stage = f.configure_stage(&one_shard_plan()).await;
     let started = f
         .store
         .start_day(Actor::Organiser, stage, f.now)
         .await
         .unwrap();
     assert_eq!(
-        started.iter().map(|one| one.team).collect::<Vec<_>>(),
+        started
+            .iter()
+            .map(|evaluation| evaluation.team)
+            .collect::<Vec<_>>(),
         [beta.team]
     );
-    f.run_all(3.0).await;
+    f.run_all_with_score(3.0).await;
 
     let reinstate = async |f: &TestStore| {
         f.store
@@ -257,13 +267,15 @@ async fn disqualified_team_is_excluded_until_reinstated() {
             .await
     };
     assert_eq!(reinstate(&f).await.unwrap().disqualified, None);
-    refused(reinstate(&f).await, &["not disqualified"]);
-    let names: Vec<_> = on_board(&f).await;
-    assert_eq!(names, [("Alpha".to_owned(), 1.0), ("Beta".to_owned(), 3.0)]);
+    assert_conflict(reinstate(&f).await, &["not disqualified"]);
+    assert_eq!(
+        board_rows(&f).await,
+        [("Alpha".to_owned(), 1.0), ("Beta".to_owned(), 3.0)]
+    );
     // An organiser can rerun the cancelled evaluation.
     let rerun = f.store.rerun_evaluation(Actor::Organiser, second.id, f.now);
     rerun.await.unwrap();
-    f.run_all(4.0).await;
-    assert_eq!(on_board(&f).await[0], ("Alpha".to_owned(), 4.0));
+    f.run_all_with_score(4.0).await;
+    assert_eq!(board_rows(&f).await[0], ("Alpha".to_owned(), 4.0));
     f.upload(&f.store.team(alpha.team).await.unwrap()).await;
 }

@@ -1,4 +1,4 @@
-//! Stages that accept only agents of some runtimes.
+//! Stages that accept only agents of some runtimes (the environments that agents run in, for example `python3`).
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -18,7 +18,8 @@ async fn accept_only(f: &TestStore, stage: StageId, runtime: &str) {
     changed.await.unwrap();
 }
 
-async fn excluded(f: &TestStore) -> Vec<Subject> {
+/// Subjects of the events that the stage did not accept a submission.
+async fn excluded_submissions(f: &TestStore) -> Vec<Subject> {
     let events = f.store.events_after(0, 1000).await.unwrap();
     let exclusions = events.into_iter().filter(|record| {
         matches!(&record.event, Event::SubmissionNotTaken { reason, .. } if reason.contains("“Qualifying”"))
@@ -29,12 +30,15 @@ async fn excluded(f: &TestStore) -> Vec<Subject> {
 #[tokio::test]
 async fn scheduled_day_without_submissions_is_released() {
     let f = TestStore::new().await;
-    let native = f.ready_team("Alpha").await;
-    let stage = f.stage(&plan()).await;
+    let native = f.valid_submission_of("Alpha").await;
+    let stage = f.configure_stage(&six_shard_plan()).await;
     accept_only(&f, stage, "python3").await;
     let started = f.store.start_scheduled_day(stage, f.now).await.unwrap();
     assert_eq!(started, Some(Vec::new()));
-    assert_eq!(excluded(&f).await, [Subject::Submission(native.id)]);
+    assert_eq!(
+        excluded_submissions(&f).await,
+        [Subject::Submission(native.id)]
+    );
     let day = f.store.newest_day(stage).await.unwrap().unwrap();
     assert_eq!(day.released_at, Some(f.now));
     assert!(f.claim().await.is_none(), "no job is queued");
@@ -43,7 +47,7 @@ async fn scheduled_day_without_submissions_is_released() {
 #[tokio::test]
 async fn submission_with_unknown_runtime_must_be_uploaded_again() {
     let f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     f.upload(&team).await;
     let old = f.validate().await;
     let mut connection = f.connection().await;
@@ -51,28 +55,41 @@ async fn submission_with_unknown_runtime_must_be_uploaded_again() {
         .execute(&mut connection)
         .await
         .unwrap();
-    let stage = f.stage(&plan()).await;
-    let active = || async { f.store.active_submissions().await.unwrap().remove(0) };
-    let current = async || f.store.stage(stage).await.unwrap();
+    let stage = f.configure_stage(&six_shard_plan()).await;
+    let active_submission = || async { f.store.active_submissions().await.unwrap().remove(0) };
+    let current_stage = async || f.store.stage(stage).await.unwrap();
     assert_eq!(
-        current().await.check_accepts(&active().await),
+        current_stage()
+            .await
+            .check_accepts(&active_submission().await),
         Ok(()),
         "all runtimes are accepted"
     );
     accept_only(&f, stage, "native").await;
-    let refused = current().await.check_accepts(&active().await).unwrap_err();
+    let refused = current_stage()
+        .await
+        .check_accepts(&active_submission().await)
+        .unwrap_err();
     assert!(refused.to_string().contains("upload it again"), "{refused}");
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
-    let Err(StoreError::Conflict(why)) = started else {
+    let Err(StoreError::Conflict(reason)) = started else {
         panic!("expected a refusal, got {started:?}");
     };
-    assert!(why.contains("that the stage accepts"), "{why}");
-    assert!(excluded(&f).await.is_empty(), "no exclusion is recorded");
+    assert!(reason.contains("that the stage accepts"), "{reason}");
+    assert!(
+        excluded_submissions(&f).await.is_empty(),
+        "no exclusion is recorded"
+    );
 
     f.upload(&team).await;
     let new = f.validate().await;
     assert_eq!(new.duplicate_of, Some(old.id));
-    assert_eq!(current().await.check_accepts(&active().await), Ok(()));
+    assert_eq!(
+        current_stage()
+            .await
+            .check_accepts(&active_submission().await),
+        Ok(())
+    );
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
     assert_eq!(started.unwrap()[0].submission, new.id);
 }

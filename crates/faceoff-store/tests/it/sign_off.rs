@@ -1,86 +1,81 @@
-//! Blind stages, final days, publication, and the sign-off of results.
+//! The end of a stage: blind stages (teams see no results until organisers open the stage), the final day after the closing,
+//! publication of evaluations, and the sign-off, which makes the results final.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
 
-fn at(text: &str) -> Timestamp {
+fn time(text: &str) -> Timestamp {
     text.parse().unwrap()
 }
 
-const CLOSES: &str = "2026-03-03T10:00:00Z";
+/// When the stages of these tests close.
+const CLOSES_AT: &str = "2026-03-03T10:00:00Z";
 
-async fn stage_with(f: &TestStore, settings: StageSettings) -> Stage {
-    let (rules, of_plan) = rules_and_settings(&small());
-    let new = NewStage {
+/// Creates an open stage whose evaluations have one shard.
+async fn create_stage(f: &TestStore, settings: StageSettings) -> Stage {
+    let (rules, plan_settings) = rules_and_settings(&one_shard_plan());
+    let stage = NewStage {
         name: "Warm-up".parse().unwrap(),
         opens_at: f.now,
-        closes_at: Some(at(CLOSES)),
+        closes_at: Some(time(CLOSES_AT)),
         zone: Zone::UTC,
         rules,
         settings: StageSettings {
-            episodes_per_shard: of_plan.episodes_per_shard,
+            episodes_per_shard: plan_settings.episodes_per_shard,
             ..settings
         },
     };
-    let made = f.store.create_stage(Actor::Organiser, new, f.now);
-    made.await.unwrap()
+    let created = f.store.create_stage(Actor::Organiser, stage, f.now);
+    created.await.unwrap()
 }
 
-fn blind() -> StageSettings {
+fn blind_settings() -> StageSettings {
     StageSettings {
         blind: true,
         ..StageSettings::default()
     }
 }
 
-fn by(standings: CountingResult) -> StageSettings {
+/// `standings` chooses the result of a team that counts for its rank.
+fn settings_with_standings(standings: CountingResult) -> StageSettings {
     StageSettings {
         standings,
         ..StageSettings::default()
     }
 }
 
-async fn start(f: &TestStore, stage: &Stage) -> Vec<Evaluation> {
+async fn start_day(f: &TestStore, stage: &Stage) -> Vec<Evaluation> {
     let started = f.store.start_day(Actor::Organiser, stage.id, f.now);
     started.await.unwrap()
 }
 
 /// Changes the current settings of a stage.
-async fn set(
+async fn change_settings(
     f: &TestStore,
     stage: &Stage,
     change: impl FnOnce(&mut StageSettings),
 ) -> Result<Stage, StoreError> {
     let mut settings = f.store.stage(stage.id).await.unwrap().settings;
     change(&mut settings);
-    let wanted = StageChange {
+    let stage_change = StageChange {
         settings: Some(settings),
         ..StageChange::default()
     };
     let changed = f
         .store
-        .change_stage(Actor::Organiser, stage.id, wanted, f.now);
+        .change_stage(Actor::Organiser, stage.id, stage_change, f.now);
     changed.await
 }
 
 async fn sign_off(f: &TestStore, stage: &Stage) -> Result<Stage, StoreError> {
-    let done = f.store.sign_off_stage(Actor::Organiser, stage.id, f.now);
-    done.await
+    f.store
+        .sign_off_stage(Actor::Organiser, stage.id, f.now)
+        .await
 }
 
-#[track_caller]
-fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
-    let Err(StoreError::Conflict(why)) = done else {
-        panic!("expected a conflict with {words:?}: {done:?}");
-    };
-    for word in words {
-        assert!(why.contains(word), "{word:?} is not in {why:?}");
-    }
-}
-
-async fn kinds(f: &TestStore) -> Vec<Event> {
+async fn all_events(f: &TestStore) -> Vec<Event> {
     let events = f.store.events_after(0, 1000).await.unwrap();
     events.into_iter().map(|record| record.event).collect()
 }
@@ -88,80 +83,83 @@ async fn kinds(f: &TestStore) -> Vec<Event> {
 #[tokio::test]
 async fn blind_stage_is_opened_once() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = stage_with(&f, blind()).await;
-    // Before the first score it can be changed freely.
-    set(&f, &stage, |settings| settings.blind = false)
+    f.valid_submission_of("Alpha").await;
+    let stage = create_stage(&f, blind_settings()).await;
+    // Before the first score a stage can be made blind, and opened, any number of times.
+    change_settings(&f, &stage, |settings| settings.blind = false)
         .await
         .unwrap();
-    start(&f, &stage).await;
-    set(&f, &stage, |settings| settings.blind = true)
+    start_day(&f, &stage).await;
+    change_settings(&f, &stage, |settings| settings.blind = true)
         .await
         .unwrap();
-    f.run_all(10.0).await;
-    refused(
+    f.run_all_with_score(10.0).await;
+    assert_conflict(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["Warm-up", "blind", "open it first"],
     );
 
-    f.now = at(CLOSES);
-    refused(sign_off(&f, &stage).await, &["blind", "open it first"]);
-    let other = set(&f, &stage, |settings| {
+    f.now = time(CLOSES_AT);
+    assert_conflict(sign_off(&f, &stage).await, &["blind", "open it first"]);
+    let with_other_change = change_settings(&f, &stage, |settings| {
         settings.blind = false;
         settings.ablation_episodes = 5;
     });
-    refused(other.await, &["closed at", "except to open a blind one"]);
-    let opened = set(&f, &stage, |settings| settings.blind = false)
+    assert_conflict(
+        with_other_change.await,
+        &["closed at", "except to open a blind one"],
+    );
+    let opened = change_settings(&f, &stage, |settings| settings.blind = false)
         .await
         .unwrap();
     assert!(!opened.settings.blind);
-    let repeated = set(&f, &stage, |settings| settings.blind = true).await;
-    refused(repeated, &["closed at"]);
+    let repeated = change_settings(&f, &stage, |settings| settings.blind = true).await;
+    assert_conflict(repeated, &["closed at"]);
     f.store.close_season(Actor::Organiser, f.now).await.unwrap();
 }
 
 #[tokio::test]
 async fn stage_with_scores_cannot_be_made_blind() {
     let f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = stage_with(&f, StageSettings::default()).await;
-    start(&f, &stage).await;
-    f.run_all(10.0).await;
-    let hidden = set(&f, &stage, |settings| settings.blind = true).await;
-    refused(hidden, &["blind: 1 evaluations", "before its first score"]);
+    f.valid_submission_of("Alpha").await;
+    let stage = create_stage(&f, StageSettings::default()).await;
+    start_day(&f, &stage).await;
+    f.run_all_with_score(10.0).await;
+    let changed = change_settings(&f, &stage, |settings| settings.blind = true).await;
+    assert_conflict(changed, &["blind: 1 evaluations", "before its first score"]);
 }
 
 #[tokio::test]
 async fn closed_stage_can_publish_earlier_but_not_later() {
     let mut f = TestStore::new().await;
-    let stage = stage_with(&f, StageSettings::default()).await;
-    f.now = at(CLOSES);
-    let sooner = set(&f, &stage, |settings| {
+    let stage = create_stage(&f, StageSettings::default()).await;
+    f.now = time(CLOSES_AT);
+    let changed = change_settings(&f, &stage, |settings| {
         settings.publishes = Publication::AtRelease
     });
     assert_eq!(
-        sooner.await.unwrap().settings.publishes,
+        changed.await.unwrap().settings.publishes,
         Publication::AtRelease
     );
-    for later in [Publication::AtClose, Publication::Never] {
-        let later = set(&f, &stage, |settings| settings.publishes = later);
-        refused(later.await, &["cannot be changed"]);
+    for publication in [Publication::AtClose, Publication::Never] {
+        let changed = change_settings(&f, &stage, |settings| settings.publishes = publication);
+        assert_conflict(changed.await, &["cannot be changed"]);
     }
 }
 
 #[tokio::test]
 async fn signed_off_stage_cannot_be_changed() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    f.ready_team("Beta").await;
-    let stage = stage_with(&f, StageSettings::default()).await;
-    let started = start(&f, &stage).await;
-    refused(
+    f.valid_submission_of("Alpha").await;
+    f.valid_submission_of("Beta").await;
+    let stage = create_stage(&f, StageSettings::default()).await;
+    let started = start_day(&f, &stage).await;
+    assert_conflict(
         sign_off(&f, &stage).await,
         &["has not closed", "2026-03-03"],
     );
-    f.now = at(CLOSES);
-    refused(
+    f.now = time(CLOSES_AT);
+    assert_conflict(
         sign_off(&f, &stage).await,
         &["2 evaluations", "cancel them"],
     );
@@ -169,50 +167,52 @@ async fn signed_off_stage_cannot_be_changed() {
         .store
         .cancel_evaluation(Actor::Organiser, started[1].id, "late", f.now);
     cancelled.await.unwrap();
-    f.run_all(10.0).await;
+    f.run_all_with_score(10.0).await;
     let beta = started[1].team;
-    let out = f
+    let disqualified = f
         .store
-        .disqualify_team(Actor::Organiser, beta, "why", f.now);
-    out.await.unwrap();
+        .disqualify_team(Actor::Organiser, beta, "a test", f.now);
+    disqualified.await.unwrap();
 
     f.store.check_can_sign_off(stage.id, f.now).await.unwrap();
     assert_eq!(f.store.stage(stage.id).await.unwrap().sign_off, None);
-    let done = sign_off(&f, &stage).await.unwrap();
+    let signed_off = sign_off(&f, &stage).await.unwrap();
     let expected = SignOff {
         signed_off_at: f.now,
         actor: Actor::Organiser,
         disqualified_teams: vec![beta],
     };
-    assert_eq!(done.sign_off, Some(expected));
-    let signed = kinds(&f).await;
-    assert!(signed.contains(&Event::StageFinalised));
+    assert_eq!(signed_off.sign_off, Some(expected));
+    let events = all_events(&f).await;
+    assert!(events.contains(&Event::StageFinalised));
 
-    f.later(60);
-    let words = [
+    f.advance_clock_s(60);
+    let phrases = [
         "Warm-up",
         "signed off on 2026-03-03 at 10:00:00 UTC by organiser",
     ];
-    refused(sign_off(&f, &stage).await, &words);
-    let (of, id) = (started[0].stage_day, started[0].id);
-    refused(
+    assert_conflict(sign_off(&f, &stage).await, &phrases);
+    let (stage_day, id) = (started[0].stage_day, started[0].id);
+    assert_conflict(
         f.store
-            .void_evaluation(Actor::Organiser, id, "why", f.now)
+            .void_evaluation(Actor::Organiser, id, "a test", f.now)
             .await,
-        &words,
+        &phrases,
     );
-    refused(
-        f.store.void_day(Actor::Organiser, of, "why", f.now).await,
-        &words,
+    assert_conflict(
+        f.store
+            .void_day(Actor::Organiser, stage_day, "a test", f.now)
+            .await,
+        &phrases,
     );
     let rerun = f
         .store
         .rerun_evaluation(Actor::Organiser, started[1].id, f.now);
-    refused(rerun.await, &words);
-    let change = set(&f, &stage, |settings| {
+    assert_conflict(rerun.await, &phrases);
+    let changed = change_settings(&f, &stage, |settings| {
         settings.publishes = Publication::AtRelease
     });
-    refused(change.await, &words);
+    assert_conflict(changed.await, &phrases);
     let rename = StageChange {
         name: Some("Other".parse().unwrap()),
         ..StageChange::default()
@@ -220,33 +220,35 @@ async fn signed_off_stage_cannot_be_changed() {
     let renamed = f
         .store
         .change_stage(Actor::Organiser, stage.id, rename, f.now);
-    refused(renamed.await, &words);
+    assert_conflict(renamed.await, &phrases);
 
     // A later disqualification or reinstatement changes other boards, but not this one.
     let alpha = started[0].team;
-    let teams = async || {
+    let board_teams = async || {
         let board = f.store.board(stage.id, 1).await.unwrap();
-        let by_day = f
+        let board_by_day = f
             .store
             .board_of_days(stage.id, 1, BoardDays::All, &BoardScope::default())
             .await
             .unwrap();
-        let teams = |board: Vec<BoardRecord>| -> Vec<TeamId> {
+        let teams_of = |board: Vec<BoardRecord>| -> Vec<TeamId> {
             board.into_iter().map(|row| row.team.id).collect()
         };
-        assert_eq!(teams(by_day), teams(board.clone()));
-        teams(board)
+        assert_eq!(teams_of(board_by_day), teams_of(board.clone()));
+        teams_of(board)
     };
-    assert_eq!(teams().await, [alpha]);
-    let out = f
+    assert_eq!(board_teams().await, [alpha]);
+    let disqualified = f
         .store
-        .disqualify_team(Actor::Organiser, alpha, "why", f.now);
-    out.await.unwrap();
-    let back = f.store.reinstate_team(Actor::Organiser, beta, "why", f.now);
-    back.await.unwrap();
-    assert_eq!(teams().await, [alpha]);
+        .disqualify_team(Actor::Organiser, alpha, "a test", f.now);
+    disqualified.await.unwrap();
+    let reinstated = f
+        .store
+        .reinstate_team(Actor::Organiser, beta, "a test", f.now);
+    reinstated.await.unwrap();
+    assert_eq!(board_teams().await, [alpha]);
 
-    // The database itself refuses changes that an operation fails to check.
+    // The database refuses the changes, too, in case that an operation fails to check.
     let mut connection = f.connection().await;
     for (sql, id) in [
         (
@@ -258,9 +260,9 @@ async fn signed_off_stage_cannot_be_changed() {
             stage.id.to_string(),
         ),
     ] {
-        let done = sqlx::query(sql).bind(id).execute(&mut connection).await;
+        let executed = sqlx::query(sql).bind(id).execute(&mut connection).await;
         assert!(
-            done.unwrap_err().to_string().contains("signed off"),
+            executed.unwrap_err().to_string().contains("signed off"),
             "{sql}"
         );
     }
@@ -269,33 +271,36 @@ async fn signed_off_stage_cannot_be_changed() {
 #[tokio::test]
 async fn final_day_runs_once_between_close_and_sign_off() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = stage_with(&f, by(CountingResult::Final)).await;
-    start(&f, &stage).await;
-    f.run_all(10.0).await;
-    let last = async |now| {
+    f.valid_submission_of("Alpha").await;
+    let stage = create_stage(&f, settings_with_standings(CountingResult::Final)).await;
+    start_day(&f, &stage).await;
+    f.run_all_with_score(10.0).await;
+    let start_final_day = async |now| {
         f.store
             .start_final_day(Actor::Organiser, stage.id, now)
             .await
     };
-    refused(
-        last(f.now).await,
+    assert_conflict(
+        start_final_day(f.now).await,
         &["has not closed", "final day comes after"],
     );
     assert_eq!(f.store.final_cutoff(stage.id).await.unwrap(), None);
-    f.now = at(CLOSES);
-    refused(sign_off(&f, &stage).await, &["final day", "start it first"]);
-    refused(
+    f.now = time(CLOSES_AT);
+    assert_conflict(sign_off(&f, &stage).await, &["final day", "start it first"]);
+    assert_conflict(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["Warm-up", "final day", "start it first"],
     );
 
-    let started = last(f.now).await.unwrap();
+    let started = start_final_day(f.now).await.unwrap();
     assert_eq!(started.len(), 1);
     let date = jiff::civil::date(2026, 3, 3);
     assert_eq!(started[0].stage_day.date, date);
-    refused(last(f.now).await, &["had its cutoff", "only one"]);
-    refused(sign_off(&f, &stage).await, &["1 evaluations"]);
+    assert_conflict(
+        start_final_day(f.now).await,
+        &["had its cutoff", "only one"],
+    );
+    assert_conflict(sign_off(&f, &stage).await, &["1 evaluations"]);
     let secret = f.store.season().await.unwrap().secret;
     let claimed = f.claim().await.unwrap();
     let Job::Shard { seeds, shard, .. } = claimed.job else {
@@ -307,7 +312,7 @@ async fn final_day_runs_once_between_close_and_sign_off() {
         "the final day has its own seeds"
     );
     f.commit_shard(&claimed.claim, &shard, 0).await;
-    f.run_all(40.0).await;
+    f.run_all_with_score(40.0).await;
 
     let scores = async |days| -> Vec<f64> {
         let rows = f
@@ -322,7 +327,7 @@ async fn final_day_runs_once_between_close_and_sign_off() {
     assert_eq!(scores(BoardDays::Last(1)).await, [40.0]);
     assert_eq!(f.store.final_cutoff(stage.id).await.unwrap(), Some(f.now));
     assert!(
-        kinds(&f)
+        all_events(&f)
             .await
             .contains(&Event::StageFinalStarted { day: date })
     );
@@ -332,15 +337,17 @@ async fn final_day_runs_once_between_close_and_sign_off() {
 #[tokio::test]
 async fn final_day_needs_its_own_date_and_a_submission() {
     let mut f = TestStore::new().await;
-    let without = stage_with(&f, by(CountingResult::Best)).await;
-    let other = f.store.start_final_day(Actor::Organiser, without.id, f.now);
-    refused(other.await, &["“best”", "no final day"]);
-    f.now = at("2026-03-03T09:00:00Z");
-    let (rules, settings) = rules_and_settings(&small());
-    let new = NewStage {
+    let without_final_day = create_stage(&f, settings_with_standings(CountingResult::Best)).await;
+    let started = f
+        .store
+        .start_final_day(Actor::Organiser, without_final_day.id, f.now);
+    assert_conflict(started.await, &["“best”", "no final day"]);
+    f.now = time("2026-03-03T09:00:00Z");
+    let (rules, settings) = rules_and_settings(&one_shard_plan());
+    let with_final_day = NewStage {
         name: "Last".parse().unwrap(),
         opens_at: f.now,
-        closes_at: Some(at(CLOSES)),
+        closes_at: Some(time(CLOSES_AT)),
         zone: Zone::UTC,
         rules,
         settings: StageSettings {
@@ -350,23 +357,23 @@ async fn final_day_needs_its_own_date_and_a_submission() {
     };
     let stage = f
         .store
-        .create_stage(Actor::Organiser, new, f.now)
+        .create_stage(Actor::Organiser, with_final_day, f.now)
         .await
         .unwrap();
-    let empty = f
+    let started = f
         .store
-        .start_final_day(Actor::Organiser, stage.id, at(CLOSES));
-    refused(empty.await, &["no team has a valid submission"]);
-    f.ready_team("Alpha").await;
-    start(&f, &stage).await;
-    f.run_all(1.0).await;
-    f.now = at(CLOSES);
+        .start_final_day(Actor::Organiser, stage.id, time(CLOSES_AT));
+    assert_conflict(started.await, &["no team has a valid submission"]);
+    f.valid_submission_of("Alpha").await;
+    start_day(&f, &stage).await;
+    f.run_all_with_score(1.0).await;
+    f.now = time(CLOSES_AT);
     let same_date = f.store.start_final_day(Actor::Organiser, stage.id, f.now);
     assert!(matches!(
         same_date.await,
         Err(StoreError::CutoffPassed { .. })
     ));
-    f.later(24 * 3600);
+    f.advance_clock_s(24 * 3600);
     let next = f.store.start_final_day(Actor::Organiser, stage.id, f.now);
     assert_eq!(next.await.unwrap().len(), 1);
 }
@@ -374,31 +381,35 @@ async fn final_day_needs_its_own_date_and_a_submission() {
 #[tokio::test]
 async fn evaluation_is_publishable_once_released_and_not_blind() {
     let mut f = TestStore::new().await;
-    let alpha = f.ready_team("Alpha").await.team;
-    f.ready_team("Beta").await;
-    let stage = stage_with(&f, blind()).await;
-    let started = start(&f, &stage).await;
+    let alpha = f.valid_submission_of("Alpha").await.team;
+    f.valid_submission_of("Beta").await;
+    let stage = create_stage(&f, blind_settings()).await;
+    let started = start_day(&f, &stage).await;
     let publish = async |f: &TestStore, id| {
-        let done = f.store.publish_evaluation(Actor::Team(alpha), id, f.now);
-        done.await
+        f.store
+            .publish_evaluation(Actor::Team(alpha), id, f.now)
+            .await
     };
     let id = started[0].id;
-    refused(publish(&f, id).await, &["finished evaluation"]);
-    assert_eq!(f.finish_next().await, id);
-    refused(publish(&f, id).await, &["blind"]);
-    // The stage is opened, but the day is not released.
-    let opened = set(&f, &stage, |settings| settings.blind = false).await;
+    assert_conflict(publish(&f, id).await, &["finished evaluation"]);
+    assert_eq!(f.finish_next_evaluation().await, id);
+    assert_conflict(publish(&f, id).await, &["blind"]);
+    // The stage is not blind any more, but the day is not released.
+    let opened = change_settings(&f, &stage, |settings| settings.blind = false).await;
     opened.unwrap();
-    refused(publish(&f, id).await, &["same episodes"]);
-    f.run_all(1.0).await;
+    assert_conflict(publish(&f, id).await, &["same episodes"]);
+    f.run_all_with_score(1.0).await;
     let published = publish(&f, id).await.unwrap();
     assert_eq!(published.published_at, Some(f.now));
-    let first = f.now;
-    f.later(5);
-    assert_eq!(publish(&f, id).await.unwrap().published_at, Some(first));
-    let recorded = kinds(&f).await;
-    let times = recorded
+    let published_at = f.now;
+    f.advance_clock_s(5);
+    assert_eq!(
+        publish(&f, id).await.unwrap().published_at,
+        Some(published_at)
+    );
+    let events = all_events(&f).await;
+    let publications = events
         .iter()
         .filter(|event| **event == Event::EvaluationPublished);
-    assert_eq!(times.count(), 1);
+    assert_eq!(publications.count(), 1);
 }

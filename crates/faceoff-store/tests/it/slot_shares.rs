@@ -1,4 +1,6 @@
-//! Fair shares of slot time. Tests set the clock and the duration of each job, and check the order of claims.
+//! Fair shares of slot time: a worker has *slots*, each of which runs one job at a time, and the time of all slots is shared
+//! equally by the teams, and by the kinds of jobs. Tests set the clock and the duration of each job, and check the order in
+//! which jobs are claimed.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,11 +8,11 @@ use faceoff_types::{EvaluationId, Task, TeamId};
 use sqlx::{Row, SqlSafeStr};
 use std::collections::BTreeMap;
 
-/// Longer than any job of these tests: no lease is renewed.
+/// Duration of a lease that is longer than any job of these tests, so that no lease needs to be renewed.
 const LONG_LEASE_S: u32 = 100_000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+enum JobKind {
     Validation,
     Shard,
     Scoring,
@@ -20,52 +22,57 @@ enum Kind {
 /// A job that a slot has run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct RunJob {
+    /// Name of the team; empty for a scoring or an ablation.
     team: &'static str,
-    kind: Kind,
-    /// Start and end, seconds since the beginning.
-    from: i64,
-    to: i64,
+    kind: JobKind,
+    /// Start, in seconds since [`Slots::started_at`].
+    start_s: i64,
+    end_s: i64,
 }
 
+/// Simulated slots of a worker.
 struct Slots {
     f: TestStore,
+    /// Names of the teams.
     teams: BTreeMap<TeamId, &'static str>,
+    /// The evaluations' teams.
     evaluations: BTreeMap<EvaluationId, TeamId>,
-    /// When each slot becomes free, and the job that it runs until then.
+    /// When each slot becomes free, in seconds since `started_at`, and the job that it runs until then.
     slots: Vec<(i64, Option<(JobClaim, Job)>)>,
     started_at: jiff::Timestamp,
-    served: Vec<RunJob>,
+    /// The jobs that the slots have run, in the order of their claims.
+    run_jobs: Vec<RunJob>,
 }
 
 impl Slots {
-    async fn new(slots: usize) -> Self {
+    async fn new(slot_count: usize) -> Self {
         let f = TestStore::new().await;
         let started_at = f.now;
         Self {
             f,
             teams: BTreeMap::new(),
             evaluations: BTreeMap::new(),
-            slots: (0..slots).map(|_| (0, None)).collect(),
+            slots: (0..slot_count).map(|_| (0, None)).collect(),
             started_at,
-            served: Vec::new(),
+            run_jobs: Vec::new(),
         }
     }
 
-    fn at(&self, second: i64) -> jiff::Timestamp {
+    fn time_at(&self, second: i64) -> jiff::Timestamp {
         self.started_at + jiff::SignedDuration::from_secs(second)
     }
 
-    async fn team(&mut self, name: &'static str) -> Team {
-        let team = self.f.team(name).await;
+    async fn create_team(&mut self, name: &'static str) -> Team {
+        let team = self.f.create_team(name).await;
         self.teams.insert(team.id, name);
         team
     }
 
-    /// Teams with a valid submission each, whose evaluations with the given numbers of shards are queued in this order.
-    async fn evaluations(&mut self, teams: &[(&'static str, u32)]) {
+    /// Creates teams with a valid submission each, and queues their evaluations with these numbers of shards in this order.
+    async fn queue_evaluations(&mut self, teams: &[(&'static str, u32)]) {
         let mut submissions = Vec::new();
         for (name, shards) in teams {
-            let team = self.team(name).await;
+            let team = self.create_team(name).await;
             self.f.upload(&team).await;
             let submission = self.f.validate().await;
             submissions.push((team.id, submission.id, *shards));
@@ -75,9 +82,9 @@ impl Slots {
                 tasks: vec![Task::Hit],
                 episodes_per_task: shards,
                 episodes_per_shard: 1,
-                ..plan()
+                ..six_shard_plan()
             };
-            // on separate days, so that their lengths can differ
+            // Each evaluation has its own day, so that their numbers of shards can differ.
             let evaluation = self.f.evaluate_alone(submission, &plan).await;
             self.evaluations.insert(evaluation, team);
         }
@@ -85,35 +92,37 @@ impl Slots {
     }
 
     /// Team and kind of a job; scoring and ablations have no team here.
-    async fn team_and_kind(&self, job: &Job) -> (&'static str, Kind) {
+    async fn team_and_kind(&self, job: &Job) -> (&'static str, JobKind) {
         match job {
-            Job::Validation { submission, .. } => (self.teams[&submission.team], Kind::Validation),
+            Job::Validation { submission, .. } => {
+                (self.teams[&submission.team], JobKind::Validation)
+            }
             Job::Shard {
                 owner: RunOwner::Evaluation(id),
                 ..
-            } => (self.teams[&self.evaluations[id]], Kind::Shard),
-            Job::Shard { .. } => ("", Kind::Ablation),
-            Job::Scoring { .. } => ("", Kind::Scoring),
+            } => (self.teams[&self.evaluations[id]], JobKind::Shard),
+            Job::Shard { .. } => ("", JobKind::Ablation),
+            Job::Scoring { .. } => ("", JobKind::Scoring),
             Job::Game { .. } => panic!("no game is queued"),
         }
     }
 
-    /// Runs the slots until no job is left or `until` is true. A job takes `cost` seconds.
+    /// Runs the slots until no job is left, or `stops` is true for the jobs so far. `duration_s` gives a job's duration.
     async fn run(
         &mut self,
-        cost: impl Fn(&'static str, Kind) -> i64,
-        until: impl Fn(&[RunJob]) -> bool,
+        duration_s: impl Fn(&'static str, JobKind) -> i64,
+        stops: impl Fn(&[RunJob]) -> bool,
     ) {
         loop {
             let index = (0..self.slots.len())
                 .min_by_key(|slot| self.slots[*slot].0)
                 .unwrap();
-            let (second, done) = std::mem::take(&mut self.slots[index]);
-            self.f.now = self.at(second);
-            if let Some((claim, job)) = done {
+            let (second, completed_job) = std::mem::take(&mut self.slots[index]);
+            self.f.now = self.time_at(second);
+            if let Some((claim, job)) = completed_job {
                 self.commit(&claim, job).await;
             }
-            let next = match until(&self.served) {
+            let next_job = match stops(&self.run_jobs) {
                 true => None,
                 false => self
                     .f
@@ -122,30 +131,30 @@ impl Slots {
                     .await
                     .unwrap(),
             };
-            match next {
+            match next_job {
                 Some(ClaimedJob { claim, job }) => {
                     let (team, kind) = self.team_and_kind(&job).await;
-                    let to = second + cost(team, kind);
-                    self.served.push(RunJob {
+                    let end_s = second + duration_s(team, kind);
+                    self.run_jobs.push(RunJob {
                         team,
                         kind,
-                        from: second,
-                        to,
+                        start_s: second,
+                        end_s,
                     });
-                    self.slots[index] = (to, Some((claim, job)));
+                    self.slots[index] = (end_s, Some((claim, job)));
                 }
                 None => {
-                    // until another slot is free, which can make a job claimable
-                    let others = self
+                    // The slot waits until another slot completes its job, which can make a job claimable.
+                    let busy_slots = self
                         .slots
                         .iter()
                         .enumerate()
                         .filter(|(_, slot)| slot.1.is_some());
-                    let Some(next) = others.map(|(_, slot)| slot.0).min() else {
+                    let Some(next_free) = busy_slots.map(|(_, slot)| slot.0).min() else {
                         self.slots[index].0 = second;
                         return;
                     };
-                    self.slots[index].0 = next.max(second) + 1;
+                    self.slots[index].0 = next_free.max(second) + 1;
                 }
             }
         }
@@ -155,58 +164,62 @@ impl Slots {
         let (store, now) = (&self.f.store, self.f.now);
         let committed = match job {
             Job::Validation { .. } => {
-                let refused = faceoff_types::ValidationOutcome::Invalid {
+                let invalid = faceoff_types::ValidationOutcome::Invalid {
                     runtime: None,
                     agent_name: None,
                     reason: "it does not answer".into(),
                     timing: Vec::new(),
                     log: String::new(),
                 };
-                store.commit_validation(claim, refused, now).await
+                store.commit_validation(claim, invalid, now).await
             }
             Job::Shard { run, shard, .. } => {
-                let mut played = commit(&shard, 0);
-                played.recording = played.recording.filter(|_| run.keeps_recordings);
-                store.commit_shard(claim, played, now).await
+                let mut commit = shard_commit(&shard, 0);
+                commit.recording = commit.recording.filter(|_| run.keeps_recordings);
+                store.commit_shard(claim, commit, now).await
             }
-            Job::Scoring { .. } => Ok(self.f.finish(claim, 1.0, "d").await),
+            Job::Scoring { .. } => Ok(self.f.finish_scoring(claim, 1.0, DATASET_KEY).await),
             Job::Game { .. } => panic!("no game is queued"),
         };
         assert_eq!(committed.unwrap(), CommitOutcome::Stored);
     }
 
-    fn order(&self) -> Vec<(&'static str, Kind)> {
-        self.served.iter().map(|one| (one.team, one.kind)).collect()
+    /// Teams and kinds of the jobs, in the order of their claims.
+    fn claim_order(&self) -> Vec<(&'static str, JobKind)> {
+        self.run_jobs
+            .iter()
+            .map(|job| (job.team, job.kind))
+            .collect()
     }
 
-    /// Total slot time of the matching jobs, seconds.
-    fn slot_time(served: &[RunJob], matches: impl Fn(&RunJob) -> bool) -> i64 {
-        served
+    /// Total slot time of the matching jobs, in seconds.
+    fn slot_time_s(run_jobs: &[RunJob], matches: impl Fn(&RunJob) -> bool) -> i64 {
+        run_jobs
             .iter()
-            .filter(|one| matches(one))
-            .map(|one| one.to - one.from)
+            .filter(|job| matches(job))
+            .map(|job| job.end_s - job.start_s)
             .sum()
     }
 }
 
 impl TestStore {
-    /// An evaluation of this submission only, on its own day.
+    /// Starts a day with an evaluation of this submission only.
     async fn evaluate_alone(
         &mut self,
         submission: faceoff_types::SubmissionId,
         plan: &RunPlan,
     ) -> EvaluationId {
-        self.later(24 * 3600);
-        let stage = self.stage(plan).await;
+        self.advance_clock_s(24 * 3600);
+        let stage = self.configure_stage(plan).await;
         let started = self
             .store
             .start_day(Actor::Organiser, stage, self.now)
             .await
             .unwrap();
-        let mut of_submission = None;
+        let mut evaluation_of_submission = None;
         for evaluation in started {
             if evaluation.submission == submission {
-                of_submission = Some(evaluation.id);
+                evaluation_of_submission = Some(evaluation.id);
             } else {
                 let cancelled = self.store.cancel_evaluation(
                     Actor::Organiser,
@@ -217,15 +230,16 @@ impl TestStore {
                 cancelled.await.unwrap();
             }
         }
-        // Days are run one after the other; these represent parts of one day.
+        // Workers run days (batches) one after the other; in these tests all days are parts of one batch.
         sqlx::query("UPDATE jobs SET batch = 0")
             .execute(&mut self.connection().await)
             .await
             .unwrap();
-        of_submission.expect("it was active at the cutoff")
+        evaluation_of_submission.expect("the submission was active at the cutoff")
     }
 }
 
+/// Runs the slots until no job is left.
 const NEVER: fn(&[RunJob]) -> bool = |_| false;
 
 #[tokio::test]
@@ -233,31 +247,31 @@ async fn slow_uploads_do_not_delay_other_teams() {
     for uploads in [2, 5] {
         for slots in [1, 2] {
             let mut s = Slots::new(slots).await;
-            s.evaluations(&[("Quick", 40)]).await;
-            let sleeper = s.team("Sleeper").await;
+            s.queue_evaluations(&[("Quick", 40)]).await;
+            let slow_validations = s.create_team("Slow validations").await;
             for _ in 0..uploads {
-                s.f.upload(&sleeper).await;
+                s.f.upload(&slow_validations).await;
             }
-            let cost = |_, kind| if kind == Kind::Validation { 100 } else { 10 };
-            s.run(cost, NEVER).await;
-            let validations: Vec<usize> = (0..s.served.len())
-                .filter(|at| s.served[*at].kind == Kind::Validation)
+            let duration_s = |_, kind| if kind == JobKind::Validation { 100 } else { 10 };
+            s.run(duration_s, NEVER).await;
+            let validations: Vec<usize> = (0..s.run_jobs.len())
+                .filter(|index| s.run_jobs[*index].kind == JobKind::Validation)
                 .collect();
             assert_eq!(validations.len(), uploads);
             // Ten shards take as long as one validation run.
             for pair in validations.windows(2) {
-                let left = s.served[pair[1]..]
+                let shards_left = s.run_jobs[pair[1]..]
                     .iter()
-                    .filter(|one| one.kind == Kind::Shard)
+                    .filter(|job| job.kind == JobKind::Shard)
                     .count();
-                let between = s.served[pair[0]..pair[1]]
+                let shards_between = s.run_jobs[pair[0]..pair[1]]
                     .iter()
-                    .filter(|one| one.kind == Kind::Shard)
+                    .filter(|job| job.kind == JobKind::Shard)
                     .count();
                 assert!(
-                    between >= 10 - slots || left == 0,
+                    shards_between >= 10 - slots || shards_left == 0,
                     "{slots} slots: {:?}",
-                    s.order()
+                    s.claim_order()
                 );
             }
         }
@@ -267,16 +281,16 @@ async fn slow_uploads_do_not_delay_other_teams() {
 #[tokio::test]
 async fn upload_flood_delays_other_upload_by_one() {
     let mut s = Slots::new(1).await;
-    let flood = s.team("Flood").await;
+    let flood = s.create_team("Flood").await;
     for _ in 0..20 {
         s.f.upload(&flood).await;
     }
-    s.run(|_, _| 60, |served| served.len() == 3).await;
-    let other = s.team("Other").await;
+    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 3).await;
+    let other = s.create_team("Other").await;
     s.f.upload(&other).await;
     s.f.upload(&other).await;
-    s.run(|_, _| 60, |served| served.len() == 7).await;
-    let teams: Vec<_> = s.served.iter().map(|one| one.team).collect();
+    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 7).await;
+    let teams: Vec<_> = s.run_jobs.iter().map(|job| job.team).collect();
     assert_eq!(
         teams,
         [
@@ -287,37 +301,40 @@ async fn upload_flood_delays_other_upload_by_one() {
 
 #[tokio::test]
 async fn slot_time_is_equal_for_waiting_teams() {
-    // in several orders, so that being first is no advantage
+    /// The longest duration of a job.
+    const MAX_DURATION_S: i64 = 600;
+    // Names, numbers of shards and durations of a shard in seconds: each team needs 1800 s.
     let teams = [("Slow", 3, 600), ("Middle", 15, 120), ("Quick", 60, 30)];
     for slots in [1, 3] {
+        // In several orders, so that being first is no advantage.
         for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
             let mut s = Slots::new(slots).await;
-            s.evaluations(&order.map(|index| (teams[index].0, teams[index].1)))
+            s.queue_evaluations(&order.map(|index| (teams[index].0, teams[index].1)))
                 .await;
-            let cost = |team, kind| match kind {
-                Kind::Shard => teams.iter().find(|one| one.0 == team).unwrap().2,
+            let duration_s = |team, kind| match kind {
+                JobKind::Shard => teams.iter().find(|(name, ..)| *name == team).unwrap().2,
                 _ => 1,
             };
-            s.run(cost, NEVER).await;
+            s.run(duration_s, NEVER).await;
             assert_eq!(
-                s.served
+                s.run_jobs
                     .iter()
-                    .filter(|one| one.kind == Kind::Shard)
+                    .filter(|job| job.kind == JobKind::Shard)
                     .count(),
-                78
+                3 + 15 + 60
             );
             // While all three teams have queued jobs, none is ahead by more than one job per slot.
-            for end in 1..s.served.len() {
-                let (before, after) = s.served.split_at(end);
-                let is_waiting = |name| after.iter().any(|one| one.team == name);
-                if !teams.iter().all(|one| is_waiting(one.0)) {
+            for end in 1..s.run_jobs.len() {
+                let (before, after) = s.run_jobs.split_at(end);
+                let is_waiting = |name| after.iter().any(|job| job.team == name);
+                if !teams.iter().all(|(name, ..)| is_waiting(*name)) {
                     break;
                 }
                 let times =
-                    teams.map(|one| Slots::slot_time(before, |served| served.team == one.0));
-                let apart = times.iter().max().unwrap() - times.iter().min().unwrap();
+                    teams.map(|(name, ..)| Slots::slot_time_s(before, |job| job.team == name));
+                let difference = times.iter().max().unwrap() - times.iter().min().unwrap();
                 assert!(
-                    apart <= 600 * (1 + slots as i64),
+                    difference <= MAX_DURATION_S * (1 + slots as i64),
                     "{slots} slots, {times:?} after {end}"
                 );
             }
@@ -328,89 +345,109 @@ async fn slot_time_is_equal_for_waiting_teams() {
 #[tokio::test]
 async fn running_jobs_count_as_slot_time() {
     let mut s = Slots::new(4).await;
-    s.evaluations(&[("A", 9), ("B", 9), ("C", 9)]).await;
-    s.run(|_, _| 1000, |served| served.len() == 6).await;
-    let mut first: Vec<_> = s.served[..3].iter().map(|one| one.team).collect();
-    first.sort_unstable();
-    assert_eq!(first, ["A", "B", "C"]);
-    let mut shares = BTreeMap::new();
-    for one in &s.served {
-        *shares.entry(one.team).or_insert(0) += 1;
+    s.queue_evaluations(&[("A", 9), ("B", 9), ("C", 9)]).await;
+    s.run(|_, _| 1000, |run_jobs| run_jobs.len() == 6).await;
+    let mut first_teams: Vec<_> = s.run_jobs[..3].iter().map(|job| job.team).collect();
+    first_teams.sort_unstable();
+    assert_eq!(first_teams, ["A", "B", "C"]);
+    let mut job_counts = BTreeMap::new();
+    for job in &s.run_jobs {
+        *job_counts.entry(job.team).or_insert(0) += 1;
     }
-    assert!(shares.values().all(|count| *count == 2), "{:?}", s.order());
+    assert!(
+        job_counts.values().all(|count| *count == 2),
+        "{:?}",
+        s.claim_order()
+    );
 }
 
 #[tokio::test]
 async fn slot_time_credit_expires_after_a_pause() {
     let mut s = Slots::new(1).await;
-    s.evaluations(&[("Busy", 60)]).await;
-    s.run(|_, _| 60, |served| served.len() == 30).await;
-    // From now on they share equally. A team without jobs for half an hour does not catch up, and the other one has no
-    // debt.
-    s.evaluations(&[("New", 30)]).await;
-    s.run(|_, _| 60, |served| served.len() == 50).await;
-    let since = &s.served[30..];
-    let runs = since.chunk_by(|a, b| a.team == b.team).map(<[_]>::len);
-    assert_eq!(runs.max(), Some(1), "alternating: {:?}", s.order());
-    // The same between kinds of jobs: a third team's uploads share with both.
-    let third = s.team("Third").await;
+    s.queue_evaluations(&[("Busy", 60)]).await;
+    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 30).await;
+    // From now on two teams share equally: the new team does not catch up on the half hour that it had no jobs.
+    s.queue_evaluations(&[("New", 30)]).await;
+    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 50).await;
+    let with_new = &s.run_jobs[30..];
+    let sequences = with_new.chunk_by(|a, b| a.team == b.team).map(<[_]>::len);
+    assert_eq!(
+        sequences.max(),
+        Some(1),
+        "the teams alternate: {:?}",
+        s.claim_order()
+    );
+    // The same holds for kinds of jobs: the validation runs of a third team alternate with the shards of both teams.
+    let third = s.create_team("Third").await;
     for _ in 0..10 {
         s.f.upload(&third).await;
     }
-    s.run(|_, _| 60, |served| served.len() == 70).await;
-    let since = &s.served[50..];
-    let runs = since.chunk_by(|a, b| a.kind == b.kind).map(<[_]>::len);
-    assert_eq!(runs.max(), Some(1), "alternating: {:?}", s.order());
-    let validations = since.iter().filter(|one| one.kind == Kind::Validation);
+    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 70).await;
+    let with_third = &s.run_jobs[50..];
+    let sequences = with_third.chunk_by(|a, b| a.kind == b.kind).map(<[_]>::len);
+    assert_eq!(
+        sequences.max(),
+        Some(1),
+        "the kinds alternate: {:?}",
+        s.claim_order()
+    );
+    let validations = with_third
+        .iter()
+        .filter(|job| job.kind == JobKind::Validation);
     assert_eq!(validations.count(), 10);
 }
 
 #[tokio::test]
 async fn ablations_run_last_and_scoring_first() {
     let mut s = Slots::new(1).await;
-    s.evaluations(&[("A", 3), ("B", 6)]).await;
-    let sleeper = s.team("Sleeper").await;
-    let valid =
+    s.queue_evaluations(&[("A", 3), ("B", 6)]).await;
+    let slow_validations = s.create_team("Slow validations").await;
+    let valid_submission =
         s.f.store
             .evaluation(*s.evaluations.keys().next().unwrap())
             .await
             .unwrap()
             .submission;
-    let small = RunPlan {
+    let one_episode_plan = RunPlan {
         episodes_per_task: 1,
-        ..plan()
+        ..six_shard_plan()
     };
     s.f.store
-        .request_ablation(Actor::Organiser, valid, &small, s.f.now)
+        .request_ablation(
+            Actor::Organiser,
+            valid_submission,
+            &one_episode_plan,
+            s.f.now,
+        )
         .await
         .unwrap();
     for _ in 0..3 {
-        s.f.upload(&sleeper).await;
+        s.f.upload(&slow_validations).await;
     }
     s.run(
-        |_, kind| if kind == Kind::Validation { 50 } else { 10 },
+        |_, kind| if kind == JobKind::Validation { 50 } else { 10 },
         NEVER,
     )
     .await;
-    let order = s.order();
+    let order = s.claim_order();
     let first_ablation = order
         .iter()
-        .position(|one| one.1 == Kind::Ablation)
+        .position(|(_, kind)| *kind == JobKind::Ablation)
         .unwrap();
     assert!(
         order[first_ablation..]
             .iter()
-            .all(|one| one.1 == Kind::Ablation),
+            .all(|(_, kind)| *kind == JobKind::Ablation),
         "{order:?}"
     );
     for (team, shards) in [("A", 3), ("B", 6)] {
-        let of_team: Vec<_> = (0..order.len())
-            .filter(|at| order[*at] == (team, Kind::Shard))
+        let team_shards: Vec<_> = (0..order.len())
+            .filter(|index| order[*index] == (team, JobKind::Shard))
             .collect();
-        assert_eq!(of_team.len(), shards);
+        assert_eq!(team_shards.len(), shards);
         assert_eq!(
-            order[of_team[shards - 1] + 1],
-            ("", Kind::Scoring),
+            order[team_shards[shards - 1] + 1],
+            ("", JobKind::Scoring),
             "{order:?}"
         );
     }
@@ -419,20 +456,20 @@ async fn ablations_run_last_and_scoring_first() {
 #[tokio::test]
 async fn slot_time_lost_by_the_platform_is_not_charged() {
     let mut s = Slots::new(1).await;
-    s.evaluations(&[("A", 4), ("B", 4)]).await;
-    // The first team's jobs fail by a platform fault, are released at a shutdown, or are lost with their worker, each
-    // after a long time. The team stays first.
+    s.queue_evaluations(&[("A", 4), ("B", 4)]).await;
+    // The first team's jobs fail by a platform fault, are released at a shutdown, or lose their lease, each after a long time.
+    // The team's jobs stay the first in the queue.
     let first = s.f.claim().await.unwrap();
     let (first_team, _) = s.team_and_kind(&first.job).await;
-    s.f.later(500);
+    s.f.advance_clock_s(500);
     s.f.store
         .release_failed(&first.claim, "disk full", s.f.now)
         .await
         .unwrap();
-    for ending in ["shutdown", "dead worker", "lease runs out"] {
+    for ending in ["shutdown", "killed worker", "expired lease"] {
         let next =
             s.f.store
-                .claim("dead", LEASE_S, s.f.now)
+                .claim("worker", LEASE_S, s.f.now)
                 .await
                 .unwrap()
                 .unwrap();
@@ -449,11 +486,13 @@ async fn slot_time_lost_by_the_platform_is_not_charged() {
                         .await
                         .unwrap()
                 );
-                s.f.later(500);
+                s.f.advance_clock_s(500);
                 s.f.store.release(&next.claim, s.f.now).await.unwrap();
             }
-            "dead worker" => assert_eq!(s.f.store.end_leases_of("dead", s.f.now).await.unwrap(), 1),
-            _ => s.f.later(i64::from(LEASE_S)),
+            "killed worker" => {
+                assert_eq!(s.f.store.end_leases_of("worker", s.f.now).await.unwrap(), 1);
+            }
+            _ => s.f.advance_clock_s(i64::from(LEASE_S)),
         }
     }
     // The lost job is claimed again, and only its new lease is charged.
@@ -469,30 +508,36 @@ async fn slot_time_lost_by_the_platform_is_not_charged() {
 #[tokio::test]
 async fn slot_time_charged_is_time_used() {
     let mut s = Slots::new(1).await;
-    s.evaluations(&[("A", 3), ("B", 3)]).await;
-    let charged = async |s: &Slots| -> Vec<i64> {
+    s.queue_evaluations(&[("A", 3), ("B", 3)]).await;
+    // Charged times in ms: that of all shards first, then those of the teams, the largest first.
+    let charged_ms = async |s: &Slots| -> Vec<i64> {
         let mut connection = s.f.connection().await;
         let rows = sqlx::query(
             "SELECT served_ms FROM accounts WHERE lane = 'shard' ORDER BY served_ms DESC",
         );
         let rows = rows.fetch_all(&mut connection).await.unwrap();
-        let lane: i64 = sqlx::query_scalar("SELECT served_ms FROM lanes WHERE lane = 'shard'")
-            .fetch_one(&mut connection)
-            .await
-            .unwrap();
+        let of_all_shards: i64 =
+            sqlx::query_scalar("SELECT served_ms FROM lanes WHERE lane = 'shard'")
+                .fetch_one(&mut connection)
+                .await
+                .unwrap();
         let accounts: Vec<i64> = rows.iter().map(|row| row.get(0)).collect();
-        [vec![lane], accounts].concat()
+        [vec![of_all_shards], accounts].concat()
     };
-    let before = charged(&s).await;
-    let lane = before[0];
-    let since = async |s: &Slots| {
-        let now = charged(s).await;
-        (now[0] - lane, now[1] - before[1])
+    let before = charged_ms(&s).await;
+    // What was charged since then: for all shards, and at most for one team.
+    let newly_charged_ms = async |s: &Slots| {
+        let now = charged_ms(s).await;
+        (now[0] - before[0], now[1] - before[1])
     };
     let (claim, run, shard) = s.f.claim_shard().await;
-    assert_eq!(since(&s).await, (15_000, 15_000), "a whole lease at once");
+    assert_eq!(
+        newly_charged_ms(&s).await,
+        (15_000, 15_000),
+        "a claim is charged its lease"
+    );
     for _ in 0..7 {
-        s.f.later(5);
+        s.f.advance_clock_s(5);
         assert!(
             s.f.store
                 .heartbeat(&claim, 0, LEASE_S, s.f.now)
@@ -500,40 +545,40 @@ async fn slot_time_charged_is_time_used() {
                 .unwrap()
         );
     }
-    assert_eq!(since(&s).await, (50_000, 50_000));
-    s.f.later(3);
+    assert_eq!(newly_charged_ms(&s).await, (50_000, 50_000));
+    s.f.advance_clock_s(3);
     assert!(run.keeps_recordings);
     s.f.commit_shard(&claim, &shard, 0).await;
     assert_eq!(
-        since(&s).await,
+        newly_charged_ms(&s).await,
         (38_000, 38_000),
-        "at the end the time used"
+        "a commit leaves the time used"
     );
-    // A lease that expired before the commit: the time used, too.
+    // A commit after the lease expired is charged the time used, too.
     let (claim, _, shard) = s.f.claim_shard().await;
-    s.f.later(100);
+    s.f.advance_clock_s(100);
     s.f.commit_shard(&claim, &shard, 0).await;
-    assert_eq!(since(&s).await, (138_000, 100_000));
+    assert_eq!(newly_charged_ms(&s).await, (138_000, 100_000));
     // A cancelled job is charged until its cancellation.
     let (claim, _, _) = s.f.claim_shard().await;
-    s.f.later(4);
+    s.f.advance_clock_s(4);
     let evaluation = *s.evaluations.keys().next().unwrap();
     s.f.store
         .cancel_evaluation(Actor::Organiser, evaluation, "no", s.f.now)
         .await
         .unwrap();
-    s.f.later(4);
-    let is_held =
+    s.f.advance_clock_s(4);
+    let is_leased =
         s.f.store
             .heartbeat(&claim, 0, LEASE_S, s.f.now)
             .await
             .unwrap();
-    let expected = if is_held {
+    let expected = if is_leased {
         138_000 + 19_000
     } else {
         138_000 + 4_000
     };
-    assert_eq!(since(&s).await.0, expected);
+    assert_eq!(newly_charged_ms(&s).await.0, expected);
 }
 
 #[tokio::test]
@@ -552,19 +597,24 @@ async fn claim_query_reads_open_jobs_only() {
         .await
         .unwrap();
     let steps: Vec<String> = plan.iter().map(|step| step.get("detail")).collect();
-    let of_units: Vec<_> = steps
+    // Steps that read the table of jobs, by its name or its aliases in the query.
+    let job_steps: Vec<_> = steps
         .iter()
-        .filter(|step| [" j ", " f ", " jobs "].iter().any(|of| step.contains(of)))
+        .filter(|step| {
+            [" j ", " f ", " jobs "]
+                .iter()
+                .any(|name| step.contains(name))
+        })
         .collect();
-    assert!(of_units.len() >= 2, "{steps:#?}");
-    for step in of_units {
+    assert!(job_steps.len() >= 2, "{steps:#?}");
+    for step in job_steps {
         let by_index = step.contains("jobs_open (account_no=?")
             || step.contains("INTEGER PRIMARY KEY (rowid=?)");
         assert!(by_index, "{step} in {steps:#?}");
     }
 }
 
-/// A simple pseudo-random number generator.
+/// A linear congruential generator of pseudo-random numbers (with Knuth's multiplier for 64 bits), in its current state.
 struct Random(u64);
 
 impl Random {
@@ -579,13 +629,15 @@ impl Random {
 
 #[tokio::test]
 async fn slot_time_is_shared_by_teams_and_job_kinds() {
+    /// The longest duration of a job.
+    const MAX_DURATION_S: i64 = 200;
     const NAMES: [&str; 6] = ["A", "B", "C", "D", "E", "F"];
     for seed in 0..4 {
         let mut random = Random(seed);
         let slots = 1 + seed as usize;
         let mut s = Slots::new(slots).await;
         let shards = NAMES.map(|name| (name, 5 + random.below(20) as u32));
-        s.evaluations(&shards).await;
+        s.queue_evaluations(&shards).await;
         let teams: Vec<TeamId> = s.teams.keys().copied().collect();
         for _ in 0..40 {
             let team = teams[random.below(6) as usize];
@@ -595,44 +647,47 @@ async fn slot_time_is_shared_by_teams_and_job_kinds() {
                     .create_submission(Actor::Team(team), team, bundle(), &quota, s.f.now);
             uploaded.await.unwrap();
         }
-        let costs: BTreeMap<(&str, Kind), i64> = NAMES
+        let durations_s: BTreeMap<(&str, JobKind), i64> = NAMES
             .into_iter()
-            .flat_map(|name| [(name, Kind::Validation), (name, Kind::Shard)])
-            .map(|key| (key, 1 + random.below(200) as i64))
+            .flat_map(|name| [(name, JobKind::Validation), (name, JobKind::Shard)])
+            .map(|key| (key, 1 + random.below(MAX_DURATION_S as u64) as i64))
             .collect();
         s.run(
-            |team, kind| costs.get(&(team, kind)).copied().unwrap_or(1),
+            |team, kind| durations_s.get(&(team, kind)).copied().unwrap_or(1),
             NEVER,
         )
         .await;
-        let bound = 200 * (1 + slots as i64);
-        for end in 1..s.served.len() {
-            let (before, after) = s.served.split_at(end);
-            let is_waiting = |kind| after.iter().any(|one| one.kind == kind);
-            let time = |kind| Slots::slot_time(before, |one| one.kind == kind);
-            if is_waiting(Kind::Validation) && is_waiting(Kind::Shard) {
-                let apart = time(Kind::Validation) - time(Kind::Shard);
-                assert!(apart.abs() <= bound, "seed {seed}, after {end}: {apart}");
+        let max_difference = MAX_DURATION_S * (1 + slots as i64);
+        for end in 1..s.run_jobs.len() {
+            let (before, after) = s.run_jobs.split_at(end);
+            let is_waiting = |kind| after.iter().any(|job| job.kind == kind);
+            let time_s = |kind| Slots::slot_time_s(before, |job| job.kind == kind);
+            if is_waiting(JobKind::Validation) && is_waiting(JobKind::Shard) {
+                let difference = time_s(JobKind::Validation) - time_s(JobKind::Shard);
+                assert!(
+                    difference.abs() <= max_difference,
+                    "seed {seed}, after {end}: {difference}"
+                );
             }
-            for kind in [Kind::Validation, Kind::Shard] {
+            for kind in [JobKind::Validation, JobKind::Shard] {
                 let times: Vec<i64> = NAMES
                     .into_iter()
                     .filter(|name| {
                         after
                             .iter()
-                            .any(|one| (one.team, one.kind) == (*name, kind))
+                            .any(|job| (job.team, job.kind) == (*name, kind))
                     })
                     .map(|name| {
-                        Slots::slot_time(before, |one| (one.team, one.kind) == (name, kind))
+                        Slots::slot_time_s(before, |job| (job.team, job.kind) == (name, kind))
                     })
                     .collect();
-                let apart = times
+                let difference = times
                     .iter()
                     .max()
                     .zip(times.iter().min())
                     .map(|(most, least)| most - least);
                 assert!(
-                    apart.unwrap_or_default() <= bound,
+                    difference.unwrap_or_default() <= max_difference,
                     "seed {seed}, {kind:?} after {end}: {times:?}"
                 );
             }

@@ -1,84 +1,78 @@
-//! Stages: days, revisions of the rules, and permitted changes.
+//! Stages (parts of the season with their own rules, days and boards): days, revisions of the rules, and permitted changes.
 
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp, civil::date};
 
-fn at(text: &str) -> Timestamp {
+fn time(text: &str) -> Timestamp {
     text.parse().unwrap()
 }
 
-/// A stage that is open from the initial time of the test store until 3 March.
-fn second() -> NewStage {
-    let (rules, settings) = rules_and_settings(&small());
+/// A second stage, which is open from the initial time of the test store until 3 March.
+fn warm_up_stage() -> NewStage {
+    let (rules, settings) = rules_and_settings(&one_shard_plan());
     NewStage {
         name: "Warm-up".parse().unwrap(),
-        opens_at: at("2026-03-01T10:00:00Z"),
-        closes_at: Some(at("2026-03-03T10:00:00Z")),
+        opens_at: time("2026-03-01T10:00:00Z"),
+        closes_at: Some(time("2026-03-03T10:00:00Z")),
         zone: Zone::UTC,
         rules,
         settings,
     }
 }
 
-async fn create(f: &TestStore, new: NewStage) -> Stage {
-    let made = f.store.create_stage(Actor::Organiser, new, f.now);
-    made.await.unwrap()
+async fn create_stage(f: &TestStore, stage: NewStage) -> Stage {
+    let created = f.store.create_stage(Actor::Organiser, stage, f.now);
+    created.await.unwrap()
 }
 
-async fn start(f: &TestStore, stage: StageId) -> Result<Vec<Evaluation>, StoreError> {
+async fn start_day(f: &TestStore, stage: StageId) -> Result<Vec<Evaluation>, StoreError> {
     f.store.start_day(Actor::Organiser, stage, f.now).await
 }
 
-async fn change(f: &TestStore, stage: StageId, change: StageChange) -> Result<Stage, StoreError> {
+async fn change_stage(
+    f: &TestStore,
+    stage: StageId,
+    change: StageChange,
+) -> Result<Stage, StoreError> {
     let changed = f.store.change_stage(Actor::Organiser, stage, change, f.now);
     changed.await
-}
-
-#[track_caller]
-fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
-    let Err(StoreError::Conflict(why)) = done else {
-        panic!("expected a conflict with {words:?}: {done:?}");
-    };
-    for word in words {
-        assert!(why.contains(word), "{word:?} is not in {why:?}");
-    }
 }
 
 #[tokio::test]
 async fn stages_have_their_own_days_seeds_and_boards() {
     let f = TestStore::new().await;
-    let agent = f.ready_team("Alpha").await;
-    let first = f.stage(&small()).await;
-    let second = create(&f, second()).await.id;
+    let submission = f.valid_submission_of("Alpha").await;
+    let first = f.configure_stage(&one_shard_plan()).await;
+    let second = create_stage(&f, warm_up_stage()).await.id;
     let secret = f.store.season().await.unwrap().secret;
     let date = date(2026, 3, 1);
     let mut seeds = Vec::new();
     for (stage, score) in [(first, 10.0), (second, 20.0)] {
-        let started = start(&f, stage).await.unwrap();
+        let started = start_day(&f, stage).await.unwrap();
         assert_eq!(started.len(), 1);
         assert_eq!(started[0].stage_day, StageDay { stage, date });
-        assert_eq!(started[0].submission, agent.id);
-        let repeated = start(&f, stage).await;
+        assert_eq!(started[0].submission, submission.id);
+        let repeated = start_day(&f, stage).await;
         assert!(
             matches!(repeated, Err(StoreError::CutoffPassed { .. })),
             "{repeated:?}"
         );
         let claimed = f.claim().await.unwrap();
         let Job::Shard {
-            seeds: found,
+            seeds: job_seeds,
             shard,
             ..
         } = claimed.job
         else {
             panic!("expected a shard");
         };
-        assert_eq!(found.episodes, secret.stage(stage).day(date));
-        assert_eq!(found.mismatch, secret.model_mismatch());
-        seeds.push(found.episodes);
+        assert_eq!(job_seeds.episodes, secret.stage(stage).day(date));
+        assert_eq!(job_seeds.mismatch, secret.model_mismatch());
+        seeds.push(job_seeds.episodes);
         f.commit_shard(&claimed.claim, &shard, 0).await;
-        f.run_all(score).await;
+        f.run_all_with_score(score).await;
         let board = f.store.board(stage, 1).await.unwrap();
         assert_eq!(board.len(), 1);
         assert_eq!(board[0].result.score, score);
@@ -89,55 +83,64 @@ async fn stages_have_their_own_days_seeds_and_boards() {
     }
     assert_ne!(seeds[0], seeds[1]);
     assert_eq!(f.store.evaluations_on(date).await.unwrap().len(), 2);
-    let of = StageDay {
+    let stage_day = StageDay {
         stage: second,
         date,
     };
-    assert_eq!(f.store.evaluations_of_day(of).await.unwrap().len(), 1);
+    assert_eq!(
+        f.store.evaluations_of_day(stage_day).await.unwrap().len(),
+        1
+    );
     assert_eq!(f.store.days().await.unwrap().len(), 2);
 }
 
 #[tokio::test]
 async fn day_is_the_date_in_the_stages_zone() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
+    f.valid_submission_of("Alpha").await;
     let auckland = NewStage {
         zone: "Pacific/Auckland".parse().unwrap(),
-        ..second()
+        ..warm_up_stage()
     };
-    let stage = create(&f, auckland).await.id;
-    let day = |started: Vec<Evaluation>| started[0].stage_day.date;
-    assert_eq!(day(start(&f, stage).await.unwrap()), date(2026, 3, 1));
-    f.run_all(1.0).await;
-    // Midnight in that zone is 11:00 UTC.
-    f.now = at("2026-03-01T10:59:59Z");
+    let stage = create_stage(&f, auckland).await.id;
+    let date_of = |started: Vec<Evaluation>| started[0].stage_day.date;
+    assert_eq!(
+        date_of(start_day(&f, stage).await.unwrap()),
+        date(2026, 3, 1)
+    );
+    f.run_all_with_score(1.0).await;
+    // Midnight in Auckland is 11:00 UTC.
+    f.now = time("2026-03-01T10:59:59Z");
     assert!(matches!(
-        start(&f, stage).await,
+        start_day(&f, stage).await,
         Err(StoreError::CutoffPassed { .. })
     ));
-    f.now = at("2026-03-01T11:00:00Z");
-    assert_eq!(day(start(&f, stage).await.unwrap()), date(2026, 3, 2));
+    f.now = time("2026-03-01T11:00:00Z");
+    assert_eq!(
+        date_of(start_day(&f, stage).await.unwrap()),
+        date(2026, 3, 2)
+    );
 }
 
 #[tokio::test]
 async fn days_start_only_between_opening_and_closing() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let later = NewStage {
-        opens_at: at("2026-03-02T10:00:00Z"),
-        ..second()
+    f.valid_submission_of("Alpha").await;
+    let upcoming = NewStage {
+        opens_at: time("2026-03-02T10:00:00Z"),
+        ..warm_up_stage()
     };
-    let stage = create(&f, later).await;
+    let stage = create_stage(&f, upcoming).await;
     assert_eq!(stage.phase(f.now), StagePhase::Upcoming);
     f.now = stage.opens_at - SignedDuration::from_millis(1);
-    let early = start(&f, stage.id).await;
+    let early = start_day(&f, stage.id).await;
     let Err(
         error @ StoreError::StageNotOpen {
             closed_at: None, ..
         },
     ) = early
     else {
-        panic!("{early:?}");
+        panic!("expected that the stage is not open, got {early:?}");
     };
     assert!(
         error.to_string().contains("opens at 2026-03-02T10:00:00Z"),
@@ -148,18 +151,18 @@ async fn days_start_only_between_opening_and_closing() {
         None
     );
     f.now = stage.opens_at;
-    assert_eq!(start(&f, stage.id).await.unwrap().len(), 1);
+    assert_eq!(start_day(&f, stage.id).await.unwrap().len(), 1);
 
     let closes_at = stage.closes_at.unwrap();
     f.now = closes_at - SignedDuration::from_millis(1);
     assert_eq!(
-        start(&f, stage.id).await.unwrap().len(),
+        start_day(&f, stage.id).await.unwrap().len(),
         1,
         "the last millisecond"
     );
     f.now = closes_at;
     assert_eq!(stage.phase(f.now), StagePhase::Closed);
-    let late = start(&f, stage.id).await;
+    let late = start_day(&f, stage.id).await;
     assert!(
         matches!(late, Err(StoreError::StageNotOpen { closed_at: Some(at), .. }) if at == closes_at),
         "{late:?}"
@@ -175,46 +178,46 @@ async fn days_start_only_between_opening_and_closing() {
 #[tokio::test]
 async fn new_rules_of_open_stage_create_revision_and_board() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = create(&f, second()).await;
-    start(&f, stage.id).await.unwrap();
-    f.run_all(10.0).await;
+    f.valid_submission_of("Alpha").await;
+    let stage = create_stage(&f, warm_up_stage()).await;
+    start_day(&f, stage.id).await.unwrap();
+    f.run_all_with_score(10.0).await;
 
     let rules = StageRules {
         episodes_per_task: 2,
         ..stage.rules.rules.clone()
     };
-    let others = StageChange {
+    let new_rules = StageChange {
         rules: Some(rules.clone()),
         ..StageChange::default()
     };
-    f.later(60);
-    let changed = change(&f, stage.id, others.clone()).await.unwrap();
+    f.advance_clock_s(60);
+    let changed = change_stage(&f, stage.id, new_rules.clone()).await.unwrap();
     assert_eq!((changed.rules.number, changed.rules.since), (2, f.now));
-    let same = change(&f, stage.id, others).await.unwrap();
-    assert_eq!(same, changed, "identical rules are no change");
+    let unchanged = change_stage(&f, stage.id, new_rules).await.unwrap();
+    assert_eq!(unchanged, changed, "identical rules are no change");
     assert_eq!(
-        f.store.board_revision(&same).await.unwrap(),
+        f.store.board_revision(&unchanged).await.unwrap(),
         1,
         "there is no result of revision 2 yet"
     );
 
-    f.now = at("2026-03-02T10:00:00Z");
-    let started = start(&f, stage.id).await.unwrap().remove(0);
+    f.now = time("2026-03-02T10:00:00Z");
+    let started = start_day(&f, stage.id).await.unwrap().remove(0);
     assert_eq!((started.revision, started.plan.episodes_per_task), (2, 2));
-    f.run_all(20.0).await;
-    assert_eq!(f.store.board_revision(&same).await.unwrap(), 2);
+    f.run_all_with_score(20.0).await;
+    assert_eq!(f.store.board_revision(&unchanged).await.unwrap(), 2);
     for (revision, score) in [(1, 10.0), (2, 20.0)] {
         let board = f.store.board(stage.id, revision).await.unwrap();
         assert_eq!(board.len(), 1);
         assert_eq!(board[0].result.score, score);
     }
     let revisions = f.store.stage_revisions(stage.id).await.unwrap();
-    let found: Vec<_> = revisions
+    let revisions: Vec<_> = revisions
         .iter()
-        .map(|one| (one.number, &one.rules))
+        .map(|revision| (revision.number, &revision.rules))
         .collect();
-    assert_eq!(found, [(1, &stage.rules.rules), (2, &rules)]);
+    assert_eq!(revisions, [(1, &stage.rules.rules), (2, &rules)]);
     let events = f.store.events_after(0, 1000).await.unwrap();
     let revised = events.iter().filter(|record| {
         record.event
@@ -229,8 +232,8 @@ async fn new_rules_of_open_stage_create_revision_and_board() {
 #[tokio::test]
 async fn settings_change_creates_no_revision() {
     let f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let stage = create(&f, second()).await;
+    f.valid_submission_of("Alpha").await;
+    let stage = create_stage(&f, warm_up_stage()).await;
     let settings = StageSettings {
         schedule: Some(Schedule::daily("06:00".parse().unwrap())),
         ablation_episodes: 3,
@@ -238,13 +241,13 @@ async fn settings_change_creates_no_revision() {
         episodes_per_shard: 7,
         ..StageSettings::default()
     };
-    let others = StageChange {
+    let new_settings = StageChange {
         settings: Some(settings.clone()),
         closes_at: Some(None),
         name: Some("Qualifying 2".parse().unwrap()),
         ..StageChange::default()
     };
-    let changed = change(&f, stage.id, others).await.unwrap();
+    let changed = change_stage(&f, stage.id, new_settings).await.unwrap();
     assert_eq!((changed.settings, changed.closes_at), (settings, None));
     assert_eq!(changed.name.as_str(), "Qualifying 2");
     assert_eq!(changed.rules, stage.rules);
@@ -253,20 +256,20 @@ async fn settings_change_creates_no_revision() {
 #[tokio::test]
 async fn started_stage_refuses_most_changes() {
     let mut f = TestStore::new().await;
-    f.ready_team("Alpha").await;
-    let open = create(&f, second()).await;
+    f.valid_submission_of("Alpha").await;
+    let open = create_stage(&f, warm_up_stage()).await;
     let upcoming = NewStage {
         name: "Final".parse().unwrap(),
-        opens_at: at("2026-03-02T10:00:00Z"),
-        ..second()
+        opens_at: time("2026-03-02T10:00:00Z"),
+        ..warm_up_stage()
     };
-    let upcoming = create(&f, upcoming).await;
+    let upcoming = create_stage(&f, upcoming).await;
     let opening = |text| StageChange {
-        opens_at: Some(at(text)),
+        opens_at: Some(time(text)),
         ..StageChange::default()
     };
     let closing = |text| StageChange {
-        closes_at: Some(Some(at(text))),
+        closes_at: Some(Some(time(text))),
         ..StageChange::default()
     };
     let zone = || StageChange {
@@ -277,67 +280,72 @@ async fn started_stage_refuses_most_changes() {
         name: Some(text.parse().unwrap()),
         ..StageChange::default()
     };
-    refused(
-        change(&f, open.id, opening("2026-03-02T00:00:00Z")).await,
+    assert_conflict(
+        change_stage(&f, open.id, opening("2026-03-02T00:00:00Z")).await,
         &["opens_at", "opened at 2026-03-01T10:00:00Z"],
     );
-    refused(
-        change(&f, upcoming.id, opening("2026-03-01T09:00:00Z")).await,
+    assert_conflict(
+        change_stage(&f, upcoming.id, opening("2026-03-01T09:00:00Z")).await,
         &["opens_at", "future"],
     );
-    refused(
-        change(&f, upcoming.id, opening("2026-03-04T10:00:00Z")).await,
+    assert_conflict(
+        change_stage(&f, upcoming.id, opening("2026-03-04T10:00:00Z")).await,
         &["closes_at", "after the opening"],
     );
-    refused(
-        change(&f, open.id, closing("2026-03-01T10:00:00Z")).await,
+    assert_conflict(
+        change_stage(&f, open.id, closing("2026-03-01T10:00:00Z")).await,
         &["closes_at"],
     );
-    let taken = change(&f, upcoming.id, name("warm-UP")).await;
+    let refused = change_stage(&f, upcoming.id, name("warm-UP")).await;
     assert!(
-        matches!(taken, Err(StoreError::StageNameTaken(_))),
-        "{taken:?}"
+        matches!(refused, Err(StoreError::StageNameTaken(_))),
+        "{refused:?}"
     );
-    change(&f, open.id, zone()).await.unwrap();
+    change_stage(&f, open.id, zone()).await.unwrap();
 
     // Before the opening, new rules replace the old ones without a new revision.
-    let moved = StageChange {
+    let new_rules_and_opening = StageChange {
         rules: Some(StageRules {
             episodes_per_task: 9,
             ..upcoming.rules.rules.clone()
         }),
         ..opening("2026-03-02T12:00:00Z")
     };
-    let moved = change(&f, upcoming.id, moved).await.unwrap();
+    let changed = change_stage(&f, upcoming.id, new_rules_and_opening)
+        .await
+        .unwrap();
     assert_eq!(
         (
-            moved.rules.number,
-            moved.rules.since,
-            moved.rules.rules.episodes_per_task
+            changed.rules.number,
+            changed.rules.since,
+            changed.rules.rules.episodes_per_task
         ),
-        (1, at("2026-03-02T12:00:00Z"), 9)
+        (1, time("2026-03-02T12:00:00Z"), 9)
     );
 
-    start(&f, open.id).await.unwrap();
+    start_day(&f, open.id).await.unwrap();
     let utc = StageChange {
         zone: Some(Zone::UTC),
         ..StageChange::default()
     };
-    refused(change(&f, open.id, utc).await, &["zone", "Europe/Berlin"]);
+    assert_conflict(
+        change_stage(&f, open.id, utc).await,
+        &["zone", "Europe/Berlin"],
+    );
     f.now = open.closes_at.unwrap();
-    refused(
-        change(&f, open.id, name("Done")).await,
+    assert_conflict(
+        change_stage(&f, open.id, name("Done")).await,
         &["closed at", "another stage"],
     );
-    refused(
-        change(&f, open.id, closing("2026-03-09T10:00:00Z")).await,
+    assert_conflict(
+        change_stage(&f, open.id, closing("2026-03-09T10:00:00Z")).await,
         &["closed at"],
     );
-    let none = StageId::new();
-    let unknown = change(&f, none, name("Done")).await;
+    let unknown = StageId::new();
+    let result = change_stage(&f, unknown, name("Done")).await;
     assert!(
-        matches!(unknown, Err(StoreError::NotFound("stage"))),
-        "{unknown:?}"
+        matches!(result, Err(StoreError::NotFound("stage"))),
+        "{result:?}"
     );
 }
 
@@ -345,38 +353,38 @@ async fn started_stage_refuses_most_changes() {
 async fn invalid_stages_are_refused() {
     let mut f = TestStore::new().await;
     let bad_times = NewStage {
-        closes_at: Some(at("2026-03-01T09:00:00Z")),
-        ..second()
+        closes_at: Some(time("2026-03-01T09:00:00Z")),
+        ..warm_up_stage()
     };
     let no_tasks = NewStage {
         rules: StageRules {
             tasks: Vec::new(),
-            ..second().rules
+            ..warm_up_stage().rules
         },
-        ..second()
+        ..warm_up_stage()
     };
     let no_shards = NewStage {
         settings: StageSettings {
             episodes_per_shard: 0,
-            ..second().settings
+            ..warm_up_stage().settings
         },
-        ..second()
+        ..warm_up_stage()
     };
-    for (new, word) in [
+    for (stage, field) in [
         (bad_times, "closes_at"),
         (no_tasks, "tasks"),
         (no_shards, "episodes_per_shard"),
     ] {
-        let made = f.store.create_stage(Actor::Organiser, new, f.now).await;
-        refused(made, &[word]);
+        let created = f.store.create_stage(Actor::Organiser, stage, f.now).await;
+        assert_conflict(created, &[field]);
     }
     assert_eq!(f.store.stages().await.unwrap(), []);
     assert_eq!(f.store.events_after(0, 10).await.unwrap(), []);
     f.store.close_season(Actor::Organiser, f.now).await.unwrap();
-    f.later(1);
+    f.advance_clock_s(1);
     let late = f
         .store
-        .create_stage(Actor::Organiser, second(), f.now)
+        .create_stage(Actor::Organiser, warm_up_stage(), f.now)
         .await;
     assert!(
         matches!(late, Err(StoreError::SeasonClosed { .. })),
@@ -393,65 +401,71 @@ async fn first_stage_follows_configuration_until_changed() {
         configured.await.unwrap();
         f.store.stages().await.unwrap()
     };
-    let first = configure(&f, &plan()).await;
+    let first = configure(&f, &six_shard_plan()).await;
     assert_eq!(first.len(), 1);
     assert!(first[0].configured && first[0].names_seeds);
-    assert_eq!(first[0].plan(), plan());
-    f.later(60);
+    assert_eq!(first[0].plan(), six_shard_plan());
+    f.advance_clock_s(60);
     assert_eq!(
-        configure(&f, &plan()).await,
+        configure(&f, &six_shard_plan()).await,
         first,
         "an identical configuration is no change"
     );
-    let second = configure(&f, &small()).await;
-    assert_eq!((second[0].id, second[0].rules.number), (first[0].id, 2));
-    assert_eq!(second[0].plan(), small());
+    let changed_configuration = configure(&f, &one_shard_plan()).await;
+    assert_eq!(
+        (
+            changed_configuration[0].id,
+            changed_configuration[0].rules.number
+        ),
+        (first[0].id, 2)
+    );
+    assert_eq!(changed_configuration[0].plan(), one_shard_plan());
 
-    let by_hand = StageChange {
+    let request = StageChange {
         rules: Some(first[0].rules.rules.clone()),
         ..StageChange::default()
     };
-    let changed = change(&f, first[0].id, by_hand).await.unwrap();
+    let changed = change_stage(&f, first[0].id, request).await.unwrap();
     assert_eq!((changed.rules.number, changed.configured), (3, false));
-    assert_eq!(configure(&f, &small()).await, [changed]);
+    assert_eq!(configure(&f, &one_shard_plan()).await, [changed]);
 }
 
 #[tokio::test]
 async fn stage_of_closed_season_is_unchangeable() {
     let mut f = TestStore::new().await;
     f.store.close_season(Actor::Organiser, f.now).await.unwrap();
-    f.later(1);
-    let first = f.stage(&plan()).await;
+    f.advance_clock_s(1);
+    let first = f.configure_stage(&six_shard_plan()).await;
     let stage = f.store.stage(first).await.unwrap();
-    assert_eq!(f.stage(&small()).await, first);
+    assert_eq!(f.configure_stage(&one_shard_plan()).await, first);
     assert_eq!(f.store.stage(first).await.unwrap(), stage);
-    let change = change(&f, first, StageChange::default()).await;
+    let changed = change_stage(&f, first, StageChange::default()).await;
     assert!(
-        matches!(change, Err(StoreError::SeasonClosed { .. })),
-        "{change:?}"
+        matches!(changed, Err(StoreError::SeasonClosed { .. })),
+        "{changed:?}"
     );
 }
 
 #[tokio::test]
 async fn current_stage_is_the_open_or_nearest_one() {
     let f = TestStore::new().await;
-    let current = async |text: &str| {
-        let current = f.store.current_stage(at(text)).await.unwrap();
-        current.map(|stage| stage.name.to_string())
+    let current_stage = async |text: &str| {
+        let stage = f.store.current_stage(time(text)).await.unwrap();
+        stage.map(|stage| stage.name.to_string())
     };
-    assert_eq!(current("2026-03-01T10:00:00Z").await, None);
+    assert_eq!(current_stage("2026-03-01T10:00:00Z").await, None);
     for (name, opens_at, closes_at) in [
         ("A", "2026-03-02T00:00:00Z", "2026-03-04T00:00:00Z"),
         ("B", "2026-03-03T00:00:00Z", "2026-03-05T00:00:00Z"),
         ("C", "2026-03-07T00:00:00Z", "2026-03-08T00:00:00Z"),
     ] {
-        let new = NewStage {
+        let stage = NewStage {
             name: name.parse().unwrap(),
-            opens_at: at(opens_at),
-            closes_at: Some(at(closes_at)),
-            ..second()
+            opens_at: time(opens_at),
+            closes_at: Some(time(closes_at)),
+            ..warm_up_stage()
         };
-        create(&f, new).await;
+        create_stage(&f, stage).await;
     }
     for (now, expected) in [
         ("2026-03-01T10:00:00Z", "A"),
@@ -462,6 +476,6 @@ async fn current_stage_is_the_open_or_nearest_one() {
         ("2026-03-07T10:00:00Z", "C"),
         ("2026-03-09T10:00:00Z", "C"),
     ] {
-        assert_eq!(current(now).await.as_deref(), Some(expected), "{now}");
+        assert_eq!(current_stage(now).await.as_deref(), Some(expected), "{now}");
     }
 }

@@ -1,11 +1,16 @@
+//! Teams: unique names, their API tokens, and ids that do not exist.
+
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::TeamId;
 
+const TOKEN_HASH: [u8; 32] = [7; 32];
+const OTHER_TOKEN_HASH: [u8; 32] = [8; 32];
+
 #[tokio::test]
 async fn team_names_are_unique_ignoring_case() {
     let f = TestStore::new().await;
-    f.team("Air-HocKIT").await;
+    f.create_team("Air-HocKIT").await;
     let name = "AIR-hockit".parse().unwrap();
     let error = f
         .store
@@ -23,47 +28,65 @@ async fn team_token_is_valid_until_replaced() {
     let name = "Zoë".parse().unwrap();
     let team = f
         .store
-        .create_team(Actor::Organiser, &name, [7; 32], f.now)
+        .create_team(Actor::Organiser, &name, TOKEN_HASH, f.now)
         .await
         .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
     let principal = async |hash| {
-        let holder = f
-            .store
-            .verify_token([hash; 32], TokenKind::ApiToken, f.now)
-            .await;
-        holder.unwrap().map(|holder| holder.principal)
+        let verified = f.store.verify_token(hash, TokenKind::ApiToken, f.now).await;
+        verified.unwrap().map(|token| token.principal)
     };
-    assert_eq!(principal(7).await, Ok(Principal::Team(team.clone())));
+    assert_eq!(
+        principal(TOKEN_HASH).await,
+        Ok(Principal::Team(team.clone()))
+    );
     f.store
-        .set_team_token(Actor::Organiser, team.id, [8; 32], f.now)
+        .set_team_token(Actor::Organiser, team.id, OTHER_TOKEN_HASH, f.now)
         .await
         .unwrap();
-    assert_eq!(principal(7).await, Err(TokenRejection::Revoked(f.now)));
-    assert_eq!(principal(8).await, Ok(Principal::Team(team)));
+    assert_eq!(
+        principal(TOKEN_HASH).await,
+        Err(TokenRejection::Revoked(f.now))
+    );
+    assert_eq!(principal(OTHER_TOKEN_HASH).await, Ok(Principal::Team(team)));
 }
 
 #[tokio::test]
 async fn two_teams_cannot_share_a_token() {
     let f = TestStore::new().await;
     f.store
-        .create_team(Actor::Organiser, &"A".parse().unwrap(), [7; 32], f.now)
+        .create_team(
+            Actor::Organiser,
+            &"Alpha".parse().unwrap(),
+            TOKEN_HASH,
+            f.now,
+        )
         .await
         .unwrap();
-    let b = f
+    let beta = f
         .store
-        .create_team(Actor::Organiser, &"B".parse().unwrap(), [8; 32], f.now)
+        .create_team(
+            Actor::Organiser,
+            &"Beta".parse().unwrap(),
+            OTHER_TOKEN_HASH,
+            f.now,
+        )
         .await
         .unwrap();
     let error = f
         .store
-        .create_team(Actor::Organiser, &"C".parse().unwrap(), [7; 32], f.now)
+        .create_team(
+            Actor::Organiser,
+            &"Gamma".parse().unwrap(),
+            TOKEN_HASH,
+            f.now,
+        )
         .await
         .unwrap_err();
     assert!(matches!(error, StoreError::Conflict(_)), "{error}");
     let error = f
         .store
-        .set_team_token(Actor::Organiser, b.id, [7; 32], f.now)
+        .set_team_token(Actor::Organiser, beta.id, TOKEN_HASH, f.now)
         .await
         .unwrap_err();
     assert!(matches!(error, StoreError::Conflict(_)), "{error}");
@@ -95,11 +118,11 @@ async fn unknown_ids_are_not_found() {
         .await;
     assert!(matches!(upload, Err(StoreError::NotFound("team"))));
     let submission = uuid::Uuid::now_v7().into();
-    let active = f
+    let activated = f
         .store
         .activate_submission(Actor::Organiser, submission, f.now)
         .await;
-    assert!(matches!(active, Err(StoreError::NotFound("submission"))));
+    assert!(matches!(activated, Err(StoreError::NotFound("submission"))));
     let evaluation = uuid::Uuid::now_v7().into();
     assert!(matches!(
         f.store.evaluation(evaluation).await,

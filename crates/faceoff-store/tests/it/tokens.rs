@@ -5,7 +5,8 @@ use faceoff_store::*;
 use faceoff_types::TokenId;
 use jiff::{SignedDuration, Timestamp};
 
-fn new(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewToken {
+/// An API token; each byte of its secret's hash is `hash`.
+fn new_token(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewToken {
     NewToken {
         hash: [hash; 32],
         kind: TokenKind::ApiToken,
@@ -15,54 +16,64 @@ fn new(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewToken {
     }
 }
 
+/// Why the token with this hash is rejected; `None` if it is valid.
 async fn rejection(f: &TestStore, hash: u8) -> Option<TokenRejection> {
-    let holder = f
+    let verified = f
         .store
         .verify_token([hash; 32], TokenKind::ApiToken, f.now)
         .await;
-    holder.unwrap().err()
+    verified.unwrap().err()
 }
 
 #[tokio::test]
 async fn token_is_valid_until_expired_rotated_or_revoked() {
     let mut f = TestStore::new().await;
-    let team = TokenOwner::Team(f.team("Alpha").await.id);
-    let soon = f.now + SignedDuration::from_secs(60);
+    let team = TokenOwner::Team(f.create_team("Alpha").await.id);
+    let expires_at = f.now + SignedDuration::from_secs(60);
     let create = async |hash, expires_at| {
         f.store
-            .create_token(Actor::Organiser, new(hash, team, expires_at), f.now)
+            .create_token(Actor::Organiser, new_token(hash, team, expires_at), f.now)
             .await
     };
-    let brief = create(1, Some(soon)).await.unwrap();
-    let long = create(2, None).await.unwrap();
-    assert_eq!((brief.expires_at, long.expires_at), (Some(soon), None));
-    let past = create(3, Some(f.now)).await.unwrap_err();
-    assert!(past.to_string().contains("in the future"), "{past}");
+    let expiring = create(1, Some(expires_at)).await.unwrap();
+    let unlimited = create(2, None).await.unwrap();
+    assert_eq!(
+        (expiring.expires_at, unlimited.expires_at),
+        (Some(expires_at), None)
+    );
+    let error = create(3, Some(f.now)).await.unwrap_err();
+    assert!(error.to_string().contains("in the future"), "{error}");
     let repeated = create(2, None).await.unwrap_err();
     assert!(matches!(repeated, StoreError::Conflict(_)), "{repeated}");
     assert_eq!(rejection(&f, 1).await, None);
     assert_eq!(rejection(&f, 4).await, Some(TokenRejection::Unknown));
-    let as_cookie = f
+    let as_session = f
         .store
         .verify_token([1; 32], TokenKind::Session, f.now)
         .await;
-    assert_eq!(as_cookie.unwrap().unwrap_err(), TokenRejection::WrongKind);
+    assert_eq!(as_session.unwrap().unwrap_err(), TokenRejection::WrongKind);
 
     f.store
-        .rotate_token(Actor::Organiser, long.id, [5; 32], f.now)
+        .rotate_token(Actor::Organiser, unlimited.id, [5; 32], f.now)
         .await
         .unwrap();
     assert_eq!(rejection(&f, 2).await, Some(TokenRejection::Unknown));
     assert_eq!(rejection(&f, 5).await, None);
-    f.later(60);
-    assert_eq!(rejection(&f, 1).await, Some(TokenRejection::Expired(soon)));
+    f.advance_clock_s(60);
+    assert_eq!(
+        rejection(&f, 1).await,
+        Some(TokenRejection::Expired(expires_at))
+    );
     let rotated = f
         .store
-        .rotate_token(Actor::Organiser, brief.id, [6; 32], f.now)
+        .rotate_token(Actor::Organiser, expiring.id, [6; 32], f.now)
         .await;
     assert!(matches!(rotated, Err(StoreError::Conflict(_))));
     for _ in 0..2 {
-        let revoked = f.store.revoke_token(Actor::Organiser, long.id, f.now).await;
+        let revoked = f
+            .store
+            .revoke_token(Actor::Organiser, unlimited.id, f.now)
+            .await;
         assert_eq!(revoked.unwrap().revoked_at, Some(f.now));
     }
     assert_eq!(rejection(&f, 5).await, Some(TokenRejection::Revoked(f.now)));
@@ -81,23 +92,23 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
 #[tokio::test]
 async fn token_use_is_recorded_and_tokens_are_limited() {
     let mut f = TestStore::new().await;
-    let team = f.team("Alpha").await;
+    let team = f.create_team("Alpha").await;
     let owner = TokenOwner::Team(team.id);
     for hash in 1..u8::try_from(MAX_TOKENS).unwrap() {
         f.store
-            .create_token(Actor::Organiser, new(hash, owner, None), f.now)
+            .create_token(Actor::Organiser, new_token(hash, owner, None), f.now)
             .await
             .unwrap();
     }
-    let many = f
+    let error = f
         .store
-        .create_token(Actor::Organiser, new(200, owner, None), f.now)
+        .create_token(Actor::Organiser, new_token(200, owner, None), f.now)
         .await
         .unwrap_err();
-    assert!(many.to_string().contains("which is the limit"), "{many}");
+    assert!(error.to_string().contains("which is the limit"), "{error}");
     let used = f.store.tokens().await.unwrap().remove(3);
     assert_eq!(used.last_used_at, None);
-    f.later(90);
+    f.advance_clock_s(90);
     f.store.record_token_use(&used, f.now).await.unwrap();
     let used = f.store.token(used.id).await.unwrap();
     assert_eq!(used.last_used_at, Some(f.now));
@@ -107,7 +118,7 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
         .await
         .unwrap();
     f.store
-        .create_token(Actor::Organiser, new(200, owner, None), f.now)
+        .create_token(Actor::Organiser, new_token(200, owner, None), f.now)
         .await
         .unwrap();
 }
@@ -117,9 +128,13 @@ async fn host_token_follows_its_file_and_stays_revoked() {
     let f = TestStore::new().await;
     assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
     assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
-    let other = f
+    let other_host_token = f
         .store
-        .create_token(Actor::Organiser, new(9, TokenOwner::Host, None), f.now)
+        .create_token(
+            Actor::Organiser,
+            new_token(9, TokenOwner::Host, None),
+            f.now,
+        )
         .await
         .unwrap();
     assert!(f.store.set_host_token([2; 32], f.now).await.unwrap());
@@ -130,9 +145,9 @@ async fn host_token_follows_its_file_and_stays_revoked() {
         None,
         "other host tokens are not affected"
     );
-    // If the file token could be rotated, the next start would restore the old secret from the file.
+    // The token whose secret is in a file cannot be rotated: the next start would restore the old secret from the file.
     let tokens = f.store.tokens().await.unwrap();
-    let of_file = tokens
+    let file_token = tokens
         .iter()
         .find(|token| token.name == "admin-token" && token.revoked_at.is_none());
     let rotate = async |id, hash| {
@@ -140,14 +155,14 @@ async fn host_token_follows_its_file_and_stays_revoked() {
             .rotate_token(Actor::Organiser, id, [hash; 32], f.now)
             .await
     };
-    let refused = rotate(of_file.unwrap().id, 3).await.unwrap_err();
-    assert!(refused.to_string().contains("revoke it"), "{refused}");
+    let error = rotate(file_token.unwrap().id, 3).await.unwrap_err();
+    assert!(error.to_string().contains("revoke it"), "{error}");
     assert_eq!(rejection(&f, 2).await, None, "the token is unchanged");
-    rotate(other.id, 8).await.unwrap();
-    rotate(other.id, 9).await.unwrap();
+    rotate(other_host_token.id, 8).await.unwrap();
+    rotate(other_host_token.id, 9).await.unwrap();
     assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
     f.store
-        .revoke_token(Actor::Organiser, other.id, f.now)
+        .revoke_token(Actor::Organiser, other_host_token.id, f.now)
         .await
         .unwrap();
     assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());

@@ -8,16 +8,6 @@ use serde_json::json;
 
 const REASON: &str = "the table was tilted";
 
-#[track_caller]
-fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
-    let Err(StoreError::Conflict(why)) = done else {
-        panic!("expected a conflict with {words:?}: {done:?}");
-    };
-    for word in words {
-        assert!(why.contains(word), "{word:?} is not in {why:?}");
-    }
-}
-
 fn round(number: u32) -> RoundNumber {
     number.try_into().unwrap()
 }
@@ -30,7 +20,7 @@ async fn opened(
 ) -> (Tournament, Vec<TeamId>) {
     let mut teams = Vec::new();
     for name in names {
-        teams.push(f.ready_team(name).await.team);
+        teams.push(f.valid_submission_of(name).await.team);
     }
     let new = NewTournament {
         name: "Cup".parse().unwrap(),
@@ -185,12 +175,12 @@ async fn round_starts_once_and_ends_with_its_last_game() {
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     let (one, two) = tokio::join!(start(&f, cup.id, &first), start(&f, cup.id, &first));
     let lost = if one.is_ok() { two } else { one };
-    refused(lost, &["round 1 has started already"]);
-    refused(
+    assert_conflict(lost, &["round 1 has started already"]);
+    assert_conflict(
         start(&f, cup.id, &drawn(3, &[&[[a, b]]], &[c])).await,
         &["not the next one"],
     );
-    refused(
+    assert_conflict(
         start(&f, cup.id, &drawn(2, &[&[[a, b]]], &[c])).await,
         &["3 games of earlier rounds have no result"],
     );
@@ -204,7 +194,7 @@ async fn round_starts_once_and_ends_with_its_last_game() {
     assert_eq!(started.rounds[0].submissions.len(), 3);
     let mut seeds = Vec::new();
     for game in &started.games {
-        f.later(30);
+        f.advance_clock_s(30);
         assert_eq!(
             run_next_game(&f).await,
             game.id,
@@ -267,13 +257,13 @@ async fn mirrored_halves_share_a_seed_and_swap_sides() {
 async fn round_needs_a_valid_submission_of_each_team() {
     let f = TestStore::new().await;
     let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
-    let late = f.team("Late").await;
+    let late = f.create_team("Late").await;
     f.store
         .add_entrants(Actor::Organiser, cup.id, &[late.id], f.now)
         .await
         .unwrap();
     let round = drawn(1, &[&[[teams[0], late.id]]], &[teams[1]]);
-    refused(
+    assert_conflict(
         start(&f, cup.id, &round).await,
         &["Late", "Wait for them, or let them leave"],
     );
@@ -288,10 +278,10 @@ async fn round_needs_a_valid_submission_of_each_team() {
         None,
         "before the first round it is only removed"
     );
-    refused(start(&f, cup.id, &round).await, &["have changed meanwhile"]);
+    assert_conflict(start(&f, cup.id, &round).await, &["have changed meanwhile"]);
     let two = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
     start(&f, cup.id, &two).await.unwrap();
-    refused(
+    assert_conflict(
         f.store
             .add_entrants(Actor::Organiser, cup.id, &[late.id], f.now)
             .await,
@@ -307,7 +297,7 @@ async fn round_refuses_runtimes_that_rules_exclude() {
         ..TournamentRules::default()
     };
     let (cup, teams) = opened(&f, &["A", "B"], rules).await;
-    refused(
+    assert_conflict(
         start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[])).await,
         &["A, B"],
     );
@@ -323,7 +313,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
     let game = record(&f, cup.id).await.games[0].id;
     // A slot that dies, one that shuts down, and platform faults until the game is given up.
     let (lost, _, _) = claim_game(&f).await;
-    f.later(i64::from(LEASE_S) + 1);
+    f.advance_clock_s(i64::from(LEASE_S) + 1);
     let (claim, _, attempt) = claim_game(&f).await;
     assert_eq!(attempt, 2);
     let late = f
@@ -340,7 +330,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
             .release_failed(&claim, "no sandbox", f.now)
             .await
             .unwrap();
-        f.later(60);
+        f.advance_clock_s(60);
     }
     assert!(
         matches!(state(&f, game).await, GameState::PlatformFailed { reason, .. } if reason == "no sandbox")
@@ -364,7 +354,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         None,
         "a result is missing"
     );
-    refused(
+    assert_conflict(
         f.store
             .close_tournament(Actor::Organiser, cup.id, f.now)
             .await,
@@ -392,11 +382,11 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         (last.outcome, last.reason.as_deref()),
         (AttemptOutcome::Played, Some(REASON))
     );
-    refused(
+    assert_conflict(
         start(&f, cup.id, &drawn(2, &[&[[teams[1], teams[0]]]], &[])).await,
         &["have no result"],
     );
-    refused(
+    assert_conflict(
         f.store
             .void_game(Actor::Organiser, game, REASON, f.now)
             .await,
@@ -406,7 +396,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         .rerun_game(Actor::Organiser, game, f.now)
         .await
         .unwrap();
-    refused(
+    assert_conflict(
         f.store.rerun_game(Actor::Organiser, game, f.now).await,
         &["only a game"],
     );
@@ -429,7 +419,7 @@ async fn paused_tournament_starts_no_game() {
         .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
         .await;
     assert_eq!(paused.unwrap().paused.unwrap().reason, REASON);
-    refused(
+    assert_conflict(
         f.store
             .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
             .await,
@@ -446,7 +436,7 @@ async fn paused_tournament_starts_no_game() {
         .resume_tournament(Actor::Organiser, cup.id, f.now)
         .await
         .unwrap();
-    refused(
+    assert_conflict(
         f.store
             .resume_tournament(Actor::Organiser, cup.id, f.now)
             .await,
@@ -484,7 +474,7 @@ async fn game_forecast_uses_recent_durations() {
         "there is no measured duration"
     );
     let (claim, _, _) = claim_game(&f).await;
-    f.later(40);
+    f.advance_clock_s(40);
     f.store
         .commit_game(&claim, &result(true), f.now)
         .await
@@ -519,7 +509,7 @@ async fn departure_cancels_open_games() {
     run_next_game(&f).await;
     let (claim, running, _) = claim_game(&f).await;
     let leave = |kind, from| departure(c, kind, from);
-    refused(
+    assert_conflict(
         f.store
             .leave_tournament(
                 Actor::Organiser,
@@ -541,7 +531,7 @@ async fn departure_cancels_open_games() {
         .await
         .unwrap();
     assert_eq!(left.unwrap().from_round, round(1));
-    refused(
+    assert_conflict(
         f.store
             .leave_tournament(
                 Actor::Organiser,
@@ -582,7 +572,7 @@ async fn departure_cancels_open_games() {
     start(&f, cup.id, &drawn(2, &[&[[b, a]]], &[]))
         .await
         .unwrap();
-    refused(
+    assert_conflict(
         f.store.rerun_game(Actor::Organiser, running, f.now).await,
         &["only a game"],
     );
@@ -650,7 +640,7 @@ async fn disqualification_also_applies_after_withdrawal() {
         .await
         .unwrap();
     assert_eq!(out.unwrap().from_round, round(2));
-    refused(
+    assert_conflict(
         leave(departure(c, DepartureKind::Disqualified, Some(round(3)))).await,
         &["from_round: expected 1 to 2"],
     );
@@ -658,7 +648,7 @@ async fn disqualification_also_applies_after_withdrawal() {
         .await
         .unwrap();
     assert_eq!(out.unwrap().kind, DepartureKind::Disqualified);
-    refused(
+    assert_conflict(
         leave(departure(c, DepartureKind::Disqualified, None)).await,
         &["has left the tournament already"],
     );
@@ -670,7 +660,7 @@ async fn disqualification_also_applies_after_withdrawal() {
             .await
             .unwrap();
     }
-    refused(
+    assert_conflict(
         f.store
             .rerun_game(Actor::Organiser, games[1].id, f.now)
             .await,
@@ -692,7 +682,7 @@ async fn disqualification_also_applies_after_withdrawal() {
         of_b.departure.as_ref().unwrap().kind,
         DepartureKind::Disqualified
     );
-    refused(
+    assert_conflict(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["Cup", "close it first"],
     );
@@ -713,7 +703,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
             .request_test_game(Actor::Organiser, cup.id, a, by, f.now)
             .await
     };
-    refused(test(&f, None).await, &["has no baseline"]);
+    assert_conflict(test(&f, None).await, &["has no baseline"]);
     let baseline = f.store.active_submissions().await.unwrap();
     let baseline = baseline.iter().find(|one| one.team == base).unwrap().id;
     let change = TournamentChange {
@@ -735,8 +725,8 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     };
     let tested = test(&f, Some(a)).await.unwrap();
     assert_eq!(tested.submissions[1], baseline);
-    refused(friendly(&f, a, a).await, &["cannot play itself"]);
-    refused(
+    assert_conflict(friendly(&f, a, a).await, &["cannot play itself"]);
+    assert_conflict(
         friendly(&f, a, base).await,
         &["Base is not in the tournament"],
     );
@@ -760,7 +750,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
         .set_declines_friendly_games(Actor::Team(a), a, true, f.now)
         .await
         .unwrap();
-    refused(friendly(&f, b, a).await, &["A plays no friendly games"]);
+    assert_conflict(friendly(&f, b, a).await, &["A plays no friendly games"]);
     for _ in 0..3 {
         run_next_game(&f).await;
     }
@@ -770,20 +760,20 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
         .await
         .unwrap();
     assert_eq!(friendly_games.len(), 2, "one of them was cancelled");
-    f.later(24 * 3600);
+    f.advance_clock_s(24 * 3600);
     assert_eq!(f.store.requested_games_on_day(a, f.now).await.unwrap(), 0);
     start(&f, cup.id, &drawn(1, &[&[[a, b]]], &[]))
         .await
         .unwrap();
-    refused(test(&f, None).await, &["a round is under way"]);
-    refused(friendly(&f, a, b).await, &["a round is under way"]);
+    assert_conflict(test(&f, None).await, &["a round is under way"]);
+    assert_conflict(friendly(&f, a, b).await, &["a round is under way"]);
     let record = record(&f, cup.id).await;
     assert_eq!(record.games.len(), 1);
     let of_round = f
         .store
         .cancel_game(Actor::Organiser, record.games[0].id, "no", f.now)
         .await;
-    refused(of_round, &["cannot be cancelled"]);
+    assert_conflict(of_round, &["cannot be cancelled"]);
 }
 
 #[tokio::test]
@@ -799,15 +789,15 @@ async fn schedule_replays_have_new_seeds_and_do_not_count() {
             .request_replays(Actor::Organiser, cup.id, times, f.now)
             .await
     };
-    refused(replay(1).await, &["0 of 1 rounds have started"]);
+    assert_conflict(replay(1).await, &["0 of 1 rounds have started"]);
     start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
         .await
         .unwrap();
-    refused(replay(1).await, &["1 games have no result yet"]);
+    assert_conflict(replay(1).await, &["1 games have no result yet"]);
     let game = run_next_game(&f).await;
-    refused(replay(0).await, &["expected 1 to 1000"]);
+    assert_conflict(replay(0).await, &["expected 1 to 1000"]);
     assert_eq!(replay(3).await.unwrap(), 3);
-    refused(replay(998).await, &["expected 1 to 997"]);
+    assert_conflict(replay(998).await, &["expected 1 to 997"]);
     f.store
         .void_game(Actor::Organiser, game, REASON, f.now)
         .await
@@ -826,7 +816,7 @@ async fn schedule_replays_have_new_seeds_and_do_not_count() {
         .await
         .unwrap();
     let (claim, replayed, _) = claim_game(&f).await;
-    refused(
+    assert_conflict(
         f.store.commit_game(&claim, &result(true), f.now).await,
         &["none of a game of a replayed schedule"],
     );
@@ -899,19 +889,19 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         rules: Some(TournamentRules::default()),
         ..TournamentChange::default()
     };
-    refused(
+    assert_conflict(
         f.store
             .change_tournament(Actor::Organiser, cup.id, &other, f.now)
             .await,
         &["a round has started"],
     );
-    refused(
+    assert_conflict(
         f.store
             .close_tournament(Actor::Organiser, cup.id, f.now)
             .await,
         &["1 games are queued or running"],
     );
-    refused(
+    assert_conflict(
         f.store.close_season(Actor::Organiser, f.now).await,
         &["1 games are queued"],
     );
@@ -921,7 +911,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         .withdraw_submission(Actor::Team(teams[0]), of_a, f.now)
         .await
         .unwrap();
-    refused(
+    assert_conflict(
         f.store.check_deletable(of_a, f.now).await,
         &["a tournament that is not closed"],
     );
@@ -930,8 +920,8 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         .await
         .unwrap();
     f.store.check_deletable(of_a, f.now).await.unwrap();
-    refused(change().await, &["was closed on"]);
-    refused(
+    assert_conflict(change().await, &["was closed on"]);
+    assert_conflict(
         f.store
             .void_game(Actor::Organiser, game, REASON, f.now)
             .await,
@@ -1024,10 +1014,10 @@ async fn run_actions(actions: Vec<Action>) {
                     f.store.release(&claim, f.now).await.unwrap();
                 }
             }
-            Action::Die => f.later(i64::from(LEASE_S) + 1),
+            Action::Die => f.advance_clock_s(i64::from(LEASE_S) + 1),
         }
     }
-    f.later(600);
+    f.advance_clock_s(600);
     for game in record(&f, cup.id).await.games {
         if let GameState::PlatformFailed { .. } = game.state {
             f.store

@@ -1,4 +1,5 @@
-//! Users: how they join, what they can do, and how they leave.
+//! Users: how they join by an invitation with a secret code, what they can do, and how they leave. In these tests each byte of
+//! a code's hash is the same number.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,13 +7,16 @@ use faceoff_types::{TeamId, UserId};
 use jiff::SignedDuration;
 
 async fn invite(f: &TestStore, code: u8, role: InvitationRole) -> Invitation {
-    let new = NewInvitation {
+    let invitation = NewInvitation {
         code_hash: [code; 32],
         role,
         note: "a user".into(),
         expires_at: f.now + SignedDuration::from_hours(1),
     };
-    f.store.invite(Actor::Organiser, new, f.now).await.unwrap()
+    f.store
+        .invite(Actor::Organiser, invitation, f.now)
+        .await
+        .unwrap()
 }
 
 /// A user who has joined with this code.
@@ -22,23 +26,17 @@ async fn add_user(f: &TestStore, code: u8, name: &str, role: InvitationRole) -> 
     joined.unwrap().user
 }
 
-fn words(error: &StoreError, words: &[&str]) {
-    let text = error.to_string();
-    for word in words {
-        assert!(text.contains(word), "{word:?} is not in {text:?}");
-    }
-}
-
+/// As whom the token of the user who joined with this code acts.
 async fn principal(f: &TestStore, code: u8) -> Result<Principal, TokenRejection> {
     let hash = *blake3::hash(&[code; 32]).as_bytes();
-    let holder = f.store.verify_token(hash, TokenKind::ApiToken, f.now).await;
-    holder.unwrap().map(|holder| holder.principal)
+    let verified = f.store.verify_token(hash, TokenKind::ApiToken, f.now).await;
+    verified.unwrap().map(|token| token.principal)
 }
 
 #[tokio::test]
 async fn invitation_creates_one_user_with_its_role() {
     let mut f = TestStore::new().await;
-    let alpha = f.team("Alpha").await;
+    let alpha = f.create_team("Alpha").await;
     let member = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
     assert_eq!(member.team, Some(alpha.id));
     assert_eq!(
@@ -48,23 +46,23 @@ async fn invitation_creates_one_user_with_its_role() {
     let organiser = add_user(&f, 2, "Grace", InvitationRole::Organiser).await;
     assert_eq!(principal(&f, 2).await, Ok(Principal::Organiser(organiser)));
 
-    let used = f.store.join(join_request([1; 32], "Eve"), f.now).await;
-    words(&used.unwrap_err(), &["was accepted", "only once"]);
-    let none = f.store.join(join_request([9; 32], "Eve"), f.now).await;
-    words(&none.unwrap_err(), &["no such invitation"]);
+    let repeated = f.store.join(join_request([1; 32], "Eve"), f.now).await;
+    assert_contains(&repeated.unwrap_err(), &["was accepted", "only once"]);
+    let unknown = f.store.join(join_request([9; 32], "Eve"), f.now).await;
+    assert_contains(&unknown.unwrap_err(), &["no such invitation"]);
     let revoked = invite(&f, 3, InvitationRole::Organiser).await;
     f.store
         .revoke_invitation(Actor::Organiser, revoked.id, f.now)
         .await
         .unwrap();
     let error = f.store.join(join_request([3; 32], "Eve"), f.now).await;
-    words(&error.unwrap_err(), &["was revoked"]);
+    assert_contains(&error.unwrap_err(), &["was revoked"]);
     invite(&f, 4, InvitationRole::Organiser).await;
-    let taken = f.store.join(join_request([4; 32], "ADA"), f.now).await;
-    assert!(matches!(taken, Err(StoreError::UserNameTaken(name)) if name == "ADA"));
-    f.later(3600);
+    let refused = f.store.join(join_request([4; 32], "ADA"), f.now).await;
+    assert!(matches!(refused, Err(StoreError::UserNameTaken(name)) if name == "ADA"));
+    f.advance_clock_s(3600);
     let late = f.store.join(join_request([4; 32], "Eve"), f.now).await;
-    words(&late.unwrap_err(), &["expired on"]);
+    assert_contains(&late.unwrap_err(), &["expired on"]);
     assert_eq!(
         f.store.users().await.unwrap().len(),
         2,
@@ -75,20 +73,20 @@ async fn invitation_creates_one_user_with_its_role() {
 #[tokio::test]
 async fn founder_invitation_requires_a_team_name() {
     let f = TestStore::new().await;
-    let alpha = f.team("Alpha").await;
+    let alpha = f.create_team("Alpha").await;
     invite(&f, 1, InvitationRole::Founder).await;
     let founder = |name: &str| JoinRequest {
         team: Some((name.parse().unwrap(), TeamProfile::default())),
         ..join_request([1; 32], "Ada")
     };
-    let without = f.store.join(join_request([1; 32], "Ada"), f.now).await;
-    words(&without.unwrap_err(), &["expected the team's name"]);
-    let taken = f.store.join(founder("ALPHA"), f.now).await;
-    assert!(matches!(taken, Err(StoreError::TeamNameTaken(_))));
-    let mut nameless = founder("Beta");
-    nameless.name = None;
-    let error = f.store.join(nameless, f.now).await.unwrap_err();
-    words(&error, &["name: expected"]);
+    let without_team = f.store.join(join_request([1; 32], "Ada"), f.now).await;
+    assert_contains(&without_team.unwrap_err(), &["expected the team's name"]);
+    let refused = f.store.join(founder("ALPHA"), f.now).await;
+    assert!(matches!(refused, Err(StoreError::TeamNameTaken(_))));
+    let mut without_name = founder("Beta");
+    without_name.name = None;
+    let error = f.store.join(without_name, f.now).await.unwrap_err();
+    assert_contains(&error, &["name: expected"]);
     assert_eq!(
         f.store.teams().await.unwrap().len(),
         1,
@@ -104,23 +102,23 @@ async fn founder_invitation_requires_a_team_name() {
         ..join_request([2; 32], "Eve")
     };
     let error = f.store.join(member, f.now).await.unwrap_err();
-    words(&error, &["leave it out"]);
+    assert_contains(&error, &["leave it out"]);
 }
 
 #[tokio::test]
 async fn returning_user_keeps_identity_and_gets_new_tokens() {
     let f = TestStore::new().await;
-    let alpha = f.team("Alpha").await;
+    let alpha = f.create_team("Alpha").await;
     let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
     invite(&f, 2, InvitationRole::PasswordReset(ada.id)).await;
-    let other = f.store.join(join_request([2; 32], "Eve"), f.now).await;
-    words(&other.unwrap_err(), &["belongs to Ada"]);
-    let back = JoinRequest {
+    let other_name = f.store.join(join_request([2; 32], "Eve"), f.now).await;
+    assert_contains(&other_name.unwrap_err(), &["belongs to Ada"]);
+    let request = JoinRequest {
         name: None,
         password: Some("$argon2id$…".into()),
         ..join_request([2; 32], "Ada")
     };
-    let joined = f.store.join(back, f.now).await.unwrap();
+    let joined = f.store.join(request, f.now).await.unwrap();
     assert_eq!(joined.user.id, ada.id);
     assert!(joined.user.has_password);
     assert_eq!(principal(&f, 1).await, Err(TokenRejection::Revoked(f.now)));
@@ -128,9 +126,9 @@ async fn returning_user_keeps_identity_and_gets_new_tokens() {
     let password = f.store.password_hash_of("aDA").await.unwrap();
     assert_eq!(password, Some((ada.id, "$argon2id$…".into())));
 
-    let by = joined.token.id;
+    let request_token = joined.token.id;
     f.store
-        .set_password(Actor::User(ada.id), ada.id, "other", by, f.now)
+        .set_password(Actor::User(ada.id), ada.id, "other", request_token, f.now)
         .await
         .unwrap();
     assert!(
@@ -142,16 +140,16 @@ async fn returning_user_keeps_identity_and_gets_new_tokens() {
 #[tokio::test]
 async fn removed_user_loses_all_access() {
     let f = TestStore::new().await;
-    let alpha = f.team("Alpha").await;
+    let alpha = f.create_team("Alpha").await;
     let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
     let grace = add_user(&f, 2, "Grace", InvitationRole::Organiser).await;
     let remove = async |id| f.store.remove_user(Actor::Organiser, id, f.now).await;
-    let last = remove(grace.id).await.unwrap_err();
-    words(&last, &["Grace", "the last who can organise"]);
+    let error = remove(grace.id).await.unwrap_err();
+    assert_contains(&error, &["Grace", "the last who can organise"]);
     f.store.set_host_token([7; 32], f.now).await.unwrap();
     remove(grace.id).await.unwrap();
-    let left = remove(ada.id).await.unwrap();
-    assert_eq!(left.left_at, Some(f.now));
+    let removed = remove(ada.id).await.unwrap();
+    assert_eq!(removed.left_at, Some(f.now));
     for code in [1, 2] {
         assert_eq!(
             principal(&f, code).await,
@@ -159,51 +157,60 @@ async fn removed_user_loses_all_access() {
         );
     }
     assert_eq!(f.store.password_hash_of("Ada").await.unwrap(), None);
-    words(&remove(ada.id).await.unwrap_err(), &["has left"]);
+    assert_contains(&remove(ada.id).await.unwrap_err(), &["has left"]);
     let unknown = remove(UserId::new()).await;
     assert!(matches!(unknown, Err(StoreError::NotFound("user"))));
-    let back = NewInvitation {
+    let invitation = NewInvitation {
         code_hash: [3; 32],
         role: InvitationRole::PasswordReset(ada.id),
         note: "Ada".into(),
         expires_at: f.now + SignedDuration::from_hours(1),
     };
-    let error = f.store.invite(Actor::Organiser, back, f.now).await;
-    words(&error.unwrap_err(), &["has left"]);
-    let log = f.store.events_after(0, 100).await.unwrap();
-    let left = log
+    let error = f.store.invite(Actor::Organiser, invitation, f.now).await;
+    assert_contains(&error.unwrap_err(), &["has left"]);
+    let events = f.store.events_after(0, 100).await.unwrap();
+    let joined = events
         .iter()
         .find(|record| record.subject == Subject::User(ada.id) && record.id > 1)
         .unwrap();
-    assert!(matches!(left.event, Event::PersonJoined { .. }));
+    assert!(matches!(joined.event, Event::PersonJoined { .. }));
 }
 
 #[tokio::test]
 async fn invalid_invitations_are_refused() {
     let f = TestStore::new().await;
-    let alpha = f.team("Alpha").await;
-    let new = |code, role, expires_at| NewInvitation {
+    let alpha = f.create_team("Alpha").await;
+    let invitation = |code, role, expires_at| NewInvitation {
         code_hash: [code; 32],
         role,
         note: "a user".into(),
         expires_at,
     };
-    let soon = f.now + SignedDuration::from_hours(1);
-    let invite = async |new| -> Result<Invitation, StoreError> {
-        f.store.invite(Actor::Organiser, new, f.now).await
+    let expires_at = f.now + SignedDuration::from_hours(1);
+    let invite = async |invitation| -> Result<Invitation, StoreError> {
+        f.store.invite(Actor::Organiser, invitation, f.now).await
     };
-    let past = invite(new(1, InvitationRole::Organiser, f.now)).await;
-    words(&past.unwrap_err(), &["in the future"]);
-    let unknown_team = invite(new(1, InvitationRole::Member(TeamId::new()), soon)).await;
+    let expired = invite(invitation(1, InvitationRole::Organiser, f.now)).await;
+    assert_contains(&expired.unwrap_err(), &["in the future"]);
+    let unknown_team = invite(invitation(
+        1,
+        InvitationRole::Member(TeamId::new()),
+        expires_at,
+    ))
+    .await;
     assert!(matches!(unknown_team, Err(StoreError::NotFound("team"))));
     for code in 0..u8::try_from(MAX_OPEN_INVITATIONS).unwrap() {
-        invite(new(code, InvitationRole::Member(alpha.id), soon))
-            .await
-            .unwrap();
+        invite(invitation(
+            code,
+            InvitationRole::Member(alpha.id),
+            expires_at,
+        ))
+        .await
+        .unwrap();
     }
-    let many = invite(new(99, InvitationRole::Member(alpha.id), soon)).await;
-    words(&many.unwrap_err(), &["which is the limit"]);
-    invite(new(100, InvitationRole::Organiser, soon))
+    let refused = invite(invitation(99, InvitationRole::Member(alpha.id), expires_at)).await;
+    assert_contains(&refused.unwrap_err(), &["which is the limit"]);
+    invite(invitation(100, InvitationRole::Organiser, expires_at))
         .await
         .unwrap();
 }
@@ -211,11 +218,11 @@ async fn invalid_invitations_are_refused() {
 #[tokio::test]
 async fn new_terms_block_uploads_until_accepted() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
+    let submission = f.valid_submission_of("Alpha").await;
     let alpha = f.store.team(submission.team).await.unwrap();
     let publish = async |text| f.store.publish_terms(Actor::Organiser, text, f.now).await;
     assert_eq!(publish("Be fair.").await.unwrap().version, 1);
-    words(
+    assert_contains(
         &publish("Be fair.").await.unwrap_err(),
         &["nothing was changed"],
     );
@@ -223,15 +230,18 @@ async fn new_terms_block_uploads_until_accepted() {
     f.validate().await;
     // A team without members does not need to accept the terms; a member must accept them.
     invite(&f, 1, InvitationRole::Member(alpha.id)).await;
-    let none = f.store.join(join_request([1; 32], "Ada"), f.now).await;
-    words(&none.unwrap_err(), &["accepted_terms", "version 1", "none"]);
-    let consents = |version| JoinRequest {
+    let without_consent = f.store.join(join_request([1; 32], "Ada"), f.now).await;
+    assert_contains(
+        &without_consent.unwrap_err(),
+        &["accepted_terms", "version 1", "none"],
+    );
+    let accepting = |version| JoinRequest {
         accepted_terms: Some(version),
         ..join_request([1; 32], "Ada")
     };
-    let wrong = f.store.join(consents(2), f.now).await;
-    words(&wrong.unwrap_err(), &["version 1", "got 2"]);
-    let ada = f.store.join(consents(1), f.now).await.unwrap().user;
+    let wrong_version = f.store.join(accepting(2), f.now).await;
+    assert_contains(&wrong_version.unwrap_err(), &["version 1", "got 2"]);
+    let ada = f.store.join(accepting(1), f.now).await.unwrap().user;
     assert_eq!(ada.accepted_terms, Some(1));
     f.upload(&alpha).await;
     f.validate().await;
@@ -259,7 +269,7 @@ async fn new_terms_block_uploads_until_accepted() {
         Err(StoreError::TermsNotAccepted { version: 2 })
     ));
     // The active submission is still evaluated.
-    let stage = f.stage(&plan()).await;
+    let stage = f.configure_stage(&six_shard_plan()).await;
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
     assert_eq!(started.unwrap().len(), 1);
     let accept = async |version| {
@@ -267,31 +277,34 @@ async fn new_terms_block_uploads_until_accepted() {
             .accept_terms(Actor::User(ada.id), ada.id, version, f.now)
             .await
     };
-    words(&accept(1).await.unwrap_err(), &["expected 2"]);
+    assert_contains(&accept(1).await.unwrap_err(), &["expected 2"]);
     accept(2).await.unwrap();
-    f.later(1);
+    f.advance_clock_s(1);
     f.upload(&alpha).await;
 }
 
 #[tokio::test]
 async fn team_can_be_renamed_described_and_retired() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
+    let submission = f.valid_submission_of("Alpha").await;
     let id = submission.team;
-    f.team("Beta").await;
-    let change = async |change| {
+    f.create_team("Beta").await;
+    let change_team = async |change| {
         f.store
             .change_team(Actor::Team(id), id, change, f.now)
             .await
     };
-    let named = |name: &str| TeamChange {
+    let new_name = |name: &str| TeamChange {
         name: Some(name.parse().unwrap()),
         ..TeamChange::default()
     };
-    let taken = change(named("beta")).await;
-    assert!(matches!(taken, Err(StoreError::TeamNameTaken(_))));
-    assert_eq!(change(named("ALPHA")).await.unwrap().name.as_str(), "ALPHA");
-    let described = |division: &str| TeamChange {
+    let refused = change_team(new_name("beta")).await;
+    assert!(matches!(refused, Err(StoreError::TeamNameTaken(_))));
+    assert_eq!(
+        change_team(new_name("ALPHA")).await.unwrap().name.as_str(),
+        "ALPHA"
+    );
+    let new_description = |division: &str| TeamChange {
         name: Some("Gamma".parse().unwrap()),
         profile: Some(TeamProfile {
             affiliation: Some("TU".into()),
@@ -300,8 +313,8 @@ async fn team_can_be_renamed_described_and_retired() {
         }),
         ..TeamChange::default()
     };
-    words(
-        &change(described("Students")).await.unwrap_err(),
+    assert_contains(
+        &change_team(new_description("Students")).await.unwrap_err(),
         &["division", "no divisions"],
     );
     let unchanged = f.store.team(id).await.unwrap();
@@ -315,27 +328,27 @@ async fn team_can_be_renamed_described_and_retired() {
         .change_season(Actor::Organiser, None, Some(&divisions), f.now)
         .await
         .unwrap();
-    words(
-        &change(described("Pupils")).await.unwrap_err(),
+    assert_contains(
+        &change_team(new_description("Pupils")).await.unwrap_err(),
         &["expected “Students” or “Open”, got “Pupils”"],
     );
-    let team = change(described("students")).await.unwrap();
+    let team = change_team(new_description("students")).await.unwrap();
     assert_eq!(team.profile.division, Some("Students".parse().unwrap()));
 
     f.store
         .retire_team(Actor::Team(id), id, f.now)
         .await
         .unwrap();
-    let stage = f.stage(&plan()).await;
+    let stage = f.configure_stage(&six_shard_plan()).await;
     let empty = f.store.start_day(Actor::Organiser, stage, f.now).await;
-    words(&empty.unwrap_err(), &["no team has a valid submission"]);
+    assert_contains(&empty.unwrap_err(), &["no team has a valid submission"]);
     let chosen = f
         .store
         .activate_submission(Actor::Team(id), submission.id, f.now)
         .await;
     assert!(matches!(chosen, Err(StoreError::Retired { at }) if at == f.now));
     let repeated = f.store.retire_team(Actor::Team(id), id, f.now).await;
-    words(&repeated.unwrap_err(), &["already"]);
+    assert_contains(&repeated.unwrap_err(), &["already"]);
     f.store
         .return_team(Actor::Team(id), id, f.now)
         .await

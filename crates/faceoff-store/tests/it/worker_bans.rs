@@ -1,4 +1,5 @@
-//! Banned remote workers.
+//! Bans of remote workers (processes on other machines that run jobs): a banned worker's results are rejected, and its shards
+//! of open runs are run again. A job's lease names the worker's slot as its holder, for example `remote/rack-1/slot-0`.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -14,7 +15,7 @@ async fn claim_for(f: &TestStore, holder: &str) -> (JobClaim, Shard) {
     let claimed = f.store.claim(holder, LEASE_S, f.now).await.unwrap();
     let claimed = claimed.expect("a job is queued");
     let Job::Shard { shard, .. } = claimed.job else {
-        panic!("{:?}", claimed.job);
+        panic!("expected a shard, claimed {:?}", claimed.job);
     };
     (claimed.claim, shard)
 }
@@ -22,8 +23,8 @@ async fn claim_for(f: &TestStore, holder: &str) -> (JobClaim, Shard) {
 #[tokio::test]
 async fn ban_requeues_shards_of_open_runs() {
     let f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     // A worker with a similar name and the server's own slot are not affected.
     let (own, own_shard) = claim_for(&f, "slot-0").await;
     assert_eq!(
@@ -56,30 +57,32 @@ async fn ban_requeues_shards_of_open_runs() {
     let repeated = f.store.ban_worker(Actor::Organiser, &rack, REASON, f.now);
     assert!(matches!(repeated.await, Err(StoreError::Conflict(_))));
 
-    // Its late outcomes change nothing, and both shards go to other workers.
+    // The banned worker's late outcomes change nothing, and other workers run both shards again.
     assert_eq!(
         f.commit_shard(&banned, &banned_shard, 0).await,
         CommitOutcome::LeaseLost
     );
-    let mut left = vec![banned_shard.id, running_shard.id];
+    let mut remaining_shards = vec![banned_shard.id, running_shard.id];
     while let Some(claimed) = f.store.claim("slot-0", LEASE_S, f.now).await.unwrap() {
         match claimed.job {
             Job::Shard { shard, .. } => {
-                left.retain(|id| *id != shard.id);
+                remaining_shards.retain(|id| *id != shard.id);
                 assert_eq!(
                     f.commit_shard(&claimed.claim, &shard, 0).await,
                     CommitOutcome::Stored
                 );
             }
             Job::Scoring { .. } => {
-                let done = f.finish(&claimed.claim, 0.5, "datasets/alpha").await;
-                assert_eq!(done, CommitOutcome::Stored);
+                let finished = f
+                    .finish_scoring(&claimed.claim, 0.5, "datasets/alpha")
+                    .await;
+                assert_eq!(finished, CommitOutcome::Stored);
                 break;
             }
-            other => panic!("{other:?}"),
+            other => panic!("expected a shard or a scoring job, claimed {other:?}"),
         }
     }
-    assert!(left.is_empty(), "{left:?}");
+    assert!(remaining_shards.is_empty(), "{remaining_shards:?}");
     assert_eq!(
         f.commit_shard(&running, &running_shard, 0).await,
         CommitOutcome::LeaseLost
@@ -88,12 +91,12 @@ async fn ban_requeues_shards_of_open_runs() {
         f.state(evaluation.id).await,
         EvaluationState::Finished { .. }
     ));
-    // Finished results with a part of a worker are listed.
+    // Finished evaluations are listed for each worker that ran a shard of them.
     let results = async |name: &str| f.store.results_of_worker(&worker(name), 100).await.unwrap();
     assert_eq!(results("rack-1").await, WorkerResults::default());
     assert_eq!(results("rack-10").await.evaluations, [evaluation.id]);
 
-    // It stays banned for another process, until it is readmitted.
+    // The worker is banned for another process, too, until it is readmitted.
     let other = f.reopen().await;
     assert_eq!(other.worker_bans().await.unwrap(), bans);
     let readmit = async || {
@@ -110,12 +113,12 @@ async fn ban_requeues_shards_of_open_runs() {
 #[tokio::test]
 async fn remote_leases_survive_a_server_restart() {
     let mut f = TestStore::new().await;
-    let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await;
+    let submission = f.valid_submission_of("Alpha").await;
+    f.evaluate(submission.id, &six_shard_plan()).await;
     let (remote, shard) = claim_for(&f, "remote/rack-1/slot-0").await;
     let (own, own_shard) = claim_for(&f, "slot-0").await;
     let (unstarted, _) = claim_for(&f, "reserved").await;
-    f.later(i64::from(LEASE_S) + 5);
+    f.advance_clock_s(i64::from(LEASE_S) + 5);
     // Leases of unstarted jobs end, remote leases are renewed, and the server's own leases are unchanged.
     assert_eq!(
         f.store.release_leases_of("reserved", f.now).await.unwrap(),
@@ -125,12 +128,12 @@ async fn remote_leases_survive_a_server_restart() {
         f.store.renew_leases_of("remote", 60, f.now).await.unwrap(),
         1
     );
-    let mut next = Vec::new();
+    let mut claimed_jobs = Vec::new();
     while let Some(claimed) = f.store.claim("slot-1", LEASE_S, f.now).await.unwrap() {
-        next.push(claimed.claim.job);
+        claimed_jobs.push(claimed.claim.job);
     }
-    assert!(next.contains(&unstarted.job) && next.contains(&own.job));
-    assert!(!next.contains(&remote.job));
+    assert!(claimed_jobs.contains(&unstarted.job) && claimed_jobs.contains(&own.job));
+    assert!(!claimed_jobs.contains(&remote.job));
     assert_eq!(
         f.commit_shard(&own, &own_shard, 0).await,
         CommitOutcome::LeaseLost
@@ -152,8 +155,8 @@ async fn remote_leases_survive_a_server_restart() {
 #[test]
 fn worker_names_are_valid_subject_tokens() {
     for name in ["", "a.b", "a b", "*", ">", "a/b", &"x".repeat(65)] {
-        let refused = name.parse::<WorkerName>().unwrap_err();
-        assert!(refused.to_string().contains("1 to 64"), "{name:?}");
+        let error = name.parse::<WorkerName>().unwrap_err();
+        assert!(error.to_string().contains("1 to 64"), "{name:?}");
     }
     assert_eq!(worker("rack-1_b").holder(), "remote/rack-1_b");
 }
