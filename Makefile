@@ -1,15 +1,20 @@
 # The two main targets: `make demo` runs a competition day, `make test` runs all tests.
 
-# Variables a user may set:
+# Variables a user may set.
+# demo: EPISODES per task; SERVE=0 ends after the day instead of serving it; LISTEN is the server's address, DEMO_DIR its data folder.
 EPISODES ?= 50
 SERVE    ?= 1
 LISTEN   ?= 127.0.0.1:8080
 DEMO_DIR ?= demo-data
+# fuzz, soak: duration.
 MINUTES  ?= 60
+# crowd: least number of SHARDS (groups of episodes), number of WORKERS, and seconds for which a worker sleeps per shard.
 SHARDS   ?= 10000
 WORKERS  ?= 200
 SLEEP_S  ?= 10
+# test-engine: 1 also compiles the program in an image.
 WHOLE    ?=
+# costs: see its target.
 ONLY     ?=
 ROUNDS   ?= 1
 COMMIT   ?= HEAD
@@ -23,9 +28,14 @@ CARGO      ?= cargo
 # split names at spaces.
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
+# In a target folder without incremental data, tests are built without it: their build takes a sixth less CPU time. Once a developer's cargo
+# has written such data, they are built with it, because cargo compiles the workspace again after each change of this setting.
+ifeq ($(origin CARGO_INCREMENTAL)$(shell ls -A "$(TARGET_DIR)/debug/incremental" 2>/dev/null),undefined)
+export CARGO_INCREMENTAL := 0
+endif
 DEMO       := $(TARGET_DIR)/demo
 
-.PHONY: demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   run a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -45,7 +55,7 @@ help:
 	@echo "make fuzz   fuzz the parsers with almost valid input: MINUTES=$(MINUTES)"
 	@echo "make busy   run agents beside other load: CPU, memory, I/O and processes"
 	@echo "make load   measure how many page views a server handles, and check that agents are not affected"
-	@echo "make elsewhere   measure the overhead of a remote worker"
+	@echo "make remote-slot   measure the overhead of a remote worker, compared with the server's own slot"
 	@echo "make crowd   measure the throughput of one server with many workers: SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S)"
 	@echo "make objects   compare file transfer by JetStream's object store and by HTTP, on a link of 200 ms"
 	@echo "make soak   upload, evaluate, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
@@ -91,13 +101,13 @@ demo: setup
 	    --bundle agents/hold --bundle "$(TARGET_DIR)/bundles/striker" --bundle agents/reckless \
 	    $(if $(filter 0,$(SERVE)),--no-serve)
 
-# Runs targets in parallel, since they wait much: for a registry, for one program, for one of two CPUs. Cargo's output is printed at once
-# (the + below), other output when a target is complete.
-SIDE_BY_SIDE = $(MAKE) --no-print-directory --output-sync=target --keep-going --jobs
+# Runs targets in parallel, since they often wait: for a registry, for one program, for one of two CPUs. Lines that begin with + print
+# their output (cargo's) at once; other output is printed when a target is complete.
+PARALLEL_MAKE = $(MAKE) --no-print-directory --output-sync=target --keep-going --jobs
 
 test: setup-test
-	$(SIDE_BY_SIDE) tests-built tests-of-agents tests-of-scripts
-	$(SIDE_BY_SIDE) tests-of-rust tests-of-python tests-of-api
+	$(PARALLEL_MAKE) tests-built tests-of-agents tests-of-scripts
+	$(PARALLEL_MAKE) tests-of-rust tests-of-python tests-of-api
 
 # Parts of `make test`, in two rounds: the Rust tests use tools that the tests of agents and pages install.
 # The programs are built first, since the end-to-end tests run the real binary and the real agents. With --tests the
@@ -187,7 +197,7 @@ load:
 	python3 tests/load/load.py "$(RELEASE)/faceoff" "$(RELEASE)/striker"
 
 # Compares a slot of a remote worker with a slot of the server; run it on an idle machine.
-elsewhere: setup-test
+remote-slot: setup-test
 	$(CARGO) build --release --locked --package faceoff
 	python3 tests/load/remote_slot.py "$(RELEASE)/faceoff"
 

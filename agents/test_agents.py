@@ -1,6 +1,6 @@
-"""Tests the Python reference agents over the protocol: python3 -m unittest.
+"""Tests the Python reference agents in messages of the evaluator's protocol: python3 -m unittest.
 
-Their effect on the robot is tested end to end, with the simulator.
+Other tests run the agents in the simulator.
 """
 
 import json
@@ -15,20 +15,27 @@ from pathlib import Path
 AGENTS = Path(__file__).parent
 # Seconds for an agent to exit, more than on the slowest machine.
 EXIT_TIMEOUT_S = 600
-POSE = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0]
+DT_S = 0.02  # control period
+TABLE_LENGTH_M, TABLE_WIDTH_M = 1.948, 1.038
+PUCK_RADIUS_M, MALLET_RADIUS_M = 0.03165, 0.04815
+MALLET_HEIGHT_M = 0.1645
+BASE_DISTANCE_M = 1.51  # from a robot's base to the table's centre
+# The joint angles at which every episode starts, rad.
+START_POSE = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0]
+# Limits of the joints, rad and rad/s.
 POS_LIMIT = [2.96706, 2.0944, 2.96706, 2.0944, 2.96706, 2.0944, 3.05433]
 VEL_LIMIT = [math.radians(limit) for limit in (85, 85, 100, 75, 130, 135, 135)]
 ENV = {
-    "dt": 0.02,
-    "table": {"length": 1.948, "width": 1.038, "goal_width": 0.25},
-    "puck": {"radius": 0.03165},
-    "mallet": {"radius": 0.04815},
+    "dt": DT_S,
+    "table": {"length": TABLE_LENGTH_M, "width": TABLE_WIDTH_M, "goal_width": 0.25},
+    "puck": {"radius": PUCK_RADIUS_M},
+    "mallet": {"radius": MALLET_RADIUS_M},
     "joint_pos_ids": list(range(6, 13)),
     "joint_vel_ids": list(range(13, 20)),
     "robot": {
         "n_joints": 7,
-        "ee_desired_height": 0.1645,
-        "base_frame": [[1, 0, 0, -1.51, 0, 1, 0, 0, 0, 0, 1, -0.1, 0, 0, 0, 1]],
+        "ee_desired_height": MALLET_HEIGHT_M,
+        "base_frame": [[1, 0, 0, -BASE_DISTANCE_M, 0, 1, 0, 0, 0, 0, 1, -0.1, 0, 0, 0, 1]],
         "joint_pos_limit": [[-limit for limit in POS_LIMIT], POS_LIMIT],
         "joint_vel_limit": [[-limit for limit in VEL_LIMIT], VEL_LIMIT],
     },
@@ -36,7 +43,7 @@ ENV = {
 
 
 class Agent:
-    """A running program of a bundle, started by its manifest."""
+    """A running agent, started as its `agent.toml` says."""
 
     def __init__(self, name, task="hit"):
         folder = AGENTS / name
@@ -59,14 +66,15 @@ class Agent:
         self.process.stdin.flush()
 
     def ask(self, message):
+        """Sends a message and returns the answer."""
         self.send(message)
         return json.loads(self.process.stdout.readline())
 
     def reset(self, episode):
         return self.ask({"type": "reset", "episode": episode})
 
-    def step(self, step, pose, opponent=True, puck=(1.0, 0.1, 0.0, 0.0, 0.0, 0.0)):
-        obs = [*puck, *pose, *[0.0] * 7, *[2.37, 0.0, 0.1645] * opponent]
+    def step(self, step, pose, has_opponent=True, puck=(1.0, 0.1, 0.0, 0.0, 0.0, 0.0)):
+        obs = [*puck, *pose, *[0.0] * 7, *[2.37, 0.0, MALLET_HEIGHT_M] * has_opponent]
         answer = self.ask({"type": "step", "step": step, "obs": obs})
         assert (answer["type"], answer["step"]) == ("act", step), answer
         return answer["action"]
@@ -86,14 +94,14 @@ class AllAgents(unittest.TestCase):
                     for episode in (17, 3):
                         self.assertEqual(agent.reset(episode), {"type": "ready", "episode": episode})
                         for step in range(500):
-                            action = agent.step(step, POSE, task in ("hit", "tournament"))
+                            action = agent.step(step, START_POSE, task in ("hit", "tournament"))
                             self.assertEqual([len(row) for row in action], [7, 7])
                             self.assertTrue(all(math.isfinite(x) for row in action for x in row))
                         agent.send({"type": "end", "episode": episode, "steps": 500})
                     agent.send({"type": "bye"})
                     self.assertEqual(agent.process.wait(timeout=EXIT_TIMEOUT_S), 0)
 
-    def test_agents_end_with_the_input(self):
+    def test_agents_end_at_the_end_of_input(self):
         for name in self.names:
             with self.subTest(name), Agent(name) as agent:
                 agent.process.stdin.close()
@@ -112,17 +120,17 @@ class Hold(unittest.TestCase):
         with Agent("hold") as agent:
             for episode, offset in enumerate((0.0, 0.05)):
                 agent.reset(episode)
-                first = [q + offset for q in POSE]
+                first = [q + offset for q in START_POSE]
                 self.assertEqual(agent.step(0, first), [first, [0.0] * 7])
-                sagged = [q + offset + 0.01 for q in POSE]
+                sagged = [q + offset + 0.01 for q in START_POSE]
                 self.assertEqual(agent.step(1, sagged), [first, [0.0] * 7])
 
 
 class Reckless(unittest.TestCase):
-    def test_reckless_runs_to_both_ends_at_full_speed(self):
+    def test_reckless_moves_joints_to_both_limits_at_full_speed(self):
         with Agent("reckless") as agent:
             agent.reset(0)
-            actions = [agent.step(step, POSE) for step in range(500)]
+            actions = [agent.step(step, START_POSE) for step in range(500)]
         for joint in range(7):
             positions = [pose[joint] for pose, _ in actions]
             speeds = {abs(velocity[joint]) for _, velocity in actions}
@@ -133,7 +141,7 @@ class Reckless(unittest.TestCase):
 
 
 class Starter(unittest.TestCase):
-    """The geometry and limits of the starter agent."""
+    """The starter agent's geometry, limits and strikes."""
 
     @classmethod
     def setUpClass(cls):
@@ -142,15 +150,15 @@ class Starter(unittest.TestCase):
 
         cls.arm = arm
 
-    def test_joint_angles_reach_their_point(self):
+    def test_joint_angles_put_the_mallet_at_the_point(self):
         for x in (0.6, 0.65, 0.8, 1.0, 1.2):
             for y in (-0.45, -0.2, 0.0, 0.3):
-                q = self.arm.joints_at(x, y, 0.1645)
+                q = self.arm.joints_at(x, y, MALLET_HEIGHT_M)
                 reached = self.arm.mallet_at(q)
                 self.assertAlmostEqual(reached[0], x, 9)
                 self.assertAlmostEqual(reached[1], y, 9)
                 self.assertTrue(all(abs(a) < 0.95 * limit for a, limit in zip(q, POS_LIMIT)), (x, y, q))
-        for angle, start in zip(self.arm.joints_at(0.65, 0.0, 0.1645), POSE):
+        for angle, start in zip(self.arm.joints_at(0.65, 0.0, MALLET_HEIGHT_M), START_POSE):
             self.assertAlmostEqual(angle, start, 3)
 
     def test_starter_keeps_its_limits_under_any_puck(self):
@@ -159,31 +167,31 @@ class Starter(unittest.TestCase):
         for task in ("hit", "defend", "prepare", "tournament"):
             with self.subTest(task), Agent("starter", task) as agent:
                 agent.reset(0)
-                last, puck = POSE, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                last_pose, puck = START_POSE, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 for step in range(3000):
                     if rng.random() < 0.05:
                         puck_pose = (rng.uniform(0.5, 2.5), rng.uniform(-0.52, 0.52), 0.0)
                         puck = (*puck_pose, rng.gauss(0, 1.5), rng.gauss(0, 1.5), rng.gauss(0, 10))
                     if rng.random() < 0.03:
                         puck = (*puck[:3], 0.0, 0.0, 0.0)
-                    pose, speeds = agent.step(step, last, task in ("hit", "tournament"), puck)
-                    for before, q, dq, limit in zip(last, pose, speeds, VEL_LIMIT):
-                        self.assertLess(abs(dq), 0.95 * limit)
-                        self.assertLess(abs(q - before), 0.95 * limit * 0.02)
+                    pose, speeds = agent.step(step, last_pose, task in ("hit", "tournament"), puck)
+                    for last_angle, angle, speed, limit in zip(last_pose, pose, speeds, VEL_LIMIT):
+                        self.assertLess(abs(speed), 0.95 * limit)
+                        self.assertLess(abs(angle - last_angle), 0.95 * limit * DT_S)
                     x, y = self.arm.mallet_at(pose)
-                    self.assertGreater(x, 1.51 - 0.974 + 0.04815)
-                    self.assertLess(abs(y), 0.519 - 0.04815)
-                    last = pose
+                    self.assertGreater(x, BASE_DISTANCE_M - TABLE_LENGTH_M / 2 + MALLET_RADIUS_M)
+                    self.assertLess(abs(y), TABLE_WIDTH_M / 2 - MALLET_RADIUS_M)
+                    last_pose = pose
 
     def test_starter_strikes_a_puck_in_front_of_it(self):
         with Agent("starter", "tournament") as agent:
             agent.reset(0)
-            pose, positions = POSE, []
+            pose, positions = START_POSE, []
             for step in range(250):
                 pose, _ = agent.step(step, pose, puck=(1.0, 0.2, 0.0, 0.0, 0.0, 0.0))
                 positions.append(self.arm.mallet_at(pose))
-            nearest = min(math.dist(at, (1.0, 0.2)) for at in positions)
-            self.assertLess(nearest, 0.03165 + 0.04815, "the mallet must touch the puck")
+            nearest = min(math.dist(position, (1.0, 0.2)) for position in positions)
+            self.assertLess(nearest, PUCK_RADIUS_M + MALLET_RADIUS_M, "the mallet must touch the puck")
 
 
 if __name__ == "__main__":

@@ -114,7 +114,7 @@ limits() {
     "$tests" --test-threads 1 resource_limits:: process_limits:: cpu_limits:: cpu_count:: process_cleanup:: \
         killed_service:: exit_causes:: probe:: normal_operation:: channel_blocking::
 }
-# The evaluator's tests with agents that block it, or that compute before they are asked.
+# The tests of the evaluator, which asks agents and measures their time, with agents that block it or compute before they are asked.
 attacks() {
     "$runner_tests" --test-threads 1 early_cpu_time:: supervision:: unread_questions:: waits_of_helpers
 }

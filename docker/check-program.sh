@@ -1,6 +1,6 @@
 #!/bin/sh
-# Checks a release program before its publication: its size, that it has no symbols, and that its simulator gives the golden hashes of the
-# ruleset. Reports all defects, not only the first.
+# Checks a release program before its publication: its size, that it has no symbols, and that its simulator gives the golden hashes
+# (those of fixed episodes and games, stored in the repository). Reports all defects, not only the first.
 # usage: check-program.sh PROGRAM      (PROGRAM: for example target/release/faceoff)
 set -eu
 if [ $# -ne 1 ]; then
@@ -12,10 +12,10 @@ golden=$(dirname "$(dirname "$(realpath "$0")")")/tests/golden/simulator.txt
 # Limit for growth by dependencies and generic code; defined only here.
 most_bytes=40000000
 
-wrong=''
+has_defect=''
 refuse() {
     echo "error: $program $*" >&2
-    wrong=yes
+    has_defect=yes
 }
 
 if ! sections=$(LC_ALL=C readelf --sections --wide "$program" 2>/dev/null); then
@@ -40,5 +40,5 @@ elif [ "$computed" != "$(cat "$golden")" ]; then
         "passes, the release profile or its compiler changes the simulator's arithmetic: undo that. An intended change" \
         "needs a new ruleset"
 fi
-[ -z "$wrong" ] || exit 1
+[ -z "$has_defect" ] || exit 1
 echo "$bytes bytes of at most $most_bytes, no symbols, golden hashes as in tests/golden: $program"

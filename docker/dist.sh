@@ -18,9 +18,9 @@ if [ "$(printf '%s\n' "$needed" "$newest_glibc" | sort -V | tail -1)" != "$newes
     exit 1
 fi
 # It may only need libraries that every system has.
-others=$(objdump -p "$program" | awk '$1 == "NEEDED" { print $2 }' | grep -Ev '^(libc|libm|libgcc_s|ld-linux-.*)\.so' || true)
-if [ -n "$others" ]; then
-    echo "error: $program needs libraries that not every Linux has: $others" >&2
+other_libraries=$(objdump -p "$program" | awk '$1 == "NEEDED" { print $2 }' | grep -Ev '^(libc|libm|libgcc_s|ld-linux-.*)\.so' || true)
+if [ -n "$other_libraries" ]; then
+    echo "error: $program needs libraries that not every Linux has: $other_libraries" >&2
     exit 1
 fi
 name="faceoff-$("$program" --version | cut -d' ' -f2)-$(uname -m)-linux"

@@ -79,7 +79,7 @@ site=$("$new/bin/python3" -c 'import sysconfig; print(sysconfig.get_path("pureli
 cp "$here/faceoff_threads.py" "$site/"
 echo 'import faceoff_threads' >"$site/faceoff_threads.pth"
 "$new/bin/python3" -m compileall -q "$site/faceoff_threads.py"
-# Their first line has the path of a temporary folder, and agents run modules.
+# Scripts of packages have the path of a temporary folder in their first line, and agents run modules instead.
 find "$new/bin" -type f ! -name 'python*' -delete
 ORT_DISABLE_TELEMETRY=1 "$new/bin/python3" -I -c 'import numpy, scipy.linalg, onnxruntime' || fail "the packages do not load; see above"
 # Agents run as other users.

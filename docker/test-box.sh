@@ -1,6 +1,7 @@
 #!/bin/sh
-# Tests the images without a container engine: runs each step of docker/Dockerfile in a folder, and starts the result in
-# namespaces, like a privileged container, with the configurations of docker/compose.yaml and docker/kubernetes/.
+# Tests the server's and the worker's image without a container engine: runs each step of docker/Dockerfile in a folder, and
+# starts the result in namespaces, like a privileged container, with the configurations of docker/compose.yaml and
+# docker/kubernetes/.
 #
 #   TARGET_DIR=target docker/test-box.sh         (as root, after cargo build --bins; docker/setup.sh box)
 #   TARGET_DIR=target docker/test-box.sh start   (start the images of an earlier call)

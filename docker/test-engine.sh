@@ -75,10 +75,10 @@ docker save --output "$work/agent.tar" test-agent:latest
 # Another user reads the file in a container.
 chmod 644 "$work/agent.tar"
 
-# shellcheck source=docker/engine/withheld.sh
-. "$folder/engine/withheld.sh"
+# shellcheck source=docker/engine/missing_features.sh
+. "$folder/engine/missing_features.sh"
 # shellcheck source=docker/engine/day.sh
 . "$folder/engine/day.sh"
-# shellcheck source=docker/engine/saved.sh
-. "$folder/engine/saved.sh"
+# shellcheck source=docker/engine/saved_images.sh
+. "$folder/engine/saved_images.sh"
 echo "server, workers and agents run in containers of a real engine"

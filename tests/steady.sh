@@ -1,5 +1,5 @@
 #!/bin/sh
-# Checks that tests pass reliably, on an idle and on a busy machine.
+# Runs all tests many times, to find those that fail now and then, on an idle and on a busy machine.
 #
 #   tests/steady.sh        or `make steady`, which installs what it needs
 #

@@ -30,7 +30,7 @@ from view import DT_S, View
 ROOT = Path(__file__).parents[2]
 EPOCHS = 40
 MINIBATCH = 2048
-RATE = 2e-3
+LEARNING_RATE = 2e-3
 HIDDEN = (128, 128)
 #: Share of the episodes for validation.
 VALIDATION_SHARE = 0.1
@@ -57,9 +57,9 @@ def main() -> None:
 
         log_line("$ python " + " ".join(sys.argv))
         recording = arguments.dataset or record(arguments)
-        views, moves, episodes = read(recording)
-        log_line(f"{len(views):,} control steps of {len(np.unique(episodes))} episodes")
-        learn(views, moves, episodes, arguments.seed, arguments.out / "weights.npz", log_line)
+        features, velocities, episodes = read_recording(recording)
+        log_line(f"{len(features):,} control steps of {len(np.unique(episodes))} episodes")
+        fit(features, velocities, episodes, arguments.seed, arguments.out / "weights.npz", log_line)
         log_scores(arguments.out / "weights.npz", arguments.episodes, log_line)
 
 
@@ -77,10 +77,10 @@ def record(arguments: argparse.Namespace) -> Path:
     return folder
 
 
-def read(recording: Path) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
-    """Feature vectors, mallet velocities (as shares of MAX_SPEED_M_S) and episode numbers of all steps.
+def read_recording(recording: Path) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
+    """The features, striker's mallet velocities (as shares of MAX_SPEED_M_S) and episode numbers of all steps.
 
-    Episodes are processed in parallel, like worlds, because a view depends on earlier observations.
+    The episodes are processed together, as if each were a world, because features depend on earlier observations.
     """
     dataset = faceoff.dataset.open_dataset(recording)
     # Failed episodes are not imitated.
@@ -95,18 +95,18 @@ def read(recording: Path) -> tuple[Floats, Floats, npt.NDArray[np.int64]]:
     mallets = np.stack([padded(np.vstack([start, path]), longest + 1) for path in commanded])
     speeds = np.diff(mallets, axis=1) / DT_S
     view = View(len(recorded))
-    before = np.zeros((len(recorded), 2))
-    views, moves, episode_numbers = [], [], []
+    last_speeds = np.zeros((len(recorded), 2))
+    feature_rows, velocities, episode_numbers = [], [], []
     for step in range(longest):
-        features = view.update(observations[:, step], mallets[:, step], before)
-        before = speeds[:, step]
+        features = view.update(observations[:, step], mallets[:, step], last_speeds)
+        last_speeds = speeds[:, step]
         running = np.flatnonzero(step < lengths)
-        views.append(features[running])
-        moves.append(before[running] / MAX_SPEED_M_S)
+        feature_rows.append(features[running])
+        velocities.append(last_speeds[running] / MAX_SPEED_M_S)
         episode_numbers.append(running)
     return (
-        np.concatenate(views).astype(np.float32),
-        np.concatenate(moves).astype(np.float32),
+        np.concatenate(feature_rows).astype(np.float32),
+        np.concatenate(velocities).astype(np.float32),
         np.concatenate(episode_numbers),
     )
 
@@ -116,9 +116,9 @@ def padded(rows: npt.NDArray[np.float64], length: int) -> npt.NDArray[np.float64
     return np.concatenate([rows, np.repeat(rows[-1:], length - len(rows), axis=0)])
 
 
-def learn(
-    views: Floats,
-    moves: Floats,
+def fit(
+    features: Floats,
+    velocities: Floats,
     episodes: npt.NDArray[np.int64],
     seed: int,
     weights: Path,
@@ -126,32 +126,32 @@ def learn(
 ) -> None:
     """Fits a network to the mallet velocities by least squares, and saves it."""
     rng = np.random.default_rng(seed)
-    normalisation = Normalisation(views.shape[1])
-    normalisation.update(views)
-    inputs = normalisation(views)
-    drawn = rng.permutation(episodes.max() + 1)
-    is_validation = np.isin(episodes, drawn[: max(1, int(VALIDATION_SHARE * len(drawn)))])
+    normalisation = Normalisation(features.shape[1])
+    normalisation.update(features)
+    inputs = normalisation(features)
+    shuffled = rng.permutation(episodes.max() + 1)
+    is_validation = np.isin(episodes, shuffled[: max(1, int(VALIDATION_SHARE * len(shuffled)))])
     training = np.flatnonzero(~is_validation)
-    network = Network((views.shape[1], *HIDDEN, moves.shape[1]), rng, last_scale=0.1)
+    network = Network((features.shape[1], *HIDDEN, velocities.shape[1]), rng, last_scale=0.1)
     adam = Adam(network.parameters(), max_norm=1.0)
     started_s = time.perf_counter()
     for epoch in range(EPOCHS):
         rng.shuffle(training)
-        for first in range(0, len(training), MINIBATCH):
-            batch = training[first : first + MINIBATCH]
+        for start in range(0, len(training), MINIBATCH):
+            batch = training[start : start + MINIBATCH]
             layers = network.layers(inputs[batch])
             adam.step(
-                network.gradients(layers, (layers[-1] - moves[batch]) / np.float32(len(batch))),
-                RATE * (1.0 - epoch / EPOCHS),
+                network.gradients(layers, (layers[-1] - velocities[batch]) / np.float32(len(batch))),
+                LEARNING_RATE * (1.0 - epoch / EPOCHS),
             )
         if epoch % 5 == 4:
             errors = [
-                MAX_SPEED_M_S * float(np.sqrt(np.mean((network(inputs[part]) - moves[part]) ** 2)))
+                MAX_SPEED_M_S * float(np.sqrt(np.mean((network(inputs[part]) - velocities[part]) ** 2)))
                 for part in (training, np.flatnonzero(is_validation))
             ]
             log_line(
                 f"{time.perf_counter() - started_s:5.0f} s  epoch {epoch + 1:3}: off by {errors[0]:.3f} m/s, "
-                f"{errors[1]:.3f} m/s in episodes kept apart"
+                f"{errors[1]:.3f} m/s in validation episodes"
             )
     save(weights, network, normalisation)
 

@@ -1,4 +1,4 @@
-"""Makes a bundle from trained weights, for evaluation and submission.
+"""Makes a bundle, the folder of an agent, from trained weights, for evaluation and submission.
 
     python agents/examples/make_bundle.py agents/examples/trained/ppo/weights.npz my-learned-agent
 
@@ -18,7 +18,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from network import LARGEST, SavedPolicy
+from network import CLIP_DEVIATIONS, SavedPolicy
 
 HERE = Path(__file__).parent
 PACKAGE = Path(faceoff.__file__).parent
@@ -43,7 +43,7 @@ def main() -> None:
 
 def make(weights: Path, folder: Path) -> None:
     """Writes the bundle."""
-    network = graph(SavedPolicy(weights))
+    network = onnx_model(SavedPolicy(weights))
     folder.mkdir(parents=True)
     manifest = (HERE / "bundle" / "agent.toml").read_text()
     (folder / "agent.toml").write_text(manifest.replace("{{name}}", folder.name))
@@ -59,10 +59,10 @@ def make(weights: Path, folder: Path) -> None:
     onnx.save(network, folder / "policy.onnx")
 
 
-def graph(policy: SavedPolicy) -> onnx.ModelProto:
-    """The network from `view` (n, inputs), as computed by `view.py`, to `action` (n, outputs), both float32."""
+def onnx_model(policy: SavedPolicy) -> onnx.ModelProto:
+    """The network as ONNX: from `view` (n, inputs), the features of `view.py`, to `action` (n, outputs), both float32."""
     constants = dict(policy.parts)
-    constants |= {"least": np.array(-LARGEST, np.float32), "greatest": np.array(LARGEST, np.float32)}
+    constants |= {"least": np.array(-CLIP_DEVIATIONS, np.float32), "greatest": np.array(CLIP_DEVIATIONS, np.float32)}
     nodes = [
         helper.make_node("Sub", ["view", "mean"], ["centred"]),
         helper.make_node("Div", ["centred", "deviation"], ["scaled"]),

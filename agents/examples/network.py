@@ -1,4 +1,4 @@
-"""A small network of tanh layers in NumPy: forward, backward, Adam, and a file of at most a megabyte."""
+"""A small neural network of tanh layers in NumPy: outputs, gradients, the optimiser Adam, and saving to a file."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.floating]
 
-#: Normalised inputs are clipped to this many deviations from the mean.
-LARGEST = 10.0
+#: Normalised inputs are clipped to this many standard deviations from the mean.
+CLIP_DEVIATIONS = 10.0
 
 
 class Network:
@@ -25,7 +25,7 @@ class Network:
             self.biases.append(np.zeros(outputs, np.float32))
 
     def __call__(self, inputs: Floats) -> Floats:
-        """(n, inputs) to (n, outputs)."""
+        """Outputs (n, outputs) for inputs (n, inputs)."""
         return self.layers(inputs)[-1]
 
     def layers(self, inputs: Floats) -> list[Floats]:
@@ -37,7 +37,10 @@ class Network:
         return values
 
     def gradients(self, values: list[Floats], output_gradient: Floats) -> list[Floats]:
-        """Gradients of a loss by each of :meth:`parameters`, from its gradient by the outputs."""
+        """Gradients of a loss by each of :meth:`parameters`.
+
+        `values` is the result of :meth:`layers`, `output_gradient` the gradient of the loss by the outputs.
+        """
         gradients: list[Floats] = []
         gradient = output_gradient
         for index in reversed(range(len(self.weights))):
@@ -65,23 +68,24 @@ class Adam:
     def __init__(self, parameters: list[Floats], max_norm: float) -> None:
         self._parameters = parameters
         self._max_norm = max_norm
+        # Running means of the gradients and of their squares.
         self._means = [np.zeros_like(parameter) for parameter in parameters]
         self._squares = [np.zeros_like(parameter) for parameter in parameters]
         self._steps = 0
 
-    def step(self, gradients: list[Floats], rate: float) -> None:
+    def step(self, gradients: list[Floats], learning_rate: float) -> None:
         """Moves the parameters against the gradients."""
         self._steps += 1
         norm = float(np.sqrt(sum(float(np.vdot(gradient, gradient)) for gradient in gradients)))
-        share = min(1.0, self._max_norm / (norm + 1e-8))
-        corrected = rate * np.sqrt(1.0 - 0.999**self._steps) / (1.0 - 0.9**self._steps)
+        scale = min(1.0, self._max_norm / (norm + 1e-8))
+        corrected_rate = learning_rate * np.sqrt(1.0 - 0.999**self._steps) / (1.0 - 0.9**self._steps)
         for parameter, mean, square, gradient in zip(
             self._parameters, self._means, self._squares, gradients
         ):
-            gradient = share * gradient
+            gradient = scale * gradient
             mean += 0.1 * (gradient - mean)
             square += 0.001 * (gradient * gradient - square)
-            parameter -= np.float32(corrected) * mean / (np.sqrt(square) + 1e-8)
+            parameter -= np.float32(corrected_rate) * mean / (np.sqrt(square) + 1e-8)
 
 
 class Normalisation:
@@ -103,9 +107,9 @@ class Normalisation:
         self.count = total
 
     def __call__(self, inputs: npt.NDArray[np.floating]) -> Floats:
-        """The inputs in deviations from the mean, clipped to ±LARGEST."""
+        """The inputs in standard deviations from the mean, clipped to ±CLIP_DEVIATIONS."""
         scaled = (inputs - self.mean) / np.sqrt(self.variance + 1e-8)
-        return np.clip(scaled, -LARGEST, LARGEST).astype(np.float32)
+        return np.clip(scaled, -CLIP_DEVIATIONS, CLIP_DEVIATIONS).astype(np.float32)
 
 
 def save(path: Path, network: Network, normalisation: Normalisation) -> None:
@@ -128,7 +132,7 @@ class SavedPolicy:
     def __call__(self, inputs: Floats) -> Floats:
         """Actions (n, outputs) for inputs (n, inputs)."""
         parts = self.parts
-        value = np.clip((inputs - parts["mean"]) / parts["deviation"], -LARGEST, LARGEST)
+        value = np.clip((inputs - parts["mean"]) / parts["deviation"], -CLIP_DEVIATIONS, CLIP_DEVIATIONS)
         for index in range(self.layers - 1):
             value = np.tanh(value @ parts[f"weight{index}"] + parts[f"bias{index}"])
         actions: Floats = value @ parts[f"weight{self.layers - 1}"] + parts[f"bias{self.layers - 1}"]

@@ -1,10 +1,10 @@
-"""Learns to defend by reinforcement: PPO in NumPy, less than half an hour on two cores.
+"""Learns to defend by reinforcement: proximal policy optimisation (PPO) in NumPy, less than half an hour on two cores.
 
     python agents/examples/train_ppo.py --out my-training
 
-Trains in the package's vector environment with the perturbations of evaluations, each world with another robot, and
-writes `weights.npz` and `log.txt`. Then it evaluates on the episodes of `faceoff eval --seed 0`, which are not used for
-training, and compares with an arm that holds still. `make_bundle.py` makes an agent of the weights.
+Trains in the package's vector environment with the perturbations of evaluations, each world (simulated table) with
+another robot, and writes `weights.npz` and `log.txt`. Then it evaluates on the episodes of `faceoff eval --seed 0`,
+which are not used for training, and compares with an arm that holds still. `make_bundle.py` makes an agent of the weights.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from worlds import DefendWorlds
 
 STEPS = 20_000_000
 #: Rounds between two lines of the log.
-LOG_EVERY = 50
+ROUNDS_PER_LOG_LINE = 50
 
 
 def main() -> None:
@@ -46,8 +46,8 @@ def main() -> None:
             log.write(line + "\n")
 
         log_line("$ python " + " ".join(sys.argv))
-        worlds = train(arguments, log_line)
-        log_line(f"{worlds:,} control steps learned from")
+        steps = train(arguments, log_line)
+        log_line(f"{steps:,} control steps learned from")
         log_scores(arguments.out / "weights.npz", arguments.episodes, log_line)
 
 
@@ -55,21 +55,22 @@ def train(arguments: argparse.Namespace, log_line: Callable[[str], None]) -> int
     """Trains and saves the weights; returns the number of control steps."""
     worlds = DefendWorlds(arguments.worlds)
     learner = Learner(worlds, Settings(), arguments.seed)
-    per_round: int = learner.settings.steps_per_round * arguments.worlds
-    rounds: int = -(-arguments.steps // per_round)
+    steps_per_round: int = learner.settings.steps_per_round * arguments.worlds
+    rounds: int = -(-arguments.steps // steps_per_round)
     started_s = time.perf_counter()
-    for done in range(1, rounds + 1):
-        learner.round((done - 1) / rounds)
-        if done % LOG_EVERY == 0 or done == rounds:
+    for round_number in range(1, rounds + 1):
+        learner.round((round_number - 1) / rounds)
+        if round_number % ROUNDS_PER_LOG_LINE == 0 or round_number == rounds:
+            steps = round_number * steps_per_round
             elapsed_s = time.perf_counter() - started_s
-            success, violated = worlds.shares()
+            succeeded, violated = worlds.shares()
             log_line(
-                f"{elapsed_s:5.0f} s  {done * per_round:>12,} steps, {done * per_round / elapsed_s:,.0f}/s: "
-                f"{100.0 * success:.1f} % of the episodes since the last line held, "
-                f"{100.0 * violated:.1f} % broke a constraint"
+                f"{elapsed_s:5.0f} s  {steps:>12,} steps, {steps / elapsed_s:,.0f}/s: "
+                f"{100.0 * succeeded:.1f} % of the episodes since the last line succeeded, "
+                f"{100.0 * violated:.1f} % violated a constraint"
             )
     save(arguments.out / "weights.npz", learner.policy, learner.normalisation)
-    return rounds * per_round
+    return rounds * steps_per_round
 
 
 if __name__ == "__main__":

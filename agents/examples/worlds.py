@@ -1,4 +1,4 @@
-"""Training environment for `defend`."""
+"""The training environment for the task `defend`: many worlds (simulated tables), stepped together."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import numpy.typing as npt
 from faceoff.gym import AirHockeyVectorEnv, MalletPlaneVector, Transition
 
 from player import MAX_SPEED_M_S
-from view import LENGTH, View
+from view import FEATURE_COUNT, View
 
 #: The table's centre in the robot's base frame, m.
-TABLE_CENTRE = (1.51, 0.0)
+TABLE_CENTRE_M = (1.51, 0.0)
 
 
-def reward(step: Transition) -> npt.NDArray[np.float64]:
-    """1 for a success, plus a tenth of the speed (m/s) lost by the puck, minus a cost for a mallet out of its way.
+def reward(transition: Transition) -> npt.NDArray[np.float64]:
+    """1 for a success, plus a tenth of the speed (m/s) lost by the puck, minus a cost for a mallet beside its path.
 
     Without that cost some policies learn to stay away: a mallet that moves at random disturbs pucks that would have
     stopped without a contact, and rarely stops others.
     """
-    before, after = step.state.puck, step.next_state.puck
-    lost_m_s = np.linalg.norm(before[:, 3:5], axis=1) - np.linalg.norm(after[:, 3:5], axis=1)
-    mallet = step.next_state.mallet[:, :2] - TABLE_CENTRE
+    before, after = transition.state.puck, transition.next_state.puck
+    lost_speed_m_s = np.linalg.norm(before[:, 3:5], axis=1) - np.linalg.norm(after[:, 3:5], axis=1)
+    mallet = transition.next_state.mallet[:, :2] - TABLE_CENTRE_M
     is_coming = (after[:, 3] < 0.0) & (after[:, 0] > mallet[:, 0])
-    off_m = np.where(is_coming, np.abs(after[:, 1] - mallet[:, 1]), 0.0)
-    rewards: npt.NDArray[np.float64] = 1.0 * step.success + 0.1 * lost_m_s - 0.05 * off_m
+    distance_m = np.where(is_coming, np.abs(after[:, 1] - mallet[:, 1]), 0.0)
+    rewards: npt.NDArray[np.float64] = 1.0 * transition.success + 0.1 * lost_speed_m_s - 0.05 * distance_m
     return rewards
 
 
 class DefendWorlds:
     """Episodes of `defend`, profile `evaluation`, each world with another robot; actions are mallet velocities."""
 
-    view_length = LENGTH
+    feature_count = FEATURE_COUNT
     actions = 2
 
     def __init__(self, worlds: int) -> None:

@@ -2,9 +2,9 @@
 
 from protocol import Agent, run
 
-# Initial direction of each joint. Shoulder back and elbow open lift the mallet off the table; the base turns
-# it over the edge.
-START = [+1, -1, +1, +1, +1, -1, +1]
+# Initial direction of each of the seven joints. Moving the shoulder back and opening the elbow lifts the mallet off the table; the
+# base turns it over the table's edge.
+START_DIRECTIONS = [+1, -1, +1, +1, +1, -1, +1]
 
 
 class Reckless(Agent):
@@ -16,12 +16,12 @@ class Reckless(Agent):
     def start(self):
         self.dt = self.env["dt"]
         self.lower, self.upper = self.env["robot"]["joint_pos_limit"]
-        # The rules allow 95 % of these limits, and 95 % of the range above.
+        # The rules allow 95 % of these limits, and 95 % of the position range above.
         self.speed = self.env["robot"]["joint_vel_limit"][1]
 
     def reset(self):
         self.pose = None
-        self.direction = list(START)
+        self.direction = list(START_DIRECTIONS)
 
     def act(self, observation):
         if self.pose is None:

@@ -1,4 +1,5 @@
-"""Converts mallet motions to joint angles within the speed limits, with the arm as a planar crane.
+"""Converts mallet motions to joint angles within the speed limits, with the arm as a chain of three links in
+a vertical plane.
 
 Joints 3, 5 and 7 stay at zero. Joint 1 turns the whole arm towards a point, and joints 2, 4 and 6 move it
 in a vertical plane: upper arm, forearm and hand. The hand's angle is a fixed function of the reach; the rest
@@ -7,12 +8,14 @@ follows from triangles. (Striker, in Rust, uses all seven joints.)
 
 import math
 
-SHOULDER = 0.36  # height of joint 2, metres
-UPPER_ARM = 0.42
-FOREARM = 0.40
+# Lengths in metres.
+SHOULDER = 0.36  # height of joint 2
+UPPER_ARM = 0.42  # from joint 2 to joint 4
+FOREARM = 0.40  # from joint 4 to joint 6
 HAND = 0.666  # from joint 6 to the mallet's joint
 SPEED_SHARE = 0.8  # used share of the allowed joint speeds; the rest is for the controller's errors
-ACCELERATION = 8.0  # of the mallet, m/s²
+ACCELERATION = 8.0  # largest acceleration of the mallet, m/s²
+MARGIN = 0.015  # distance of the commanded mallet from the bounds of its area, for tracking errors, metres
 
 
 def joints_at(x, y, z):
@@ -39,47 +42,47 @@ def mallet_at(q):
 
 
 def _triangle_angle(opposite, a, b):
-    """The angle of a triangle between sides a and b."""
+    """The angle between the sides a and b of a triangle, rad."""
     cosine = (a * a + b * b - opposite * opposite) / (2 * a * b)
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
 class Arm:
-    """A smoothly moving reference of the mallet, with its joint angles and speeds."""
+    """The reference: a smooth commanded motion of the mallet, and its joint angles and speeds."""
 
     def __init__(self, env):
         robot = env["robot"]
         self.dt = env["dt"]
         self.height = robot["ee_desired_height"]
-        # More than 95 % of a limit is a violation.
+        # The rules count more than 95 % of a limit as a violation.
         self.speed_limit = [SPEED_SHARE * 0.95 * limit for limit in robot["joint_vel_limit"][1]]
         table, mallet = env["table"], env["mallet"]["radius"]
-        # Distance of the robot from the table's centre. A margin of 15 mm is for tracking errors.
-        self.base = abs(_base_x(robot["base_frame"][0]))
-        self.x_min = self.base - table["length"] / 2 + mallet + 0.015
-        self.y_max = table["width"] / 2 - mallet - 0.015
-        self.reach_max = 1.30
+        # Distance of the robot from the table's centre, metres.
+        self.base_distance = abs(_frame_x(robot["base_frame"][0]))
+        self.x_min = self.base_distance - table["length"] / 2 + mallet + MARGIN
+        self.y_max = table["width"] / 2 - mallet - MARGIN
+        self.reach_max = 1.30  # the arm is nearly stretched there, metres
 
     def reset(self, q):
         """Starts an episode or rally at rest, at the observed joint angles."""
         self.pos = mallet_at(q)
         self.vel = (0.0, 0.0)
 
-    def inside(self, x, y):
+    def nearest_allowed(self, x, y):
         """The nearest point in the allowed area of the mallet."""
         y = max(-self.y_max, min(self.y_max, y))
         x_max = math.sqrt(self.reach_max**2 - y * y)
         return max(self.x_min, min(x_max, x)), y
 
-    def go(self, target, speed, final=(0.0, 0.0)):
-        """One control step towards `target`, at most at `speed` and with velocity `final` there."""
-        x, y = self.inside(*target)
-        way = (x - self.pos[0], y - self.pos[1])
-        distance = math.hypot(*way)
+    def move_to(self, target, speed, final_velocity=(0.0, 0.0)):
+        """One control step towards `target` at `speed` (m/s) or less, with `final_velocity` there; returns the action."""
+        x, y = self.nearest_allowed(*target)
+        offset = (x - self.pos[0], y - self.pos[1])
+        distance = math.hypot(*offset)
         # The largest speed from which it can still brake, with half of the acceleration.
         gain = min(speed, math.sqrt(ACCELERATION * distance)) / max(distance, 1e-6)
         gain = min(gain, 0.5 / self.dt)
-        return self.move(way[0] * gain + final[0], way[1] * gain + final[1])
+        return self.move(offset[0] * gain + final_velocity[0], offset[1] * gain + final_velocity[1])
 
     def move(self, vx, vy):
         """One control step at a desired velocity, m/s; returns the action."""
@@ -106,21 +109,21 @@ class Arm:
         """Position and velocity after a step that ends with (vx, vy), both limited at the bounds."""
         x = self.pos[0] + 0.5 * self.dt * (self.vel[0] + vx)
         y = self.pos[1] + 0.5 * self.dt * (self.vel[1] + vy)
-        inside_x, inside_y = self.inside(x, y)
-        if inside_x != x:
+        allowed_x, allowed_y = self.nearest_allowed(x, y)
+        if allowed_x != x:
             vx = 0.0
-        if inside_y != y:
+        if allowed_y != y:
             vy = 0.0
-        return inside_x, inside_y, vx, vy
+        return allowed_x, allowed_y, vx, vy
 
     def _speeds(self, x, y, vx, vy):
         """Joint speeds, rad/s, for a velocity of the mallet, as a difference quotient."""
-        tiny = 1e-4
-        before = joints_at(x - tiny * vx, y - tiny * vy, self.height)
-        after = joints_at(x + tiny * vx, y + tiny * vy, self.height)
-        return [(b - a) / (2 * tiny) for a, b in zip(before, after)]
+        half_interval = 1e-4
+        before = joints_at(x - half_interval * vx, y - half_interval * vy, self.height)
+        after = joints_at(x + half_interval * vx, y + half_interval * vy, self.height)
+        return [(b - a) / (2 * half_interval) for a, b in zip(before, after)]
 
 
-def _base_x(frame):
+def _frame_x(frame):
     """The x of a 4×4 transform of four rows or sixteen numbers."""
     return frame[3] if len(frame) == 16 else frame[0][3]

@@ -1,17 +1,17 @@
-# Sourced by docker/test-engine.sh: a day in containers, controlled from outside by API and command line.
+# Sourced by docker/test-engine.sh: an evaluation day in containers, controlled from outside by API and command line.
 # shellcheck shell=sh
 : "${work:?}" "${folder:?}" "${repository:?}" "${program:?}"
-#
-# holds CONDITION PATH: is a Python condition true for the server's answer `a`?
-holds() {
+
+# is_true CONDITION PATH: is a Python condition true for the server's answer `a` to a GET of the path?
+is_true() {
     curl --silent --show-error --fail --noproxy '*' --max-time 20 --header "Authorization: Bearer $FACEOFF_ADMIN_TOKEN" \
         "$FACEOFF_SERVER$2" >"$work/answer" 2>"$work/log" &&
         python3 -c 'import json, sys; a = json.load(open(sys.argv[1])); sys.exit(not eval(sys.argv[2]))' "$work/answer" "$1"
 }
-# wait_until SECONDS CONDITION PATH
+# wait_until SECONDS CONDITION PATH: waits until the condition is true, at most so many seconds.
 wait_until() {
     ends=$(($(date +%s) + $1))
-    until holds "$2" "$3"; do
+    until is_true "$2" "$3"; do
         [ "$(date +%s)" -lt "$ends" ] || {
             for container in nats server worker-1 worker-2; do
                 echo "--- $container" && docker logs --tail 30 $container
@@ -22,7 +22,7 @@ wait_until() {
         sleep 1
     done
 }
-# start_service SERVICE [MORE]: as in compose.yaml, with MORE appended to its configuration.
+# start_service SERVICE [ADDITION]: as in compose.yaml, with the file ADDITION appended to its configuration.
 start_service() {
     python3 "$folder/engine/service.py" "$1" "$work/configs" ${2:+"$2"} >"$work/words"
     set --
@@ -37,7 +37,7 @@ SERVER_CPUS=0-$(($(nproc) - 1))
 export SERVER_CPUS WORKER_1_CPUS="$SERVER_CPUS" WORKER_2_CPUS="$SERVER_CPUS"
 # A short day with enough shards for both workers, without time limits that a busy machine could exceed.
 {
-    cat "$repository/tests/patient.toml"
+    cat "$repository/tests/long_time_limits.toml"
     printf '[evaluation]\nepisodes_per_task = 4\nepisodes_per_shard = 1\n'
 } >"$work/short.toml"
 quietly docker network create --internal work
@@ -60,9 +60,9 @@ echo "server, NATS and two workers are ready in containers"
 team_token=$("$program" admin --json create-team Contained | python3 -c 'import json, sys; print(json.load(sys.stdin)["token"])')
 quietly env FACEOFF_TOKEN="$team_token" "$program" submit "$work/agent.tar"
 evaluation=/api/v1/evaluations/$("$program" admin --json start-day |
-    python3 -c 'import json, sys; [made] = json.load(sys.stdin)["created"]; print(made["id"])')
+    python3 -c 'import json, sys; [created] = json.load(sys.stdin)["created"]; print(created["id"])')
 wait_until 300 'a["state"] not in ("queued", "running", "finalising")' "$evaluation"
-holds 'a["state"] == "finished" and [t["episodes"] for t in a["result"]["tasks"].values()] == [4] * 3 and a["result"]["score"] >= 0' "$evaluation" || {
+is_true 'a["state"] == "finished" and [t["episodes"] for t in a["result"]["tasks"].values()] == [4] * 3 and a["result"]["score"] >= 0' "$evaluation" || {
     cat "$work/answer" >&2
     fail "the evaluation of an image is not finished with a score"
 }

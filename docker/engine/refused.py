@@ -31,6 +31,7 @@ column = {"x86_64": 0, "aarch64": 1}[os.uname().machine]
 
 
 def is_refused(number, first):
+    """Whether the system call fails with EPERM; its first argument is `first`, all others are 0."""
     ctypes.set_errno(0)
     libc.syscall(ctypes.c_long(number), ctypes.c_long(first), *[ctypes.c_long(0)] * 5)
     return ctypes.get_errno() == errno.EPERM

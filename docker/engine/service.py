@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Prints a service of docker/compose.yaml as arguments of `docker run`, one per line; replaces the Compose program.
 
-usage: service.py SERVICE CONFIGS [MORE]      (CONFIGS: a folder for the files that Compose would mount; MORE: files to append to them)
+usage: service.py SERVICE CONFIGS [ADDITION]      (CONFIGS: a folder for the files that Compose would mount; ADDITION: a file that is
+                                                   appended to them)
 
 Unknown keys are refused, so that no setting is ignored silently. Ports and dependencies are left out on purpose: the test is inside the
 network and starts the services in order.
@@ -15,7 +16,7 @@ import sys
 import yaml
 
 compose = yaml.safe_load((pathlib.Path(__file__).parent.parent / "compose.yaml").read_text())
-name, configs, *more = sys.argv[1], *map(pathlib.Path, sys.argv[2:])
+name, configs, *additions = sys.argv[1], *map(pathlib.Path, sys.argv[2:])
 service = compose["services"][name]
 
 
@@ -40,29 +41,31 @@ def variables(value):
 
 def network(value):
     """The internal network of the service."""
-    return ["--network", next(one for one in value if compose["networks"][one].get("internal")), "--network-alias", name]
+    return ["--network", next(entry for entry in value if compose["networks"][entry].get("internal")), "--network-alias", name]
 
 
-known = {
+# From each known key's value to the options of `docker run`.
+CONVERTERS = {
     "privileged": lambda value: ["--privileged"] if value else [],
     "cgroup": lambda value: ["--cgroupns", value],
     "restart": lambda value: ["--restart", value],
     "stop_grace_period": lambda value: ["--stop-timeout", seconds(value)],
     "shm_size": lambda value: ["--shm-size", value],
     "environment": lambda value: [word for key in value for word in ("--env", f"{key}={value[key]}")],
-    "configs": lambda value: [word for one in value for word in config(one)],
-    "volumes": lambda value: [word for one in value for word in volume(one)],
+    "configs": lambda value: [word for entry in value for word in config(entry)],
+    "volumes": lambda value: [word for entry in value for word in volume(entry)],
     "hostname": lambda value: ["--hostname", value],
     "networks": network,
     "cpuset": lambda value: ["--cpuset-cpus", variables(value)],
 }
 LEFT_OUT = {"ports", "depends_on"}
+# Keys that are used for the image and its command, below.
 IMAGE = {"build", "image", "command"}
 
-options = [word for key in service if key not in LEFT_OUT | IMAGE for word in known[key](service[key])]
+options = [word for key in service if key not in LEFT_OUT | IMAGE for word in CONVERTERS[key](service[key])]
 configs.mkdir(exist_ok=True)
-for one in service.get("configs", []):
-    texts = [compose["configs"][one["source"]]["content"], *(file.read_text() for file in more)]
-    (configs / one["source"]).write_text("".join(texts))
+for entry in service.get("configs", []):
+    texts = [compose["configs"][entry["source"]]["content"], *(file.read_text() for file in additions)]
+    (configs / entry["source"]).write_text("".join(texts))
 image = {"server": "faceoff", "worker": "faceoff-worker"}[service["build"]["target"]] if "build" in service else service["image"]
 print("\n".join(["--name", name, *options, image, *service.get("command", [])]))

@@ -1,10 +1,10 @@
 # Sourced by docker/test-engine.sh: a separate engine, and the base images of the Dockerfile.
 # shellcheck shell=sh
 : "${work:?}" "${folder:?}"
-#
-# It shares nothing with an existing engine: no data, socket, configuration or containerd namespace. It does not change the host's
-# firewall, and its networks are removed with it. `work` is the folder of data that stay, `run` of temporary data. The path of `run` is
-# short, since a socket's path has at most 107 bytes.
+
+# Starts a Docker engine of its own. It shares nothing with an existing engine: no data, socket, configuration or containerd namespace. It
+# does not change the host's firewall, and its networks are removed with it. `work` is the folder of data that stay, `run` of temporary
+# data. The path of `run` is short, since a socket's path has at most 107 bytes.
 engine_start() {
     run=$(mktemp -d /tmp/faceoff-engine-XXXXXX)
     echo '{}' >"$run/daemon.json"

@@ -35,7 +35,7 @@ def limit(onnxruntime: ModuleType) -> None:
     session.__init__ = start_limited
 
 
-class Watch:
+class ImportHook:
     """Waits on ``sys.meta_path`` for the import of onnxruntime, and then removes itself."""
 
     def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
@@ -55,4 +55,4 @@ class Watch:
         return spec
 
 
-sys.meta_path.insert(0, Watch())
+sys.meta_path.insert(0, ImportHook())

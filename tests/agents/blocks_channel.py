@@ -1,4 +1,5 @@
-"""Blocks or misuses the channels that it shares with the service.
+"""Blocks or misuses the channels that it shares with the service: blocks_channel.py MARK KIND. MARK identifies its processes for
+the test.
 
 It prints `ready`, then acts as KIND says: blocks in system calls on its standard input, output or error (`splice-…`,
 `fault-…`), stops itself, closes or shuts down one direction, fills it, writes single bytes, or sends out-of-band data or
@@ -16,11 +17,13 @@ import threading
 import time
 
 KIND = sys.argv[2]
+PAGE = 4096
 libc = ctypes.CDLL(None, use_errno=True)
+# Objects that must not be freed: threads, sockets, memory.
 references = []
 
 
-def thread(body):
+def start_thread(body):
     references.append(threading.Thread(target=body, daemon=True))
     references[-1].start()
 
@@ -52,7 +55,7 @@ def splice(source, target):
             except OSError as error:
                 print("splice:", error.strerror, file=sys.stderr, flush=True)
                 return
-    thread(body)
+    start_thread(body)
 
 
 def slow_memory():
@@ -68,10 +71,10 @@ def slow_memory():
     def change_protection():
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
         while True:
-            libc.mprotect(ctypes.c_void_p(address), ctypes.c_size_t(size), 1)
-            libc.mprotect(ctypes.c_void_p(address), ctypes.c_size_t(size), 3)
+            for protection in (mmap.PROT_READ, mmap.PROT_READ | mmap.PROT_WRITE):
+                libc.mprotect(ctypes.c_void_p(address), ctypes.c_size_t(size), protection)
 
-    thread(change_protection)
+    start_thread(change_protection)
     for _ in range(3):
         if os.fork() == 0:
             while True:
@@ -79,29 +82,31 @@ def slow_memory():
     return address, size
 
 
-def faults(call):
+def call_with_slow_memory(call):
+    """Calls `call(address, size)` for page after page of memory whose page faults block."""
     address, size = slow_memory()
 
     def body():
-        at = 0
+        offset = 0
         while True:
-            call(ctypes.c_void_p(address + at), ctypes.c_size_t(4096))
-            at = (at + 4096) % size
-    thread(body)
+            call(ctypes.c_void_p(address + offset), ctypes.c_size_t(PAGE))
+            offset = (offset + PAGE) % size
+    start_thread(body)
 
 
 def send(data, flags=0, files=()):
-    with socket.socket(fileno=os.dup(1)) as line:
+    """Sends bytes, and descriptors of open files, through standard output."""
+    with socket.socket(fileno=os.dup(1)) as channel:
         rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))] if files else []
         try:
-            line.sendmsg([data], rights, flags)
+            channel.sendmsg([data], rights, flags)
         except OSError as error:
             print("sendmsg:", error.strerror, file=sys.stderr, flush=True)
 
 
-def shut(fd, how):
-    with socket.socket(fileno=os.dup(fd)) as line:
-        line.shutdown(how)
+def shut_down(fd, direction):
+    with socket.socket(fileno=os.dup(fd)) as channel:
+        channel.shutdown(direction)
 
 
 def block():
@@ -112,33 +117,33 @@ def block():
     elif KIND == "splice-input":
         splice(0, full_socket())
     elif KIND == "fault-output":
-        faults(lambda memory, size: libc.write(1, memory, size))
+        call_with_slow_memory(lambda memory, size: libc.write(1, memory, size))
     elif KIND == "fault-log":
-        faults(lambda memory, size: libc.write(2, memory, size))
+        call_with_slow_memory(lambda memory, size: libc.write(2, memory, size))
     elif KIND == "fault-input":
-        faults(lambda memory, size: libc.read(0, memory, size))
+        call_with_slow_memory(lambda memory, size: libc.read(0, memory, size))
     elif KIND == "shut-input":
-        shut(0, socket.SHUT_RD)
+        shut_down(0, socket.SHUT_RD)
     elif KIND == "shut-output":
-        shut(1, socket.SHUT_WR)
+        shut_down(1, socket.SHUT_WR)
     elif KIND == "close-input":
         os.close(0)
     elif KIND == "close-output":
         os.close(1)
     elif KIND == "fills":
-        thread(lambda: [os.write(1, b"x" * 9999 + b"\n") for _ in iter(int, 1)])
-        thread(lambda: [os.write(2, b"x" * 9999) for _ in iter(int, 1)])
+        start_thread(lambda: [os.write(1, b"x" * 9999 + b"\n") for _ in iter(int, 1)])
+        start_thread(lambda: [os.write(2, b"x" * 9999) for _ in iter(int, 1)])
     elif KIND == "dribbles":
-        thread(lambda: [(os.write(1, b"x"), os.write(2, b"x"), time.sleep(0.0005)) for _ in iter(int, 1)])
+        start_thread(lambda: [(os.write(1, b"x"), os.write(2, b"x"), time.sleep(0.0005)) for _ in iter(int, 1)])
     elif KIND == "watches":
-        # Reading one byte wakes all of these.
+        # 20,000 registrations that wait for space: reading one byte wakes all of them.
         for fd in (1, 2):
             ends = [os.dup(fd) for _ in range(100)]
             for _ in range(100):
                 references.append(select.epoll())
                 for end in ends:
                     references[-1].register(end, select.EPOLLOUT | select.EPOLLET)
-        thread(lambda: [(os.write(1, b"x"), os.write(2, b"x")) for _ in iter(int, 1)])
+        start_thread(lambda: [(os.write(1, b"x"), os.write(2, b"x")) for _ in iter(int, 1)])
     elif KIND == "out-of-band":
         send(b"x", socket.MSG_OOB)
         send(b"yz", socket.MSG_OOB)
@@ -146,7 +151,7 @@ def block():
         for _ in range(50):
             send(b"x", 0, [0, 1, 2])
     elif KIND == "spins":
-        thread(lambda: [None for _ in iter(int, 1)])
+        start_thread(lambda: [None for _ in iter(int, 1)])
     elif KIND == "stops":
         os.kill(os.getpid(), signal.SIGSTOP)
 

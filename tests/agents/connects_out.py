@@ -1,4 +1,5 @@
-"""Tries to connect to the outside. Arguments: a TCP port of the host, a socket path of the host, an abstract socket name."""
+"""Tries to connect to the outside: connects_out.py MARK PORT PATH NAME, with a TCP port, a socket path and an abstract socket name of
+the host. MARK identifies its processes for the test. Reports `reached` or the error for each kind of socket."""
 import json
 import socket
 import sys
@@ -8,16 +9,17 @@ port, path, abstract = int(sys.argv[2]), sys.argv[3], sys.argv[4]
 
 def attempt(family, kind, address, protocol=0):
     try:
-        with socket.socket(family, kind, protocol) as line:
-            line.settimeout(60)
-            line.connect(address)
-            line.send(b"hello")
+        with socket.socket(family, kind, protocol) as connection:
+            connection.settimeout(60)
+            connection.connect(address)
+            connection.send(b"hello")
             return "reached"
     except OSError as error:
         return error.strerror or str(error)
 
 
 def pair():
+    """Sends a byte through a socket pair of its own."""
     left, right = socket.socketpair()
     left.send(b"x")
     return right.recv(1).decode()

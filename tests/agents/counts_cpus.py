@@ -3,7 +3,7 @@ import json
 import os
 
 
-def listed(name):
+def listed_cpus(name):
     with open(f"/sys/devices/system/cpu/{name}") as file:
         parts = [part.split("-") for part in file.read().strip().split(",")]
     return [cpu for part in parts for cpu in range(int(part[0]), int(part[-1]) + 1)]
@@ -17,9 +17,9 @@ print(json.dumps({
     "count": os.cpu_count(),
     "configured": os.sysconf("SC_NPROCESSORS_CONF"),
     "affinity": sorted(os.sched_getaffinity(0)),
-    "online": listed("online"),
-    "possible": listed("possible"),
-    "present": listed("present"),
+    "online": listed_cpus("online"),
+    "possible": listed_cpus("possible"),
+    "present": listed_cpus("present"),
     "cpuinfo": cpuinfo,
     "stat": [int(word[3:]) for word in words if word[:3] == "cpu" and word != "cpu"],
     "system": sorted(os.listdir("/sys/devices/system/cpu")),

@@ -1,4 +1,6 @@
-"""Exceeds a limit. The first argument after the mark names the resource."""
+"""Exceeds a limit: exceeds_limits.py MARK RESOURCE. MARK identifies its processes for the test. Prints a number and a reason (the
+number of successes, and the error that ended them), then echoes lines."""
+import errno
 import mmap
 import os
 import resource
@@ -10,13 +12,13 @@ MIB = 1 << 20
 
 def until_refused(action):
     """The number of times that `action` succeeds, and the error that ends it."""
-    done = 0
+    count = 0
     while True:
         try:
-            action(done)
+            action(count)
         except OSError as error:
-            return done, error.strerror
-        done += 1
+            return count, error.strerror
+        count += 1
 
 
 def memory():
@@ -39,7 +41,7 @@ def scratch(folder, size=MIB):
         def step(_):
             # A full disk may accept part of a block first.
             if file.write(block) < size:
-                raise OSError(28, "No space left on device")
+                raise OSError(errno.ENOSPC, "No space left on device")
         return until_refused(step)
 
 

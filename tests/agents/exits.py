@@ -1,4 +1,4 @@
-"""Ends in the way that its first argument names, after one answer."""
+"""Ends in the way that KIND names, after one answer: exits.py MARK KIND [STATUS]. MARK identifies its processes for the test."""
 import os
 import signal
 import sys
@@ -23,6 +23,7 @@ if kind == "close-input":
     print("closed", flush=True)
     signal.pause()
 if kind == "half":
+    # Half of an answer.
     os.write(1, b'{"type":"act","step"')
     os._exit(3)
 if kind == "silent":

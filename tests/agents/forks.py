@@ -1,10 +1,11 @@
-"""Forks. `count`: until refused, then reports the number of children. `exit`: the same, then exits. `bomb`: endlessly, in
-each child."""
+"""Forks: forks.py MARK KIND. MARK identifies its processes for the test. `count`: until refused, then reports the number of children.
+`exit`: the same, then exits. `bomb`: endlessly, in each child."""
 import os
 import sys
 import time
 
 if sys.argv[2] == "bomb":
+    # The test waits for this line.
     print("lit", flush=True)
     while True:
         try:

@@ -1,4 +1,5 @@
-"""Tries to read files of the host. Arguments: files and folders that must stay hidden.
+"""Tries to read files of the host: reads_host.py MARK PATH…, with files and folders that must stay hidden. MARK identifies its
+processes for the test.
 
 Reports one JSON object: the files that could be read, what is visible, and the rights of the process.
 """

@@ -6,9 +6,11 @@ import fcntl
 import json
 import os
 import socket
+import stat
 import threading
 
-SHRINK = 1031
+# The command of `fcntl` that sets the size of a pipe.
+F_SETPIPE_SZ = 1031
 
 
 def attempt(action):
@@ -24,19 +26,20 @@ def names(process, threads):
     yield from (f"/proc/{process}/task/{thread}/fd/{fd}" for thread in threads for fd in (0, 1))
 
 
-def tries(label, process):
+def try_all_modes(label, process):
     threads = os.listdir(f"/proc/{process}/task")
     for name in names(process, threads):
-        for way, flags in (("read", os.O_RDONLY), ("write", os.O_WRONLY), ("both", os.O_RDWR)):
-            found[f"{label} {name} {way}"] = attempt(lambda: os.open(name, flags | os.O_NONBLOCK))
+        for mode, flags in (("read", os.O_RDONLY), ("write", os.O_WRONLY), ("both", os.O_RDWR)):
+            found[f"{label} {name} {mode}"] = attempt(lambda: os.open(name, flags | os.O_NONBLOCK))
 
 
+# What each attempt led to.
 found = {}
 stop = threading.Event()
 other = threading.Thread(target=stop.wait)
 other.start()
-tries("own", "self")
-tries("own", os.getpid())
+try_all_modes("own", "self")
+try_all_modes("own", os.getpid())
 for name in ("/dev/stdin", "/dev/stdout", "/dev/fd/0", "/dev/fd/1", "/proc/thread-self/fd/0"):
     found[name] = attempt(lambda: os.open(name, os.O_RDWR | os.O_NONBLOCK))
 read_end, write_end = os.pipe()
@@ -45,16 +48,16 @@ if child == 0:
     os.close(write_end)
     os.read(read_end, 1)
     os._exit(0)
-tries("child", child)
+try_all_modes("child", child)
 os.close(write_end)
 os.waitpid(child, 0)
-# Sockets may have any mode.
-mode = attempt(lambda: os.fchmod(0, 0o666))
-if os.fstat(0).st_mode & 0o170000 == 0o010000:
-    found["shrink mode"] = mode
+# Sockets may have any mode, so only that of a pipe is reported.
+mode_change = attempt(lambda: os.fchmod(0, 0o666))
+if stat.S_ISFIFO(os.fstat(0).st_mode):
+    found["shrink mode"] = mode_change
 copy = os.dup(0)
 for label, fd in (("input", 0), ("output", 1), ("copy", copy)):
-    found[f"shrink {label}"] = attempt(lambda: fcntl.fcntl(fd, SHRINK, 4096))
+    found[f"shrink {label}"] = attempt(lambda: fcntl.fcntl(fd, F_SETPIPE_SZ, 4096))
 with socket.socket(fileno=os.dup(2)) as log:
     before = log.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
     found["send_buffer"] = attempt(lambda: log.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4 * before))

@@ -1,5 +1,6 @@
-"""Tries to survive a kill. It resets its parent-death signal and ignores signals. Kinds: `ignores` also ignores a closed input,
-`daemon` leaves a grandchild in a new session and exits, `daemon-stays` leaves one and stays, `group` has many children."""
+"""Tries to survive a kill: resists_kill.py MARK KIND. MARK identifies its processes for the test. It resets its parent-death
+signal and ignores signals. Kinds: `ignores` also ignores a closed input, `daemon` leaves a grandchild in a new session and
+exits, `daemon-stays` leaves one and stays, `group` has many children."""
 import ctypes
 import os
 import signal

@@ -1,4 +1,5 @@
-"""Uses Python's libraries as ordinary agents do, and reports `ok` or the error for each."""
+"""Uses Python's libraries as ordinary agents do, and reports `ok` or the error for each. The names of the functions are the keys of
+the report."""
 import asyncio
 import concurrent.futures
 import ctypes
@@ -31,15 +32,16 @@ def square(number):
 
 
 def database(path):
-    with sqlite3.connect(path) as one:
-        one.execute("create table t (x)")
-        one.executemany("insert into t values (?)", [(n,) for n in range(100)])
-    two = sqlite3.connect(path, timeout=60)
-    three = sqlite3.connect(path, timeout=60)
-    with two:
-        two.execute("update t set x = x + 1")
-    assert three.execute("select sum(x) from t").fetchone() == (5050,)
-    two.close(), three.close(), one.close()
+    with sqlite3.connect(path) as creator:
+        creator.execute("create table t (x)")
+        creator.executemany("insert into t values (?)", [(n,) for n in range(100)])
+    writer = sqlite3.connect(path, timeout=60)
+    reader = sqlite3.connect(path, timeout=60)
+    with writer:
+        writer.execute("update t set x = x + 1")
+    # The sum of 1 to 100.
+    assert reader.execute("select sum(x) from t").fetchone() == (5050,)
+    writer.close(), reader.close(), creator.close()
 
 
 def databases():

@@ -1,4 +1,5 @@
-"""Tries to write to many folders and files. Reports where it could create or change something."""
+"""Tries to write to many folders and files: writes_files.py MARK FOLDER…. MARK identifies its processes for the test. Reports where it
+could create (`took`) or change (`changed`) something."""
 import json
 import os
 import sys

@@ -1,4 +1,5 @@
-"""Strategies for request bodies: valid archives, archives with invalid content, and other bytes."""
+"""Strategies of hypothesis (generators of random test data) for request bodies: valid archives, archives with invalid content, and
+other bytes."""
 
 import gzip
 import io
@@ -30,13 +31,13 @@ def make_zip(files: dict[str, bytes]) -> bytes:
 
 names = st.sampled_from(["agent.toml", "agent.py", "data/weights.bin", "../outside", "/etc/passwd", "a" * 90])
 files = st.dictionaries(names, st.binary(max_size=64), max_size=4)
-with_manifest = files.map(lambda some: {**some, "agent.toml": MANIFEST})
+with_manifest = files.map(lambda contents: {**contents, "agent.toml": MANIFEST})
 
 
-def truncate(archive: bytes, at: int) -> bytes:
-    """A truncated archive."""
-    return archive[: at % (len(archive) + 1)]
+def truncate(archive: bytes, number: int) -> bytes:
+    """The beginning of an archive, of a length that follows from any number."""
+    return archive[: number % (len(archive) + 1)]
 
 
-whole = st.one_of(files, with_manifest).flatmap(lambda some: st.sampled_from([make_tar(some), make_zip(some)]))
+whole = st.one_of(files, with_manifest).flatmap(lambda contents: st.sampled_from([make_tar(contents), make_zip(contents)]))
 archives = st.one_of(whole, st.builds(truncate, whole, st.integers(0, 4096)), st.binary(max_size=64))

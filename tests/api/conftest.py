@@ -1,3 +1,5 @@
+"""Fixtures of the API's tests: a running server, and its OpenAPI document."""
+
 import json
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Hooks for schemathesis. test_operations.py sets the environment variables."""
+"""Hooks for schemathesis, which generates requests from the OpenAPI document. test_operations.py sets the environment variables."""
 
 import json
 import os
@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 API = os.environ["API_URL"]
 TOKEN = os.environ.get("API_TOKEN")
+# Ids of existing resources, by the first part of the path.
 IDS = json.loads(os.environ["API_IDS"])
+# Ids of the operations that can end the token of the request.
 TOKEN_ENDING = json.loads(os.environ["API_TOKEN_ENDING"])
 
 # The bodies of uploads, which have no schema.
@@ -22,11 +24,12 @@ for media_type in json.loads(os.environ["API_ARCHIVE_TYPES"]):
 def flatmap_path_parameters(context, path_parameters):
     """Replaces most generated ids by ids of existing resources."""
     resource = context.operation.path.removeprefix("/api/v1/").split("/")[0]
-    known = IDS.get(resource)
-    if not known or not path_parameters or "id" not in path_parameters:
+    existing_ids = IDS.get(resource)
+    if not existing_ids or not path_parameters or "id" not in path_parameters:
         return st.just(path_parameters)
-    existing = st.sampled_from(known).map(lambda one: {**path_parameters, "id": one})
-    return st.one_of(existing, existing, existing, st.just(path_parameters))
+    with_existing = st.sampled_from(existing_ids).map(lambda existing: {**path_parameters, "id": existing})
+    # Three of four requests have an existing id.
+    return st.one_of(with_existing, with_existing, with_existing, st.just(path_parameters))
 
 
 if TOKEN is not None:

@@ -47,9 +47,9 @@ def pack_bundle(folder: Path = HOLD) -> bytes:
     return buffer.getvalue()
 
 
-def poll(read, is_reached):
-    """Reads until the condition is met. There is no time limit, since the machine may be slow."""
-    while not is_reached(value := read()):
+def poll(read, is_done):
+    """Calls `read` until its value meets the condition, and returns that value. There is no time limit, since the machine may be slow."""
+    while not is_done(value := read()):
         time.sleep(0.1)
     return value
 
@@ -120,9 +120,9 @@ def create_season(server: Server) -> Season:
     server.request("POST", "/days", organiser)
     evaluations = poll(
         lambda: server.request("GET", "/evaluations", organiser).json(),
-        lambda views: len(views) == 2 and all("finished_at" in one for one in views),
+        lambda views: len(views) == 2 and all("finished_at" in view for view in views),
     )
-    assert all(one["state"] == "finished" for one in evaluations), json.dumps(evaluations, indent=2)
+    assert all(view["state"] == "finished" for view in evaluations), json.dumps(evaluations, indent=2)
     # Jobs that are created from now on stay queued, so that no response depends on the progress of the slot.
     server.request("POST", "/queue/pause", organiser, json={"reason": "All operations are tested."})
     server.request("PATCH", "/season", organiser, json={"takes_registrations": True, "divisions": ["Open"]})
@@ -141,9 +141,9 @@ def create_season(server: Server) -> Season:
     stages = server.request("GET", "/stages").json()
     ids = {
         "teams": [alpha, beta],
-        "submissions": [one["id"] for one in submissions],
-        "evaluations": [one["id"] for one in evaluations],
-        "stages": [one["id"] for one in stages],
+        "submissions": [view["id"] for view in submissions],
+        "evaluations": [view["id"] for view in evaluations],
+        "stages": [view["id"] for view in stages],
         "registrations": [registration["id"]],
         "invitations": [invitations[1]["id"]],
         "tournaments": [tournament["id"]],

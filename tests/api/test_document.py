@@ -1,4 +1,4 @@
-"""The document is valid OpenAPI 3.1, and its operations have unique names."""
+"""The API's document, /api/v1/openapi.json, is valid OpenAPI 3.1, and its operations have unique names."""
 
 import json
 

@@ -14,7 +14,8 @@ ROUNDS = 3
 class Change:
     """Replaces a line of a file by another one, in which `#` is the number of the change."""
 
-    what: str
+    # What is changed, for the report.
+    label: str
     file: str
     line: str
     replacement: str
@@ -25,7 +26,7 @@ class Change:
 
 # Keep these up to date when files, crates or tests are renamed.
 PAGE = Change(
-    what="a line in a page",
+    label="a line in a page",
     file="crates/faceoff-pages/src/help.rs",
     line='            row("Scratch files in /tmp", |limits| {',
     replacement='            row("Scratch files in /tmp #", |limits| {',
@@ -33,7 +34,7 @@ PAGE = Change(
     tests="runtimes::",
 )
 TEMPLATE = Change(
-    what="a line in a page's template",
+    label="a line in a page's template",
     file="web/templates/help.html",
     line="    <div><dt>GPU</dt><dd>none</dd></div>",
     replacement="    <div><dt>GPU</dt><dd>none #</dd></div>",
@@ -41,7 +42,7 @@ TEMPLATE = Change(
     tests="runtimes::",
 )
 STORE = Change(
-    what="a line in the store",
+    label="a line in the store",
     file="crates/faceoff-store/src/tables/teams.rs",
     line='    let teams = select_teams!("ORDER BY name").fetch_all(connection).await?;',
     replacement='    let teams = select_teams!("ORDER BY name").fetch_all(connection).await?; let _ = std::hint::black_box(#);',
@@ -56,7 +57,7 @@ class Edit:
     def __init__(self, change: Change, source: Path):
         self.change, self.file = change, source / change.file
         if not self.file.is_file():
-            raise Failed(f"there is no {change.file}, where {change.what} should be changed: correct it in {__file__}")
+            raise Failed(f"there is no {change.file}, where {change.label} should be changed: correct it in {__file__}")
         self.original = self.file.read_text()
         lines = self.original.splitlines().count(change.line)
         if lines != 1:

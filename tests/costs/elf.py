@@ -6,7 +6,8 @@ from pathlib import Path
 
 from runs import Failed
 
-NO_BYTES = 8  # SHT_NOBITS: in memory only
+# The type of a section that takes no bytes of the file, only memory.
+SHT_NOBITS = 8
 
 
 @dataclass(frozen=True)
@@ -20,16 +21,17 @@ def sections(program: Path) -> list[Section]:
     data = program.read_bytes()
     if data[:6] != b"\x7fELF\x02\x01":
         raise Failed(f"{program} is no ELF program of 64 bits, little-endian: its sections cannot be read")
+    # Offsets in the file's header: the table of section headers; their size and number, and the index of the one with their names.
     (table,) = struct.unpack_from("<Q", data, 0x28)
     size, count, name_index = struct.unpack_from("<HHH", data, 0x3A)
     # name, type, flags, address, offset, size
     headers = [struct.unpack_from("<IIQQQQ", data, table + k * size) for k in range(count)]
-    names_at = headers[name_index][4] if headers else 0
+    names_offset = headers[name_index][4] if headers else 0
     found = []
     for name, kind, _, _, _, bytes_ in headers:
-        start = names_at + name
+        start = names_offset + name
         text = data[start : data.index(b"\0", start)].decode()
-        if text and kind != NO_BYTES:
+        if text and kind != SHT_NOBITS:
             found.append(Section(text, bytes_))
     return sorted(found, key=lambda section: -section.bytes)
 

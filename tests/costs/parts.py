@@ -13,8 +13,9 @@ from clone import Clone
 from report import Report
 from runs import Failed, Run
 
-# Lines that `faceoff demo` prints: commands/demo.rs.
-DEMO_STARTS, BOARD = "1. starting the server", "4. the board"
+# The beginnings of lines that `faceoff demo` prints (crates/faceoff/src/commands/demo.rs) when it starts, and when the board is there.
+START_LINE, BOARD_LINE = "1. starting the server", "4. the board"
+# Texts of the report's column “how”.
 FRESH = "from a fresh clone, with an empty target folder"
 CPU = "user and system time of all processes"
 
@@ -49,12 +50,12 @@ def demo(measurement: Measurement) -> None:
         measurement.say(f"make demo, {number} of {measurement.rounds}")
         with measurement.clone(f"demo-{number}") as clone:
             # Any free port: another server may run here.
-            run = clone.make("demo", "SERVE=0", "LISTEN=127.0.0.1:0", texts=(DEMO_STARTS, BOARD)).require_success()
+            run = clone.make("demo", "SERVE=0", "LISTEN=127.0.0.1:0", texts=(START_LINE, BOARD_LINE)).require_success()
             measurement.add_units("make demo", clone)
         runs.append(run)
     add, how = measurement.report.add, f"`make demo SERVE=0` {FRESH}"
-    add("`make demo`, until it is built", [time_of(run, DEMO_STARTS) for run in runs], "s", f"{how}: until “{DEMO_STARTS}”")
-    add("`make demo`, until the board is available", [time_of(run, BOARD) for run in runs], "s", f"{how}: until “{BOARD}”")
+    add("`make demo`, until it is built", [time_of(run, START_LINE) for run in runs], "s", f"{how}: until “{START_LINE}”")
+    add("`make demo`, until the board is available", [time_of(run, BOARD_LINE) for run in runs], "s", f"{how}: until “{BOARD_LINE}”")
     add("`make demo`, to its end", [run.wall_s for run in runs], "s", how)
     add("`make demo`, CPU", [run.cpu_s for run in runs], "CPU s", CPU)
 
@@ -92,12 +93,12 @@ def changed_lines(measurement: Measurement) -> None:
         add(f"`{name}`, CPU", [build.cpu_s], "CPU s", CPU)
         measurement.add_units(name, clone)
         for change in wanted:
-            measurement.say(f"changing {change.what}")
+            measurement.say(f"changing {change.label}")
             unchanged, runs = changes.measure(change, clone)
             how = f"`{' '.join(runs[0].command)}`"
-            add(f"{change.what}, until its test has run", [run.wall_s for run in runs], "s", f"{change.file}; {how}")
-            add(f"{change.what}, CPU", [run.cpu_s for run in runs], "CPU s", CPU)
-            add(f"{change.what}: the same test before it", [unchanged.wall_s], "s", "includes what a build of one package compiles again")
+            add(f"{change.label}, until its test has run", [run.wall_s for run in runs], "s", f"{change.file}; {how}")
+            add(f"{change.label}, CPU", [run.cpu_s for run in runs], "CPU s", CPU)
+            add(f"{change.label}: the same test before it", [unchanged.wall_s], "s", "includes what a build of one package compiles again")
 
 
 def release(measurement: Measurement) -> None:

@@ -7,6 +7,7 @@ from runs import Step
 from sources import Lines
 from units import Crate, Unit, by_crate, total
 
+# The slowest crates, which are listed; the others are one row.
 MAX_CRATES = 25
 # Shorter steps are not listed.
 MIN_STEP_S = 1.0
@@ -14,10 +15,12 @@ MIN_STEP_S = 1.0
 
 @dataclass(frozen=True)
 class Row:
+    # The measured quantity.
     what: str
     # One per round.
     values: list[float]
     unit: str
+    # The command, or what the number includes.
     how: str
 
     def text(self) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 LIMIT_S = 4 * 3600
 # Interval at which the log is read: the precision of all times.
 POLL_S = 0.1
+# Lines of a failed command's log that are shown.
 LAST_LINES = 30
 
 
@@ -27,6 +28,7 @@ class Step:
 
     target: str
     line: str
+    # Seconds since 1970.
     began: float
     wall_s: float
     cpu_s: float

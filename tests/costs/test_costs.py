@@ -21,6 +21,7 @@ import units
 
 COSTS = Path(__file__).parent
 
+# The fake cargo, the project's Makefile, and the units of cargo's report.
 CARGO = """#!/bin/sh
 case $1 in
 build)
@@ -192,7 +193,7 @@ class Runs(unittest.TestCase):
         self.folder = Path(folder.name)
         self.log = self.folder / "log"
         # A duration that no other process uses for its sleep.
-        self.long = f"1000.{os.getpid()}"
+        self.long_sleep_s = f"1000.{os.getpid()}"
 
     def run_shell(self, line: str, **options) -> runs.Run:
         return runs.run(["sh", "-c", line], self.folder, dict(os.environ), self.log, **options)
@@ -209,17 +210,17 @@ class Runs(unittest.TestCase):
 
     def test_hanging_command_is_killed_with_its_children(self) -> None:
         with self.assertRaisesRegex(runs.Failed, "did not end within"):
-            self.run_shell(f"sleep {self.long} & wait", limit_s=0.2)
+            self.run_shell(f"sleep {self.long_sleep_s} & wait", limit_s=0.2)
         self.assert_gone()
 
     def test_leftover_child_is_killed(self) -> None:
-        self.run_shell(f"sleep {self.long} &")
+        self.run_shell(f"sleep {self.long_sleep_s} &")
         self.assert_gone()
 
     def assert_gone(self) -> None:
         """Asserts that the sleep is gone. A killed process may need a moment to disappear."""
         deadline = time.monotonic() + 600
-        while any(f"sleep\0{self.long}\0".encode() == command for command in commands()):
+        while any(f"sleep\0{self.long_sleep_s}\0".encode() == command for command in commands()):
             self.assertLess(time.monotonic(), deadline, "it is still running")
             time.sleep(0.01)
 

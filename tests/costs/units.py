@@ -6,8 +6,8 @@ from pathlib import Path
 
 from runs import Failed
 
-# In the report's script: `const UNIT_DATA = [{"name": …, "duration": …, "sections": [["frontend", {…}], …]}, …];`
-DATA = "UNIT_DATA = "
+# The report has the units in its script: `const UNIT_DATA = [{"name": …, "duration": …, "sections": [["frontend", {…}], …]}, …];`
+DATA_PREFIX = "UNIT_DATA = "
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def read(report: Path) -> list[Unit]:
 
 def parse(text: str, report: Path) -> list[Unit]:
     try:
-        start = text.index(DATA) + len(DATA)
+        start = text.index(DATA_PREFIX) + len(DATA_PREFIX)
         units, _ = json.JSONDecoder().raw_decode(text, start)
         return [Unit(unit["name"], unit["duration"], frontend_s(unit.get("sections"))) for unit in units]
     except (ValueError, KeyError, TypeError) as error:

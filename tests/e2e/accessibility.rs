@@ -1,8 +1,8 @@
-//! Accessibility of the public pages and of both dashboards: axe reports no violation, no page is wider than its window,
-//! and no script fails.
+//! Accessibility of the public pages and of both dashboards (signed-in start pages of teams and organisers): the library
+//! axe-core reports no violation, no page is wider than its window, and no script fails.
 
 use crate::{
-    axe::{axe, faults},
+    axe::{axe_script, faults},
     commands::admin,
     dashboards::{InvitedUser, sign_in},
     replay::released_evaluation,
@@ -14,7 +14,7 @@ use faceoff_tests::{
 use serde_json::{Value, json};
 
 /// Opens a page and returns its faults.
-fn check_page(page: &Page, server: &Server, axe: &str, path: &str) -> Vec<String> {
+fn check_page(page: &Page, server: &Server, axe_script: &str, path: &str) -> Vec<String> {
     page.set_view(View::DESKTOP);
     page.go_to(&format!("{}{path}", server.url));
     let has_heading = page.evaluate("document.querySelector('h1') !== null");
@@ -22,14 +22,14 @@ fn check_page(page: &Page, server: &Server, axe: &str, path: &str) -> Vec<String
     page.wait_until(
         "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.state == 'ready')",
     );
-    faults(page, axe, path)
+    faults(page, axe_script, path)
 }
 
 #[test]
 fn public_pages_follow_accessibility_rules() {
-    let axe = axe();
+    let axe_script = axe_script();
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, evaluation) = released_evaluation(scratch.path());
+    let (server, evaluation_page) = released_evaluation(scratch.path());
     let browser = Browser::start(scratch.path());
     let board: Value = server
         .get("/api/v1/board", None)
@@ -37,16 +37,16 @@ fn public_pages_follow_accessibility_rules() {
         .expect("the API speaks JSON");
     let team = board["rows"][0]["team_id"].as_str();
     let team = format!("/teams/{}", team.expect("a row names its team"));
-    let episodes = format!("{evaluation}/episodes");
-    let replay = format!("{evaluation}/episodes/defend/0");
+    let episodes = format!("{evaluation_page}/episodes");
+    let replay = format!("{evaluation_page}/episodes/defend/0");
     let embedded = format!("{replay}/embed");
-    let mut found = Vec::new();
+    let mut all_faults = Vec::new();
     let page = browser.open(&format!("{}/", server.url));
     for path in [
         "/",
         "/tasks/defend",
         &team,
-        &evaluation,
+        &evaluation_page,
         &episodes,
         &replay,
         &embedded,
@@ -60,21 +60,21 @@ fn public_pages_follow_accessibility_rules() {
         "/sign-in",
         "/register",
     ] {
-        found.extend(check_page(&page, &server, &axe, path));
+        all_faults.extend(check_page(&page, &server, &axe_script, path));
     }
-    assert!(found.is_empty(), "{}", found.join("\n"));
+    assert!(all_faults.is_empty(), "{}", all_faults.join("\n"));
 }
 
 #[test]
 fn dashboards_follow_accessibility_rules() {
-    let axe = axe();
+    let axe_script = axe_script();
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, evaluation) = released_evaluation(scratch.path());
-    let id = evaluation
+    let (server, evaluation_page) = released_evaluation(scratch.path());
+    let id = evaluation_page
         .rsplit('/')
         .next()
         .expect("the path ends with the id");
-    let view: Value = server
+    let evaluation: Value = server
         .get(
             &format!("/api/v1/evaluations/{id}"),
             Some(&server.admin_token),
@@ -82,7 +82,7 @@ fn dashboards_follow_accessibility_rules() {
         .json()
         .expect("the API speaks JSON");
     let field = |name: &str| {
-        view[name]
+        evaluation[name]
             .as_str()
             .expect("an evaluation has this field")
             .to_owned()
@@ -94,9 +94,10 @@ fn dashboards_follow_accessibility_rules() {
         &json!({ "title": "Hello", "text": "The season has begun." }),
     );
     assert_eq!(announced.status(), 201);
+    // An ablation evaluates a submission with each perturbation of the simulation alone.
     admin(&server, &["order-ablation", &submission, "--episodes", "1"]).expect_success();
     let browser = Browser::start(scratch.path());
-    let mut found = Vec::new();
+    let mut all_faults = Vec::new();
     let member = sign_in(&browser, &server, InvitedUser::member("Ada", &team));
     for path in [
         "/dashboard",
@@ -105,10 +106,12 @@ fn dashboards_follow_accessibility_rules() {
         "/dashboard/access",
         "/account",
     ] {
-        found.extend(check_page(&member, &server, &axe, path));
+        all_faults.extend(check_page(&member, &server, &axe_script, path));
     }
     let organiser = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
-    let stage = view["stage"].as_str().expect("an evaluation has a stage");
+    let stage = evaluation["stage"]
+        .as_str()
+        .expect("an evaluation has a stage");
     for path in [
         "/organiser",
         "/organiser/day",
@@ -124,7 +127,7 @@ fn dashboards_follow_accessibility_rules() {
         &format!("/organiser/decide/void/{id}"),
         &format!("/submissions/{submission}/ablation"),
     ] {
-        found.extend(check_page(&organiser, &server, &axe, path));
+        all_faults.extend(check_page(&organiser, &server, &axe_script, path));
     }
-    assert!(found.is_empty(), "{}", found.join("\n"));
+    assert!(all_faults.is_empty(), "{}", all_faults.join("\n"));
 }

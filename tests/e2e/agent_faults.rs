@@ -1,4 +1,5 @@
-//! Faulty agents: each gets a verdict with the reason and its log, and other teams are not affected.
+//! Agents with faults: the verdict of the validation run (the short check of a new submission) gives the reason and shows
+//! the agent's log, and other teams are not affected.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{
@@ -8,8 +9,8 @@ use faceoff_tests::{
 };
 use serde_json::Value;
 
-/// Faulty agents: name, code for each step, and a word of the verdict.
-const FAULTY: [(&str, &str, &str); 6] = [
+/// Faulty agents: name, statements that [`python_agent`] runs at each step, and a part of the verdict's reason.
+const FAULTY_AGENTS: [(&str, &str, &str); 6] = [
     ("rubbish", "print('hello there', flush=True)", "JSON"),
     (
         "endless",
@@ -41,6 +42,7 @@ const FAULTY: [(&str, &str, &str); 6] = [
 #[test]
 fn faulty_agent_gets_reason_and_log_without_affecting_others() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    // 256 MiB, less than the agent named glutton allocates.
     let config = format!("{CONFIG}\n[limits]\nmemory_bytes = 268435456\n");
     let server = Server::start(&scratch.path().join("data"), &config);
 
@@ -49,7 +51,7 @@ fn faulty_agent_gets_reason_and_log_without_affecting_others() {
     assert_eq!(submission["state"], "valid", "{submission:#}");
     let evaluation = good.evaluate(&server, &submission);
 
-    let verdicts: Vec<(&str, &str, Value)> = FAULTY
+    let verdicts: Vec<(&str, &str, Value)> = FAULTY_AGENTS
         .iter()
         .map(|(name, on_step, word)| {
             let team = Team::create(&server, name);
@@ -135,7 +137,8 @@ fn agent_failing_midway_fails_evaluation_with_all_faults() {
         );
     let server = Server::start(&scratch.path().join("data"), &config);
     let team = Team::create(&server, "Half-way");
-    // The agent fails only after 15 episodes. A validation run has fewer: it ends with the episode that passes 500 steps.
+    // The agent fails only after 15 episodes. A validation run has fewer: it ends with the episode in which it reaches 500
+    // steps.
     let source = python_agent(
         "episodes = globals().get('episodes', 0) + (message['step'] == 0)\n\
          if episodes > 15 and message['step'] == 12: sys.stderr.write('enough\\n'); sys.exit(9)\n\
@@ -145,12 +148,12 @@ fn agent_failing_midway_fails_evaluation_with_all_faults() {
     let submission = team.submit(&server, &folder);
     assert_eq!(submission["state"], "valid", "{submission:#}");
     let evaluation = team.evaluate(&server, &submission);
-    let done = team.wait_until_finished(&server, &evaluation);
-    assert_eq!(done["state"], "agent_failed", "{done:#}");
-    let faults = done["faults"]
+    let failed = team.wait_until_finished(&server, &evaluation);
+    assert_eq!(failed["state"], "agent_failed", "{failed:#}");
+    let faults = failed["faults"]
         .as_array()
         .expect("a failed evaluation names its faults");
-    assert!(faults.len() > 2, "{done:#}");
+    assert!(faults.len() > 2, "{failed:#}");
     for fault in faults {
         assert_eq!(fault["step"], 12);
         assert!(
@@ -161,10 +164,10 @@ fn agent_failing_midway_fails_evaluation_with_all_faults() {
         );
     }
     assert!(
-        done["log"]
+        failed["log"]
             .as_str()
             .is_some_and(|log| log.contains("enough")),
-        "{done:#}"
+        "{failed:#}"
     );
     let board: Value = server
         .get("/api/v1/board", None)

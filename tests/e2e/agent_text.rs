@@ -1,4 +1,5 @@
-//! Text from agents is shown without control characters, and bundles reveal nothing about the host's files.
+//! Text from agents (output and names) is shown without control characters, and the reasons why bundles are invalid reveal
+//! nothing about the host's files.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{
@@ -20,13 +21,14 @@ fn text(value: &Value) -> &str {
         .unwrap_or_else(|| panic!("{value} is no text"))
 }
 
-/// Asserts that a text has no control characters, and none that change the writing direction or are invisible.
+/// Asserts that a text has no control characters, and none that change the writing direction. `name` names
+/// the case in the message.
 fn assert_harmless(name: &str, text: &str) {
-    let bad = text.chars().find(|c| {
+    let harmful = text.chars().find(|c| {
         (c.is_control() && !"\n\t\r".contains(*c))
             || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     });
-    assert_eq!(bad, None, "{name}: {text:?}");
+    assert_eq!(harmful, None, "{name}: {text:?}");
 }
 
 #[test]
@@ -34,34 +36,44 @@ fn agent_toml_that_is_no_file_makes_bundle_invalid() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let team = Team::create(&server, "Folder");
-    let bundle = |name: &str, make: &dyn Fn(&Path)| {
+    // A bundle whose file `agent.toml` is replaced by what `create` makes at its path.
+    let bundle = |name: &str, create: &dyn Fn(&Path)| {
         let folder = python_bundle(scratch.path(), name, "pass");
         fs::remove_file(folder.join("agent.toml")).expect("it was just written");
-        make(&folder.join("agent.toml"));
+        create(&folder.join("agent.toml"));
         folder
     };
-    // The same below a top folder of the archive.
-    let top = scratch.path().join("with-top");
-    fs::create_dir_all(top.join("striker/agent.toml")).expect("a scratch folder");
-    let folder = bundle("folder", &|path| {
+    // A bundle inside a folder of the archive, also with a folder for `agent.toml`.
+    let nested = scratch.path().join("nested");
+    fs::create_dir_all(nested.join("striker/agent.toml")).expect("a scratch folder");
+    let empty_folder = bundle("folder", &|path| {
         fs::create_dir(path).expect("a scratch folder")
     });
-    let full = bundle("full", &|path| {
+    let full_folder = bundle("full", &|path| {
         fs::create_dir(path).expect("a scratch folder");
         fs::write(path.join("agent.toml"), "name = \"x\"").expect("a scratch file");
     });
+    // The archive of a bundle whose `agent.toml` is a symbolic link.
     let linked = |name, target: &'static str| {
         let folder = bundle(name, &|path| symlink(target, path).expect("a scratch link"));
         packed_with_links(&folder)
     };
     for (name, archive, word) in [
-        ("folder", pack(&folder), "agent.toml is a folder"),
         (
-            "a folder that holds one",
-            pack(&full),
+            "empty folder",
+            pack(&empty_folder),
             "agent.toml is a folder",
         ),
-        ("below a top folder", pack(&top), "agent.toml is a folder"),
+        (
+            "folder with a file",
+            pack(&full_folder),
+            "agent.toml is a folder",
+        ),
+        (
+            "folder in a nested bundle",
+            pack(&nested),
+            "agent.toml is a folder",
+        ),
         (
             "link to a file",
             linked("link", "agent.py"),
@@ -109,17 +121,19 @@ fn command_path_reveals_nothing_about_host_files() {
     let data_dir = scratch.path().join("data");
     let server = Server::start(&data_dir, CONFIG);
     let team = Team::create(&server, "Curious");
-    // An existing file that is not executable, compared with a missing one.
+    // The commands of the bundles are files that exist but are not executable (`secret` and `/etc/shadow`). The verdict must equal
+    // that on a missing file.
     let secret = scratch.path().join("secret");
     fs::write(&secret, "x").expect("a scratch file");
     fs::set_permissions(&secret, fs::Permissions::from_mode(0o640)).expect("a scratch file");
-    let up = "../".repeat(12);
+    // More levels than any scratch folder has, so the path leads to the root.
+    let to_root = "../".repeat(12);
     let folder = scratch.path().display().to_string();
     for (number, directory) in [
-        format!("{up}{folder}/"),
-        format!("./{up}{folder}/"),
-        format!("deep/../{up}{folder}/"),
-        format!("/agent/{up}{folder}/"),
+        format!("{to_root}{folder}/"),
+        format!("./{to_root}{folder}/"),
+        format!("deep/../{to_root}{folder}/"),
+        format!("/agent/{to_root}{folder}/"),
         format!("/agent/{folder}/"),
         format!("{folder}/"),
         "../../etc/".to_owned(),
@@ -128,20 +142,23 @@ fn command_path_reveals_nothing_about_host_files() {
     .into_iter()
     .enumerate()
     {
-        let answers = ["secret", "shadow", "no-such-file"].map(|name| {
-            let folder = python_bundle(scratch.path(), &format!("agent-{number}-{name}"), "pass");
-            let manifest =
-                format!("name = \"x\"\ncommand = [\"{directory}{name}\"]\nruntime = \"python3\"\n");
-            fs::write(folder.join("agent.toml"), manifest).expect("a scratch file");
-            let verdict = team.submit(&server, &folder);
-            assert_eq!(
-                verdict["state"], "invalid",
-                "{directory}{name}: {verdict:#}"
-            );
-            format!("{} {}", verdict["reason"], verdict["log"]).replace(name, "NAME")
-        });
-        assert_eq!(answers[0], answers[2], "{directory}");
-        assert_eq!(answers[1], answers[2], "{directory}");
+        let [secret_answer, shadow_answer, missing_answer] = ["secret", "shadow", "no-such-file"]
+            .map(|name| {
+                let folder =
+                    python_bundle(scratch.path(), &format!("agent-{number}-{name}"), "pass");
+                let manifest = format!(
+                    "name = \"x\"\ncommand = [\"{directory}{name}\"]\nruntime = \"python3\"\n"
+                );
+                fs::write(folder.join("agent.toml"), manifest).expect("a scratch file");
+                let verdict = team.submit(&server, &folder);
+                assert_eq!(
+                    verdict["state"], "invalid",
+                    "{directory}{name}: {verdict:#}"
+                );
+                format!("{} {}", verdict["reason"], verdict["log"]).replace(name, "NAME")
+            });
+        assert_eq!(secret_answer, missing_answer, "{directory}");
+        assert_eq!(shadow_answer, missing_answer, "{directory}");
     }
 }
 
@@ -150,6 +167,7 @@ fn agent_output_and_names_contain_no_control_characters() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let team = Team::create(&server, "Painter");
+    // Where the text appears, the statements that write it at each step, and how it is shown.
     for (number, (name, on_step, expected)) in [
         (
             "log",
@@ -204,14 +222,15 @@ fn agent_output_and_names_contain_no_control_characters() {
             assert_harmless(name, &String::from_utf8_lossy(output));
         }
     }
-    for (name, chars) in [
+    // Names in agent.toml, in the notation of TOML strings.
+    for (name, agent_name) in [
         ("escape", "a\\u001b[31m"),
         ("override", "\\u202eredro"),
         ("invisible", "a\\u200bb"),
     ] {
         let folder = python_bundle(scratch.path(), name, "pass");
         let manifest = format!(
-            "name = \"{chars}\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n"
+            "name = \"{agent_name}\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n"
         );
         fs::write(folder.join("agent.toml"), manifest).expect("a scratch file");
         let verdict = team.submit(&server, &folder);
@@ -220,6 +239,7 @@ fn agent_output_and_names_contain_no_control_characters() {
         assert!(reason.contains("name must have"), "{reason}");
         assert_harmless(name, reason);
     }
+    // Team names; the last is the Hangul filler, a letter without a visible form.
     for name in ["a\u{202e}b", "a\u{1b}[31m", "a\u{200f}", "\u{3164}"] {
         let answer = server.post(
             "/api/v1/teams",

@@ -1,17 +1,16 @@
-//! The architecture in `ARCHITECTURE.md`: each crate uses only the crates that its table lists, and files have no import
-//! cycles.
+//! The rules of `ARCHITECTURE.md`: each crate uses only the crates that the table there lists for it, and there are no import
+//! cycles (files that import from each other, directly or through further files).
 
 mod crate_table;
 mod import_cycles;
 mod imports;
 
-use faceoff_tests::repository;
 use import_cycles::find_cycles;
 use std::{collections::BTreeSet, fs, path::Path};
 
-/// Dependencies that only one crate may use, with that crate and the reason.
-const EXCLUSIVE: [(&str, &str); 4] = [
-    ("rapier3d-f64", "faceoff-sim"), // the contact finder is part of the ruleset
+/// Dependencies that only one crate may use, each with that crate and the reason.
+const EXCLUSIVE_DEPENDENCIES: [(&str, &str); 4] = [
+    ("rapier3d-f64", "faceoff-sim"), // its collision detection defines the simulated contacts
     ("sqlx", "faceoff-store"),       // SQL lives in one crate
     ("seccompiler", "faceoff-sandbox"), // the confinement of agents lives in one crate
     ("libc", "faceoff-sandbox"),
@@ -20,24 +19,26 @@ const EXCLUSIVE: [(&str, &str); 4] = [
 #[test]
 fn crates_use_only_dependencies_of_the_table() {
     let members = crate_table::members();
-    let allowed = crate_table::allowed();
-    let known: BTreeSet<&str> = members.iter().map(|member| member.name.as_str()).collect();
-    let listed: BTreeSet<&str> = allowed.keys().map(String::as_str).collect();
+    let allowed = crate_table::allowed_dependencies();
+    let crates: BTreeSet<&str> = members.iter().map(|member| member.name.as_str()).collect();
+    let table_rows: BTreeSet<&str> = allowed.keys().map(String::as_str).collect();
     assert_eq!(
-        listed, known,
+        table_rows, crates,
         "the table of ARCHITECTURE.md names each crate once"
     );
-    let mut wrong = Vec::new();
+    let mut violations = Vec::new();
     for member in &members {
         for dependency in &member.dependencies {
-            let is_member = known.contains(dependency.as_str());
-            if is_member && !allowed[&member.name].permits(dependency) {
-                wrong.push(format!("{} uses {dependency}", member.name));
+            let is_own_crate = crates.contains(dependency.as_str());
+            if is_own_crate && !allowed[&member.name].permits(dependency) {
+                violations.push(format!("{} uses {dependency}", member.name));
             }
-            if let Some((_, owner)) = EXCLUSIVE.iter().find(|(name, _)| name == dependency)
+            if let Some((_, owner)) = EXCLUSIVE_DEPENDENCIES
+                .iter()
+                .find(|(name, _)| name == dependency)
                 && *owner != member.name
             {
-                wrong.push(format!(
+                violations.push(format!(
                     "{} uses {dependency}, which only {owner} may use",
                     member.name
                 ));
@@ -45,25 +46,25 @@ fn crates_use_only_dependencies_of_the_table() {
         }
     }
     assert!(
-        wrong.is_empty(),
-        "not allowed by the table of ARCHITECTURE.md: {wrong:#?}"
+        violations.is_empty(),
+        "not allowed by the table of ARCHITECTURE.md: {violations:#?}"
     );
 }
 
 #[test]
 fn source_files_have_no_import_cycles() {
-    let mut found = Vec::new();
+    let mut cycles = Vec::new();
     for member in crate_table::members() {
-        found.extend(find_cycles(&member.folder.join("src")));
+        cycles.extend(find_cycles(&member.folder.join("src")));
     }
     assert!(
-        found.is_empty(),
+        cycles.is_empty(),
         "import cycles: move the shared items to a separate file\n{}",
-        found.join("\n")
+        cycles.join("\n")
     );
 }
 
-/// Writes a crate and returns its import cycles.
+/// Writes the files (name and content) of a crate and returns descriptions of its import cycles.
 fn cycles_of(files: &[(&str, &str)]) -> Vec<String> {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     for (name, text) in files {
@@ -117,9 +118,9 @@ fn import_cycle_is_found() {
 
 #[test]
 fn re_exports_and_tests_are_no_import_cycle() {
-    let none = cycles_of(&[
+    let cycles = cycles_of(&[
         ("main.rs", "mod parent; fn main() { parent::run(); }"),
-        // a parent that only re-exports items of its children
+        // A parent that only re-exports items of its children is in no cycle with them.
         ("parent/mod.rs", "mod one; mod two; pub use one::run; pub(crate) use two::Two;"),
         ("parent/one.rs", "use super::Two; pub fn run() { let _ = Two::new(); }"),
         (
@@ -128,6 +129,5 @@ fn re_exports_and_tests_are_no_import_cycle() {
              #[cfg(test)] mod tests { use super::*; use crate::parent::run; #[test] fn t() { run() } }",
         ),
     ]);
-    assert!(none.is_empty(), "{none:?}");
-    assert!(repository().join("crates").is_dir());
+    assert!(cycles.is_empty(), "{cycles:?}");
 }

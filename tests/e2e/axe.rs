@@ -1,4 +1,5 @@
-//! Faults of a page in a real browser: violations that axe reports, overflowing elements, errors on the console.
+//! Faults of a page in a real browser: violations of accessibility rules, which the library axe-core reports, overflowing
+//! elements, and errors on the console.
 
 use faceoff_tests::{
     browser::{Page, View},
@@ -6,16 +7,17 @@ use faceoff_tests::{
 };
 use std::fs;
 
-/// Rules of WCAG 2.0 to 2.2, levels A and AA.
-const RUN: &str = "axe.run(document, {
+/// JavaScript: lists violations of the rules of WCAG 2.0 to 2.2 (web accessibility), levels A and AA.
+const LIST_VIOLATIONS: &str = "axe.run(document, {
     runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'],
     resultTypes: ['violations'],
-}).then(found => found.violations.map(one => one.id + ': ' + one.nodes.map(node => node.html).join(' … ').slice(0, 400)))";
+}).then(found => found.violations.map(rule => rule.id + ': ' + rule.nodes.map(node => node.html).join(' … ').slice(0, 400)))";
 
-/// Elements beyond the window's edge, without those in tables that scroll separately.
-const WIDEST: &str = "[...document.querySelectorAll('body *')]
-    .filter(one => one.getBoundingClientRect().right > innerWidth + 1 && !one.closest('.wide'))
-    .map(one => one.outerHTML.slice(0, 120)).slice(-3)";
+/// JavaScript: lists three elements beyond the window's right edge. Tables in a `.wide` element scroll separately and do not
+/// count.
+const LIST_WIDE_ELEMENTS: &str = "[...document.querySelectorAll('body *')]
+    .filter(element => element.getBoundingClientRect().right > innerWidth + 1 && !element.closest('.wide'))
+    .map(element => element.outerHTML.slice(0, 120)).slice(-3)";
 
 /// The windows and colour schemes in which pages are checked.
 const VIEWS: [View; 4] = [
@@ -28,34 +30,35 @@ const VIEWS: [View; 4] = [
     View::PROJECTOR,
 ];
 
-pub fn axe() -> String {
-    let axe = repository().join("web/client/node_modules/axe-core/axe.min.js");
-    fs::read_to_string(&axe).unwrap_or_else(|error| {
+/// The source of axe-core.
+pub fn axe_script() -> String {
+    let file = repository().join("web/client/node_modules/axe-core/axe.min.js");
+    fs::read_to_string(&file).unwrap_or_else(|error| {
         panic!(
             "{}: {error}; `web/client/build.sh test`, a part of `make test`, installs it",
-            axe.display()
+            file.display()
         )
     })
 }
 
-/// The faults of an open page in all views.
-pub fn faults(page: &Page, axe: &str, path: &str) -> Vec<String> {
+/// The faults of an open page in all views; `path` names the page in their descriptions.
+pub fn faults(page: &Page, axe_script: &str, path: &str) -> Vec<String> {
     let mut faults = Vec::new();
-    let _ = page.evaluate(&format!("{axe};1"));
+    let _ = page.evaluate(&format!("{axe_script};1"));
     for view in VIEWS {
         page.set_view(view);
         if page.overflow() != 0 {
-            let widest = page.evaluate(WIDEST);
+            let elements = page.evaluate(LIST_WIDE_ELEMENTS);
             let width = view.width;
-            faults.push(format!("{path} is wider than {width} pixels: {widest}"));
+            faults.push(format!("{path} is wider than {width} pixels: {elements}"));
         }
-        // The rules depend only on the colour scheme and on narrow windows.
+        // The results of the rules depend only on the colour scheme and on whether the window is narrow.
         if view == View::DESKTOP || view.dark {
-            let found = page.evaluate(RUN);
-            let found = found.as_array().expect("axe returns a list");
-            let violations = found
+            let list = page.evaluate(LIST_VIOLATIONS);
+            let list = list.as_array().expect("axe returns a list");
+            let violations = list
                 .iter()
-                .map(|one| format!("{path} {}: {one}", view.width));
+                .map(|violation| format!("{path} {}: {violation}", view.width));
             faults.extend(violations);
         }
     }

@@ -1,4 +1,5 @@
-//! Backups of a running server, and servers that continue from a backup.
+//! The commands `faceoff backup` and `faceoff restore`: backups of a data folder (database and files of a server), also while
+//! the server runs, and servers that continue from a backup.
 
 use crate::{
     CONFIG, Team,
@@ -14,7 +15,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-fn text(path: &Path) -> &str {
+fn path_text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are text")
 }
 
@@ -32,11 +33,16 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Makes a backup and returns the command's output.
-fn back_up(data: &Path, to: &Path) -> String {
-    faceoff(&["backup", text(to), "--data-dir", text(data)], "").expect_success()
+/// Backs up the data folder `data` to the folder `backup`; returns the command's output.
+fn back_up(data: &Path, backup: &Path) -> String {
+    faceoff(
+        &["backup", path_text(backup), "--data-dir", path_text(data)],
+        "",
+    )
+    .expect_success()
 }
 
+/// The first row of the board, the ranking of teams.
 fn board_row(server: &Server) -> Value {
     let board = server.poll("/api/v1/board", &server.admin_token, |_| true);
     board["rows"][0].clone()
@@ -45,50 +51,52 @@ fn board_row(server: &Server) -> Value {
 #[test]
 fn backup_during_evaluation_restores_running_evaluation() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let at = |name: &str| scratch.path().join(name);
-    let server = Server::start(&at("data"), CONFIG);
+    let in_scratch = |name: &str| scratch.path().join(name);
+    let [data, backup] = ["data", "backup"].map(in_scratch);
+    let server = Server::start(&data, CONFIG);
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &bundle::reference("striker", scratch.path()));
     let evaluation = team.evaluate(&server, &submission);
     let _ = server.poll(&evaluation, &team.token, |answer| {
         answer["progress"]["episodes_done"].as_u64() >= Some(2)
     });
-    let output = back_up(&at("data"), &at("backup"));
+    let output = back_up(&data, &backup);
     assert!(output.contains("the database is intact"), "{output}");
-    for path in files(&at("backup")) {
+    for path in files(&backup) {
         let mode = path.metadata().expect("it is there").permissions().mode();
-        assert_eq!(mode & 0o077, 0, "{}", path.display());
+        assert_eq!(mode & 0o077, 0, "only the owner may use {}", path.display());
     }
     // The server continues and has more results than the backup.
     let expected = team.wait_until_finished(&server, &evaluation);
     let season = server.poll("/api/v1/season", &server.admin_token, |_| true);
-    let row = board_row(&server);
+    let expected_row = board_row(&server);
     server.kill();
-    fs::remove_dir_all(at("data")).expect("the disk is lost");
+    fs::remove_dir_all(&data).expect("the folder can be removed");
 
-    let checked = faceoff(&["restore", text(&at("backup")), "--check"], "").expect_success();
-    assert!(checked.contains("is intact"), "{checked}");
-    let restored = faceoff(
+    let check_output = faceoff(&["restore", path_text(&backup), "--check"], "").expect_success();
+    assert!(check_output.contains("is intact"), "{check_output}");
+    let output = faceoff(
         &[
             "restore",
-            text(&at("backup")),
+            path_text(&backup),
             "--data",
-            text(&at("restored")),
+            path_text(&in_scratch("restored")),
         ],
         "",
     )
     .expect_success();
-    assert!(restored.contains("faceoff serve --data-dir"), "{restored}");
-    let mode = at("restored")
+    assert!(output.contains("faceoff serve --data-dir"), "{output}");
+    let mode = in_scratch("restored")
         .metadata()
         .expect("it is there")
         .permissions()
         .mode();
     assert_eq!(mode & 0o777, 0o700);
-    let server = Server::start(&at("restored"), CONFIG);
+    let server = Server::start(&in_scratch("restored"), CONFIG);
     let finished = team.wait_until_finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
-    // The same secret draws the same episodes, whichever of them were done at the backup.
+    // The secret of the season, which is in the backup, determines the episodes. So they are the same as before, also those that
+    // were not finished at the backup.
     assert_eq!(
         finished["result"]["tasks"]["hit"]["successes"],
         expected["result"]["tasks"]["hit"]["successes"]
@@ -96,7 +104,11 @@ fn backup_during_evaluation_restores_running_evaluation() {
     let restored_season = server.poll("/api/v1/season", &server.admin_token, |_| true);
     assert_eq!(restored_season["commitment"], season["commitment"]);
     for field in ["rank", "team", "evaluation"] {
-        assert_eq!(board_row(&server)[field], row[field], "{row:#}");
+        assert_eq!(
+            board_row(&server)[field],
+            expected_row[field],
+            "{expected_row:#}"
+        );
     }
 }
 
@@ -115,21 +127,27 @@ fn second_server_on_data_folder_changes_nothing() {
         "--listen",
         "127.0.0.1:0",
         "--config",
-        text(&config),
+        path_text(&config),
         "--data-dir",
-        text(&data),
+        path_text(&data),
     ];
-    let holder = format!("in use by process {}", server.process_id());
+    let in_use_message = format!("in use by process {}", server.process_id());
     let refused = faceoff(&serve, "").expect_failure(FAILED);
-    assert!(refused.contains(&holder), "{refused}");
+    assert!(refused.contains(&in_use_message), "{refused}");
     assert_eq!(
         fs::read_to_string(&upload).expect("the file is unchanged"),
         "half"
     );
-    let back = scratch.path().join("backup");
-    back_up(&data, &back);
-    let restore = ["restore", text(&back), "--data", text(&data), "--replace"];
-    faceoff(&restore, "").expect_refusal(FAILED, &[&holder]);
+    let backup = scratch.path().join("backup");
+    back_up(&data, &backup);
+    let restore = [
+        "restore",
+        path_text(&backup),
+        "--data",
+        path_text(&data),
+        "--replace",
+    ];
+    faceoff(&restore, "").expect_refusal(FAILED, &[&in_use_message]);
     let health = server.get("/api/v1/health", None);
     assert_eq!(health.status(), 200, "the first server still answers");
 }
@@ -137,122 +155,133 @@ fn second_server_on_data_folder_changes_nothing() {
 #[test]
 fn damaged_backup_is_neither_restored_nor_reported_intact() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let at = |name: &str| scratch.path().join(name);
-    let server = Server::start(&at("data"), CONFIG);
+    let in_scratch = |name: &str| scratch.path().join(name);
+    let [data, backup] = ["data", "backup"].map(in_scratch);
+    let server = Server::start(&data, CONFIG);
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));
     let evaluation = team.evaluate(&server, &submission);
     let _ = team.wait_until_finished(&server, &evaluation);
     server.kill();
-    back_up(&at("data"), &at("backup"));
-    let backup = |args: &[&str]| faceoff(args, "");
+    back_up(&data, &backup);
+    let run = |args: &[&str]| faceoff(args, "");
 
     // Folders with contents are not overwritten.
-    backup(&[
-        "backup",
-        text(&at("backup")),
-        "--data-dir",
-        text(&at("data")),
-    ])
-    .expect_refusal(FAILED, &["is not empty"]);
-    backup(&["restore", text(&at("backup")), "--data", text(&at("data"))])
+    run(&["backup", path_text(&backup), "--data-dir", path_text(&data)])
+        .expect_refusal(FAILED, &["is not empty"]);
+    run(&["restore", path_text(&backup), "--data", path_text(&data)])
         .expect_refusal(FAILED, &["is not empty", "--replace"]);
-    backup(&[
+    run(&[
         "backup",
-        text(&at("new")),
+        path_text(&in_scratch("new")),
         "--data-dir",
-        text(&at("nowhere")),
+        path_text(&in_scratch("not-there")),
     ])
     .expect_refusal(FAILED, &["not the data folder of a server"]);
-    backup(&["restore", text(&at("data")), "--check"]).expect_refusal(FAILED, &["not a backup"]);
-    let inside = at("data").join("artifacts/backup");
-    backup(&["backup", text(&inside), "--data-dir", text(&at("data"))])
-        .expect_refusal(FAILED, &["inside the data folder"]);
-    // A folder that is no data folder is never moved, and a link is not followed.
-    let home = at("home");
+    run(&["restore", path_text(&data), "--check"]).expect_refusal(FAILED, &["not a backup"]);
+    let inside_data = data.join("artifacts/backup");
+    run(&[
+        "backup",
+        path_text(&inside_data),
+        "--data-dir",
+        path_text(&data),
+    ])
+    .expect_refusal(FAILED, &["inside the data folder"]);
+    // A folder that is no data folder is not replaced, and a link is not followed.
+    let home = in_scratch("home");
     fs::create_dir(&home).expect("a scratch folder");
     fs::write(home.join("letter"), "Dear").expect("a scratch file");
-    backup(&[
+    run(&[
         "restore",
-        text(&at("backup")),
+        path_text(&backup),
         "--data",
-        text(&home),
+        path_text(&home),
         "--replace",
     ])
     .expect_refusal(FAILED, &["has no faceoff.sqlite3"]);
     assert_eq!(files(&home), [home.join("letter")]);
-    let link = at("link");
-    fs::create_dir(at("empty")).expect("a scratch folder");
-    std::os::unix::fs::symlink(at("empty"), &link).expect("a scratch link");
-    backup(&["restore", text(&at("backup")), "--data", text(&link)])
+    let link = in_scratch("link");
+    fs::create_dir(in_scratch("empty")).expect("a scratch folder");
+    std::os::unix::fs::symlink(in_scratch("empty"), &link).expect("a scratch link");
+    run(&["restore", path_text(&backup), "--data", path_text(&link)])
         .expect_refusal(FAILED, &["is a symbolic link"]);
 
     // With --replace the former folder, its write-ahead log included, is moved aside.
-    fs::write(at("data").join("faceoff.sqlite3-wal"), "stale").expect("a scratch file");
-    let output = backup(&[
+    fs::write(data.join("faceoff.sqlite3-wal"), "stale").expect("a scratch file");
+    let output = run(&[
         "restore",
-        text(&at("backup")),
+        path_text(&backup),
         "--data",
-        text(&at("data")),
+        path_text(&data),
         "--replace",
     ])
     .expect_success();
-    assert!(!at("data").join("faceoff.sqlite3-wal").exists(), "{output}");
-    let aside = fs::read_dir(scratch.path())
+    assert!(!data.join("faceoff.sqlite3-wal").exists(), "{output}");
+    let replaced_data = fs::read_dir(scratch.path())
         .expect("a folder can be read")
         .map(|entry| entry.expect("a folder can be read").path())
-        .find(|path| text(path).contains("data.replaced-"))
+        .find(|path| path_text(path).contains("data.replaced-"))
         .unwrap_or_else(|| panic!("{output}"));
     assert_eq!(
-        fs::read_to_string(aside.join("faceoff.sqlite3-wal")).expect("it is there"),
+        fs::read_to_string(replaced_data.join("faceoff.sqlite3-wal")).expect("it is there"),
         "stale"
     );
-    // Clients may know event ids from after the backup. The restored server must not assign them again.
-    let next_ids_query = "SELECT seq > 100000000 FROM sqlite_sequence WHERE name = 'events'";
+    // Clients may know event ids from after the backup. The restored server must not assign them again, so it continues 100
+    // million ids later.
+    let ids_skipped_query = "SELECT seq > 100000000 FROM sqlite_sequence WHERE name = 'events'";
     let output = Command::new("sqlite3")
-        .arg(at("data").join("faceoff.sqlite3"))
-        .arg(next_ids_query)
+        .arg(data.join("faceoff.sqlite3"))
+        .arg(ids_skipped_query)
         .output()
         .expect("sqlite3 starts");
-    assert_eq!(output.stdout, b"1\n");
+    assert_eq!(output.stdout, b"1\n", "SQLite prints 1 for true");
 
     // The backup of a data folder with a lost file is made, and reports the missing file.
-    let lost = files(&at("data").join("artifacts/datasets")).remove(0);
-    fs::remove_file(&lost).expect("a scratch file");
-    let errors = backup(&[
+    let lost_file = files(&data.join("artifacts/datasets")).remove(0);
+    fs::remove_file(&lost_file).expect("a scratch file");
+    let errors = run(&[
         "backup",
-        text(&at("incomplete")),
+        path_text(&in_scratch("incomplete")),
         "--data-dir",
-        text(&at("data")),
+        path_text(&data),
     ])
     .expect_failure(FAILED);
     assert!(errors.contains("missing: artifacts/datasets/"), "{errors}");
-    assert!(at("incomplete").join("backup.json").exists());
-    let errors = backup(&["restore", text(&at("incomplete")), "--check"]).expect_failure(FAILED);
+    assert!(in_scratch("incomplete").join("backup.json").exists());
+    let errors =
+        run(&["restore", path_text(&in_scratch("incomplete")), "--check"]).expect_failure(FAILED);
     assert!(
         errors.contains("lacks 1 files that its database refers to"),
         "{errors}"
     );
 
-    // Each file of the backup is damaged in turn.
-    let all = files(&at("backup"));
-    assert!(all.len() >= 4, "{all:?}");
-    for file in all.iter().filter(|file| !file.ends_with("backup.json")) {
-        let whole = fs::read(file).expect("it is there");
-        let mut damaged = whole.clone();
+    // Each file of the backup is damaged in turn: one bit in its middle, or one byte in an empty file.
+    let backup_files = files(&backup);
+    assert!(backup_files.len() >= 4, "{backup_files:?}");
+    for file in backup_files
+        .iter()
+        .filter(|file| !file.ends_with("backup.json"))
+    {
+        let intact = fs::read(file).expect("it is there");
+        let mut damaged = intact.clone();
         let middle = damaged.len() / 2;
         match damaged.get_mut(middle) {
             Some(byte) => *byte ^= 1,
             None => damaged.push(1),
         }
         fs::write(file, &damaged).expect("a scratch file");
-        backup(&["restore", text(&at("backup")), "--data", text(&at("never"))])
+        run(&[
+            "restore",
+            path_text(&backup),
+            "--data",
+            path_text(&in_scratch("not-restored")),
+        ])
+        .expect_refusal(FAILED, &["has changed since the backup"]);
+        run(&["restore", path_text(&backup), "--check"])
             .expect_refusal(FAILED, &["has changed since the backup"]);
-        backup(&["restore", text(&at("backup")), "--check"])
-            .expect_refusal(FAILED, &["has changed since the backup"]);
-        fs::write(file, &whole).expect("a scratch file");
+        fs::write(file, &intact).expect("a scratch file");
     }
-    assert!(!at("never").exists() && !at("never.restoring").exists());
+    assert!(!in_scratch("not-restored").exists() && !in_scratch("not-restored.restoring").exists());
 }
 
 /// Runs SQL on a database that no server has open.
@@ -269,14 +298,14 @@ fn sql(database: &Path, statements: &str) {
 #[test]
 fn database_of_later_version_is_refused_with_reason() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (data, back) = (scratch.path().join("data"), scratch.path().join("backup"));
+    let (data, backup) = (scratch.path().join("data"), scratch.path().join("backup"));
     Server::start(&data, CONFIG).kill();
-    back_up(&data, &back);
-    let later =
+    back_up(&data, &backup);
+    let later_version =
         "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
                  VALUES (9999, 'later', 1, x'00', 0);
                  INSERT INTO programs (id, version, schema) VALUES (77, '7.8.9', 9999);";
-    sql(&data.join("faceoff.sqlite3"), later);
+    sql(&data.join("faceoff.sqlite3"), later_version);
     let messages = [
         "a later version of Faceoff: 7.8.9 has its migration 9999",
         "restore a backup from before it",
@@ -287,7 +316,7 @@ fn database_of_later_version_is_refused_with_reason() {
             "--listen",
             "127.0.0.1:0",
             "--data-dir",
-            text(&data),
+            path_text(&data),
         ])
         .output()
         .expect("the program starts");
@@ -296,13 +325,27 @@ fn database_of_later_version_is_refused_with_reason() {
     for message in messages {
         assert!(errors.contains(message), "{errors}");
     }
-    let target = scratch.path().join("backup-of-later");
-    faceoff(&["backup", text(&target), "--data-dir", text(&data)], "")
-        .expect_refusal(FAILED, &messages);
-    assert!(!target.exists());
+    let later_backup = scratch.path().join("backup-of-later");
+    faceoff(
+        &[
+            "backup",
+            path_text(&later_backup),
+            "--data-dir",
+            path_text(&data),
+        ],
+        "",
+    )
+    .expect_refusal(FAILED, &messages);
+    assert!(!later_backup.exists());
     // The backup from before the upgrade can be restored.
     faceoff(
-        &["restore", text(&back), "--data", text(&data), "--replace"],
+        &[
+            "restore",
+            path_text(&backup),
+            "--data",
+            path_text(&data),
+            "--replace",
+        ],
         "",
     )
     .expect_success();
@@ -312,11 +355,15 @@ fn database_of_later_version_is_refused_with_reason() {
 #[test]
 fn first_release_data_folder_is_backed_up_before_upgrade() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    // A data folder of the first release, at commit e67a08c.
     unpack("data-folder-e67a08c.tar.gz", scratch.path());
-    let (data, back) = (scratch.path().join("data"), scratch.path().join("backup"));
-    // The fixture lacks Delta's bundle: the backup has the rest, and reports the missing file.
-    let errors =
-        faceoff(&["backup", text(&back), "--data-dir", text(&data)], "").expect_failure(FAILED);
+    let (data, backup) = (scratch.path().join("data"), scratch.path().join("backup"));
+    // The data folder lacks the bundle of the team Delta: the backup has the rest, and reports the missing file.
+    let errors = faceoff(
+        &["backup", path_text(&backup), "--data-dir", path_text(&data)],
+        "",
+    )
+    .expect_failure(FAILED);
     assert_eq!(
         errors.matches("missing: artifacts/bundles/").count(),
         1,
@@ -324,12 +371,18 @@ fn first_release_data_folder_is_backed_up_before_upgrade() {
     );
     assert!(errors.contains("can be restored"), "{errors}");
     let restored = scratch.path().join("restored");
-    faceoff(&["restore", text(&back), "--data", text(&restored)], "").expect_success();
+    faceoff(
+        &[
+            "restore",
+            path_text(&backup),
+            "--data",
+            path_text(&restored),
+        ],
+        "",
+    )
+    .expect_success();
     let server = Server::start(&restored, CONFIG);
     server.wait_for_log("database upgraded", 1);
-    let upgraded = server.log();
-    assert!(
-        upgraded.contains("from=\"an earlier version\""),
-        "{upgraded}"
-    );
+    let log = server.log();
+    assert!(log.contains("from=\"an earlier version\""), "{log}");
 }

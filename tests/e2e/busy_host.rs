@@ -1,5 +1,5 @@
-//! Other load on the host: it causes no penalty point, no fault and no other score. Reference agents are evaluated with
-//! the limits of the rules, beside each kind of load.
+//! Other load on the host (the evaluator's machine): it causes no penalty point and no fault, and changes no score. Reference
+//! agents of the folder `agents` are evaluated with the time limits of the rules, beside each kind of load.
 
 use crate::{Team, kills::copy_folder, start_day, without_times};
 use faceoff_tests::{bundle, server::Server};
@@ -12,17 +12,18 @@ use std::{
     process::{Child, Command, Stdio},
     sync::{
         Arc,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
 };
 
 /// Keeps the time limits of the rules, unlike the other tests.
 const CONFIG: &str =
-    "[workers]\nslots = 1\n[evaluation]\nepisodes_per_task = 6\nepisodes_per_shard = 3\n";
+    "[workers]\nslots = 1\n[evaluation]\nepisodes_per_task = 4\nepisodes_per_shard = 2\n";
+/// Reference agents that are evaluated.
 const AGENTS: [&str; 2] = ["hold", "striker"];
 
-/// Starts a load beside a server.
+/// A function that starts a load beside a server.
 type StartLoad = fn(&mut Load, &Server);
 
 /// Processes and threads that load the host; dropping it ends them.
@@ -31,8 +32,6 @@ struct Load {
     processes: Vec<Child>,
     threads: Vec<JoinHandle<()>>,
     stop: Arc<AtomicBool>,
-    /// Pages fetched and processes of a burst that ended.
-    completed: Arc<AtomicU64>,
 }
 
 impl Drop for Load {
@@ -50,7 +49,7 @@ impl Drop for Load {
 }
 
 impl Load {
-    fn program(&mut self, name: &str, arguments: &[&str]) {
+    fn start_program(&mut self, name: &str, arguments: &[&str]) {
         let child = Command::new(name)
             .args(arguments)
             .stdin(Stdio::null())
@@ -62,25 +61,24 @@ impl Load {
 
     /// Runs `body` repeatedly on a thread.
     fn repeat(&mut self, mut body: impl FnMut() + Send + 'static) {
-        let (stop, completed) = (Arc::clone(&self.stop), Arc::clone(&self.completed));
+        let stop = Arc::clone(&self.stop);
         self.threads.push(thread::spawn(move || {
             while !stop.load(Ordering::Relaxed) {
                 body();
-                completed.fetch_add(1, Ordering::Relaxed);
             }
         }));
     }
 
-    /// A process per CPU that never sleeps.
-    fn hogs(&mut self) {
+    /// Starts a process per CPU that never sleeps.
+    fn start_cpu_hogs(&mut self) {
         let cpus = thread::available_parallelism().map_or(1, std::num::NonZero::get);
         for _ in 0..cpus {
-            self.program("sh", &["-c", "while :; do :; done"]);
+            self.start_program("sh", &["-c", "while :; do :; done"]);
         }
     }
 
-    /// Writes a quarter of the memory repeatedly, from end to end.
-    fn memory(&mut self) {
+    /// Starts a process that writes a quarter of the memory repeatedly, from end to end.
+    fn start_memory_writer(&mut self) {
         let meminfo = fs::read_to_string("/proc/meminfo").expect("Linux reports its memory");
         let bytes_of = |key: &str| {
             let line = meminfo.lines().find_map(|line| line.strip_prefix(key));
@@ -93,13 +91,14 @@ impl Load {
             kib << 10
         };
         let bytes = (bytes_of("MemTotal:") / 4).min(bytes_of("MemAvailable:") / 2);
-        let source = "import sys\nheld = bytearray(int(sys.argv[1]))\nn = 0\n\
-                      while True:\n    n += 1\n    held[::4096] = bytes([n % 256]) * len(held[::4096])";
-        self.program("python3", &["-c", source, &bytes.to_string()]);
+        // One byte per page of 4096 bytes makes the whole page dirty.
+        let source = "import sys\nmemory = bytearray(int(sys.argv[1]))\nn = 0\n\
+                      while True:\n    n += 1\n    memory[::4096] = bytes([n % 256]) * len(memory[::4096])";
+        self.start_program("python3", &["-c", source, &bytes.to_string()]);
     }
 
-    /// Visitors without a token that fetch pages without a pause, each on its own connection.
-    fn flood(&mut self, server: &Server) {
+    /// Starts 48 visitors without a token that fetch pages without a pause, each page on a new connection.
+    fn start_page_flood(&mut self, server: &Server) {
         let address = server.url.trim_start_matches("http://").to_owned();
         for visitor in 0..48 {
             let address = address.clone();
@@ -118,8 +117,8 @@ impl Load {
         }
     }
 
-    /// Many concurrent processes as short as a compiler's, some of which start further ones.
-    fn burst(&mut self) {
+    /// Starts 12 threads that each run one short process after another, as a compilation does; each process starts another.
+    fn start_process_bursts(&mut self) {
         for _ in 0..12 {
             self.repeat(|| {
                 let source = "import subprocess\nsum(i * i for i in range(300_000))\n\
@@ -130,7 +129,7 @@ impl Load {
     }
 }
 
-/// Evaluates a day of the season in `data`, from uploads to results, beside a load.
+/// Runs an evaluation day of the season in `data`, from uploads to results, beside a load. Returns the results by agent.
 fn evaluate_day(
     data: &Path,
     scratch: &Path,
@@ -153,12 +152,15 @@ fn evaluate_day(
         .iter()
         .map(|(team, submission)| {
             let path = crate::evaluation_path(&day, submission);
-            // Before the release of the day a team sees its score alone.
+            // Before the release of the day a team sees only its score.
             let finished = server.poll(&path, &team.token, |answer| {
                 !answer["released_at"].is_null()
             });
             assert_eq!(finished["state"], "finished", "{finished:#}");
-            for (task, result) in finished["result"]["tasks"].as_object().expect("tasks") {
+            for (task, result) in finished["result"]["tasks"]
+                .as_object()
+                .expect("a result has tasks")
+            {
                 assert_eq!(
                     result["violations"]["computation_time"],
                     0,
@@ -176,7 +178,7 @@ fn evaluate_day(
 /// Evaluates the same day of the same season without load and beside each load: scores and penalty points are equal.
 fn assert_no_effect(loads: &[(&str, StartLoad)]) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    // Copies of one data folder have the same secret, so all days have the same episodes.
+    // Copies of one data folder have the same secret, which determines the episodes. So all days have the same ones.
     let season = scratch.path().join("season");
     Server::start(&season, CONFIG).kill();
     let undisturbed = scratch.path().join("undisturbed");
@@ -185,15 +187,15 @@ fn assert_no_effect(loads: &[(&str, StartLoad)]) {
     for (name, load) in loads {
         let data = scratch.path().join(name);
         copy_folder(&season, &data);
-        let found = evaluate_day(&data, scratch.path(), load);
-        for (expected, found) in expected.iter().zip(&found) {
+        let results = evaluate_day(&data, scratch.path(), load);
+        for (expected, result) in expected.iter().zip(&results) {
             assert_eq!(
-                without_times(found),
+                without_times(result),
                 without_times(expected),
                 "beside {name}"
             );
             assert_eq!(
-                found["penalty_points"], expected["penalty_points"],
+                result["penalty_points"], expected["penalty_points"],
                 "beside {name}"
             );
         }
@@ -203,9 +205,9 @@ fn assert_no_effect(loads: &[(&str, StartLoad)]) {
 #[test]
 fn cpu_hogs_and_flood_change_no_result() {
     assert_no_effect(&[("hogs, memory and flood", |load, server| {
-        load.hogs();
-        load.memory();
-        load.flood(server);
+        load.start_cpu_hogs();
+        load.start_memory_writer();
+        load.start_page_flood(server);
     })]);
 }
 
@@ -213,15 +215,15 @@ fn cpu_hogs_and_flood_change_no_result() {
 #[ignore = "it uses all of the machine for minutes; `make busy` runs it alone"]
 fn separate_and_combined_loads_change_no_result() {
     assert_no_effect(&[
-        ("hogs", |load, _| load.hogs()),
-        ("memory", |load, _| load.memory()),
-        ("flood", Load::flood),
-        ("burst", |load, _| load.burst()),
+        ("hogs", |load, _| load.start_cpu_hogs()),
+        ("memory", |load, _| load.start_memory_writer()),
+        ("flood", Load::start_page_flood),
+        ("burst", |load, _| load.start_process_bursts()),
         ("all", |load, server| {
-            load.hogs();
-            load.memory();
-            load.flood(server);
-            load.burst();
+            load.start_cpu_hogs();
+            load.start_memory_writer();
+            load.start_page_flood(server);
+            load.start_process_bursts();
         }),
     ]);
 }
@@ -231,7 +233,8 @@ type ThreadCpus = (String, String);
 
 /// The server's threads with their CPUs: those of ordinary priority, and those of lower priority.
 fn threads_of(server: &Server) -> (Vec<ThreadCpus>, Vec<ThreadCpus>) {
-    let tasks = fs::read_dir(format!("/proc/{}/task", server.process_id())).expect("it runs");
+    let tasks =
+        fs::read_dir(format!("/proc/{}/task", server.process_id())).expect("the server runs");
     let (mut ordinary, mut low_priority) = (Vec::new(), Vec::new());
     for task in tasks.flatten() {
         // A thread that has just ended has no files.
@@ -240,6 +243,7 @@ fn threads_of(server: &Server) -> (Vec<ThreadCpus>, Vec<ThreadCpus>) {
         else {
             continue;
         };
+        // Field 19 of `stat` is the nice value. The name in brackets is field 2 and may contain spaces.
         let after_name = stat.rsplit_once(") ").expect("a name in brackets").1;
         let nice: i32 = after_name
             .split(' ')
@@ -268,7 +272,7 @@ fn http_threads_yield_and_avoid_agent_cpus() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let mut load = Load::default();
-    load.flood(&server);
+    load.start_page_flood(&server);
     let team = Team::create(&server, "Held");
     let id = team.upload(
         &server,
@@ -281,15 +285,15 @@ fn http_threads_yield_and_avoid_agent_cpus() {
         let matching = threads.iter().filter(|thread| thread.0.starts_with(prefix));
         matching.map(|thread| thread.1.clone()).collect()
     };
-    let slot = cpus_of(&ordinary, "faceoff-slot");
-    assert_eq!(slot.len(), 1, "{ordinary:?}");
+    let slot_cpus = cpus_of(&ordinary, "faceoff-slot");
+    assert_eq!(slot_cpus.len(), 1, "{ordinary:?}");
     for name in ["http", "sqlx-sqlite", "service"] {
         assert!(
             !cpus_of(&low_priority, name).is_empty(),
             "{name}: {low_priority:?}"
         );
     }
-    // A thread that was just started for a slot's request lowers its priority first of all.
+    // A service thread that was just started for a slot has the slot's priority until it has lowered its own.
     let has_service_thread = |threads: &[ThreadCpus]| {
         let names = ["http", "service"];
         names.iter().any(|name| !cpus_of(threads, name).is_empty())
@@ -303,7 +307,7 @@ fn http_threads_yield_and_avoid_agent_cpus() {
         threads = threads_of(&server).0;
     }
     assert!(!has_service_thread(&threads), "{threads:?}");
-    // With more than two CPUs, these threads avoid the agent's and the simulator's.
+    // With more than two CPUs, the HTTP threads avoid those of the agent and the simulator.
     let cpus = thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let http_cpus = cpus_of(&low_priority, "http");
     assert!(
@@ -313,9 +317,9 @@ fn http_threads_yield_and_avoid_agent_cpus() {
     match cpus {
         1 => {}
         2 => assert_eq!(
-            http_cpus[0], slot[0],
-            "they share the simulator's CPU at a lower priority"
+            http_cpus[0], slot_cpus[0],
+            "HTTP threads share the simulator's CPU at a lower priority"
         ),
-        _ => assert_ne!(http_cpus[0], slot[0]),
+        _ => assert_ne!(http_cpus[0], slot_cpus[0]),
     }
 }

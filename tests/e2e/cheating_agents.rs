@@ -1,5 +1,6 @@
-//! Agents that try to gain an unfair advantage, on a real server and with its evaluator: thinking time that is not
-//! charged, faked host interference, messages to another agent. Each attack has several variants.
+//! Agents that try to gain an unfair advantage, on a real server and with its evaluator: thinking time that is not charged to
+//! them, faked host interference (time that other load on the machine took), messages to another agent. Each attack has
+//! several variants.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{
@@ -14,7 +15,10 @@ use std::{
     process::Command,
 };
 
-/// A bundle that runs a program of `tests/agents` in place of an agent; the program's report goes to the log.
+/// First argument of each program in `tests/agents`. It marks the processes for tests that search them; here none does.
+const PROCESS_MARK: &str = "mark";
+
+/// A bundle that runs the program `file` of `tests/agents` in place of an agent; the program's report goes to the log.
 fn reporting_bundle(scratch: &Path, name: &str, file: &str, arguments: &[&str]) -> PathBuf {
     let source = format!(
         "import runpy, sys\n\
@@ -24,8 +28,8 @@ fn reporting_bundle(scratch: &Path, name: &str, file: &str, arguments: &[&str]) 
          sys.exit(3)\n"
     );
     let folder = python_bundle(scratch, name, &source);
-    let from = repository().join("tests/agents").join(file);
-    fs::copy(from, folder.join(file)).expect("the program is there");
+    let program = repository().join("tests/agents").join(file);
+    fs::copy(program, folder.join(file)).expect("the program is there");
     folder
 }
 
@@ -41,13 +45,19 @@ fn report(server: &Server, name: &str, folder: &Path) -> Value {
     serde_json::from_str(line).expect("a report is JSON")
 }
 
+/// The channel between evaluator and agent consists of the agent's standard input, output and error.
 #[test]
 fn agent_cannot_reopen_or_resize_its_channel() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    let folder = reporting_bundle(scratch.path(), "reopens", "reopens_channel.py", &["mark"]);
-    let found = report(&server, "Reopens", &folder);
-    let attempts = found.as_object().expect("a report is an object");
+    let folder = reporting_bundle(
+        scratch.path(),
+        "reopens",
+        "reopens_channel.py",
+        &[PROCESS_MARK],
+    );
+    let answers = report(&server, "Reopens", &folder);
+    let attempts = answers.as_object().expect("a report is an object");
     for attempt in [
         "own /proc/self/fd/0 write",
         "own /proc/self/fd/1 read",
@@ -58,34 +68,36 @@ fn agent_cannot_reopen_or_resize_its_channel() {
     for (attempt, answer) in attempts {
         assert_ne!(answer, "ok", "{attempt}");
     }
-    let shrinks = ["shrink input", "shrink output", "shrink copy"];
-    for attempt in shrinks {
+    for attempt in ["shrink input", "shrink output", "shrink copy"] {
         assert_eq!(attempts[attempt], "EPERM", "{attempt}");
     }
 
-    let folder = reporting_bundle(scratch.path(), "timers", "makes_timers.py", &["mark"]);
-    let made = report(&server, "Timers", &folder);
+    let folder = reporting_bundle(scratch.path(), "timers", "makes_timers.py", &[PROCESS_MARK]);
+    let timer_report = report(&server, "Timers", &folder);
     assert!(
-        made["timers"].as_u64().is_some_and(|timers| timers <= 256),
-        "{made}"
+        timer_report["timers"]
+            .as_u64()
+            .is_some_and(|timers| timers <= 256),
+        "{timer_report}"
     );
 }
 
 #[test]
 fn agent_leaves_no_trace_visible_to_another_teams_agent() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    // Runtimes are copied to memory, as by default.
+    // Libraries of the runtimes are copied to memory, as by default: agents then share these copies.
     let config = CONFIG.replace("resident_bytes = 0", "");
     let server = Server::start(&scratch.path().join("data"), &config);
     // The first agent uses locks, leases, hints, notifications, advice, non-blocking reads, counters, terminals, kernel
-    // objects and files, on a file that both can read. The second checks whether it can see any of it.
+    // objects and files, on a file that both can read. The second makes the same calls, and gets the same answers as the first.
     let shared_file = "library";
-    let [before, after] = ["leave", "look"].map(|action| {
-        let arguments = ["mark", shared_file, action];
+    let [first_agent, second_agent] = ["leave", "look"].map(|action| {
+        let arguments = [PROCESS_MARK, shared_file, action];
         let folder = reporting_bundle(scratch.path(), action, "covert_channel.py", &arguments);
         report(&server, action, &folder)
     });
-    assert_eq!(before, after);
+    assert_eq!(first_agent, second_agent);
+    // Each call or observation of the program, with its error, its value or `ok`.
     for (call, answer) in [
         ("flock", "ENOSYS"),
         ("lock_query", "ok"),
@@ -105,16 +117,17 @@ fn agent_leaves_no_trace_visible_to_another_teams_agent() {
         ("leftover_files", ""),
         ("system_locks", "EACCES"),
     ] {
-        assert_eq!(after[call], answer, "{call}");
+        assert_eq!(second_agent[call], answer, "{call}");
     }
 }
 
-/// Evaluates an agent with the server's evaluator; returns the results.
+/// Evaluates an agent with `faceoff eval`, which evaluates as the server does; returns the results.
 fn evaluate_locally(scratch: &Path, name: &str, source: &str, config: &str) -> Value {
     let folder = python_bundle(scratch, name, source);
-    let file = scratch.join(format!("{name}.toml"));
-    let patient = include_str!("../patient.toml");
-    fs::write(&file, format!("{patient}\n{config}")).expect("a scratch file can be written");
+    let config_file = scratch.join(format!("{name}.toml"));
+    let long_time_limits = include_str!("../long_time_limits.toml");
+    fs::write(&config_file, format!("{long_time_limits}\n{config}"))
+        .expect("a scratch file can be written");
     let out = scratch.join(format!("{name}-out"));
     let output = Command::new(program("faceoff"))
         .arg("eval")
@@ -127,7 +140,7 @@ fn evaluate_locally(scratch: &Path, name: &str, source: &str, config: &str) -> V
             "--allow-faults",
             "--config",
         ])
-        .arg(&file)
+        .arg(&config_file)
         .arg("--out")
         .arg(&out)
         .output()
@@ -137,7 +150,8 @@ fn evaluate_locally(scratch: &Path, name: &str, source: &str, config: &str) -> V
     serde_json::from_slice(&results).expect("results are JSON")
 }
 
-/// Ways to cause many events at one instant, each for 0.15 s. Each was once mistaken for host interference.
+/// Statements that cause many events at one instant, each within 0.15 s. Each was once mistaken for host interference.
+/// The timers use clock 1, CLOCK_MONOTONIC, and expire after 50 ms.
 const EVENT_STORMS: [(&str, &str); 4] = [
     (
         "timers",
@@ -188,12 +202,13 @@ fn event_storm_of_agent_is_charged_to_agent() {
             "{name}: {result:#}"
         );
         // All of the time is charged, except for host interference that is proven.
-        let took = &result["tasks"]["hit"]["computation_time_s"]["max"];
-        let host = &result["timing"]["longest_stall_s"];
-        let (took, host) = (took.as_f64(), host.as_f64());
+        let charged_s = &result["tasks"]["hit"]["computation_time_s"]["max"];
+        let host_s = &result["timing"]["longest_stall_s"];
+        let (charged_s, host_s) = (charged_s.as_f64(), host_s.as_f64());
         assert!(
-            took.zip(host)
-                .is_some_and(|(took, host)| took + host >= 0.15),
+            charged_s
+                .zip(host_s)
+                .is_some_and(|(charged_s, host_s)| charged_s + host_s >= 0.15),
             "{name}: {result:#}"
         );
     }
@@ -205,7 +220,7 @@ fn slow_answers_report_agent_and_host_time() {
     let config = CONFIG.replace("episodes_per_task = 4", "episodes_per_task = 8");
     let server = Server::start(&scratch.path().join("data"), &config);
     let team = Team::create(&server, "Hesitant");
-    // Slow by computing and by sleeping, alternately.
+    // The agent answers step 3 of each episode slowly, alternately by computing and by sleeping. `TIMES` counts these answers.
     let source = python_agent(
         "if message['step'] == 3:\n    \
          until = time.process_time() + 0.25\n    \
@@ -225,6 +240,7 @@ fn slow_answers_report_agent_and_host_time() {
         .get(&format!("{path}/violations"), Some(&team.token))
         .json::<Value>()
         .expect("the API speaks JSON");
+    // Episodes in which the slow answer was computing, and in which it was sleeping.
     let (mut computed, mut slept) = (0, 0);
     for (task, task_violations) in violations["tasks"].as_object().expect("there are tasks") {
         let slow = task_violations["computation_time"]
@@ -252,15 +268,16 @@ fn slow_answers_report_agent_and_host_time() {
     assert!(page.contains("the worst 20 of 24 episodes"), "{page}");
     assert!(page.contains(&format!("{path}/violations")));
     let other = Team::create(&server, "Other");
-    let foreign = server.get(&format!("{path}/violations"), Some(&other.token));
-    assert_eq!(foreign.status(), 404);
+    let other_answer = server.get(&format!("{path}/violations"), Some(&other.token));
+    assert_eq!(other_answer.status(), 404);
 }
 
-/// Blocks its channel, as far as possible, from right before its answer is read until it has thought about the next one.
+/// Source of an agent that tries to think for 0.3 s without being charged: right before its answer is read it blocks its
+/// output, by splicing from an empty socket, until it has thought about the next answer.
 const BLOCKING_AGENT: &str = r#"
 import json, os, socket, sys, threading, time
 
-def hold(fd, source):
+def block(fd, source):
     try:
         os.splice(source, fd, 1)
     except OSError as error:
@@ -280,12 +297,12 @@ for line in sys.stdin:
         held = held or message["obs"][6:13]
         say({"type": "act", "step": message["step"], "action": [held, [0.0] * 7]})
         if message["step"] in (3, 4, 5):
-            near, far = socket.socketpair()
-            holder = threading.Thread(target=hold, args=(1, far.fileno()))
-            holder.start()
+            writer, reader = socket.socketpair()
+            blocker = threading.Thread(target=block, args=(1, reader.fileno()))
+            blocker.start()
             time.sleep(0.3)
-            near.close()
-            holder.join()
+            writer.close()
+            blocker.join()
     elif message["type"] == "bye":
         sys.exit(0)
 "#;
@@ -293,19 +310,21 @@ for line in sys.stdin:
 #[test]
 fn thinking_behind_blocked_channel_is_charged() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    // With the sandbox's filter of system calls (seccomp), and without it.
     for (name, config) in [
-        ("thinks", ""),
+        ("filtered", ""),
         ("unfiltered", "[sandbox]\ngiven_up = [\"seccomp\"]"),
     ] {
         let result = evaluate_locally(scratch.path(), name, BLOCKING_AGENT, config);
         let hit = &result["tasks"]["hit"];
-        let (took, host) = (
+        let (charged_s, host_s) = (
             hit["computation_time_s"]["max"].as_f64(),
             result["timing"]["longest_stall_s"].as_f64(),
         );
         assert!(
-            took.zip(host)
-                .is_some_and(|(took, host)| took + host >= 0.3),
+            charged_s
+                .zip(host_s)
+                .is_some_and(|(charged_s, host_s)| charged_s + host_s >= 0.3),
             "{result:#}"
         );
         assert_eq!(result["timing"]["host_noise_reruns"], 0);

@@ -1,4 +1,5 @@
-//! A team's day with nothing but the program: sign in, submit, watch progress, download results.
+//! What a team does on a day, with nothing but the command-line program `faceoff`: sign in, submit, watch progress, download
+//! results.
 
 use crate::{
     CONFIG, Team,
@@ -18,6 +19,9 @@ use std::{
     process::{Command, Stdio},
 };
 
+/// The beginning of each user's token.
+const TOKEN_PREFIX: &str = "fo_person_";
+/// A password as a line of standard input.
 const PASSWORD: &str = "a dozen characters, and more\n";
 
 /// An invitation link for a new team.
@@ -34,8 +38,9 @@ fn sign_in_and_sign_out_never_print_the_token() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let home = scratch.path().join("config");
+    // Runs the program as Ada, a member of a team.
     let ada = |args: &[&str], input: &str| faceoff_with_home(&home, args, input);
-    let file = home.join("faceoff/credentials.toml");
+    let credentials_file = home.join("faceoff/credentials.toml");
 
     ada(&["whoami"], "").expect_refusal(NOT_ALLOWED, &["faceoff login", "FACEOFF_TOKEN"]);
     ada(
@@ -44,7 +49,7 @@ fn sign_in_and_sign_out_never_print_the_token() {
     )
     .expect_refusal(UNREACHABLE, &["talking to http://127.0.0.1:1"]);
     assert!(
-        !file.exists(),
+        !credentials_file.exists(),
         "a token that cannot be verified is not stored"
     );
 
@@ -64,10 +69,10 @@ fn sign_in_and_sign_out_never_print_the_token() {
     ];
     let output = ada(&join, PASSWORD).expect_success();
     assert!(
-        output.contains("signed in to") && !output.contains("fo_person"),
+        output.contains("signed in to") && !output.contains(TOKEN_PREFIX),
         "{output}"
     );
-    let mode = fs::metadata(&file)
+    let mode = fs::metadata(&credentials_file)
         .expect("the login is stored")
         .permissions()
         .mode();
@@ -86,12 +91,12 @@ fn sign_in_and_sign_out_never_print_the_token() {
         .expect_refusal(NOT_ALLOWED, &["not signed in to"]);
     ada(&["login", "--surely"], "").expect_refusal(USAGE_ERROR, &["--surely"]);
 
-    // Sign out without revoking the token.
-    let credentials = fs::read_to_string(&file).expect("the file can be read");
-    let stored = credentials
+    // Signing out with --keep-token does not revoke the token. It can be used to sign in again.
+    let credentials = fs::read_to_string(&credentials_file).expect("the file can be read");
+    let stored_token = credentials
         .split('"')
-        .find(|word| word.starts_with("fo_person_"));
-    let token = stored.expect("the token is in the file").to_owned();
+        .find(|word| word.starts_with(TOKEN_PREFIX));
+    let token = stored_token.expect("the token is in the file").to_owned();
     let output = ada(&["logout", "--keep-token"], "").expect_success();
     assert!(output.contains("still valid"), "{output}");
     ada(&["logout"], "").expect_refusal(FAILED, &["not signed in"]);
@@ -122,7 +127,7 @@ fn sign_in_and_sign_out_never_print_the_token() {
     assert!(output.contains("the token is revoked"), "{output}");
     ada(&["whoami", "--server", &server.url, "--token", &token], "").expect_success();
     assert!(
-        !fs::read_to_string(&file)
+        !fs::read_to_string(&credentials_file)
             .expect("it can be read")
             .contains("fo_")
     );
@@ -133,6 +138,7 @@ fn organiser_sign_in_needs_no_data_folder() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let home = scratch.path().join("config");
+    // Runs the program as Grace, an organiser.
     let grace = |args: &[&str], input: &str| faceoff_with_home(&home, args, input);
     grace(&["admin", "teams", "--server", &server.url], "").expect_refusal(
         NOT_ALLOWED,
@@ -163,6 +169,7 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let home = scratch.path().join("config");
+    // Runs the program as Ada, a member of a team.
     let ada = |args: &[&str]| faceoff_with_home(&home, args, "");
     let link = team_invitation_link(&server);
     let join = [
@@ -187,24 +194,27 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     fs::write(bundle.join("__pycache__/agent.pyc"), "x").expect("a file can be written");
     fs::write(bundle.join("notes.md"), "plans").expect("a file can be written");
     fs::write(bundle.join(".faceoffignore"), "notes.md\n").expect("a file can be written");
-    let at = |path: &Path| path.to_str().expect("scratch paths are text").to_owned();
+    let path_text = |path: &Path| path.to_str().expect("scratch paths are text").to_owned();
 
-    let dry = ada(&["submit", &at(&bundle), "--dry-run", "--json"]).json();
-    let files: Vec<_> = dry["files"]
+    let dry_run = ada(&["submit", &path_text(&bundle), "--dry-run", "--json"]).json();
+    let files: Vec<_> = dry_run["files"]
         .as_array()
         .expect("a dry run lists the files")
         .iter()
         .map(|file| file["path"].clone())
         .collect();
-    assert_eq!(files, ["agent.py", "agent.toml", "protocol.py"], "{dry:#}");
     assert_eq!(
-        dry["left_out"],
+        files,
+        ["agent.py", "agent.toml", "protocol.py"],
+        "{dry_run:#}"
+    );
+    assert_eq!(
+        dry_run["left_out"],
         serde_json::json!([".faceoffignore", "__pycache__", "notes.md"])
     );
-    let submitted = ada(&["submit", &at(&bundle)]);
-    let output = submitted.expect_success();
+    let output = ada(&["submit", &path_text(&bundle)]).expect_success();
     assert!(output.contains("valid: hold starts"), "{output}");
-    let repeated = ada(&["submit", &at(&bundle), "--json"]).json();
+    let repeated = ada(&["submit", &path_text(&bundle), "--json"]).json();
     assert_eq!(repeated["state"], "valid", "{repeated:#}");
     let first = repeated["same_as"]
         .as_str()
@@ -233,8 +243,8 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
             .expect_success()
             .contains("no results yet")
     );
-    let offered = ada(&["runtimes", "--json"]).json();
-    assert_eq!(offered["network"], "none", "{offered:#}");
+    let runtimes = ada(&["runtimes", "--json"]).json();
+    assert_eq!(runtimes["network"], "none", "{runtimes:#}");
     let output = ada(&["runtimes"]).expect_success();
     assert!(
         output.contains("python3") && output.contains("glibc"),
@@ -242,6 +252,7 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     );
     let season = ada(&["season", "--json"]).json();
     assert_eq!(season["closed_at"], Value::Null, "{season:#}");
+    // The commitment is the published hash of the season's secret.
     assert!(ada(&["season"]).expect_success().contains("commitment "));
     assert_eq!(ada(&["health", "--json"]).json()["status"], "ok");
     assert!(
@@ -257,18 +268,18 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
         .as_str()
         .expect("the active submission is evaluated")
         .to_owned();
-    let token =
+    let credentials =
         fs::read_to_string(home.join("faceoff/credentials.toml")).expect("the login is stored");
-    let token = token
+    let token = credentials
         .split('"')
-        .find(|word| word.starts_with("fo_person_"))
+        .find(|word| word.starts_with(TOKEN_PREFIX))
         .expect("the token is in the file")
         .to_owned();
     let path = format!("/api/v1/evaluations/{evaluation}");
-    let ended = server.poll(&path, &token, |answer: &Value| {
+    let evaluated = server.poll(&path, &token, |answer: &Value| {
         !answer["released_at"].is_null()
     });
-    assert_eq!(ended["state"], "finished", "{ended:#}");
+    assert_eq!(evaluated["state"], "finished", "{evaluated:#}");
     let output = ada(&["status"]).expect_success();
     assert!(
         output.contains("last evaluations:")
@@ -286,27 +297,27 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     );
     assert!(ada(&["board"]).expect_success().contains("Alpha"));
 
-    let file = scratch.path().join("dataset.zip");
+    let dataset_file = scratch.path().join("dataset.zip");
     let download = [
         "dataset",
         "download",
         &evaluation,
         "--out",
-        &at(&file),
+        &path_text(&dataset_file),
         "--json",
     ];
-    let done = ada(&download).json();
-    assert_eq!(done["checked"], true, "{done:#}");
-    assert_eq!(done["blake3"], ended["dataset_blake3"]);
+    let downloaded = ada(&download).json();
+    assert_eq!(downloaded["checked"], true, "{downloaded:#}");
+    assert_eq!(downloaded["blake3"], evaluated["dataset_blake3"]);
     ada(&[
         "verify",
-        &at(&file),
+        &path_text(&dataset_file),
         "--blake3",
-        done["blake3"].as_str().expect("a hash is text"),
+        downloaded["blake3"].as_str().expect("a hash is text"),
     ])
     .expect_success();
-    // An agent compared with itself: the lists match the counts.
-    let itself = [
+    // An evaluation is compared with itself: the number of episodes in each list equals the count.
+    let compare = [
         "compare",
         &evaluation,
         &evaluation,
@@ -315,8 +326,11 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
         "--episodes",
         "--json",
     ];
-    let compared = ada(&itself).json();
-    for (task, counts) in compared["tasks"].as_object().expect("it has tasks") {
+    let compared = ada(&compare).json();
+    for (task, counts) in compared["tasks"]
+        .as_object()
+        .expect("a comparison has tasks")
+    {
         let lists = &compared["episodes"][task];
         for group in ["both", "only_a", "only_b", "neither"] {
             let listed = lists[group].as_array().expect("each group has a list");
@@ -327,18 +341,21 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     let url = link["url"].as_str().expect("a link has an address");
     let public_download = http()
         .build()
-        .expect("a client needs nothing")
+        .expect("an HTTP client can be made")
         .get(url)
         .send();
     let public_download = public_download
         .expect("the server answers")
         .bytes()
-        .expect("all of it comes");
-    assert_eq!(public_download, fs::read(&file).expect("it is there"));
+        .expect("the download completes");
+    assert_eq!(
+        public_download,
+        fs::read(&dataset_file).expect("it is there")
+    );
     // A partial file with other contents is replaced.
     fs::write(scratch.path().join("dataset.zip.part"), "something else")
         .expect("a file can be written");
-    assert_eq!(ada(&download).json()["blake3"], done["blake3"]);
+    assert_eq!(ada(&download).json()["blake3"], downloaded["blake3"]);
 }
 
 #[test]
@@ -357,11 +374,11 @@ fn status_watch_prints_each_change() {
         .spawn()
         .expect("the program can be started");
     let output = BufReader::new(watching.stdout.take().expect("standard output is piped"));
-    let mut views = output.lines().map(|line| -> Value {
+    let mut states = output.lines().map(|line| -> Value {
         let line = line.expect("it runs until it is killed");
         serde_json::from_str(&line).expect("each line is JSON")
     });
-    let first = views.next().expect("it prints the team's state first");
+    let first = states.next().expect("it prints the team's state first");
     assert_eq!(first["me"]["active_submission"], id, "{first:#}");
     faceoff_with_home(
         scratch.path(),
@@ -369,7 +386,7 @@ fn status_watch_prints_each_change() {
         "",
     )
     .expect_success();
-    let changed = views.find(|view| view["me"]["active_submission"].is_null());
+    let changed = states.find(|state| state["me"]["active_submission"].is_null());
     assert!(changed.is_some(), "a change is printed");
     watching.kill().expect("a child can be killed");
     watching.wait().expect("a child can be reaped");

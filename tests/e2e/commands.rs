@@ -1,4 +1,4 @@
-//! The program's commands, run as users run them: output and exit status.
+//! Helpers that run commands of the program `faceoff` as users do, and check their output and exit status.
 
 use faceoff_tests::{program, server::Server};
 use serde_json::Value;
@@ -8,40 +8,40 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// The command failed.
+/// Exit status: the command failed.
 pub const FAILED: i32 = 1;
-/// The command line is invalid.
+/// Exit status: the command line is invalid.
 pub const USAGE_ERROR: i32 = 2;
-/// The server refused the request.
+/// Exit status: the server refused the request.
 pub const REFUSED: i32 = 3;
-/// The server does not answer.
+/// Exit status: the server does not answer.
 pub const UNREACHABLE: i32 = 4;
-/// The token is missing, unknown or insufficient.
+/// Exit status: the token is missing, unknown or without the required permission.
 pub const NOT_ALLOWED: i32 = 5;
 
-/// No folder with stored logins: those of the user options runs the tests must not be used.
+/// A folder that does not exist, so that commands do not use the stored logins of the user who runs the tests.
 const NO_CONFIG_HOME: &str = "/nonexistent";
 
 /// Exit status, standard output and standard error of a command.
 pub struct CommandOutput {
     pub code: Option<i32>,
-    out: String,
-    err: String,
+    stdout: String,
+    stderr: String,
 }
 
 impl CommandOutput {
     /// Standard output of a command that must succeed.
     #[track_caller]
     pub fn expect_success(self) -> String {
-        assert_eq!(self.code, Some(0), "{}{}", self.out, self.err);
-        self.out
+        assert_eq!(self.code, Some(0), "{}{}", self.stdout, self.stderr);
+        self.stdout
     }
 
     /// Standard error of a command that must fail with this status. It may have printed output before.
     #[track_caller]
     pub fn expect_failure(self, code: i32) -> String {
-        assert_eq!(self.code, Some(code), "{}{}", self.out, self.err);
-        self.err
+        assert_eq!(self.code, Some(code), "{}{}", self.stdout, self.stderr);
+        self.stderr
     }
 
     /// Standard output, as JSON, of a command that must succeed.
@@ -50,13 +50,17 @@ impl CommandOutput {
         serde_json::from_str(&self.expect_success()).expect("--json prints JSON")
     }
 
-    /// The command must fail with this status, print nothing to standard output, and these words to standard error.
+    /// The command must fail with this status, print nothing to standard output, and print these words to standard error.
     #[track_caller]
     pub fn expect_refusal(self, code: i32, words: &[&str]) {
-        assert_eq!(self.code, Some(code), "{}{}", self.out, self.err);
-        assert_eq!(self.out, "", "a refused command prints no output");
+        assert_eq!(self.code, Some(code), "{}{}", self.stdout, self.stderr);
+        assert_eq!(self.stdout, "", "a refused command prints no output");
         for word in words {
-            assert!(self.err.contains(word), "{word:?} is not in {:?}", self.err);
+            assert!(
+                self.stderr.contains(word),
+                "{word:?} is not in {:?}",
+                self.stderr
+            );
         }
     }
 }
@@ -66,7 +70,7 @@ pub fn faceoff(args: &[&str], input: &str) -> CommandOutput {
     faceoff_with_home(Path::new(NO_CONFIG_HOME), args, input)
 }
 
-/// Runs the program with logins stored in this folder.
+/// Runs the program with the logins that are stored in the folder `config_home`.
 pub fn faceoff_with_home(config_home: &Path, args: &[&str], input: &str) -> CommandOutput {
     let mut child = Command::new(program("faceoff"))
         .args(args)
@@ -88,8 +92,8 @@ pub fn faceoff_with_home(config_home: &Path, args: &[&str], input: &str) -> Comm
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("a command prints text");
     CommandOutput {
         code: output.status.code(),
-        out: text(output.stdout),
-        err: text(output.stderr),
+        stdout: text(output.stdout),
+        stderr: text(output.stderr),
     }
 }
 
@@ -99,12 +103,12 @@ pub fn admin_as(server: &Server, token: &str, args: &[&str]) -> CommandOutput {
     faceoff(&[&options[..], args].concat(), "")
 }
 
-/// `faceoff admin` with the host's token.
+/// `faceoff admin` with the administration token of the server's host.
 pub fn admin(server: &Server, args: &[&str]) -> CommandOutput {
     admin_as(server, &server.admin_token, args)
 }
 
-/// A command of teams and their members, with a token.
+/// A command that team members use, with a token.
 pub fn member(server: &Server, token: &str, command: &str, args: &[&str]) -> CommandOutput {
     let options = [command, "--server", &server.url, "--token", token];
     faceoff(&[&options[..], args].concat(), "")

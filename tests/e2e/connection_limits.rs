@@ -1,4 +1,5 @@
-//! Limits against idle and slow connections of clients without a token, on a host with few file descriptors.
+//! Limits against idle and slow connections of clients without a token, for a server that may open few file descriptors:
+//! evaluations and other clients are not affected.
 
 use crate::{
     Team,
@@ -20,10 +21,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// As many as once made evaluations fail for lack of descriptors.
+/// Number of idle or slow connections: as many as once made evaluations fail for lack of descriptors.
 const CONNECTIONS: usize = 190;
+/// The server's limit of open file descriptors.
 const DESCRIPTORS: u32 = 300;
-/// Client addresses: each gets a share of the connections, and together they request all.
+/// Number of addresses from which the clients connect. Each address may have a share of the server's connections; together
+/// they try to use all.
 const ADDRESSES: u8 = 5;
 
 /// How a client keeps a connection open.
@@ -35,40 +38,41 @@ enum Behaviour {
     ReadsNothing,
 }
 
+/// A client that keeps its connection open without using it as it should.
 struct IdleClient {
     stream: TcpStream,
     behaviour: Behaviour,
 }
 
 impl IdleClient {
-    /// Connects from one of several loopback addresses.
+    /// Connects from a loopback address that `number` selects, and sends the first bytes. `None` if the connection is refused.
     fn connect(server: SocketAddrV4, number: usize, behaviour: Behaviour) -> Option<Self> {
-        let last = 2 + u8::try_from(number % usize::from(ADDRESSES)).expect("it is small");
-        let from = SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, last), 0);
+        let last_byte = 2 + u8::try_from(number % usize::from(ADDRESSES)).expect("it is small");
+        let client = SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, last_byte), 0);
         let stream = socket(AddressFamily::INET, SocketType::STREAM, None).expect("a socket");
         if behaviour == Behaviour::ReadsNothing {
             set_socket_recv_buffer_size(&stream, 4096).expect("it can be made smaller");
         }
-        bind(&stream, &from).expect("all of 127 is this host");
+        bind(&stream, &client).expect("each address 127.x.x.x is this host");
         connect(&stream, &server).ok()?;
         let mut client = Self {
             stream: TcpStream::from(stream),
             behaviour,
         };
-        client.begin();
+        client.send_first_bytes();
         Some(client)
     }
 
     /// Sends the first bytes. Errors are ignored: the server may have refused the connection.
-    fn begin(&mut self) {
-        let page = "GET /api/v1/openapi.json HTTP/1.1\r\nhost: x\r\n\r\n";
+    fn send_first_bytes(&mut self) {
+        let large_request = "GET /api/v1/openapi.json HTTP/1.1\r\nhost: x\r\n\r\n";
         let request = match self.behaviour {
             Behaviour::PartialRequestLine => "GET /api/v1/boa".to_owned(),
             Behaviour::EndlessHeaders => "GET / HTTP/1.1\r\nhost: x\r\n".to_owned(),
             Behaviour::IdleAfterResponse => {
                 "GET /api/v1/season HTTP/1.1\r\nhost: x\r\n\r\n".to_owned()
             }
-            Behaviour::ReadsNothing => page.repeat(100),
+            Behaviour::ReadsNothing => large_request.repeat(100),
         };
         let _ = self.stream.write_all(request.as_bytes());
     }
@@ -76,7 +80,7 @@ impl IdleClient {
     /// Sends another header, if the client never ends its headers.
     fn continue_headers(&mut self) {
         if self.behaviour == Behaviour::EndlessHeaders {
-            let _ = self.stream.write_all(b"x-more: of the same\r\n");
+            let _ = self.stream.write_all(b"x-more: and more\r\n");
         }
     }
 
@@ -96,8 +100,10 @@ impl IdleClient {
     }
 }
 
+/// Asserts that clients of this behaviour do not affect an evaluation, and that the server closes their connections.
 fn check_evaluation_beside(behaviour: Behaviour) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    // The server closes a connection whose request head takes 4 s, and one that for 4 s is slower than 10 kB/s.
     let config = format!(
         "{CONFIG}\n[connections]\nhead_s = 4.0\nleast_bytes_per_s = 10000\ngrace_s = 4.0\n"
     );
@@ -120,23 +126,26 @@ fn check_evaluation_beside(behaviour: Behaviour) {
         for client in &mut clients {
             client.continue_headers();
         }
-        let state = server
+        let evaluation_state = server
             .get(&evaluation, Some(&team.token))
             .json::<serde_json::Value>()
             .expect("the API speaks JSON");
-        let is_finished = state["state"] == "finished";
-        // The clients keep their connections; the server closes them. Its last few sockets may belong to this test. A client
+        let is_finished = evaluation_state["state"] == "finished";
+        // The clients keep their connections; the server closes them. A few sockets may belong to this test's own requests. A client
         // that reads nothing cannot see the end of its connection.
         all_closed |= server.sockets() <= 8
             && (behaviour == Behaviour::ReadsNothing || clients.iter().all(IdleClient::is_closed));
         if is_finished && all_closed {
             break;
         }
-        assert!(started.elapsed() < TIMEOUT, "{behaviour:?}: {state:#}");
+        assert!(
+            started.elapsed() < TIMEOUT,
+            "{behaviour:?}: {evaluation_state:#}"
+        );
         thread::sleep(Duration::from_millis(200));
     }
     // A new client is answered.
-    let client = http().build().expect("a client needs nothing");
+    let client = http().build().expect("an HTTP client can be made");
     let health = client.get(format!("{}/api/v1/health", server.url)).send();
     assert_eq!(health.expect("the server answers").status(), 200);
     assert_undisturbed(&server, &team, &evaluation, &hold, scratch.path());
@@ -167,18 +176,18 @@ fn address_over_its_connection_share_gets_429() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let config = format!("{CONFIG}\n[connections]\nper_address = 3\n");
     let server = Server::start(&scratch.path().join("data"), &config);
-    // All connections come from 127.0.0.2.
+    // With the number 0 all connections come from 127.0.0.2.
     let clients: Vec<_> = (0..4)
         .map(|_| IdleClient::connect(server.address(), 0, Behaviour::PartialRequestLine))
         .collect();
-    let mut last = clients
+    let mut refused = clients
         .into_iter()
         .next_back()
         .flatten()
         .expect("the system accepts the connection");
     let mut answer = Vec::new();
-    // Unread bytes of its request may turn the end into a reset.
-    let _ = last.stream.read_to_end(&mut answer);
+    // The server has not read the request, so the connection may end with a reset and without the answer.
+    let _ = refused.stream.read_to_end(&mut answer);
     let answer = String::from_utf8(answer).expect("an answer is text");
     if !answer.is_empty() {
         assert!(answer.starts_with("HTTP/1.1 429 "), "{answer}");
@@ -188,30 +197,31 @@ fn address_over_its_connection_share_gets_429() {
     assert_eq!(server.get("/api/v1/health", None).status(), 200);
 }
 
-/// Sets the server's limits of descriptors; returns the previous ones.
+/// Sets the server's soft and hard limit of descriptors; returns the previous ones.
 fn limit_descriptors(server: &Server, limits: Rlimit) -> Rlimit {
-    let id = i32::try_from(server.process_id()).expect("a process number");
-    let before = prlimit(Pid::from_raw(id), Resource::Nofile, limits);
-    before.expect("a parent may set limits of its child")
+    let id = i32::try_from(server.process_id()).expect("a process id is small");
+    let previous = prlimit(Pid::from_raw(id), Resource::Nofile, limits);
+    previous.expect("a parent may set limits of its child")
 }
 
 #[test]
 fn connection_waits_while_server_lacks_descriptors() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    // Waits for the inventory of the runtimes, which opens and closes descriptors.
+    // This request waits until the server has listed its runtimes, which opens and closes descriptors.
     assert_eq!(server.get("/api/v1/runtimes", None).status(), 200);
-    let open = fs::read_dir(format!("/proc/{}/fd", server.process_id())).expect("it runs");
-    let open: Vec<u64> = open
+    let entries = fs::read_dir(format!("/proc/{}/fd", server.process_id()));
+    let open_descriptors: Vec<u64> = entries
+        .expect("the server runs")
         .flatten()
         .filter_map(|entry| entry.file_name().to_string_lossy().parse().ok())
         .collect();
-    let began = Instant::now();
+    let started = Instant::now();
     // Open descriptors stay open, and no new one can be opened.
-    let before = limit_descriptors(
+    let previous = limit_descriptors(
         &server,
         Rlimit {
-            current: (0..).find(|number| !open.contains(number)),
+            current: (0..).find(|number| !open_descriptors.contains(number)),
             maximum: getrlimit(Resource::Nofile).maximum,
         },
     );
@@ -223,7 +233,7 @@ fn connection_waits_while_server_lacks_descriptors() {
         .expect("the system buffers the request");
     server.wait_for_log("no connection can be accepted", 1);
 
-    limit_descriptors(&server, before);
+    limit_descriptors(&server, previous);
     let mut answer = String::new();
     stream
         .read_to_string(&mut answer)
@@ -233,6 +243,6 @@ fn connection_waits_while_server_lacks_descriptors() {
     // The log has the message at most once a minute.
     let log = server.log();
     let messages = log.matches("no connection can be accepted").count();
-    let minutes = began.elapsed().as_secs() / 60;
+    let minutes = started.elapsed().as_secs() / 60;
     assert!(messages as u64 <= 1 + minutes, "{log}");
 }

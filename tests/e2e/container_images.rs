@@ -1,8 +1,9 @@
-//! Container images as bundles: an image is uploaded, validated and scored like any other bundle.
+//! Container images as bundles (a bundle is what a team uploads): an image is uploaded, validated and scored like a folder of
+//! files.
 
 use crate::{
     Team, evaluation_path,
-    kills::{assert_same, outcome},
+    kills::{assert_same, wait_for_outcome},
     start_day,
 };
 use faceoff_tests::{bundle, program, server::Server};
@@ -15,8 +16,9 @@ use std::{
     process::{Command, Stdio},
 };
 
+/// A short evaluation of all three tasks, one job per task.
 const CONFIG: &str = concat!(
-    include_str!("../patient.toml"),
+    include_str!("../long_time_limits.toml"),
     r#"
 [evaluation]
 episodes_per_task = 4
@@ -41,23 +43,24 @@ fn libraries(program: &Path) -> Vec<PathBuf> {
 }
 
 fn sha256(bytes: &[u8]) -> String {
-    let mut hashing = Command::new("sha256sum")
+    let mut process = Command::new("sha256sum")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
         .expect("sha256sum is part of every system");
-    let mut input = hashing.stdin.take().expect("its input is piped");
+    let mut input = process.stdin.take().expect("its input is piped");
     let bytes = bytes.to_owned();
-    let writing = std::thread::spawn(move || input.write_all(&bytes));
-    let output = hashing.wait_with_output().expect("it ends");
-    writing
+    let writer = std::thread::spawn(move || input.write_all(&bytes));
+    let output = process.wait_with_output().expect("it ends");
+    writer
         .join()
         .expect("the thread does not panic")
-        .expect("it reads its input");
+        .expect("sha256sum reads its input");
+    // The digest has 64 digits; a file name follows.
     String::from_utf8_lossy(&output.stdout)[..64].to_owned()
 }
 
-/// An image with these files in its layers, as `docker save` writes it.
+/// An image as `docker save` writes it; each layer has these files, each with its name and content.
 fn image_archive(layers: &[Vec<(String, Vec<u8>)>]) -> Vec<u8> {
     let mut image = tar::Builder::new(GzEncoder::new(Vec::new(), Compression::fast()));
     let mut add = |name: &str, bytes: &[u8]| {
@@ -85,17 +88,18 @@ fn image_archive(layers: &[Vec<(String, Vec<u8>)>]) -> Vec<u8> {
         "rootfs": { "type": "layers", "diff_ids": diff_ids },
     });
     add("config.json", config.to_string().as_bytes());
-    let list = json!([{ "Config": "config.json", "RepoTags": ["agent:latest"], "Layers": names }]);
-    add("manifest.json", list.to_string().as_bytes());
-    let packed = image.into_inner().expect("writing to memory does not fail");
-    packed.finish().expect("writing to memory does not fail")
+    let manifest =
+        json!([{ "Config": "config.json", "RepoTags": ["agent:latest"], "Layers": names }]);
+    add("manifest.json", manifest.to_string().as_bytes());
+    let encoder = image.into_inner().expect("writing to memory does not fail");
+    encoder.finish().expect("writing to memory does not fail")
 }
 
-fn append<W: io::Write>(into: &mut tar::Builder<W>, name: &str, bytes: &[u8]) -> io::Result<()> {
+fn append<W: io::Write>(archive: &mut tar::Builder<W>, name: &str, bytes: &[u8]) -> io::Result<()> {
     let mut header = tar::Header::new_gnu();
     header.set_size(bytes.len() as u64);
     header.set_mode(0o755);
-    into.append_data(&mut header, name, bytes)
+    archive.append_data(&mut header, name, bytes)
 }
 
 #[test]
@@ -103,26 +107,26 @@ fn image_and_bundle_of_same_program_get_same_score() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = bundle::reference("striker", scratch.path());
     let read = |path: &Path| fs::read(path).expect("it can be read");
-    let inside = |path: &Path| {
+    let path_in_image = |path: &Path| {
         path.display()
             .to_string()
             .trim_start_matches('/')
             .to_owned()
     };
-    let base = libraries(&program("striker"))
+    let library_layer = libraries(&program("striker"))
         .iter()
-        .map(|path| (inside(path), read(path)))
+        .map(|path| (path_in_image(path), read(path)))
         .collect();
     let manifest = fs::read_to_string(folder.join("agent.toml")).expect("striker has one");
     assert!(manifest.contains("runtime = \"native\""), "{manifest}");
     let manifest = manifest.replace("runtime = \"native\"", "runtime = \"image\"");
-    let own = vec![
+    let agent_layer = vec![
         ("agent/agent.toml".to_owned(), manifest.into_bytes()),
         ("agent/striker".to_owned(), read(&folder.join("striker"))),
     ];
-    let image = image_archive(&[base, own]);
+    let image = image_archive(&[library_layer, agent_layer]);
 
-    // Both teams get the episodes of the same day.
+    // Both submissions are evaluated on the same day, so in the same episodes.
     let data = scratch.path().join("data");
     let server = Server::start(&data, CONFIG);
     let (files_team, image_team) = (
@@ -130,8 +134,8 @@ fn image_and_bundle_of_same_program_get_same_score() {
         Team::create(&server, "Image"),
     );
     let files_submission = files_team.submit(&server, &folder);
-    let uploaded = image_team.upload(&server, image);
-    let image_submission = image_team.verdict(&server, &uploaded);
+    let image_id = image_team.upload(&server, image);
+    let image_submission = image_team.verdict(&server, &image_id);
     assert_eq!(image_submission["state"], "valid", "{image_submission:#}");
     assert_eq!(image_submission["runtime"], "image", "{image_submission:#}");
     let day = start_day(&server);
@@ -140,19 +144,20 @@ fn image_and_bundle_of_same_program_get_same_score() {
     // Datasets are released with the day, when all evaluations have ended.
     let _ = image_team.wait_until_finished(&server, &image_evaluation);
     let _ = files_team.wait_until_finished(&server, &files_evaluation);
-    let expected = outcome(&server, &files_team, &files_evaluation);
-    let found = outcome(&server, &image_team, &image_evaluation);
-    assert_eq!(assert_same(found, expected), 3 * 4);
+    let files_outcome = wait_for_outcome(&server, &files_team, &files_evaluation);
+    let image_outcome = wait_for_outcome(&server, &image_team, &image_evaluation);
+    let episodes = assert_same(image_outcome, files_outcome);
+    assert_eq!(episodes, 3 * 4, "three tasks of four episodes");
 
     // An image without an agent is invalid, and the reason shows what to write.
-    let empty = image_team.upload(
+    let no_agent_id = image_team.upload(
         &server,
         image_archive(&[vec![(
             "usr/bin/true".to_owned(),
             read(Path::new("/bin/true")),
         )]]),
     );
-    let refused = image_team.verdict(&server, &empty);
+    let refused = image_team.verdict(&server, &no_agent_id);
     assert_eq!(refused["state"], "invalid", "{refused:#}");
     let reason = refused["reason"].as_str().unwrap_or_default();
     assert!(reason.contains("COPY . /agent"), "{reason}");

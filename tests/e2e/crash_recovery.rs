@@ -1,4 +1,4 @@
-//! A server that is killed during an evaluation, and the same score from the local evaluator.
+//! A server that is killed during an evaluation and restarted: its result equals that of the local evaluator.
 
 use crate::{CONFIG, Team, dataset, entry, score_locally, without_times};
 use faceoff_tests::{bundle, server::Server};
@@ -15,7 +15,7 @@ fn killed_server_scores_evaluation_like_local_evaluator() {
     assert_eq!(submission["state"], "valid", "{submission:#}");
     let evaluation = team.evaluate(&server, &submission);
 
-    // The server is killed after each of three parts of the evaluation.
+    // The server is killed after so many of the 12 episodes of the evaluation, and restarted.
     for episodes in [1, 4, 8] {
         let _ = server.poll(&evaluation, &team.token, |answer| {
             answer["progress"]["episodes_done"].as_u64() >= Some(episodes)
@@ -29,7 +29,7 @@ fn killed_server_scores_evaluation_like_local_evaluator() {
     let mut dataset = dataset(&server, &evaluation, &team.token);
     let manifest = entry(&mut dataset, "manifest.json");
 
-    // The download released the day's seed, so the result contains it now.
+    // The dataset has the day's seed. Its download shows that the day is released, so the result contains the seed, too.
     let survived = team.wait_until_finished(&server, &evaluation);
     assert_eq!(survived["result"]["seed"], manifest["seed"]);
 

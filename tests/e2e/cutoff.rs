@@ -1,5 +1,6 @@
-//! Teams that try to gain an advantage on a day: several evaluations, uploads based on what an earlier agent saw,
-//! locking others out. A day has one cutoff and is released when all its evaluations have ended.
+//! Teams that try to gain an advantage on an evaluation day: by several evaluations, by uploads based on what an earlier agent
+//! saw, by locking other teams out. A day has one cutoff, the moment when each team's active submission is fixed. The day is
+//! released (its results become public) when all its evaluations have ended.
 
 use crate::{CONFIG, Team, evaluation_path, start_day};
 use faceoff_tests::{
@@ -15,7 +16,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// One task, and shards that are longer than a validation run.
+/// A configuration with one task, and with one shard (job of consecutive episodes) that is longer than a validation run.
 fn one_task() -> String {
     CONFIG.replace(
         "episodes_per_task = 4\nepisodes_per_shard = 2",
@@ -56,7 +57,7 @@ fn assert_second_start_is_refused(server: &Server, day: &Value) {
     }
 }
 
-/// The ids of the day's evaluations, with their submissions.
+/// The ids of the day's evaluations, each with the id of its submission.
 fn evaluations_of(server: &Server, day: &Value) -> Vec<(Value, Value)> {
     let day = day["day"].as_str().expect("a day has a date");
     let path = format!("/api/v1/evaluations?day={day}");
@@ -68,6 +69,7 @@ fn evaluations_of(server: &Server, day: &Value) -> Vec<(Value, Value)> {
         .collect()
 }
 
+/// The manifest in the dataset of an evaluation.
 fn manifest(server: &Server, evaluation: &str, token: &str) -> Value {
     let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
     assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
@@ -77,6 +79,7 @@ fn manifest(server: &Server, evaluation: &str, token: &str) -> Value {
     serde_json::from_reader(file.expect("a dataset has a manifest")).expect("it is JSON")
 }
 
+/// Chooses the submission for the team's next evaluation.
 fn activate(server: &Server, team: &Team, submission: &Value) -> Response {
     let id = submission["id"].as_str().expect("a submission has an id");
     let path = format!("/api/v1/submissions/{id}/activate");
@@ -92,10 +95,10 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
         Team::create(&server, "Stopped"),
     );
     let first = greedy.submit(&server, &holding_agent(scratch.path(), "first"));
-    let entered = stopped.submit(&server, &holding_agent(scratch.path(), "entered"));
+    let at_cutoff = stopped.submit(&server, &holding_agent(scratch.path(), "at-cutoff"));
     let day = start_day(&server);
     let [finished, cancelled] =
-        [&first, &entered].map(|submission| evaluation_path(&day, submission));
+        [&first, &at_cutoff].map(|submission| evaluation_path(&day, submission));
     let reason = json!({ "reason": "power cut" });
     let cancel = server.post(&format!("{cancelled}/cancel"), &server.admin_token, &reason);
     assert_eq!(cancel.status(), 200);
@@ -103,9 +106,9 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
     assert_eq!(done["state"], "finished", "{done:#}");
     let seed = done["result"]["seed"].clone();
     assert!(seed.is_string(), "the day is released: {done:#}");
-    let before = evaluations_of(&server, &day);
+    let evaluations_before = evaluations_of(&server, &day);
 
-    // Variants made with the public seed, and every way to request an evaluation for them.
+    // The team makes variants that know the public seed, and tries every way to request an evaluation for them.
     for number in 0..3 {
         let variant = holding_agent(scratch.path(), &format!("variant-{number}"));
         let variant = greedy.submit(&server, &variant);
@@ -116,8 +119,8 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
             assert_refused(server.post(&path, token, &json!({})), 410, "gone");
         }
         assert_eq!(activate(&server, &greedy, &variant).status(), 200);
-        let day_by_team = server.post("/api/v1/days", &greedy.token, &json!({}));
-        assert_refused(day_by_team, 403, "forbidden");
+        let start_by_team = server.post("/api/v1/days", &greedy.token, &json!({}));
+        assert_refused(start_by_team, 403, "forbidden");
         assert_second_start_is_refused(&server, &day);
         let rerun = format!("{finished}/rerun");
         assert_refused(
@@ -125,20 +128,24 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
             403,
             "forbidden",
         );
-        let other = json!({ "submission": id });
-        let by_organiser = server.post(&rerun, &server.admin_token, &other);
-        assert_refused(by_organiser, 409, "conflict");
+        let with_variant = json!({ "submission": id });
+        let rerun_by_organiser = server.post(&rerun, &server.admin_token, &with_variant);
+        assert_refused(rerun_by_organiser, 409, "conflict");
     }
-    assert_eq!(evaluations_of(&server, &day), before);
+    assert_eq!(evaluations_of(&server, &day), evaluations_before);
 
     // A rerun by the organiser uses the submission of the cutoff and the day's seed.
     let better = stopped.submit(&server, &holding_agent(scratch.path(), "better"));
     assert_eq!(better["active"], true, "{better:#}");
-    let other = json!({ "submission": better["id"] });
-    let rerun = server.post(&format!("{cancelled}/rerun"), &server.admin_token, &other);
+    let with_newer = json!({ "submission": better["id"] });
+    let rerun = server.post(
+        &format!("{cancelled}/rerun"),
+        &server.admin_token,
+        &with_newer,
+    );
     assert_eq!(rerun.status(), 201);
     let rerun = json_of(rerun);
-    assert_eq!(rerun["submission"], entered["id"]);
+    assert_eq!(rerun["submission"], at_cutoff["id"]);
     let path = format!(
         "/api/v1/evaluations/{}",
         rerun["id"].as_str().expect("an id")
@@ -148,7 +155,7 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
     let manifest = manifest(&server, &path, &stopped.token);
     assert_eq!(
         (&manifest["agent"], &manifest["seed"]),
-        (&json!("entered"), &seed)
+        (&json!("at-cutoff"), &seed)
     );
 }
 
@@ -163,13 +170,14 @@ fn second_start_and_choice_after_cutoff_change_nothing() {
     assert_eq!(activate(&server, &team, &older).status(), 200);
     let day = start_day(&server);
     let evaluation = evaluation_path(&day, &older);
-    // Another choice, a newer upload that becomes active, and another body of the request.
+    // After the cutoff the team chooses another submission and uploads a newer one, which becomes active. The organiser tries
+    // to start the day again, also with another request body.
     assert_eq!(activate(&server, &team, &newer).status(), 200);
     let newest = team.submit(&server, &holding_agent(scratch.path(), "newest"));
     assert_eq!(newest["active"], true, "{newest:#}");
     assert_second_start_is_refused(&server, &day);
-    let named = json!({ "stage": day["stage"] });
-    let answer = server.post("/api/v1/days", &server.admin_token, &named);
+    let with_stage = json!({ "stage": day["stage"] });
+    let answer = server.post("/api/v1/days", &server.admin_token, &with_stage);
     if get(&server, "/api/v1/season", &team.token)["today"] == day["day"] {
         assert_refused(answer, 409, "cutoff-passed");
     }
@@ -185,7 +193,8 @@ fn second_start_and_choice_after_cutoff_change_nothing() {
     assert_eq!(me["active_submission"], newest["id"]);
 }
 
-/// Logs how each episode begins, and exits in the sixteenth episode of a shard: no validation run is that long.
+/// Statements at each step of an agent that logs how each episode begins, and exits in the sixteenth episode of a shard: no
+/// validation run is that long.
 const LEAKING_AGENT: &str = "
 if message['step'] == 0:
     seen = globals().get('seen', 0) + 1
@@ -261,12 +270,12 @@ fn pending_rerun_delays_release_and_locks_out_no_team() {
         assert!(value.is_null(), "{field}: {done:#}");
     }
     // No team is locked out meanwhile: new uploads are valid and active for the next day.
-    let sources = [
+    let new_uploads = [
         (&leaking, "informed"),
         (&newcomer, "new"),
         (&early, "again"),
     ];
-    for (team, name) in sources {
+    for (team, name) in new_uploads {
         let uploaded = team.submit(&server, &holding_agent(scratch.path(), name));
         assert_eq!(
             (&uploaded["state"], &uploaded["active"]),
@@ -277,17 +286,21 @@ fn pending_rerun_delays_release_and_locks_out_no_team() {
     assert_second_start_is_refused(&server, &day);
 
     // The bundle is restored, and the same submission is evaluated on the same episodes.
-    fs::rename(&lost, &bundles).expect("it goes back");
+    fs::rename(&lost, &bundles).expect("the folder can be moved back");
     let is_finished = |evaluation: &&Value| evaluation["state"] == "finished";
-    let own = server.poll("/api/v1/evaluations", &broken.token, |own| {
-        own.as_array()
+    let own_evaluations = server.poll("/api/v1/evaluations", &broken.token, |list| {
+        list.as_array()
             .expect("a list")
             .iter()
             .any(|evaluation| is_finished(&evaluation))
     });
-    let rerun = own.as_array().expect("a list").iter().find(is_finished);
+    let rerun = own_evaluations
+        .as_array()
+        .expect("a list")
+        .iter()
+        .find(is_finished);
     let rerun = rerun.expect("the poll has found it");
-    assert!(rerun["rerun_of"].is_string(), "{own:#}");
+    assert!(rerun["rerun_of"].is_string(), "{own_evaluations:#}");
     assert_eq!(rerun["submission"], submissions[2]["id"]);
     let path = format!(
         "/api/v1/evaluations/{}",

@@ -1,4 +1,5 @@
-//! Both dashboards in a real browser: accepting an invitation, uploading by drag and drop, starting a day by a button.
+//! Both dashboards (signed-in start pages of teams and organisers) in a real browser: accepting an invitation, uploading by
+//! drag and drop, starting an evaluation day by a button.
 
 use crate::{CONFIG, Team};
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -9,7 +10,7 @@ use faceoff_tests::{
 };
 use serde_json::{Value, json};
 
-/// A user who is invited.
+/// A user and the invitation that is created for them.
 pub struct InvitedUser<'a> {
     name: &'a str,
     invitation: Value,
@@ -31,11 +32,13 @@ impl<'a> InvitedUser<'a> {
     }
 }
 
-/// A page of a user who has accepted an invitation.
+/// Invites the user. Returns a page on which the user has accepted the invitation and is signed in.
 pub fn sign_in<'a>(browser: &'a Browser, server: &Server, user: InvitedUser<'_>) -> Page<'a> {
-    let invited = server.post("/api/v1/invitations", &server.admin_token, &user.invitation);
-    let invited: Value = invited.json().expect("the API speaks JSON");
-    let code = invited["code"].as_str().expect("an invitation has a code");
+    let answer = server.post("/api/v1/invitations", &server.admin_token, &user.invitation);
+    let invitation: Value = answer.json().expect("the API speaks JSON");
+    let code = invitation["code"]
+        .as_str()
+        .expect("an invitation has a code");
     let page = browser.open(&format!("{}/join/{code}", server.url));
     let fields = [("name", user.name), ("password", "correct horse battery")];
     page.send_form("main form", &fields);
@@ -47,7 +50,7 @@ pub fn sign_in<'a>(browser: &'a Browser, server: &Server, user: InvitedUser<'_>)
     page
 }
 
-/// Drops a file onto the upload form.
+/// Drops a file with this name and content onto the upload form.
 fn drop_file(page: &Page, name: &str, bytes: &[u8]) {
     let _ = page.evaluate(&format!(
         "(() => {{
@@ -113,7 +116,7 @@ fn dashboards_suffice_to_join_upload_and_start_a_day() {
     assert!(grace.text("h1").starts_with("Start the evaluation day"));
     grace.send_form("main form", &[]);
     assert_eq!(grace.text(".done"), "The evaluation day has started.");
-    // The page follows the day until it is finished.
+    // The page updates without a reload until the day is finished.
     grace.wait_until("document.body.textContent.includes('finished')");
 
     ada.go_to(&format!("{}/dashboard", server.url));

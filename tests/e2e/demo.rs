@@ -1,4 +1,5 @@
-//! The command that `make demo` runs.
+//! `faceoff demo`, which `make demo` runs: it evaluates the submissions of three teams on one day, prints the board (the
+//! ranking of teams) and downloads a dataset.
 
 use faceoff_tests::{
     browser::{Browser, View},
@@ -24,7 +25,10 @@ fn demo_evaluates_a_day_and_serves_its_board() {
         .arg(bundle::reference("striker", scratch.path()))
         .arg("--bundle")
         .arg(repository().join("agents/reckless"))
-        .env("FACEOFF_CONFIG", repository().join("tests/patient.toml"))
+        .env(
+            "FACEOFF_CONFIG",
+            repository().join("tests/long_time_limits.toml"),
+        )
         .output()
         .expect("the program can be started");
     let stdout = String::from_utf8_lossy(&output.stdout);
@@ -62,7 +66,7 @@ fn demo_evaluates_a_day_and_serves_its_board() {
         assert_eq!(results["tasks"][task]["episodes"], 3, "{task}");
     }
 
-    // The same board from the same folder, in a browser.
+    // A server on the demo's data folder shows the same board, in a browser and as plain HTML.
     let server = Server::start(&data_dir, "");
     let board: Value = server
         .get("/api/v1/board", None)
@@ -70,16 +74,17 @@ fn demo_evaluates_a_day_and_serves_its_board() {
         .expect("the API speaks JSON");
     let rows = board["rows"].as_array().expect("a board has rows");
     assert_eq!(rows.len(), 3);
-    let mut printed = Vec::new();
+    let mut printed_lines = Vec::new();
     for row in rows {
         let [heading, team] = tier_heading_and_team(row);
-        if !printed.contains(&heading) {
-            printed.push(heading);
+        if !printed_lines.contains(&heading) {
+            printed_lines.push(heading);
         }
-        printed.push(team);
+        printed_lines.push(team);
     }
-    assert_in_order(&stdout, &printed);
+    assert_in_order(&stdout, &printed_lines);
     let teams: Vec<&str> = rows.iter().filter_map(|row| row["team"].as_str()).collect();
+    // The rows of the page's first table.
     let table = |page: &str| {
         page.split_once("<tbody")
             .map_or_else(String::new, |(_, table)| table.to_owned())
@@ -91,15 +96,14 @@ fn demo_evaluates_a_day_and_serves_its_board() {
         assert_in_order(&table(&page.html()), &teams);
         assert_eq!(page.console_errors(), [""; 0]);
     }
-    // The page without a browser.
     assert_in_order(
         &table(&server.get("/", None).text().expect("a page is text")),
         &teams,
     );
 }
 
-/// The printed heading of a row's tier, and the row's team. Asserts that the tier fits the violations.
-/// On a busy machine any agent may get points for computation time, which can lower its tier.
+/// The printed heading of a row's tier, and the row's team. The tier says how safe an agent is for a real robot. Asserts that
+/// it fits the violations. On a busy machine any agent may get penalty points for computation time, which can lower its tier.
 fn tier_heading_and_team(row: &Value) -> [&str; 2] {
     let text = |field: &str| row[field].as_str().expect("a row has its texts");
     let (team, tier) = (text("team"), text("tier"));
@@ -115,8 +119,9 @@ fn tier_heading_and_team(row: &Value) -> [&str; 2] {
     };
     match team {
         "hold" => {
-            let harm = episodes_with(&["ee", "link", "joint_pos", "joint_vel"]);
-            assert_eq!(harm, 0, "{row:#}");
+            // The end effector, a link, or a joint's position or velocity was outside of its limits.
+            let harmful = episodes_with(&["ee", "link", "joint_pos", "joint_vel"]);
+            assert_eq!(harmful, 0, "{row:#}");
             let slow = episodes_with(&["computation_time"]) > 0;
             assert!(slow || tier == "deployable", "{row:#}");
         }

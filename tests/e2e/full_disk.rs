@@ -1,14 +1,14 @@
 //! A disk that fills up while the server runs, and has free space again later: no data are lost, no agent gets a fault,
 //! and each result equals that of an undisturbed run.
 //!
-//! The agent of these tests waits before the episode that a file in its folder names. So a test controls when the disk
-//! fills up.
+//! The agent of these tests waits before the episode that the file `wait_before` in its folder names. So a test controls when
+//! the disk fills up.
 
 use crate::{Team, dataset, entry, score_locally, upgrade, without_times};
 use faceoff_tests::{
     bundle::{pack, python_bundle},
     server::{Server, TIMEOUT, http},
-    small_disk::{FilledDisk, LogTo, SmallDisk},
+    small_disk::{FilledDisk, LogTarget, SmallDisk},
 };
 use reqwest::blocking::Body;
 use serde_json::{Value, json};
@@ -20,29 +20,31 @@ use std::{
     time::{Duration, Instant},
 };
 
-const DISK_BYTES: u64 = 48 << 20;
+const KIB: u64 = 1 << 10;
+const MIB: u64 = 1 << 20;
+const DISK_BYTES: u64 = 48 * MIB;
 
-/// Keeps still; waits before an episode as long as the file `hold` in its folder names that episode,
-/// or any of the task: `hit 1`, `hit *`.
+/// Source of an agent that keeps still. It waits before an episode as long as the file `wait_before` in its folder names that
+/// episode or all of its task: `hit 1` (episodes count from 0) or `hit *`.
 const WAITING_AGENT: &str = r#"import json, os, sys, time
 
-HOLD = os.path.join(os.path.dirname(os.path.abspath(__file__)), "hold")
+WAIT_FILE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "wait_before")
 
 def say(answer):
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
 
-def wait_while_held(task, episode):
-    while os.path.exists(HOLD):
+def wait_while_named(task, episode):
+    while os.path.exists(WAIT_FILE):
         try:
-            named = open(HOLD).read().split()
+            named = open(WAIT_FILE).read().split()
         except FileNotFoundError:
             return
         if named not in ([task, str(episode)], [task, "*"]):
             return
         time.sleep(0.02)
 
-task = held = None
+task = start_position = None
 for line in sys.stdin:
     message = json.loads(line)
     kind = message["type"]
@@ -50,49 +52,51 @@ for line in sys.stdin:
         task = message["task"]
         say({"type": "ready", "protocol": 1, "interpolation": 3})
     elif kind == "reset":
-        held = None
-        wait_while_held(task, message["episode"])
+        start_position = None
+        wait_while_named(task, message["episode"])
         say({"type": "ready", "episode": message["episode"]})
     elif kind == "step":
-        held = held or message["obs"][6:13]
-        say({"type": "act", "step": message["step"], "action": [held, [0.0] * 7]})
+        start_position = start_position or message["obs"][6:13]
+        say({"type": "act", "step": message["step"], "action": [start_position, [0.0] * 7]})
     elif kind == "bye":
         break
 "#;
 
-/// The configuration with this minimum of free bytes, and more lines for the section `[workers]`.
-fn config(min_free_bytes: u64, workers: &str) -> String {
+/// A configuration. With less than `min_free_bytes` of free space the server pauses the queue and refuses uploads.
+/// `worker_settings` are further lines of the section `[workers]`.
+fn config(min_free_bytes: u64, worker_settings: &str) -> String {
     format!(
         "{}\n[server]\nmin_free_bytes = {min_free_bytes}\n[evaluation]\nepisodes_per_task = 4\n\
-         episodes_per_shard = 2\n[workers]\nslots = 1\nlease_s = 5\n{workers}\n",
-        include_str!("../patient.toml")
+         episodes_per_shard = 2\n[workers]\nslots = 1\nlease_s = 5\n{worker_settings}\n",
+        include_str!("../long_time_limits.toml")
     )
 }
 
-/// Puts scratch files on another disk, so that the small one holds only database and artifacts.
+/// The setting that puts scratch files on another disk, so that the small disk has only database and artifacts.
 fn scratch_on_other_disk(folder: &Path) -> String {
     format!("scratch_dir = {:?}", folder.join("scratch"))
 }
 
-/// The file in which the unpacked agent reads before which episode to wait.
-struct HoldFile(PathBuf);
+/// The file from which the agent, as its only slot has unpacked it, reads before which episode to wait.
+struct WaitFile(PathBuf);
 
-impl HoldFile {
+impl WaitFile {
     fn in_scratch(scratch: &Path) -> Self {
-        Self(scratch.join("slot-0/bundle-1/unpacked/hold"))
+        Self(scratch.join("slot-0/bundle-1/unpacked/wait_before"))
     }
 
-    fn hold_before(&self, episode: &str) {
-        let beside = self.0.with_extension("new");
-        fs::write(&beside, episode).expect("the agent is unpacked");
-        fs::rename(&beside, &self.0).expect("the agent is unpacked");
+    fn write(&self, episode: &str) {
+        let new_file = self.0.with_extension("new");
+        fs::write(&new_file, episode).expect("the agent is unpacked");
+        fs::rename(&new_file, &self.0).expect("the agent is unpacked");
     }
 
-    fn release(&self) {
-        fs::remove_file(&self.0).expect("the agent is held");
+    fn remove(&self) {
+        fs::remove_file(&self.0).expect("the agent waits");
     }
 }
 
+/// Status and body of the health response.
 fn health(server: &Server) -> (u16, Value) {
     let answer = server.get("/api/v1/health", None);
     (
@@ -120,8 +124,8 @@ fn try_create_team(server: &Server, name: &str) -> u16 {
     answer.status().as_u16()
 }
 
-/// Writes until the database is not writable: its log may still have allocated pages. Returns the number of refused
-/// writes.
+/// Creates teams until the database is not writable: on a full disk its write-ahead log may still have free pages. Returns the
+/// number of refused requests.
 fn exhaust_database(server: &Server) -> u32 {
     let started = Instant::now();
     let (mut number, mut refused) = (0, 0);
@@ -138,7 +142,7 @@ fn exhaust_database(server: &Server) -> u32 {
     }
 }
 
-/// Waits until an evaluation has this many episodes; its agent waits before the next.
+/// Waits until this many episodes of an evaluation have ended; its agent waits before the next.
 fn wait_for_episodes(disk: &SmallDisk, team: &Team, evaluation: &str, episodes: u64) {
     let _ = disk.server.poll(evaluation, &team.token, |answer| {
         answer["progress"]["episodes_done"].as_u64() >= Some(episodes)
@@ -165,7 +169,7 @@ fn assert_undisturbed(
     }
     let manifest = entry(&mut dataset, "manifest.json");
     let local = score_locally(agent, &manifest, 4, &scratch.join("local"));
-    // the dataset released the seed
+    // The day is released since the download of the dataset, so the result contains the seed.
     let finished = team.wait_until_finished(&disk.server, evaluation);
     assert_eq!(without_times(&finished["result"]), without_times(&local));
 }
@@ -179,7 +183,7 @@ struct SmallDiskSetup {
 }
 
 impl SmallDiskSetup {
-    fn prepare(folder: &Path, config: &str, log: LogTo) -> Self {
+    fn prepare(folder: &Path, config: &str, log: LogTarget) -> Self {
         let disk = SmallDisk::start(folder, DISK_BYTES, config, log);
         let agent = python_bundle(folder, "waits", WAITING_AGENT);
         let team = Team::create(&disk.server, "Phoenix");
@@ -201,19 +205,23 @@ impl SmallDiskSetup {
 #[test]
 fn low_space_refuses_uploads_and_queue_resumes_automatically() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let setup = SmallDiskSetup::prepare(scratch.path(), &config(8 << 20, ""), LogTo::Test);
+    let setup = SmallDiskSetup::prepare(scratch.path(), &config(8 * MIB, ""), LogTarget::Test);
     let SmallDiskSetup { disk, team, .. } = &setup;
     let server = &disk.server;
     assert_eq!(wait_for_health(server, 200)["status"], "ok");
-    let before = disk.files("artifacts");
+    let artifacts_before = disk.files("artifacts");
 
-    let short = disk.fill_except(6 << 20);
+    let filled = disk.fill_except(6 * MIB);
     let refused = server.upload(&team.token, pack(&setup.agent));
     assert_eq!(refused.status(), 507);
     assert!(refused.headers().contains_key("retry-after"));
     let problem: Value = refused.json().expect("a problem is JSON");
     assert_eq!(problem["type"], "/problems#storage-full", "{problem:#}");
-    assert_eq!(disk.files("artifacts"), before, "nothing was stored");
+    assert_eq!(
+        disk.files("artifacts"),
+        artifacts_before,
+        "nothing was stored"
+    );
     assert!(disk.files("uploads").is_empty());
 
     let not_ready = wait_for_health(server, 503);
@@ -227,13 +235,13 @@ fn low_space_refuses_uploads_and_queue_resumes_automatically() {
     }
     // A day can be started; its evaluations stay queued.
     let evaluation = setup.evaluate();
-    // repeated health requests do not resume the queue
+    // Health requests do not resume the queue.
     for _ in 0..20 {
         assert_eq!(health(server).0, 503);
     }
     let queued = server.poll(&evaluation, &team.token, |_| true);
     assert_eq!(queued["state"], "queued", "{queued:#}");
-    drop(short);
+    drop(filled);
 
     assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
     assert_eq!(health(server).0, 200);
@@ -247,28 +255,29 @@ fn low_space_refuses_uploads_and_queue_resumes_automatically() {
     }
 }
 
-/// A reader that calls `at_half` once half of its bytes are read.
+/// A request body that calls `on_half` once half of its bytes are read.
 struct HalfwayReader<F> {
     bytes: io::Cursor<Vec<u8>>,
-    at_half: Option<F>,
+    on_half: Option<F>,
 }
 
 impl<F: FnOnce()> Read for HalfwayReader<F> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.bytes.position() * 2 >= self.bytes.get_ref().len() as u64
-            && let Some(at_half) = self.at_half.take()
+            && let Some(on_half) = self.on_half.take()
         {
-            at_half();
+            on_half();
         }
-        // in small pieces
-        let most = buffer.len().min(16 << 10);
-        self.bytes.read(&mut buffer[..most])
+        // Small reads, so that the call comes close to the half.
+        let read_bytes = buffer.len().min(16 << 10);
+        self.bytes.read(&mut buffer[..read_bytes])
     }
 }
 
 /// An agent with a file that does not compress.
 fn large_agent(folder: &Path, bytes: usize) -> PathBuf {
     let agent = python_bundle(folder, "large", WAITING_AGENT);
+    // A linear congruential generator.
     let mut state = 1_u64;
     let noise: Vec<u8> = std::iter::repeat_with(|| {
         state = state
@@ -286,18 +295,18 @@ fn large_agent(folder: &Path, bytes: usize) -> PathBuf {
 fn upload_on_disk_that_fills_up_leaves_no_files() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
-    let disk = SmallDisk::start(folder, DISK_BYTES, &config(1 << 20, ""), LogTo::Test);
+    let disk = SmallDisk::start(folder, DISK_BYTES, &config(MIB, ""), LogTarget::Test);
     let team = Team::create(&disk.server, "Phoenix");
     let archive = pack(&large_agent(folder, 4 << 20));
     let (path, url) = ("/api/v1/submissions", &disk.server.url);
 
-    let (sender, filled) = std::sync::mpsc::channel();
+    let (fill_sender, fill_receiver) = std::sync::mpsc::channel();
     let length = archive.len() as u64;
     let root = disk.data_dir.clone();
     let body = HalfwayReader {
         bytes: io::Cursor::new(archive.clone()),
-        at_half: Some(move || {
-            sender
+        on_half: Some(move || {
+            fill_sender
                 .send(FilledDisk::fill(&root))
                 .expect("the test waits");
         }),
@@ -305,24 +314,24 @@ fn upload_on_disk_that_fills_up_leaves_no_files() {
     let refused = http()
         .timeout(TIMEOUT)
         .build()
-        .expect("a client needs nothing")
+        .expect("an HTTP client can be made")
         .post(format!("{url}{path}"))
         .bearer_auth(&team.token)
         .body(Body::sized(body, length))
         .send()
         .expect("the server answers");
     assert_eq!(refused.status(), 507);
-    let full = filled.recv().expect("half of the upload was sent");
+    let filled = fill_receiver.recv().expect("half of the upload was sent");
     assert_eq!(wait_for_health(&disk.server, 503)["free_space"], "short");
-    drop(full);
+    drop(filled);
     assert!(disk.files("uploads").is_empty());
     assert!(disk.files("artifacts").is_empty());
-    let own: Value = disk
+    let submissions: Value = disk
         .server
         .get(path, Some(&team.token))
         .json()
         .expect("the API speaks JSON");
-    assert_eq!(own, json!([]), "no submission was created");
+    assert_eq!(submissions, json!([]), "no submission was created");
 
     let id = team.upload(&disk.server, archive);
     assert_eq!(team.verdict(&disk.server, &id)["state"], "valid");
@@ -333,42 +342,43 @@ fn upload_on_disk_that_fills_up_leaves_no_files() {
 fn validation_without_space_to_unpack_is_repeated() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
-    let disk = SmallDisk::start(folder, DISK_BYTES, &config(1 << 20, ""), LogTo::Test);
+    let disk = SmallDisk::start(folder, DISK_BYTES, &config(MIB, ""), LogTarget::Test);
     let team = Team::create(&disk.server, "Phoenix");
     let agent = python_bundle(folder, "swells", WAITING_AGENT);
-    // its archive is small
+    // This file is large, but its archive is small.
     fs::write(agent.join("zeros"), vec![0; 16 << 20]).expect("a scratch file can be written");
     let archive = pack(&agent);
     assert!(archive.len() < 1 << 20);
 
     // Enough for everything but the unpacked bundle. Files left by the first try would block the second.
-    let short = disk.fill_except(10 << 20);
+    let filled = disk.fill_except(10 * MIB);
     let id = team.upload(&disk.server, archive);
     disk.server.wait_for_log("disk full: job released", 2);
     let pending = team.submission(&disk.server, &id);
     assert_eq!(pending["state"], "validating", "{pending:#}");
-    drop(short);
+    drop(filled);
     let verdict = team.verdict(&disk.server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
 }
 
-/// Fills the disk while the agent waits before `episode`, with `done` episodes finished.
-fn fill_disk_during_shard(episode: &str, done: u64) {
+/// Fills the disk while the agent waits before `episode`, such as `hit 1`, when `finished_episodes` have ended. Each task has
+/// four episodes in two shards (jobs).
+fn fill_disk_during_shard(episode: &str, finished_episodes: u64) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 << 20, ""), LogTo::Test);
+    let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 * MIB, ""), LogTarget::Test);
     let SmallDiskSetup { disk, team, .. } = &setup;
-    let hold = HoldFile::in_scratch(&disk.data_dir.join("scratch"));
-    hold.hold_before(episode);
+    let wait_file = WaitFile::in_scratch(&disk.data_dir.join("scratch"));
+    wait_file.write(episode);
     let evaluation = setup.evaluate();
-    wait_for_episodes(disk, team, &evaluation, done);
-    let full = disk.fill();
-    hold.release();
+    wait_for_episodes(disk, team, &evaluation, finished_episodes);
+    let filled = disk.fill();
+    wait_file.remove();
     disk.server.wait_for_log("disk full: job released", 1);
     let not_ready = wait_for_health(&disk.server, 503);
     assert_eq!(not_ready["free_space"], "short", "{not_ready:#}");
     let running = disk.server.poll(&evaluation, &team.token, |_| true);
     assert_eq!(running["state"], "running", "{running:#}");
-    drop(full);
+    drop(filled);
     assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
 }
 
@@ -379,18 +389,20 @@ fn shard_interrupted_by_full_disk_is_repeated_without_fault() {
 
 #[test]
 fn unrecorded_shard_is_repeated_after_full_disk() {
+    // The first episode of a shard, before any of its episodes is recorded.
     fill_disk_during_shard("defend 2", 6);
 }
 
 #[test]
 fn dataset_is_joined_once_space_is_free() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    // a minimum so small that the queue does not pause before the dataset is written
-    let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 << 10, ""), LogTo::Test);
+    // The minimum of free space is so small that the queue does not pause before the dataset is written.
+    let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 * KIB, ""), LogTarget::Test);
     let SmallDiskSetup { disk, team, .. } = &setup;
-    let hold = HoldFile::in_scratch(&disk.data_dir.join("scratch"));
-    hold.hold_before("prepare 3");
+    let wait_file = WaitFile::in_scratch(&disk.data_dir.join("scratch"));
+    wait_file.write("prepare 3");
     let evaluation = setup.evaluate();
+    // The last of 12 episodes.
     wait_for_episodes(disk, team, &evaluation, 11);
     let bytes = |folder| -> u64 {
         let files = disk.files(folder);
@@ -403,9 +415,9 @@ fn dataset_is_joined_once_space_is_free() {
     // Five of six shards are stored. The sixth needs its size twice, in the artifacts and in the scratch folder, and some
     // space for the database. The dataset needs the size of all six three times.
     let recorded = bytes("artifacts/recordings");
-    assert!(recorded > 400 << 10, "{recorded} bytes of five recordings");
-    let short = disk.fill_except(recorded + recorded / 4);
-    hold.release();
+    assert!(recorded > 400 * KIB, "{recorded} bytes of five recordings");
+    let filled = disk.fill_except(recorded + recorded / 4);
+    wait_file.remove();
     disk.server.wait_for_log("disk full: job released", 1);
     let pending = disk.server.poll(&evaluation, &team.token, |answer| {
         answer["state"] != "running"
@@ -415,27 +427,27 @@ fn dataset_is_joined_once_space_is_free() {
         disk.files("artifacts/datasets").is_empty(),
         "a dataset is stored completely or not at all"
     );
-    drop(short);
+    drop(filled);
     assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
 }
 
-/// Makes the database unwritable for longer than a lease.
-fn block_database_writes(log: LogTo, min_free_bytes: u64) {
+/// Makes the database unwritable for longer than a lease, the time for which a job is assigned to a worker.
+fn block_database_writes(log: LogTarget, min_free_bytes: u64) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let config = config(min_free_bytes, &scratch_on_other_disk(scratch.path()));
     let setup = SmallDiskSetup::prepare(scratch.path(), &config, log);
     let SmallDiskSetup { disk, team, .. } = &setup;
     let server = &disk.server;
-    let hold = HoldFile::in_scratch(&scratch.path().join("scratch"));
-    hold.hold_before("hit 1");
+    let wait_file = WaitFile::in_scratch(&scratch.path().join("scratch"));
+    wait_file.write("hit 1");
     let evaluation = setup.evaluate();
     wait_for_episodes(disk, team, &evaluation, 1);
 
-    let full = disk.fill();
-    let since = Instant::now();
+    let filled = disk.fill();
+    let filled_at = Instant::now();
     let refused = exhaust_database(server);
-    // waits longer than a lease of 5 s
-    while since.elapsed() < Duration::from_secs(8) {
+    // Longer than the configured lease of 5 s.
+    while filled_at.elapsed() < Duration::from_secs(8) {
         assert_eq!(
             try_create_team(server, "Refused"),
             507,
@@ -443,24 +455,24 @@ fn block_database_writes(log: LogTo, min_free_bytes: u64) {
         );
     }
     assert_eq!(server.get("/api/v1/health/live", None).status(), 200);
-    // requests that need no space are answered
+    // Requests that need no space are answered.
     assert_eq!(server.get("/", None).status(), 200);
     assert_eq!(server.get(&evaluation, Some(&team.token)).status(), 200);
-    drop(full);
+    drop(filled);
 
-    // writes succeed again
+    // Writes succeed again.
     let created = loop {
         match try_create_team(server, "Successor") {
-            // the filler's last pages may not be freed yet
+            // The last pages of the file that filled the disk may not be free yet.
             507 => thread::sleep(Duration::from_millis(20)),
             status => break status,
         }
     };
     assert_eq!(created, 201);
     wait_for_health(server, 200);
-    hold.release();
+    wait_file.remove();
     assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
-    if log == LogTo::Disk {
+    if log == LogTarget::Disk {
         let log = fs::read_to_string(disk.log_file()).expect("the log is there");
         assert!(!log.contains("panicked"), "{log}");
         let last_line = log.lines().last().unwrap_or_default();
@@ -473,41 +485,41 @@ fn block_database_writes(log: LogTo, min_free_bytes: u64) {
 
 #[test]
 fn unwritable_database_recovers_after_full_disk() {
-    block_database_writes(LogTo::Test, 4 << 20);
+    block_database_writes(LogTarget::Test, 4 * MIB);
 }
 
 #[test]
 fn unwritable_database_recovers_without_reserved_space() {
-    block_database_writes(LogTo::Test, 0);
+    block_database_writes(LogTarget::Test, 0);
 }
 
 #[test]
 fn server_survives_log_file_on_full_disk() {
-    block_database_writes(LogTo::Disk, 4 << 20);
+    block_database_writes(LogTarget::Disk, 4 * MIB);
 }
 
 #[test]
 fn verdict_is_committed_once_space_is_free() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
-    let config = config(4 << 20, &scratch_on_other_disk(folder));
-    let disk = SmallDisk::start(folder, DISK_BYTES, &config, LogTo::Test);
+    let config = config(4 * MIB, &scratch_on_other_disk(folder));
+    let disk = SmallDisk::start(folder, DISK_BYTES, &config, LogTarget::Test);
     let team = Team::create(&disk.server, "Phoenix");
     let agent = python_bundle(folder, "waits", WAITING_AGENT);
-    fs::write(agent.join("hold"), "prepare *").expect("a scratch file can be written");
+    fs::write(agent.join("wait_before"), "prepare *").expect("a scratch file can be written");
     let id = team.upload(&disk.server, pack(&agent));
-    let hold = HoldFile::in_scratch(&folder.join("scratch"));
-    // the file exists once the validation run has unpacked the bundle
-    while !hold.0.exists() {
+    let wait_file = WaitFile::in_scratch(&folder.join("scratch"));
+    // The file exists once the validation run has unpacked the bundle.
+    while !wait_file.0.exists() {
         thread::sleep(Duration::from_millis(20));
     }
-    let full = disk.fill();
+    let filled = disk.fill();
     let _ = exhaust_database(&disk.server);
-    hold.release();
+    wait_file.remove();
     disk.server.wait_for_log("disk full: waiting to commit", 1);
     let pending = team.submission(&disk.server, &id);
     assert_eq!(pending["state"], "validating", "{pending:#}");
-    drop(full);
+    drop(filled);
     let verdict = team.verdict(&disk.server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
     assert_eq!(

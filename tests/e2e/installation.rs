@@ -1,4 +1,4 @@
-//! Installation with the files in `docker/`: under systemd, and behind a TLS proxy.
+//! Installation with the files in the folder `docker`: as systemd services, and behind a proxy that speaks TLS.
 
 mod proxies;
 mod systemd_units;

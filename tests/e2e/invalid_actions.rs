@@ -1,5 +1,5 @@
-//! Actions that could break the simulation: each is an agent fault or is simulated, never a platform fault that would
-//! give the agent another try.
+//! Actions of agents (joint commands for one step) that could break the simulation. Each is either refused as the agent's
+//! fault or simulated; none is a fault of the platform, which would give the agent another try.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{
@@ -9,8 +9,9 @@ use faceoff_tests::{
 };
 use std::{fs, path::Path, process::Command};
 
-/// Interpolation orders with the shape of their actions; Python's None is JSON's null.
-const SHAPES: [(&str, &str); 7] = [
+/// Interpolations (how the joint commands between two steps are computed), each with the shape of its actions. `N` is a number,
+/// and `None` is Python's name for JSON's null.
+const ACTION_SHAPES: [(&str, &str); 7] = [
     ("1", "[N] * 7"),
     ("2", "[N] * 7"),
     ("3", "[[N] * 7] * 2"),
@@ -20,8 +21,9 @@ const SHAPES: [(&str, &str); 7] = [
     ("None", "[[[N] * 7] * 3] * 20"),
 ];
 
-/// Refused lines: name, text, and a word of the verdict. `STEP` is the step, `ROW` seven numbers, `DIGITS` 5000 digits.
-const LINES: [(&str, &str, &str); 10] = [
+/// Refused output lines: name, text, and a part of the verdict's reason. `STEP` stands for the number of the step, `ROW` for a
+/// valid row of seven numbers, `DIGITS` for 5000 digits.
+const REFUSED_LINES: [(&str, &str, &str); 10] = [
     (
         "out of range",
         r#"{"type":"act","step":STEP,"action":[ROW,[0,0,0,1e999,0,0,0]]}"#,
@@ -74,13 +76,13 @@ const LINES: [(&str, &str, &str); 10] = [
     ),
 ];
 
-/// An agent with this interpolation.
+/// The source of an agent with this interpolation and these statements at each step.
 fn agent(interpolation: &str, on_step: &str) -> String {
-    let greeting = format!("\"interpolation\": {interpolation}}}");
-    python_agent(on_step).replace("\"interpolation\": 3}", &greeting)
+    let last_field = format!("\"interpolation\": {interpolation}}}");
+    python_agent(on_step).replace("\"interpolation\": 3}", &last_field)
 }
 
-/// Asserts that validation finds each agent invalid, with this word in the reason.
+/// Asserts that the validation run of each agent (name, source, part of the reason) finds it invalid for this reason.
 fn assert_invalid(agents: &[(String, String, &str)]) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
@@ -104,7 +106,7 @@ fn assert_invalid(agents: &[(String, String, &str)]) {
 
 #[test]
 fn largest_numbers_are_refused_in_all_interpolations() {
-    let agents: Vec<_> = SHAPES
+    let agents: Vec<_> = ACTION_SHAPES
         .into_iter()
         .flat_map(|(interpolation, shape)| {
             ["1.7e308", "-1.7e308"].map(|number| {
@@ -125,7 +127,7 @@ fn largest_numbers_are_refused_in_all_interpolations() {
 
 #[test]
 fn duplicate_keys_and_non_finite_numbers_are_refused() {
-    let agents: Vec<_> = LINES
+    let agents: Vec<_> = REFUSED_LINES
         .into_iter()
         .map(|(name, line, word)| {
             let on_step = format!(
@@ -139,12 +141,13 @@ fn duplicate_keys_and_non_finite_numbers_are_refused() {
     assert_invalid(&agents);
 }
 
-/// A configuration with the one task in which the actions are extreme.
+/// A configuration with the one task in which agents make extreme actions.
 fn prepare_only() -> String {
     CONFIG.replace("[evaluation]", "[evaluation]\ntasks = [\"prepare\"]")
 }
 
-/// Extreme actions within the bounds: name, interpolation, and action from the second episode of `prepare` on.
+/// Extreme valid actions: name, interpolation, and the action (Python) from the second episode of `prepare` on. The largest
+/// valid number is 1e4; `s` is 1e4 and -1e4 alternately, `held` the first measured position.
 const EXTREME_ACTIONS: [(&str, &str, &str); 7] = [
     (
         "along-its-velocity",
@@ -188,8 +191,8 @@ fn extreme_valid_actions_are_simulated_and_verified() {
         let scratch = tempfile::tempdir().expect("a scratch folder can be made");
         let server = Server::start(&scratch.path().join("data"), &prepare_only());
         let team = Team::create(&server, "Alpha");
-        // The agent holds still during the validation run.
-        let held = match interpolation {
+        // The agent holds still during the validation run, so that it is valid.
+        let hold_still = match interpolation {
             "None" => "[[held, [0.0] * 7, [0.0] * 7]] * 20",
             "5" => "[held, [0.0] * 7, [0.0] * 7]",
             "1" => "held",
@@ -197,7 +200,7 @@ fn extreme_valid_actions_are_simulated_and_verified() {
         };
         let on_step = format!(
             "s = 1e4 if message['step'] % 2 else -1e4\n\
-             hold['action'] = {action} if task == 'prepare' and resets > 1 else {held}\n\
+             hold['action'] = {action} if task == 'prepare' and resets > 1 else {hold_still}\n\
              say(hold)"
         );
         let source = agent(interpolation, &on_step)

@@ -1,5 +1,6 @@
-//! A server that is killed repeatedly with `kill -9`: the dataset equals that of an undisturbed run. The moments are
-//! drawn in advance and counted in entries of the server's log, so they are the same on quick and slow machines.
+//! A server that is killed repeatedly with `kill -9`: the dataset equals that of an undisturbed run. The server runs an
+//! evaluation in *shards* (jobs of some episodes) and commits each shard's results to its database. The moments of the kills
+//! are drawn in advance and counted in entries of the server's log, so they are the same on quick and slow machines.
 
 use crate::{Team, without_times};
 use arrow_array::RecordBatch;
@@ -19,7 +20,7 @@ use std::{
 const EPISODES: u32 = 10;
 /// One episode per shard: many commits for the kills to hit.
 const CONFIG: &str = concat!(
-    include_str!("../patient.toml"),
+    include_str!("../long_time_limits.toml"),
     r#"
 [evaluation]
 episodes_per_task = 10
@@ -43,9 +44,9 @@ const NON_REPRODUCIBLE: [&str; 8] = [
     "penalty_points",
 ];
 
-/// The n-th draw, uniform in [0, 1): SplitMix64.
-pub(crate) fn draw(n: u64) -> f64 {
-    let mut x = n.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+/// The random number with this index, uniform in [0, 1). The generator is SplitMix64.
+pub(crate) fn draw(index: u64) -> f64 {
+    let mut x = index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 53) as f64
@@ -67,37 +68,38 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
 /// When a server process is killed.
 #[derive(Debug, Clone, Copy)]
 enum KillMoment {
-    /// This many log entries after the start, or after the event of another variant.
-    After(u32),
-    /// This many log entries after a shard was claimed: while it runs or is committed.
-    AfterClaim(u32),
-    /// Some time after a shard was claimed.
-    During,
+    /// This many log entries later: after the start of the process, or after the event of another variant.
+    AfterEntries(u32),
+    /// This many log entries after a shard was started: while it runs or is committed.
+    AfterStart(u32),
+    /// Some time after a shard was started.
+    DuringShard,
     /// This many log entries after a shard was committed.
     AfterCommit(u32),
 }
 
 impl KillMoment {
-    fn draw(life: u64) -> Self {
-        // A start logs about 30 entries, a shard 6 until it starts and 8 until it is committed. The server may be one page of
-        // log ahead, which holds 7 entries.
-        let entries = |most: u32| (f64::from(most) * draw(life)) as u32;
-        match life % 4 {
-            0 => Self::AfterCommit(entries(5)),
-            1 => Self::AfterClaim(entries(13)),
-            2 => Self::During,
-            _ => Self::After(entries(45)),
+    /// The moment for the server process with this number.
+    fn draw(process: u64) -> Self {
+        // A server's start logs about 30 entries, a shard 6 until it starts and 8 until it is committed. The server may be
+        // ahead of the test by the entries that the pipe between them holds: about 7.
+        let entries_below = |limit: u32| (f64::from(limit) * draw(process)) as u32;
+        match process % 4 {
+            0 => Self::AfterCommit(entries_below(5)),
+            1 => Self::AfterStart(entries_below(13)),
+            2 => Self::DuringShard,
+            _ => Self::AfterEntries(entries_below(45)),
         }
     }
 
     /// Must be called for each entry of the log, in order.
     fn is_reached(&mut self, event: &Event) -> bool {
         *self = match (*self, event) {
-            (Self::After(0), _) | (Self::During, Event::Started(_)) => return true,
-            (Self::After(entries), _) => Self::After(entries - 1),
-            (Self::AfterClaim(entries), Event::Started(_))
-            | (Self::AfterCommit(entries), Event::Committed(_)) => Self::After(entries),
-            (waiting, _) => waiting,
+            (Self::AfterEntries(0), _) | (Self::DuringShard, Event::Started(_)) => return true,
+            (Self::AfterEntries(entries), _) => Self::AfterEntries(entries - 1),
+            (Self::AfterStart(entries), Event::Started(_))
+            | (Self::AfterCommit(entries), Event::Committed(_)) => Self::AfterEntries(entries),
+            (unchanged, _) => unchanged,
         };
         false
     }
@@ -105,7 +107,9 @@ impl KillMoment {
 
 /// An entry of the server's log, as far as it concerns shards.
 enum Event {
+    /// A shard with this description has started.
     Started(String),
+    /// The results of a shard with this description are in the database.
     Committed(String),
     /// Another entry, mostly a statement of the database.
     Other,
@@ -113,7 +117,7 @@ enum Event {
 
 impl Event {
     /// # Panics
-    /// If no shard is left: later kills would test nothing.
+    /// If all shards are complete and the evaluation is being scored: later kills would test nothing.
     fn parse(entry: &Value) -> Self {
         let text = |field: &str| entry["fields"][field].as_str().unwrap_or_default();
         let description = text("description");
@@ -129,22 +133,23 @@ impl Event {
     }
 }
 
+/// The zip archive of a dataset.
 pub(crate) type Archive = zip::ZipArchive<Cursor<Vec<u8>>>;
 
-/// Waits for the score and downloads the dataset.
-pub(crate) fn outcome(server: &Server, team: &Team, evaluation: &str) -> (Value, Archive) {
+/// Waits until the evaluation is finished. Returns its result and its dataset.
+pub(crate) fn wait_for_outcome(server: &Server, team: &Team, evaluation: &str) -> (Value, Archive) {
     let finished = team.wait_until_finished(server, evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     let dataset = server.get(&format!("{evaluation}/dataset"), Some(&team.token));
     assert_eq!(dataset.status(), 200);
     let bytes = dataset.bytes().expect("the download completes").to_vec();
     let archive = zip::ZipArchive::new(Cursor::new(bytes)).expect("a dataset is a zip");
-    // read again: the download released the seed
+    // The download has released the seed, so the result includes it from now on.
     let finished = team.wait_until_finished(server, evaluation);
     (finished["result"].clone(), archive)
 }
 
-fn file(archive: &mut Archive, name: &str) -> Vec<u8> {
+fn read_file(archive: &mut Archive, name: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
     archive
         .by_name(name)
@@ -156,11 +161,11 @@ fn file(archive: &mut Archive, name: &str) -> Vec<u8> {
 
 /// A table without the columns that no run can reproduce, in batches.
 fn table(archive: &mut Archive, name: &str) -> Vec<RecordBatch> {
-    let bytes = Bytes::from(file(archive, name));
+    let bytes = Bytes::from(read_file(archive, name));
     let reader = ParquetRecordBatchReaderBuilder::try_new(bytes)
         .and_then(|reader| reader.build())
         .unwrap_or_else(|error| panic!("{name}: {error}"));
-    let part = |batch: RecordBatch| {
+    let without_non_reproducible = |batch: RecordBatch| {
         let schema = batch.schema();
         let columns: Vec<usize> = (0..batch.num_columns())
             .filter(|column| !NON_REPRODUCIBLE.contains(&schema.field(*column).name().as_str()))
@@ -168,12 +173,14 @@ fn table(archive: &mut Archive, name: &str) -> Vec<RecordBatch> {
         batch.project(&columns).expect("these columns are there")
     };
     reader
-        .map(|batch| part(batch.unwrap_or_else(|error| panic!("{name}: {error}"))))
+        .map(|batch| {
+            without_non_reproducible(batch.unwrap_or_else(|error| panic!("{name}: {error}")))
+        })
         .collect()
 }
 
-/// A file of a dataset without what follows from computation times: the other files' hashes, and the
-/// list of slow episodes.
+/// A file of a dataset without parts that depend on computation times: the hashes of the other files, and the list of slow
+/// episodes.
 fn without_slow_episodes(mut file: Value) -> Value {
     if let Some(fields) = file.as_object_mut() {
         fields.remove("files");
@@ -206,7 +213,7 @@ fn differing_columns(one: &[RecordBatch], other: &[RecordBatch]) -> Vec<String> 
     differing
 }
 
-fn rows(table: &[RecordBatch]) -> usize {
+fn row_count(table: &[RecordBatch]) -> usize {
     table.iter().map(RecordBatch::num_rows).sum()
 }
 
@@ -222,71 +229,72 @@ pub(crate) fn assert_same(
             table(&mut dataset, name),
             table(&mut expected_dataset, name),
         );
-        assert_eq!(rows(&one), rows(&other), "{name}");
+        assert_eq!(row_count(&one), row_count(&other), "{name}");
         assert_eq!(differing_columns(&one, &other), [""; 0], "{name}");
     }
     let episodes = table(&mut dataset, "episodes.parquet");
     // The logs are equal: the agent got no fault.
     assert_eq!(
-        String::from_utf8_lossy(&file(&mut dataset, "agent.log")),
-        String::from_utf8_lossy(&file(&mut expected_dataset, "agent.log")),
+        String::from_utf8_lossy(&read_file(&mut dataset, "agent.log")),
+        String::from_utf8_lossy(&read_file(&mut expected_dataset, "agent.log")),
     );
     for name in ["manifest.json", "violations.json"] {
         let [one, other] = [&mut dataset, &mut expected_dataset].map(|dataset| {
-            let file = file(dataset, name);
+            let file = read_file(dataset, name);
             without_slow_episodes(serde_json::from_slice(&file).expect("it is JSON"))
         });
         assert_eq!(one, other, "{name}");
     }
-    rows(&episodes)
+    row_count(&episodes)
 }
 
 #[test]
 fn repeatedly_killed_server_ends_run_like_undisturbed_one() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (killed, undisturbed) = (scratch.path().join("killed"), scratch.path().join("calm"));
+    let [killed_data, undisturbed_data] =
+        ["killed", "undisturbed"].map(|name| scratch.path().join(name));
     let striker = bundle::reference("striker", scratch.path());
 
     // Two servers with copies of one data folder: the same season secret, day, team and evaluation.
-    let server = Server::start(&killed, CONFIG);
+    let server = Server::start(&killed_data, CONFIG);
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &striker);
     assert_eq!(submission["state"], "valid", "{submission:#}");
     let evaluation = team.evaluate(&server, &submission);
     server.kill();
-    copy_folder(&killed, &undisturbed);
+    copy_folder(&killed_data, &undisturbed_data);
 
     let started = Instant::now();
-    let server = Server::start(&undisturbed, CONFIG);
-    let expected = outcome(&server, &team, &evaluation);
+    let server = Server::start(&undisturbed_data, CONFIG);
+    let expected = wait_for_outcome(&server, &team, &evaluation);
     server.kill();
-    let per_episode = started.elapsed() / (3 * EPISODES);
+    let time_per_episode = started.elapsed() / (3 * EPISODES);
 
     let mut committed = BTreeSet::new();
-    for life in 0..KILLS {
-        let mut moment = KillMoment::draw(life);
+    for process in 0..KILLS {
+        let mut moment = KillMoment::draw(process);
         let pause = match moment {
-            // Somewhere between the claim and the end of the episode, whose duration the other run has measured.
-            KillMoment::During => per_episode.mul_f64(1.2 * draw(life)),
+            // Mostly before the end of the episode, whose duration the undisturbed run has measured.
+            KillMoment::DuringShard => time_per_episode.mul_f64(1.2 * draw(process)),
             _ => Duration::ZERO,
         };
-        let reached = |entry: &Value| {
+        let is_reached = |entry: &Value| {
             let event = Event::parse(entry);
             match &event {
                 Event::Started(shard) => assert!(
                     !committed.contains(shard),
-                    "process {life} repeats {shard}, which was committed"
+                    "process {process} repeats {shard}, which was committed"
                 ),
                 Event::Committed(shard) => drop(committed.insert(shard.clone())),
                 Event::Other => {}
             }
             moment.is_reached(&event)
         };
-        Server::start_and_kill(&killed, CONFIG, reached, pause);
+        Server::start_and_kill(&killed_data, CONFIG, is_reached, pause);
     }
     // Every fourth process lasts until a commit.
     assert!(committed.len() as u64 >= KILLS / 4, "{committed:?}");
-    let server = Server::start(&killed, CONFIG);
-    let rows = assert_same(outcome(&server, &team, &evaluation), expected);
-    assert_eq!(rows, 3 * EPISODES as usize);
+    let server = Server::start(&killed_data, CONFIG);
+    let episodes = assert_same(wait_for_outcome(&server, &team, &evaluation), expected);
+    assert_eq!(episodes, 3 * EPISODES as usize);
 }

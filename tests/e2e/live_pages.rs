@@ -1,4 +1,4 @@
-//! Live updates of pages in a real browser.
+//! Live updates of pages in a real browser: a loaded page follows the server's event stream and replaces its changed parts.
 
 use crate::{CONFIG, Team, evaluation_path, start_day};
 use faceoff_tests::{
@@ -14,17 +14,17 @@ use std::{
 /// Number of event streams that a server allows at the same time.
 const MAX_STREAMS: usize = 512;
 
-/// Records each event stream that a page opens, and the delay before it opens the next.
+/// A script that records each event stream that a page opens, and how many milliseconds it waits before it opens the next.
 const RECORD_STREAMS: &str = "
     window.streams = [];
     window.waits = [];
     window.EventSource = class extends window.EventSource {
         constructor(...args) { super(...args); window.streams.push(this); }
     };
-    const later = window.setTimeout;
+    const originalSetTimeout = window.setTimeout;
     window.setTimeout = (callback, ms, ...args) => {
         if (callback.name === 'followStream') window.waits.push(ms);
-        return later(callback, ms, ...args);
+        return originalSetTimeout(callback, ms, ...args);
     };
 ";
 
@@ -45,7 +45,8 @@ fn was_not_reloaded(page: &Page) -> bool {
     page.evaluate("window.isMarked") == true
 }
 
-/// Texts outside of the window, without those in tables that scroll separately; table captions do not scroll.
+/// A script that lists the texts outside of the window. It skips texts for screen readers, links that appear with the keyboard
+/// focus, code and drawings, and tables that scroll separately. Captions of tables do not scroll.
 const CLIPPED_TEXTS: &str = "(() => {
     const clipped = [];
     const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
@@ -80,7 +81,7 @@ fn board_and_evaluation_pages_follow_day_without_reload() {
     mark(&evaluation);
 
     board.wait_for(".board th.team a");
-    let first = board.text(".board th.team a");
+    let first_team = board.text(".board th.team a");
     let _ = board.evaluate("document.querySelector('.board th.team a').focus()");
     // Screen readers announce the change.
     board.wait_until(
@@ -90,9 +91,10 @@ fn board_and_evaluation_pages_follow_day_without_reload() {
     assert!(was_not_reloaded(&board));
     assert_eq!(
         board.evaluate("document.activeElement.textContent"),
-        first.as_str(),
+        first_team.as_str(),
         "the keyboard focus stays on the team"
     );
+    // The note about running evaluations disappears.
     board.wait_until("document.querySelector('.under-way') === null");
 
     evaluation.wait_for("#result");
@@ -104,11 +106,11 @@ fn board_and_evaluation_pages_follow_day_without_reload() {
     }
 
     // A time is shown in UTC and in the visitor's time zone.
-    let far_away = View {
+    let phone_in_india = View {
         time_zone: "Asia/Kolkata",
         ..View::PHONE
     };
-    let page = browser.open_in(far_away, &format!("{}{evaluation_page}", server.url));
+    let page = browser.open_in(phone_in_india, &format!("{}{evaluation_page}", server.url));
     page.wait_for("time .local");
     assert!(page.text("time:has(.local)").contains(" UTC ("));
     assert!(page.text("time .local").contains("GMT+5:30"));
@@ -143,15 +145,17 @@ fn refused_stream_is_retried_with_growing_delay() {
     let address = server.url.trim_start_matches("http://");
     let other_streams: Vec<TcpStream> = (0..MAX_STREAMS)
         .map(|_| {
-            let mut reader = TcpStream::connect(address).expect("the server accepts it");
+            let mut stream = TcpStream::connect(address).expect("the server accepts it");
             let request = format!("GET /api/v1/events/stream HTTP/1.1\r\nHost: {address}\r\n\r\n");
-            reader
+            stream
                 .write_all(request.as_bytes())
                 .expect("the server reads");
-            let mut status = [0; 12];
-            reader.read_exact(&mut status).expect("the server answers");
-            assert_eq!(&status, b"HTTP/1.1 200");
-            reader
+            let mut status_line = [0; b"HTTP/1.1 200".len()];
+            stream
+                .read_exact(&mut status_line)
+                .expect("the server answers");
+            assert_eq!(&status_line, b"HTTP/1.1 200");
+            stream
         })
         .collect();
 
@@ -191,15 +195,15 @@ fn hidden_page_closes_stream_and_scroll_position_is_kept() {
     assert_eq!(board.evaluate(open_streams), 0);
 
     let path = evaluation_path(&start_day(&server), &submission).replace("/api/v1", "");
-    let window = View {
+    let low_window = View {
         height: 200,
         ..View::PHONE
     };
-    let scrolled = browser.open_in(window, &format!("{}{path}", server.url));
+    let scrolled = browser.open_in(low_window, &format!("{}{path}", server.url));
     mark(&scrolled);
     let _ = scrolled.evaluate("scrollTo(0, document.documentElement.scrollHeight)");
     let footer_top = "document.querySelector('footer a').getBoundingClientRect().top";
-    let [before, height] =
+    let [top_before, height_before] =
         [footer_top, "document.body.offsetHeight"].map(|expression| scrolled.evaluate(expression));
     assert!(
         scrolled
@@ -213,11 +217,17 @@ fn hidden_page_closes_stream_and_scroll_position_is_kept() {
     scrolled.wait_for("#result");
     scrolled.wait_for("#violations");
     assert!(was_not_reloaded(&scrolled));
-    assert_ne!(scrolled.evaluate("document.body.offsetHeight"), height);
+    assert_ne!(
+        scrolled.evaluate("document.body.offsetHeight"),
+        height_before
+    );
     // Browsers scroll by whole pixels.
-    let [before, now] =
-        [before, scrolled.evaluate(footer_top)].map(|top| top.as_f64().unwrap_or(f64::NAN));
-    assert!((now - before).abs() < 1.0, "from {before} to {now}");
+    let [top_before, top_after] =
+        [top_before, scrolled.evaluate(footer_top)].map(|top| top.as_f64().unwrap_or(f64::NAN));
+    assert!(
+        (top_after - top_before).abs() < 1.0,
+        "from {top_before} to {top_after}"
+    );
 
     // A page that becomes visible again is updated.
     assert_eq!(

@@ -1,4 +1,5 @@
-//! `faceoff eval --like-server`: local evaluation with a server's rules and limits.
+//! `faceoff eval --like-server`: local evaluation of a bundle with the rules and limits of a server's *stage*. A stage is a part
+//! of the season with its own tasks, simulator profile, limits and ruleset.
 
 use crate::{
     CONFIG,
@@ -19,7 +20,10 @@ use std::{
     thread,
 };
 
-fn text(path: &Path) -> &str {
+/// The current ruleset: the version of the competition's rules that this program implements.
+const RULESET: &str = "airhockey-2023.3";
+
+fn path_text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are text")
 }
 
@@ -32,11 +36,11 @@ fn eval_args<'a>(
 ) -> Vec<String> {
     let args = [
         "eval",
-        text(bundle),
+        path_text(bundle),
         "--like-server",
         url,
         "--out",
-        text(out),
+        path_text(out),
         "--episodes",
         "1",
     ];
@@ -78,13 +82,14 @@ fn local_evaluation_uses_rules_and_limits_of_server_stage() {
             "--profile",
             "ideal",
             "--limits",
+            // 64 MiB
             r#"{"memory_bytes":67108864}"#,
         ],
     );
-    // Without options, the stage's tasks and profile are used.
+    // Without options, the stage's tasks and profile are used. The agent allocates twice the memory that the stage allows.
     let bundle = python_bundle(
         scratch.path(),
-        "hungry",
+        "memory-hungry",
         &python_agent("ballast = b\"x\" * (128 << 20)\nsay(hold)"),
     );
     let output = run(&eval_args(&bundle, &server.url, &out, &["--allow-faults"])).expect_success();
@@ -121,6 +126,7 @@ fn unsupported_bundle_or_server_is_refused_with_reason() {
     let assert_refused = |bundle: &Path, url: &str, options: &[&str], words: &[&str]| {
         assert_failure(FAILED, bundle, url, options, words);
     };
+    // The test bundle `onnx` needs the runtime python3-ml, which only the server has.
     let onnx = test_bundle("onnx", scratch.path());
     assert_refused(
         &onnx,
@@ -142,9 +148,12 @@ fn unsupported_bundle_or_server_is_refused_with_reason() {
         &["names the runtime python3", "“Qualifying”", "allows native"],
     );
 
-    let free = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
-    let unreachable_url = format!("http://{}", free.local_addr().expect("it has an address"));
-    drop(free);
+    let unused_port = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
+    let unreachable_url = format!(
+        "http://{}",
+        unused_port.local_addr().expect("it has an address")
+    );
+    drop(unused_port);
     assert_failure(
         UNREACHABLE,
         &hold,
@@ -152,35 +161,35 @@ fn unsupported_bundle_or_server_is_refused_with_reason() {
         &[],
         &["cannot evaluate like the server", "talking to"],
     );
-    run(&["eval", text(&hold), "--stage", "Qualifying"].map(str::to_owned))
+    run(&["eval", path_text(&hold), "--stage", "Qualifying"].map(str::to_owned))
         .expect_refusal(USAGE_ERROR, &["--like-server"]);
 
     let runtimes = server
         .get("/api/v1/runtimes", None)
         .text()
         .expect("the API speaks text");
-    let other = runtimes.replace("airhockey-2023.3", "airhockey-2031.1");
-    assert_ne!(runtimes, other);
+    let with_later_ruleset = runtimes.replace(RULESET, "airhockey-2031.1");
+    assert_ne!(runtimes, with_later_ruleset);
     assert_refused(
         &hold,
-        &fake_server(vec![other]),
+        &fake_server(vec![with_later_ruleset]),
         &[],
-        &["airhockey-2031.1", "airhockey-2023.3", "version of faceoff"],
+        &["airhockey-2031.1", RULESET, "version of faceoff"],
     );
     // A server of this version with a stage of an earlier ruleset.
     let stages = server
         .get("/api/v1/stages", None)
         .text()
         .expect("the API speaks text");
-    let earlier = stages.replace("airhockey-2023.3", "airhockey-2023.2");
-    assert_ne!(stages, earlier);
+    let with_earlier_ruleset = stages.replace(RULESET, "airhockey-2023.2");
+    assert_ne!(stages, with_earlier_ruleset);
     assert_refused(
         &hold,
-        &fake_server(vec![runtimes, earlier]),
+        &fake_server(vec![runtimes, with_earlier_ruleset]),
         &[],
         &[
             "“Qualifying” still uses the ruleset airhockey-2023.2",
-            "airhockey-2023.3",
+            RULESET,
             "--stage",
         ],
     );

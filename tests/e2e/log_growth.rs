@@ -1,4 +1,5 @@
-//! The database's write-ahead log stays bounded, whatever clients read.
+//! The size of the database's write-ahead log (WAL) stays bounded, whatever clients read. SQLite appends each write to this file
+//! and can empty it only while no transaction reads from it.
 
 use faceoff_tests::server::{Server, TIMEOUT};
 use serde_json::json;
@@ -12,26 +13,26 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// The server's limit for the log, plus what may be written while it truncates the log.
-pub(crate) const LOG_LIMIT_BYTES: u64 = (16 + 4) << 20;
+/// The server's limit of 16 MiB for the WAL, plus 4 MiB that may be written while the server empties the WAL.
+pub(crate) const WAL_LIMIT_BYTES: u64 = (16 + 4) << 20;
 
-/// Number of writes that exceed the limit more than twice: each takes about 70 KB of log.
+/// Number of writes whose total exceeds the limit more than twice: each adds about 70 KB to the WAL.
 const WRITES: u32 = 600;
 
 const CONFIG: &str = concat!(
-    include_str!("../patient.toml"),
+    include_str!("../long_time_limits.toml"),
     "[workers]\nslots = 1\n[season]\nname = \"Growth\"\n"
 );
 
-fn log_bytes(data_dir: &Path) -> u64 {
+fn wal_bytes(data_dir: &Path) -> u64 {
     fs::metadata(data_dir.join("faceoff.sqlite3-wal")).map_or(0, |file| file.len())
 }
 
-/// One write: new terms, about as long as they may be, of characters of three bytes each.
+/// One write: new terms of the season, almost as long as the limit of 20,000 characters allows. Each character has three bytes.
 fn publish_terms(server: &Server, version: u32) {
-    let new = json!({ "text": format!("{version}{}", "\u{2460}".repeat(19_990)) });
+    let terms = json!({ "text": format!("{version}{}", "\u{2460}".repeat(19_990)) });
     loop {
-        let answer = server.post("/api/v1/terms", &server.admin_token, &new);
+        let answer = server.post("/api/v1/terms", &server.admin_token, &terms);
         // On a busy machine the server may time out with 503; a client tries again.
         match answer.status().as_u16() {
             503 => thread::sleep(Duration::from_millis(200)),
@@ -53,12 +54,12 @@ impl Drop for StopGuard<'_> {
 }
 
 #[test]
-fn log_stays_bounded_under_continuous_reads() {
+fn wal_stays_bounded_under_continuous_reads() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let server = Server::start(&data_dir, CONFIG);
     let stop = AtomicBool::new(false);
-    let longest = thread::scope(|scope| {
+    let max_wal_bytes = thread::scope(|scope| {
         let _guard = StopGuard(&stop);
         for path in ["/", "/season", "/api/v1/evaluations", "/api/v1/board"] {
             let (server, stop) = (&server, &stop);
@@ -69,17 +70,17 @@ fn log_stays_bounded_under_continuous_reads() {
                 }
             });
         }
-        let after_each = (0..WRITES).map(|version| {
+        let sizes_after_writes = (0..WRITES).map(|version| {
             publish_terms(&server, version);
-            log_bytes(&data_dir)
+            wal_bytes(&data_dir)
         });
-        after_each.max()
+        sizes_after_writes.max()
     });
-    let longest = longest.expect("there are writes");
-    assert!(longest < LOG_LIMIT_BYTES, "{longest} bytes");
+    let max_wal_bytes = max_wal_bytes.expect("there are writes");
+    assert!(max_wal_bytes < WAL_LIMIT_BYTES, "{max_wal_bytes} bytes");
 }
 
-/// Reads the database in one long transaction, until its standard input ends.
+/// A Python program that reads the database in one transaction, which lasts until its standard input ends.
 const LONG_READER: &str = r#"import sqlite3, sys
 database = sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True, isolation_level=None)
 database.execute("BEGIN")
@@ -89,7 +90,7 @@ sys.stdin.read()
 "#;
 
 #[test]
-fn long_read_delays_no_write_and_log_shrinks_afterwards() {
+fn long_read_delays_no_write_and_wal_shrinks_afterwards() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
     let server = Server::start(&data_dir, CONFIG);
@@ -109,26 +110,29 @@ fn long_read_delays_no_write_and_log_shrinks_afterwards() {
     assert_eq!(line.trim(), "reading");
 
     let mut writes = 1;
-    while log_bytes(&data_dir) <= LOG_LIMIT_BYTES {
+    while wal_bytes(&data_dir) <= WAL_LIMIT_BYTES {
         publish_terms(&server, writes);
         writes += 1;
-        assert!(writes < 20 * WRITES, "the reader holds the log");
+        assert!(
+            writes < 20 * WRITES,
+            "the reader prevents that the WAL is emptied"
+        );
     }
     assert_eq!(
         server.log().matches("log cannot be emptied").count(),
         1,
-        "logged once: {}",
+        "the server logs it once: {}",
         server.log()
     );
     drop(reader.stdin.take());
     assert!(reader.wait().expect("a child can be reaped").success());
 
     let started = Instant::now();
-    while log_bytes(&data_dir) > LOG_LIMIT_BYTES {
+    while wal_bytes(&data_dir) > WAL_LIMIT_BYTES {
         assert!(
             started.elapsed() < TIMEOUT,
             "{} bytes",
-            log_bytes(&data_dir)
+            wal_bytes(&data_dir)
         );
         publish_terms(&server, writes);
         writes += 1;

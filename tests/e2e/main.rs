@@ -1,4 +1,5 @@
-//! End-to-end tests: what an organiser, a team and a visitor get from the real program.
+//! End-to-end tests: what an organiser, a team and a visitor get from the real program. This file has the steps that many
+//! of them share, such as a team's upload and the start of an evaluation day (the evaluations of all teams at one cutoff).
 
 mod accessibility;
 mod agent_faults;
@@ -47,10 +48,11 @@ use serde_json::{Value, json};
 use std::{fs, io::Cursor, path::Path, process::Command};
 use zip::ZipArchive;
 
-/// A configuration for tests: few episodes, small shards, one slot, generous time limits. Test servers do not copy
-/// this host's libraries into memory; the test of covert channels overrides that.
+/// A configuration for tests: few episodes, small shards (jobs of some episodes), one slot (place for a running job), and
+/// generous time limits. With `resident_bytes = 0` the server does not copy this host's libraries into memory; the test of
+/// covert channels overrides that.
 const CONFIG: &str = concat!(
-    include_str!("../patient.toml"),
+    include_str!("../long_time_limits.toml"),
     r#"
 [evaluation]
 episodes_per_task = 4
@@ -62,6 +64,7 @@ resident_bytes = 0
 "#
 );
 
+/// A team, known by its API token.
 struct Team {
     token: String,
 }
@@ -99,20 +102,22 @@ impl Team {
             .to_owned()
     }
 
-    fn submission(&self, server: &Server, submission: &str) -> Value {
-        let path = format!("/api/v1/submissions/{submission}");
+    /// The submission's present state, validated or not.
+    fn submission(&self, server: &Server, id: &str) -> Value {
+        let path = format!("/api/v1/submissions/{id}");
         server.poll(&path, &self.token, |_| true)
     }
 
-    fn verdict(&self, server: &Server, submission: &str) -> Value {
+    /// The submission after its validation run, which decides whether it is valid.
+    fn verdict(&self, server: &Server, id: &str) -> Value {
         server.poll(
-            &format!("/api/v1/submissions/{submission}"),
+            &format!("/api/v1/submissions/{id}"),
             &self.token,
             |answer| answer["state"] != "validating",
         )
     }
 
-    /// Starts the day and returns the path of the evaluation of this active submission.
+    /// Starts the evaluation day. Returns the API path of the evaluation of the team's active submission.
     fn evaluate(&self, server: &Server, submission: &Value) -> String {
         let day = start_day(server);
         evaluation_path(&day, submission)
@@ -135,8 +140,8 @@ fn start_day(server: &Server) -> Value {
 
 /// The API path of a submission's evaluation on a day.
 fn evaluation_path(day: &Value, submission: &Value) -> String {
-    let created = day["created"].as_array().expect("a day has evaluations");
-    let evaluation = created
+    let evaluations = day["created"].as_array().expect("a day has evaluations");
+    let evaluation = evaluations
         .iter()
         .find(|evaluation| evaluation["submission"] == submission["id"]);
     let id = &evaluation.expect("the submission was active at the cutoff")["id"];
@@ -160,9 +165,10 @@ fn entry(dataset: &mut ZipArchive<Cursor<Bytes>>, name: &str) -> Value {
     serde_json::from_reader(file).expect("it is JSON")
 }
 
-/// The result of the local evaluator for a bundle: with the seeds from a dataset's manifest, this number of episodes per
-/// task, and another number of workers than the server.
-fn score_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) -> Value {
+/// The result of the local evaluator (`faceoff eval`) for a bundle, with `episodes` per task and the seeds in a dataset's
+/// manifest: `seed` for the episodes, `mismatch_seed` for how the robot deviates from its published model. Two workers, since
+/// the number of workers must not affect the result.
+fn score_locally(bundle: &Path, manifest: &Value, episodes: u32, out_dir: &Path) -> Value {
     let seed = |name: &str| {
         manifest[name]
             .as_str()
@@ -176,9 +182,9 @@ fn score_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) -> 
         .args(["--profile", "evaluation", "--seed", seed("seed")])
         .args(["--mismatch-seed", seed("mismatch_seed"), "--workers", "2"])
         .arg("--config")
-        .arg(repository().join("tests/patient.toml"))
+        .arg(repository().join("tests/long_time_limits.toml"))
         .arg("--out")
-        .arg(out)
+        .arg(out_dir)
         .output()
         .expect("the program can be started");
     assert!(
@@ -186,11 +192,12 @@ fn score_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) -> 
         "{}",
         String::from_utf8_lossy(&local.stderr)
     );
-    let result = fs::read(out.join("results.json")).expect("the evaluator writes its result");
+    let result = fs::read(out_dir.join("results.json")).expect("the evaluator writes its result");
     serde_json::from_slice(&result).expect("it is JSON")
 }
 
-/// A result without its non-reproducible parts: computation times and the penalty points that follow from them.
+/// A result without its non-reproducible parts: computation times, and the penalty points and tiers that depend
+/// on them.
 fn without_times(result: &Value) -> Value {
     fn remove(object: &mut Value, fields: &[&str]) {
         let object = object

@@ -1,4 +1,5 @@
-//! Python packages: in an organiser's runtime, and in the bundle.
+//! Python packages that an agent imports: from a runtime (a folder with an interpreter and packages) of the organiser, here
+//! `python3-ml`, or from the team's own bundle.
 
 use crate::{CONFIG, commands::faceoff};
 use faceoff_tests::{
@@ -26,13 +27,13 @@ pub fn python3_ml_config() -> String {
     )
 }
 
-fn text(path: &Path) -> &str {
+fn path_text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are text")
 }
 
 /// Evaluates two episodes of `defend` and returns `results.json`.
 fn evaluate(bundle: &Path, out: &Path, options: &[&str]) -> Value {
-    let args = ["eval", text(bundle), "--out", text(out)];
+    let args = ["eval", path_text(bundle), "--out", path_text(out)];
     let size = ["--task", "defend", "--episodes", "2"];
     let output = faceoff(&[&args[..], &size, options].concat(), "").expect_success();
     assert!(!output.contains("fault:"), "{output}");
@@ -48,7 +49,7 @@ fn neural_network_runs_in_organiser_runtime() {
     // One worker gets separate CPUs if there are at least two; two workers share all CPUs.
     for workers in ["1", "2"] {
         let out = scratch.path().join(workers);
-        let options = ["--config", text(&config), "--workers", workers];
+        let options = ["--config", path_text(&config), "--workers", workers];
         let results = evaluate(&bundle, &out, &options);
         let task = &results["tasks"]["defend"];
         assert_eq!(task["episodes"], 2, "{results:#}");
@@ -72,41 +73,46 @@ fn server_and_doctor_report_contents_of_runtimes() {
             .unwrap_or_else(|| panic!("{name} is offered: {inventory:#}"))
             .clone()
     };
-    let (python, ml, native) = (runtime("python3"), runtime("python3-ml"), runtime("native"));
+    let (python, python_ml, native) =
+        (runtime("python3"), runtime("python3-ml"), runtime("native"));
     assert_eq!(
-        (&python["kind"], &ml["kind"]),
+        (&python["kind"], &python_ml["kind"]),
         (&json!("python"), &json!("python"))
     );
     assert_eq!(
-        python["version"], ml["version"],
-        "one is based on the other"
+        python["version"], python_ml["version"],
+        "python3-ml is based on python3"
     );
     assert_eq!(
         (&native["kind"], &native["libc"]),
-        (&json!("native"), &ml["libc"])
+        (&json!("native"), &python_ml["libc"])
     );
     assert_ne!(native["libc"], Value::Null);
-    let pinned = include_str!("../../docker/python3-ml/requirements.txt");
-    let mut packages = 0;
-    for line in pinned.lines() {
+    let requirements = include_str!("../../docker/python3-ml/requirements.txt");
+    let mut package_count = 0;
+    for line in requirements.lines() {
         if let Some((name, version)) = line.trim_end_matches(" \\").split_once("==") {
-            assert_eq!(ml["packages"][name], version, "{name}");
-            packages += 1;
+            assert_eq!(python_ml["packages"][name], version, "{name}");
+            package_count += 1;
         }
     }
-    let found = ml["packages"].as_object().expect("an object");
+    let packages = python_ml["packages"].as_object().expect("an object");
     assert_eq!(
-        found.len(),
-        packages,
-        "packages of the host are not visible: {ml:#}"
+        packages.len(),
+        package_count,
+        "packages of the host are not visible: {python_ml:#}"
     );
 
     let config = python3_ml_config_file(scratch.path());
-    let doctor = faceoff(&["doctor", "--config", text(&config)], "").expect_success();
+    let doctor = faceoff(&["doctor", "--config", path_text(&config)], "").expect_success();
     assert!(doctor.contains("numpy 2"), "{doctor}");
-    let gone = scratch.path().join("gone.toml");
-    fs::write(&gone, "[runtimes.python3-ml]\nfolder = \"/nowhere\"\n").expect("a scratch file");
-    let doctor = faceoff(&["doctor", "--config", text(&gone)], "").expect_success();
+    let missing_runtime = scratch.path().join("missing-runtime.toml");
+    fs::write(
+        &missing_runtime,
+        "[runtimes.python3-ml]\nfolder = \"/nowhere\"\n",
+    )
+    .expect("a scratch file");
+    let doctor = faceoff(&["doctor", "--config", path_text(&missing_runtime)], "").expect_success();
     for text in [
         "/nowhere/bin/python3 does not exist",
         "docker/runtime.sh /nowhere",
@@ -114,14 +120,20 @@ fn server_and_doctor_report_contents_of_runtimes() {
         assert!(doctor.contains(text), "{doctor}");
     }
     let data = scratch.path().join("unused");
-    let serve = ["serve", "--config", text(&gone), "--data-dir", text(&data)];
+    let serve = [
+        "serve",
+        "--config",
+        path_text(&missing_runtime),
+        "--data-dir",
+        path_text(&data),
+    ];
     faceoff(&serve, "").expect_refusal(1, &["runtimes.python3-ml", "docker/runtime.sh /nowhere"]);
 }
 
 #[test]
 fn bundle_with_compiled_package_is_evaluated() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let config = scratch.path().join("patient.toml");
+    let config = scratch.path().join("long_time_limits.toml");
     fs::write(&config, CONFIG).expect("a scratch file can be written");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let inventory: Value = server
@@ -132,16 +144,18 @@ fn bundle_with_compiled_package_is_evaluated() {
     let python = runtimes.iter().find(|runtime| runtime["name"] == "python3");
     let version = python.expect("python3 is offered")["version"].as_str();
     let mut parts = version.expect("it has a version").splitn(3, '.');
-    let minor = [parts.next(), parts.next()].map(|part| part.expect("three numbers"));
+    let major_and_minor =
+        [parts.next(), parts.next()].map(|part| part.expect("a version has three numbers"));
     let bundle = test_bundle("vendored", scratch.path());
-    vendor(&bundle, &minor.join("."));
-    let compiled = fs::read_dir(bundle.join("vendor/markupsafe")).expect("it was installed");
-    let mut names = compiled.map(|entry| entry.expect("a folder can be read").file_name());
+    // Installs packages for this version of Python into the bundle's folder `vendor`.
+    vendor(&bundle, &major_and_minor.join("."));
+    let installed_files = fs::read_dir(bundle.join("vendor/markupsafe")).expect("it was installed");
+    let mut names = installed_files.map(|entry| entry.expect("a folder can be read").file_name());
     assert!(names.any(|name| name.to_string_lossy().ends_with(".so")));
     let results = evaluate(
         &bundle,
         &scratch.path().join("out"),
-        &["--config", text(&config)],
+        &["--config", path_text(&config)],
     );
     assert_eq!(results["tasks"]["defend"]["episodes"], 2, "{results:#}");
 }

@@ -1,4 +1,5 @@
-//! The reference result for an evaluation under disturbances: the local evaluator repeats it.
+//! The reference result for an evaluation that other teams or clients try to disturb: the local evaluator `faceoff eval` repeats
+//! the evaluation with the same seeds.
 
 use crate::{Team, without_times};
 use faceoff_tests::{program, repository, server::Server};
@@ -7,7 +8,7 @@ use std::{fs, io::Cursor, path::Path, process::Command};
 
 /// A short evaluation of one task.
 pub const CONFIG: &str = concat!(
-    include_str!("../patient.toml"),
+    include_str!("../long_time_limits.toml"),
     r#"
 [evaluation]
 tasks = ["hit"]
@@ -18,8 +19,8 @@ slots = 1
 "#
 );
 
-/// Asserts that the evaluation of `bundle`, with [`CONFIG`], finishes at the first try and with the result of a local
-/// evaluation. Writes to the folder `scratch`.
+/// Asserts that the evaluation of `bundle`, with [`CONFIG`], finishes at the first attempt and with the result of a local
+/// evaluation. Files are written to the folder `scratch`.
 pub fn assert_undisturbed(
     server: &Server,
     team: &Team,
@@ -27,9 +28,9 @@ pub fn assert_undisturbed(
     bundle: &Path,
     scratch: &Path,
 ) {
-    let done = team.wait_until_finished(server, evaluation);
-    assert_eq!(done["state"], "finished", "{done:#}");
-    assert!(done["rerun_of"].is_null(), "{done:#}");
+    let finished = team.wait_until_finished(server, evaluation);
+    assert_eq!(finished["state"], "finished", "{finished:#}");
+    assert!(finished["rerun_of"].is_null(), "{finished:#}");
     let answer = server.get(&format!("{evaluation}/dataset"), Some(&team.token));
     assert_eq!(answer.status(), 200);
     let bytes = answer.bytes().expect("the download completes");
@@ -58,7 +59,7 @@ pub fn assert_undisturbed(
         .args(["--mismatch-seed", seed("mismatch_seed")])
         .args(["--workers", "1"])
         .arg("--config")
-        .arg(repository().join("tests/patient.toml"))
+        .arg(repository().join("tests/long_time_limits.toml"))
         .arg("--out")
         .arg(&out)
         .output()
@@ -67,9 +68,9 @@ pub fn assert_undisturbed(
     assert!(local.status.success(), "{errors}");
     let local = fs::read(out.join("results.json")).expect("the evaluator writes its result");
     let local: Value = serde_json::from_slice(&local).expect("a result is JSON");
-    // Visible since the download released the day.
-    let done = team.wait_until_finished(server, evaluation);
-    let retries = &done["result"]["timing"]["platform_retries"];
-    assert!(retries.is_null() || *retries == 0, "{done:#}");
-    assert_eq!(without_times(&done["result"]), without_times(&local));
+    // The download has released the day, so the result is visible from now on.
+    let finished = team.wait_until_finished(server, evaluation);
+    let retries = &finished["result"]["timing"]["platform_retries"];
+    assert!(retries.is_null() || *retries == 0, "{finished:#}");
+    assert_eq!(without_times(&finished["result"]), without_times(&local));
 }

@@ -1,4 +1,6 @@
-//! Remote workers with a real NATS server: equal results, network faults, kills, and workers that send false results.
+//! Remote workers with a real NATS server: equal results, network faults, kills, and workers that send false results. A *remote
+//! worker* is a process on another machine that runs jobs for the server. Jobs and results travel as messages through the
+//! message broker NATS, files through HTTP. A [`Relay`] is a TCP proxy between them that can delay and break connections.
 
 mod ablation;
 mod bucket;
@@ -13,7 +15,7 @@ mod shutdown;
 
 use crate::{
     Team, evaluation_path,
-    kills::{Archive, assert_same, copy_folder, outcome},
+    kills::{Archive, assert_same, copy_folder, wait_for_outcome},
     start_day,
 };
 use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server};
@@ -23,13 +25,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Episodes of each task; each is a shard.
+/// Episodes of each of the three tasks. Each episode is a shard, the job that a worker runs.
 const EPISODES: u32 = 4;
 /// Episodes of each task in tests that need many shards: see [`many_shards`].
 const MANY_EPISODES: u32 = 10;
 
-const COMMON: &str = concat!(
-    include_str!("../patient.toml"),
+/// Settings of servers and workers.
+const COMMON_CONFIG: &str = concat!(
+    include_str!("../long_time_limits.toml"),
     r#"
 [evaluation]
 episodes_per_task = 4
@@ -39,9 +42,9 @@ resident_bytes = 0
 "#
 );
 
-/// Configuration of a server that runs all jobs in its own slot.
+/// Configuration of a server that runs all jobs itself, one at a time.
 fn local_config() -> String {
-    format!("{COMMON}[workers]\nslots = 1\n")
+    format!("{COMMON_CONFIG}[workers]\nslots = 1\n")
 }
 
 /// The configuration with this number of episodes per task and per shard.
@@ -57,22 +60,23 @@ fn many_shards(config: &str) -> String {
     with_episodes(config, MANY_EPISODES, 1)
 }
 
-/// Configuration of a server that runs no jobs itself; remote workers transfer files at `files`.
-fn server_config(nats: &Nats, files: SocketAddr) -> String {
+/// Configuration of a server that runs no jobs itself (`play = false`). Remote workers transfer files at `files_address`.
+fn server_config(nats: &Nats, files_address: SocketAddr) -> String {
     format!(
-        "{COMMON}[workers]\nslots = 1\nplay = false\nlease_s = 10\n[nats]\nurl = \"{}\"\nfiles_url = \"http://{files}\"\n",
+        "{COMMON_CONFIG}[workers]\nslots = 1\nplay = false\nlease_s = 10\n[nats]\nurl = \"{}\"\nfiles_url = \"http://{files_address}\"\n",
         nats.url()
     )
 }
 
-/// Configuration of a worker that connects to NATS at this address.
-fn worker_config(nats: SocketAddr, slots: usize) -> String {
-    format!("{COMMON}[workers]\nslots = {slots}\n[nats]\nurl = \"nats://{nats}\"\n")
+/// Configuration of a worker that runs `slots` jobs at the same time and connects to NATS at this address.
+fn worker_config(nats_address: SocketAddr, slots: usize) -> String {
+    format!("{COMMON_CONFIG}[workers]\nslots = {slots}\n[nats]\nurl = \"nats://{nats_address}\"\n")
 }
 
-/// Creates a data folder with a queued evaluation of striker that has not started; returns its path and the team.
-fn queue_evaluation(data: &Path, scratch: &Path, config: &str) -> (String, Team) {
-    let server = Server::start(data, config);
+/// Creates a server's data folder with an evaluation of the agent `striker` that is queued. Its jobs are paused. Returns the
+/// API path of the evaluation, and its team.
+fn queue_evaluation(data_dir: &Path, scratch: &Path, config: &str) -> (String, Team) {
+    let server = Server::start(data_dir, config);
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &bundle::reference("striker", scratch));
     assert_eq!(submission["state"], "valid", "{submission:#}");
@@ -83,6 +87,7 @@ fn queue_evaluation(data: &Path, scratch: &Path, config: &str) -> (String, Team)
     (path, team)
 }
 
+/// Lets jobs start.
 fn resume(server: &Server) {
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     assert!(resumed.status().is_success(), "{}", resumed.status());
@@ -91,7 +96,8 @@ fn resume(server: &Server) {
 /// An evaluation for remote workers, and its result from a local slot.
 struct ReferenceRun {
     /// The data folder of a server on which the evaluation is queued.
-    data: PathBuf,
+    data_dir: PathBuf,
+    /// The API path of the evaluation.
     evaluation: String,
     team: Team,
     expected: (Value, Archive),
@@ -112,15 +118,15 @@ impl ReferenceRun {
     }
 
     fn prepare_with(scratch: &Path, config: &str, episodes: usize) -> Self {
-        let [data, local_data] = ["data", "local"].map(|name| scratch.join(name));
-        let (evaluation, team) = queue_evaluation(&data, scratch, config);
-        copy_folder(&data, &local_data);
-        let local_server = Server::start(&local_data, config);
+        let [data_dir, local_data_dir] = ["data", "local"].map(|name| scratch.join(name));
+        let (evaluation, team) = queue_evaluation(&data_dir, scratch, config);
+        copy_folder(&data_dir, &local_data_dir);
+        let local_server = Server::start(&local_data_dir, config);
         resume(&local_server);
-        let expected = outcome(&local_server, &team, &evaluation);
+        let expected = wait_for_outcome(&local_server, &team, &evaluation);
         local_server.kill();
         Self {
-            data,
+            data_dir,
             evaluation,
             team,
             expected,
@@ -130,7 +136,7 @@ impl ReferenceRun {
 
     /// Waits for the end of the evaluation, and asserts that result and dataset equal the reference.
     fn assert_equal_result(&self, server: &Server) {
-        let found = outcome(server, &self.team, &self.evaluation);
+        let found = wait_for_outcome(server, &self.team, &self.evaluation);
         let evaluation = server.poll(&self.evaluation, &self.team.token, |_| true);
         let submission = evaluation["submission"]
             .as_str()
@@ -141,10 +147,10 @@ impl ReferenceRun {
     }
 }
 
-/// Starts a server on the data of a reference run, with `files` connected to it.
-fn start_server(reference_run: &ReferenceRun, config: &str, files: &Relay) -> Server {
-    let server = Server::start(&reference_run.data, config);
-    files.set_target(server.address().into());
+/// Starts a server on the data of a reference run, and connects the relay for files to it.
+fn start_server(reference_run: &ReferenceRun, config: &str, file_relay: &Relay) -> Server {
+    let server = Server::start(&reference_run.data_dir, config);
+    file_relay.set_target(server.address().into());
     server
 }
 

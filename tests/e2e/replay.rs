@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG, Team,
-    axe::{axe, faults},
+    axe::{axe_script, faults},
     evaluation_path, start_day,
 };
 use faceoff_replay::Clip;
@@ -238,7 +238,7 @@ fn compared_replays_run_in_step() {
     page.wait_until(
         "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.step == '12')",
     );
-    let axe = axe();
+    let axe = axe_script();
     let mut found = faults(&page, &axe, "an episode twice");
     page.set_view(View::DESKTOP);
     page.go_to(&format!("{}{a}/compare/{other}", server.url));

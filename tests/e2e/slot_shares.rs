@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, path::Path};
 
 /// One slot, small shards, and time limits that a sleeping agent exceeds.
 const CONFIG: &str = concat!(
-    include_str!("../patient.toml"),
+    include_str!("../long_time_limits.toml"),
     r#"
 [evaluation]
 tasks = ["prepare"]

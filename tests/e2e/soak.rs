@@ -4,13 +4,13 @@
 #![expect(clippy::print_stdout, reason = "it prints a summary of its run")]
 
 use crate::{
-    Team, dataset, entry, evaluation_path, kills::draw, log_growth::LOG_LIMIT_BYTES, score_locally,
+    Team, dataset, entry, evaluation_path, kills::draw, log_growth::WAL_LIMIT_BYTES, score_locally,
     start_day, upgrade, without_times,
 };
 use faceoff_tests::{
     bundle::{pack, python_agent, python_bundle, reference},
     server::{Server, http},
-    small_disk::{FilledDisk, LogTo, SmallDisk},
+    small_disk::{FilledDisk, LogTarget, SmallDisk},
 };
 use reqwest::blocking::{Client, RequestBuilder};
 use serde_json::Value;
@@ -221,10 +221,10 @@ fn disturbed_server_reaches_undisturbed_results() {
     let config = format!(
         "{}\n[server]\nmin_free_bytes = {}\n[evaluation]\nepisodes_per_task = {episodes}\n\
          episodes_per_shard = 3\n[workers]\nslots = 1\nlease_s = 5\n",
-        include_str!("../patient.toml"),
+        include_str!("../long_time_limits.toml"),
         8 << 20,
     );
-    let mut disk = SmallDisk::start(folder, (256 + 24 * minutes) << 20, &config, LogTo::Test);
+    let mut disk = SmallDisk::start(folder, (256 + 24 * minutes) << 20, &config, LogTarget::Test);
     let server = &disk.server;
     let striker = reference("striker", folder);
     let contestants = [
@@ -319,8 +319,9 @@ fn disturbed_server_reaches_undisturbed_results() {
     }
     assert_eq!(server.get("/api/v1/health", None).status(), 200);
     assert_no_unexpected_errors(&server.log());
-    let log = fs::metadata(disk.data_dir.join("faceoff.sqlite3-wal")).map_or(0, |file| file.len());
-    assert!(log < LOG_LIMIT_BYTES, "{log} bytes");
+    let wal = fs::metadata(disk.data_dir.join("faceoff.sqlite3-wal"));
+    let wal_bytes = wal.map_or(0, |file| file.len());
+    assert!(wal_bytes < WAL_LIMIT_BYTES, "{wal_bytes} bytes");
     let tally = lock(&soak.tally.0).clone();
     println!(
         "{minutes} minutes: {tally:#?}; {} accepted uploads, {episodes} episodes of each task",

@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG, Team,
-    axe::{axe, faults},
+    axe::{axe_script, faults},
     commands::admin,
 };
 use faceoff_tests::{
@@ -19,7 +19,7 @@ fn mark(page: &Page) {
 
 #[test]
 fn round_pages_update_live_and_can_hide_results() {
-    let axe = axe();
+    let axe = axe_script();
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     for name in ["Ada", "Bob"] {

@@ -30,8 +30,8 @@ from pathlib import Path
 
 TEAMS = 20
 EPISODES = 50  # of each task
-OFFERED_PER_S = 500
-CONNECTIONS = 10  # more connections with the same pace would send bursts
+OFFERED_PER_S = 500  # requests during evaluations
+CONNECTIONS = 10  # more connections at the same rate would send bursts
 
 CONFIG = f"""
 [server]
@@ -112,6 +112,7 @@ def slow_answers(evaluations: list[dict]) -> int:
 
 
 def wrk(url: str, connections: int, seconds: int) -> dict:
+    """Runs the load generator wrk: as many requests as the connections can send. Returns rates and latencies."""
     command = ["wrk", "--latency", "-t1", f"-c{connections}", f"-d{seconds}s", url]
     output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     refused = re.search(r"Non-2xx or 3xx responses: (\d+)", output)
@@ -128,12 +129,13 @@ def wrk(url: str, connections: int, seconds: int) -> dict:
 
 
 def percentile(times_ms: list[float], share: float) -> float:
-    """The nearest rank."""
+    """The smallest time that at least this share of all times does not exceed."""
     return round(sorted(times_ms)[math.ceil(share * len(times_ms)) - 1], 1)
 
 
 def hey(url: str, connections: int, seconds: int, per_s: int | None = None) -> dict:
-    """Sends requests over `connections` connections: `per_s` in total, or without it as many as possible. Returns rates and latencies."""
+    """Runs the load generator hey over `connections` connections. It sends `per_s` requests per second in
+    total, or without it as many as possible. Returns rates and latencies."""
     command = ["hey", "-z", f"{seconds}s", "-c", str(connections), "-o", "csv"]
     if per_s is not None:
         command += ["-q", str(per_s / connections)]
@@ -149,7 +151,7 @@ def hey(url: str, connections: int, seconds: int, per_s: int | None = None) -> d
     }
 
 
-def payload(url: str) -> int:
+def payload_bytes(url: str) -> int:
     with urllib.request.urlopen(url) as answer:
         return len(answer.read())
 
@@ -181,14 +183,14 @@ def run(season: Season, archive: bytes) -> None:
     created = [one["id"] for one in day["created"]]
 
     def results(ids: list[str]) -> list[dict]:
-        """The results once the day is released: fouls are hidden before."""
+        """The results once the day is released: violations are hidden before."""
         ended = [season.wait_until(f"/api/v1/evaluations/{one}", admin, is_over) for one in ids]
         assert all(one["state"] == "finished" for one in ended), ended
         return [season.wait_until(f"/api/v1/evaluations/{one}", admin, is_released) for one in ids]
 
     quiet = results(created)
     board, data = season.url + "/", season.url + "/api/v1/board"
-    print(f"{TEAMS} teams on the board; page {payload(board)} bytes, JSON {payload(data)} bytes")
+    print(f"{TEAMS} teams on the board; page {payload_bytes(board)} bytes, JSON {payload_bytes(data)} bytes")
     print(f"without visitors: {slow_answers(quiet)} episodes with slow answers")
 
     print("idle, 32 connections:")
@@ -217,13 +219,13 @@ def run(season: Season, archive: bytes) -> None:
         assert rounds, "the evaluations ended before the load started"
         assert found == 0, "visitors slowed agents down"
 
-    def paced_load() -> list[dict]:
+    def fixed_rate_load() -> list[dict]:
         with ThreadPoolExecutor() as pool:
             half = OFFERED_PER_S // 2
             parts = [pool.submit(hey, url, CONNECTIONS // 2, 10, half) for url in (board, data)]
             return [part.result() for part in parts]
 
-    measure(f"{OFFERED_PER_S} requests per second during evaluations", paced_load)
+    measure(f"{OFFERED_PER_S} requests per second during evaluations", fixed_rate_load)
     measure("256 connections during evaluations", lambda: hey(board, 256, 10))
 
 

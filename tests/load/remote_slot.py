@@ -1,4 +1,4 @@
-"""Compares a slot of a remote worker with one of the server's own, over the loopback interface.
+"""Compares a slot (a place for one running job) of a remote worker with one of the server's own, over the loopback interface.
 
     python3 tests/load/remote_slot.py target/release/faceoff [ROUNDS]
 
@@ -112,8 +112,8 @@ class Season:
             entry = json.loads(line)
             fields = entry["fields"]
             if fields["message"] == "played" or " episodes " in fields.get("description", ""):
-                at = datetime.fromisoformat(entry["timestamp"].replace("Z", "+00:00")).timestamp()
-                times.get(fields["message"], []).append(at)
+                time_s = datetime.fromisoformat(entry["timestamp"].replace("Z", "+00:00")).timestamp()
+                times.get(fields["message"], []).append(time_s)
         assert all(len(shard_times) == SHARDS for shard_times in times.values()), times
         return ShardTimes(**times)
 
@@ -151,7 +151,7 @@ def main() -> None:
                         shard_times[kind], cpu[kind] = season.evaluate(), season.cpu_s()
                     finally:
                         season.stop()
-                times = {kind: of_kind.total() for kind, of_kind in shard_times.items()}
+                times = {kind: season_times.total() for kind, season_times in shard_times.items()}
                 for kind, all_gaps in gaps.items():
                     all_gaps += shard_times[kind].gaps()
                     durations += shard_times[kind].durations()

@@ -1,4 +1,4 @@
-"""An S3 server on this machine. Prints its address, and serves until its input ends.
+"""An S3 server (object storage, by moto) on this machine for tests. Prints its address, and serves until its input ends.
 
     TARGET/s3-test/bin/python tests/s3/server.py
 """

@@ -454,7 +454,7 @@ fn console_error(event: &Value) -> Option<String> {
     is_error.then(|| params.to_string())
 }
 
-/// The connection to the browser: a pipe for commands and one for answers and events.
+/// The connection to the browser by its DevTools protocol: a pipe for commands and one for answers and events.
 #[derive(Debug)]
 struct DevTools {
     commands: Mutex<ChildStdin>,

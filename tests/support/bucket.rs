@@ -1,4 +1,4 @@
-//! A local server with the protocol of S3, and a bucket on it.
+//! A local server with the protocol of S3 (object storage), and a bucket, a store for files, on it.
 
 use crate::{
     repository,

@@ -1,4 +1,4 @@
-//! Bundles: the reference agents, and small Python agents written by a test.
+//! Bundles (the folder or archive of an agent, as a team uploads it): the reference agents, and small Python agents written by a test.
 
 use crate::{program, repository};
 use flate2::{Compression, write::GzEncoder};
@@ -7,17 +7,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folder of a reference agent, with its program.
+/// The folder of a reference agent, with its program. A compiled agent is copied below `scratch`.
 ///
 /// # Panics
-/// If the agent is unknown or cannot be copy_folder.
+/// If the agent is unknown or cannot be copied.
 #[must_use]
-pub fn reference(name: &str, into: &Path) -> PathBuf {
+pub fn reference(name: &str, scratch: &Path) -> PathBuf {
     let source = repository().join("agents").join(name);
     if name != "striker" {
         return source;
     }
-    let folder = into.join("striker");
+    let folder = scratch.join("striker");
     fs::create_dir_all(&folder).expect("a scratch folder can be made");
     fs::copy(source.join("agent.toml"), folder.join("agent.toml")).expect("striker has agent.toml");
     fs::copy(program("striker"), folder.join("striker")).expect("striker is built");
@@ -77,15 +77,15 @@ pub fn python_bundle(folder: &Path, name: &str, source: &str) -> PathBuf {
 /// Copies a folder of files.
 ///
 /// # Panics
-/// If it has subfolders or cannot be copy_folder.
+/// If it has subfolders or cannot be copied.
 #[must_use]
-pub(crate) fn copy_folder(folder: &Path, to: &Path) -> PathBuf {
-    fs::create_dir_all(to).expect("a scratch folder can be made");
+pub(crate) fn copy_folder(folder: &Path, target: &Path) -> PathBuf {
+    fs::create_dir_all(target).expect("a scratch folder can be made");
     for entry in fs::read_dir(folder).expect("the folder is there") {
         let entry = entry.expect("a folder can be read");
-        fs::copy(entry.path(), to.join(entry.file_name())).expect("the folder has files only");
+        fs::copy(entry.path(), target.join(entry.file_name())).expect("the folder has files only");
     }
-    to.to_path_buf()
+    target.to_path_buf()
 }
 
 /// Packs the folder as a `.tar.gz`.

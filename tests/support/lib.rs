@@ -13,6 +13,7 @@ pub mod worker;
 
 use std::path::PathBuf;
 
+/// The root folder of this repository.
 #[must_use]
 pub fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

@@ -1,4 +1,4 @@
-//! A real `nats-server` with JetStream.
+//! A real `nats-server`, the message broker between server and remote workers, with its message store JetStream.
 
 use crate::server::{Process, TIMEOUT};
 use std::{

@@ -7,6 +7,7 @@ use std::{
     process::Command,
 };
 
+/// Cargo's target folder.
 fn target() -> PathBuf {
     let programs = program("faceoff");
     let target = programs.ancestors().nth(2);
@@ -30,15 +31,15 @@ pub fn python3_ml() -> PathBuf {
     Path::new(folder.trim_end_matches('\n')).join("python3-ml")
 }
 
-/// Copies the bundle `tests/bundles/NAME`, with the protocol module that it needs.
+/// Copies the bundle `tests/bundles/NAME` below `scratch`, with the protocol module that it needs.
 ///
 /// # Panics
 /// If it cannot be copied.
 #[must_use]
-pub fn test_bundle(name: &str, into: &Path) -> PathBuf {
+pub fn test_bundle(name: &str, scratch: &Path) -> PathBuf {
     let folder = copy_folder(
         &repository().join("tests/bundles").join(name),
-        &into.join(name),
+        &scratch.join(name),
     );
     let protocol = repository().join("agents/hold/protocol.py");
     fs::copy(protocol, folder.join("protocol.py")).expect("a scratch file can be written");

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-/// Which connections break, drawn from a seed.
+/// Which connections break, and when. Random numbers from a seed decide it.
 #[derive(Debug, Clone, Copy)]
 pub struct ConnectionBreaks {
     pub seed: u64,
@@ -30,9 +30,9 @@ impl ConnectionBreaks {
     }
 }
 
-/// SplitMix64.
-const fn draw(seed: u64, n: u64) -> u64 {
-    let x = seed.wrapping_add(n.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+/// The number with this index of the random generator SplitMix64.
+const fn draw(seed: u64, index: u64) -> u64 {
+    let x = seed.wrapping_add(index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     x ^ (x >> 31)
@@ -45,6 +45,7 @@ pub struct Relay {
     link: Arc<Mutex<Link>>,
 }
 
+/// The state of a relay, which its threads share.
 #[derive(Debug, Default)]
 struct Link {
     /// `None`: connections are dropped.
@@ -71,8 +72,8 @@ impl Relay {
         thread::spawn({
             let link = Arc::clone(&link);
             move || {
-                for near in listener.incoming().map_while(Result::ok) {
-                    forward_connection(&link, near);
+                for client in listener.incoming().map_while(Result::ok) {
+                    forward_connection(&link, client);
                 }
             }
         });
@@ -85,8 +86,8 @@ impl Relay {
     }
 
     /// Sets the target of new connections.
-    pub fn set_target(&self, to: SocketAddr) {
-        self.link().target = Some(to);
+    pub fn set_target(&self, target: SocketAddr) {
+        self.link().target = Some(target);
     }
 
     /// Delays each chunk in both directions from now on.
@@ -123,7 +124,7 @@ impl Relay {
 }
 
 /// Forwards a connection in both directions, or drops it.
-fn forward_connection(link: &Arc<Mutex<Link>>, near: TcpStream) {
+fn forward_connection(link: &Arc<Mutex<Link>>, client: TcpStream) {
     let (target, bytes_until_break) = {
         let mut link = link
             .lock()
@@ -139,10 +140,10 @@ fn forward_connection(link: &Arc<Mutex<Link>>, near: TcpStream) {
         }
         (link.target, bytes_until_break)
     };
-    let Some(far) = target.and_then(|target| TcpStream::connect(target).ok()) else {
+    let Some(server) = target.and_then(|target| TcpStream::connect(target).ok()) else {
         return;
     };
-    let ends = [(&near, &far), (&far, &near)];
+    let ends = [(&client, &server), (&server, &client)];
     let ends = ends.map(|(from, to)| Some((from.try_clone().ok()?, to.try_clone().ok()?)));
     let [Some(outbound), Some(inbound)] = ends else {
         return;
@@ -151,18 +152,24 @@ fn forward_connection(link: &Arc<Mutex<Link>>, near: TcpStream) {
         let mut link = link
             .lock()
             .expect("no thread panics while it holds the link");
-        link.open.push(near);
-        link.open.push(far);
+        link.open.push(client);
+        link.open.push(server);
     }
-    // Bytes left in both directions together; `None`: the connection does not break.
-    let left = bytes_until_break.map(|bytes| Arc::new(Mutex::new(bytes)));
+    // In both directions together; `None`: the connection does not break.
+    let remaining_bytes = bytes_until_break.map(|bytes| Arc::new(Mutex::new(bytes)));
     for (from, to) in [outbound, inbound] {
-        let (link, left) = (Arc::clone(link), left.clone());
-        thread::spawn(move || forward(&link, from, to, left.as_deref()));
+        let (link, remaining_bytes) = (Arc::clone(link), remaining_bytes.clone());
+        thread::spawn(move || forward(&link, from, to, remaining_bytes.as_deref()));
     }
 }
 
-fn forward(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Option<&Mutex<u64>>) {
+/// Forwards one direction of a connection, until it ends or breaks.
+fn forward(
+    link: &Mutex<Link>,
+    mut from: TcpStream,
+    mut to: TcpStream,
+    remaining_bytes: Option<&Mutex<u64>>,
+) {
     let mut chunk = vec![0; 1 << 16];
     loop {
         let bytes = from.read(&mut chunk).unwrap_or_default();
@@ -173,7 +180,7 @@ fn forward(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Opt
         if !delay.is_zero() {
             thread::sleep(delay);
         }
-        let forwarded = left.map_or(bytes, |left| take_bytes(left, bytes));
+        let forwarded = remaining_bytes.map_or(bytes, |remaining| take_bytes(remaining, bytes));
         if bytes == 0 || to.write_all(&chunk[..forwarded]).is_err() {
             break;
         }
@@ -193,12 +200,12 @@ fn forward(link: &Mutex<Link>, mut from: TcpStream, mut to: TcpStream, left: Opt
     let _ = to.shutdown(Shutdown::Write);
 }
 
-/// Takes up to this number from the bytes that are left.
-fn take_bytes(left: &Mutex<u64>, bytes: usize) -> usize {
-    let mut left = left
+/// Takes up to `bytes` from the remaining bytes; returns the number taken.
+fn take_bytes(remaining: &Mutex<u64>, bytes: usize) -> usize {
+    let mut remaining = remaining
         .lock()
         .expect("no thread panics while it holds the number");
-    let taken = usize::try_from(*left).map_or(bytes, |left| left.min(bytes));
-    *left -= taken as u64;
+    let taken = usize::try_from(*remaining).map_or(bytes, |remaining| remaining.min(bytes));
+    *remaining -= taken as u64;
     taken
 }

@@ -199,17 +199,17 @@ impl Server {
         self.process.kill();
     }
 
-    /// Starts the server and kills it `later` after `reached` returns true for an entry of its log. The log has each
+    /// Starts the server, and kills it `delay` after `is_moment` has returned true for an entry of its log. The log has each
     /// statement of the database and goes through a pipe of one page. So the server is at most one page of log ahead of
-    /// what `reached` has seen.
+    /// the entry that `is_moment` has seen.
     ///
     /// # Panics
     /// If the server cannot be started, or ends before.
     pub fn start_and_kill(
         data_dir: &Path,
         config: &str,
-        mut reached: impl FnMut(&Value) -> bool,
-        later: Duration,
+        mut is_moment: impl FnMut(&Value) -> bool,
+        delay: Duration,
     ) {
         let (log, writer) = io::pipe().expect("there are pipes");
         rustix::pipe::fcntl_setpipe_size(&log, PAGE_BYTES).expect("a pipe can be made smaller");
@@ -229,12 +229,11 @@ impl Server {
             assert!(length > 0, "the server ended before it was killed");
             let entry = serde_json::from_str(&line)
                 .unwrap_or_else(|error| panic!("a line of the log: {error}: {line}"));
-            if reached(&entry) {
+            if is_moment(&entry) {
                 break;
             }
         }
-        // The delay is part of the drawn moment.
-        thread::sleep(later);
+        thread::sleep(delay);
         // The log's pipe is still full, so the server cannot run ahead.
         drop(process);
     }
@@ -287,19 +286,19 @@ impl Server {
             .expect("the server answers")
     }
 
-    /// Repeats `GET path` until `done` returns true; returns the last response.
+    /// Repeats `GET path` until `is_done` returns true; returns the last response.
     ///
     /// # Panics
     /// After [`TIMEOUT`], with the last answer.
     #[must_use]
-    pub fn poll(&self, path: &str, token: &str, done: impl Fn(&Value) -> bool) -> Value {
+    pub fn poll(&self, path: &str, token: &str, is_done: impl Fn(&Value) -> bool) -> Value {
         let started = Instant::now();
         loop {
             let answer: Value = self
                 .get(path, Some(token))
                 .json()
                 .expect("the API speaks JSON");
-            if done(&answer) {
+            if is_done(&answer) {
                 return answer;
             }
             assert!(

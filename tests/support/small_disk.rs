@@ -23,6 +23,7 @@ use std::{
 };
 
 const PAGE_BYTES: usize = 4096;
+/// The file that fills the disk.
 const FILLER: &str = "filler";
 
 /// Mounts a disk of size `$0` at `$1`, prints `mounted`, and holds it until its input ends.
@@ -31,9 +32,9 @@ const MOUNT_AND_HOLD: &str =
 /// Runs the arguments, with standard error appended to the file `$0` unless that is empty.
 const LOG_AND_RUN: &str = r#"if [ -n "$0" ]; then exec "$@" 2>>"$0"; else exec "$@"; fi"#;
 
-/// Where the server's log goes.
+/// The destination of the server's log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LogTo {
+pub enum LogTarget {
     /// The pipe that [`Server::log`] reads.
     Test,
     /// A file on the small disk, [`SmallDisk::log_file`].
@@ -111,11 +112,11 @@ impl MountedDisk {
 struct ServerDisk {
     disk: MountedDisk,
     config_file: PathBuf,
-    log: LogTo,
+    log: LogTarget,
 }
 
 impl ServerDisk {
-    fn mount(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
+    fn mount(folder: &Path, bytes: u64, config: &str, log: LogTarget) -> Self {
         let config_file = folder.join("faceoff.toml");
         fs::create_dir_all(folder).expect("a scratch folder can be made");
         fs::write(&config_file, config).expect("a scratch file can be written");
@@ -136,8 +137,8 @@ impl ServerDisk {
         command
             .args(["sh", "-c", LOG_AND_RUN])
             .arg(match self.log {
-                LogTo::Test => PathBuf::new(),
-                LogTo::Disk => self.disk.mount.join("log"),
+                LogTarget::Test => PathBuf::new(),
+                LogTarget::Disk => self.disk.mount.join("log"),
             })
             .arg(program("faceoff"));
         add_serve_arguments(&mut command, &self.disk.mount, &self.config_file);
@@ -152,7 +153,7 @@ impl SmallDisk {
     /// # Panics
     /// If it does not start: this needs root, as the sandbox does.
     #[must_use]
-    pub fn start(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
+    pub fn start(folder: &Path, bytes: u64, config: &str, log: LogTarget) -> Self {
         let disk = ServerDisk::mount(folder, bytes, config, log);
         Self {
             server: disk.start_server(),
@@ -161,17 +162,17 @@ impl SmallDisk {
         }
     }
 
-    /// Kills the server, calls `between`, and starts a new server on the same disk.
+    /// Kills the server, calls `change`, which may change the disk, and starts a new server on it.
     ///
     /// # Panics
     /// If the new server does not start.
-    pub fn kill_and_restart(&mut self, between: impl FnOnce()) {
+    pub fn kill_and_restart(&mut self, change: impl FnOnce()) {
         self.server.kill_process();
-        between();
+        change();
         self.server = self.disk.start_server();
     }
 
-    /// The log file on the disk, for [`LogTo::Disk`].
+    /// The log file on the disk, for [`LogTarget::Disk`].
     #[must_use]
     pub fn log_file(&self) -> PathBuf {
         self.data_dir.join("log")
@@ -247,7 +248,7 @@ pub struct FilledDisk {
 }
 
 impl FilledDisk {
-    /// Fills the disk of a data folder as [`SmallDisk::full`] does.
+    /// Fills the disk of a data folder as [`SmallDisk::fill`] does.
     ///
     /// # Panics
     /// If the disk does not fill up.

@@ -1,4 +1,4 @@
-//! A real `faceoff worker` as a child process.
+//! A real `faceoff worker` (a process that runs jobs of a server) as a child process.
 
 use crate::{
     program,

@@ -42,8 +42,8 @@ class Check(unittest.TestCase):
         listed = words.Words(words.HERE / "words.toml")
         listed.exceptions = [{"file": "docs/a.md", "text": "anew, he wrote", "reason": "a quotation"}]
         quoted = list(listed.check("docs/a.md", "Begin anew, he wrote.\nBegin anew.\n"))
-        self.assertEqual([finding.line for finding in listed.left(quoted)], [2])
-        self.assertIn("nothing needs", str(listed.left([])[0]))
+        self.assertEqual([finding.line for finding in listed.remaining(quoted)], [2])
+        self.assertIn("nothing needs", str(listed.remaining([])[0]))
 
     def test_planted_word_fails_the_command(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -24,6 +24,8 @@ PYTHON_TEST = re.compile(r"^\s*def\s+test_(\w+)\(")
 
 @dataclass(frozen=True)
 class Finding:
+    """A word that may not be used: `found`, in a line with this text, and what to write in its place."""
+
     file: str
     line: int
     found: str
@@ -90,23 +92,23 @@ class Words:
         if name.split("_")[0] in self.beginnings:
             yield finding(name, "a test is named subject_condition_expectation")
 
-    def left(self, findings: list[Finding]) -> list[Finding]:
+    def remaining(self, findings: list[Finding]) -> list[Finding]:
         """Findings without an exception, and exceptions without a finding."""
         unused = list(range(len(self.exceptions)))
-        left = []
+        remaining = []
         for finding in findings:
-            fits = [
-                at
-                for at, exception in enumerate(self.exceptions)
+            matching = [
+                index
+                for index, exception in enumerate(self.exceptions)
                 if Path(finding.file).match(exception["file"]) and exception["text"] in finding.text
             ]
-            unused = [at for at in unused if at not in fits]
-            if not fits:
-                left.append(finding)
-        for at in unused:
-            exception = self.exceptions[at]
-            left.append(Finding(exception["file"], 0, exception["text"], exception["reason"], "an exception that nothing needs"))
-        return left
+            unused = [index for index in unused if index not in matching]
+            if not matching:
+                remaining.append(finding)
+        for index in unused:
+            exception = self.exceptions[index]
+            remaining.append(Finding(exception["file"], 0, exception["text"], exception["reason"], "an exception that nothing needs"))
+        return remaining
 
 
 def files(folder: Path) -> list[str]:
@@ -128,7 +130,7 @@ def check(folder: Path, words: Words) -> list[Finding]:
         path = folder / file
         if not file.startswith(words.leave_out) and path.is_file():
             findings += words.check(file, path.read_text())
-    return words.left(findings)
+    return words.remaining(findings)
 
 
 def main() -> None:

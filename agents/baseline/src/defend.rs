@@ -7,19 +7,22 @@ use striker::scene::{MalletCommand, Scene};
 
 use crate::guard::guard;
 
-/// x of the interception, metres.
-const LINE_X: f64 = -0.56;
+/// x of the line at which the puck is intercepted, metres.
+const INTERCEPTION_X: f64 = -0.56;
 /// Prediction horizon for the crossing, seconds.
 const HORIZON: f64 = 2.0;
-/// Within this time before the contact the plan is kept, seconds.
+/// A plan whose contact is nearer than this is not changed any more, seconds.
 const PLAN_TIME: f64 = 0.6;
-/// Speed of the mallet's retreat as a share of the puck's speed.
+/// Speed of the mallet's retreat as a share of the puck's speed. 0: this agent does not cushion the contact, unlike `striker`.
 const RETREAT_SHARE: f64 = 0.0;
 
 #[derive(Debug, Clone, Copy)]
 struct Interception {
+    /// Time of the contact, seconds since the episode's start.
     time: f64,
+    /// Position of the mallet at contact.
     mallet: Vec2,
+    /// Velocity of the mallet at contact.
     velocity: Vec2,
 }
 
@@ -35,42 +38,42 @@ impl Defend {
 
     /// The command for this control step.
     pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
-        let kept = self
+        let valid_plan = self
             .interception
-            .filter(|m| m.time - scene.time < PLAN_TIME && m.time - scene.time > -0.06);
-        self.interception = kept.or_else(|| find_crossing(scene));
-        let Some(m) = self.interception else {
+            .filter(|plan| plan.time - scene.time < PLAN_TIME && plan.time - scene.time > -0.06);
+        self.interception = valid_plan.or_else(|| find_crossing(scene));
+        let Some(plan) = self.interception else {
             return guard(scene);
         };
-        let left = m.time - scene.time;
-        if left < 0.5 * scene.dt {
-            return MalletCommand::coast(scene, m.velocity, Posture::Free);
+        let time_left = plan.time - scene.time;
+        if time_left < 0.5 * scene.dt {
+            return MalletCommand::coast(scene, plan.velocity, Posture::Free);
         }
         MalletCommand::new(
             Target {
-                pos: m.mallet,
-                vel: m.velocity,
-                time: left,
+                pos: plan.mallet,
+                vel: plan.velocity,
+                time: time_left,
             },
             Posture::Free,
         )
     }
 }
 
-/// Position and time at which the puck crosses the line.
+/// The interception where the puck will cross the line at [`INTERCEPTION_X`]; `None` if it does not.
 fn find_crossing(scene: &Scene<'_>) -> Option<Interception> {
     let mut puck = scene.puck;
-    let mut left = 0.0;
-    while left < HORIZON {
+    let mut time_left = 0.0;
+    while time_left < HORIZON {
         if !puck.advance(scene.field, scene.dt) {
             return None;
         }
-        left += scene.dt;
-        if puck.pos.x < LINE_X + scene.field.contact() {
+        time_left += scene.dt;
+        if puck.pos.x < INTERCEPTION_X + scene.field.contact_distance() {
             let speed = puck.vel.norm();
-            let mallet = puck.pos + scene.field.contact() * puck.vel / speed.max(1e-3);
+            let mallet = puck.pos + scene.field.contact_distance() * puck.vel / speed.max(1e-3);
             return Some(Interception {
-                time: scene.time + left,
+                time: scene.time + time_left,
                 mallet: scene.field.clamp_mallet(mallet),
                 velocity: RETREAT_SHARE * puck.vel,
             });

@@ -6,26 +6,29 @@ use striker::motion::{Pace, Target};
 use striker::scene::{MalletCommand, Scene, lean_side, waypoint};
 
 /// Speed of the mallet at the contact, m/s.
-const SPEED: f64 = 0.84;
+const STRIKE_SPEED: f64 = 0.84;
 /// Length of the run-up, metres.
-const RUN_UP: f64 = 0.14;
+const RUN_UP_LENGTH: f64 = 0.14;
+/// Largest acceleration of the mallet in a strike, m/s².
+const STRIKE_ACCELERATION: f64 = 30.0;
 /// The strike begins when the mallet is this close to the start of the run-up, metres.
-const BEHIND: f64 = 0.01;
+const START_TOLERANCE: f64 = 0.01;
 /// Time for the mallet to stop after the contact, seconds.
 const STOP_TIME: f64 = 0.3;
 
 #[derive(Debug, Clone, Copy)]
 enum Phase {
+    /// Moves to the start of the run-up.
     Approach,
+    /// Accelerates until the contact. Times are in seconds since the episode's start.
     Strike {
-        contact: f64,
+        contact_time: f64,
+        /// Position of the mallet at contact.
         mallet: Vec2,
         velocity: Vec2,
     },
-    Stop {
-        until: f64,
-        pos: Vec2,
-    },
+    /// Comes to rest at `pos`.
+    Stop { end_time: f64, pos: Vec2 },
 }
 
 #[derive(Debug, Clone)]
@@ -50,19 +53,19 @@ impl Hit {
         match self.phase {
             Phase::Approach => self.approach(scene),
             Phase::Strike {
-                contact,
+                contact_time,
                 mallet,
                 velocity,
-            } => self.strike(scene, contact, mallet, velocity),
-            Phase::Stop { until, pos } => {
-                let left = until - scene.time;
-                if left < scene.dt {
+            } => self.strike(scene, contact_time, mallet, velocity),
+            Phase::Stop { end_time, pos } => {
+                let time_left = end_time - scene.time;
+                if time_left < scene.dt {
                     self.phase = Phase::Approach;
                 }
                 let target = Target {
                     pos,
                     vel: Vec2::zeros(),
-                    time: left.max(scene.dt),
+                    time: time_left.max(scene.dt),
                 };
                 MalletCommand::new(target, Posture::Ready(lean_side(pos)))
             }
@@ -73,21 +76,21 @@ impl Hit {
         let field = scene.field;
         let goal = Vec2::new(field.half_length, 0.0);
         // Position of the puck at contact if the run-up begins now.
-        let time = 2.0 * RUN_UP / SPEED;
+        let run_up_time = 2.0 * RUN_UP_LENGTH / STRIKE_SPEED;
         let mut puck = scene.puck;
-        puck.advance(field, time);
+        puck.advance(field, run_up_time);
         let direction = (goal - puck.pos).normalize();
-        let mallet = puck.pos - field.contact() * direction;
-        let start = field.clamp_mallet(mallet - RUN_UP * direction);
-        let goal = waypoint(scene, start, field.contact() + 0.015);
-        if goal == start && (scene.mallet.pos - start).norm() < BEHIND {
+        let mallet = puck.pos - field.contact_distance() * direction;
+        let start = field.clamp_mallet(mallet - RUN_UP_LENGTH * direction);
+        let next_point = waypoint(scene, start, field.contact_distance() + 0.015);
+        if next_point == start && (scene.mallet.pos - start).norm() < START_TOLERANCE {
             self.phase = Phase::Strike {
-                contact: scene.time + 2.0 * (mallet - start).norm().max(0.02) / SPEED,
+                contact_time: scene.time + 2.0 * (mallet - start).norm().max(0.02) / STRIKE_SPEED,
                 mallet: field.clamp_mallet(mallet),
-                velocity: SPEED * direction,
+                velocity: STRIKE_SPEED * direction,
             };
         }
-        let mut command = MalletCommand::stop(scene, goal, Pace::QUICK);
+        let mut command = MalletCommand::stop(scene, next_point, Pace::QUICK);
         command.posture = Posture::Ready(lean_side(start));
         command
     }
@@ -95,15 +98,15 @@ impl Hit {
     fn strike(
         &mut self,
         scene: &Scene<'_>,
-        contact: f64,
+        contact_time: f64,
         mallet: Vec2,
         velocity: Vec2,
     ) -> MalletCommand {
-        let left = contact - scene.time;
-        if left < 0.5 * scene.dt {
+        let time_left = contact_time - scene.time;
+        if time_left < 0.5 * scene.dt {
             let pos = scene.mallet.pos + 0.5 * STOP_TIME * scene.mallet.vel;
             self.phase = Phase::Stop {
-                until: scene.time + STOP_TIME,
+                end_time: scene.time + STOP_TIME,
                 pos: scene.field.clamp_mallet(pos),
             };
             return MalletCommand::coast(scene, scene.mallet.vel, Posture::Free);
@@ -112,11 +115,11 @@ impl Hit {
             Target {
                 pos: mallet,
                 vel: velocity,
-                time: left,
+                time: time_left,
             },
             Posture::Strike(lean_side(mallet)),
         );
-        command.acceleration = 30.0;
+        command.acceleration = STRIKE_ACCELERATION;
         command
     }
 }

@@ -1,8 +1,8 @@
 //! A rule-based opponent of about the strength of the 2023 challenge's baseline agent.
 //!
-//! The paper describes that agent as typical approaches, planning and optimisation, that work well in the
+//! The paper about that challenge describes its agent as typical approaches, planning and optimisation, that work well in the
 //! ideal simulator and badly elsewhere. This agent shares only that description: it predicts the puck, chooses
-//! a tactic by rules, plans one motion for it and carries it out without corrections. It does not have the
+//! a skill (defend, hit, prepare) by rules, plans one motion and carries it out without corrections. It does not have the
 //! strengths of [`striker`]: corrections of a running strike, the choice among many shots, and cushioning.
 
 mod defend;
@@ -23,7 +23,7 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// An agent for `task` and the environment in `hello`.
+    /// An agent for `task` and the environment that the evaluator sends in the message `hello`.
     #[must_use]
     pub fn new(task: Task, env: &Env) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Runs the agent over standard input and output.
+//! Runs the agent: messages of the evaluator's protocol come on standard input, answers go to standard output.
 
 use std::process::ExitCode;
 
@@ -6,6 +6,6 @@ use baseline::Baseline;
 use striker::protocol;
 
 fn main() -> ExitCode {
-    let name = [env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")];
-    protocol::run(name, Baseline::new)
+    let name_and_version = [env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")];
+    protocol::run(name_and_version, Baseline::new)
 }

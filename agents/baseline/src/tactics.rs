@@ -1,4 +1,4 @@
-//! Chooses the skill for each control step.
+//! Chooses the skill for each control step: wait, defend the goal, hit the puck, or *prepare* it, which is to move it off the table's rim.
 
 use striker::Task;
 use striker::scene::{MalletCommand, Scene};
@@ -9,15 +9,15 @@ use crate::hit::Hit;
 use crate::prepare::Prepare;
 
 /// A puck approaching faster than this is stopped, m/s.
-const INCOMING: f64 = 0.35;
+const INCOMING_SPEED: f64 = 0.35;
 /// A puck slower than this can be struck, m/s.
-const SLOW: f64 = 0.3;
+const STRIKEABLE_SPEED: f64 = 0.3;
 /// Beyond this |y| a puck is too close to the rim for a shot, metres.
-const NEAR_RIM: f64 = 0.38;
+const SHOT_Y_MAX: f64 = 0.38;
 /// Beyond this x a puck is out of reach, metres.
-const OUT_OF_REACH: f64 = -0.16;
-/// Behind this x a run-up does not fit, metres.
-const NEAR_END: f64 = -0.78;
+const REACH_X_MAX: f64 = -0.16;
+/// Below this x, near the own goal, a run-up does not fit behind the puck, metres.
+const SHOT_X_MIN: f64 = -0.78;
 
 /// The active skill.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ enum Skill {
     Prepare(Prepare),
 }
 
-/// State of an episode or rally.
+/// State of the decisions in an episode or rally.
 #[derive(Debug, Clone)]
 pub struct Tactics {
     task: Task,
@@ -64,14 +64,14 @@ impl Tactics {
     /// Continues with the present skill if it is still suitable, or begins another.
     fn choose(&mut self, scene: &Scene<'_>) {
         let puck = &scene.puck;
-        let cornered = puck.pos.y.abs() > NEAR_RIM || puck.pos.x < NEAR_END;
-        let strikeable = puck.vel.norm() < SLOW && puck.pos.x < OUT_OF_REACH;
+        let is_near_rim = puck.pos.y.abs() > SHOT_Y_MAX || puck.pos.x < SHOT_X_MIN;
+        let is_strikeable = puck.vel.norm() < STRIKEABLE_SPEED && puck.pos.x < REACH_X_MAX;
         match self.task {
             Task::Defend => self.begin_defend(),
             Task::Prepare => self.begin_prepare(),
-            Task::Hit | Task::Tournament if puck.vel.x < -INCOMING => self.begin_defend(),
-            Task::Hit | Task::Tournament if strikeable && cornered => self.begin_prepare(),
-            Task::Hit | Task::Tournament if strikeable => {
+            Task::Hit | Task::Tournament if puck.vel.x < -INCOMING_SPEED => self.begin_defend(),
+            Task::Hit | Task::Tournament if is_strikeable && is_near_rim => self.begin_prepare(),
+            Task::Hit | Task::Tournament if is_strikeable => {
                 if !matches!(self.skill, Skill::Hit(_)) {
                     self.skill = Skill::Hit(Hit::new());
                 }

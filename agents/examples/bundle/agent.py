@@ -7,13 +7,13 @@ from player import Player
 
 
 class Learned(Agent):
-    """Policy from features through the network to arm commands: see `player.py`."""
+    """Lets the network choose the mallet's velocity; `player.py` computes its input and commands the arm."""
 
     interpolation = 3
 
     def start(self) -> None:
         session = onnxruntime.InferenceSession("policy.onnx", providers=["CPUExecutionProvider"])
-        self.player = Player(lambda view: session.run(["action"], {"view": view})[0])
+        self.player = Player(lambda features: session.run(["action"], {"view": features})[0])
 
     def reset(self) -> None:
         self.player.reset()

@@ -1,12 +1,12 @@
-//! Plays games in this process and prints scores. For development only; real games are run by `faceoff play`.
+//! Plays games between two agents in this process and prints scores. For development only; `faceoff play` runs real games.
 //!
 //! `cargo run --release -p striker --example game -- striker hold [steps] [profile] [games] [first seed]`
 //!
 //! A player is `striker`, `hold`, or the folder of a bundle whose actions are positions and velocities
 //! (interpolation 3), which is started without a sandbox.
 //!
-//! With `TRACE=from:to` the control steps between these of each game are printed, with `LIST=1` the end of each
-//! rally and each step at which a constraint was first broken in its window.
+//! With `TRACE=100:200` the control steps 100 to 199 of each game are printed. With `LIST=1` the end of each rally is printed, and the
+//! first step in each window (500 steps) at which a constraint was violated.
 
 #![expect(clippy::print_stdout, reason = "a tool for the terminal")]
 
@@ -23,37 +23,49 @@ mod support;
 mod program;
 
 use program::Program;
-use support::game::{Player, game, play};
+use support::game::{Player, new_game, play};
+
+/// Distance of a robot's base from the table's centre, metres.
+const BASE_DISTANCE_M: f64 = 1.51;
+/// Whether a robot has violated each of its four constraints in the current window.
+type Violated = [[bool; 4]; 2];
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let argument =
-        |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
+    let argument = |index: usize, default: &str| {
+        arguments
+            .get(index)
+            .map_or(default, String::as_str)
+            .to_owned()
+    };
     let names = [argument(0, "striker"), argument(1, "hold")];
     let steps: u32 = argument(2, "45000")
         .parse()
         .context("number of control steps")?;
     let profile: Profile = argument(3, "evaluation").parse()?;
     let games: u64 = argument(4, "1").parse().context("number of games")?;
-    let first: u64 = argument(5, "1").parse().context("first game's seed")?;
-    let trace = std::env::var("TRACE").ok().and_then(|t| {
-        let (from, to) = t.split_once(':')?;
+    let first_seed: u64 = argument(5, "1").parse().context("first game's seed")?;
+    let traced_steps = std::env::var("TRACE").ok().and_then(|range| {
+        let (from, to) = range.split_once(':')?;
         Some(from.parse::<u32>().ok()?..to.parse::<u32>().ok()?)
     });
-    let list = std::env::var("LIST").is_ok();
-    for seed in first..first + games {
+    let lists_events = std::env::var("LIST").is_ok();
+    for seed in first_seed..first_seed + games {
         let mut players = [player(&names[0], 0)?, player(&names[1], 1)?];
-        let mut broken = [[false; 4]; 2];
+        let mut violated = [[false; 4]; 2];
         let tally = play(
-            &mut game(profile, seed),
+            &mut new_game(profile, seed),
             &mut players,
             steps,
             |game, players, step| {
-                if trace.as_ref().is_some_and(|t| t.contains(&game.steps())) {
+                if traced_steps
+                    .as_ref()
+                    .is_some_and(|range| range.contains(&game.steps()))
+                {
                     print_step(game, players);
                 }
-                if list {
-                    print_events(game, step, &mut broken);
+                if lists_events {
+                    print_events(game, step, &mut violated);
                 }
             },
         );
@@ -62,26 +74,27 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn player(name: &str, own: usize) -> anyhow::Result<Player> {
+/// The player of a name on the command line.
+fn player(name: &str, robot_index: usize) -> anyhow::Result<Player> {
     match name {
         "hold" => Ok(Player::Hold(None)),
-        "striker" => Ok(Player::agent(Agent::new, own)),
+        "striker" => Ok(Player::agent(Agent::new, robot_index)),
         folder => Ok(Player::Agent(Box::new(Program::start(
             Path::new(folder),
-            own,
+            robot_index,
         )?))),
     }
 }
 
-fn print_events(game: &Game, step: &GameStep, broken: &mut [[bool; 4]; 2]) {
+fn print_events(game: &Game, step: &GameStep, violated: &mut Violated) {
     for (robot, values) in step.constraints.iter().enumerate() {
         let values = [values.ee, values.link, values.joint_pos, values.joint_vel];
         for (k, name) in ["ee", "link", "joint_pos", "joint_vel"]
             .into_iter()
             .enumerate()
         {
-            if values[k] > 0.0 && !broken[robot][k] {
-                broken[robot][k] = true;
+            if values[k] > 0.0 && !violated[robot][k] {
+                violated[robot][k] = true;
                 println!(
                     "  {} robot {} breaks {name} by {:.4}",
                     game.steps(),
@@ -92,7 +105,7 @@ fn print_events(game: &Game, step: &GameStep, broken: &mut [[bool; 4]; 2]) {
         }
     }
     if step.window.is_some() {
-        *broken = [[false; 4]; 2];
+        *violated = [[false; 4]; 2];
     }
     if let Some(end) = step.rally_end {
         println!("  {} rally ends: {end:?}", game.steps());
@@ -112,7 +125,7 @@ fn print_step(game: &Game, players: &[Player; 2]) {
         let side = if robot == 0 { -1.0 } else { 1.0 };
         print!(
             " mallet {:+.3} {:+.3}",
-            side * (seen[0] - 1.51),
+            side * (seen[0] - BASE_DISTANCE_M),
             side * seen[1]
         );
     }

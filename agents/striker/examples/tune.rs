@@ -1,10 +1,10 @@
-//! Runs episodes in this process, without pipes and sandbox, and prints success, penalty points by
+//! Runs episodes of the agent in this process, without pipes and sandbox. Prints success, penalty points by
 //! kind, and how close to its limits the arm came. For development only.
 //!
 //! `cargo run -p striker --example tune -- hit,defend,prepare 100 [profile] [seasons] [first seed]`
 //!
-//! Each season is another draw of the arm's model mismatch. With `TRACE=season:episode` the steps of
-//! that episode are printed, with `LIST=1` the episodes that failed or broke a constraint.
+//! Each season is another draw of the arm's model mismatch. With `TRACE=SEASON:EPISODE` (two numbers) the steps of
+//! that episode are printed, with `LIST=1` the episodes that failed or violated a constraint.
 
 #![expect(clippy::print_stdout, reason = "a tool for the terminal")]
 
@@ -20,17 +20,26 @@ mod env;
 
 use env::env;
 
+/// Distance of the robot's base from the table's centre, metres.
+const BASE_DISTANCE_M: f64 = 1.51;
+/// Desired height of the mallet above the base frame's origin, metres.
+const MALLET_HEIGHT_M: f64 = 0.1645;
+/// Control steps after which every episode must have ended.
+const EPISODE_STEPS_MAX: u32 = 500;
+
 /// Sums over the episodes of a task.
 #[derive(Default)]
 struct Tally {
     episodes: u32,
     successes: u32,
     steps: u32,
+    /// Episodes that violated the constraint of the end effector; the next three likewise.
     ee: u32,
     link: u32,
     joint_pos: u32,
     joint_vel: u32,
     worst_height_m: f64,
+    /// Largest joint speed relative to its limit.
     worst_speed_share: f64,
     longest_act_ms: f64,
     act_ms: f64,
@@ -44,8 +53,12 @@ impl Tally {
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let argument =
-        |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
+    let argument = |index: usize, default: &str| {
+        arguments
+            .get(index)
+            .map_or(default, String::as_str)
+            .to_owned()
+    };
     let tasks: Vec<Task> = argument(0, "hit,defend,prepare")
         .split(',')
         .map(str::parse)
@@ -55,20 +68,20 @@ fn main() -> anyhow::Result<()> {
         .context("number of episodes per season")?;
     let profile: Profile = argument(2, "evaluation").parse()?;
     let seasons: u64 = argument(3, "2").parse().context("number of seasons")?;
-    let first: u64 = argument(4, "1").parse().context("first season's seed")?;
-    let trace = std::env::var("TRACE").ok().and_then(|t| {
+    let first_season: u64 = argument(4, "1").parse().context("first season's seed")?;
+    let traced_episode = std::env::var("TRACE").ok().and_then(|t| {
         let (season, episode) = t.split_once(':')?;
         Some((season.parse::<u64>().ok()?, episode.parse::<u32>().ok()?))
     });
-    let list = std::env::var("LIST").is_ok();
+    let lists_failures = std::env::var("LIST").is_ok();
 
     let settings = PerturbationSettings::default();
     for task in tasks {
         let mut tally = Tally::default();
-        for season in first..first + seasons {
+        for season in first_season..first_season + seasons {
             let seed = Seed::from_number(season);
             let plant = Plant::for_factors(profile.factors(), &settings, seed.model_mismatch());
-            let mut agent = agent(task)?;
+            let mut agent = new_agent(task)?;
             for index in 0..episodes {
                 let mut episode = Episode::new(
                     task,
@@ -82,10 +95,12 @@ fn main() -> anyhow::Result<()> {
                     &mut agent,
                     &mut episode,
                     &mut tally,
-                    trace == Some((season, index)),
+                    traced_episode == Some((season, index)),
                 )?;
                 let v = episode.violations();
-                if list && (!episode.success() || v.ee || v.link || v.joint_pos || v.joint_vel) {
+                if lists_failures
+                    && (!episode.success() || v.ee || v.link || v.joint_pos || v.joint_vel)
+                {
                     let puck = episode.state().puck;
                     println!(
                         "  {season}:{index} success {} steps {} puck {puck:.2?} {v:?}",
@@ -119,27 +134,29 @@ fn play(
     agent: &mut Agent,
     episode: &mut Episode,
     tally: &mut Tally,
-    trace: bool,
+    is_traced: bool,
 ) -> anyhow::Result<()> {
     agent.reset();
     loop {
         let observation = episode.observation().to_vec();
         let start = Instant::now();
         let action = agent.act(&observation)?;
-        let took_ms = 1e3 * start.elapsed().as_secs_f64();
-        tally.act_ms += took_ms;
-        tally.longest_act_ms = tally.longest_act_ms.max(took_ms);
+        let duration_ms = 1e3 * start.elapsed().as_secs_f64();
+        tally.act_ms += duration_ms;
+        tally.longest_act_ms = tally.longest_act_ms.max(duration_ms);
         let outcome = episode.step(action.as_flattened());
         let state = episode.state();
-        tally.worst_height_m = tally.worst_height_m.max((state.ee[2] - 0.1645).abs());
+        tally.worst_height_m = tally
+            .worst_height_m
+            .max((state.ee[2] - MALLET_HEIGHT_M).abs());
         tally.worst_speed_share = tally.worst_speed_share.max(speed_share(&state));
-        if trace {
+        if is_traced {
             print_step(agent, episode, &state);
         }
         if outcome.end.is_some() {
             break;
         }
-        if episode.steps() > 500 {
+        if episode.steps() > EPISODE_STEPS_MAX {
             bail!("the episode does not end");
         }
     }
@@ -181,15 +198,15 @@ fn print_step(agent: &Agent, episode: &Episode, state: &EpisodeState) {
         p[1],
         p[3],
         p[4],
-        state.ee[0] - 1.51,
+        state.ee[0] - BASE_DISTANCE_M,
         state.ee[1],
-        1e3 * (state.ee[2] - 0.1645),
+        1e3 * (state.ee[2] - MALLET_HEIGHT_M),
         speed_shares(state),
         agent.describe(),
     );
 }
 
-fn agent(task: Task) -> anyhow::Result<Agent> {
+fn new_agent(task: Task) -> anyhow::Result<Agent> {
     Ok(Agent::new(
         serde_json::from_str(&format!("{:?}", task.as_str()))?,
         &env(1, 0),

@@ -1,8 +1,9 @@
-//! Converts mallet motions to joint commands: redundancy, limits and correction of model errors.
+//! Converts mallet motions to joint commands, within the joints' limits and with a correction of model errors. The *tip* is the point of
+//! the arm that carries the mallet; its position leaves four of the seven joint angles free, the *posture*.
 //!
 //! The arm keeps a *reference*: joint angles and speeds that follow the desired mallet motion exactly
 //! at constant height. The command sent is the reference plus a slowly learnt *correction*, because
-//! the real arm's mass differs from its controller's model: it sags by up to a centimetre.
+//! the real arm's mass differs from its controller's model, so the arm sags by up to a centimetre.
 
 use nalgebra::Vector3;
 
@@ -13,28 +14,28 @@ use crate::redundancy::{even_speeds, least_change, least_peak};
 
 /// Share of the evaluator's joint speed limits that references may use; the rest is for tracking
 /// errors and the observation filter.
-const CRUISE_SHARE: f64 = 0.955;
+const REFERENCE_SPEED_SHARE: f64 = 0.955;
 /// Rate at which a free posture approaches its preference, 1/s.
 const POSTURE_RATE: f64 = 4.0;
 /// Share of the speed limits that a posture change may take.
-const POSTURE_SHARE: f64 = 0.6;
+const POSTURE_SPEED_SHARE: f64 = 0.6;
 /// Largest acceleration of a posture change, rad/s².
 const POSTURE_ACCELERATION: f64 = 8.0;
-/// Share of the possible speed that strikes are planned with: the posture is never exactly the best.
+/// Share of the possible speed for which strikes are planned: the posture is never exactly the best.
 const STRIKE_SHARE: f64 = 0.98;
-/// Largest correction of the tip per control step that does not come from the velocity, metres.
-const NUDGE_MAX_M: f64 = 0.004;
-/// Time in which the strike's way to share the load between joints fades, seconds.
-const FADE_TIME: f64 = 0.2;
+/// Largest correction of the tip's position per control step, in addition to its velocity, metres.
+const TIP_CORRECTION_MAX_M: f64 = 0.004;
+/// Time after a strike in which the distribution of the load over the joints returns to the usual one, seconds.
+const STRIKE_FADE_TIME: f64 = 0.2;
 /// Integral gain from observed joint errors to the correction, 1/s.
-const CORRECTION_RATE: f64 = 4.0;
-/// Bound of the correction; static errors of the plant stay well below it, radians.
-const CORRECTION_MAX: f64 = 0.04;
+const JOINT_CORRECTION_RATE: f64 = 4.0;
+/// Bound of the joints' correction; static errors of the plant stay well below it, radians.
+const JOINT_CORRECTION_MAX: f64 = 0.04;
 
 /// Preference for the arm's four free degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Posture {
-    /// Ready to strike: the family of [`Arm::strike_posture`].
+    /// Ready to strike: as [`Arm::strike_posture`] at the mallet's position.
     Ready(Side),
     /// Striking: as `Ready`, and the joints share the motion so that the fastest is as slow as
     /// possible.
@@ -55,19 +56,24 @@ pub enum Side {
 /// The reference of the arm, in its base frame.
 #[derive(Debug, Clone)]
 pub struct Arm {
+    /// Height of the tip, metres.
     height: f64,
+    /// Bounds of the reference's joint speeds, rad/s, and angles, radians.
     speed_max: Joints,
     angle_max: Joints,
+    /// Control period, seconds.
     dt: f64,
     /// Reference joint angles, radians.
     pub q: Joints,
     /// Reference joint speeds, rad/s.
     pub dq: Joints,
-    drift: Joints,
-    /// 0: loads spread evenly; 1: least peak load. In between while a strike fades out.
-    sharpness: f64,
-    /// Compliances of the joints in a strike.
-    balance: Option<Joints>,
+    /// Joint speeds towards the preferred posture, rad/s.
+    posture_speed: Joints,
+    /// How a motion is distributed over the joints. 0: loads spread evenly; 1: least peak load. In between after a strike.
+    least_peak_weight: f64,
+    /// Weights of the joints in a strike, found by [`least_peak`]; a larger one gives the joint more of the motion.
+    strike_compliance: Option<Joints>,
+    /// Learnt addition to the reference's joint angles, radians.
     correction: Joints,
 }
 
@@ -85,14 +91,14 @@ impl Arm {
     pub fn new(env: &Env) -> Self {
         Self {
             height: env.robot.ee_desired_height,
-            speed_max: CRUISE_SHARE * joint_speed_max(&env.robot),
+            speed_max: REFERENCE_SPEED_SHARE * joint_speed_max(&env.robot),
             angle_max: joint_angle_max(&env.robot),
             dt: env.dt,
             q: Joints::zeros(),
             dq: Joints::zeros(),
-            drift: Joints::zeros(),
-            sharpness: 0.0,
-            balance: None,
+            posture_speed: Joints::zeros(),
+            least_peak_weight: 0.0,
+            strike_compliance: None,
             correction: Joints::zeros(),
         }
     }
@@ -101,44 +107,46 @@ impl Arm {
     pub fn reset(&mut self, q: &Joints) {
         self.q = *q;
         self.dq = Joints::zeros();
-        self.drift = Joints::zeros();
-        self.sharpness = 0.0;
-        self.balance = None;
+        self.posture_speed = Joints::zeros();
+        self.least_peak_weight = 0.0;
+        self.strike_compliance = None;
         self.correction = Joints::zeros();
     }
 
     /// Learns from the observed joint angles, which belong to the present reference.
     pub fn observe(&mut self, q: &Joints) {
         let error = self.q - q;
-        self.correction += CORRECTION_RATE * self.dt * error;
-        for c in self.correction.iter_mut() {
-            *c = c.clamp(-CORRECTION_MAX, CORRECTION_MAX);
+        self.correction += JOINT_CORRECTION_RATE * self.dt * error;
+        for angle in self.correction.iter_mut() {
+            *angle = angle.clamp(-JOINT_CORRECTION_MAX, JOINT_CORRECTION_MAX);
         }
     }
 
     /// Advances the reference by one control step towards a mallet at `position` with `velocity`
     /// (base frame, metres, m/s), within the joint speed limits.
     pub fn advance(&mut self, position: Vec2, velocity: Vec2, posture: Posture) -> ReferenceState {
-        let preferred = self.posture_rate(posture, position);
+        let preferred = self.update_posture_speed(posture, position);
         let velocity = Vector3::new(velocity.x, velocity.y, 0.0);
-        // Striking begins at rest, where the two ways to share a motion agree, and fades out after it.
-        self.sharpness = match posture {
+        // A strike begins at rest, where both distributions of the motion agree. After it the weight fades.
+        self.least_peak_weight = match posture {
             Posture::Strike(_) => 1.0,
-            Posture::Ready(_) | Posture::Free => (self.sharpness - self.dt / FADE_TIME).max(0.0),
+            Posture::Ready(_) | Posture::Free => {
+                (self.least_peak_weight - self.dt / STRIKE_FADE_TIME).max(0.0)
+            }
         };
         let expected = forward(&(self.q + self.dt * self.dq));
-        let (dq, share) = self.resolve(&expected.jacobian, &velocity, &preferred);
+        let (dq, allowed_share) = self.resolve(&expected.jacobian, &velocity, &preferred);
         // Constant acceleration over the step, as in the cubic interpolation between its ends.
         let mut q = self.q + 0.5 * self.dt * (self.dq + dq);
         let end = forward(&q);
-        let goal = if share < 1.0 {
+        let goal = if allowed_share < 1.0 {
             Vector3::new(end.tip.x, end.tip.y, self.height)
         } else {
             Vector3::new(position.x, position.y, self.height)
         };
         // The remaining error is small unless a reference jumped; a jump must not reach the joints.
         let error = goal - end.tip;
-        let error = error * (NUDGE_MAX_M / error.norm().max(NUDGE_MAX_M));
+        let error = error * (TIP_CORRECTION_MAX_M / error.norm().max(TIP_CORRECTION_MAX_M));
         q += least_change(&end.jacobian, &error, &self.speed_max);
         for i in 0..JOINTS {
             q[i] = q[i].clamp(-self.angle_max[i], self.angle_max[i]);
@@ -167,37 +175,51 @@ impl Arm {
         preferred: &Joints,
     ) -> (Joints, f64) {
         let mut base = Joints::zeros();
-        if self.sharpness < 1.0 {
-            base += (1.0 - self.sharpness) * even_speeds(jacobian, velocity, &self.speed_max);
-        }
-        if self.sharpness > 0.0 {
-            // Few steps from the last balance, so that it changes smoothly over a swing.
-            let rounds = if self.balance.is_some() { 3 } else { 12 };
-            let balance = self
-                .balance
-                .get_or_insert(self.speed_max.component_mul(&self.speed_max));
+        if self.least_peak_weight < 1.0 {
             base +=
-                self.sharpness * least_peak(jacobian, velocity, &self.speed_max, balance, rounds);
+                (1.0 - self.least_peak_weight) * even_speeds(jacobian, velocity, &self.speed_max);
+        }
+        if self.least_peak_weight > 0.0 {
+            // Few iterations from the last weights, so that they change smoothly over a swing.
+            let iterations = if self.strike_compliance.is_some() {
+                3
+            } else {
+                12
+            };
+            let strike_compliance = self
+                .strike_compliance
+                .get_or_insert(self.speed_max.component_mul(&self.speed_max));
+            base += self.least_peak_weight
+                * least_peak(
+                    jacobian,
+                    velocity,
+                    &self.speed_max,
+                    strike_compliance,
+                    iterations,
+                );
         } else {
-            self.balance = None;
+            self.strike_compliance = None;
         }
         let peak = base.component_div(&self.speed_max).amax();
         if peak >= 1.0 {
             return (base / peak, 1.0 / peak);
         }
-        let null = preferred - least_change(jacobian, &(jacobian * preferred), &self.speed_max);
-        let mut room = 1.0_f64;
+        // The part of `preferred` that does not move the tip.
+        let posture_motion =
+            preferred - least_change(jacobian, &(jacobian * preferred), &self.speed_max);
+        let mut posture_share = 1.0_f64;
         for i in 0..JOINTS {
-            let (b, n, cap) = (base[i], null[i], self.speed_max[i]);
-            if n.abs() > 1e-9 {
-                room = room.min((cap * n.signum() - b) / n);
+            let (base_speed, posture_speed, cap) = (base[i], posture_motion[i], self.speed_max[i]);
+            if posture_speed.abs() > 1e-9 {
+                posture_share =
+                    posture_share.min((cap * posture_speed.signum() - base_speed) / posture_speed);
             }
         }
-        (base + room.max(0.0) * null, 1.0)
+        (base + posture_share.max(0.0) * posture_motion, 1.0)
     }
 
-    /// Speed towards the preferred posture, changing no faster than the acceleration bound.
-    fn posture_rate(&mut self, posture: Posture, position: Vec2) -> Joints {
+    /// Changes the speeds towards the preferred posture, no faster than the acceleration bound, and returns them.
+    fn update_posture_speed(&mut self, posture: Posture, position: Vec2) -> Joints {
         let desired = match posture {
             Posture::Free => Joints::zeros(),
             // A strike is over before the posture could follow.
@@ -206,10 +228,11 @@ impl Arm {
         };
         let step = POSTURE_ACCELERATION * self.dt;
         for i in 0..JOINTS {
-            let cap = POSTURE_SHARE * self.speed_max[i];
-            self.drift[i] += (desired[i].clamp(-cap, cap) - self.drift[i]).clamp(-step, step);
+            let cap = POSTURE_SPEED_SHARE * self.speed_max[i];
+            self.posture_speed[i] +=
+                (desired[i].clamp(-cap, cap) - self.posture_speed[i]).clamp(-step, step);
         }
-        self.drift
+        self.posture_speed
     }
 
     /// The posture for striking at `position` (base frame): elbow up and the hand turned out of the
@@ -218,6 +241,7 @@ impl Arm {
     /// linear in the reach and joint 3 near zero, and the other three follow from the position.
     fn strike_posture(&self, position: Vec2, side: Side) -> Joints {
         let reach = position.norm();
+        // Joints 5 and 6, as linear functions of the reach.
         let lean = (0.6 + 0.6 * (reach - 0.65)).clamp(0.5, 1.0);
         let wrist = (1.78 - 1.45 * (reach - 0.65)).clamp(0.75, 1.85);
         let lean = match side {
@@ -235,26 +259,26 @@ impl Arm {
         // … and the rest is a triangle between shoulder, elbow and tip. Angles from the vertical.
         let rise = self.height - SHOULDER_M;
         let distance = ahead.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
-        let corner = |opposite: f64, a: f64, b: f64| {
+        let triangle_angle = |opposite: f64, a: f64, b: f64| {
             ((a * a + b * b - opposite * opposite) / (2.0 * a * b))
                 .clamp(-1.0, 1.0)
                 .acos()
         };
-        let shoulder = ahead.atan2(rise) - corner(lower, UPPER_ARM_M, distance);
-        let elbow = corner(distance, UPPER_ARM_M, lower);
+        let shoulder = ahead.atan2(rise) - triangle_angle(lower, UPPER_ARM_M, distance);
+        let elbow = triangle_angle(distance, UPPER_ARM_M, lower);
         // The bent link leaves the elbow at `shoulder + π − elbow`, the forearm `bend` before that.
         let forearm = shoulder + std::f64::consts::PI - elbow - bend;
         let azimuth = position.y.atan2(position.x) - (outward / reach).clamp(-1.0, 1.0).asin();
         Joints::from([azimuth, shoulder, 0.0, shoulder - forearm, lean, wrist, 0.0])
     }
 
-    /// Minimum time in which the free joints reach the posture for a strike from `position`, seconds.
-    pub fn ready_time(&self, position: Vec2, side: Side) -> f64 {
+    /// Minimum time in which the posture for a strike from `position` is reached, seconds.
+    pub fn posture_time(&self, position: Vec2, side: Side) -> f64 {
         let change = self.strike_posture(position, side) - self.q;
-        // Most of the motion is at full rate, the last part slower.
-        let share = change.component_div(&self.speed_max);
-        let longest = share[4].abs().max(share[5].abs());
-        longest / POSTURE_SHARE + if longest > 0.05 { 0.15 } else { 0.0 }
+        // Joints 5 and 6 determine the time. Most of the motion is at the posture's full speed, the last part slower.
+        let times = change.component_div(&self.speed_max);
+        let longest = times[4].abs().max(times[5].abs());
+        longest / POSTURE_SPEED_SHARE + if longest > 0.05 { 0.15 } else { 0.0 }
     }
 
     /// Maximum speed of the mallet at `position` along `direction` (a unit vector, base frame) in the
@@ -262,8 +286,14 @@ impl Arm {
     pub fn strike_speed(&self, position: Vec2, direction: Vec2, side: Side) -> f64 {
         let pose = forward(&self.strike_posture(position, side));
         let unit = Vector3::new(direction.x, direction.y, 0.0);
-        let mut balance = self.speed_max.component_mul(&self.speed_max);
-        let speeds = least_peak(&pose.jacobian, &unit, &self.speed_max, &mut balance, 12);
+        let mut strike_compliance = self.speed_max.component_mul(&self.speed_max);
+        let speeds = least_peak(
+            &pose.jacobian,
+            &unit,
+            &self.speed_max,
+            &mut strike_compliance,
+            12,
+        );
         let peak = speeds.component_div(&self.speed_max).amax();
         STRIKE_SHARE / peak.max(1e-6)
     }

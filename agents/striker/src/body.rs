@@ -1,4 +1,5 @@
-//! Sensing and motion of an agent, without decisions: estimates, and a mallet that follows commands.
+//! The *body* of an agent: sensing and motion without decisions. It estimates the state of the table from observations, and moves the
+//! mallet as commanded.
 
 use crate::arm::Arm;
 use crate::env::{Env, Joints};
@@ -10,7 +11,7 @@ use crate::motion::Motion;
 use crate::scene::{MalletCommand, Scene};
 use crate::task::{Action, Task, WrongLength};
 
-/// Estimates, the arm's reference and the mallet's.
+/// Estimates of puck and opponent, and the references (commanded motions) of arm and mallet.
 #[derive(Debug, Clone)]
 pub struct Body {
     task: Task,
@@ -24,7 +25,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// A body for the environment in `hello`.
+    /// A body for the environment that the evaluator sends in the message `hello`.
     #[must_use]
     pub fn new(task: Task, env: &Env) -> Self {
         let field = Field::new(env);
@@ -34,7 +35,7 @@ impl Body {
             arm: Arm::new(env),
             estimator: Estimator::new(&field, env.dt),
             keeper: Keeper::Unseen,
-            mallet: Motion::rest(Vec2::zeros()),
+            mallet: Motion::at_rest(Vec2::zeros()),
             step: 0,
             field,
         }
@@ -47,7 +48,7 @@ impl Body {
         self.step = 0;
     }
 
-    /// Updates the estimates with an observation of 20 or 23 numbers (robot base frame).
+    /// Updates the estimates with an observation in the robot's base frame: 20 numbers, or 23 with an opponent on the table.
     ///
     /// # Errors
     /// If the observation has another length.
@@ -60,29 +61,32 @@ impl Body {
         let time = f64::from(self.step) * self.dt;
         let pose = forward(&q);
         let tip_velocity = pose.jacobian * dq;
-        let seen = MalletState {
+        let own_mallet = MalletState {
             pos: self.field.to_field(Vec2::new(pose.tip.x, pose.tip.y)),
             vel: Vec2::new(tip_velocity.x, tip_velocity.y),
         };
         if self.step == 0 {
             self.arm.reset(&q);
-            self.mallet = Motion::rest(seen.pos);
+            self.mallet = Motion::at_rest(own_mallet.pos);
         } else {
             self.arm.observe(&q);
         }
-        let o = observation;
         let puck = self.estimator.observe(
             &PuckObservation {
-                pose: [o[0] - self.field.base, o[1], o[2]],
-                velocity: [o[3], o[4], o[5]],
+                pose: [
+                    observation[0] - self.field.base_distance,
+                    observation[1],
+                    observation[2],
+                ],
+                velocity: [observation[3], observation[4], observation[5]],
             },
-            seen,
+            own_mallet,
         );
-        if let [x, y, _] = o[20..] {
-            let seen = self.field.to_field(Vec2::new(x, y));
+        if let [x, y, _] = observation[20..] {
+            let opponent_mallet = self.field.to_field(Vec2::new(x, y));
             let in_game = self.task == Task::Tournament;
             self.keeper
-                .observe(&self.field, in_game, time, self.dt, seen);
+                .observe(&self.field, in_game, time, self.dt, opponent_mallet);
         }
         Ok(Scene {
             field: &self.field,
@@ -96,7 +100,7 @@ impl Body {
         })
     }
 
-    /// Advances the references by one control step and returns the action.
+    /// Advances the references by one control step according to `command`, and returns the action.
     pub fn follow(&mut self, command: &MalletCommand) -> Action {
         let before = self.mallet;
         let mut next = before.towards(&command.target, self.dt);

@@ -1,4 +1,4 @@
-//! The puck at the millisecond scale: the soft contacts of rims and mallet, resolved in substeps.
+//! The puck's motion in substeps of a millisecond, with the soft contacts of rims and mallet.
 //!
 //! `puck.rs` models a contact as an impulse, which is wrong where two contacts overlap: a mallet that
 //! presses a puck against the rim. This model simulates strikes at such pucks.
@@ -9,49 +9,58 @@ use crate::puck::Puck;
 /// Length of a substep, seconds.
 pub const SUBSTEP: f64 = 1e-3;
 /// Mass of the puck, kg.
-const MASS: f64 = 0.01;
-/// Its yaw inertia, kg m².
-const INERTIA: f64 = 5e-6;
+const PUCK_MASS: f64 = 0.01;
+/// Yaw inertia of the puck, kg m².
+const PUCK_INERTIA: f64 = 5e-6;
 /// Viscous damping of sliding, N s/m.
 const DAMPING: f64 = 0.005;
 /// Viscous damping of yaw, N m s.
 const SPIN_DAMPING: f64 = 2e-6;
 /// Radius of the rounded goal posts, metres.
-const POST: f64 = 0.005;
+const POST_RADIUS: f64 = 0.005;
 
-/// Parameters of a soft contact: impedance at the surface and at depth, damping, stiffness,
-/// softness, friction.
+/// Penetration at which a contact's impedance reaches its final value, metres.
+const IMPEDANCE_WIDTH: f64 = 1e-3;
+
+/// Parameters of a soft contact, as in the physics engine MuJoCo: a spring and damper whose force grows with the depth of
+/// penetration. The *impedance*, between 0 and 1, is the share of the ideal, rigid contact force.
 struct ContactLaw {
-    surface: f64,
-    depth: f64,
+    impedance_at_surface: f64,
+    impedance_at_depth: f64,
+    /// 1/s. For MuJoCo's time constant T and final impedance d: 2 / (d T).
     damping: f64,
+    /// 1/s². With the damping ratio ζ: 1 / (d² T² ζ²).
     stiffness: f64,
-    softness: f64,
+    /// Inverse inertia of the two bodies, 1/kg; MuJoCo scales the softness of the contact by it.
+    inverse_inertia: f64,
+    /// Coefficient of friction.
     friction: f64,
     /// Inverse mass of the other body, 1/kg.
     inverse_mass: f64,
 }
 
+/// Contact of puck and rim: T = 0.0075 s, ζ = 0.1.
 const RIM: ContactLaw = ContactLaw {
-    surface: 0.99,
-    depth: 0.999,
+    impedance_at_surface: 0.99,
+    impedance_at_depth: 0.999,
     damping: 2.0 / (0.999 * 0.0075),
     stiffness: 1.0 / (0.999 * 0.999 * 0.0075 * 0.0075 * 0.1 * 0.1),
-    softness: 200.0 / 3.0,
+    inverse_inertia: 200.0 / 3.0,
     friction: 1e4,
     inverse_mass: 0.0,
 };
+/// Contact of puck and mallet: T = 0.02 s, ζ = 0.3.
 const MALLET: ContactLaw = ContactLaw {
-    surface: 0.9,
-    depth: 0.95,
+    impedance_at_surface: 0.9,
+    impedance_at_depth: 0.95,
     damping: 2.0 / (0.95 * 0.02),
     stiffness: 1.0 / (0.95 * 0.95 * 0.02 * 0.02 * 0.3 * 0.3),
-    softness: 200.0 / 3.0 + 1.07,
+    inverse_inertia: 200.0 / 3.0 + 1.07,
     friction: 1.0,
     inverse_mass: 1.0,
 };
 
-/// Force and torque that accumulate over the contacts of a substep.
+/// Force (N) and torque (N m) on the puck.
 struct Wrench {
     force: Vec2,
     torque: f64,
@@ -69,52 +78,52 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
     };
     let offset = puck.pos - mallet;
     let distance = offset.norm();
-    if distance < field.contact() && distance > 1e-9 {
+    if distance < field.contact_distance() && distance > 1e-9 {
         add_contact(
             puck,
             field,
             &MALLET,
             &free,
-            field.contact() - distance,
+            field.contact_distance() - distance,
             offset / distance,
             velocity,
             &mut sum,
         );
     }
-    let side = puck.pos.y.abs() - field.puck_y();
-    if side > 0.0 {
+    let long_rim_depth = puck.pos.y.abs() - field.puck_y();
+    if long_rim_depth > 0.0 {
         add_contact(
             puck,
             field,
             &RIM,
             &free,
-            side,
+            long_rim_depth,
             Vec2::new(0.0, -puck.pos.y.signum()),
             Vec2::zeros(),
             &mut sum,
         );
     }
-    let end = puck.pos.x.abs() - field.puck_x();
-    if end > 0.0 {
-        if puck.pos.y.abs() > field.half_goal + POST {
+    let short_rim_depth = puck.pos.x.abs() - field.puck_x();
+    if short_rim_depth > 0.0 {
+        if puck.pos.y.abs() > field.half_goal + POST_RADIUS {
             add_contact(
                 puck,
                 field,
                 &RIM,
                 &free,
-                end,
+                short_rim_depth,
                 Vec2::new(-puck.pos.x.signum(), 0.0),
                 Vec2::zeros(),
                 &mut sum,
             );
         } else {
             let post = Vec2::new(
-                (field.half_length + POST) * puck.pos.x.signum(),
-                (field.half_goal + POST) * puck.pos.y.signum(),
+                (field.half_length + POST_RADIUS) * puck.pos.x.signum(),
+                (field.half_goal + POST_RADIUS) * puck.pos.y.signum(),
             );
             let offset = puck.pos - post;
             let distance = offset.norm();
-            let depth = field.puck + POST - distance;
+            let depth = field.puck_radius + POST_RADIUS - distance;
             if depth > 0.0 && distance > 1e-9 {
                 add_contact(
                     puck,
@@ -129,12 +138,13 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
             }
         }
     }
-    puck.vel += SUBSTEP / MASS * sum.force;
-    puck.spin += SUBSTEP / INERTIA * sum.torque;
+    puck.vel += SUBSTEP / PUCK_MASS * sum.force;
+    puck.spin += SUBSTEP / PUCK_INERTIA * sum.torque;
     puck.pos += SUBSTEP * puck.vel;
 }
 
-/// Adds the force of one contact. Overlapping contacts are solved one by one, accurate enough for
+/// Adds the force of one contact to `sum`. `free` is the force without contacts, `normal` points into the puck, and `velocity` is that of
+/// the other body. Overlapping contacts are solved one after another, which is accurate enough for
 /// planning.
 #[expect(
     clippy::too_many_arguments,
@@ -150,29 +160,30 @@ fn add_contact(
     velocity: Vec2,
     sum: &mut Wrench,
 ) {
-    let r = field.puck;
-    let x = depth / 1e-3;
-    let blend = if x <= 0.5 {
-        2.0 * x * x
-    } else if x < 1.0 {
-        1.0 - 2.0 * (1.0 - x) * (1.0 - x)
+    let radius = field.puck_radius;
+    let depth_share = depth / IMPEDANCE_WIDTH;
+    let blend = if depth_share <= 0.5 {
+        2.0 * depth_share * depth_share
+    } else if depth_share < 1.0 {
+        1.0 - 2.0 * (1.0 - depth_share) * (1.0 - depth_share)
     } else {
         1.0
     };
-    let impedance = law.surface + (law.depth - law.surface) * blend;
-    let softness = (1.0 - impedance) / impedance * law.softness;
+    let impedance =
+        law.impedance_at_surface + (law.impedance_at_depth - law.impedance_at_surface) * blend;
+    let regularisation = (1.0 - impedance) / impedance * law.inverse_inertia;
     let tangent = Vec2::new(-normal.y, normal.x);
     let relative = puck.vel - velocity;
-    let slip = relative.dot(&tangent) - puck.spin * r;
-    let free_normal = free.force.dot(&normal) / MASS;
-    let free_tangent = free.force.dot(&tangent) / MASS - free.torque / INERTIA * r;
+    let slip = relative.dot(&tangent) - puck.spin * radius;
+    let free_normal = free.force.dot(&normal) / PUCK_MASS;
+    let free_tangent = free.force.dot(&tangent) / PUCK_MASS - free.torque / PUCK_INERTIA * radius;
     let push = (-law.damping * relative.dot(&normal) + law.stiffness * impedance * depth
         - free_normal)
-        / (1.0 / MASS + law.inverse_mass + softness);
+        / (1.0 / PUCK_MASS + law.inverse_mass + regularisation);
     let push = push.max(0.0);
     let grip = (-law.damping * slip - free_tangent)
-        / (1.0 / MASS + r * r / INERTIA + law.inverse_mass + softness);
+        / (1.0 / PUCK_MASS + radius * radius / PUCK_INERTIA + law.inverse_mass + regularisation);
     let grip = grip.clamp(-law.friction * push, law.friction * push);
     sum.force += push * normal + grip * tangent;
-    sum.torque -= grip * r;
+    sum.torque -= grip * radius;
 }

@@ -1,4 +1,4 @@
-//! Limits from the protocol's `env`, as vectors.
+//! The joints' limits, as vectors, from `env`: the description of table and robot that the evaluator sends in the message `hello`.
 
 pub use faceoff_agent::{BaseFrame, Env, JOINTS, RadiusInfo, RobotInfo, TableInfo};
 use nalgebra::SVector;
@@ -21,6 +21,7 @@ pub fn joint_angle_max(robot: &RobotInfo) -> Joints {
     allowed_max(&robot.joint_pos_limit)
 }
 
+/// The allowed share of the symmetric limits [lower, upper].
 fn allowed_max([lower, upper]: &[[f64; JOINTS]; 2]) -> Joints {
     Joints::from_fn(|i, _| LIMIT_SHARE * upper[i].min(-lower[i]))
 }

@@ -1,4 +1,5 @@
-//! The field frame, from the agent's side: origin at the table's centre, own goal at −x, metres.
+//! The field frame, from the agent's side: origin at the table's centre, own goal at −x, lengths in metres. Also the table's
+//! dimensions, and the area in which the mallet may move.
 
 use nalgebra::Vector2;
 
@@ -7,7 +8,7 @@ use crate::env::Env;
 /// A point or velocity in the plane of the table.
 pub type Vec2 = Vector2<f64>;
 
-/// Dimensions in the plane.
+/// Dimensions in the plane of the table, metres.
 #[derive(Debug, Clone)]
 pub struct Field {
     /// Half the length of the table.
@@ -17,15 +18,18 @@ pub struct Field {
     /// Half the goal's width.
     pub half_goal: f64,
     /// Radius of the puck.
-    pub puck: f64,
+    pub puck_radius: f64,
     /// Radius of the mallet.
-    pub mallet: f64,
+    pub mallet_radius: f64,
     /// Distance from the robot's base to the table's centre.
-    pub base: f64,
+    pub base_distance: f64,
 }
 
-/// Margin of mallet references to the evaluator's bounds, for tracking errors.
-const MARGIN: f64 = 0.012;
+/// Distance, metres, of mallet references from the evaluator's bounds: the real mallet deviates a little from its reference.
+const REFERENCE_MARGIN: f64 = 0.012;
+
+/// Distance from the robot's base to the table's centre if the environment does not give it, metres.
+const DEFAULT_BASE_DISTANCE: f64 = 1.51;
 
 impl Field {
     /// Reads the dimensions from the environment.
@@ -34,40 +38,40 @@ impl Field {
             half_length: env.table.length / 2.0,
             half_width: env.table.width / 2.0,
             half_goal: env.table.goal_width / 2.0,
-            puck: env.puck.radius,
-            mallet: env.mallet.radius,
-            base: env.robot.base_distance_m().unwrap_or(1.51),
+            puck_radius: env.puck.radius,
+            mallet_radius: env.mallet.radius,
+            base_distance: env.robot.base_distance_m().unwrap_or(DEFAULT_BASE_DISTANCE),
         }
     }
 
     /// Field coordinates of a point in the robot's base frame.
-    pub fn to_field(&self, p: Vec2) -> Vec2 {
-        Vec2::new(p.x - self.base, p.y)
+    pub fn to_field(&self, point: Vec2) -> Vec2 {
+        Vec2::new(point.x - self.base_distance, point.y)
     }
 
     /// Base-frame coordinates of a point in the field.
-    pub fn to_base(&self, p: Vec2) -> Vec2 {
-        Vec2::new(p.x + self.base, p.y)
+    pub fn to_base(&self, point: Vec2) -> Vec2 {
+        Vec2::new(point.x + self.base_distance, point.y)
     }
 
     /// Distance of the centres when mallet and puck touch.
-    pub fn contact(&self) -> f64 {
-        self.puck + self.mallet
+    pub fn contact_distance(&self) -> f64 {
+        self.puck_radius + self.mallet_radius
     }
 
     /// Largest |x| of the puck's centre in front of the short rims.
     pub fn puck_x(&self) -> f64 {
-        self.half_length - self.puck
+        self.half_length - self.puck_radius
     }
 
     /// Largest |y| of the puck's centre.
     pub fn puck_y(&self) -> f64 {
-        self.half_width - self.puck
+        self.half_width - self.puck_radius
     }
 
-    /// Smallest x allowed for a mallet reference.
+    /// Smallest x allowed for a mallet reference, the position that the arm is commanded to reach.
     pub fn mallet_x_min(&self) -> f64 {
-        -self.half_length + self.mallet + MARGIN
+        -self.half_length + self.mallet_radius + REFERENCE_MARGIN
     }
 
     /// Largest distance from the robot's base allowed for a mallet reference; the arm is nearly
@@ -78,7 +82,7 @@ impl Field {
 
     /// Largest |y| allowed for a mallet reference.
     pub fn mallet_y_max(&self) -> f64 {
-        self.half_width - self.mallet - MARGIN
+        self.half_width - self.mallet_radius - REFERENCE_MARGIN
     }
 
     /// Lowest and highest coordinates allowed for a mallet reference; the reach is another bound.
@@ -86,18 +90,18 @@ impl Field {
         let y = self.mallet_y_max();
         (
             Vec2::new(self.mallet_x_min(), -y),
-            Vec2::new(self.reach_max() - self.base, y),
+            Vec2::new(self.reach_max() - self.base_distance, y),
         )
     }
 
     /// The nearest point allowed for a mallet reference.
-    pub fn clamp_mallet(&self, p: Vec2) -> Vec2 {
+    pub fn clamp_mallet(&self, point: Vec2) -> Vec2 {
         let (low, high) = self.mallet_bounds();
-        let p = Vec2::new(p.x.clamp(low.x, high.x), p.y.clamp(low.y, high.y));
-        let from_base = self.to_base(p);
+        let point = Vec2::new(point.x.clamp(low.x, high.x), point.y.clamp(low.y, high.y));
+        let from_base = self.to_base(point);
         let reach = from_base.norm();
         if reach <= self.reach_max() {
-            p
+            point
         } else {
             self.to_field(from_base * (self.reach_max() / reach))
         }

@@ -1,4 +1,4 @@
-//! Forward kinematics and positional Jacobian of the arm, in its own base frame.
+//! Forward kinematics of the arm: the position of the mallet, and its Jacobian, from the joint angles, in the arm's own base frame.
 //!
 //! The arm is a serial chain of seven revolute joints, each turning about the local z axis of its
 //! body, with the mallet's joint ("end effector") at the tip of a rod on the last link. The mallet
@@ -12,8 +12,8 @@ use crate::env::{JOINTS, Joints};
 /// Rows: x, y, z of the end effector; columns: joints.
 pub type Jacobian = SMatrix<f64, 3, JOINTS>;
 
-/// Each body's origin in its parent's frame, metres.
-const ORIGIN: [[f64; 3]; JOINTS] = [
+/// Origin of each joint's body in the frame of the previous body, metres.
+const ORIGINS_M: [[f64; 3]; JOINTS] = [
     [0.0, 0.0, 0.1575],
     [0.0, 0.0, 0.2025],
     [0.0, 0.2045, 0.0],
@@ -22,10 +22,10 @@ const ORIGIN: [[f64; 3]; JOINTS] = [
     [0.0, 0.0, 0.2155],
     [0.0, 0.081, 0.0],
 ];
-/// The end effector on link 7, metres along its z axis.
+/// Distance of the end effector from link 7's origin along its z axis, metres.
 const ROD_M: f64 = 0.585;
 
-// The same lengths for the arm in one plane (joints 3, 5 at zero).
+// The same lengths, in metres, for an arm in one vertical plane (joints 3 and 5 at zero).
 /// Height of joint 2's axis.
 pub const SHOULDER_M: f64 = 0.1575 + 0.2025;
 /// From joint 2's to joint 4's axis.
@@ -35,7 +35,7 @@ pub const FOREARM_M: f64 = 0.1845 + 0.2155;
 /// From joint 6's axis to the end effector.
 pub const HAND_M: f64 = 0.081 + ROD_M;
 
-/// Orientation of a body in its parent at joint angle zero. All of them are multiples of quarter
+/// Orientation of a joint's body in the frame of the previous body at joint angle zero. All of them are multiples of quarter
 /// turns, so exact matrices stand in for the quaternions.
 #[rustfmt::skip]
 fn mounting(joint: usize) -> Matrix3<f64> {
@@ -64,11 +64,11 @@ pub struct Pose {
     pub elbow_z: f64,
     /// Height of link 7's origin (wrist), metres.
     pub wrist_z: f64,
-    /// d tip / d q.
+    /// Derivative of the tip by the joint angles.
     pub jacobian: Jacobian,
 }
 
-/// Computes the pose of the chain at `q` (radians).
+/// Computes the arm's pose at the joint angles `q`, radians.
 #[must_use]
 pub fn forward(q: &Joints) -> Pose {
     let mut rotation = Matrix3::identity();
@@ -76,7 +76,7 @@ pub fn forward(q: &Joints) -> Pose {
     let mut origins = [Vector3::zeros(); JOINTS];
     let mut axes = [Vector3::zeros(); JOINTS];
     for i in 0..JOINTS {
-        position += rotation * Vector3::from(ORIGIN[i]);
+        position += rotation * Vector3::from(ORIGINS_M[i]);
         let (sin, cos) = q[i].sin_cos();
         rotation =
             rotation * mounting(i) * Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);

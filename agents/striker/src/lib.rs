@@ -1,7 +1,7 @@
 //! Striker: a reference agent for Robot Air Hockey.
 //!
 //! Model based, no learning: a Kalman filter estimates the puck, a skill chooses the mallet's target
-//! position and velocity, a quintic makes the motion smooth, and inverse kinematics with an online
+//! position and velocity, a polynomial of degree five makes the motion smooth, and inverse kinematics with an online
 //! correction converts it to joint commands within the evaluator's limits. The library has no clock
 //! and no I/O; `main.rs` adds the protocol.
 
@@ -14,7 +14,7 @@ pub mod field;
 mod keeper;
 mod kinematics;
 pub mod motion;
-mod opponent;
+mod pendulum;
 pub mod protocol;
 pub mod puck;
 mod redundancy;
@@ -32,6 +32,7 @@ pub use env::{BaseFrame, Env, JOINTS, Joints, RadiusInfo, RobotInfo, TableInfo};
 pub use kinematics::{Pose, forward};
 pub use task::{Action, Policy, Task, WrongLength};
 
+/// The kind of play for the task: each skill decides where the mallet moves.
 #[derive(Debug, Clone)]
 enum Skill {
     Hit(Hit),
@@ -52,10 +53,10 @@ impl Skill {
 
     fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         match self {
-            Self::Hit(s) => s.decide(scene),
-            Self::Defend(s) => s.decide(scene),
-            Self::Prepare(s) => s.decide(scene),
-            Self::Tournament(s) => s.decide(scene),
+            Self::Hit(skill) => skill.decide(scene),
+            Self::Defend(skill) => skill.decide(scene),
+            Self::Prepare(skill) => skill.decide(scene),
+            Self::Tournament(skill) => skill.decide(scene),
         }
     }
 }
@@ -69,7 +70,7 @@ pub struct Agent {
 }
 
 impl Agent {
-    /// An agent for `task` and the environment in `hello`.
+    /// An agent for `task` and the environment that the evaluator sends in the message `hello`.
     #[must_use]
     pub fn new(task: Task, env: &Env) -> Self {
         Self {

@@ -1,4 +1,5 @@
-//! Smooth mallet motions in the plane: quintic polynomials, replanned at every control step.
+//! Smooth mallet motions in the plane: polynomials of degree five (*quintics*) in time, replanned at every control step. The planned
+//! position, velocity and acceleration of the mallet are its *reference*.
 
 use crate::field::{Field, Vec2};
 
@@ -43,7 +44,7 @@ impl Target {
     }
 }
 
-/// Limits of a positioning motion.
+/// Limits of a motion to a point at which the mallet stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
     /// Peak speed, m/s.
@@ -66,7 +67,7 @@ impl Pace {
 }
 
 impl Motion {
-    pub fn rest(pos: Vec2) -> Self {
+    pub fn at_rest(pos: Vec2) -> Self {
         Self {
             pos,
             vel: Vec2::zeros(),
@@ -74,12 +75,17 @@ impl Motion {
         }
     }
 
-    /// The state `t` seconds along the quintic to the target (arriving without acceleration).
-    pub fn towards(&self, target: &Target, t: f64) -> Self {
-        let total = target.time.max(t).max(1e-3);
-        let u = t / total;
-        let (p0, v0, a0) = (self.pos, self.vel * total, self.acc * total * total);
-        let (p1, v1) = (target.pos, target.vel * total);
+    /// The state after `time` seconds on the quintic to the target, where the mallet arrives without acceleration.
+    pub fn towards(&self, target: &Target, time: f64) -> Self {
+        let total_time = target.time.max(time).max(1e-3);
+        // The quintic in the share u of the total time, with coefficients c3 to c5.
+        let u = time / total_time;
+        let (p0, v0, a0) = (
+            self.pos,
+            self.vel * total_time,
+            self.acc * total_time * total_time,
+        );
+        let (p1, v1) = (target.pos, target.vel * total_time);
         let d = p1 - p0 - v0 - 0.5 * a0;
         let dv = v1 - v0 - a0;
         let da = -a0;
@@ -91,8 +97,8 @@ impl Motion {
         let acc = a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5));
         Self {
             pos,
-            vel: vel / total,
-            acc: acc / (total * total),
+            vel: vel / total_time,
+            acc: acc / (total_time * total_time),
         }
     }
 
@@ -104,53 +110,53 @@ impl Motion {
             excess: 0.0,
         };
         for k in 1..=8 {
-            let m = self.towards(target, target.time * f64::from(k) / 8.0);
-            effort.speed = effort.speed.max(m.vel.norm());
-            effort.acceleration = effort.acceleration.max(m.acc.norm());
+            let state = self.towards(target, target.time * f64::from(k) / 8.0);
+            effort.speed = effort.speed.max(state.vel.norm());
+            effort.acceleration = effort.acceleration.max(state.acc.norm());
             effort.excess = effort
                 .excess
-                .max((m.pos - field.clamp_mallet(m.pos)).norm());
+                .max((state.pos - field.clamp_mallet(state.pos)).norm());
         }
         effort
     }
 
-    /// Limits the change of velocity since `before`, `dt` seconds ago: a late change of plan may require
-    /// more than the arm can follow.
+    /// Limits the change of velocity since the state `before`, `dt` seconds ago: a late change of plan may require
+    /// more than the arm can follow. `acceleration` is the limit, m/s².
     pub fn limit(&mut self, before: &Self, dt: f64, acceleration: f64) {
         let change = self.vel - before.vel;
-        let max = acceleration * dt;
-        if change.norm() > max {
-            let change = change * (max / change.norm());
+        let change_max = acceleration * dt;
+        if change.norm() > change_max {
+            let change = change * (change_max / change.norm());
             self.vel = before.vel + change;
             self.pos = before.pos + 0.5 * dt * (before.vel + self.vel);
             self.acc = change / dt;
         }
     }
 
-    /// Keeps the reference in the allowed area: it approaches a bound only as fast as it can still stop
+    /// Keeps the reference in the allowed area: the mallet approaches a bound only as fast as it can still stop
     /// before it.
     pub fn confine(&mut self, before: &Self, dt: f64, field: &Field) {
         let (low, high) = field.mallet_bounds();
         for i in 0..2 {
-            let room = if self.vel[i] > 0.0 {
+            let distance_left = if self.vel[i] > 0.0 {
                 high[i] - before.pos[i]
             } else {
                 before.pos[i] - low[i]
             };
-            let max = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
-            if self.vel[i].abs() > max {
-                self.vel[i] = max * self.vel[i].signum();
+            let speed_max = (2.0 * BOUND_BRAKE * distance_left.max(0.0)).sqrt();
+            if self.vel[i].abs() > speed_max {
+                self.vel[i] = speed_max * self.vel[i].signum();
                 self.pos[i] = before.pos[i] + dt * self.vel[i];
                 self.acc[i] = 0.0;
             }
             self.pos[i] = self.pos[i].clamp(low[i], high[i]);
         }
-        // The same along the reach of the arm.
+        // The same for the bound of the arm's reach, a circle around its base.
         let radius = field.to_base(self.pos);
         let outward = radius / radius.norm();
-        let room = field.reach_max() - field.to_base(before.pos).norm();
-        let max = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
-        let excess = self.vel.dot(&outward) - max;
+        let distance_left = field.reach_max() - field.to_base(before.pos).norm();
+        let speed_max = (2.0 * BOUND_BRAKE * distance_left.max(0.0)).sqrt();
+        let excess = self.vel.dot(&outward) - speed_max;
         if excess > 0.0 {
             self.vel -= excess * outward;
             self.pos = before.pos + dt * self.vel;

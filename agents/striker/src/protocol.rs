@@ -1,4 +1,4 @@
-//! The agent's side of the protocol, for any [`Policy`].
+//! The agent's side of the evaluator's protocol, for any [`Policy`].
 
 use std::process::ExitCode;
 
@@ -21,7 +21,7 @@ impl<P: Policy> Agent for PolicyAgent<P> {
     }
 }
 
-/// Runs the policy that `make_policy` creates over standard input and output. `name` and `version` identify the
+/// Creates a policy with `make_policy` for each `hello` and runs it over standard input and output. `name` and `version` identify the
 /// program.
 pub fn run<P: Policy>(
     [name, version]: [&'static str; 2],

@@ -5,20 +5,24 @@
 
 use crate::field::{Field, Vec2};
 
-/// Velocity decay of the sliding puck, 1/s.
+/// Rate at which the sliding puck's velocity decays, 1/s.
 pub const DRAG: f64 = 0.5;
 /// Mean coefficient of restitution of the rims.
 pub const RIM_RESTITUTION: f64 = 0.75;
-/// Share of the slip between puck and rim that one bounce removes (one or two substeps' contact).
-const RIM_GRIP: f64 = 0.37;
+/// Share of the slip (relative speed along the surface) between puck and rim that one bounce removes. The contact lasts one or two of the
+/// simulator's steps of 1 ms.
+const RIM_SLIP_REMOVED: f64 = 0.37;
 /// Mean coefficient of restitution of the mallet.
 pub const MALLET_RESTITUTION: f64 = 0.44;
 /// Share of the slip that a mallet contact removes.
-const MALLET_GRIP: f64 = 0.8;
-/// Decay of the yaw rate, 1/s.
+const MALLET_SLIP_REMOVED: f64 = 0.8;
+/// Rate at which the yaw rate decays, 1/s.
 const SPIN_DRAG: f64 = 0.4;
-/// Share of a removed slip that changes the puck's velocity: 1/(1 + m r²/I); the rest changes its spin.
-const SLIP_TO_VELOCITY: f64 = 1.0 / (1.0 + 0.01 * 0.031_65 * 0.031_65 / 5e-6);
+/// Radius of the puck, metres.
+const RADIUS: f64 = 0.031_65;
+/// Share of a removed slip that changes the puck's velocity: 1/(1 + m r²/I) with mass m, radius r and yaw inertia I; the rest changes its
+/// spin.
+const SLIP_TO_VELOCITY: f64 = 1.0 / (1.0 + 0.01 * RADIUS * RADIUS / 5e-6);
 
 /// State of the puck in the field frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +35,7 @@ pub struct Puck {
     pub spin: f64,
 }
 
-/// The boundary that a puck reaches.
+/// The boundary of the table that a puck reaches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rim {
     /// A short side: the normal is along x.
@@ -51,41 +55,41 @@ impl Puck {
         self.spin *= (-SPIN_DRAG * time).exp();
     }
 
-    /// Time until the next rim and that rim; `None` if the puck stops before.
+    /// Time, seconds, until the puck reaches the next rim, and that rim; `None` if the puck stops before.
     pub fn next_rim(&self, field: &Field) -> Option<(f64, Rim)> {
-        let arrival = |pos: f64, vel: f64, bound: f64| {
+        let arrival_time = |pos: f64, vel: f64, bound: f64| {
             let distance = if vel > 0.0 { bound - pos } else { bound + pos };
-            let share = DRAG * distance.max(0.0) / vel.abs();
-            (vel.abs() > 1e-6 && share < 1.0).then(|| -(1.0 - share).ln() / DRAG)
+            let speed_loss = DRAG * distance.max(0.0) / vel.abs();
+            (vel.abs() > 1e-6 && speed_loss < 1.0).then(|| -(1.0 - speed_loss).ln() / DRAG)
         };
-        let short = arrival(self.pos.x, self.vel.x, field.puck_x());
-        let long = arrival(self.pos.y, self.vel.y, field.puck_y());
+        let short = arrival_time(self.pos.x, self.vel.x, field.puck_x());
+        let long = arrival_time(self.pos.y, self.vel.y, field.puck_y());
         match (short, long) {
-            (Some(s), Some(l)) if l < s => Some((l, Rim::Long)),
-            (Some(s), _) => {
-                let y = self.pos.y + self.vel.y * (1.0 - (-DRAG * s).exp()) / DRAG;
+            (Some(short), Some(long)) if long < short => Some((long, Rim::Long)),
+            (Some(short), _) => {
+                let y = self.pos.y + self.vel.y * (1.0 - (-DRAG * short).exp()) / DRAG;
                 // A puck that just grazes the rounded post still enters the goal.
-                let rim = if y.abs() < field.half_goal - 0.7 * field.puck {
+                let rim = if y.abs() < field.half_goal - 0.7 * field.puck_radius {
                     Rim::Goal
                 } else {
                     Rim::Short
                 };
-                Some((s, rim))
+                Some((short, rim))
             }
-            (None, Some(l)) => Some((l, Rim::Long)),
+            (None, Some(long)) => Some((long, Rim::Long)),
             (None, None) => None,
         }
     }
 
-    /// Slides for `time` seconds, bouncing off the rims. Returns false if it left through a goal.
+    /// Slides for `time` seconds, bouncing off the rims. Returns false if the puck went into a goal.
     pub fn advance(&mut self, field: &Field, time: f64) -> bool {
-        let mut left = time;
+        let mut time_left = time;
         // A puck in a corner bounces at most a few times in any span that is planned.
         for _ in 0..12 {
             match self.next_rim(field) {
-                Some((t, rim)) if t <= left => {
-                    self.slide(t);
-                    left -= t;
+                Some((time, rim)) if time <= time_left => {
+                    self.slide(time);
+                    time_left -= time;
                     if rim == Rim::Goal {
                         return false;
                     }
@@ -94,7 +98,7 @@ impl Puck {
                 _ => break,
             }
         }
-        self.slide(left);
+        self.slide(time_left);
         true
     }
 
@@ -105,7 +109,7 @@ impl Puck {
             Rim::Long => Vec2::new(0.0, -self.vel.y.signum()),
             Rim::Goal => return,
         };
-        self.collide(normal, Vec2::zeros(), RIM_RESTITUTION, RIM_GRIP);
+        self.collide(normal, Vec2::zeros(), RIM_RESTITUTION, RIM_SLIP_REMOVED);
     }
 
     /// Applies a strike by a mallet at `mallet` moving with `velocity`; nothing changes if they already
@@ -114,25 +118,32 @@ impl Puck {
         let offset = self.pos - mallet;
         let distance = offset.norm();
         if distance > 1e-9 {
-            self.collide(offset / distance, velocity, MALLET_RESTITUTION, MALLET_GRIP);
+            self.collide(
+                offset / distance,
+                velocity,
+                MALLET_RESTITUTION,
+                MALLET_SLIP_REMOVED,
+            );
         }
     }
 
-    /// Applies the impulse along `normal` (into the puck) and the friction of a body moving with `other`.
-    fn collide(&mut self, normal: Vec2, other: Vec2, restitution: f64, grip: f64) {
-        let relative = self.vel - other;
-        let approach = relative.dot(&normal);
-        if approach >= 0.0 {
+    /// Applies the impulse along `normal` (into the puck) and the friction of a body that moves with `other_velocity`. `slip_removed`
+    /// is the share of the slip that the contact removes.
+    fn collide(&mut self, normal: Vec2, other_velocity: Vec2, restitution: f64, slip_removed: f64) {
+        let relative = self.vel - other_velocity;
+        let normal_speed = relative.dot(&normal);
+        if normal_speed >= 0.0 {
             return;
         }
         let tangent = Vec2::new(-normal.y, normal.x);
-        let radius = 0.031_65;
+        let radius = RADIUS;
         let slip = relative.dot(&tangent) - self.spin * radius;
-        // Friction is bounded by the normal impulse (coefficient one for the mallet; the rims grip
-        // so briefly that the bound never matters).
-        let push = (1.0 + restitution) * -approach;
-        let along = (grip * slip * SLIP_TO_VELOCITY).clamp(-push, push);
-        self.vel += normal * push - tangent * along;
-        self.spin += along * (1.0 - SLIP_TO_VELOCITY) / SLIP_TO_VELOCITY / radius;
+        // Friction is bounded by the normal impulse: its coefficient is 1 for the mallet, and contacts with rims are
+        // so short that the bound never matters.
+        let normal_change = (1.0 + restitution) * -normal_speed;
+        let tangent_change =
+            (slip_removed * slip * SLIP_TO_VELOCITY).clamp(-normal_change, normal_change);
+        self.vel += normal * normal_change - tangent * tangent_change;
+        self.spin += tangent_change * (1.0 - SLIP_TO_VELOCITY) / SLIP_TO_VELOCITY / radius;
     }
 }

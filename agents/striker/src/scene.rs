@@ -1,4 +1,4 @@
-//! Input and output of the skills: the scene, and the command for the mallet.
+//! Input and output of the skills (decisions how to play): the *scene*, the estimated state of the table, and the command for the mallet.
 
 use crate::arm::{Arm, Posture, Side};
 use crate::field::{Field, Vec2};
@@ -15,8 +15,9 @@ pub struct Scene<'a> {
     /// Seconds since the episode's (or rally's) start.
     pub time: f64,
     pub puck: Puck,
-    /// Standard deviation of its velocity components, m/s.
+    /// Standard deviations of the puck's velocity components, m/s.
     pub puck_speed_deviation: Vec2,
+    /// Reference of the own mallet: its commanded motion.
     pub mallet: Motion,
     /// The arm, for its possible speeds.
     pub arm: &'a Arm,
@@ -29,9 +30,9 @@ pub struct Scene<'a> {
 pub struct MalletCommand {
     /// Position, velocity and time of arrival.
     pub target: Target,
-    /// Preference for the free degrees of freedom.
+    /// Preference for the arm's free degrees of freedom.
     pub posture: Posture,
-    /// Largest acceleration of the reference, m/s².
+    /// Largest acceleration of the mallet's reference, m/s².
     pub acceleration: f64,
 }
 
@@ -57,7 +58,7 @@ impl MalletCommand {
         )
     }
 
-    /// Slows down along the present direction.
+    /// Stops soon, along the present direction.
     pub fn brake(scene: &Scene<'_>) -> Self {
         let time = 0.1 + 0.1 * scene.mallet.vel.norm();
         let pos = scene
@@ -100,8 +101,9 @@ pub fn lean_side(pos: Vec2) -> Side {
 /// `goal` itself, or a point beside the puck.
 pub fn waypoint(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
     let from = scene.mallet.pos;
+    // The puck's position in a tenth of a second.
     let puck = scene.puck.pos + 0.1 * scene.puck.vel;
-    // If the goal is closer to the puck, its own distance is the clearance.
+    // If the goal is closer to the puck than the clearance, its distance is the clearance.
     let clearance = clearance.min((goal - puck).norm() - 1e-3);
     let path = goal - from;
     let length = path.norm();
@@ -111,14 +113,14 @@ pub fn waypoint(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
     let direction = path / length;
     let along = (puck - from).dot(&direction);
     let nearest = from + direction * along.clamp(0.0, length);
-    let away = nearest - puck;
-    let distance = away.norm();
+    let puck_to_path = nearest - puck;
+    let distance = puck_to_path.norm();
     if distance >= clearance || along <= 0.0 {
         return goal;
     }
-    // Pass on the side of the straight path, unless the rim is there.
+    // Pass the puck on the side of the straight path, unless the rim is there.
     let normal = Vec2::new(-direction.y, direction.x);
-    let mut side = if away.dot(&normal) >= 0.0 {
+    let mut side = if puck_to_path.dot(&normal) >= 0.0 {
         normal
     } else {
         -normal

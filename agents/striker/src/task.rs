@@ -1,9 +1,9 @@
-//! Interface of a policy: task, action and errors.
+//! Interface of a policy, the part of an agent that chooses actions: task, observation, action and errors.
 
 use crate::env::JOINTS;
 pub use faceoff_agent::{Task, WrongLength};
 
-/// Positions, then velocities, of the seven joints (the protocol's interpolation 3).
+/// Positions (radians), then velocities (rad/s), of the seven joints at the end of the control step: interpolation 3 of the protocol.
 pub type Action = [[f64; JOINTS]; 2];
 
 /// A policy: everything between an observation and an action.
@@ -11,7 +11,7 @@ pub trait Policy {
     /// Starts a new episode or rally.
     fn reset(&mut self);
 
-    /// The action for an observation of 20 or 23 numbers (robot base frame).
+    /// The action for an observation in the robot's base frame: 20 numbers, or 23 with an opponent on the table.
     ///
     /// # Errors
     /// If the observation has another length.

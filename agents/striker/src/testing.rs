@@ -1,8 +1,8 @@
-//! The environment of the published table for tests.
+//! The environment description `env` for unit tests: the table and robot of the competition.
 
 use crate::Env;
 
-/// The `env` that the evaluator sends in `hello`.
+/// The `env` that the evaluator sends in the message `hello`.
 pub fn env() -> Env {
     let position = [
         2.967_06, 2.0944, 2.967_06, 2.0944, 2.967_06, 2.0944, 3.054_33,

@@ -19,7 +19,7 @@ const VERSION: u32 = 1;
 /// Error of an agent's policy.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// A policy: everything between an observation and an action.
+/// A policy: computes an action for each observation.
 pub trait Agent {
     /// Called before each episode, and before each rally of a game. It may take at most 10 s.
     fn reset(&mut self);

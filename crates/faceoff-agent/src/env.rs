@@ -1,4 +1,4 @@
-//! The field `env` of `hello`: constants of table, puck, mallet and robot.
+//! The field `env` of the evaluator's first message, `hello`: constants of table, puck, mallet and robot.
 
 use serde::Deserialize;
 
@@ -41,7 +41,7 @@ pub struct RadiusInfo {
 /// Limits and placement of the agent's robot.
 #[derive(Debug, Clone, Deserialize)]
 pub struct RobotInfo {
-    /// Height of the end effector in the robot's base frame, metres.
+    /// Height at which the rules want the end effector (the tip of the arm), in the robot's base frame, metres.
     pub ee_desired_height: f64,
     /// Lower and upper joint position limits, radians; constraints are tested at 95 % of them.
     pub joint_pos_limit: [[f64; JOINTS]; 2],

@@ -43,7 +43,7 @@ impl<'de> Deserializer<'de> for ObjectsOnly<'de> {
         match self.0 {
             Value::Array(items) => visitor.visit_seq(Items(items.iter())),
             Value::Object(fields) => visitor.visit_map(Fields::new(fields)),
-            plain => plain.deserialize_any(visitor),
+            scalar => scalar.deserialize_any(visitor),
         }
     }
 
@@ -82,7 +82,7 @@ impl<'de> Deserializer<'de> for ObjectsOnly<'de> {
     ) -> Result<V::Value, Error> {
         match self.0 {
             Value::Object(fields) if fields.len() == 1 => visitor.visit_enum(Fields::new(fields)),
-            plain => plain.deserialize_enum(name, variants, visitor),
+            other => other.deserialize_enum(name, variants, visitor),
         }
     }
 
@@ -115,9 +115,10 @@ impl<'de> SeqAccess<'de> for Items<'de> {
     }
 }
 
-/// The fields of an object: those that remain to be read, and the value of the last name that was read.
+/// Reads the fields of an object.
 struct Fields<'de> {
     remaining: map::Iter<'de>,
+    /// The value of the field whose name was read last.
     value: &'de Value,
 }
 
@@ -226,7 +227,7 @@ mod tests {
             check::<Outer>(&value).unwrap();
         }
         let assert_refused = |value: Value, path: &str| {
-            // The derived implementation accepts the value; otherwise this check would not be needed.
+            // The derived `Deserialize` accepts the value, which is why `check` is needed.
             serde_json::from_value::<Outer>(value.clone()).unwrap();
             let error = check::<Outer>(&value).unwrap_err();
             assert_eq!(error.path().to_string(), path, "{error}");

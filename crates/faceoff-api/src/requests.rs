@@ -42,7 +42,7 @@ pub struct NewTeam {
     pub name: String,
 }
 
-/// Query of a comparison.
+/// Query of a comparison of two evaluations.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
@@ -60,11 +60,11 @@ pub struct ComparisonQuery {
 pub struct ArchiveQuery {
     /// `public` leaves out what only organisers may see; `organiser` is complete. Default: `organiser`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[param(schema_with = editions, required = false)]
+    #[param(schema_with = edition_schema, required = false)]
     pub edition: Option<Edition>,
 }
 
-fn editions() -> Object {
+fn edition_schema() -> Object {
     let names = [Edition::Public, Edition::Organiser].map(|edition| edition.to_string());
     ObjectBuilder::new()
         .schema_type(Type::String)
@@ -78,7 +78,7 @@ fn editions() -> Object {
 pub struct MissedDay {
     /// The day's date in the stage's time zone; in the past.
     pub day: Date,
-    /// Public. 1 to 500 characters.
+    /// Why the day was missed. Public. 1 to 500 characters.
     pub reason: String,
 }
 
@@ -88,7 +88,7 @@ pub struct MissedDay {
 pub struct NewExtraEvaluation {
     /// The team to evaluate.
     pub team: TeamId,
-    /// Public. 1 to 500 characters.
+    /// Why the team gets the evaluation. Public. 1 to 500 characters.
     pub reason: String,
     /// The team's name. Required if the evaluation replaces a result of the day that counts; without it the request
     /// changes nothing and the response describes the effects.
@@ -339,7 +339,7 @@ pub struct Trial {
     /// A valid submission. Default: the active submission of every team.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub submission: Option<SubmissionId>,
-    /// Written to the log. 1 to 500 characters.
+    /// Why the trial is started; for the event log. 1 to 500 characters.
     pub reason: String,
 }
 
@@ -356,7 +356,7 @@ pub struct NewProposal {
     /// Whether to use the stage's newest rules, and add the results to the board of these rules. Only with `day`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub new_rules: bool,
-    /// Public once the proposal is applied. 1 to 500 characters.
+    /// Why the re-evaluation is needed. Public once the proposal is applied. 1 to 500 characters.
     pub reason: String,
 }
 
@@ -389,7 +389,7 @@ pub struct DeleteSubmission {
     /// The bundle's file name. Without it the request changes nothing and the response describes the effects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
-    /// Shown to the team. 1 to 500 characters. Required from an organiser, optional from the team.
+    /// Why the bundle is deleted. Shown to the team. 1 to 500 characters. Required from an organiser, optional from the team.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
@@ -398,7 +398,7 @@ pub struct DeleteSubmission {
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cancellation {
-    /// Shown to the team. 1 to 500 characters.
+    /// Why the evaluation is cancelled. Shown to the team. 1 to 500 characters.
     pub reason: String,
 }
 
@@ -406,7 +406,7 @@ pub struct Cancellation {
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decision {
-    /// Public. 1 to 500 characters.
+    /// The reason for the decision. Public. 1 to 500 characters.
     pub reason: String,
     /// The name of the team, or the date of the day, that the decision affects. Without it the request changes nothing
     /// and the response describes the effects.
@@ -432,11 +432,12 @@ pub struct Reason {
     pub reason: String,
 }
 
-/// An ablation to start. All fields are optional.
+/// An ablation to start: the submission is evaluated without perturbations, with each one alone and with all. All fields
+/// are optional.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NewAblation {
-    /// Episodes per task in each of the six profiles. Default: 100.
+    /// Episodes per task in each of the six perturbation profiles. Default: 100.
     pub episodes_per_task: Option<u32>,
 }
 

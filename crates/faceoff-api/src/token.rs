@@ -10,7 +10,7 @@ use std::fmt;
 pub enum SecretKind {
     /// A team's API token.
     Team,
-    /// The host's API token.
+    /// The API token of the host, the person who runs the server.
     Admin,
     /// A user's API token.
     User,
@@ -77,13 +77,14 @@ mod tests {
 
     #[test]
     fn secrets_are_unique_and_hidden_in_debug_output() {
-        let a = Secret::generate(SecretKind::Team).unwrap();
-        let b = Secret::generate(SecretKind::Team).unwrap();
-        assert_ne!(a.as_str(), b.as_str());
-        assert_eq!(a.as_str().len(), "fo_team_".len() + 64);
-        assert!(a.as_str().starts_with("fo_team_"));
-        assert!(!format!("{a:?}").contains(a.as_str()));
-        assert_eq!(a.hash(), hash_token(a.as_str()));
-        assert_ne!(a.hash(), b.hash());
+        const HEX_DIGITS: usize = 64;
+        let first = Secret::generate(SecretKind::Team).unwrap();
+        let second = Secret::generate(SecretKind::Team).unwrap();
+        assert_ne!(first.as_str(), second.as_str());
+        assert_eq!(first.as_str().len(), "fo_team_".len() + HEX_DIGITS);
+        assert!(first.as_str().starts_with("fo_team_"));
+        assert!(!format!("{first:?}").contains(first.as_str()));
+        assert_eq!(first.hash(), hash_token(first.as_str()));
+        assert_ne!(first.hash(), second.hash());
     }
 }

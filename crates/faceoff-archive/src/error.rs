@@ -1,3 +1,5 @@
+//! Errors of reading and writing archives of a season.
+
 use crate::format::FORMAT;
 use std::io;
 
@@ -13,6 +15,7 @@ pub enum ArchiveError {
          ones: use the version of Faceoff that made it, or a later one"
     )]
     Newer {
+        /// Format number of the archive.
         format: u64,
         /// Name and version of the program that wrote it, from the manifest.
         program: String,

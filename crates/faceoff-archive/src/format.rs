@@ -1,2 +1,4 @@
+//! The version number of the archive format.
+
 /// The archive format that this program writes, and the newest that it reads.
 pub const FORMAT: u32 = 1;

@@ -1,4 +1,4 @@
-//! The manifest of an archive.
+//! The manifest of an archive: its first file, which lists the path, length and hash of all others.
 
 use crate::{error::ArchiveError, format::FORMAT};
 use jiff::Timestamp;
@@ -12,8 +12,9 @@ pub const MANIFEST_NAME: &str = "manifest.json";
 pub(crate) const MANIFEST_MAX_BYTES: u64 = 64 << 20;
 /// Maximum number of files in an archive.
 const MAX_FILES: usize = 500_000;
-/// Maximum length of a path that fits into a plain tar header regardless of its parts.
+/// Maximum length of a path. A plain tar header has space for it, wherever it is split between the two name fields.
 const PATH_MAX_BYTES: usize = 155;
+/// Maximum length of a part of a path, between two slashes.
 const PART_MAX_BYTES: usize = 100;
 
 /// The readers that an archive is for.
@@ -42,6 +43,7 @@ pub struct Manifest {
     pub format: u32,
     /// Name and version of that program, for example `faceoff 0.1.0`.
     pub program: String,
+    /// Name of the season.
     pub season: String,
     /// Time of the data in the archive.
     pub made_at: Timestamp,
@@ -58,6 +60,7 @@ pub struct Manifest {
 pub struct Entry {
     /// Relative path of ASCII letters, digits and `. _ -`, with slashes between its parts.
     pub path: String,
+    /// Length of the file.
     pub bytes: u64,
     /// BLAKE3 hash of its content, 64 hexadecimal digits.
     pub blake3: String,
@@ -73,7 +76,7 @@ impl Manifest {
 
     /// Parses an untrusted manifest.
     pub(crate) fn parse(bytes: &[u8]) -> Result<Self, ArchiveError> {
-        // A later format may have another layout, but it keeps these fields.
+        // A later format may have other fields, but it keeps these.
         #[derive(Deserialize)]
         struct Head {
             format: u64,
@@ -106,14 +109,13 @@ impl Manifest {
                 self.files.len()
             )));
         }
-        // The length of the serialised form.
-        let bytes = serde_json::to_vec_pretty(self).map_err(|error| {
+        let json = serde_json::to_vec_pretty(self).map_err(|error| {
             ArchiveError::Refused(format!("{MANIFEST_NAME} cannot be written: {error}"))
         })?;
-        if bytes.len() as u64 > MANIFEST_MAX_BYTES {
+        if json.len() as u64 > MANIFEST_MAX_BYTES {
             return Err(ArchiveError::Refused(format!(
                 "{MANIFEST_NAME} has {} bytes for {} files; at most {MANIFEST_MAX_BYTES} are allowed",
-                bytes.len(),
+                json.len(),
                 self.files.len()
             )));
         }
@@ -170,8 +172,8 @@ mod tests {
 
     #[test]
     fn path_must_be_plain_and_relative() {
-        let deep = format!("{}/x", "a".repeat(101));
-        let long = "ab/".repeat(60) + "x";
+        let long_part = format!("{}/x", "a".repeat(PART_MAX_BYTES + 1));
+        let long_path = "ab/".repeat(60) + "x";
         for valid in [
             "a",
             "results/1-qualifying/board.json",
@@ -191,8 +193,8 @@ mod tests {
             "a\\b",
             "a\0b",
             "ä",
-            &deep,
-            &long,
+            &long_part,
+            &long_path,
         ] {
             assert!(check_path(invalid).is_err(), "{invalid:?}");
         }

@@ -1,4 +1,4 @@
-//! Checking and unpacking untrusted archives.
+//! Checks and unpacks untrusted archives of a season.
 
 use crate::{
     error::ArchiveError,
@@ -15,17 +15,18 @@ use std::{
 use tar::EntryType;
 
 /// The first bytes of a zstd frame.
-const MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-/// Maximum memory for decompression as a power of 2; all zstd decompressors support this window.
-const WINDOW_LOG: u32 = 27;
+const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+/// Maximum window of decompression as a power of 2, in bytes: 128 MiB, which all zstd decompressors support.
+const MAX_WINDOW_LOG2: u32 = 27;
 /// Maximum ratio of the unpacked to the packed length …
-const EXPANSION: u64 = 200;
+const MAX_EXPANSION_FACTOR: u64 = 200;
 /// … plus this many bytes. Results and logs are text, other files are already compressed.
-const EXPANSION_EXTRA_BYTES: u64 = 256 << 20;
+const MAX_EXPANSION_EXTRA_BYTES: u64 = 256 << 20;
 /// Maximum length of a file's header and padding.
-const OVERHEAD_BYTES: u64 = 1024;
+const ENTRY_OVERHEAD_BYTES: u64 = 1024;
 /// Maximum length of the data after the last file: end markers and padding of a whole tar record.
 const END_BYTES: u64 = 64 << 10;
+/// Length of the buffers through which files are read.
 const BUFFER_BYTES: usize = 256 << 10;
 
 /// Reads a whole archive and verifies it against its manifest, without writing files.
@@ -36,49 +37,49 @@ pub fn check(archive: &Path) -> Result<Manifest, ArchiveError> {
     read(archive, &|_| Ok(()), &|_| Ok(None))
 }
 
-/// Unpacks an archive into the empty folder `into`. After an error the content of the folder is invalid.
+/// Unpacks an archive into an empty folder. After an error the content of the folder is invalid.
 ///
 /// # Errors
 /// [`ArchiveError::Refused`] if the archive differs from its manifest: another file, a link or device, a path outside of
 /// the folder, another length or hash, a missing end; or if it is too large for its packed length or the free disk space.
 /// [`ArchiveError::Newer`]; [`ArchiveError::Io`] if the disk fails.
-pub fn unpack(archive: &Path, into: &Path) -> Result<Manifest, ArchiveError> {
+pub fn unpack(archive: &Path, folder: &Path) -> Result<Manifest, ArchiveError> {
     let check_free_space = |manifest: &Manifest| {
-        let disk = rustix::fs::statvfs(into).map_err(io::Error::from)?;
+        let disk = rustix::fs::statvfs(folder).map_err(io::Error::from)?;
         let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
         let total_bytes = manifest.total_bytes();
         if total_bytes > free_bytes {
             return Err(ArchiveError::Refused(format!(
                 "the archive unpacks to {total_bytes} bytes, and {free_bytes} are free in {}: free some space, or choose \
                  a folder on another disk",
-                into.display()
+                folder.display()
             )));
         }
         Ok(())
     };
     read(archive, &check_free_space, &|entry| {
         // The path has plain parts and no links are created, so it stays within the folder.
-        let path = into.join(&entry.path);
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder)?;
+        let path = folder.join(&entry.path);
+        if let Some(parent) = path.parent() {
+            fs::create_dir_all(parent)?;
         }
         File::create_new(path).map(Some)
     })
 }
 
-/// Reads an archive. `accept` may refuse its manifest; `create` opens the file to write an entry to, if any.
+/// Reads an archive. `check_manifest` may refuse its manifest; `create_file` opens the file to write an entry to, if any.
 fn read(
     archive: &Path,
-    accept: &dyn Fn(&Manifest) -> Result<(), ArchiveError>,
-    create: &dyn Fn(&Entry) -> io::Result<Option<File>>,
+    check_manifest: &dyn Fn(&Manifest) -> Result<(), ArchiveError>,
+    create_file: &dyn Fn(&Entry) -> io::Result<Option<File>>,
 ) -> Result<Manifest, ArchiveError> {
     let mut file = File::open(archive)?;
     let packed_bytes = file.metadata()?.len();
     let mut head = Vec::new();
     (&mut file)
-        .take(MAGIC.len() as u64)
+        .take(ZSTD_MAGIC.len() as u64)
         .read_to_end(&mut head)?;
-    if head != MAGIC {
+    if head != ZSTD_MAGIC {
         return Err(ArchiveError::Refused(format!(
             "{} is no archive of a season: expected a .tar.zst",
             archive.display()
@@ -86,70 +87,72 @@ fn read(
     }
     let file = io::Cursor::new(head).chain(file);
     let mut decoder = zstd::Decoder::with_buffer(BufReader::with_capacity(BUFFER_BYTES, file))?;
-    decoder.window_log_max(WINDOW_LOG)?;
-    let allowed = Rc::new(Cell::new(MANIFEST_MAX_BYTES + OVERHEAD_BYTES + END_BYTES));
-    let mut tar = tar::Archive::new(Bounded {
+    decoder.window_log_max(MAX_WINDOW_LOG2)?;
+    let remaining_bytes = Rc::new(Cell::new(
+        MANIFEST_MAX_BYTES + ENTRY_OVERHEAD_BYTES + END_BYTES,
+    ));
+    let mut tar = tar::Archive::new(BoundedReader {
         inner: decoder,
-        left: Rc::clone(&allowed),
+        remaining_bytes: Rc::clone(&remaining_bytes),
     });
 
-    let mut found: Option<Manifest> = None;
-    let mut missing: BTreeMap<String, Entry> = BTreeMap::new();
-    // Raw: extensions of the tar format are listed as entries, and therefore refused.
+    let mut manifest: Option<Manifest> = None;
+    let mut missing_files: BTreeMap<String, Entry> = BTreeMap::new();
+    // `raw` lists extensions of the tar format as entries, so that they are refused below.
     for entry in tar.entries()?.raw(true) {
         let mut entry = entry.map_err(read_error)?;
         let path = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
-        let shown: String = path.chars().take(200).collect();
+        let printed_path: String = path.chars().take(200).collect();
         let kind = entry.header().entry_type();
         if kind != EntryType::Regular {
             return Err(ArchiveError::Refused(format!(
-                "the archive's entry {shown:?} is {}: a season's archive contains only files",
+                "the archive's entry {printed_path:?} is {}: a season's archive contains only files",
                 kind_label(kind)
             )));
         }
-        if found.is_none() {
-            let manifest = read_manifest(&mut entry, &path)?;
-            let total_bytes = manifest.total_bytes();
+        if manifest.is_none() {
+            let parsed = read_manifest(&mut entry, &path)?;
+            let total_bytes = parsed.total_bytes();
             let max_bytes = packed_bytes
-                .saturating_mul(EXPANSION)
-                .saturating_add(EXPANSION_EXTRA_BYTES);
+                .saturating_mul(MAX_EXPANSION_FACTOR)
+                .saturating_add(MAX_EXPANSION_EXTRA_BYTES);
             if total_bytes > max_bytes {
                 return Err(ArchiveError::Refused(format!(
                     "{MANIFEST_NAME} names files with {total_bytes} bytes, too many for an archive of {packed_bytes} \
                      bytes: at most {max_bytes} are allowed"
                 )));
             }
-            accept(&manifest)?;
-            let overhead = OVERHEAD_BYTES.saturating_mul(manifest.files.len() as u64);
-            allowed.set(
+            check_manifest(&parsed)?;
+            let overhead = ENTRY_OVERHEAD_BYTES.saturating_mul(parsed.files.len() as u64);
+            remaining_bytes.set(
                 total_bytes
                     .saturating_add(overhead)
                     .saturating_add(END_BYTES),
             );
-            missing = manifest
+            missing_files = parsed
                 .files
                 .iter()
                 .map(|file| (file.path.clone(), file.clone()))
                 .collect();
-            found = Some(manifest);
+            manifest = Some(parsed);
             continue;
         }
-        let Some(expected) = missing.remove(&path) else {
+        let Some(expected) = missing_files.remove(&path) else {
             return Err(ArchiveError::Refused(format!(
-                "the archive contains {shown:?}, which {MANIFEST_NAME} does not name, or contains it twice"
+                "the archive contains {printed_path:?}, which {MANIFEST_NAME} does not name, or contains it twice"
             )));
         };
-        copy_verified(&mut entry, &expected, create(&expected)?)?;
+        copy_verified(&mut entry, &expected, create_file(&expected)?)?;
     }
-    let Some(manifest) = found else {
+    let Some(manifest) = manifest else {
         return Err(ArchiveError::Refused(format!(
             "the archive is empty: expected {MANIFEST_NAME} and the files that it names"
         )));
     };
-    if let Some(path) = missing.keys().next() {
+    if let Some(path) = missing_files.keys().next() {
         return Err(ArchiveError::Refused(format!(
             "the archive ends before {} of its files, {path:?} among them: it is truncated, copy or create it again",
-            missing.len()
+            missing_files.len()
         )));
     }
     // Read to the end, where the checksum of the zstd frame is.
@@ -163,9 +166,9 @@ fn read_manifest(
     path: &str,
 ) -> Result<Manifest, ArchiveError> {
     if path != MANIFEST_NAME {
-        let shown: String = path.chars().take(200).collect();
+        let printed_path: String = path.chars().take(200).collect();
         return Err(ArchiveError::Refused(format!(
-            "the archive begins with {shown:?}: expected {MANIFEST_NAME}"
+            "the archive begins with {printed_path:?}: expected {MANIFEST_NAME}"
         )));
     }
     if entry.size() > MANIFEST_MAX_BYTES {
@@ -236,24 +239,25 @@ fn read_error(error: io::Error) -> ArchiveError {
     ))
 }
 
-/// Reads up to `left` bytes, then fails if there are more.
-struct Bounded<R> {
+/// Reads at most `remaining_bytes`, then fails if there are more.
+struct BoundedReader<R> {
     inner: R,
-    left: Rc<Cell<u64>>,
+    remaining_bytes: Rc<Cell<u64>>,
 }
 
-impl<R: Read> Read for Bounded<R> {
+impl<R: Read> Read for BoundedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let left = self.left.get();
-        if left == 0 && !buffer.is_empty() {
+        let remaining = self.remaining_bytes.get();
+        if remaining == 0 && !buffer.is_empty() {
             return match self.inner.read(&mut [0])? {
                 0 => Ok(0),
                 _ => Err(io::Error::other("it is longer than its manifest says")),
             };
         }
-        let max = usize::try_from(left).map_or(buffer.len(), |left| left.min(buffer.len()));
+        let max = usize::try_from(remaining)
+            .map_or(buffer.len(), |remaining| remaining.min(buffer.len()));
         let read = self.inner.read(&mut buffer[..max])?;
-        self.left.set(left - read as u64);
+        self.remaining_bytes.set(remaining - read as u64);
         Ok(read)
     }
 }

@@ -1,4 +1,4 @@
-//! Streaming an archive.
+//! Writes an archive of a season to a stream.
 
 use crate::{
     error::ArchiveError,
@@ -6,14 +6,15 @@ use crate::{
 };
 use std::io::{self, Read, Write};
 
-/// A low compression level, since most files are already compressed.
-const LEVEL: i32 = 3;
+/// Compression level: a low one, since most files are already compressed.
+const ZSTD_LEVEL: i32 = 3;
 
 /// Writes an archive's files in the order of its manifest.
 pub struct Writer<W: Write> {
     tar: tar::Builder<zstd::Encoder<'static, W>>,
+    /// Time of the data, in seconds since 1970: the modification time of all files.
     made_at_s: u64,
-    left: std::vec::IntoIter<Entry>,
+    remaining_files: std::vec::IntoIter<Entry>,
 }
 
 impl<W: Write> Writer<W> {
@@ -23,12 +24,12 @@ impl<W: Write> Writer<W> {
     /// [`ArchiveError::Refused`] if the manifest is invalid; [`ArchiveError::Io`].
     pub fn begin(out: W, manifest: &Manifest) -> Result<Self, ArchiveError> {
         manifest.check()?;
-        let mut encoder = zstd::Encoder::new(out, LEVEL)?;
+        let mut encoder = zstd::Encoder::new(out, ZSTD_LEVEL)?;
         encoder.include_checksum(true)?;
         let mut writer = Self {
             tar: tar::Builder::new(encoder),
             made_at_s: u64::try_from(manifest.made_at.as_second()).unwrap_or(0),
-            left: manifest.files.clone().into_iter(),
+            remaining_files: manifest.files.clone().into_iter(),
         };
         let json = serde_json::to_vec_pretty(manifest).map_err(io::Error::other)?;
         let header = writer.header(MANIFEST_NAME, json.len() as u64)?;
@@ -36,26 +37,26 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
-    /// Writes the next file of the manifest, with the content from `open`; returns false after the last one.
+    /// Writes the next file of the manifest, with the content from `open_content`; returns false after the last one.
     ///
     /// # Errors
     /// [`ArchiveError::Refused`] if its content differs from the manifest: the archive is invalid then.
     pub fn next<R: Read>(
         &mut self,
-        open: impl FnOnce(&Entry) -> io::Result<R>,
+        open_content: impl FnOnce(&Entry) -> io::Result<R>,
     ) -> Result<bool, ArchiveError> {
-        let Some(entry) = self.left.next() else {
+        let Some(entry) = self.remaining_files.next() else {
             return Ok(false);
         };
         let header = self.header(&entry.path, entry.bytes)?;
-        let mut content = open(&entry)?;
-        let mut hashed = Hashed {
+        let mut content = open_content(&entry)?;
+        let mut reader = HashingReader {
             content: (&mut content).take(entry.bytes),
             hasher: blake3::Hasher::new(),
             bytes: 0,
         };
-        self.tar.append(&header, &mut hashed)?;
-        let (bytes, hash) = (hashed.bytes, hashed.hasher.finalize().to_string());
+        self.tar.append(&header, &mut reader)?;
+        let (bytes, hash) = (reader.bytes, reader.hasher.finalize().to_string());
         let has_more = content.read(&mut [0])? > 0;
         if bytes != entry.bytes || has_more || hash != entry.blake3 {
             return Err(ArchiveError::Refused(format!(
@@ -71,7 +72,11 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// [`ArchiveError::Io`].
     pub fn finish(self) -> Result<W, ArchiveError> {
-        debug_assert_eq!(self.left.len(), 0, "all files of the manifest were written");
+        debug_assert_eq!(
+            self.remaining_files.len(),
+            0,
+            "all files of the manifest were written"
+        );
         Ok(self.tar.into_inner()?.finish()?)
     }
 
@@ -88,13 +93,13 @@ impl<W: Write> Writer<W> {
 }
 
 /// Counts and hashes the bytes read through it.
-struct Hashed<R> {
+struct HashingReader<R> {
     content: R,
     hasher: blake3::Hasher,
     bytes: u64,
 }
 
-impl<R: Read> Read for Hashed<R> {
+impl<R: Read> Read for HashingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.content.read(buffer)?;
         self.hasher.update(&buffer[..read]);

@@ -1,5 +1,5 @@
-//! Reads one episode from an archive of about 300 MB, like a replay page: each time the archive is opened again, and
-//! only the page cache is warm.
+//! Measures reading one episode (a slice of the dataset) from an archive of about 300 MB, as a replay page does. The archive
+//! is opened for each reading; only the operating system has its bytes in the cache.
 #![expect(clippy::unwrap_used, reason = "a benchmark may panic")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -14,6 +14,7 @@ use std::{hint::black_box, path::Path};
 
 const EPISODES: u32 = 1000;
 const EPISODES_PER_SHARD: u32 = 100;
+/// Control steps of each episode.
 const STEPS: u32 = 230;
 
 /// A number that rarely repeats, like a measurement.
@@ -21,6 +22,7 @@ fn noise(number: f64) -> f64 {
     (number * 1e3 + 0.37).sin()
 }
 
+/// Records a shard of noise in the folder `out`.
 fn record(spec: &ShardSpec, out: &Path) {
     let folder = ShardFolder::create(out).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task).unwrap();
@@ -29,8 +31,8 @@ fn record(spec: &ShardSpec, out: &Path) {
     for episode in spec.episodes.clone() {
         let seed = spec.seed.episode(spec.task, episode);
         let (cubic, factors) = (Interpolation::Cubic, spec.profile.factors());
-        let world = Episode::new(spec.task, cubic, factors, &settings, &plant, seed);
-        let (mut state, mut observation) = (world.state(), world.observation().to_vec());
+        let simulation = Episode::new(spec.task, cubic, factors, &settings, &plant, seed);
+        let (mut state, mut observation) = (simulation.state(), simulation.observation().to_vec());
         recorder.begin(EpisodeStart {
             episode,
             seed,
@@ -38,7 +40,9 @@ fn record(spec: &ShardSpec, out: &Path) {
             state: &state,
         });
         for step in 0..STEPS {
-            observation.iter_mut().for_each(|x| *x = noise(*x));
+            observation
+                .iter_mut()
+                .for_each(|number| *number = noise(*number));
             recorder.observe(&observation);
             state.puck = state.puck.map(noise);
             state.q = state.q.map(noise);
@@ -126,9 +130,9 @@ fn slice(criterion: &mut Criterion) {
     group.bench_function("all columns", |bencher| {
         bencher.iter(|| black_box(read(None)));
     });
-    let puck = ["puck_x", "puck_y"].map(str::to_owned);
+    let puck_position = ["puck_x", "puck_y"].map(str::to_owned);
     group.bench_function("two columns", |bencher| {
-        bencher.iter(|| black_box(read(Some(&puck))));
+        bencher.iter(|| black_box(read(Some(&puck_position))));
     });
     group.finish();
 }

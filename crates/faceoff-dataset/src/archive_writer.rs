@@ -1,3 +1,5 @@
+//! Writes the zip archive of a dataset or of a recorded game, and hashes its files on the way.
+
 use crate::{digest::HashingWriter, error::RecordingError, score::json_file};
 use faceoff_wire::dataset::FileDigest;
 use fs_err::File;
@@ -9,7 +11,7 @@ use std::{
 };
 use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
-/// A file in the archive that is being written.
+/// The writer of one file in the archive.
 pub(crate) type Entry<'a> = HashingWriter<&'a mut ZipWriter<BufWriter<File>>>;
 
 /// Writes a zip archive and records sizes and hashes of its files.
@@ -32,6 +34,7 @@ impl ArchiveWriter {
         &self.files
     }
 
+    /// Adds a file; `write` writes its bytes.
     pub fn add(
         &mut self,
         name: &str,
@@ -65,6 +68,7 @@ impl ArchiveWriter {
         self.add(name, |out| Ok(out.write_all(&bytes)?))
     }
 
+    /// Completes the archive and waits until it is on the disk.
     pub fn finish(self) -> Result<(), RecordingError> {
         let mut buffered = self
             .zip

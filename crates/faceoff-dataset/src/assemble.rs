@@ -1,4 +1,5 @@
-//! Joins the shards of an evaluation into its dataset, and scores it.
+//! Joins the shards of an evaluation into its dataset, and scores it. A *shard* is the recording of a range of episodes of
+//! one task, played in one *slot* (a worker's place for one agent).
 
 use crate::{
     archive_writer::ArchiveWriter,
@@ -33,7 +34,7 @@ pub struct AssembledDataset {
     pub result: EvaluationResult,
     /// Size and hash of the archive. Once published, they authenticate every byte of it.
     pub archive: FileDigest,
-    /// Was a pack of clips for replays written?
+    /// Was a pack of clips written? A clip is a compact recording of one episode, for replays in the browser.
     pub clips: bool,
 }
 
@@ -42,8 +43,8 @@ pub struct AssembledDataset {
 /// `agent.log` and `manifest.json` with the hashes of the others. The clips for replays are written to a separate
 /// pack, `clips`, if given; shards of earlier layouts have no clips.
 ///
-/// No episode is simulated. The archive is written under a temporary name and renamed; the same
-/// shards give the same bytes. Memory grows with the episodes, not with their steps.
+/// No episode is simulated. The archive is written under a temporary name and then renamed. The same shards give the same
+/// bytes. Memory grows with the number of episodes, not of their steps.
 ///
 /// # Errors
 /// [`RecordingError::Unusable`] if a shard is damaged, incomplete, of another evaluation or ended by faults, or if
@@ -72,7 +73,7 @@ pub fn assemble(
     );
 
     let partial = archive.with_extension("zip.partial");
-    let written = write(meta, &shards, episodes, &scored, &calibration, &partial)
+    let written = write_archive(meta, &shards, episodes, &scored, &calibration, &partial)
         .and_then(|()| Ok(digest::of_file(&partial)?))
         .and_then(|digest| {
             fs::rename(&partial, archive)?;
@@ -111,7 +112,8 @@ fn join_clips(shards: &[ShardRecording], path: &Path) -> Result<bool, RecordingE
     Ok(true)
 }
 
-fn write(
+/// Writes the archive to `path`; temporary files are in the same folder.
+fn write_archive(
     meta: &EvaluationMeta,
     shards: &[ShardRecording],
     episodes: BTreeMap<Task, u32>,
@@ -119,7 +121,7 @@ fn write(
     calibration: &CalibrationFile,
     path: &Path,
 ) -> Result<(), RecordingError> {
-    let scratch = match path.parent() {
+    let temporary_dir = match path.parent() {
         Some(dir) if dir != Path::new("") => dir,
         _ => Path::new("."),
     };
@@ -128,10 +130,10 @@ fn write(
     };
     let mut dataset = ArchiveWriter::create(path)?;
     dataset.add(STEPS_FILE, |out| {
-        join(&tables(|shard| &shard.steps), scratch, out)
+        join(&tables(|shard| &shard.steps), temporary_dir, out)
     })?;
     dataset.add(EPISODES_FILE, |out| {
-        join(&tables(|shard| &shard.episodes), scratch, out)
+        join(&tables(|shard| &shard.episodes), temporary_dir, out)
     })?;
     dataset.add_json(VIOLATIONS_FILE, violations)?;
     dataset.add_json(RESULTS_FILE, result)?;
@@ -190,7 +192,7 @@ fn check_shards(
         let next = episodes.entry(spec.task).or_insert(0);
         if spec.episodes.start != *next {
             return unusable(format!(
-                "shard {name} does not follow on episode {next}: episodes are missing or twice"
+                "shard {name} does not start at episode {next}: episodes are missing or recorded twice"
             ));
         }
         let expected = spec.episodes.clone().map(|episode| (spec.task, episode));
@@ -225,7 +227,7 @@ fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
     }
 }
 
-/// Outcomes and steps of all shards, which are in order.
+/// The numbers for the score of each task, from the outcomes and steps of all shards, which are in order.
 fn tally_tasks(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingError> {
     let mut steps: BTreeMap<Task, u64> = BTreeMap::new();
     for ShardRecording { spec, report, .. } in shards {
@@ -258,6 +260,7 @@ fn tally_tasks(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, Recor
     Ok(tallies)
 }
 
+/// Writes the agents' logs of all shards, each under a heading with its episodes.
 fn write_log(shards: &[ShardRecording], out: &mut dyn Write) -> Result<(), RecordingError> {
     for ShardRecording { spec, report, .. } in shards {
         let last = spec.episodes.end.saturating_sub(1);

@@ -1,4 +1,5 @@
-//! Reads a dataset: the archive, an unpacked folder, or the folder that `faceoff eval` writes.
+//! Reads a dataset, the recording of all episodes of an evaluation: the archive `dataset.zip`, an unpacked folder, or the
+//! folder that `faceoff eval` writes.
 
 mod container;
 mod episodes;
@@ -59,10 +60,12 @@ pub struct Dataset {
     hash_check: HashCheck,
 }
 
-/// Time at which files are compared with their hashes.
+/// When the dataset's files are compared with their hashes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum HashCheck {
+    /// All files when the dataset is opened.
     OnOpen,
+    /// Each file when it is read.
     OnRead,
 }
 
@@ -83,7 +86,7 @@ impl Dataset {
         if dataset.layout == Layout::Two {
             dataset.container.check_seal()?;
         }
-        FILES.iter().try_for_each(|name| dataset.check(name))?;
+        FILES.iter().try_for_each(|name| dataset.check_hash(name))?;
         dataset.hash_check = HashCheck::OnOpen;
         Ok(dataset)
     }
@@ -110,7 +113,7 @@ impl Dataset {
             check_results_copy(&path.join(RESULTS_FILE), &container)?;
             (archive, container)
         };
-        let (layout, manifest) = manifest(&container)?;
+        let (layout, manifest) = read_manifest(&container)?;
         let listed: BTreeSet<&str> = manifest.files.keys().map(String::as_str).collect();
         if listed != BTreeSet::from(FILES) {
             return Err(DatasetError::Altered(format!(
@@ -127,7 +130,7 @@ impl Dataset {
         })
     }
 
-    /// The layout of its files.
+    /// The layout of the dataset's files.
     #[must_use]
     pub const fn layout(&self) -> Layout {
         self.layout
@@ -180,8 +183,8 @@ impl Dataset {
     /// The episodes, in order.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if it is not a table of episodes, or does not have the number of episodes in the
-    /// manifest.
+    /// [`DatasetError::Unreadable`] if `episodes.parquet` is not a table of episodes, or does not have the number of
+    /// episodes in the manifest.
     pub fn episodes(&self) -> Result<Vec<EpisodeRecord>, DatasetError> {
         let records = episodes::records(&self.episode_batches()?)?;
         for (task, expected) in &self.manifest.episodes {
@@ -197,7 +200,7 @@ impl Dataset {
         Ok(records)
     }
 
-    /// The unparsed table of episodes.
+    /// The table of episodes as Arrow batches.
     pub(crate) fn episode_batches(&self) -> Result<Vec<RecordBatch>, DatasetError> {
         episodes::batches(self.table(EPISODES_FILE)?)
     }
@@ -205,7 +208,7 @@ impl Dataset {
     /// The table of control steps.
     ///
     /// # Errors
-    /// [`DatasetError::Unreadable`] if it is not a table of control steps.
+    /// [`DatasetError::Unreadable`] if `steps.parquet` is not a table of control steps.
     pub fn steps(&self) -> Result<StepTable, DatasetError> {
         let table = StepTable::open(self.table(STEPS_FILE)?)?;
         if self.layout == Layout::Four && !table.has_host_time() {
@@ -246,12 +249,12 @@ impl Dataset {
 
     /// A small file's bytes.
     pub(crate) fn bytes(&self, name: &str) -> Result<Vec<u8>, DatasetError> {
-        self.check_on_read(name)?;
+        self.check_hash_on_read(name)?;
         self.container.bytes(name)
     }
 
     fn table(&self, name: &str) -> Result<FileRange, DatasetError> {
-        self.check_on_read(name)?;
+        self.check_hash_on_read(name)?;
         self.range(name)
     }
 
@@ -267,14 +270,14 @@ impl Dataset {
         )))
     }
 
-    fn check_on_read(&self, name: &str) -> Result<(), DatasetError> {
+    fn check_hash_on_read(&self, name: &str) -> Result<(), DatasetError> {
         match self.hash_check {
             HashCheck::OnOpen => Ok(()),
-            HashCheck::OnRead => self.check(name),
+            HashCheck::OnRead => self.check_hash(name),
         }
     }
 
-    fn check(&self, name: &str) -> Result<(), DatasetError> {
+    fn check_hash(&self, name: &str) -> Result<(), DatasetError> {
         let (listed, found) = (&self.manifest.files[name], self.container.digest(name)?);
         if found == *listed {
             return Ok(());
@@ -286,7 +289,7 @@ impl Dataset {
     }
 }
 
-fn manifest(container: &Container) -> Result<(Layout, DatasetManifest), DatasetError> {
+fn read_manifest(container: &Container) -> Result<(Layout, DatasetManifest), DatasetError> {
     let bytes = container.bytes(MANIFEST_FILE)?;
     // Check the layout first: a manifest of another layout may lack fields.
     let ManifestSchema { schema } =

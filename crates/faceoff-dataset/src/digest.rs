@@ -1,3 +1,5 @@
+//! BLAKE3 hashes of files, and of the recorded actions and times of an episode.
+
 use crate::times::nanoseconds;
 use faceoff_episode::AnswerTiming;
 use faceoff_wire::dataset::FileDigest;
@@ -6,7 +8,7 @@ use std::{
     path::Path,
 };
 
-/// Forwards bytes and computes their count and hash.
+/// Writes bytes to `inner` and computes their count and hash.
 pub(crate) struct HashingWriter<W> {
     inner: W,
     hasher: blake3::Hasher,

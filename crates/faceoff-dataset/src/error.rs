@@ -1,3 +1,5 @@
+//! Errors of writing a recording and of reading a dataset.
+
 use faceoff_replay::ReplayError;
 use faceoff_types::is_full_disk;
 use std::{error::Error, fmt::Display, io};
@@ -45,16 +47,16 @@ pub enum DatasetError {
     /// A file could not be read; the error names it.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// It is not a dataset, or not a complete one.
+    /// The files are not a dataset, or not a complete one.
     #[error("not a readable dataset: {0}")]
     Unreadable(String),
-    /// It is a dataset of another layout, ruleset or simulator.
+    /// The dataset is of another layout, ruleset or simulator.
     #[error("{0}")]
     Foreign(String),
-    /// Its bytes differ from the published ones.
+    /// The dataset's bytes differ from the published ones.
     #[error("damaged or altered: {0}")]
     Altered(String),
-    /// It does not contain the requested episode or column.
+    /// The dataset does not contain the requested episode or column.
     #[error("{0}")]
     Absent(String),
 }

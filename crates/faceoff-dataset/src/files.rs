@@ -1,4 +1,4 @@
-//! File names of datasets and shards.
+//! File names of datasets and of shards (recordings of a part of an evaluation's episodes).
 
 /// The dataset's archive in the folder that `faceoff eval` writes.
 pub const ARCHIVE_FILE: &str = "dataset.zip";
@@ -9,7 +9,7 @@ pub(crate) const EPISODES_FILE: &str = "episodes.parquet";
 /// Violations of constraints, and slow answers.
 pub(crate) const VIOLATIONS_FILE: &str = "violations.json";
 pub(crate) const RESULTS_FILE: &str = "results.json";
-/// Timing measurements of the slots.
+/// Timing measurements of the slots, the places on the workers where the agents ran.
 pub(crate) const CALIBRATION_FILE: &str = "calibration.json";
 /// Description of the dataset, and the hashes of its other files.
 pub(crate) const MANIFEST_FILE: &str = "manifest.json";

@@ -1,4 +1,5 @@
-//! Recordings of games: writing during the game, the archive and each side's archive, reading, and verification.
+//! Recordings of games, in which two agents (the *sides*) play a series of rallies against each other: writing during the
+//! game, the archive of the game and of each side, reading, and verification by simulating the game again.
 
 mod archive;
 mod files;

@@ -1,4 +1,4 @@
-//! Files that a grant allows its holder to write.
+//! Which files a *grant* allows its holder to write. A grant is a worker's permission to access the files of one job.
 
 use crate::{files::CLIPS_FILE, game::GAME_FILES, shard_folder::SHARD_FILES};
 use faceoff_wire::grant::{ExpectedRecording, Grant, WriteScope};

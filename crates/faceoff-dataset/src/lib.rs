@@ -1,5 +1,8 @@
-//! Recordings of evaluations: schemas of the tables, recording of shards, joining and scoring of shards, reading of
-//! datasets completely or by episode, and verification. Games are recorded and verified likewise, without shards.
+//! Recordings of evaluations and of games.
+//!
+//! An evaluation (one agent's run of all tasks) is recorded in *shards*, each a range of episodes of one task. This crate
+//! records shards, joins them to a *dataset* and scores it, reads datasets completely or by episode, and verifies them by
+//! simulating them again. Games are recorded and verified likewise, without shards.
 //!
 //! This crate starts no process and depends on neither sandbox nor database. It reads no clock: measured times come
 //! from the caller or from the recording.

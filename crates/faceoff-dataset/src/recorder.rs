@@ -1,3 +1,6 @@
+//! Records a shard (a range of episodes of one task) while it is played: its tables, and the clips for replays (a clip is
+//! a compact recording of one episode).
+
 use crate::{
     error::RecordingError,
     files::{CLIPS_FILE, EPISODES_FILE, STEPS_FILE},
@@ -20,8 +23,8 @@ pub struct Recorder {
     clips: ClipRecorder<BufWriter<File>>,
 }
 
-/// Episodes that are buffered in memory before they are written.
-const EPISODES_BATCH: usize = 256;
+/// Rows of `episodes.parquet` that are buffered in memory before they are written.
+const BUFFERED_EPISODES: usize = 256;
 
 impl Recorder {
     /// Creates the three files in the folder, under temporary names.
@@ -47,7 +50,7 @@ impl Recorder {
     ) -> Result<(), RecordingError> {
         self.steps_file.write(self.steps.take())?;
         self.episodes.end(outcome, host_noise_reruns)?;
-        if self.episodes.len() >= EPISODES_BATCH {
+        if self.episodes.len() >= BUFFERED_EPISODES {
             self.episodes_file.write(self.episodes.take())?;
         }
         Ok(())
@@ -72,7 +75,7 @@ impl Recorder {
 impl std::fmt::Debug for Recorder {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Recorder")
-            .field("episodes_held", &self.episodes.len())
+            .field("buffered_episodes", &self.episodes.len())
             .finish_non_exhaustive()
     }
 }

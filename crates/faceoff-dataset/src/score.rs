@@ -27,7 +27,7 @@ use std::{collections::BTreeMap, path::Path};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StepMeasurement {
     pub timing: AnswerTiming,
-    /// Joint position, joint velocity, end effector, link height; violated when above 0.
+    /// How far each constraint is exceeded: joint position, joint velocity, end effector, link height. Violated if above 0.
     pub constraints: [f64; 4],
 }
 
@@ -36,16 +36,18 @@ pub(crate) struct StepMeasurement {
 pub(crate) struct Tally {
     outcomes: Vec<EpisodeOutcome>,
     times: Times,
-    /// In the order of [`StepMeasurement::constraints`].
+    /// Violations of each constraint, in the order of [`StepMeasurement::constraints`].
     violations: [Vec<ConstraintViolation>; 4],
-    /// The slowest answer of each episode by computation time; `None` for layouts without host interference.
+    /// By number of episode: computation time (s) and step of the slowest answer. `None` for layouts that do not record
+    /// host interference, the time that other programs on the evaluator's machine took.
     slowest: Option<BTreeMap<u32, (f64, SlowStep)>>,
 }
 
+/// Computation times, in the sequence in which they are summed: the mean then has the published bits.
 #[derive(Debug)]
 enum Times {
     PlayOrder(StepTimes),
-    /// For layout 2, whose mean was summed in ascending order.
+    /// Times in s, for layout 2, whose mean was summed in ascending order.
     Ascending(Vec<f64>),
 }
 
@@ -80,7 +82,7 @@ impl Tally {
         if let Some(slowest) = &mut self.slowest
             && slowest
                 .get(&episode)
-                .is_none_or(|(before_s, _)| computation_time_s > *before_s)
+                .is_none_or(|(slowest_s, _)| computation_time_s > *slowest_s)
         {
             let slow = SlowStep {
                 step,
@@ -90,16 +92,16 @@ impl Tally {
             };
             slowest.insert(episode, (computation_time_s, slow));
         }
-        for (found, value) in self.violations.iter_mut().zip(measured.constraints) {
+        for (violations, value) in self.violations.iter_mut().zip(measured.constraints) {
             if value.is_nan() || value <= 0.0 {
                 continue;
             }
-            match found.last_mut() {
+            match violations.last_mut() {
                 Some(last) if last.episode == episode => {
                     last.steps += 1;
                     last.max = last.max.max(value);
                 }
-                _ => found.push(ConstraintViolation {
+                _ => violations.push(ConstraintViolation {
                     episode,
                     first_step: step,
                     steps: 1,
@@ -120,13 +122,14 @@ impl Tally {
         ]
         .into_iter();
         let names: Vec<String> = names.chain(CONSTRAINTS).map(str::to_owned).collect();
-        let read = |error: DatasetError| match error {
+        let recording_error = |error: DatasetError| match error {
             DatasetError::Io(error) => RecordingError::Io(error),
             other => RecordingError::unusable(path.display())(other),
         };
-        let table = StepTable::open(FileRange::whole(path).map_err(read)?).map_err(read)?;
-        let mut batches = table.read(Some(&names)).map_err(read)?;
-        while let Some(batch) = batches.next_batch().map_err(read)? {
+        let range = FileRange::whole(path).map_err(recording_error)?;
+        let table = StepTable::open(range).map_err(recording_error)?;
+        let mut batches = table.read(Some(&names)).map_err(recording_error)?;
+        while let Some(batch) = batches.next_batch().map_err(recording_error)? {
             self.add_batch(&batch);
         }
         Ok(())
@@ -181,7 +184,7 @@ pub(crate) struct ScoredEvaluation {
     pub violations: ViolationsFile,
 }
 
-/// Scores an evaluation; `violations.json` names the layout.
+/// Scores an evaluation; `layout` is the one that `violations.json` names.
 pub(crate) fn score(
     ruleset: Ruleset,
     profile: Profile,
@@ -223,7 +226,7 @@ pub(crate) fn score(
     ScoredEvaluation { result, violations }
 }
 
-/// A JSON file of a dataset, byte for byte.
+/// The bytes of a JSON file of a dataset, which are the same for the same value.
 pub(crate) fn json_file<T: Serialize>(value: &T) -> serde_json::Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(value)?;
     bytes.push(b'\n');

@@ -1,3 +1,5 @@
+//! The report of a shard. A shard is a range of episodes of one task that one worker runs.
+
 use faceoff_types::{EpisodeOutcome, SlotTiming};
 use serde::{Deserialize, Serialize};
 
@@ -8,8 +10,8 @@ pub struct ShardReport {
     pub outcomes: Vec<EpisodeOutcome>,
     /// The end of the agent's standard error, with its faults.
     pub log: String,
-    /// The allowed faults were exceeded, so the remaining episodes were not run.
+    /// Did the agent exceed the allowed number of faults, so that the remaining episodes were not run?
     pub stopped_by_faults: bool,
-    /// Timing measurements of the slot.
+    /// Timing measurements of the slot, the place on the worker where the agent ran.
     pub timing: SlotTiming,
 }

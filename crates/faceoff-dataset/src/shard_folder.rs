@@ -1,3 +1,6 @@
+//! The folder of a shard's recording: writing, and reading with a check of all hashes. A shard is a range of episodes of one
+//! task; the shards of an evaluation are joined to its dataset.
+
 use crate::{
     digest,
     error::RecordingError,
@@ -27,7 +30,8 @@ const SHARD_SCHEMA: &str = "faceoff-shard/5";
 /// The previous layout, which has no clips.
 const WITHOUT_CLIPS_SCHEMA: &str = "faceoff-shard/4";
 /// Earlier layouts: 2, whose tables split integers by bytes and have no page index, and 3, whose steps have no column
-/// for host interference. Evaluations that run during an upgrade of the program have such shards.
+/// for host interference (time that other programs on the evaluator's machine took). Evaluations that run during an
+/// upgrade of the program have such shards.
 const OLD_SHARD_SCHEMAS: [&str; 2] = ["faceoff-shard/2", "faceoff-shard/3"];
 
 /// The files of a recorded shard.
@@ -132,7 +136,7 @@ pub(crate) struct ShardRecording {
     pub report: ShardReport,
     pub steps: ShardTable,
     pub episodes: ShardTable,
-    /// Its pack of clips; `None` for earlier layouts.
+    /// The shard's pack of clips, which replays show; `None` for earlier layouts.
     pub clips: Option<PathBuf>,
 }
 

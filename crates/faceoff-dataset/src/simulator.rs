@@ -1,13 +1,15 @@
+//! Identity of the simulator: a dataset can only be verified with the simulator that made it.
+
 use faceoff_sim::{Episode, EpisodeState, Interpolation, JOINTS, PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed, Task};
 use faceoff_wire::dataset::SimulatorId;
 use std::sync::OnceLock;
 
-/// Control steps of each fixed episode: enough for contacts of the puck with rim and mallet.
+/// Control steps of each episode of the fingerprint: enough for contacts of the puck with rim and mallet.
 const STEPS: u32 = 60;
 
-/// Version and fingerprint of this simulator. The fingerprint covers a short episode of each task with all
-/// perturbations.
+/// Version and fingerprint of this simulator. The fingerprint is a hash of the motion in a short episode of each task with
+/// all perturbations.
 pub(crate) fn simulator_id() -> &'static SimulatorId {
     static ID: OnceLock<SimulatorId> = OnceLock::new();
     ID.get_or_init(|| SimulatorId {
@@ -16,7 +18,8 @@ pub(crate) fn simulator_id() -> &'static SimulatorId {
     })
 }
 
-/// Can a plant be drawn within these magnitudes? See [`Plant::can_be_drawn`]; takes up to a second.
+/// Can a plant (the simulated robot and table) be drawn within these magnitudes of the perturbations? See
+/// [`Plant::can_be_drawn`]; takes up to a second.
 #[must_use]
 pub fn can_draw_plant(settings: &PerturbationSettings, mismatch_seed: Seed) -> bool {
     Plant::can_be_drawn(settings, mismatch_seed)
@@ -36,16 +39,24 @@ fn fingerprint() -> String {
             &plant,
             seed.episode(task, 0),
         );
-        let held = episode.state().q;
+        let initial_joints = episode.state().q;
         for step in 0..STEPS {
             add(&mut hasher, episode.observation());
             let mut action = [0.0; 2 * JOINTS];
-            action[..JOINTS].copy_from_slice(&held);
+            action[..JOINTS].copy_from_slice(&initial_joints);
             // A slow swing of the base joint, so that the fingerprint covers the arm's dynamics.
             action[0] += 0.005 * f64::from(step);
             let outcome = episode.step(&action);
-            let c = outcome.constraints;
-            add(&mut hasher, &[c.joint_pos, c.joint_vel, c.ee, c.link]);
+            let constraints = outcome.constraints;
+            add(
+                &mut hasher,
+                &[
+                    constraints.joint_pos,
+                    constraints.joint_vel,
+                    constraints.ee,
+                    constraints.link,
+                ],
+            );
             add_state(&mut hasher, &episode.state());
             if outcome.end.is_some() {
                 break;

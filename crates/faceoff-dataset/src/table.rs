@@ -1,4 +1,4 @@
-//! The tables of evaluations (control steps, episodes) and of games: columns, rows, files.
+//! The Parquet tables of evaluations (control steps, episodes) and of games: their columns, and writing of their rows.
 
 mod columns;
 mod episodes;

@@ -1,3 +1,5 @@
+//! Conversion of measured times between seconds and the tables' nanoseconds.
+
 use std::time::Duration;
 
 /// A measured time in whole nanoseconds, as in the tables: a third of the size of the same time in seconds. Clocks
@@ -20,7 +22,7 @@ mod tests {
     fn nanoseconds_round_trip_clock_times() {
         let mut nanos: u64 = 1;
         for _ in 0..2000 {
-            // Pseudo-random times between a nanosecond and an hour.
+            // Pseudo-random times up to an hour, from Knuth's linear congruential generator.
             nanos = nanos
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1_442_695_040_888_963_407);

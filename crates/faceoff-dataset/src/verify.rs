@@ -2,8 +2,9 @@
 //! recorded actions, and compares every recorded number bit for bit; then scores again and compares
 //! the published score.
 //!
-//! Computation times, CPU times, faults, the slots' calibration and re-runs cannot be simulated.
-//! They are taken from the recording; values that follow from them are recomputed.
+//! Computation times, CPU times, faults, the timing measurements of the slots (the places on workers where agents ran) and
+//! the numbers of re-runs (episodes played again because other programs disturbed the host) cannot be simulated. They are
+//! taken from the recording; values that follow from them are recomputed.
 
 pub(crate) mod compare;
 mod difference;
@@ -35,8 +36,8 @@ use rayon::{
 use replay::{ReplayedEpisode, Replayer};
 use std::{collections::BTreeMap, num::NonZero};
 
-/// Episodes per thread that are read ahead.
-const READ_AHEAD: usize = 8;
+/// Episodes per thread that are read while others are simulated.
+const READ_AHEAD_PER_THREAD: usize = 8;
 
 /// A dataset that was verified: the simulation gives the same numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,8 +53,8 @@ pub struct VerifiedDataset {
 /// on the number of threads. Memory grows with the episodes, not with their steps.
 ///
 /// # Errors
-/// [`VerifyError::Differs`] with the first difference in order of task, episode and step; otherwise the
-/// reason why nothing could be compared.
+/// [`VerifyError::Differs`] with the first difference in order of task, episode and step, or the reason why the dataset
+/// cannot be verified.
 pub fn verify(
     dataset: &Dataset,
     workers: NonZero<usize>,
@@ -70,35 +71,35 @@ pub fn verify(
         manifest.seed,
         manifest.mismatch_seed,
     );
-    let replay = Replayer::new(ruleset, arena);
+    let replayer = Replayer::new(ruleset, arena);
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
         .thread_name(|index| format!("verify-{index}"))
         .build()?;
-    let ahead = READ_AHEAD * workers.get();
+    let batch_size = READ_AHEAD_PER_THREAD * workers.get();
     pool.install(|| {
-        let mut episodes = reader.next_episodes(ahead);
-        while !episodes.episodes.is_empty() {
+        let mut batch = reader.next_episodes(batch_size);
+        while !batch.episodes.is_empty() {
             let simulate = || -> Vec<Result<ReplayedEpisode, Difference>> {
-                let replayed = episodes.episodes.par_iter().map(|recorded| {
-                    let replayed = replay.episode(recorded);
+                let replayed = batch.episodes.par_iter().map(|recorded| {
+                    let replayed = replayer.episode(recorded);
                     progress();
                     replayed
                 });
                 replayed.collect()
             };
-            let (replayed, next) = match episodes.result {
-                Ok(()) => rayon::join(simulate, || reader.next_episodes(ahead)),
-                // Episodes before the error are reported first.
+            let (replayed, next_batch) = match batch.result {
+                Ok(()) => rayon::join(simulate, || reader.next_episodes(batch_size)),
+                // Differences in the episodes before the reading error are reported first.
                 Err(_) => (simulate(), episode_reader::EpisodeBatch::default()),
             };
-            for (replayed, recorded) in replayed.into_iter().zip(&episodes.episodes) {
+            for (replayed, recorded) in replayed.into_iter().zip(&batch.episodes) {
                 totals.add(recorded, replayed?);
             }
-            episodes.result?;
-            episodes = next;
+            batch.result?;
+            batch = next_batch;
         }
-        episodes.result
+        batch.result
     })?;
     totals.finish(ruleset, dataset)
 }
@@ -165,8 +166,8 @@ impl Totals {
     fn finish(self, ruleset: Ruleset, dataset: &Dataset) -> Result<VerifiedDataset, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();
-        let counted = timing.map_or(0, |timing| timing.host_noise_reruns);
-        if counted != self.host_noise_reruns {
+        let recorded_reruns = timing.map_or(0, |timing| timing.host_noise_reruns);
+        if recorded_reruns != self.host_noise_reruns {
             return Err(Difference {
                 file: CALIBRATION_FILE,
                 task: None,
@@ -174,7 +175,7 @@ impl Totals {
                 rally: None,
                 step: None,
                 field: "host_noise_reruns".to_owned(),
-                recorded: format!("{counted} in total"),
+                recorded: format!("{recorded_reruns} in total"),
                 expected: format!("{}, the sum over the episodes", self.host_noise_reruns),
             }
             .into());

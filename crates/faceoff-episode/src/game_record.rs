@@ -122,7 +122,7 @@ pub struct RallyStart<'a> {
     /// Control steps of the game before the rally.
     pub game_step: u32,
     /// The side in whose half the puck lies at the start.
-    pub serves: Side,
+    pub serving_side: Side,
     /// How the sides got ready.
     pub entries: &'a [RallyEntry; 2],
     /// The true initial state.

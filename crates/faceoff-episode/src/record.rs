@@ -1,4 +1,5 @@
-//! Rows of the recording of an episode, and the trait of their receivers.
+//! Rows of the recording of an episode (one attempt of an agent at a task), and the trait of their receivers. In an *evaluation* one agent
+//! plays many episodes of each task.
 
 use faceoff_sim::{ConstraintValues, EpisodeState, Impact};
 use faceoff_types::{EpisodeOutcome, Interpolation, Seed};

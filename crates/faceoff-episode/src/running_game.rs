@@ -150,7 +150,7 @@ impl<S: GameSink> RunningGame<S> {
         self.sink.begin_rally(&RallyStart {
             rally: number,
             game_step,
-            serves: Side::BOTH[self.game.referee().serves],
+            serving_side: Side::BOTH[self.game.referee().serving_robot],
             entries: &entries,
             state: &self.game.state(),
         })?;
@@ -265,7 +265,7 @@ impl<S: GameSink> RunningGame<S> {
         for (side_state, _) in self
             .sides
             .iter_mut()
-            .zip(divergence.by)
+            .zip(divergence.robots_at_fault)
             .filter(|(side_state, is_cause)| *is_cause && side_state.fault().is_none())
         {
             let kind = AgentFaultKind::Diverged {

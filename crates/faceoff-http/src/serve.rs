@@ -116,7 +116,7 @@ pub async fn serve(
         if let Err(error) = SockRef::from(&stream).set_tcp_notsent_lowat(MAX_UNSENT_BYTES) {
             tracing::debug!(from = %client, %error, "cannot bound the send buffer; a slow client may be dropped too early");
         }
-        let stream = MinRateStream::new(stream, limits.min_read_rate, reset);
+        let stream = MinRateStream::new(stream, limits.min_read_rate, reset_on_close);
         let peer = Peer {
             address: client.ip(),
             trusted_proxies: Arc::clone(&proxies),
@@ -193,7 +193,7 @@ fn is_peer_gone(error: &io::Error) -> bool {
 }
 
 /// Makes closing reset the connection: data that the client does not read must not stay in the kernel's buffers for minutes.
-fn reset(stream: &TcpStream) {
+fn reset_on_close(stream: &TcpStream) {
     // If this fails, the data stays there for a while, which does no harm.
     let _ = stream.set_zero_linger();
 }

@@ -1,7 +1,7 @@
 //! File transfer of remote workers, which are processes on other machines that run jobs. A worker downloads the bundles
 //! (uploaded agents) of its job, and uploads the job's recordings. The grant of a job (`Grant`) gives access to these files
 //! only, and only while the worker holds the job's lease: the right to run it for a time. These routes are not part of the
-//! API: both sides are this program.
+//! API, because workers and server are the same program.
 
 use axum::{
     Router,
@@ -38,9 +38,11 @@ impl FromRequestParts<App> for LeaseHolder {
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
         let forbidden = |reason| Problem::new(ProblemKind::Forbidden, reason);
-        let sent = parts.headers.get(header::AUTHORIZATION);
-        let sent = sent.and_then(|value| value.to_str().ok()?.strip_prefix("Grant "));
-        let grant = sent.and_then(|text| Grant::open(text, &app.config.link_key.grant_key()));
+        let authorization = parts.headers.get(header::AUTHORIZATION);
+        let sealed_grant =
+            authorization.and_then(|value| value.to_str().ok()?.strip_prefix("Grant "));
+        let grant =
+            sealed_grant.and_then(|text| Grant::open(text, &app.config.link_key.grant_key()));
         let grant = grant.ok_or_else(|| {
             forbidden("expected the grant of a job of this server (Authorization: Grant …)")
         })?;

@@ -1,3 +1,5 @@
+//! The type of gauges whose value is not a whole number.
+
 use prometheus_client::metrics::gauge::Gauge;
 use std::sync::atomic::AtomicU64;
 

@@ -1,3 +1,6 @@
+//! Gauges: the state of the server at the moment at which Prometheus reads its metrics. A *slot* is a place in a worker that
+//! runs one job at a time.
+
 use crate::float_gauge::FloatGauge;
 use prometheus_client::{
     encoding::EncodeLabelSet,
@@ -5,7 +8,7 @@ use prometheus_client::{
     registry::{Registry, Unit},
 };
 
-/// State of the server at the time that the metrics are read.
+/// State of the server when the metrics are read.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct GaugeValues {
     /// Result of the latest write test.
@@ -26,11 +29,12 @@ pub struct GaugeValues {
     pub process: Process,
 }
 
+/// The queue of jobs: validation runs, parts of evaluations, and games.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Queue {
-    /// Jobs with a valid lease.
+    /// Jobs that a slot is running.
     pub running: u32,
-    /// Jobs that can be claimed.
+    /// Jobs that a slot can start.
     pub waiting: u32,
     /// Jobs that have repeatedly run out of disk space.
     pub out_of_space: u32,
@@ -42,6 +46,7 @@ pub struct Queue {
     pub expected_s: f64,
 }
 
+/// A disk that the server writes to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Disk {
     /// Use of the disk: `data` or `scratch`.
@@ -73,98 +78,98 @@ struct DiskLabels {
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Gauges {
-    writable: Gauge,
+    database_writable: Gauge,
     jobs: Family<StateLabels, Gauge>,
     paused: Gauge,
     oldest_wait: FloatGauge,
-    expected: FloatGauge,
-    evaluations: Gauge,
+    expected_time: FloatGauge,
+    open_evaluations: Gauge,
     slots: Gauge,
     remote_slots: Gauge,
     remote_workers: Gauge,
     long_remote_jobs: Gauge,
-    free: Family<DiskLabels, Gauge>,
-    size: Family<DiskLabels, Gauge>,
-    resident: Gauge,
-    fds: Gauge,
+    disk_free: Family<DiskLabels, Gauge>,
+    disk_size: Family<DiskLabels, Gauge>,
+    resident_memory: Gauge,
+    open_fds: Gauge,
     max_fds: Gauge,
 }
 
 impl Gauges {
-    pub(crate) fn new(all: &mut Registry) -> Self {
+    pub(crate) fn new(registry: &mut Registry) -> Self {
         let gauges = Self::default();
-        all.register(
+        registry.register(
             "database_writable",
             "1 if the latest write test of the database succeeded",
-            gauges.writable.clone(),
+            gauges.database_writable.clone(),
         );
-        all.register(
+        registry.register(
             "queue_units",
             "Jobs: running, waiting, or waiting for disk space",
             gauges.jobs.clone(),
         );
-        all.register(
+        registry.register(
             "queue_paused",
             "1 if no job is started: paused by an organiser, or for lack of disk space",
             gauges.paused.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "queue_oldest_wait",
             "Waiting time of the oldest waiting job",
             Unit::Seconds,
             gauges.oldest_wait.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "queue_expected",
             "Expected time until everything that counts is done with the current slots; NaN if it was never measured, or the queue is paused",
             Unit::Seconds,
-            gauges.expected.clone(),
+            gauges.expected_time.clone(),
         );
-        all.register(
+        registry.register(
             "evaluations_open",
             "Evaluations that are queued or running",
-            gauges.evaluations.clone(),
+            gauges.open_evaluations.clone(),
         );
-        all.register("slots", "Slots of this process", gauges.slots.clone());
-        all.register(
+        registry.register("slots", "Slots of this process", gauges.slots.clone());
+        registry.register(
             "remote_slots",
             "Slots of remote workers that accept jobs",
             gauges.remote_slots.clone(),
         );
-        all.register(
+        registry.register(
             "remote_workers",
             "Remote workers that have polled in the last half minute",
             gauges.remote_workers.clone(),
         );
-        all.register(
+        registry.register(
             "remote_long_units",
             "Jobs that a remote worker has been running for more than an hour",
             gauges.long_remote_jobs.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "disk_free",
             "Free space on the disks that the server writes to",
             Unit::Bytes,
-            gauges.free.clone(),
+            gauges.disk_free.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "disk_size",
             "Size of these disks",
             Unit::Bytes,
-            gauges.size.clone(),
+            gauges.disk_size.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "process_resident_memory",
             "Memory of the server itself, without agents",
             Unit::Bytes,
-            gauges.resident.clone(),
+            gauges.resident_memory.clone(),
         );
-        all.register(
+        registry.register(
             "process_open_fds",
             "Open file descriptors of the server",
-            gauges.fds.clone(),
+            gauges.open_fds.clone(),
         );
-        all.register(
+        registry.register(
             "process_max_fds",
             "Limit of open file descriptors",
             gauges.max_fds.clone(),
@@ -172,7 +177,7 @@ impl Gauges {
         gauges
     }
 
-    pub(crate) fn set(&self, now: &GaugeValues) {
+    pub(crate) fn set(&self, values: &GaugeValues) {
         let GaugeValues {
             database_writable,
             queue,
@@ -183,8 +188,8 @@ impl Gauges {
             long_remote_jobs,
             disks,
             process,
-        } = now;
-        self.writable.set((*database_writable).into());
+        } = values;
+        self.database_writable.set((*database_writable).into());
         for (state, count) in [
             ("running", queue.running),
             ("waiting", queue.waiting),
@@ -196,8 +201,8 @@ impl Gauges {
         }
         self.paused.set(queue.paused.into());
         self.oldest_wait.set(queue.oldest_wait_s);
-        self.expected.set(queue.expected_s);
-        self.evaluations.set((*open_evaluations).into());
+        self.expected_time.set(queue.expected_s);
+        self.open_evaluations.set((*open_evaluations).into());
         self.slots.set((*slots).into());
         self.remote_slots.set((*remote_slots).into());
         self.remote_workers
@@ -206,20 +211,21 @@ impl Gauges {
             .set(i64::try_from(*long_remote_jobs).unwrap_or(i64::MAX));
         for disk in disks {
             let labels = DiskLabels { disk: disk.name };
-            self.free
+            self.disk_free
                 .get_or_create(&labels)
-                .set(clamped(disk.free_bytes));
-            self.size
+                .set(clamp_to_i64(disk.free_bytes));
+            self.disk_size
                 .get_or_create(&labels)
-                .set(clamped(disk.size_bytes));
+                .set(clamp_to_i64(disk.size_bytes));
         }
-        self.resident.set(clamped(process.resident_bytes));
-        self.fds.set(clamped(process.open_fds));
-        self.max_fds.set(clamped(process.max_fds));
+        self.resident_memory
+            .set(clamp_to_i64(process.resident_bytes));
+        self.open_fds.set(clamp_to_i64(process.open_fds));
+        self.max_fds.set(clamp_to_i64(process.max_fds));
     }
 }
 
 /// Clamped to the largest gauge value, which also represents “no limit”.
-fn clamped(count: u64) -> i64 {
+fn clamp_to_i64(count: u64) -> i64 {
     i64::try_from(count).unwrap_or(i64::MAX)
 }

@@ -1,18 +1,18 @@
 //! Metrics of a server for Prometheus (OpenMetrics text).
 //!
-//! Requests ([`Web`]), jobs of slots ([`Slots`]) and events ([`Metrics::record_event`]) are counted as they happen. The
+//! Requests ([`RequestMetrics`]), jobs of slots ([`SlotMetrics`]) and events ([`Metrics::record_event`]) are counted as they happen. The
 //! state of the queue, disks and the process is passed as [`GaugeValues`] when the metrics are read. No metric names a
 //! team, a user or a score, so that operators learn nothing about teams from them. No clock is read and nothing is stored;
 //! counters start at 0 with the process, as Prometheus expects.
 
 mod float_gauge;
 mod gauges;
-mod slots;
-mod web;
+mod slot_metrics;
+mod request_metrics;
 
 pub use gauges::{Disk, GaugeValues, Process, Queue};
-pub use slots::{BusySlot, JobEnd, Slots};
-pub use web::Web;
+pub use slot_metrics::{BusySlot, JobEnd, SlotMetrics};
+pub use request_metrics::RequestMetrics;
 
 use gauges::Gauges;
 use prometheus_client::{
@@ -29,8 +29,8 @@ pub const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; chars
 #[derive(Clone)]
 pub struct Metrics {
     registry: Arc<Registry>,
-    web: Web,
-    slots: Slots,
+    web: RequestMetrics,
+    slots: SlotMetrics,
     events: Family<EventLabels, Counter>,
     gauges: Gauges,
 }
@@ -44,23 +44,23 @@ impl Metrics {
     /// Metrics of a server of this version; counters start at 0.
     #[must_use]
     pub fn new(version: &str) -> Self {
-        let mut all = Registry::with_prefix("faceoff");
-        all.register(
+        let mut registry = Registry::with_prefix("faceoff");
+        registry.register(
             "build",
             "Version of the server",
             Info::new([("version", version.to_owned())]),
         );
         let events = Family::default();
-        all.register(
+        registry.register(
             "events",
             "Changes of the season that this process stored, by what happened",
             Family::clone(&events),
         );
-        let web = Web::new(all.sub_registry_with_prefix("http"));
-        let slots = Slots::new(&mut all);
-        let gauges = Gauges::new(&mut all);
+        let web = RequestMetrics::new(registry.sub_registry_with_prefix("http"));
+        let slots = SlotMetrics::new(&mut registry);
+        let gauges = Gauges::new(&mut registry);
         Self {
-            registry: Arc::new(all),
+            registry: Arc::new(registry),
             web,
             slots,
             events,
@@ -68,14 +68,15 @@ impl Metrics {
         }
     }
 
+    /// Metrics of HTTP requests.
     #[must_use]
-    pub const fn web(&self) -> &Web {
+    pub const fn web(&self) -> &RequestMetrics {
         &self.web
     }
 
-    /// Metrics of slots and their jobs.
+    /// Metrics of slots, each of which runs one job at a time, and of their jobs.
     #[must_use]
-    pub const fn slots(&self) -> &Slots {
+    pub const fn slots(&self) -> &SlotMetrics {
         &self.slots
     }
 
@@ -87,6 +88,7 @@ impl Metrics {
 
     /// Counts events that were missed because they came faster than they could be processed.
     pub fn record_missed_events(&self, count: u64) {
+        // The label's value is part of the published metrics, and stays.
         let kind = "untold".to_owned();
         self.events
             .get_or_create(&EventLabels { kind })
@@ -97,8 +99,8 @@ impl Metrics {
     ///
     /// # Errors
     /// If the library cannot format one of them.
-    pub fn text(&self, now: &GaugeValues) -> Result<String, fmt::Error> {
-        self.gauges.set(now);
+    pub fn text(&self, gauge_values: &GaugeValues) -> Result<String, fmt::Error> {
+        self.gauges.set(gauge_values);
         let mut text = String::new();
         text::encode(&mut text, &self.registry)?;
         Ok(text)
@@ -121,11 +123,11 @@ mod tests {
         let metrics = Metrics::new("1.2.3");
         metrics.record_event("evaluation_finished");
         metrics.record_event("evaluation_finished");
-        let took = Duration::from_millis(3);
+        let duration = Duration::from_millis(3);
         metrics
             .web()
-            .record_response("GET", Some("/board"), 200, took);
-        metrics.web().record_response("PUT", None, 404, took);
+            .record_response("GET", Some("/board"), 200, duration);
+        metrics.web().record_response("PUT", None, 404, duration);
         let text = metrics.text(&GaugeValues::default()).unwrap();
         for line in [
             "faceoff_build_info{version=\"1.2.3\"} 1",

@@ -1,11 +1,12 @@
-//! Addresses that webhooks may have: public ones on the Internet, and those that the operator allows.
+//! Addresses that webhooks may have: public ones on the Internet, and those that the operator of the server allows. All
+//! others are refused, so that a webhook cannot be used to attack the operator's network through the server.
 
 use ipnet::{IpNet, Ipv4Net, Ipv6Net};
 use reqwest::Url;
 use serde::{Deserialize, Serialize};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
-const MAX_URL: usize = 1000;
+const MAX_URL_BYTES: usize = 1000;
 
 /// Permitted addresses of webhooks.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,7 +33,7 @@ impl Default for WebhookRules {
     }
 }
 
-/// Why an address is rejected.
+/// What an address that is not public is instead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotPublic {
     #[error("a loopback address")]
@@ -50,16 +51,18 @@ pub enum NotPublic {
     Reserved,
 }
 
-const fn v4(a: u8, b: u8, c: u8, length: u8) -> Ipv4Net {
-    Ipv4Net::new_assert(Ipv4Addr::new(a, b, c, 0), length)
+/// The network `a.b.c.0/prefix_bits`.
+const fn v4(a: u8, b: u8, c: u8, prefix_bits: u8) -> Ipv4Net {
+    Ipv4Net::new_assert(Ipv4Addr::new(a, b, c, 0), prefix_bits)
 }
 
-const fn v6(a: u16, b: u16, length: u8) -> Ipv6Net {
-    Ipv6Net::new_assert(Ipv6Addr::new(a, b, 0, 0, 0, 0, 0, 0), length)
+/// The network `a:b::/prefix_bits`.
+const fn v6(a: u16, b: u16, prefix_bits: u8) -> Ipv6Net {
+    Ipv6Net::new_assert(Ipv6Addr::new(a, b, 0, 0, 0, 0, 0, 0), prefix_bits)
 }
 
 /// Entries of the registry of special-purpose IPv4 addresses (RFC 6890 and later) that are not globally reachable.
-const V4: [(Ipv4Net, NotPublic); 16] = [
+const SPECIAL_V4: [(Ipv4Net, NotPublic); 16] = [
     (v4(0, 0, 0, 8), NotPublic::Reserved),
     (v4(10, 0, 0, 8), NotPublic::Private),
     (v4(100, 64, 0, 10), NotPublic::Private), // carrier-grade NAT
@@ -68,7 +71,7 @@ const V4: [(Ipv4Net, NotPublic); 16] = [
     (v4(172, 16, 0, 12), NotPublic::Private),
     (v4(192, 0, 0, 24), NotPublic::Reserved),
     (v4(192, 0, 2, 24), NotPublic::Reserved), // documentation
-    (v4(192, 88, 99, 24), NotPublic::Reserved),
+    (v4(192, 88, 99, 24), NotPublic::Reserved), // former 6to4 relays
     (v4(192, 168, 0, 16), NotPublic::Private),
     (v4(198, 18, 0, 15), NotPublic::Private), // benchmarks
     (v4(198, 51, 100, 24), NotPublic::Reserved), // documentation
@@ -79,7 +82,7 @@ const V4: [(Ipv4Net, NotPublic); 16] = [
 ];
 
 /// Special-purpose IPv6 networks. Outside of 2000::/3 nothing is public.
-const V6: [(Ipv6Net, NotPublic); 7] = [
+const SPECIAL_V6: [(Ipv6Net, NotPublic); 7] = [
     (v6(0xfc00, 0, 7), NotPublic::Private),
     (v6(0xfe80, 0, 10), NotPublic::LinkLocal),
     (v6(0xff00, 0, 8), NotPublic::Multicast),
@@ -90,20 +93,20 @@ const V6: [(Ipv6Net, NotPublic); 7] = [
 ];
 
 /// Global unicast addresses of IPv6.
-const GLOBAL: Ipv6Net = v6(0x2000, 0, 3);
+const GLOBAL_UNICAST_V6: Ipv6Net = v6(0x2000, 0, 3);
 
 fn check_public(address: IpAddr) -> Result<(), NotPublic> {
     match address {
-        IpAddr::V4(address) => V4
+        IpAddr::V4(address) => SPECIAL_V4
             .iter()
             .find(|(net, _)| net.contains(&address))
-            .map_or(Ok(()), |(_, why)| Err(*why)),
+            .map_or(Ok(()), |(_, reason)| Err(*reason)),
         IpAddr::V6(Ipv6Addr::LOCALHOST) => Err(NotPublic::Loopback),
         IpAddr::V6(address) => {
-            let found = V6.iter().find(|(net, _)| net.contains(&address));
+            let found = SPECIAL_V6.iter().find(|(net, _)| net.contains(&address));
             match found {
-                Some((_, why)) => Err(*why),
-                None if GLOBAL.contains(&address) => Ok(()),
+                Some((_, reason)) => Err(*reason),
+                None if GLOBAL_UNICAST_V6.contains(&address) => Ok(()),
                 None => Err(NotPublic::Reserved),
             }
         }
@@ -129,9 +132,9 @@ impl WebhookRules {
     /// # Errors
     /// A text with what was expected and what came.
     pub fn check_url(&self, text: &str) -> Result<Url, String> {
-        if text.len() > MAX_URL {
+        if text.len() > MAX_URL_BYTES {
             return Err(format!(
-                "expected at most {MAX_URL} bytes, got {}",
+                "expected at most {MAX_URL_BYTES} bytes, got {}",
                 text.len()
             ));
         }
@@ -157,16 +160,16 @@ impl WebhookRules {
             return Err("expected no fragment (#…), which is never sent".into());
         }
         let port = url.port_or_known_default().unwrap_or_default();
-        let is_usual = url.port().is_none();
-        if !is_usual && !self.ports.is_empty() && !self.ports.contains(&port) {
+        let has_default_port = url.port().is_none();
+        if !has_default_port && !self.ports.is_empty() && !self.ports.contains(&port) {
             return Err(format!(
                 "expected one of the ports {:?}, got {port}",
                 self.ports
             ));
         }
-        if let Some(address) = literal(&url) {
-            self.check_address(address).map_err(|why| {
-                format!("expected an address on the Internet, got {why}: {address}")
+        if let Some(address) = ip_address(&url) {
+            self.check_address(address).map_err(|reason| {
+                format!("expected an address on the Internet, got {reason}: {address}")
             })?;
         }
         Ok(url)
@@ -174,7 +177,7 @@ impl WebhookRules {
 }
 
 /// The IP address in a URL, unless its host is a name.
-pub(crate) fn literal(url: &Url) -> Option<IpAddr> {
+pub(crate) fn ip_address(url: &Url) -> Option<IpAddr> {
     let host = url.host_str()?;
     let host = host.strip_prefix('[').unwrap_or(host);
     host.strip_suffix(']').unwrap_or(host).parse().ok()
@@ -204,7 +207,7 @@ mod tests {
             let checked = WebhookRules::default().check_address(address);
             assert_eq!(checked, Ok(()), "{public}");
         }
-        for (private, why) in [
+        for (private, reason) in [
             ("0.0.0.0", NotPublic::Reserved),
             ("0.1.2.3", NotPublic::Reserved),
             ("10.0.0.1", NotPublic::Private),
@@ -246,12 +249,12 @@ mod tests {
         ] {
             let address = private.parse().unwrap();
             let checked = WebhookRules::default().check_address(address);
-            assert_eq!(checked, Err(why), "{private}");
+            assert_eq!(checked, Err(reason), "{private}");
         }
     }
 
     #[test]
-    fn an_operator_allows_networks_by_name() {
+    fn networks_allowed_by_the_operator_are_accepted() {
         let rules = WebhookRules {
             allow_private: vec!["10.1.0.0/16".parse().unwrap()],
             ..WebhookRules::default()
@@ -267,17 +270,17 @@ mod tests {
     }
 
     #[test]
-    fn an_address_in_any_spelling_is_found_in_a_url() {
+    fn private_address_in_any_spelling_of_a_url_is_refused() {
         let rules = WebhookRules::default();
-        for good in [
+        for valid in [
             "https://example.org/faceoff?a=b",
             "https://example.org:8443/",
             "https://1.1.1.1/",
             "https://localhost/", // resolved when a message is sent
         ] {
-            rules.check_url(good).unwrap();
+            rules.check_url(valid).unwrap();
         }
-        for (bad, word) in [
+        for (invalid, word) in [
             ("example.org", "https://example.org"),
             ("http://example.org/", "https"),
             ("ftp://example.org/", "https"),
@@ -296,15 +299,15 @@ mod tests {
             ("https://169.254.169.254/latest/meta-data", "link-local"),
             ("https://0.0.0.0/", "not assigned"),
         ] {
-            let error = rules.check_url(bad).unwrap_err();
-            assert!(error.contains(word), "{bad}: {error}");
+            let error = rules.check_url(invalid).unwrap_err();
+            assert!(error.contains(word), "{invalid}: {error}");
         }
-        let long = format!("https://example.org/{}", "a".repeat(MAX_URL));
+        let long = format!("https://example.org/{}", "a".repeat(MAX_URL_BYTES));
         assert!(rules.check_url(&long).unwrap_err().contains("at most"));
-        let by_http = WebhookRules {
+        let http_rules = WebhookRules {
             allow_http: true,
             ..rules
         };
-        by_http.check_url("http://example.org/").unwrap();
+        http_rules.check_url("http://example.org/").unwrap();
     }
 }

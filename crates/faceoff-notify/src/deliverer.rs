@@ -1,4 +1,5 @@
-//! Delivery to webhooks: turns events of the log into deliveries and sends those that are due.
+//! Delivery to webhooks, the Internet addresses to which the server sends events. The deliverer first *plans*: it stores a
+//! delivery for each event of the log and each webhook that gets it. Then it sends the deliveries that are due.
 
 use crate::{
     address::WebhookRules,
@@ -27,18 +28,19 @@ use tokio_util::sync::CancellationToken;
 const MAX_CONCURRENT: usize = 32;
 /// Maximum number of concurrent messages of one owner, so that slow receivers do not delay other owners' messages.
 const MAX_CONCURRENT_PER_OWNER: usize = 3;
-/// Minimum time between two reads of the log: events in between are planned together.
-const MIN_INTERVAL: Duration = Duration::from_secs(1);
-/// Maximum time between two reads of the log: another process may write to it, and a machine may sleep.
-const MAX_INTERVAL: Duration = Duration::from_secs(5);
+/// Minimum time between two reads of the log, so that several events are planned together.
+const MIN_READ_INTERVAL: Duration = Duration::from_secs(1);
+/// Maximum time between two reads of the log. Signals of new events do not suffice: another process may write to the
+/// log, and a machine may sleep.
+const MAX_READ_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Pause after an attempt that could not be recorded. It is sent again, but a full disk must not cause a tight loop.
+/// Pause after an attempt that could not be recorded. The message is sent again, but a full disk must not cause a tight loop.
 const UNRECORDED_PAUSE: Duration = Duration::from_secs(60);
 
 /// Body of a message, by the Standard Webhooks conventions: event kind, time and data.
 #[must_use]
-pub fn message(kind: &str, at: jiff::Timestamp, data: &Value) -> String {
-    json!({ "type": kind, "timestamp": at, "data": data }).to_string()
+pub fn message(kind: &str, occurred_at: jiff::Timestamp, data: &Value) -> String {
+    json!({ "type": kind, "timestamp": occurred_at, "data": data }).to_string()
 }
 
 /// Sends messages to webhooks. Its state is in the store: after a crash it sends unrecorded attempts again, with the
@@ -55,6 +57,7 @@ pub struct Deliverer {
 #[derive(Debug, Default)]
 struct ActiveDeliveries {
     tasks: JoinSet<()>,
+    /// For each task, its webhook and the team that owns this; `None` for the organisers.
     webhooks: HashMap<task::Id, (WebhookId, Option<TeamId>)>,
 }
 
@@ -113,10 +116,10 @@ impl Deliverer {
         let mut has_failed = false;
         loop {
             let planned_at = Instant::now();
-            let next = match self.step(&mut active).await {
-                Ok(next) => {
+            let wait = match self.plan_and_start(&mut active).await {
+                Ok(wait) => {
                     has_failed = false;
-                    next
+                    wait
                 }
                 Err(error) => {
                     // Logged once: the error repeats every few seconds.
@@ -124,22 +127,23 @@ impl Deliverer {
                         tracing::error!(%error, "webhooks could not be processed; trying again");
                     }
                     has_failed = true;
-                    MAX_INTERVAL
+                    MAX_READ_INTERVAL
                 }
             };
-            let wake = planned_at + next.min(MAX_INTERVAL);
+            let wake_at = planned_at + wait.min(MAX_READ_INTERVAL);
             tokio::select! {
                 // Active deliveries are sent again after the next start.
                 () = shutdown.cancelled() => return,
-                () = sleep_until(wake) => {}
+                () = sleep_until(wake_at) => {}
                 true = active.join_next() => {}
                 () = wait_for_change(&mut changes) => {
                     tokio::select! {
                         () = shutdown.cancelled() => return,
-                        () = sleep_until(planned_at + MIN_INTERVAL) => {}
+                        () = sleep_until(planned_at + MIN_READ_INTERVAL) => {}
                     }
                 }
             }
+            // Drops the queued signals, since the next step reads all new events.
             changes = changes.resubscribe();
         }
     }
@@ -152,16 +156,17 @@ impl Deliverer {
     pub async fn deliver_due(&self) -> Result<(), StoreError> {
         let mut active = ActiveDeliveries::default();
         loop {
-            self.step(&mut active).await?;
-            let more = active.join_next().await;
-            if !more && self.store.webhooks_with_new_events().await?.is_empty() {
+            self.plan_and_start(&mut active).await?;
+            let has_ended = active.join_next().await;
+            if !has_ended && self.store.webhooks_with_new_events().await?.is_empty() {
                 return Ok(());
             }
         }
     }
 
-    /// Plans a page of the log, and starts due deliveries within the limits. Returns the time until the next step.
-    async fn step(&self, active: &mut ActiveDeliveries) -> Result<Duration, StoreError> {
+    /// Plans deliveries of the next page of the log, and starts due deliveries within the limits. Returns the time until
+    /// the next step.
+    async fn plan_and_start(&self, active: &mut ActiveDeliveries) -> Result<Duration, StoreError> {
         let has_more = self.plan().await?;
         let now = self.clock.now();
         for delivery in self.store.due_deliveries(now).await? {
@@ -184,38 +189,41 @@ impl Deliverer {
         }
         let next = self.store.next_delivery_at().await?;
         // Due deliveries beyond the limits start when an active one ends.
-        let wait = next.filter(|at| *at > now).map_or(MAX_INTERVAL, |at| {
-            Duration::try_from(at.duration_since(now)).unwrap_or(MAX_INTERVAL)
-        });
+        let wait = next
+            .filter(|due| *due > now)
+            .map_or(MAX_READ_INTERVAL, |due| {
+                Duration::try_from(due.duration_since(now)).unwrap_or(MAX_READ_INTERVAL)
+            });
         Ok(wait)
     }
 
     /// Plans deliveries of the next page of the log, for all webhooks that have not seen it. True if there may be more.
     async fn plan(&self) -> Result<bool, StoreError> {
+        // By the id of the last event that the webhooks have seen.
         let mut by_position: BTreeMap<i64, Vec<Webhook>> = BTreeMap::new();
         for webhook in self.store.webhooks_with_new_events().await? {
             by_position.entry(webhook.seen).or_default().push(webhook);
         }
         let mut planned = Vec::new();
-        for (after, webhooks) in by_position {
-            let Some(page) = self.feed.after(after).await? else {
+        for (position, webhooks) in by_position {
+            let Some(page) = self.feed.page_after(position).await? else {
                 continue;
             };
             for webhook in webhooks {
                 let filter = NoticeFilter::parse(&webhook.topics);
                 let audience = webhook.team.map_or(Audience::Organiser, Audience::Team);
-                let is_sent = |notice: &&Notice| {
+                let is_wanted = |notice: &&Notice| {
                     filter.as_ref().is_ok_and(|filter| filter.matches(notice))
-                        && notice.is_visible_to(audience, &page.stages)
+                        && notice.is_visible_to(audience, &page.stage_visibility)
                 };
-                let bodies = page.notices.iter().filter(is_sent).map(|notice| {
+                let bodies = page.notices.iter().filter(is_wanted).map(|notice| {
                     let body = message(&notice.kind, notice.at, &notice.json());
                     (notice.id, notice.kind.clone(), body)
                 });
                 planned.push(PlannedDeliveries {
                     webhook: webhook.id,
-                    seen_event: after,
-                    last_event: page.until,
+                    seen_event: position,
+                    last_event: page.last_event,
                     bodies: bodies.collect(),
                 });
             }
@@ -233,9 +241,11 @@ impl Deliverer {
     async fn send(&self, url: &str, delivery: Delivery) {
         let now = self.clock.now();
         let recorded = async {
-            let keys = self.store.webhook_keys(delivery.webhook, now).await?;
-            let (attempt, means) = self.sender.send(url, &keys, &delivery, now).await;
-            self.store.record_attempt(delivery.id, attempt, means).await
+            let secrets = self.store.webhook_keys(delivery.webhook, now).await?;
+            let (attempt, outcome) = self.sender.send(url, &secrets, &delivery, now).await;
+            self.store
+                .record_attempt(delivery.id, attempt, outcome)
+                .await
         };
         match recorded.await {
             Ok(()) | Err(StoreError::NotFound(_)) => {}
@@ -247,11 +257,11 @@ impl Deliverer {
     }
 }
 
-/// Waits for a new event in the log.
+/// Waits for a new event in the log, or a test message.
 async fn wait_for_change(changes: &mut broadcast::Receiver<Change>) {
     loop {
         match changes.recv().await {
-            // A test message was queued.
+            // The store signals a new test message, which is not an event, in this way.
             Ok(Change::Progress(Subject::Season)) => return,
             Ok(Change::Progress(_)) => {}
             Ok(Change::Recorded(_)) | Err(RecvError::Lagged(_)) => return,

@@ -1,4 +1,5 @@
-//! The feed of the log: each page is read once for all followers.
+//! The feed of the event log, page by page. Its *followers* are webhooks and clients of the API's event stream. Each page is
+//! read once for all of them.
 
 use crate::{boxed, notice::Notice, stage_visibility::StageVisibility};
 use faceoff_store::{Store, StoreError, Subject, SubjectContext};
@@ -10,19 +11,19 @@ use tokio::sync::Mutex;
 
 /// Maximum number of events in a page.
 const PAGE_SIZE: u32 = 200;
-/// Number of cached pages: most followers are at the same position, or nearly.
+/// Number of cached pages. A few suffice, since most followers have read the log to nearly the same position.
 const CACHED_PAGES: usize = 8;
 
-/// Notices after an event, the oldest first.
+/// A page of the log: notices of consecutive events, the oldest first.
 #[derive(Debug)]
 pub struct Page {
     /// Id of the event before the page.
-    after: i64,
+    previous_event: i64,
     pub notices: Vec<Notice>,
     /// Visibility of results, as of the end of the page or later.
-    pub stages: StageVisibility,
+    pub stage_visibility: StageVisibility,
     /// Id of the last event of the page.
-    pub until: i64,
+    pub last_event: i64,
 }
 
 /// Reads the log. All waiting followers get the same cached page. A follower's only state is the id of the last event
@@ -42,19 +43,19 @@ impl Feed {
         }
     }
 
-    /// The page after the event with this id; `None` if there are no later events yet.
+    /// The page that follows an event; `None` if there are no later events yet.
     ///
     /// # Errors
     /// If the log cannot be read.
     #[boxed]
-    pub async fn after(&self, id: i64) -> Result<Option<Arc<Page>>, StoreError> {
+    pub async fn page_after(&self, event: i64) -> Result<Option<Arc<Page>>, StoreError> {
         let mut cache = self.cache.lock().await;
         // Pages never change: newer events are on later pages.
-        if let Some(page) = cache.iter().find(|page| page.after == id) {
+        if let Some(page) = cache.iter().find(|page| page.previous_event == event) {
             return Ok(Some(Arc::clone(page)));
         }
-        let records = self.store.events_after(id, PAGE_SIZE).await?;
-        let Some(until) = records.last().map(|record| record.id) else {
+        let records = self.store.events_after(event, PAGE_SIZE).await?;
+        let Some(last_event) = records.last().map(|record| record.id) else {
             return Ok(None);
         };
         let mut notices = Vec::with_capacity(records.len());
@@ -70,10 +71,10 @@ impl Feed {
             notices.push(Notice::new(record, context));
         }
         let page = Arc::new(Page {
-            after: id,
+            previous_event: event,
             notices,
-            stages: StageVisibility::read(&self.store).await?,
-            until,
+            stage_visibility: StageVisibility::read(&self.store).await?,
+            last_event,
         });
         cache.truncate(CACHED_PAGES - 1);
         cache.push_front(Arc::clone(&page));

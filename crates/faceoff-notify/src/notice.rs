@@ -1,4 +1,6 @@
-//! Notices of events, and their visibility.
+//! Notices of events, and their visibility. A notice names an event of the season's log, its *subject* (what the event is
+//! about, such as an evaluation) and the subject's *context* (such as its team and stage). Recipients get neither scores
+//! nor free texts: the notice says only what to reload.
 
 use crate::stage_visibility::StageVisibility;
 use faceoff_store::{Event, EventRecord, Subject, SubjectContext};
@@ -6,7 +8,7 @@ use faceoff_types::TeamId;
 use jiff::Timestamp;
 use serde_json::{Map, Value, json};
 
-/// Recipients that a notice is checked for.
+/// Recipients for which the visibility of a notice is checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Audience {
     Public,
@@ -14,15 +16,18 @@ pub enum Audience {
     Organiser,
 }
 
+/// An event of the log, with what its visibility depends on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Notice {
     /// Id of the event; ids are ascending.
     pub id: i64,
     pub at: Timestamp,
-    /// Kind of the event, as `day_released`.
+    /// Kind of the event, such as `day_released`.
     pub kind: String,
     pub event: Event,
+    /// The resource that the event changes.
     pub subject: Subject,
+    /// The teams, stage and day that the subject belongs to.
     pub context: SubjectContext,
 }
 
@@ -42,32 +47,32 @@ impl Notice {
 
     /// Whether an audience may see the notice.
     #[must_use]
-    pub fn is_visible_to(&self, audience: Audience, stages: &StageVisibility) -> bool {
+    pub fn is_visible_to(&self, audience: Audience, stage_visibility: &StageVisibility) -> bool {
         match audience {
             Audience::Organiser => true,
-            Audience::Team(team) => self.is_own(team) || self.is_public(stages),
-            Audience::Public => self.is_public(stages),
+            Audience::Team(team) => self.is_own(team) || self.is_public(stage_visibility),
+            Audience::Public => self.is_public(stage_visibility),
         }
     }
 
-    /// Whether the notice concerns a team privately.
-    fn is_own(&self, own: TeamId) -> bool {
+    /// Whether the notice concerns this team, which may see it before the public does.
+    fn is_own(&self, own_team: TeamId) -> bool {
         match self.context {
             // Platform faults are visible to organisers only.
             _ if matches!(self.event, Event::UnitGivenBack { .. }) => false,
             SubjectContext::Team(team)
             | SubjectContext::Submission { team, .. }
             | SubjectContext::Ablation { team, .. }
-            | SubjectContext::Evaluation { team, .. } => team == own,
-            SubjectContext::Game { teams, .. } => teams.contains(&own),
-            SubjectContext::Question { team } => team == Some(own),
-            // Sign-ins and tokens of a user are private.
+            | SubjectContext::Evaluation { team, .. } => team == own_team,
+            SubjectContext::Game { teams, .. } => teams.contains(&own_team),
+            SubjectContext::Question { team } => team == Some(own_team),
+            // A user's other events, such as sign-ins and new tokens, are private to the user.
             SubjectContext::User { team } => {
                 let is_membership = matches!(
                     self.event,
                     Event::PersonJoined { .. } | Event::PersonLeft { .. }
                 );
-                is_membership && team == Some(own)
+                is_membership && team == Some(own_team)
             }
             SubjectContext::Season
             | SubjectContext::Stage { .. }
@@ -76,9 +81,9 @@ impl Notice {
         }
     }
 
-    /// Whether the notice is public. Results of blind stages and after a board freeze are hidden; before a day's release
-    /// only the events that boards show at once are public.
-    fn is_public(&self, stages: &StageVisibility) -> bool {
+    /// Whether the notice is public. Results of blind stages and those after a freeze of the board are hidden. Before a
+    /// day's results are released, only the events that boards show at once are public.
+    fn is_public(&self, stage_visibility: &StageVisibility) -> bool {
         match self.context {
             SubjectContext::Evaluation {
                 stage,
@@ -92,9 +97,9 @@ impl Notice {
                 );
                 self.event.is_public()
                     && (is_released || is_shown_at_once)
-                    && stages.is_result_visible(stage, finished_at)
+                    && stage_visibility.is_result_visible(stage, finished_at)
             }
-            // Everything else about a public game is shown on its page.
+            // The page of a public game shows everything but platform faults.
             SubjectContext::Game { is_public, .. } => {
                 is_public && !matches!(self.event, Event::UnitGivenBack { .. })
             }
@@ -118,8 +123,8 @@ impl Notice {
             (Subject::Team(team), _) => self.teams().contains(&team),
             (Subject::Stage(id), SubjectContext::Stage { stage, .. })
             | (Subject::Stage(id), SubjectContext::Evaluation { stage, .. }) => id == stage,
-            (Subject::Day(other), SubjectContext::Evaluation { stage, day, .. }) => {
-                (other.stage, other.date) == (stage, day)
+            (Subject::Day(stage_day), SubjectContext::Evaluation { stage, day, .. }) => {
+                (stage_day.stage, stage_day.date) == (stage, day)
             }
             (Subject::Submission(id), SubjectContext::Evaluation { submission, .. })
             | (Subject::Submission(id), SubjectContext::Ablation { submission, .. }) => {
@@ -151,7 +156,7 @@ impl Notice {
         }
     }
 
-    /// The notice as recipients get it: ids to reload, without the event's content.
+    /// The notice as recipients get it: the ids of what has changed, without the event's content.
     #[must_use]
     pub fn json(&self) -> Value {
         let mut fields = Map::new();

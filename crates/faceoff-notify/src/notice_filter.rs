@@ -1,4 +1,5 @@
-//! Filters of notices: by topic, subject or event kind.
+//! Filters of notices of events. A filter item is a topic (a group of events), a subject (the resource that an event changes)
+//! or an event kind.
 
 use crate::{notice::Notice, topic::Topic};
 use faceoff_store::{Event, Subject};
@@ -22,14 +23,14 @@ pub enum ParseNoticeFilterError {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Item {
+enum FilterItem {
     Topic(Topic),
     Subject(Subject),
     /// Kind of an event, as `day_released`.
     Kind(String),
 }
 
-impl Item {
+impl FilterItem {
     fn matches(&self, notice: &Notice) -> bool {
         match self {
             Self::Topic(topic) => topic.includes(notice.subject, &notice.event),
@@ -39,7 +40,7 @@ impl Item {
     }
 }
 
-impl FromStr for Item {
+impl FromStr for FilterItem {
     type Err = ParseNoticeFilterError;
 
     fn from_str(text: &str) -> Result<Self, ParseNoticeFilterError> {
@@ -55,7 +56,7 @@ impl FromStr for Item {
     }
 }
 
-impl fmt::Display for Item {
+impl fmt::Display for FilterItem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Topic(topic) => topic.fmt(f),
@@ -65,9 +66,9 @@ impl fmt::Display for Item {
     }
 }
 
-/// A filter that matches notices which match any of its items; without items it matches all.
+/// A filter. A notice has to match one of its items; a filter without items matches all notices.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct NoticeFilter(Vec<Item>);
+pub struct NoticeFilter(Vec<FilterItem>);
 
 impl NoticeFilter {
     /// Parses the words of a request or a database row.
@@ -90,7 +91,7 @@ impl NoticeFilter {
     /// The words that [`parse`](Self::parse) accepts.
     #[must_use]
     pub fn to_words(&self) -> Vec<String> {
-        self.0.iter().map(Item::to_string).collect()
+        self.0.iter().map(FilterItem::to_string).collect()
     }
 }
 
@@ -109,12 +110,15 @@ mod tests {
     use faceoff_types::StageId;
 
     #[test]
-    fn filter_survives_a_round_trip() {
-        let stage = format!("stage:{}", StageId::new());
-        let text = format!("board, queue,{stage},day_released,season");
+    fn filter_round_trips_as_words() {
+        let subject = format!("stage:{}", StageId::new());
+        let text = format!("board, queue,{subject},day_released,season");
         let filter: NoticeFilter = text.parse().unwrap();
         let words = filter.to_words();
-        assert_eq!(words, ["board", "queue", &stage, "day_released", "season"]);
+        assert_eq!(
+            words,
+            ["board", "queue", &subject, "day_released", "season"]
+        );
         assert_eq!(NoticeFilter::parse(&words), Ok(filter));
     }
 
@@ -127,7 +131,7 @@ mod tests {
         let many = vec!["board".to_owned(); MAX_FILTER_ITEMS + 1];
         assert_eq!(
             NoticeFilter::parse(&many),
-            Err(ParseNoticeFilterError::TooMany(51))
+            Err(ParseNoticeFilterError::TooMany(MAX_FILTER_ITEMS + 1))
         );
     }
 }

@@ -1,5 +1,5 @@
-//! Resolution of webhooks' host names. The client connects to the addresses that were checked, even if the name resolves
-//! otherwise a moment later.
+//! Resolution of webhooks' host names. The client connects to exactly the addresses that were checked, even if the name
+//! resolves to others a moment later.
 
 use crate::address::{NotPublic, WebhookRules};
 use reqwest::dns::{Addrs, Name, Resolve, Resolving};
@@ -22,16 +22,16 @@ impl Resolve for CheckedResolver {
     fn resolve(&self, name: Name) -> Resolving {
         let rules = Arc::clone(&self.0);
         Box::pin(async move {
-            let found = tokio::net::lookup_host((name.as_str(), 0)).await;
-            let found: Vec<SocketAddr> = found.map_err(ResolveError::Unknown)?.collect();
-            // One private address is enough to refuse: the owner may want the server to reach it.
-            for address in &found {
+            let addresses = tokio::net::lookup_host((name.as_str(), 0)).await;
+            let addresses: Vec<SocketAddr> = addresses.map_err(ResolveError::Unknown)?.collect();
+            // One private address is enough to refuse: the name's owner may want the server to connect to a private network.
+            for address in &addresses {
                 rules
                     .check_address(address.ip())
                     .map_err(ResolveError::NotPublic)?;
             }
-            let found: Addrs = Box::new(found.into_iter());
-            Ok(found)
+            let addresses: Addrs = Box::new(addresses.into_iter());
+            Ok(addresses)
         })
     }
 }

@@ -1,4 +1,5 @@
-//! Secrets of webhooks: with them, receivers verify that a message comes from the server.
+//! Secrets of webhooks. The server signs its messages with a secret, and receivers verify the signature as Standard Webhooks
+//! defines it.
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use faceoff_store::WebhookSecrets;
@@ -26,7 +27,7 @@ impl WebhookSecret {
         format!("whsec_{}", STANDARD.encode(self.0))
     }
 
-    /// Key that is stored and signs messages.
+    /// The secret as it is stored and signs messages.
     #[must_use]
     pub const fn bytes(&self) -> [u8; 32] {
         self.0
@@ -39,53 +40,59 @@ impl fmt::Debug for WebhookSecret {
     }
 }
 
-fn signature(key: &[u8; 32], signed: &str) -> String {
-    let mut mac = Hmac::<Sha256>::new_from_slice(key).unwrap_or_else(|_| unreachable!());
-    mac.update(signed.as_bytes());
+/// The signature of a text, with the version prefix of Standard Webhooks.
+fn signature(secret: &[u8; 32], signed_text: &str) -> String {
+    let mut mac = Hmac::<Sha256>::new_from_slice(secret).unwrap_or_else(|_| unreachable!());
+    mac.update(signed_text.as_bytes());
     format!("v1,{}", STANDARD.encode(mac.finalize().into_bytes()))
 }
 
 /// Value of the header `webhook-signature`: one signature of each active secret.
-pub(crate) fn signatures(keys: &WebhookSecrets, id: &str, timestamp: i64, body: &str) -> String {
-    let signed = format!("{id}.{timestamp}.{body}");
-    let all = [Some(&keys.secret), keys.old_secret.as_ref()];
-    let all: Vec<String> = all
+pub(crate) fn signatures(secrets: &WebhookSecrets, id: &str, timestamp: i64, body: &str) -> String {
+    let signed_text = format!("{id}.{timestamp}.{body}");
+    let active_secrets = [Some(&secrets.secret), secrets.old_secret.as_ref()];
+    let signatures: Vec<String> = active_secrets
         .into_iter()
         .flatten()
-        .map(|key| signature(key, &signed))
+        .map(|secret| signature(secret, &signed_text))
         .collect();
-    all.join(" ")
+    signatures.join(" ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The example of the Standard Webhooks' own libraries.
+    /// The example in the reference libraries of Standard Webhooks.
     #[test]
     fn signature_matches_the_reference_example() {
         let key = STANDARD.decode("MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw").unwrap();
         let body = r#"{"test": 2432232314}"#;
-        let signed = format!("msg_p5jXN8AQM9LWM0D4loKWxJek.1614265330.{body}");
+        let signed_text = format!("msg_p5jXN8AQM9LWM0D4loKWxJek.1614265330.{body}");
         let mut mac = Hmac::<Sha256>::new_from_slice(&key).unwrap();
-        mac.update(signed.as_bytes());
+        mac.update(signed_text.as_bytes());
         let signature = STANDARD.encode(mac.finalize().into_bytes());
         assert_eq!(signature, "g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=");
     }
 
     #[test]
     fn replaced_secret_also_signs() {
-        let keys = |old_secret| WebhookSecrets {
-            secret: [1; 32],
-            old_secret,
+        let sign = |old_secret| {
+            let secrets = WebhookSecrets {
+                secret: [1; 32],
+                old_secret,
+            };
+            let (message_id, timestamp, body) = ("a", 1, "{}");
+            signatures(&secrets, message_id, timestamp, body)
         };
-        let alone = signatures(&keys(None), "a", 1, "{}");
-        let both = signatures(&keys(Some([2; 32])), "a", 1, "{}");
-        let parts: Vec<&str> = both.split(' ').collect();
-        assert_eq!(parts.len(), 2);
-        assert_eq!(parts[0], alone);
-        assert!(parts[1].starts_with("v1,"));
-        assert_ne!(parts[1], alone);
+        let new_only = sign(None);
+        let new_and_old = sign(Some([2; 32]));
+        let [new, old] = new_and_old.split(' ').collect::<Vec<_>>()[..] else {
+            panic!("expected two signatures, got {new_and_old}");
+        };
+        assert_eq!(new, new_only);
+        assert!(old.starts_with("v1,"));
+        assert_ne!(old, new_only);
     }
 
     #[test]
@@ -94,6 +101,6 @@ mod tests {
         let encoded = secret.encoded();
         let bytes = STANDARD.decode(encoded.strip_prefix("whsec_").unwrap());
         assert_eq!(bytes.unwrap(), secret.bytes());
-        assert!(!format!("{secret:?}").contains(&encoded[6..]));
+        assert!(!format!("{secret:?}").contains(&encoded["whsec_".len()..]));
     }
 }

@@ -1,4 +1,4 @@
-//! Sending of one message to one webhook.
+//! Sends one message to one webhook, and decides when to try again after a failure.
 
 use crate::{
     address::WebhookRules,
@@ -13,10 +13,10 @@ use std::{error::Error, sync::Arc, time::Duration};
 
 /// Time that a receiver has to respond.
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
-/// Pauses after failed attempts, seconds.
+/// Pauses after the first, second … failed attempt, seconds. After one more failure the message is not sent again.
 const RETRY_PAUSES_S: [i64; 6] = [5, 5 * 60, 30 * 60, 2 * 3600, 5 * 3600, 10 * 3600];
 /// Maximum random extension, as a fraction of the pause: simultaneous failures must not be retried simultaneously.
-const JITTER: f64 = 0.2;
+const MAX_JITTER: f64 = 0.2;
 
 /// Sends messages; redirects are not followed.
 #[derive(Debug, Clone)]
@@ -48,11 +48,11 @@ impl Sender {
     pub(crate) async fn send(
         &self,
         url: &str,
-        keys: &WebhookSecrets,
+        secrets: &WebhookSecrets,
         delivery: &Delivery,
         now: Timestamp,
     ) -> (DeliveryAttempt, DeliveryOutcome) {
-        let response = self.post(url, keys, delivery, now).await;
+        let response = self.post(url, secrets, delivery, now).await;
         let (status, error) = match response {
             Ok(status) => (Some(status), status_error(status)),
             Err(error) => (None, Some(error)),
@@ -76,14 +76,15 @@ impl Sender {
     async fn post(
         &self,
         url: &str,
-        keys: &WebhookSecrets,
+        secrets: &WebhookSecrets,
         delivery: &Delivery,
         now: Timestamp,
     ) -> Result<StatusCode, String> {
-        // Checked again: the rules may have changed, and literal addresses bypass the resolver.
+        // The URL was checked when it was registered, but the rules may have changed. The resolver checks host names
+        // only, not IP addresses in URLs.
         let url = self.rules.check_url(url)?;
         let (id, timestamp) = (delivery.id.to_string(), now.as_second());
-        let signature = signatures(keys, &id, timestamp, &delivery.body);
+        let signature = signatures(secrets, &id, timestamp, &delivery.body);
         let request = self
             .client
             .post(url)
@@ -118,8 +119,8 @@ fn status_error(status: StatusCode) -> Option<String> {
 fn describe_error(error: &reqwest::Error) -> String {
     let mut cause: Option<&(dyn Error + 'static)> = Some(error);
     while let Some(found) = cause {
-        if let Some(resolving) = found.downcast_ref::<ResolveError>() {
-            return resolving.to_string();
+        if let Some(resolve_error) = found.downcast_ref::<ResolveError>() {
+            return resolve_error.to_string();
         }
         cause = found.source();
     }
@@ -132,17 +133,19 @@ fn describe_error(error: &reqwest::Error) -> String {
     }
 }
 
-/// Time of the next attempt after `attempts` earlier ones and this one; `None` after the last.
-fn retry_at(id: DeliveryId, attempts: u32, now: Timestamp) -> Option<Timestamp> {
-    let pause = *RETRY_PAUSES_S.get(usize::try_from(attempts).ok()?)?;
-    // Derived from the id, so that the same log gives the same times.
+/// Time of the next attempt after one that failed now; `None` after the last attempt. `earlier_attempts` does not count
+/// the one that failed now.
+fn retry_at(id: DeliveryId, earlier_attempts: u32, now: Timestamp) -> Option<Timestamp> {
+    let pause_s = *RETRY_PAUSES_S.get(usize::try_from(earlier_attempts).ok()?)?;
+    // The jitter derives from the delivery's id, so that it is reproducible.
     let mut hasher =
         blake3::Hasher::new_derive_key("Faceoff: pauses between attempts of a webhook");
     hasher.update(id.as_uuid().as_bytes());
-    hasher.update(&attempts.to_le_bytes());
+    hasher.update(&earlier_attempts.to_le_bytes());
     let [first, second, ..] = *hasher.finalize().as_bytes();
-    let fraction = f64::from(u16::from_le_bytes([first, second])) / f64::from(u16::MAX);
-    let pause = SignedDuration::from_secs(pause).mul_f64(1.0 + JITTER * fraction);
+    // From 0 to 1.
+    let random = f64::from(u16::from_le_bytes([first, second])) / f64::from(u16::MAX);
+    let pause = SignedDuration::from_secs(pause_s).mul_f64(1.0 + MAX_JITTER * random);
     now.checked_add(pause).ok()
 }
 
@@ -154,23 +157,24 @@ mod tests {
     fn retry_pauses_grow_vary_and_end() {
         let now: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
         let ids = [DeliveryId::new(), DeliveryId::new()];
-        for (attempts, pause) in (0..).zip(RETRY_PAUSES_S) {
+        for (earlier_attempts, min_pause_s) in (0..).zip(RETRY_PAUSES_S) {
             for id in ids {
-                let at = retry_at(id, attempts, now).unwrap();
-                let waits = at.duration_since(now).as_secs_f64();
-                let pause = pause as f64;
-                assert!((pause..=pause * (1.0 + JITTER)).contains(&waits));
+                let at = retry_at(id, earlier_attempts, now).unwrap();
+                let pause_s = at.duration_since(now).as_secs_f64();
+                let min_pause_s = min_pause_s as f64;
+                assert!((min_pause_s..=min_pause_s * (1.0 + MAX_JITTER)).contains(&pause_s));
                 assert_eq!(
                     Some(at),
-                    retry_at(id, attempts, now),
+                    retry_at(id, earlier_attempts, now),
                     "the time is deterministic"
                 );
             }
             assert_ne!(
-                retry_at(ids[0], attempts, now),
-                retry_at(ids[1], attempts, now)
+                retry_at(ids[0], earlier_attempts, now),
+                retry_at(ids[1], earlier_attempts, now)
             );
         }
-        assert_eq!(retry_at(ids[0], 6, now), None);
+        let earlier_attempts = u32::try_from(RETRY_PAUSES_S.len()).unwrap();
+        assert_eq!(retry_at(ids[0], earlier_attempts, now), None);
     }
 }

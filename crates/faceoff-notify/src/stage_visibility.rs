@@ -1,4 +1,5 @@
-//! Visibility of the stages' results.
+//! Visibility of the stages' results to the public. The results of a *blind* stage are hidden until the organisers reveal
+//! them; after a stage's boards are *frozen*, new results are hidden.
 
 use crate::boxed;
 use faceoff_store::{Store, StoreError};
@@ -25,7 +26,7 @@ impl StageVisibility {
     /// If the database cannot be read.
     #[boxed]
     pub async fn read(store: &Store) -> Result<Self, StoreError> {
-        let frozen: HashMap<StageId, Timestamp> = store
+        let freeze_times: HashMap<StageId, Timestamp> = store
             .frozen_boards()
             .await?
             .into_iter()
@@ -34,7 +35,7 @@ impl StageVisibility {
         let stages = store.stages().await?.into_iter().map(|stage| {
             let state = StageState {
                 is_blind: stage.settings.blind,
-                frozen_at: frozen.get(&stage.id).copied(),
+                frozen_at: freeze_times.get(&stage.id).copied(),
             };
             (stage.id, state)
         });
@@ -43,12 +44,13 @@ impl StageVisibility {
         })
     }
 
-    /// Whether the stage's settings let the public see a result that finished at `finished_at`.
+    /// Whether the stage lets the public see a result. `finished_at` is `None` for one that is not finished.
     #[must_use]
     pub fn is_result_visible(&self, stage: StageId, finished_at: Option<Timestamp>) -> bool {
         self.stages.get(&stage).is_some_and(|state| {
-            let is_after = |frozen| finished_at.is_none_or(|at| at > frozen);
-            !state.is_blind && !state.frozen_at.is_some_and(is_after)
+            let is_hidden_by_freeze =
+                |frozen_at| finished_at.is_none_or(|finished_at| finished_at > frozen_at);
+            !state.is_blind && !state.frozen_at.is_some_and(is_hidden_by_freeze)
         })
     }
 }

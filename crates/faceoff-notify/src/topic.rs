@@ -1,9 +1,9 @@
-//! Topics: groups of events that clients follow.
+//! Topics: groups of events that clients follow, each about a part of the season that a page shows.
 
 use faceoff_store::{Event, Subject};
 use std::{fmt, str::FromStr};
 
-/// A part of the season that pages and API clients show.
+/// A part of the season whose changes can be followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Topic {
     /// The season itself, its terms and pauses of its queue.
@@ -19,10 +19,13 @@ pub enum Topic {
     Submissions,
     Evaluations,
     Ablations,
+    /// Announcements, and questions with their answers.
     Announcements,
+    /// Users: organisers and members of teams.
     People,
     /// Registrations of new teams.
     Registrations,
+    /// Trials and proposed re-evaluations, which do not count.
     Proposals,
     /// Tournaments and their rounds.
     Tournaments,
@@ -68,7 +71,7 @@ impl Topic {
         }
     }
 
-    /// Whether an event of this subject belongs to the topic.
+    /// Whether an event about this subject belongs to the topic.
     #[must_use]
     pub const fn includes(self, subject: Subject, event: &Event) -> bool {
         match self {

@@ -86,14 +86,14 @@ pub(super) async fn overall(
     let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
     let today = today.day(app.config.clock.now());
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
-    let context = Context::new(&board, timeline.before.as_ref(), sort.is_by_rank());
+    let context = Context::new(&board, timeline.previous_board.as_ref(), sort.is_by_rank());
     let page = OverallPage {
         frame: Frame::for_app(&app, season.name, "/"),
         heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
         days: Days::new(&board, &timeline, &address),
         commitment: season.commitment,
         conditions: common_conditions(&board.rows),
-        comparison_day: timeline.before.as_ref().map(|earlier| earlier.day),
+        comparison_day: timeline.previous_board.as_ref().map(|earlier| earlier.day),
         has_ties: context.has_ties(),
         groups: context.groups(|row| OverallRow::new(row, &context, &board.weights)),
         baselines: baselines::rows(&board),
@@ -162,7 +162,7 @@ pub(super) async fn by_task(
     board.rows.retain(|row| row.tasks.contains_key(&task));
     sort.apply(&mut board.rows, Some(task));
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
-    let context = Context::new(&board, timeline.before.as_ref(), sort.is_by_rank());
+    let context = Context::new(&board, timeline.previous_board.as_ref(), sort.is_by_rank());
     render_with_etag(&TaskPage {
         frame: Frame::for_app(&app, season.name, path.clone()),
         heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
@@ -170,7 +170,7 @@ pub(super) async fn by_task(
         title,
         aim,
         conditions: common_conditions(&board.rows),
-        comparison_day: timeline.before.as_ref().map(|earlier| earlier.day),
+        comparison_day: timeline.previous_board.as_ref().map(|earlier| earlier.day),
         has_ties: context.has_ties(),
         groups: context.groups(|row| TaskRow::new(row, &row.tasks[&task], &context)),
         baselines: baselines::rows(&board),

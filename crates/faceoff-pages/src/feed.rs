@@ -36,7 +36,9 @@ pub(super) async fn feed(State(app): State<App>, headers: HeaderMap) -> Result<R
     let season = app.store.season().await?;
     let head = SeasonHead::load(&app).await?;
     let entries = newest(&app).await?;
-    let updated = entries.first().map_or(season.created_at, |item| item.at);
+    let updated = entries
+        .first()
+        .map_or(season.created_at, |item| item.occurred_at);
     let feed = Feed {
         id: feed_id(&head.commitment),
         season: head.name,

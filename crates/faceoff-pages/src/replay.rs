@@ -117,8 +117,8 @@ impl EpisodeReplay {
             ),
             script: assets::REPLAY_SCRIPT.url(),
             styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
-            previous: clip.has_before.then(|| page_path(id, task, episode - 1)),
-            next: clip.has_after.then(|| page_path(id, task, episode + 1)),
+            previous: clip.has_previous.then(|| page_path(id, task, episode - 1)),
+            next: clip.has_next.then(|| page_path(id, task, episode + 1)),
         })
     }
 }

@@ -40,9 +40,12 @@ impl ReplaySection {
             title,
             end_reason: episode.line.why.clone(),
             steps: episode.line.steps,
-            still: Still::new(&episode.motion, episode.observed.as_ref()),
+            still: Still::new(&episode.motion, episode.observations.as_ref()),
             motion: format!("{api}/motion"),
-            observed: episode.observed.as_ref().map(|_| format!("{api}/observed")),
+            observed: episode
+                .observations
+                .as_ref()
+                .map(|_| format!("{api}/observed")),
             is_embedded: false,
             sync_group: None,
         }

@@ -1,4 +1,5 @@
-//! Conversion of actions to commands.
+//! Converts actions, the numbers that a Python program passes to an environment, to commands: joint positions, velocities
+//! and accelerations for one control step of 20 ms, as an agent sends them to the server.
 
 use crate::errors::argument_error;
 use faceoff_sim::{
@@ -9,7 +10,7 @@ use faceoff_types::ACTION_LIMIT;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Acceleration limits are this many times the velocity limits, 1/s.
+/// Acceleration limits of the robot's model are this many times the velocity limits, 1/s.
 const ACCELERATION_PER_VELOCITY: f64 = 10.0;
 
 /// Meaning of the numbers of an action.
@@ -29,7 +30,7 @@ pub enum ActionMode {
 
 /// Format of an environment's actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Actions {
+pub struct ActionFormat {
     /// Meaning of their numbers.
     pub mode: ActionMode,
     /// Conversion to trajectories.
@@ -47,7 +48,7 @@ enum Quantity {
     Acceleration,
 }
 
-impl Actions {
+impl ActionFormat {
     /// Count of numbers in an action.
     pub fn len(&self) -> usize {
         self.interpolation.len()

@@ -1,4 +1,4 @@
-//! The simulator's batch, as the reference for benchmarks of the environments.
+//! The simulator's batch, which steps many worlds together without Python: benchmarks compare the environments with it.
 
 use crate::errors::{argument_error, catch_panic, simulator_error};
 use faceoff_sim::{

@@ -1,4 +1,4 @@
-//! Errors as Python exceptions.
+//! Errors as Python exceptions: the classes of the package's `errors.py`.
 
 use pyo3::{import_exception, prelude::*};
 use std::{

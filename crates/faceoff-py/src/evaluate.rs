@@ -1,7 +1,8 @@
-//! The evaluator for a policy in Python.
+//! The evaluator for a policy, a Python function from an observation to an action: it runs the episodes of an evaluation
+//! as the server does, and scores them.
 
 use crate::{
-    actions::{ActionMode, Actions},
+    actions::{ActionFormat, ActionMode},
     errors::{OrderError, argument_error, catch_panic, simulator_error},
 };
 use faceoff_episode::{AnswerTiming, Arena, NullSink, RunningEpisode};
@@ -22,15 +23,18 @@ const UNTIMED: AnswerTiming = AnswerTiming {
 /// State shared by all episodes of an evaluation.
 #[pyclass(frozen, module = "faceoff._native")]
 pub struct Evaluation {
+    /// Ruleset, perturbations, and the simulated arm of all episodes.
     arena: Arena,
     profile: Profile,
     seed: Seed,
+    /// Settings that differ from the ruleset's.
     variation: Variation,
 }
 
 #[pymethods]
 impl Evaluation {
-    /// `profile` is a name, `seed` as on the command line. `mismatch_seed` is derived from `seed` if absent.
+    /// `profile` names a set of perturbations, `seed` is as on the command line. `mismatch_seed`, from which the arm's
+    /// deviation from its model follows, is derived from `seed` if absent.
     /// `perturbations` are magnitudes in JSON.
     #[new]
     fn new(
@@ -50,7 +54,7 @@ impl Evaluation {
                 })
         };
         let seed = read("seed", seed)?;
-        let season = match mismatch_seed {
+        let mismatch_seed = match mismatch_seed {
             Some(text) => read("mismatch_seed", text)?,
             None => seed.model_mismatch(),
         };
@@ -67,7 +71,7 @@ impl Evaluation {
                     profile,
                     &magnitudes,
                     seed,
-                    season,
+                    mismatch_seed,
                 ))
             })
         })?;
@@ -106,7 +110,7 @@ impl Evaluation {
                 ));
             }
         };
-        let actions = Actions {
+        let action_format = ActionFormat {
             mode,
             interpolation,
             clip: clip_actions,
@@ -124,9 +128,9 @@ impl Evaluation {
         })?;
         Ok(PolicyEpisode {
             running,
-            actions,
+            action_format,
             commanded: INITIAL_Q,
-            command: vec![0.0; actions.len()],
+            command: vec![0.0; action_format.len()],
             is_over: false,
         })
     }
@@ -169,7 +173,8 @@ impl Evaluation {
 #[pyclass(module = "faceoff._native")]
 pub struct PolicyEpisode {
     running: RunningEpisode<NullSink>,
-    actions: Actions,
+    action_format: ActionFormat,
+    /// Last commanded joint positions, rad.
     commanded: [f64; JOINTS],
     command: Vec<f64>,
     is_over: bool,
@@ -198,19 +203,19 @@ impl PolicyEpisode {
             ));
         }
         let action = action.as_slice()?;
-        if action.len() != self.actions.len() {
-            let expected = format!("{} numbers", self.actions.len());
+        if action.len() != self.action_format.len() {
+            let expected = format!("{} numbers", self.action_format.len());
             return Err(argument_error("action", expected, action.len()));
         }
-        self.actions.check(action, |_| String::new())?;
+        self.action_format.check(action, |_| String::new())?;
         let Self {
             running,
-            actions,
+            action_format,
             commanded,
             command,
             ..
         } = self;
-        actions.command(action, commanded, command);
+        action_format.command(action, commanded, command);
         let outcome = py.detach(|| {
             catch_panic(|| {
                 Ok(match running.answer(command, UNTIMED) {

@@ -1,7 +1,8 @@
-//! A game of two robots, driven by the Python half.
+//! A game of two robots, driven by the Python half. It consists of rallies: each lasts until a goal, a foul or another
+//! reason to put the puck down again.
 
 use crate::{
-    actions::{ActionMode, Actions},
+    actions::{ActionFormat, ActionMode},
     errors::{ClosedError, OrderError, argument_error, catch_panic, simulator_error},
     observation,
 };
@@ -23,6 +24,7 @@ struct Setup {
     clip_actions: bool,
     factors: Vec<Factor>,
     perturbations: PerturbationSettings,
+    /// Seed of the arms' deviation from their model; `None` derives it from the seed of the game.
     mismatch_seed: Option<Seed>,
 }
 
@@ -30,7 +32,7 @@ struct Setup {
 #[pyclass(module = "faceoff._native")]
 pub struct Game {
     setup: Setup,
-    actions: [Actions; 2],
+    action_formats: [ActionFormat; 2],
     commanded: [[f64; JOINTS]; 2],
     state: State,
 }
@@ -52,14 +54,14 @@ impl Game {
             .perturbations
             .check()
             .map_err(|error| argument_error("perturbations", "valid magnitudes", error))?;
-        let actions = [0, 1].map(|robot| Actions {
+        let action_formats = [0, 1].map(|robot| ActionFormat {
             mode: setup.action_mode[robot],
             interpolation: setup.interpolation[robot],
             clip: setup.clip_actions,
         });
         Ok(Self {
             setup,
-            actions,
+            action_formats,
             commanded: [INITIAL_Q; 2],
             state: State::Unstarted,
         })
@@ -83,14 +85,14 @@ impl Game {
             .factors
             .iter()
             .fold(Factors::NONE, |set, factor| set.with(*factor));
-        let season = setup.mismatch_seed.unwrap_or_else(|| root.model_mismatch());
+        let mismatch_seed = setup.mismatch_seed.unwrap_or_else(|| root.model_mismatch());
         let game = py.detach(|| {
             catch_panic(|| {
                 Ok(faceoff_sim::Game::new(GameSetup {
                     interpolation: setup.interpolation,
                     factors,
                     settings: setup.perturbations.clone(),
-                    plant: Plant::for_factors(factors, &setup.perturbations, season),
+                    plant: Plant::for_factors(factors, &setup.perturbations, mismatch_seed),
                     seed: match number {
                         0 => root,
                         _ => root.derive("game", &number.to_le_bytes()),
@@ -118,14 +120,14 @@ impl Game {
         for (robot, action) in actions.iter().enumerate() {
             let Some(action) = action else { continue };
             let action = action.as_slice()?;
-            let reader = &self.actions[robot];
-            if action.len() != reader.len() {
-                let expected = format!("{} numbers for robot {}", reader.len(), robot + 1);
+            let action_format = &self.action_formats[robot];
+            if action.len() != action_format.len() {
+                let expected = format!("{} numbers for robot {}", action_format.len(), robot + 1);
                 return Err(argument_error("action", expected, action.len()));
             }
-            reader.check(action, |_| format!(" of robot {}", robot + 1))?;
-            let mut command = vec![0.0; reader.len()];
-            reader.command(action, &mut commanded[robot], &mut command);
+            action_format.check(action, |_| format!(" of robot {}", robot + 1))?;
+            let mut command = vec![0.0; action_format.len()];
+            action_format.command(action, &mut commanded[robot], &mut command);
             commands[robot] = Some(command);
         }
         let step = py.detach(|| {
@@ -223,7 +225,7 @@ fn step_dict<'py>(
     result.set_item(
         "diverged",
         step.divergence
-            .map_or([false; 2], |divergence| divergence.by),
+            .map_or([false; 2], |divergence| divergence.robots_at_fault),
     )?;
     result.set_item("goals", game.referee().goals)?;
     result.set_item("fouls", game.referee().fouls)?;

@@ -1,5 +1,5 @@
 //! The native half of the Python package `faceoff`: the simulator, the evaluator and the arm's kinematics, for Python
-//! programs.
+//! programs. A *world* is one simulated table with its robots and puck; an environment has one world or many.
 //!
 //! This crate converts arguments to the types of the other crates, and their results to arrays. It has
 //! no simulation logic, and converts panics to exceptions.
@@ -72,7 +72,8 @@ mod _native {
         faceoff_sim::model::INITIAL_Q
     }
 
-    /// Lengths of an action's nested arrays, outermost first, for an interpolation's code.
+    /// Lengths of an action's nested arrays, outermost first, for the code of an interpolation, the rule by which an
+    /// action becomes a trajectory of 20 ms.
     #[pyfunction]
     fn action_shape(interpolation: Option<i64>) -> PyResult<Vec<usize>> {
         let interpolation = faceoff_types::Interpolation::from_code(interpolation);

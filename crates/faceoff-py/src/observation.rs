@@ -1,4 +1,5 @@
-//! Observations for learners: single precision, within fixed bounds.
+//! Observations for learners: single precision, within fixed bounds. An observation has the puck's x, y, yaw and their
+//! rates, 7 joint positions, 7 joint velocities, and with an opponent the x, y, z of its end effector.
 
 use faceoff_sim::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,

@@ -1,4 +1,5 @@
-//! Output arrays of a step, a row per world, in memory of Python or of this crate.
+//! Output arrays of a step, a row per world, in memory of Python or of this crate. The *facts* of a world are 12 numbers
+//! about its episode, such as its number of steps and its constraint values.
 
 use crate::{
     observation,

@@ -1,4 +1,4 @@
-//! The thread pool of an environment.
+//! The thread pool of an environment, which also works in a forked process.
 
 use crate::errors::simulator_error;
 use pyo3::prelude::*;

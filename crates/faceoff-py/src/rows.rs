@@ -28,7 +28,17 @@ impl Rows<'_> {
     /// # Errors
     /// If an array has another shape or is not contiguous.
     pub fn outputs(&mut self, worlds: usize, observation_len: usize) -> PyResult<Outputs<'_>> {
-        let wide = |name, shape: &[usize], width, optional| match shape {
+        let Self(
+            observations,
+            final_observations,
+            rewards,
+            terminated,
+            truncated,
+            facts,
+            states,
+            next_states,
+        ) = self;
+        let check_matrix = |name, shape: &[usize], width, optional| match shape {
             [rows, columns] if *rows == worlds && *columns == width => Ok(()),
             [0, _] if optional => Ok(()),
             other => Err(argument_error(
@@ -37,7 +47,7 @@ impl Rows<'_> {
                 format!("one of shape {other:?}"),
             )),
         };
-        let narrow = |name, len| {
+        let check_vector = |name, len| {
             if len == worlds {
                 return Ok(());
             }
@@ -48,24 +58,29 @@ impl Rows<'_> {
                 format!("one of length {len}"),
             ))
         };
-        wide("observations", self.0.shape(), observation_len, false)?;
-        wide("final observations", self.1.shape(), observation_len, true)?;
-        narrow("rewards", self.2.len())?;
-        narrow("terminated", self.3.len())?;
-        narrow("truncated", self.4.len())?;
-        wide("facts", self.5.shape(), FACTS, false)?;
-        wide("states", self.6.shape(), STATE_LEN, true)?;
-        wide("next states", self.7.shape(), STATE_LEN, true)?;
+        check_matrix("observations", observations.shape(), observation_len, false)?;
+        check_matrix(
+            "final observations",
+            final_observations.shape(),
+            observation_len,
+            true,
+        )?;
+        check_vector("rewards", rewards.len())?;
+        check_vector("terminated", terminated.len())?;
+        check_vector("truncated", truncated.len())?;
+        check_matrix("facts", facts.shape(), FACTS, false)?;
+        check_matrix("states", states.shape(), STATE_LEN, true)?;
+        check_matrix("next states", next_states.shape(), STATE_LEN, true)?;
         Ok(Outputs {
             observation_len,
-            observations: self.0.as_slice_mut()?,
-            final_observations: self.1.as_slice_mut()?,
-            rewards: self.2.as_slice_mut()?,
-            terminated: self.3.as_slice_mut()?,
-            truncated: self.4.as_slice_mut()?,
-            facts: self.5.as_slice_mut()?,
-            states: self.6.as_slice_mut()?,
-            next_states: self.7.as_slice_mut()?,
+            observations: observations.as_slice_mut()?,
+            final_observations: final_observations.as_slice_mut()?,
+            rewards: rewards.as_slice_mut()?,
+            terminated: terminated.as_slice_mut()?,
+            truncated: truncated.as_slice_mut()?,
+            facts: facts.as_slice_mut()?,
+            states: states.as_slice_mut()?,
+            next_states: next_states.as_slice_mut()?,
         })
     }
 }

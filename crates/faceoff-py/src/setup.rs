@@ -1,7 +1,10 @@
 //! Setup shared by all worlds of an environment.
+//!
+//! A *factor* is one kind of perturbation, a difference from the ideal simulator. A *plant* is a simulated arm; with the
+//! factor `model_mismatch` its masses, gains and friction deviate from the model, by random numbers from a seed.
 
 use crate::{
-    actions::{ActionMode, Actions},
+    actions::{ActionFormat, ActionMode},
     errors::argument_error,
 };
 use faceoff_sim::{Episode, Plant};
@@ -76,8 +79,8 @@ impl Setup {
     }
 
     /// The format of this setup's actions.
-    pub fn actions(&self) -> Actions {
-        Actions {
+    pub fn action_format(&self) -> ActionFormat {
+        ActionFormat {
             mode: self.action_mode,
             interpolation: self.interpolation,
             clip: self.clip_actions,
@@ -91,8 +94,8 @@ impl Setup {
 
     /// The plant of a world with this seed.
     pub fn plant(&self, seed: Seed) -> Plant {
-        let season = self.mismatch_seed.unwrap_or_else(|| seed.model_mismatch());
-        Plant::for_factors(self.factor_set(), &self.perturbations, season)
+        let mismatch_seed = self.mismatch_seed.unwrap_or_else(|| seed.model_mismatch());
+        Plant::for_factors(self.factor_set(), &self.perturbations, mismatch_seed)
     }
 
     /// A new episode; `puck` replaces its initial state of the puck.

@@ -20,9 +20,11 @@ pub struct Snapshot {
     pub world: World,
 }
 
+/// What a pickled state contains.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SavedState {
+    /// The version of the package that wrote it.
     faceoff: String,
     setup: Setup,
     seed: u64,

@@ -1,4 +1,4 @@
-//! A control step of several worlds.
+//! A control step, 20 ms, of several worlds.
 
 use crate::{
     outputs::{FACTS, Outputs, write_facts},
@@ -29,8 +29,8 @@ pub fn step(
     actions: &[f64],
     outputs: &mut Outputs<'_>,
 ) {
-    let reader = setup.actions();
-    let len = reader.len();
+    let action_format = setup.action_format();
+    let len = action_format.len();
     let mut commands = vec![0.0; worlds.len() * len];
     let mut is_stepped = vec![true; worlds.len()];
     for (row, world) in worlds.iter_mut().enumerate() {
@@ -42,7 +42,7 @@ pub fn step(
             let action = &actions[row * len..][..len];
             world.actions.extend_from_slice(action);
             let command = &mut commands[row * len..][..len];
-            reader.command(action, &mut world.commanded, command);
+            action_format.command(action, &mut world.commanded, command);
         }
     }
     let outcomes = step_marked(worlds, &is_stepped, &commands, len);
@@ -79,13 +79,13 @@ fn step_marked(
         .map(|world| &mut world.episode)
         .zip(commands.chunks_exact(len))
         .zip(is_stepped)
-        .filter_map(|(both, is_stepped)| is_stepped.then_some(both))
+        .filter_map(|(episode_and_command, is_stepped)| is_stepped.then_some(episode_and_command))
         .unzip();
-    let unknown = StepOutcome {
+    let placeholder = StepOutcome {
         end: None,
         constraints: ConstraintValues::default(),
     };
-    let mut outcomes = vec![unknown; episodes.len()];
+    let mut outcomes = vec![placeholder; episodes.len()];
     step_episodes(&mut episodes, &commands, &mut outcomes);
     outcomes
 }

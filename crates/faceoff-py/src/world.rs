@@ -1,4 +1,4 @@
-//! One world of an environment: its running episode and the history of that.
+//! One world of an environment: a simulated table with its running episode and that episode's actions so far.
 
 use crate::{errors::argument_error, reward, setup::Setup};
 use faceoff_sim::{Episode, EpisodeState, JOINTS, Plant, StepOutcome, model::INITIAL_Q};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// each), the end effector's 3, and the 3 of the opponent's, zero without one, each in its robot's base frame.
 pub const STATE_LEN: usize = 6 + 3 * JOINTS + 6;
 
-/// Identity of a world's episode.
+/// What an episode starts from; two episodes with the same origin and setup start equally.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origin {
     /// The number from which the episode's seeds are derived.
@@ -26,7 +26,7 @@ pub struct Origin {
 pub struct World {
     /// The simulated episode.
     pub episode: Episode,
-    /// Identity of the episode.
+    /// What the episode started from.
     pub origin: Origin,
     /// Last commanded joint positions, rad.
     pub commanded: [f64; JOINTS],
@@ -34,7 +34,9 @@ pub struct World {
     pub actions: Vec<f64>,
     /// How the episode ended; `None` while it runs.
     pub end: Option<EpisodeEnd>,
+    /// The simulated arm.
     plant: Arc<Plant>,
+    /// The reward's potential of the present state, points; the next reward contains its change.
     potential: f64,
     violations: Violations,
 }
@@ -119,8 +121,8 @@ impl World {
     /// # Errors
     /// If the actions are not those of a possible episode.
     pub fn replay(setup: &Setup, origin: Origin, actions: Vec<f64>) -> PyResult<Self> {
-        let reader = setup.actions();
-        let len = reader.len();
+        let action_format = setup.action_format();
+        let len = action_format.len();
         let max_len = len * setup.max_episode_steps as usize;
         if !actions.len().is_multiple_of(len) || actions.len() > max_len {
             return Err(argument_error(
@@ -129,7 +131,7 @@ impl World {
                 format!("{} numbers", actions.len()),
             ));
         }
-        reader.check(&actions, |index| format!(" of the state's action {index}"))?;
+        action_format.check(&actions, |index| format!(" of the state's action {index}"))?;
         let mut world = Self::start(setup, origin, None);
         let mut command = vec![0.0; len];
         for (step, action) in actions.chunks_exact(len).enumerate() {
@@ -140,7 +142,7 @@ impl World {
                     format!("{} actions", actions.len() / len),
                 ));
             }
-            reader.command(action, &mut world.commanded, &mut command);
+            action_format.command(action, &mut world.commanded, &mut command);
             let outcome = world.episode.step(&command);
             world.apply_step(setup, &outcome);
         }
@@ -174,14 +176,15 @@ fn flatten(state: &EpisodeState) -> [f64; STATE_LEN] {
 pub fn check_puck(task: Task, puck: &[f64; 6]) -> PyResult<()> {
     use faceoff_sim::table::geometry::{PUCK, TABLE};
     let [x, y, ..] = *puck;
-    let (along, across) = (
+    // The largest |x| and |y| of the puck's centre.
+    let (max_x, max_y) = (
         TABLE.half_length_m() - PUCK.radius_m,
         TABLE.half_width_m() - PUCK.radius_m,
     );
     let speed = (puck[3] * puck[3] + puck[4] * puck[4]).sqrt();
     let is_valid = puck.iter().all(|x| x.is_finite())
-        && x.abs() <= along
-        && y.abs() <= across
+        && x.abs() <= max_x
+        && y.abs() <= max_y
         && speed <= 20.0
         && puck[5].abs() <= 500.0;
     if is_valid {
@@ -190,7 +193,7 @@ pub fn check_puck(task: Task, puck: &[f64; 6]) -> PyResult<()> {
     Err(argument_error(
         "puck",
         format!(
-            "x, y, yaw, vx, vy, yaw rate of a puck on the table ({task}): |x| <= {along:.5}, |y| <= {across:.5}, \
+            "x, y, yaw, vx, vy, yaw rate of a puck on the table ({task}): |x| <= {max_x:.5}, |y| <= {max_y:.5}, \
              at most 20 m/s and 500 rad/s"
         ),
         format!("{puck:?}"),

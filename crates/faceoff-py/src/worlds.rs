@@ -1,4 +1,4 @@
-//! The worlds of an environment, driven by the Python half.
+//! The worlds of an environment, driven by the Python half. A *world* is one simulated table with its running episode.
 
 use crate::{
     errors::{
@@ -24,7 +24,7 @@ use std::{
     },
 };
 
-/// Worlds that the simulator steps in SIMD lanes; the size of a chunk is a multiple of it.
+/// Number of worlds that the simulator computes in one SIMD register; threads work on chunks of a multiple of it.
 const LANES: usize = 4;
 /// Chunks per thread, for balancing: worlds take different times.
 const CHUNKS_PER_THREAD: usize = 4;
@@ -49,7 +49,9 @@ enum State {
     Failed,
 }
 
+/// A step that runs in the pool's threads.
 struct SentStep {
+    /// The process that sent it; a forked one has no copy of the threads.
     process_id: u32,
     result: Mutex<Receiver<Result<StepOutput, String>>>,
 }
@@ -305,17 +307,21 @@ impl Worlds {
 
 impl Worlds {
     fn check_actions<'a>(&self, actions: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
-        let reader = self.setup.actions();
-        if actions.shape() != [self.count, reader.len()] {
+        let action_format = self.setup.action_format();
+        if actions.shape() != [self.count, action_format.len()] {
             return Err(argument_error(
                 "action",
-                format!("an array of shape ({}, {})", self.count, reader.len()),
+                format!(
+                    "an array of shape ({}, {})",
+                    self.count,
+                    action_format.len()
+                ),
                 format!("one of shape {:?}", actions.shape()),
             ));
         }
         let actions = actions.as_slice()?;
         let is_single = self.count == 1;
-        reader.check(actions, |index| {
+        action_format.check(actions, |index| {
             if is_single {
                 String::new()
             } else {
@@ -373,7 +379,7 @@ impl State {
             result.recv()
         });
         let message = match received {
-            Ok(Ok(both)) => return Ok(both),
+            Ok(Ok(output)) => return Ok(output),
             Ok(Err(message)) => message,
             Err(_) => "the step was aborted".to_owned(),
         };

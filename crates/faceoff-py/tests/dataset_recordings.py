@@ -16,8 +16,8 @@ ROOT = Path(__file__).parents[3]
 FIXTURES = ROOT / "tests" / "fixtures"
 PROGRAM = Path(os.environ.get("FACEOFF_BIN", ROOT / "target" / "debug" / "faceoff"))
 
-# An agent with the interpolations 5 and null that violates limits, sends an invalid answer in one episode, and
-# exits at the reset of another.
+# An agent with the interpolations 5 and null (rules by which an action becomes a trajectory). It violates limits, sends an
+# invalid answer in one episode, and exits at the reset of another.
 ODD_AGENT = """
 import json, sys
 for line in sys.stdin:

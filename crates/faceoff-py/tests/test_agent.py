@@ -1,4 +1,4 @@
-"""The protocol loop, as a library in this process and as a program over pipes."""
+"""The loop of `faceoff.agent`, which exchanges messages with the evaluator, as a library in this process and as a program over pipes."""
 
 from __future__ import annotations
 

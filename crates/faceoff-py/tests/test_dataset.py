@@ -1,4 +1,4 @@
-"""`faceoff.dataset` reads the same numbers as the program in all layouts."""
+"""`faceoff.dataset` reads the same numbers as the program in all layouts (versions of the dataset's files)."""
 
 from __future__ import annotations
 
@@ -20,10 +20,14 @@ LAYOUT_3 = FIXTURES / "dataset-layout-3.zip"
 
 
 def recordings() -> list[Path]:
+    """Two datasets of the current layout and one of each earlier layout."""
     return [hold(), odd(), LAYOUT_2, LAYOUT_3]
 
 
-@pytest.mark.parametrize("index", range(4))
+RECORDINGS = 4
+
+
+@pytest.mark.parametrize("index", range(RECORDINGS))
 def test_tables_equal_those_of_the_program(index: int) -> None:
     path = recordings()[index]
     dataset = fd.open_dataset(path)
@@ -35,7 +39,7 @@ def test_tables_equal_those_of_the_program(index: int) -> None:
         assert table == rows
 
 
-@pytest.mark.parametrize("index", range(4))
+@pytest.mark.parametrize("index", range(RECORDINGS))
 def test_episodes_equal_those_of_the_program(index: int) -> None:
     path = recordings()[index]
     dataset = fd.open_dataset(path)

@@ -1,4 +1,4 @@
-"""The layout of the 2023 challenge."""
+"""The export in the layout of the 2023 challenge, for tools that were written for it."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ pytest.importorskip("pyarrow")
 import faceoff.dataset as fd  # noqa: E402
 from dataset_recordings import FIXTURES, hold, odd, slice_of  # noqa: E402
 
+# The expected content of the exports of two fixtures, as `digest` gives it.
 GOLDEN = Path(__file__).with_name("golden_dataset_2023.json")
 GROUPS = ("joint_pos", "joint_vel", "ee", "link")
 

@@ -29,10 +29,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "dataset"
 
 
-def flip_bit(path: Path, at: int) -> None:
-    """Flips the lowest bit of a byte of a file."""
+def flip_bit(path: Path, offset: int) -> None:
+    """Flips the lowest bit of the byte at `offset` in a file."""
     data = bytearray(path.read_bytes())
-    data[at] ^= 1
+    data[offset] ^= 1
     path.write_bytes(data)
 
 

@@ -1,4 +1,4 @@
-"""Recordings of games."""
+"""Recordings of games, which consist of rallies of two sides, read by `faceoff.dataset`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def test_rallies_follow_each_other_and_fill_the_game() -> None:
 
 def test_sides_observe_the_table_from_their_own_end() -> None:
     recording = fd.open_game(game())
-    for side, away in ((1, -1), (2, 1)):
+    # The x axes of the table and of side 1 point in the same direction.
+    for side, direction in ((1, 1), (2, -1)):
         arrays = recording.rallies[0].to_numpy(side)
         steps = recording.rallies[0].steps
         assert arrays.observations.shape == (steps, 23)
@@ -45,7 +46,7 @@ def test_sides_observe_the_table_from_their_own_end() -> None:
         # An observation is from the beginning of a step, the true state from its end. The distance between
         # a base and the table's centre is 1.51 m; side 2 observes from the other end.
         observed, true = arrays.observations[1:, 0] - 1.51, arrays.puck[:-1, 0]
-        moved = np.abs(observed - -away * true)
+        moved = np.abs(observed - direction * true)
         assert np.median(moved) < 0.05
 
 

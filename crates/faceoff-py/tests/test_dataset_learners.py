@@ -1,4 +1,4 @@
-"""Exports for learners: Minari datasets opened by Minari, and LeRobot datasets checked file by file.
+"""Exports of datasets for learning libraries: Minari datasets opened by Minari, and LeRobot datasets checked file by file.
 
 LeRobot itself opens them in `tests_learning/test_lerobot.py`: it needs torch.
 """

@@ -24,6 +24,9 @@ from dataset_recordings import FIXTURES, PROGRAM, ROOT, game, hold, odd  # noqa:
 HERE = Path(__file__).parent
 REQUIREMENTS = HERE / "requirements-old-readers.txt"
 
+# Control steps in the fixture dataset-layout-3.zip.
+LAYOUT_3_STEPS = 1149
+
 # Reads every table of the archives with pyarrow and with DuckDB, and compares all values.
 READ = """
 import sys, tempfile, zipfile
@@ -43,6 +46,7 @@ for archive in sys.argv[1:]:
 print(tables, rows)
 """
 
+# Loads the last transition and the times of an export in the layout of 2023.
 READ_EXPORT = """
 import sys, numpy
 steps = numpy.load(sys.argv[1] + "/7dof-hit/dataset.pkl", allow_pickle=True)
@@ -89,8 +93,9 @@ def test_pyarrow_12_and_duckdb_read_recordings() -> None:
     archives = [hold() / "dataset.zip", odd() / "dataset.zip", game() / "game.zip"]
     archives += [game() / "side-1.zip", FIXTURES / "dataset-layout-3.zip"]
     tables, rows = map(int, run("-c", READ, *archives).split())
+    # Of two datasets, a game, one side of it, and the dataset of layout 3.
     assert tables == 2 + 2 + 6 + 4 + 2
-    assert rows > 1149 + len(fd.open_dataset(hold()).table())
+    assert rows > LAYOUT_3_STEPS + len(fd.open_dataset(hold()).table())
 
 
 def test_current_duckdb_reads_recordings(tmp_path: Path) -> None:

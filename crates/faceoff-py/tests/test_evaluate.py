@@ -1,4 +1,4 @@
-"""The evaluator in this process has the same results as the program."""
+"""`faceoff.evaluate`, the evaluator in this process, has the same results as the program."""
 
 import json
 import os

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordEpisodeStatistics
-from commands import pump
+from commands import runaway_action
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 from faceoff.game import AGENTS, AirHockeyGame, GameTransition, SelfPlayEnv
@@ -17,7 +17,7 @@ def hold(observation: np.ndarray) -> np.ndarray:
     return np.zeros(7)
 
 
-def both(value: float = 0.0) -> dict[str, np.ndarray]:
+def actions_of_both(value: float = 0.0) -> dict[str, np.ndarray]:
     return {agent: np.full(7, value) for agent in AGENTS}
 
 
@@ -34,9 +34,9 @@ def test_game_is_truncated_for_both_agents() -> None:
     assert infos["robot_2"] == {"seed": 1, "game_number": 0}
     assert observations["robot_1"].shape == (23,)
     for _ in range(2):
-        *_, truncations, _ = game.step(both())
+        *_, truncations, _ = game.step(actions_of_both())
         assert truncations == {"robot_1": False, "robot_2": False}
-    _, _, terminations, truncations, _ = game.step(both())
+    _, _, terminations, truncations, _ = game.step(actions_of_both())
     assert terminations == {"robot_1": False, "robot_2": False}
     assert truncations == {"robot_1": True, "robot_2": True}
     assert game.agents == []
@@ -46,6 +46,7 @@ def test_observations_are_from_the_own_side() -> None:
     game = AirHockeyGame()
     observations, _ = game.reset(seed=1)
     first, second = observations["robot_1"], observations["robot_2"]
+    # Each base is 1.51 m from the table's centre.
     np.testing.assert_allclose(first[0] + second[0], 2 * 1.51, rtol=1e-6)
     np.testing.assert_allclose(first[1], -second[1], rtol=1e-6)
 
@@ -64,13 +65,13 @@ def test_idle_puck_is_a_foul_and_begins_the_next_rally() -> None:
     game = AirHockeyGame()
     game.reset(seed=1)
     for _ in range(800):
-        *_, infos = game.step(both())
+        *_, infos = game.step(actions_of_both())
         if "rally_end" in infos["robot_1"]:
             break
     assert infos["robot_1"]["rally_end"] == "foul"
     by = infos["robot_1"]["rally_end_by"]
     assert infos["robot_2"]["fouls"] == ((1, 0) if by == "robot_1" else (0, 1))
-    game.step(both())
+    game.step(actions_of_both())
 
 
 def test_reward_is_the_difference_of_points() -> None:
@@ -79,7 +80,7 @@ def test_reward_is_the_difference_of_points() -> None:
     game.reset(seed=1)
     total = {agent: 0.0 for agent in AGENTS}
     for _ in range(6_000):
-        _, rewards, _, _, infos = game.step(both())
+        _, rewards, _, _, infos = game.step(actions_of_both())
         for agent in AGENTS:
             total[agent] += rewards[agent]
         if sum(infos["robot_1"]["score"]) > 0:
@@ -93,7 +94,7 @@ def test_diverging_robot_is_terminated_and_the_other_continues() -> None:
     game = AirHockeyGame(interpolation=(None, 1), action_mode=("raw", "delta"))
     observations, _ = game.reset(seed=1)
     for _ in range(1_500):
-        actions = {"robot_1": pump(*np.split(observations["robot_1"][6:20], 2)), "robot_2": np.zeros(7)}
+        actions = {"robot_1": runaway_action(*np.split(observations["robot_1"][6:20], 2)), "robot_2": np.zeros(7)}
         observations, rewards, terminations, _, _ = game.step(actions)
         if terminations["robot_1"]:
             break
@@ -110,7 +111,7 @@ def test_custom_reward_replaces_the_default() -> None:
 
     game = AirHockeyGame(reward=reward)
     game.reset(seed=1)
-    _, rewards, *_ = game.step(both())
+    _, rewards, *_ = game.step(actions_of_both())
     assert -0.8 < rewards["robot_1"] < 0.8
     assert rewards["robot_2"] == pytest.approx(0.65, abs=0.01)
 
@@ -121,7 +122,7 @@ def test_pictures_show_both_robots() -> None:
     before = game.render()
     assert before is not None
     for _ in range(20):
-        game.step(both(1.0))
+        game.step(actions_of_both(1.0))
     after = game.render()
     assert after is not None
     changed = (before != after).any(axis=2)

@@ -1,4 +1,4 @@
-"""The environment of one world, with Gymnasium's checks."""
+"""The environment of one world (a simulated table), with Gymnasium's checks."""
 
 import copy
 import pickle
@@ -28,7 +28,8 @@ def play(env: Any, actions: np.ndarray) -> list[Any]:
     return results
 
 
-def some_actions(env: Any, steps: int, seed: int = 0) -> np.ndarray:
+def random_actions(env: Any, steps: int, seed: int = 0) -> np.ndarray:
+    """Actions for a number of steps."""
     draws = np.random.default_rng(seed).uniform(-1, 1, (steps, *env.action_space.shape))
     return draws.astype(np.float32)
 
@@ -66,7 +67,7 @@ def test_observations_are_bounded_float32_vectors(task: str) -> None:
     assert env.observation_space.is_bounded()
     observation, _ = env.reset(seed=5)
     assert observation.dtype == np.float32
-    for observation, *_ in play(env, some_actions(env, 60)):
+    for observation, *_ in play(env, random_actions(env, 60)):
         assert observation.dtype == np.float32
         assert observation in env.observation_space
 
@@ -168,12 +169,12 @@ def test_profile_accepts_names_of_factors() -> None:
 def test_saved_state_is_restored_exactly() -> None:
     env = AirHockeyEnv("hit", profile="evaluation", interpolation=3)
     env.reset(seed=2)
-    play(env, some_actions(env, 40))
+    play(env, random_actions(env, 40))
     saved = env.save()
-    expected = play(env, some_actions(env, 30, seed=1))
+    expected = play(env, random_actions(env, 30, seed=1))
     env.reset(seed=77)
     env.restore(saved)
-    repeated = play(env, some_actions(env, 30, seed=1))
+    repeated = play(env, random_actions(env, 30, seed=1))
     for first, second in zip(expected, repeated, strict=True):
         np.testing.assert_array_equal(first[0], second[0])
         assert first[1:4] == second[1:4]
@@ -183,10 +184,10 @@ def test_saved_state_is_restored_exactly() -> None:
 def test_pickled_environment_continues_like_the_original(method: str) -> None:
     env = gymnasium.make("faceoff/AirHockey-Defend-v0", profile="evaluation", interpolation=5)
     env.reset(seed=4)
-    play(env, some_actions(env, 20))
+    play(env, random_actions(env, 20))
     twin = pickle.loads(pickle.dumps(env)) if method == "pickle" else copy.deepcopy(env)
     for original, copied in zip(
-        play(env, some_actions(env, 20, seed=1)), play(twin, some_actions(env, 20, seed=1)), strict=True
+        play(env, random_actions(env, 20, seed=1)), play(twin, random_actions(env, 20, seed=1)), strict=True
     ):
         np.testing.assert_array_equal(original[0], copied[0])
         assert original[1:4] == copied[1:4]
@@ -195,7 +196,7 @@ def test_pickled_environment_continues_like_the_original(method: str) -> None:
 def test_pickled_state_is_restored_exactly() -> None:
     env = AirHockeyEnv("prepare")
     env.reset(seed=4)
-    play(env, some_actions(env, 25))
+    play(env, random_actions(env, 25))
     state = env.save()
     loaded = pickle.loads(pickle.dumps(state))
     assert (loaded.seed, loaded.episode_number, loaded.steps) == (4, 0, 25)
@@ -228,8 +229,9 @@ def test_default_reward_sums_to_success_minus_penalty_points() -> None:
     env = AirHockeyEnv("defend")
     for seed in range(5):
         env.reset(seed=seed)
-        results = play(env, some_actions(env, 500, seed=seed))
+        results = play(env, random_actions(env, 500, seed=seed))
         info = results[-1][4]
+        # Points of the constraints end effector, link, joint position and joint velocity.
         points = float(np.dot(info["violations"], [3, 3, 2, 1]))
         shaped = sum(reward for _, reward, *_ in results) - 10 * info["success"] + points
         assert abs(shaped) < 6
@@ -240,7 +242,7 @@ def test_statistics_wrappers_work() -> None:
         RecordEpisodeStatistics(gymnasium.make("faceoff/AirHockey-Defend-v0"))
     )
     env.reset(seed=0)
-    results = play(env, some_actions(env, 500))
+    results = play(env, random_actions(env, 500))
     assert results[-1][4]["episode"]["l"] == len(results)
 
 

@@ -1,4 +1,7 @@
-"""`faceoff.kinematics`: NumPy and standard library agree with each other and with the simulator."""
+"""`faceoff.kinematics`: NumPy and standard library agree with each other and with the simulator.
+
+A *pose* is the angles of all joints; the *posture* of a point is the pose that `inverse` gives without a start pose.
+"""
 
 import math
 import subprocess
@@ -15,11 +18,12 @@ from faceoff.kinematics import model, plain
 BOUND = np.array(plain.JOINT_BOUND_RAD)
 
 
-def some_poses(count, seed, share=0.95):
+def random_poses(count, seed, share=0.95):
+    """Joint angles, rad, within a share of their bounds."""
     return np.random.default_rng(seed).uniform(-share * BOUND, share * BOUND, (count, 7))
 
 
-def over_the_table(count, seed, reach=1.4):
+def points_over_the_table(count, seed, reach=1.4):
     """Random points in the mallet's area and the arm's reach, m."""
     rng = np.random.default_rng(seed)
     points = rng.uniform([plain.X_MIN_M, -plain.Y_MAX_M], [reach, plain.Y_MAX_M], (3 * count, 2))
@@ -47,7 +51,7 @@ def test_plain_file_needs_only_the_standard_library(tmp_path):
 class TestAgainstTheSimulator:
     """Positions, Jacobian and constraints to 1e-12."""
 
-    q = some_poses(200, seed=1)
+    q = random_poses(200, seed=1)
     dq = np.random.default_rng(2).normal(0.0, 1.5, (200, 7))
 
     @pytest.fixture(scope="class")
@@ -82,7 +86,7 @@ class TestAgainstTheSimulator:
 
 class TestInverse:
     def test_postures_reach_their_points_within_all_bounds(self):
-        points = over_the_table(2000, seed=3, reach=1.43)
+        points = points_over_the_table(2000, seed=3, reach=1.43)
         q, ok = arm.inverse(points)
         assert ok.all()
         np.testing.assert_allclose(arm.forward(q)[:, :2], points, atol=1e-9)
@@ -96,7 +100,7 @@ class TestInverse:
         np.testing.assert_allclose(q, model.START_Q, atol=1e-12)
 
     def test_solution_is_near_its_start_pose(self):
-        points = over_the_table(500, seed=4)
+        points = points_over_the_table(500, seed=4)
         start, _ = arm.inverse(points + np.random.default_rng(5).normal(0.0, 0.02, points.shape))
         q, ok = arm.inverse(points, start)
         assert ok.mean() > 0.99, "at the table's edges a start may lie beyond the bounds"
@@ -107,8 +111,8 @@ class TestInverse:
 
     def test_most_points_are_reached_from_any_start_pose(self):
         """A local search from a distant pose may end at a bound; the flag is then false."""
-        points = over_the_table(400, seed=6, reach=1.3)
-        q, ok = arm.inverse(points, some_poses(400, seed=7, share=0.6))
+        points = points_over_the_table(400, seed=6, reach=1.3)
+        q, ok = arm.inverse(points, random_poses(400, seed=7, share=0.6))
         print("reached", ok.mean())
         assert ok.mean() > 0.95
         values = arm.constraints(q[ok], np.zeros_like(q[ok])).worst()
@@ -158,13 +162,13 @@ class TestInverse:
         assert arm.jacobian(np.zeros((4, 7))).shape == (4, 3, 7)
 
     def test_numpy_and_standard_library_agree(self):
-        points = over_the_table(60, seed=8)
-        starts = some_poses(60, seed=9, share=0.5)
+        points = points_over_the_table(60, seed=8)
+        starts = random_poses(60, seed=9, share=0.5)
         postures, good = arm.inverse(points)
         near, near_good = arm.inverse(points, starts)
         rates = np.random.default_rng(10).normal(0.0, 1.0, (60, 2))
-        along = arm.posture_velocities(points, rates)
-        least = arm.velocities(starts, rates)
+        posture_rates = arm.posture_velocities(points, rates)
+        minimal = arm.velocities(starts, rates)
         for i, point in enumerate(points):
             q, ok = plain.inverse(point)
             np.testing.assert_allclose(q, postures[i], atol=1e-12)
@@ -174,9 +178,9 @@ class TestInverse:
             if ok:
                 np.testing.assert_allclose(q, near[i], atol=1e-9)
             np.testing.assert_allclose(
-                plain.posture_velocities(point, rates[i]), along[i], atol=1e-11
+                plain.posture_velocities(point, rates[i]), posture_rates[i], atol=1e-11
             )
-            np.testing.assert_allclose(plain.velocities(starts[i], rates[i]), least[i], atol=1e-11)
+            np.testing.assert_allclose(plain.velocities(starts[i], rates[i]), minimal[i], atol=1e-11)
 
 
 class TestVelocities:
@@ -185,23 +189,23 @@ class TestVelocities:
         assert all(map(math.isfinite, plain.posture_velocities([0.0, 0.0], [1.0, 1.0])))
 
     def test_posture_velocities_are_the_derivative_of_the_posture(self):
-        points = over_the_table(200, seed=11)
+        points = points_over_the_table(200, seed=11)
         rates = np.random.default_rng(12).normal(0.0, 1.0, points.shape)
-        tiny = 1e-6
-        before, _ = arm.inverse(points - tiny * rates)
-        after, _ = arm.inverse(points + tiny * rates)
-        expected = (after - before) / (2 * tiny)
+        step_s = 1e-6
+        before, _ = arm.inverse(points - step_s * rates)
+        after, _ = arm.inverse(points + step_s * rates)
+        expected = (after - before) / (2 * step_s)
         np.testing.assert_allclose(arm.posture_velocities(points, rates), expected, atol=1e-6)
 
     def test_minimum_velocities_move_the_mallet_as_requested(self):
-        q, _ = arm.inverse(over_the_table(200, seed=13))
+        q, _ = arm.inverse(points_over_the_table(200, seed=13))
         rates = np.random.default_rng(14).normal(0.0, 1.0, (200, 3))
         dq = arm.velocities(q, rates)
         np.testing.assert_allclose(np.einsum("nij,nj->ni", arm.jacobian(q), dq), rates, atol=1e-4)
-        along = arm.posture_velocities(arm.forward(q), rates)
+        posture_rates = arm.posture_velocities(arm.forward(q), rates)
         weighted = np.array(model.VELOCITY_LIMIT_RAD_S)
-        least, other = (np.linalg.norm(v / weighted, axis=-1) for v in (dq, along))
-        assert (least <= other + 1e-4).all()
+        minimal, other = (np.linalg.norm(v / weighted, axis=-1) for v in (dq, posture_rates))
+        assert (minimal <= other + 1e-4).all()
 
     def test_speed_share_is_relative_to_the_allowed_velocity(self):
         at_limit = 0.95 * np.array(model.VELOCITY_LIMIT_RAD_S)

@@ -83,7 +83,7 @@ class TestAgainstNumpyAndPlain:
         assert type(actual) is type(numpy_result)
         for name, values in numpy_result._asdict().items():
             np.testing.assert_allclose(getattr(actual, name), values, rtol=0.0, atol=1e-12, err_msg=name)
-        plain_results = [plain.constraints(*both) for both in zip(q.tolist(), dq.tolist(), strict=True)]
+        plain_results = [plain.constraints(*pair) for pair in zip(q.tolist(), dq.tolist(), strict=True)]
         for name, values in actual.worst().items():
             one_by_one = [each[name] for each in plain_results]
             np.testing.assert_allclose(values, one_by_one, rtol=0.0, atol=1e-12, err_msg=name)
@@ -117,7 +117,7 @@ class TestAgainstNumpyAndPlain:
         is_bent = np.abs(np.sin(q[:, 3])) > 1e-3
         actual, numpy_result = native.posture_velocities(points, speeds), arm.posture_velocities(points, speeds)
         assert is_bent.sum() > 2000 and np.isfinite(actual).all()
-        plain_results = np.array([plain.posture_velocities(*both) for both in zip(points, speeds, strict=True)])
+        plain_results = np.array([plain.posture_velocities(*pair) for pair in zip(points, speeds, strict=True)])
         assert relative_difference(actual, numpy_result)[is_bent].max() < 1e-12
         assert relative_difference(actual, plain_results)[is_bent].max() < 1e-12
 
@@ -126,7 +126,7 @@ class TestAgainstNumpyAndPlain:
         q = drawn_poses()
         speeds = np.random.default_rng(6).normal(0.0, 1.0, (len(q), 3))
         actual = native.velocities(q, speeds)
-        plain_results = np.array([plain.velocities(*both) for both in zip(q, speeds, strict=True)])
+        plain_results = np.array([plain.velocities(*pair) for pair in zip(q, speeds, strict=True)])
         assert relative_difference(actual, arm.velocities(q, speeds)).max() < 1e-10
         assert relative_difference(actual, plain_results).max() < 1e-10
 
@@ -140,7 +140,7 @@ class TestAgainstNumpyAndPlain:
         np.testing.assert_array_equal(is_solved, numpy_solved)
         np.testing.assert_allclose(q[is_solved], numpy_result[is_solved], rtol=0.0, atol=1e-10)
         sample = slice(None, None, 10)
-        plain_results = [plain.inverse(*both) for both in zip(points[sample], starts[sample], strict=True)]
+        plain_results = [plain.inverse(*pair) for pair in zip(points[sample], starts[sample], strict=True)]
         assert is_solved[sample].tolist() == [solved for _, solved in plain_results]
         found = np.array([pose for pose, _ in plain_results])
         np.testing.assert_allclose(q[sample][is_solved[sample]], found[is_solved[sample]], rtol=0.0, atol=1e-10)
@@ -159,9 +159,9 @@ class TestAgainstNumpyAndPlain:
         assert (arm.heights(q[is_solved]) > model.LINK_HEIGHT_M).all()
 
 
-def relative_difference(actual: np.ndarray, others: np.ndarray) -> np.ndarray:
+def relative_difference(actual: np.ndarray, expected: np.ndarray) -> np.ndarray:
     """Differences (n, m) relative to the largest number of each row."""
-    shares: np.ndarray = np.abs(actual - others) / np.abs(others).max(axis=1, keepdims=True)
+    shares: np.ndarray = np.abs(actual - expected) / np.abs(expected).max(axis=1, keepdims=True)
     return shares
 
 
@@ -266,7 +266,7 @@ def test_arguments_are_unchanged_and_results_are_new_arrays() -> None:
     np.testing.assert_array_equal(q, before)
 
 
-BAD: list[tuple[str, tuple[Any, ...]]] = [
+INVALID_CALLS: list[tuple[str, tuple[Any, ...]]] = [
     ("forward", ([0.0] * 6,)),
     ("forward", (0.0,)),
     ("forward", (["a"] * 7,)),
@@ -297,7 +297,7 @@ BAD: list[tuple[str, tuple[Any, ...]]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "arguments"), BAD)
+@pytest.mark.parametrize(("name", "arguments"), INVALID_CALLS)
 def test_errors_equal_those_of_the_numpy_functions(name: str, arguments: tuple[Any, ...]) -> None:
     errors = []
     for module in (arm, native):

@@ -16,19 +16,19 @@ import faceoff
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
 
 
-def step_some(envs: Any) -> np.ndarray:
+def step_five_times(envs: Any) -> np.ndarray:
     for _ in range(5):
         observations, *_ = envs.step(np.full(envs.action_space.shape, 0.5))
     return observations
 
 
-def make_and_step(_: int) -> np.ndarray:
+def make_and_step(_index: int) -> np.ndarray:
     envs = AirHockeyVectorEnv(16, "hit", threads=2)
     envs.reset(seed=3)
-    return step_some(envs)
+    return step_five_times(envs)
 
 
-def in_child(work: Any) -> Any:
+def run_in_child(work: Any) -> Any:
     """The result of ``work`` in a forked process; an exception is returned as a value."""
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
@@ -62,8 +62,8 @@ def test_environment_continues_in_a_forked_process() -> None:
     envs = AirHockeyVectorEnv(16, "hit", threads=2)
     envs.reset(seed=3)
     envs.step(np.zeros((16, 7)))
-    child_result = in_child(lambda: step_some(envs))
-    np.testing.assert_array_equal(child_result, step_some(envs))
+    child_result = run_in_child(lambda: step_five_times(envs))
+    np.testing.assert_array_equal(child_result, step_five_times(envs))
 
 
 def test_forked_process_can_close_an_inherited_environment() -> None:
@@ -75,15 +75,15 @@ def test_forked_process_can_close_an_inherited_environment() -> None:
         envs.close()
         return "closed"
 
-    assert in_child(work) == "closed"
-    step_some(envs)
+    assert run_in_child(work) == "closed"
+    step_five_times(envs)
 
 
 def test_step_sent_by_the_parent_is_refused_in_the_child() -> None:
     envs = AirHockeyVectorEnv(16, "hit", threads=2)
     envs.reset(seed=3)
     envs.send(np.zeros((16, 7)))
-    error = in_child(envs.recv)
+    error = run_in_child(envs.recv)
     assert isinstance(error, faceoff.OrderError)
     assert "forked" in str(error)
     envs.recv()
@@ -93,11 +93,11 @@ def test_async_vector_env_runs_the_environment() -> None:
     make = lambda: gymnasium.make("faceoff/AirHockey-Defend-v0")  # noqa: E731
     envs: Any = AsyncVectorEnv([make] * 2)
     envs.reset(seed=0)
-    observations = step_some(envs)
+    observations = step_five_times(envs)
     envs.close()
     single = AirHockeyEnv("defend")
     single.reset(seed=1)
-    np.testing.assert_array_equal(step_some(single), observations[1])
+    np.testing.assert_array_equal(step_five_times(single), observations[1])
 
 
 def test_python_threads_run_during_a_step() -> None:
@@ -154,6 +154,6 @@ def test_results_do_not_depend_on_the_number_of_threads() -> None:
     for threads in (1, 2, 5, os.cpu_count() or 1):
         envs = AirHockeyVectorEnv(37, "prepare", profile="evaluation", threads=threads)
         envs.reset(seed=3)
-        results.append(step_some(envs))
+        results.append(step_five_times(envs))
     for other in results[1:]:
         np.testing.assert_array_equal(results[0], other)

@@ -13,7 +13,9 @@ from program import PROGRAM, REPOSITORY, exported_model, faceoff, kinematics, tr
 
 from faceoff.kinematics import model as numbers
 
-FIELDS = ("plant", "controller")
+# The simulated arm with the mallet, and the controller's model, which ends at the end effector.
+MODELS = ("plant", "controller")
+# Joints with a motor; the plant's last two are those of the mallet's universal joint.
 DRIVEN = numbers.JOINTS
 
 
@@ -31,6 +33,7 @@ def answers(q, dq):
 
 
 def dofs_of(model):
+    """The model's number of joints."""
     return 9 if model == "plant" else 7
 
 
@@ -40,7 +43,7 @@ def dynamics_of(answer, model):
     return np.array(part["mass"]), np.array(part["bias"])
 
 
-@pytest.mark.parametrize("model", FIELDS)
+@pytest.mark.parametrize("model", MODELS)
 class TestUrdfInPinocchio:
     """pinocchio 4, which reads URDF: frames to 1e-12 m, mass matrix and bias to 1e-10."""
 
@@ -77,7 +80,7 @@ class TestUrdfInPinocchio:
             np.testing.assert_allclose(pin.crba(robot, data, pose), mass, atol=1e-10)
             np.testing.assert_allclose(pin.nle(robot, data, pose, rate), bias, atol=1e-10)
 
-    def test_limits_and_friction_are_exported_model(self, robot, model):
+    def test_limits_and_friction_are_exported(self, robot, model):
         _, robot, _ = robot
         np.testing.assert_array_equal(robot.upperPositionLimit[:DRIVEN], numbers.POSITION_LIMIT_RAD)
         np.testing.assert_array_equal(-robot.lowerPositionLimit[:DRIVEN], numbers.POSITION_LIMIT_RAD)
@@ -93,7 +96,7 @@ def load(model="plant"):
     return mujoco, loaded, mujoco.MjData(loaded)
 
 
-@pytest.mark.parametrize("model", FIELDS)
+@pytest.mark.parametrize("model", MODELS)
 def test_mujoco_finds_the_same_positions_mass_matrix_and_bias(model):
     """MuJoCo 4: positions to 1e-12 m, mass matrix and bias to 1e-10."""
     mujoco, robot, data = load(model)
@@ -146,6 +149,7 @@ class UniversalController:
         self.filtered = np.zeros(2)
 
     def torque(self, rotation, angle, rate):
+        """Torques of both hinges for the end effector's rotation and the hinges' angles and speeds."""
         new = numbers.UNIVERSAL_FILTER_NEW
         self.filtered = new * rate + (1.0 - new) * self.filtered
         desired = np.clip(self.upright(rotation), -numbers.UNIVERSAL_RANGE_RAD, numbers.UNIVERSAL_RANGE_RAD)
@@ -155,6 +159,7 @@ class UniversalController:
 
     @staticmethod
     def upright(rotation):
+        """Angles of both hinges at which the mallet is vertical."""
         x, y = rotation[:, 0], rotation[:, 1]
 
         def angle(a, b, axis):
@@ -170,10 +175,10 @@ def test_arm_motion_in_mujoco_agrees():
     """One second under the torques of the simulator's controller: joints within 1e-6 rad, universal joint too."""
     rng = np.random.default_rng(3)
     steps, amplitude = 50, rng.uniform(0.1, 0.4, DRIVEN)
-    pace = rng.uniform(3.0, 6.0, DRIVEN)
+    frequency_rad_s = rng.uniform(3.0, 6.0, DRIVEN)
     t = 0.02 * np.arange(1, steps + 1)[:, None]
-    q = np.array(numbers.START_Q) + amplitude * (1 - np.cos(pace * t)) / 2
-    dq = amplitude * pace * np.sin(pace * t) / 2
+    q = np.array(numbers.START_Q) + amplitude * (1 - np.cos(frequency_rad_s * t)) / 2
+    dq = amplitude * frequency_rad_s * np.sin(frequency_rad_s * t) / 2
     scenario = {
         "puck": [0.8, 0.4, 0, 0, 0, 0],
         "duration_ms": 20 * steps,
@@ -258,7 +263,7 @@ def test_document_programs_run(tmp_path, monkeypatch):
         exec(compile(program, "docs/robot.md", "exec"), {})
 
 
-@pytest.mark.parametrize("model", FIELDS)
+@pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("format_", ["urdf", "mjcf"])
 def test_exported_files_need_no_other_files(format_, model):
     tags = {element.tag for element in ET.fromstring(exported_model(format_, model)).iter()}

@@ -8,19 +8,19 @@ from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
 from faceoff.sb3 import VecEnvMethods, make_vec_env
 
 
-def make(worlds: int, **arguments: object) -> VecEnvMethods:
+def make_worlds(worlds: int, **arguments: object) -> VecEnvMethods:
     return VecEnvMethods(AirHockeyVectorEnv(worlds, autoreset_mode="SameStep", **arguments))  # type: ignore[arg-type]
 
 
 def test_spaces_are_those_of_one_world() -> None:
-    envs = make(3, task="hit")
+    envs = make_worlds(3, task="hit")
     assert envs.num_envs == 3
     assert envs.observation_space.shape == (23,)
     assert envs.action_space.shape == (7,)
 
 
 def test_end_info_has_terminal_observation_and_truncation() -> None:
-    envs = make(2, task="prepare", max_episode_steps=4)
+    envs = make_worlds(2, task="prepare", max_episode_steps=4)
     assert envs.seed(6) == [6, 7]
     envs.reset()
     assert envs.reset_infos[1]["seed"] == 7
@@ -42,7 +42,7 @@ def test_end_info_has_terminal_observation_and_truncation() -> None:
 
 
 def test_terminated_episode_is_not_truncated() -> None:
-    envs = make(4, task="defend")
+    envs = make_worlds(4, task="defend")
     envs.seed(0)
     envs.reset()
     terminated = 0
@@ -57,7 +57,7 @@ def test_terminated_episode_is_not_truncated() -> None:
 
 
 def test_attributes_and_methods_of_worlds() -> None:
-    envs = make(3, task="hit", render_mode="rgb_array")
+    envs = make_worlds(3, task="hit", render_mode="rgb_array")
     envs.reset()
     assert envs.get_attr("task") == ["hit"] * 3
     assert envs.get_attr("render_mode", indices=1) == ["rgb_array"]

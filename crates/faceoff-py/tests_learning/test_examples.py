@@ -23,7 +23,7 @@ TARGET = Path(os.environ.get("TARGET_DIR", ROOT / "target"))
     ],
     ids=["ppo", "clone"],
 )
-def test_new_training_beats_holding_by_30_points(command: list[str | Path], tmp_path: Path) -> None:
+def test_new_training_beats_holding_by_30_percentage_points(command: list[str | Path], tmp_path: Path) -> None:
     program, *arguments = command
     subprocess.run([sys.executable, EXAMPLES / program, *arguments, "--out", tmp_path], check=True)
     log = (tmp_path / "log.txt").read_text()

@@ -1,4 +1,5 @@
-//! The columns of a side's observations, commands and times.
+//! Collects what one side (the agent of an episode, or one of a game's two) saw and did: the columns of its observations,
+//! commands and computation times, one value per sample (the state after a control step).
 
 use crate::{column::Column, header::TrackingGap, motion::joints};
 use faceoff_episode::AnswerTiming;
@@ -21,9 +22,12 @@ const HOST_TIME_COLUMN: usize = COMPUTATION_TIME_COLUMN + 1;
 /// The samples of one side.
 #[derive(Debug)]
 pub(crate) struct AgentView {
+    /// 0 or 1.
     side: u32,
     columns: Vec<Column>,
+    /// Samples whose answer took longer than a control step.
     late: Vec<u32>,
+    /// Spans in which the simulated tracking had lost the puck.
     gaps: Vec<TrackingGap>,
 }
 
@@ -102,7 +106,8 @@ impl AgentView {
         }
     }
 
-    /// The columns, the late samples, and the tracking gaps.
+    /// The columns, the late samples, and the tracking gaps. The column for host interference (time that other programs
+    /// on the evaluator's machine took) is left out if it has only zeros.
     pub fn take(mut self) -> (Vec<Column>, Vec<u32>, Vec<TrackingGap>) {
         if self.columns[HOST_TIME_COLUMN]
             .counts
@@ -117,14 +122,15 @@ impl AgentView {
 
 /// The commanded joint positions at the end of the control step, rad.
 fn commanded(action: &[f64]) -> &[f64] {
-    let whole = Interpolation::Trajectory.len();
-    // In a trajectory, those of the last substep; otherwise positions come first (PROTOCOL).
-    let from = if action.len() == whole {
-        whole - 3 * JOINTS
+    let trajectory_numbers = Interpolation::Trajectory.len();
+    // A trajectory has positions, velocities and accelerations for each substep: take those of the last one. In other
+    // actions the positions come first.
+    let start = if action.len() == trajectory_numbers {
+        trajectory_numbers - 3 * JOINTS
     } else {
         0
     };
-    action.get(from..from + JOINTS).unwrap_or_default()
+    action.get(start..start + JOINTS).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -134,6 +140,8 @@ mod tests {
     #[test]
     fn commanded_positions_are_those_at_the_end() {
         let numbers = |n: u32| (0..n).map(f64::from).collect::<Vec<_>>();
+        // The numbers of an action: 7 positions; 7 each of positions, velocities and accelerations; 21 for each of 20
+        // substeps.
         assert_eq!(commanded(&numbers(7))[6], 6.0);
         assert_eq!(commanded(&numbers(21))[0], 0.0, "positions come first");
         assert_eq!(commanded(&numbers(420))[0], 399.0, "of the last substep");
@@ -142,14 +150,15 @@ mod tests {
     #[test]
     fn observed_puck_is_in_the_table_frame() {
         let mut sides = [AgentView::new(0), AgentView::new(1)];
+        // The puck at x = 0.3 m, y = 0.2 m, seen from both bases, which are at x = ±1.51 m.
         sides[0].observe(&[1.51 + 0.3, 0.2, 1.0, 0.0]);
         sides[1].observe(&[1.51 - 0.3, -0.2, 1.0 - PI, 0.0]);
         let positions = sides.map(|side| {
             let position: Vec<f64> = side.columns[..3].iter().flat_map(Column::values).collect();
             position
         });
-        for (one, other) in positions[0].iter().zip(&positions[1]) {
-            assert!((one - other).abs() < 1e-3, "{positions:?}");
+        for (first, second) in positions[0].iter().zip(&positions[1]) {
+            assert!((first - second).abs() < 1e-3, "{positions:?}");
         }
     }
 }

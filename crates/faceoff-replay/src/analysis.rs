@@ -1,4 +1,5 @@
-//! Analysis of a game's clips: goals, possession, shots and violations.
+//! Analysis of a game from its clips (recordings of 500 control steps each): goals, possession, shots and violations. A
+//! *rally* is the play from a serve to a goal, a foul or another end; a *sample* is the state after a control step.
 
 use crate::{
     clip::Clip,
@@ -14,13 +15,13 @@ pub struct GameAnalysis {
     /// Number of analysed control steps.
     pub steps: u32,
     /// The ends of rallies, in order.
-    pub breaks: Vec<RallyEndEvent>,
+    pub rally_ends: Vec<RallyEndEvent>,
     /// Number of control steps after which the puck was in each side's half.
-    pub halves: [u32; 2],
+    pub steps_in_half: [u32; 2],
     /// Number of control steps after which each side had touched the puck last in the rally.
-    pub touched: [u32; 2],
+    pub steps_after_touch: [u32; 2],
     /// Number of control steps before the first touch of a rally.
-    pub untouched: u32,
+    pub steps_before_touch: u32,
     /// The puck's paths into the goals, in order.
     pub goals: Vec<GoalPath>,
     /// The shots: a mallet sent the puck over the middle line.
@@ -47,12 +48,12 @@ pub const GOAL_PATH_STEPS: usize = 100;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot {
     pub side: usize,
-    /// Time of the touch, s since sample 0.
-    pub t: f64,
+    /// Time of the touch since the start of the game, s.
+    pub touch_s: f64,
     /// Position of the puck at the touch.
-    pub at: [f64; 2],
-    /// Speed of the puck at the first sample beyond the middle line, m/s.
-    pub speed: f64,
+    pub touch_position: [f64; 2],
+    /// Speed of the puck at the first sample beyond the middle line.
+    pub speed_m_s: f64,
     /// Did the rally end with a goal of that side before the puck crossed the middle line again?
     pub goal: bool,
 }
@@ -62,29 +63,30 @@ pub struct Shot {
 pub struct LocatedViolation {
     pub side: usize,
     pub group: Group,
-    /// The first sample.
-    pub from: u32,
-    pub to: u32,
+    /// The first sample of the violation.
+    pub first_sample: u32,
+    pub last_sample: u32,
     /// Largest excess over the limit: rad, rad/s or m.
-    pub worst: f64,
+    pub max_excess: f64,
     /// Position of the side's mallet at the first sample.
-    pub at: [f64; 2],
+    pub mallet_position: [f64; 2],
 }
 
 /// The last touch of a mallet in a rally.
 #[derive(Debug, Clone, Copy)]
 struct Touch {
+    /// The shot that the touch becomes if the puck crosses the middle line.
     shot: Shot,
     has_crossed: bool,
 }
 
-/// State that is carried from clip to clip.
+/// The analysis so far, and the state that the next clip continues.
 #[derive(Debug, Default)]
 struct Analyzer {
     analysis: GameAnalysis,
     touch: Option<Touch>,
-    /// Index of the shot that brought the puck into its current half.
-    open: Option<usize>,
+    /// Index of the shot that brought the puck into its current half; the shot may still become a goal.
+    open_shot: Option<usize>,
     /// The last positions of the puck in the rally.
     path: VecDeque<[f64; 2]>,
 }
@@ -102,7 +104,9 @@ impl GameAnalysis {
             analyzer.add_clip(&clip?);
         }
         let mut analysis = analyzer.analysis;
-        analysis.violations.sort_by_key(|violation| violation.from);
+        analysis
+            .violations
+            .sort_by_key(|violation| violation.first_sample);
         Ok(analysis)
     }
 
@@ -125,7 +129,7 @@ impl Analyzer {
         let (vx, vy) = (values("puck_vx"), values("puck_vy"));
         let positions = clip.puck_positions();
         let mut contacts = header.contacts.iter().peekable();
-        let mut breaks = header.breaks.iter().peekable();
+        let mut rally_ends = header.breaks.iter().peekable();
         // The first sample of a clip repeats the last one of the previous clip, or is the start.
         for (index, position) in positions.iter().enumerate().skip(1) {
             let sample = header.first + u32::try_from(index).unwrap_or(u32::MAX);
@@ -134,12 +138,12 @@ impl Analyzer {
             while let Some(contact) = contacts.next_if(|contact| contact.t < end_s || is_last) {
                 self.add_contact(contact);
             }
-            let speed = |of: &[f64]| of.get(index).copied().unwrap_or_default();
-            let (vx, vy) = (speed(&vx), speed(&vy));
+            let value = |column: &[f64]| column.get(index).copied().unwrap_or_default();
+            let (vx, vy) = (value(&vx), value(&vy));
             self.add_position(*position, (vx * vx + vy * vy).sqrt());
-            while let Some(end) = breaks.next_if(|end| end.sample <= sample) {
+            while let Some(end) = rally_ends.next_if(|end| end.sample <= sample) {
                 self.end_rally(end);
-                self.analysis.breaks.push(end.clone());
+                self.analysis.rally_ends.push(end.clone());
             }
         }
         self.add_violations(clip);
@@ -155,43 +159,43 @@ impl Analyzer {
         self.touch = Some(Touch {
             shot: Shot {
                 side,
-                t: contact.t,
-                at: [contact.x, contact.y],
-                speed: 0.0,
+                touch_s: contact.t,
+                touch_position: [contact.x, contact.y],
+                speed_m_s: 0.0,
                 goal: false,
             },
             has_crossed: false,
         });
     }
 
-    /// Adds the puck's position after a control step.
-    fn add_position(&mut self, [x, y]: [f64; 2], speed: f64) {
+    /// Adds the puck's position and speed after a control step.
+    fn add_position(&mut self, [x, y]: [f64; 2], speed_m_s: f64) {
         let half = usize::from(x >= 0.0);
         if self.path.len() > GOAL_PATH_STEPS {
             self.path.pop_front();
         }
         self.path.push_back([x, y]);
         self.analysis.steps += 1;
-        self.analysis.halves[half] += 1;
+        self.analysis.steps_in_half[half] += 1;
         let Self {
             analysis,
             touch,
-            open,
+            open_shot,
             ..
         } = self;
         // The puck is back in the half from which it was shot.
-        if open.is_some_and(|shot| analysis.shots[shot].side == half) {
-            *open = None;
+        if open_shot.is_some_and(|shot| analysis.shots[shot].side == half) {
+            *open_shot = None;
         }
         match touch {
-            None => analysis.untouched += 1,
+            None => analysis.steps_before_touch += 1,
             Some(touch) => {
-                analysis.touched[touch.shot.side] += 1;
+                analysis.steps_after_touch[touch.shot.side] += 1;
                 if !touch.has_crossed && half != touch.shot.side {
                     touch.has_crossed = true;
-                    *open = Some(analysis.shots.len());
+                    *open_shot = Some(analysis.shots.len());
                     analysis.shots.push(Shot {
-                        speed,
+                        speed_m_s,
                         ..touch.shot
                     });
                 }
@@ -200,16 +204,20 @@ impl Analyzer {
     }
 
     fn end_rally(&mut self, end: &RallyEndEvent) {
-        let scored = (end.what == RallyEndKind::Goal)
+        let scoring_side = (end.what == RallyEndKind::Goal)
             .then_some(end.by)
             .flatten()
             .map(|by| usize::from(by == 1));
-        if let Some(shot) = self.open.take().map(|shot| &mut self.analysis.shots[shot]) {
-            shot.goal = scored == Some(shot.side);
+        if let Some(shot) = self
+            .open_shot
+            .take()
+            .map(|shot| &mut self.analysis.shots[shot])
+        {
+            shot.goal = scoring_side == Some(shot.side);
         }
         self.touch = None;
         let positions = std::mem::take(&mut self.path);
-        if let Some(side) = scored {
+        if let Some(side) = scoring_side {
             self.analysis.goals.push(GoalPath {
                 side,
                 sample: end.sample,
@@ -224,22 +232,24 @@ impl Analyzer {
             let side = usize::from(span.side == 1);
             // A violation may continue from the previous clip.
             let previous = self.analysis.violations.iter_mut().rev().find(|violation| {
-                violation.side == side && violation.group == span.group && violation.to == first
+                violation.side == side
+                    && violation.group == span.group
+                    && violation.last_sample == first
             });
             match previous {
                 Some(violation) if span.from == first + 1 => {
-                    violation.to = span.to;
-                    violation.worst = violation.worst.max(span.worst);
+                    violation.last_sample = span.to;
+                    violation.max_excess = violation.max_excess.max(span.worst);
                 }
                 _ => {
                     let index = span.from.saturating_sub(first) as usize;
                     self.analysis.violations.push(LocatedViolation {
                         side,
                         group: span.group,
-                        from: span.from,
-                        to: span.to,
-                        worst: span.worst,
-                        at: clip.mallet_position(side, index).unwrap_or_default(),
+                        first_sample: span.from,
+                        last_sample: span.to,
+                        max_excess: span.worst,
+                        mallet_position: clip.mallet_position(side, index).unwrap_or_default(),
                     });
                 }
             }
@@ -256,14 +266,14 @@ mod tests {
     };
     use faceoff_sim::model::CONTROL_STEP_S;
 
-    /// A clip with these x of the puck, one per sample, and a speed of 2 m/s.
+    /// A clip with the given x of the puck at each sample, and a speed of 2 m/s. The side 0 defends x < 0.
     fn clip(first: u32, xs: &[f64]) -> Clip {
         let column = |name: &str, values: &[f64]| {
             let mut column = Column::new(name, "m", 1e-4, 1);
             values.iter().for_each(|value| column.push(*value));
             column
         };
-        let same = |value: f64| vec![value; xs.len()];
+        let constant = |value: f64| vec![value; xs.len()];
         Clip {
             header: Header {
                 format: CLIP_FORMAT.to_owned(),
@@ -285,17 +295,19 @@ mod tests {
             },
             columns: vec![
                 column("puck_x", xs),
-                column("puck_y", &same(0.1)),
-                column("puck_vx", &same(2.0)),
-                column("puck_vy", &same(0.0)),
+                column("puck_y", &constant(0.1)),
+                column("puck_vx", &constant(2.0)),
+                column("puck_vy", &constant(0.0)),
             ],
         }
     }
 
+    /// A contact of the puck at time `t` (s) and position `x` (m).
     fn contact(t: f64, what: ContactWith, x: f64) -> Contact {
         Contact { t, what, x, y: 0.1 }
     }
 
+    /// A goal of the side `by`.
     fn goal(sample: u32, by: u32) -> RallyEndEvent {
         RallyEndEvent {
             sample,
@@ -317,13 +329,24 @@ mod tests {
         let analysis = analyse(vec![game]);
         assert_eq!(analysis.shots.len(), 1);
         let shot = analysis.shots[0];
-        assert_eq!((shot.side, shot.goal, shot.at), (0, true, [-0.45, 0.1]));
-        assert!((shot.speed - 2.0).abs() < 1e-9 && (shot.t - 0.021).abs() < 1e-9);
-        assert_eq!(analysis.steps, 6);
-        assert_eq!(analysis.halves, [4, 2], "samples 1, 2, 5, 6 and 3, 4");
-        assert_eq!(analysis.touched, [3, 0], "from sample 2 to the goal");
         assert_eq!(
-            analysis.untouched, 3,
+            (shot.side, shot.goal, shot.touch_position),
+            (0, true, [-0.45, 0.1])
+        );
+        assert!((shot.speed_m_s - 2.0).abs() < 1e-9 && (shot.touch_s - 0.021).abs() < 1e-9);
+        assert_eq!(analysis.steps, 6);
+        assert_eq!(
+            analysis.steps_in_half,
+            [4, 2],
+            "samples 1, 2, 5, 6 and 3, 4"
+        );
+        assert_eq!(
+            analysis.steps_after_touch,
+            [3, 0],
+            "from sample 2 to the goal"
+        );
+        assert_eq!(
+            analysis.steps_before_touch, 3,
             "before the touch, and in the next rally"
         );
     }
@@ -345,7 +368,7 @@ mod tests {
             .map(|shot| (shot.side, shot.goal))
             .collect();
         assert_eq!(shots, [(0, false), (1, false)], "both came back");
-        assert!((analysis.shots[0].t - 0.041).abs() < 1e-9);
+        assert!((analysis.shots[0].touch_s - 0.041).abs() < 1e-9);
     }
 
     #[test]
@@ -393,8 +416,8 @@ mod tests {
         assert!(analysis.shots[0].goal && analysis.shots[0].side == 1);
         assert_eq!(analysis.violations.len(), 1);
         let violation = analysis.violations[0];
-        assert_eq!((violation.from, violation.to), (2, 4));
-        assert!((violation.worst - 0.03).abs() < 1e-12);
-        assert_eq!(analysis.touched, [0, 4]);
+        assert_eq!((violation.first_sample, violation.last_sample), (2, 4));
+        assert!((violation.max_excess - 0.03).abs() < 1e-12);
+        assert_eq!(analysis.steps_after_touch, [0, 4]);
     }
 }

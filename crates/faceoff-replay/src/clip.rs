@@ -1,4 +1,5 @@
-//! Reading and writing of clips.
+//! Reading and writing of clips. A clip is the recording of an episode, or of 500 control steps of a game, for replays in
+//! the browser: a JSON header and columns of numbers, compressed.
 
 use crate::{
     column::Column,
@@ -17,7 +18,7 @@ pub struct Clip {
     pub columns: Vec<Column>,
 }
 
-/// Maximum uncompressed size of a clip, in bytes.
+/// Maximum uncompressed size of a clip.
 const MAX_BYTES: u64 = 64 << 20;
 
 impl Clip {
@@ -33,12 +34,13 @@ impl Clip {
     /// [`ReplayError::Io`] if writing to memory fails; [`ReplayError::Unreadable`] if the clip is too long.
     pub(crate) fn compressed(&self, gzip: &mut Gzip) -> Result<Vec<u8>, ReplayError> {
         let too_long = || ReplayError::unreadable("the recording", "it is too long");
-        let values: usize = self.columns.iter().map(|column| column.counts.len()).sum();
-        let mut payload = Vec::with_capacity(2 * values);
+        let value_count: usize = self.columns.iter().map(|column| column.counts.len()).sum();
+        // Most values take one or two bytes.
+        let mut payload = Vec::with_capacity(2 * value_count);
         let mut header = self.header.clone();
         header.columns.clear();
         for column in &self.columns {
-            let before = payload.len();
+            let start = payload.len();
             column.write(&mut payload);
             header.columns.push(ColumnHeader {
                 name: column.name.clone(),
@@ -47,7 +49,7 @@ impl Clip {
                 order: column.order,
                 first: column.first,
                 count: u32::try_from(column.counts.len()).map_err(|_| too_long())?,
-                bytes: u32::try_from(payload.len() - before).map_err(|_| too_long())?,
+                bytes: u32::try_from(payload.len() - start).map_err(|_| too_long())?,
             });
         }
         let header = serde_json::to_vec(&header).map_err(io::Error::other)?;
@@ -66,10 +68,10 @@ impl Clip {
             .take(MAX_BYTES)
             .read_to_end(&mut bytes)
             .map_err(|error| wrong(&error))?;
-        let cut = || wrong(&"it is cut off");
-        let (length, rest) = bytes.split_first_chunk::<4>().ok_or_else(cut)?;
+        let cut_off = || wrong(&"it is cut off");
+        let (length, rest) = bytes.split_first_chunk::<4>().ok_or_else(cut_off)?;
         let length = usize::try_from(u32::from_le_bytes(*length)).map_err(|error| wrong(&error))?;
-        let (header, mut payload) = rest.split_at_checked(length).ok_or_else(cut)?;
+        let (header, mut payload) = rest.split_at_checked(length).ok_or_else(cut_off)?;
         let header: Header = serde_json::from_slice(header).map_err(|error| wrong(&error))?;
         if header.format != CLIP_FORMAT {
             return Err(wrong(&format!(
@@ -80,7 +82,7 @@ impl Clip {
         let mut columns = Vec::with_capacity(header.columns.len());
         for column_header in &header.columns {
             let bytes = usize::try_from(column_header.bytes).map_err(|error| wrong(&error))?;
-            let (column_bytes, rest) = payload.split_at_checked(bytes).ok_or_else(cut)?;
+            let (column_bytes, rest) = payload.split_at_checked(bytes).ok_or_else(cut_off)?;
             payload = rest;
             let mut column = Column::new(
                 column_header.name.as_str(),

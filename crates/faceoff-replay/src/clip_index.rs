@@ -1,4 +1,5 @@
-//! The index of the episodes in a pack of clips.
+//! The index of the episodes in a pack of clips (a clip is the recording of an episode for replays): a line for each episode
+//! with its start, its end and its violations.
 
 use crate::{error::ReplayError, group::Group};
 use faceoff_episode::describe_end;
@@ -10,7 +11,9 @@ use std::{
     io::{self, Read},
 };
 
+/// Name and version of the index's layout.
 const INDEX_FORMAT: &str = "faceoff-sheet/1";
+/// Maximum uncompressed size of an index.
 const MAX_BYTES: u64 = 256 << 20;
 
 /// A summary line for each episode, in the order of tasks and episodes, and histograms of computation times.
@@ -42,9 +45,9 @@ pub struct EpisodeLine {
     pub episode: u32,
     /// Control steps played.
     pub steps: u32,
-    /// Was it a success?
+    /// Was the episode a success?
     pub success: bool,
-    /// How it ended.
+    /// How the episode ended.
     pub end: EpisodeEnd,
     /// Description of the end.
     pub why: String,
@@ -88,7 +91,7 @@ const fn is_zero(count: &u32) -> bool {
 pub struct ViolationSummary {
     /// The group of constraints.
     pub group: Group,
-    /// The first sample with a violation: the number of control steps before it.
+    /// The first sample with a violation. Sample k is the state after k control steps.
     pub from: u32,
     /// Number of samples with a violation.
     pub samples: u32,
@@ -138,13 +141,14 @@ impl TimeBins {
         if self.0.len() < other.0.len() {
             self.0.resize(other.0.len(), 0);
         }
-        for (own, others) in self.0.iter_mut().zip(&other.0) {
-            *own += others;
+        for (count, other_count) in self.0.iter_mut().zip(&other.0) {
+            *count += other_count;
         }
     }
 }
 
 impl ClipIndex {
+    /// The line of an episode; `None` if the index has no such episode.
     #[must_use]
     pub fn line(&self, task: Task, episode: u32) -> Option<&EpisodeLine> {
         let found = self
@@ -157,14 +161,14 @@ impl ClipIndex {
     #[must_use]
     pub fn differing_ends(&self, other: &Self) -> BTreeSet<(Task, u32)> {
         let differing = self.episodes.iter().filter_map(|line| {
-            let others = other.line(line.task, line.episode)?;
-            let is_same = (line.success, line.end) == (others.success, others.end);
+            let other_line = other.line(line.task, line.episode)?;
+            let is_same = (line.success, line.end) == (other_line.success, other_line.end);
             (!is_same).then_some((line.task, line.episode))
         });
         differing.collect()
     }
 
-    /// Adds the lines of another shard.
+    /// Adds the lines of another shard (a range of episodes of one task).
     pub(crate) fn merge(&mut self, other: Self) {
         self.episodes.extend(other.episodes);
         self.episodes.sort_by_key(|line| (line.task, line.episode));

@@ -1,4 +1,5 @@
-//! Columns of numbers as small integers.
+//! The columns of a clip. Numbers are stored as *counts*, integer multiples of the column's resolution, and written as
+//! differences between neighbours, which are small.
 
 use crate::error::ReplayError;
 
@@ -10,18 +11,18 @@ pub struct Column {
     pub unit: String,
     /// The value of one count, in that unit.
     pub scale: f64,
-    /// Order of the differences that are written: 0 to 2.
+    /// Order of the differences that are written: 0 (the counts themselves), 1 or 2 (differences of the differences).
     pub order: u8,
     /// Index of the column's first sample within the clip.
     pub first: u32,
     /// The values, in units of `scale`.
     pub counts: Vec<i64>,
-    /// 1 / `scale`.
+    /// Counts per unit: 1 / `scale`.
     per_unit: f64,
 }
 
 /// Largest magnitude of a count: far beyond simulated values, and exact as a float.
-const LIMIT: f64 = 1e15;
+const MAX_COUNT: f64 = 1e15;
 
 impl Column {
     pub(crate) fn new(name: impl Into<String>, unit: &str, scale: f64, order: u8) -> Self {
@@ -45,7 +46,7 @@ impl Column {
     /// Adds a value, rounded; NaN is stored as 0.
     pub(crate) fn push(&mut self, value: f64) {
         // Hot path: avoids a division and a call of a rounding function.
-        let count = (value * self.per_unit).clamp(-LIMIT, LIMIT);
+        let count = (value * self.per_unit).clamp(-MAX_COUNT, MAX_COUNT);
         #[expect(clippy::cast_possible_truncation, reason = "clamped to ±1e15 before")]
         let rounded = (count + 0.5_f64.copysign(count)) as i64;
         self.counts.push(rounded);
@@ -56,16 +57,17 @@ impl Column {
         self.counts.iter().map(|count| *count as f64 * self.scale)
     }
 
-    /// Appends the differences as varints.
+    /// Appends the differences as integers of variable length (varints).
     pub(crate) fn write(&self, out: &mut Vec<u8>) {
-        let (mut last, mut before) = (0_i64, 0_i64);
+        // The previous count and the one before that.
+        let (mut previous, mut second_previous) = (0_i64, 0_i64);
         for count in &self.counts {
             let difference = match self.order {
                 0 => *count,
-                1 => count - last,
-                _ => count - 2 * last + before,
+                1 => count - previous,
+                _ => count - 2 * previous + second_previous,
             };
-            (before, last) = (last, *count);
+            (second_previous, previous) = (previous, *count);
             write_varint(out, difference);
         }
     }
@@ -80,23 +82,23 @@ impl Column {
         }
         let mut rest = bytes;
         let mut counts = Vec::with_capacity(count);
-        let (mut last, mut before) = (0_i64, 0_i64);
+        let (mut previous, mut second_previous) = (0_i64, 0_i64);
         for _ in 0..count {
             let difference = read_varint(&mut rest).ok_or_else(|| wrong("it is cut off"))?;
             let value = match self.order {
                 0 => Some(difference),
-                1 => last.checked_add(difference),
-                _ => last
+                1 => previous.checked_add(difference),
+                _ => previous
                     .checked_mul(2)
-                    .and_then(|twice| twice.checked_sub(before))
+                    .and_then(|twice| twice.checked_sub(second_previous))
                     .and_then(|expected| expected.checked_add(difference)),
             };
             let value = value.ok_or_else(|| wrong("its numbers are too large"))?;
-            (before, last) = (last, value);
+            (second_previous, previous) = (previous, value);
             counts.push(value);
         }
         if !rest.is_empty() {
-            return Err(wrong("it is longer than it says"));
+            return Err(wrong("it is longer than its header states"));
         }
         self.counts = counts;
         Ok(())

@@ -1,4 +1,5 @@
-//! Records an episode as two clips and a line of the index.
+//! Records an episode as two clips for replays (the public motion; the agent's observations and commands) and as a line of
+//! the index of episodes.
 
 use crate::{
     agent_view::AgentView,
@@ -23,13 +24,16 @@ use faceoff_types::{EpisodeOutcome, Task, escape_unprintable};
 #[derive(Debug)]
 pub(crate) struct Recording {
     episode: u32,
+    /// The puck's true state before the first step: x, y, yaw and their velocities.
     start: [f64; 6],
+    /// The puck's true state after the last step.
     last: [f64; 6],
     motion: Motion,
     agent_view: AgentView,
     tracker: ViolationTracker,
     violations: Vec<ViolationSummary>,
-    times: Vec<f64>,
+    /// Computation times, s.
+    times_s: Vec<f64>,
 }
 
 /// The recorded data of a finished episode.
@@ -52,7 +56,7 @@ impl Recording {
             agent_view: AgentView::new(0),
             tracker: ViolationTracker::default(),
             violations: Vec::new(),
-            times: Vec::new(),
+            times_s: Vec::new(),
         }
     }
 
@@ -77,7 +81,7 @@ impl Recording {
                 self.add_violation(group, sample, value, row.state);
             }
         }
-        self.times.push(row.timing.computation_time_s);
+        self.times_s.push(row.timing.computation_time_s);
         self.last = row.state.puck;
     }
 
@@ -92,8 +96,8 @@ impl Recording {
             return;
         }
         let [x, y, _] = table_from_robot(0, state.ee);
-        let most_exceeded = |share: [f64; JOINTS]| {
-            let joints = (1_u32..).zip(share);
+        let most_exceeded = |fraction_of_limit: [f64; JOINTS]| {
+            let joints = (1_u32..).zip(fraction_of_limit);
             joints
                 .max_by(|(_, a), (_, b)| a.total_cmp(b))
                 .map(|(joint, _)| joint)
@@ -133,7 +137,7 @@ impl Recording {
             why: reason,
             steps: outcome.steps,
         };
-        self.times.iter().for_each(|time| times.add(*time));
+        self.times_s.iter().for_each(|time_s| times.add(*time_s));
         let (observed_columns, late, lost) = self.agent_view.take();
         let line = EpisodeLine {
             task: outcome.task,
@@ -145,7 +149,7 @@ impl Recording {
             start: position_and_velocity(&self.start),
             last: position_and_velocity(&self.last),
             broken: self.violations,
-            longest_s: Some(self.times.iter().copied().fold(0.0, f64::max)),
+            longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
             late: u32::try_from(late.len()).unwrap_or(u32::MAX),
         };
         let (motion_columns, contacts) = self.motion.take();
@@ -203,6 +207,7 @@ impl EpisodeClips {
     }
 }
 
+/// The contest in a clip's header: the task's name.
 fn contest(task: Task) -> String {
     task.as_str().to_owned()
 }

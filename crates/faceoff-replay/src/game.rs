@@ -1,4 +1,5 @@
-//! Records the clips of a game while it is played, 500 control steps each.
+//! Records the clips of a game for replays while it is played: for each *chunk* of 500 control steps one clip of the motion and
+//! one of each side's observations and commands.
 
 use crate::{
     agent_view::AgentView,
@@ -7,7 +8,7 @@ use crate::{
     gzip::Gzip,
     header::{CLIP_FORMAT, ClipKind, Header, RallyEndEvent, RallyEndKind},
     motion::Motion,
-    pack::{Key, PackWriter},
+    pack::{ClipKey, PackWriter},
     violations::ViolationTracker,
 };
 use faceoff_episode::{
@@ -27,13 +28,14 @@ pub struct GameClipRecorder<W> {
     gzip: Gzip,
 }
 
+/// The chunk that is being recorded. Its number and samples (states after control steps) are counted from the game's start.
 #[derive(Debug)]
 struct Chunk {
     number: u32,
     motion: Motion,
     sides: [AgentView; 2],
     trackers: [ViolationTracker; 2],
-    breaks: Vec<RallyEndEvent>,
+    rally_ends: Vec<RallyEndEvent>,
     /// The score at the first sample, and the current score.
     score: [[u32; 2]; 2],
     /// The last sample so far.
@@ -59,7 +61,7 @@ impl Chunk {
             motion,
             sides: [AgentView::new(0), AgentView::new(1)],
             trackers: Default::default(),
-            breaks: Vec::new(),
+            rally_ends: Vec::new(),
             score: [score; 2],
             last: number * CHUNK_STEPS,
             state: *state,
@@ -80,13 +82,13 @@ impl Chunk {
                 }
                 // Without a command the arm holds its position.
                 (_, timing) => {
-                    let held = row.state.q[index];
+                    let joint_positions = row.state.q[index];
                     let timing = timing.unwrap_or(AnswerTiming {
                         computation_time_s: 0.0,
                         host_time_s: 0.0,
                         cpu_time_s: None,
                     });
-                    view.answer(sample, &held, &timing, row.puck_lost);
+                    view.answer(sample, &joint_positions, &timing, row.puck_lost);
                 }
             }
         }
@@ -98,7 +100,7 @@ impl Chunk {
         self.last == (self.number + 1) * CHUNK_STEPS
     }
 
-    /// The clips: the motion, and the view of each side.
+    /// The chunk's number and its clips: the motion, and the view of each side.
     fn end(mut self) -> (u32, [Clip; 3]) {
         let first = self.number * CHUNK_STEPS;
         let header = Header {
@@ -145,7 +147,7 @@ impl Chunk {
             header: Header {
                 contacts,
                 violations,
-                breaks: self.breaks,
+                breaks: self.rally_ends,
                 score: Some(self.score[0]),
                 ..header
             },
@@ -184,12 +186,12 @@ impl<W: Write> GameClipRecorder<W> {
         };
         let (number, [motion, home, away]) = chunk.end();
         self.pack.add(
-            Key::game_motion(number),
+            ClipKey::game_motion(number),
             &motion.compressed(&mut self.gzip)?,
         )?;
         for (side, clip) in Side::BOTH.into_iter().zip([home, away]) {
             self.pack.add(
-                Key::game_observed(side, number),
+                ClipKey::game_observed(side, number),
                 &clip.compressed(&mut self.gzip)?,
             )?;
         }
@@ -199,7 +201,8 @@ impl<W: Write> GameClipRecorder<W> {
 
 impl<W: Write> GameSink for GameClipRecorder<W> {
     fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError> {
-        // The first sample of a later rally is the one after its first step.
+        // Only the first rally begins a chunk with its initial state. In later rallies the initial state is not a sample:
+        // their first sample is the state after the first step.
         self.chunk.get_or_insert_with(|| {
             Chunk::begin(start.game_step / CHUNK_STEPS, start.state, [0; 2])
         });
@@ -230,7 +233,7 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
     fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
         if let Some(chunk) = &mut self.chunk {
             chunk.score[1] = row.score;
-            chunk.breaks.push(RallyEndEvent {
+            chunk.rally_ends.push(RallyEndEvent {
                 sample: chunk.last,
                 what: rally_end_kind(row.ending),
                 by: row

@@ -1,4 +1,4 @@
-//! Groups of constraints.
+//! The groups of constraints on a robot's motion, each of which has one kind of violation.
 
 use faceoff_sim::ConstraintValues;
 use serde::{Deserialize, Serialize};

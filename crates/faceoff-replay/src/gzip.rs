@@ -14,7 +14,8 @@ const HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
 
 impl Default for Gzip {
     fn default() -> Self {
-        // The fastest level: clips are compressed while agents play, and differences gain little from higher levels.
+        // The fastest level: clips are compressed while agents play, and the differences between numbers, of which clips
+        // consist, gain little from higher levels.
         Self {
             deflate: DeflateEncoder::new(Vec::new(), Compression::fast()),
         }

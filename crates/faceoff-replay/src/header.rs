@@ -1,4 +1,5 @@
-//! The header of a clip.
+//! The header of a clip (the recording of an episode or a part of a game for replays): JSON with everything but the columns'
+//! numbers. A *sample* is the state after a control step.
 
 use crate::group::Group;
 use faceoff_types::EpisodeEnd;
@@ -23,7 +24,7 @@ pub struct Header {
     /// `faceoff-clip/1`.
     pub format: String,
     pub kind: ClipKind,
-    /// `hit`, `defend`, `prepare` or `game`.
+    /// The episode's task (`hit`, `defend`, `prepare`), or `game`.
     pub contest: String,
     /// Index of the episode within the evaluation; absent in games.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -54,7 +55,7 @@ pub struct Header {
     /// Samples whose answer took longer than a control step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub late: Vec<u32>,
-    /// Spans in which tracking had lost the puck.
+    /// Spans in which the simulated tracking had lost the puck.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<TrackingGap>,
     /// How an episode ended.
@@ -97,7 +98,7 @@ pub struct Contact {
 pub enum ContactWith {
     /// A rim of the table.
     Rim,
-    /// The mallet of the first robot: the agent's own, or side A's.
+    /// The mallet of the first robot: in an episode the agent's own, in a game that of the first side.
     Mallet,
     /// The mallet of the second robot.
     OpponentMallet,
@@ -109,8 +110,9 @@ pub struct ViolationSpan {
     /// The side, 0 or 1.
     pub side: u32,
     pub group: Group,
-    /// The first sample.
+    /// The first sample of the violation.
     pub from: u32,
+    /// The last sample of the violation.
     pub to: u32,
     /// Largest excess over the limit: rad, rad/s or m.
     pub worst: f64,
@@ -124,6 +126,7 @@ pub struct RallyEndEvent {
     pub what: RallyEndKind,
     /// The side that scored or committed the foul, 0 or 1.
     pub by: Option<u32>,
+    /// The score after the rally.
     pub score: [u32; 2],
 }
 
@@ -143,11 +146,12 @@ pub enum RallyEndKind {
     GameOver,
 }
 
-/// A span in which tracking had lost the puck.
+/// A span in which the simulated tracking had lost the puck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TrackingGap {
-    /// The first sample.
+    /// The first sample of the span.
     pub from: u32,
+    /// The last sample of the span.
     pub to: u32,
 }
 
@@ -156,6 +160,8 @@ pub struct TrackingGap {
 pub struct EpisodeEndSummary {
     pub end: EpisodeEnd,
     pub success: bool,
+    /// Description of the end, for readers.
     pub why: String,
+    /// Control steps played.
     pub steps: u32,
 }

@@ -35,7 +35,7 @@ pub use header::{
     ClipKind, ColumnHeader, Contact, ContactWith, EpisodeEndSummary, Header, RallyEndEvent,
     RallyEndKind, TrackingGap, ViolationSpan,
 };
-pub use pack::{Key, Pack, PackWriter, join_packs, merged_index, select_episodes};
+pub use pack::{ClipKey, Pack, PackWriter, join_packs, merged_index, select_episodes};
 pub use recorder::ClipRecorder;
 
 /// Constants of the model that are needed to draw a clip.

@@ -1,4 +1,4 @@
-//! The columns of the motion of puck and robots.
+//! Collects the columns of the true motion of puck and robots, and the puck's contacts.
 
 use crate::{
     column::Column,
@@ -6,16 +6,17 @@ use crate::{
 };
 use faceoff_sim::{ContactBody, EpisodeState, GameState, Impact, JOINTS, model::CONTROL_STEP_S};
 
-/// m: a tenth of a pixel in the largest picture.
-const POSITION: f64 = 1e-4;
-/// rad: an error of a few tenths of a millimetre at the end effector.
-const ANGLE: f64 = 1e-4;
-const PUCK_YAW: f64 = 1e-3;
-/// m/s.
-const PUCK_SPEED: f64 = 1e-3;
-/// rad/s: a quarter of a percent of the slowest joint's limit.
-const JOINT_SPEED: f64 = 4e-3;
-const UNIVERSAL: f64 = 1e-3;
+// Resolutions: values are stored as multiples of these.
+/// A tenth of a pixel in the largest picture.
+const POSITION_RESOLUTION_M: f64 = 1e-4;
+/// An error of a few tenths of a millimetre at the end effector.
+const JOINT_ANGLE_RESOLUTION_RAD: f64 = 1e-4;
+const PUCK_YAW_RESOLUTION_RAD: f64 = 1e-3;
+const PUCK_SPEED_RESOLUTION_M_S: f64 = 1e-3;
+/// A quarter of a percent of the slowest joint's limit.
+const JOINT_SPEED_RESOLUTION_RAD_S: f64 = 4e-3;
+/// Angles of the universal joint between arm and mallet.
+const UNIVERSAL_RESOLUTION_RAD: f64 = 1e-3;
 
 /// A contact that begins sooner after one with the same body belongs to the same bounce.
 const BOUNCE_S: f64 = 0.01;
@@ -27,7 +28,7 @@ pub(crate) struct Motion {
     contacts: Vec<Contact>,
 }
 
-/// `name_1` … `name_7`.
+/// One column for each joint: `name_1` … `name_7`.
 pub(crate) fn joints(
     name: &str,
     unit: &str,
@@ -41,19 +42,24 @@ impl Motion {
     /// The columns of an episode, with or without an opponent.
     pub fn new(has_opponent: bool) -> Self {
         let mut columns = vec![
-            Column::new("puck_x", "m", POSITION, 2),
-            Column::new("puck_y", "m", POSITION, 2),
-            Column::new("puck_yaw", "rad", PUCK_YAW, 2),
-            Column::new("puck_vx", "m/s", PUCK_SPEED, 1),
-            Column::new("puck_vy", "m/s", PUCK_SPEED, 1),
+            Column::new("puck_x", "m", POSITION_RESOLUTION_M, 2),
+            Column::new("puck_y", "m", POSITION_RESOLUTION_M, 2),
+            Column::new("puck_yaw", "rad", PUCK_YAW_RESOLUTION_RAD, 2),
+            Column::new("puck_vx", "m/s", PUCK_SPEED_RESOLUTION_M_S, 1),
+            Column::new("puck_vy", "m/s", PUCK_SPEED_RESOLUTION_M_S, 1),
         ];
-        columns.extend(joints("q", "rad", ANGLE, 2));
-        columns.extend(joints("dq", "rad/s", JOINT_SPEED, 1));
-        columns.extend(
-            [1, 2].map(|axis| Column::new(format!("universal_{axis}"), "rad", UNIVERSAL, 1)),
-        );
+        columns.extend(joints("q", "rad", JOINT_ANGLE_RESOLUTION_RAD, 2));
+        columns.extend(joints("dq", "rad/s", JOINT_SPEED_RESOLUTION_RAD_S, 1));
+        columns.extend([1, 2].map(|axis| {
+            Column::new(
+                format!("universal_{axis}"),
+                "rad",
+                UNIVERSAL_RESOLUTION_RAD,
+                1,
+            )
+        }));
         if has_opponent {
-            columns.extend(joints("opponent_q", "rad", ANGLE, 2));
+            columns.extend(joints("opponent_q", "rad", JOINT_ANGLE_RESOLUTION_RAD, 2));
         }
         Self {
             columns,
@@ -64,14 +70,20 @@ impl Motion {
     /// The columns of a game, in which both robots have the same columns.
     pub fn for_game() -> Self {
         let mut motion = Self::new(true);
-        motion
-            .columns
-            .extend(joints("opponent_dq", "rad/s", JOINT_SPEED, 1));
-        motion
-            .columns
-            .extend([1, 2].map(|axis| {
-                Column::new(format!("opponent_universal_{axis}"), "rad", UNIVERSAL, 1)
-            }));
+        motion.columns.extend(joints(
+            "opponent_dq",
+            "rad/s",
+            JOINT_SPEED_RESOLUTION_RAD_S,
+            1,
+        ));
+        motion.columns.extend([1, 2].map(|axis| {
+            Column::new(
+                format!("opponent_universal_{axis}"),
+                "rad",
+                UNIVERSAL_RESOLUTION_RAD,
+                1,
+            )
+        }));
         motion
     }
 
@@ -92,6 +104,7 @@ impl Motion {
         }
     }
 
+    /// Adds a sample of an episode.
     pub fn push(&mut self, state: &EpisodeState) {
         let [x, y, yaw, vx, vy, _] = state.puck;
         let own = [x, y, yaw, vx, vy]
@@ -110,18 +123,18 @@ impl Motion {
     pub fn add_contacts(&mut self, step: u32, impacts: &[Impact]) {
         for impact in impacts {
             let t = f64::from(step) * CONTROL_STEP_S + impact.after_s();
-            let what = match impact.body {
+            let body = match impact.body {
                 ContactBody::LongRim | ContactBody::ShortRim => ContactWith::Rim,
                 ContactBody::Mallet(0) => ContactWith::Mallet,
                 ContactBody::Mallet(_) => ContactWith::OpponentMallet,
             };
             let is_same_bounce =
-                |earlier: &Contact| earlier.what == what && t - earlier.t < BOUNCE_S;
+                |earlier: &Contact| earlier.what == body && t - earlier.t < BOUNCE_S;
             if !self.contacts.iter().rev().any(is_same_bounce) {
                 let [x, y] = impact.puck;
                 self.contacts.push(Contact {
                     t: rounded(t, 1e3),
-                    what,
+                    what: body,
                     x: rounded(x, 1e4),
                     y: rounded(y, 1e4),
                 });
@@ -129,6 +142,7 @@ impl Motion {
         }
     }
 
+    /// The columns and the contacts.
     pub fn take(self) -> (Vec<Column>, Vec<Contact>) {
         (self.columns, self.contacts)
     }

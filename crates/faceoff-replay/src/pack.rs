@@ -1,4 +1,4 @@
-//! A file of clips with an index for random access.
+//! A pack: a file of clips (recordings of episodes or of parts of a game for replays) with an index for random access.
 //!
 //! ```text
 //! 16 bytes   "faceoff-clips/1\n"
@@ -7,6 +7,12 @@
 //!            kind u8 · contest u8 · 0 · 0 · number u32 · offset u64 · length u32 (all little-endian)
 //! 16 bytes   offset of the index u64 · clips u32 · "clip"
 //! ```
+//!
+//! | field   | values                                                                                     |
+//! |---------|--------------------------------------------------------------------------------------------|
+//! | kind    | 0 index of episodes, 1 motion, 2 observations of the (first) side, 3 of the second side     |
+//! | contest | 0 hit, 1 defend, 2 prepare, 3 game                                                         |
+//! | number  | the episode; in a game the chunk, which is a part of 500 control steps                     |
 
 use crate::{clip_index::ClipIndex, error::ReplayError};
 use faceoff_types::{Side, Task};
@@ -18,8 +24,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// First bytes of a pack.
 const MAGIC: &[u8; 16] = b"faceoff-clips/1\n";
+/// Last bytes of a pack.
 const END: &[u8; 4] = b"clip";
+/// Size of an entry of the index.
 const ENTRY_BYTES: usize = 20;
 const FOOTER_BYTES: u64 = 16;
 /// Maximum number of clips in a pack; their index has 20 MB.
@@ -27,13 +36,14 @@ const MAX_CLIPS: u32 = 1 << 20;
 
 /// Identifies a clip in a pack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Key {
+pub struct ClipKey {
     kind: u8,
     contest: u8,
     number: u32,
 }
 
-impl Key {
+impl ClipKey {
+    /// The index of episodes ([`ClipIndex`]), which is stored like a clip.
     const INDEX: Self = Self {
         kind: 0,
         contest: 0,
@@ -44,7 +54,7 @@ impl Key {
     #[must_use]
     pub const fn motion(task: Task, episode: u32) -> Self {
         Self {
-            kind: 1,
+            kind: KIND_MOTION,
             contest: contest(task),
             number: episode,
         }
@@ -54,7 +64,7 @@ impl Key {
     #[must_use]
     pub const fn observed(task: Task, episode: u32) -> Self {
         Self {
-            kind: 2,
+            kind: KIND_OBSERVED,
             contest: contest(task),
             number: episode,
         }
@@ -64,27 +74,30 @@ impl Key {
     #[must_use]
     pub const fn game_motion(chunk: u32) -> Self {
         Self {
-            kind: 1,
-            contest: GAME,
+            kind: KIND_MOTION,
+            contest: CONTEST_GAME,
             number: chunk,
         }
     }
 
-    /// A side's observations and commands in such a part of a game.
+    /// A side's observations and commands in a game: 500 control steps from `500 × chunk` on.
     #[must_use]
     pub const fn game_observed(side: Side, chunk: u32) -> Self {
         Self {
             kind: match side {
-                Side::First => 2,
-                Side::Second => 3,
+                Side::First => KIND_OBSERVED,
+                Side::Second => KIND_OBSERVED_BY_SECOND,
             },
-            contest: GAME,
+            contest: CONTEST_GAME,
             number: chunk,
         }
     }
 }
 
-const GAME: u8 = 3;
+const KIND_MOTION: u8 = 1;
+const KIND_OBSERVED: u8 = 2;
+const KIND_OBSERVED_BY_SECOND: u8 = 3;
+const CONTEST_GAME: u8 = 3;
 
 const fn contest(task: Task) -> u8 {
     match task {
@@ -94,9 +107,10 @@ const fn contest(task: Task) -> u8 {
     }
 }
 
+/// An entry of the index of clips: where a clip lies in the file.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
-    key: Key,
+    key: ClipKey,
     offset: u64,
     length: u32,
 }
@@ -118,7 +132,7 @@ impl Entry {
         let (offset, rest) = rest.split_first_chunk().unwrap_or((&[0; 8], &[]));
         let (length, _) = rest.split_first_chunk().unwrap_or((&[0; 4], &[]));
         Self {
-            key: Key {
+            key: ClipKey {
                 kind: *kind,
                 contest: *contest,
                 number: u32::from_le_bytes(*number),
@@ -133,7 +147,7 @@ impl Entry {
 #[derive(Debug)]
 pub struct PackWriter<W> {
     out: W,
-    written: u64,
+    bytes_written: u64,
     index: Vec<Entry>,
 }
 
@@ -146,7 +160,7 @@ impl<W: Write> PackWriter<W> {
         out.write_all(MAGIC)?;
         Ok(Self {
             out,
-            written: MAGIC.len() as u64,
+            bytes_written: MAGIC.len() as u64,
             index: Vec::new(),
         })
     }
@@ -155,21 +169,25 @@ impl<W: Write> PackWriter<W> {
     ///
     /// # Errors
     /// [`ReplayError::Io`].
-    pub fn add(&mut self, key: Key, compressed: &[u8]) -> Result<(), ReplayError> {
+    pub fn add(&mut self, key: ClipKey, compressed: &[u8]) -> Result<(), ReplayError> {
         let length = u32::try_from(compressed.len())
             .map_err(|_| ReplayError::unreadable("a clip", "it is longer than 4 GB"))?;
         self.out.write_all(compressed)?;
         self.index.push(Entry {
             key,
-            offset: self.written,
+            offset: self.bytes_written,
             length,
         });
-        self.written += u64::from(length);
+        self.bytes_written += u64::from(length);
         Ok(())
     }
 
     /// Copies clips of another pack.
-    fn copy(&mut self, pack: &Pack, is_wanted: impl Fn(Key) -> bool) -> Result<(), ReplayError> {
+    fn copy(
+        &mut self,
+        pack: &Pack,
+        is_wanted: impl Fn(ClipKey) -> bool,
+    ) -> Result<(), ReplayError> {
         for entry in pack.index.iter().filter(|entry| is_wanted(entry.key)) {
             if let Some(bytes) = pack.clip(entry.key)? {
                 self.add(entry.key, &bytes)?;
@@ -183,7 +201,7 @@ impl<W: Write> PackWriter<W> {
     /// # Errors
     /// [`ReplayError::Io`].
     pub fn add_index(&mut self, index: &ClipIndex) -> Result<(), ReplayError> {
-        self.add(Key::INDEX, &index.compressed()?)
+        self.add(ClipKey::INDEX, &index.compressed()?)
     }
 
     /// Writes the file's index of clips.
@@ -199,7 +217,7 @@ impl<W: Write> PackWriter<W> {
             .ok()
             .filter(|count| *count <= MAX_CLIPS)
             .ok_or_else(|| ReplayError::unreadable("a pack", "it has too many clips"))?;
-        self.out.write_all(&self.written.to_le_bytes())?;
+        self.out.write_all(&self.bytes_written.to_le_bytes())?;
         self.out.write_all(&count.to_le_bytes())?;
         self.out.write_all(END)?;
         Ok(self.out)
@@ -248,11 +266,11 @@ impl Pack {
         file.file().read_exact_at(&mut index_bytes, offset)?;
         let (entries, _) = index_bytes.as_chunks::<ENTRY_BYTES>();
         let index: Vec<Entry> = entries.iter().map(Entry::from_bytes).collect();
-        let inside = |entry: &Entry| {
+        let lies_before_index = |entry: &Entry| {
             let end = entry.offset.checked_add(u64::from(entry.length));
             entry.offset >= MAGIC.len() as u64 && end.is_some_and(|end| end <= offset)
         };
-        if !index.iter().all(inside) || !index.is_sorted_by(|a, b| a.key < b.key) {
+        if !index.iter().all(lies_before_index) || !index.is_sorted_by(|a, b| a.key < b.key) {
             return Err(wrong("its index is damaged"));
         }
         Ok(Self {
@@ -266,7 +284,7 @@ impl Pack {
     ///
     /// # Errors
     /// [`ReplayError::Io`].
-    pub fn clip(&self, key: Key) -> Result<Option<Vec<u8>>, ReplayError> {
+    pub fn clip(&self, key: ClipKey) -> Result<Option<Vec<u8>>, ReplayError> {
         let found = self.index.binary_search_by_key(&key, |entry| entry.key);
         let Some(entry) = found.ok().map(|index| self.index[index]) else {
             return Ok(None);
@@ -276,12 +294,12 @@ impl Pack {
         Ok(Some(bytes))
     }
 
-    /// The index of its episodes.
+    /// The index of the pack's episodes.
     ///
     /// # Errors
     /// [`ReplayError`].
     pub fn clip_index(&self) -> Result<ClipIndex, ReplayError> {
-        match self.clip(Key::INDEX)? {
+        match self.clip(ClipKey::INDEX)? {
             Some(bytes) => ClipIndex::read(&bytes),
             None => Err(ReplayError::unreadable(
                 self.path.display().to_string(),
@@ -291,7 +309,7 @@ impl Pack {
     }
 }
 
-/// Joins the packs of an evaluation's shards.
+/// Joins the packs of an evaluation's shards, each of which has a range of episodes of one task.
 ///
 /// # Errors
 /// [`ReplayError`].
@@ -299,7 +317,7 @@ pub fn join_packs<W: Write>(packs: &[PathBuf], out: W) -> Result<W, ReplayError>
     let (mut writer, mut index) = (PackWriter::new(out)?, ClipIndex::default());
     for path in packs {
         let pack = Pack::open(path)?;
-        writer.copy(&pack, |key| key != Key::INDEX)?;
+        writer.copy(&pack, |key| key != ClipKey::INDEX)?;
         index.merge(pack.clip_index()?);
     }
     writer.add_index(&index)?;
@@ -317,9 +335,12 @@ pub fn select_episodes<W: Write>(
     out: W,
 ) -> Result<W, ReplayError> {
     let episode_keys = |(task, episode): &(Task, u32)| {
-        [Key::motion(*task, *episode), Key::observed(*task, *episode)]
+        [
+            ClipKey::motion(*task, *episode),
+            ClipKey::observed(*task, *episode),
+        ]
     };
-    let keys: BTreeSet<Key> = selected.iter().flat_map(episode_keys).collect();
+    let keys: BTreeSet<ClipKey> = selected.iter().flat_map(episode_keys).collect();
     let mut writer = PackWriter::new(out)?;
     for path in packs {
         writer.copy(&Pack::open(path)?, |key| keys.contains(&key))?;

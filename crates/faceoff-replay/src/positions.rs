@@ -19,7 +19,8 @@ impl Clip {
     }
 
     /// Position of a robot's mallet at each sample, by the arm's kinematics: x, y (m), table frame; empty if there is no such
-    /// robot. The opponent's universal joint is not recorded in episodes, and assumed to be straight.
+    /// robot. The universal joint between the opponent's arm and mallet is not recorded in episodes; it is assumed to be
+    /// straight.
     #[must_use]
     pub fn mallet_positions(&self, robot: usize) -> Vec<[f64; 2]> {
         let angles: Vec<Vec<f64>> = self
@@ -50,18 +51,19 @@ impl Clip {
             .angles(robot)
             .map(|column| column?.values().nth(sample))
             .collect();
-        let is_there = angles[..JOINTS].iter().all(Option::is_some);
-        is_there.then(|| mallet(robot, |joint| angles[joint].unwrap_or_default()))
+        let exists = angles[..JOINTS].iter().all(Option::is_some);
+        exists.then(|| mallet(robot, |joint| angles[joint].unwrap_or_default()))
     }
 
     /// The columns of a robot's joints and of its universal joint.
     fn angles(&self, robot: usize) -> impl Iterator<Item = Option<&Column>> {
         let prefix = if robot == 0 { "" } else { "opponent_" };
         let names = (1..=JOINTS).map(move |joint| format!("{prefix}q_{joint}"));
-        let hinges = [1, 2].map(|axis| format!("{prefix}universal_{axis}"));
-        names.chain(hinges).map(|name| self.column(&name))
+        let universal_names = [1, 2].map(|axis| format!("{prefix}universal_{axis}"));
+        names.chain(universal_names).map(|name| self.column(&name))
     }
 
+    /// The values of two columns as pairs.
     fn pairs(&self, x: &str, y: &str) -> Vec<[f64; 2]> {
         match (self.column(x), self.column(y)) {
             (Some(x), Some(y)) => x.values().zip(y.values()).map(Into::into).collect(),
@@ -73,6 +75,7 @@ impl Clip {
 /// The mallet's position, by the arm's kinematics.
 fn mallet(robot: usize, angle: impl Fn(usize) -> f64) -> [f64; 2] {
     let q: [f64; DOFS] = std::array::from_fn(angle);
+    // The kinematics can compute several arms at once; the only one here is lane 0.
     let centre = Kinematics::new(&q).cylinder_centre().lane(0);
     let [x, y, _] = table_from_robot(robot, centre);
     [x, y]

@@ -1,11 +1,11 @@
-//! Records the clips of a shard while it is played.
+//! Records the clips (for replays) of a shard, a range of episodes of one task, while it is played.
 
 use crate::{
     clip_index::ClipIndex,
     episode::Recording,
     error::ReplayError,
     gzip::Gzip,
-    pack::{Key, PackWriter},
+    pack::{ClipKey, PackWriter},
 };
 use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{EpisodeOutcome, Task};
@@ -16,6 +16,7 @@ pub struct ClipRecorder<W> {
     task: Task,
     pack: PackWriter<W>,
     index: ClipIndex,
+    /// The episode that is being recorded.
     current: Option<Recording>,
     gzip: Gzip,
 }
@@ -61,9 +62,10 @@ impl<W: Write> ClipRecorder<W> {
         let clips = recording.end(outcome, times);
         let [motion, observed] = clips.compressed(&mut self.gzip)?;
         let episode = outcome.episode;
-        self.pack.add(Key::motion(self.task, episode), &motion)?;
         self.pack
-            .add(Key::observed(self.task, episode), &observed)?;
+            .add(ClipKey::motion(self.task, episode), &motion)?;
+        self.pack
+            .add(ClipKey::observed(self.task, episode), &observed)?;
         self.index.episodes.push(clips.line);
         Ok(())
     }

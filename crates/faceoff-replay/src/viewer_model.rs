@@ -13,6 +13,7 @@ use faceoff_sim::{
 use serde_json::Value;
 use std::f64::consts::FRAC_1_SQRT_2;
 
+/// The constants of the viewer.
 const MODEL: &str = include_str!("../../../web/client/src/model/model.json");
 
 #[track_caller]
@@ -47,6 +48,7 @@ fn viewer_model_matches_the_simulator() {
             Offset::Y(y) => [0.0, y, 0.0],
             Offset::Z(z) => [0.0, 0.0, z],
         };
+        // Quaternion components of a quarter turn: sine and cosine of 45°.
         let half = FRAC_1_SQRT_2;
         let orientation = match link.mount {
             Mount::Aligned => [1.0, 0.0, 0.0, 0.0],

@@ -1,4 +1,4 @@
-//! Tracks violations of constraints.
+//! Joins violations of constraints in successive samples (states after control steps) to spans.
 
 use crate::{group::Group, header::ViolationSpan};
 use faceoff_sim::ConstraintValues;
@@ -6,6 +6,7 @@ use faceoff_sim::ConstraintValues;
 /// Collects the violations of a side.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ViolationTracker {
+    /// Spans that the last sample belongs to, for each [`Group`].
     current: [Option<ViolationSpan>; 4],
     finished: Vec<ViolationSpan>,
 }

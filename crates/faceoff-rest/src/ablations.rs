@@ -13,7 +13,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_api::{requests::NewAblation, views::ablation::AblationView};
-use faceoff_replay::Key;
+use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,
     auth::{Caller, Organiser},
@@ -73,7 +73,7 @@ pub(crate) async fn ablation_motion(
     path: AblationPath,
 ) -> Result<Response, Problem> {
     let clips = AblationClips::load(&app, viewer, path.submission).await?;
-    let key = Key::motion(path.task, path.episode);
+    let key = ClipKey::motion(path.task, path.episode);
     send_episode(&app, &clips, key, "motion", path, &conditions, &headers).await
 }
 
@@ -105,20 +105,20 @@ pub(crate) async fn ablation_observed(
             "observations and actions are visible only to the agent's team; the motion is public",
         ));
     }
-    let key = Key::observed(path.task, path.episode);
+    let key = ClipKey::observed(path.task, path.episode);
     send_episode(&app, &clips, key, "observed", path, &conditions, &headers).await
 }
 
 async fn send_episode(
     app: &App,
     clips: &AblationClips,
-    key: Key,
+    key: ClipKey,
     tag_prefix: &str,
     path: AblationPath,
     conditions: &Conditions,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
-    let file = clips.profile(app, path.profile).await?;
+    let file = clips.profile_file(app, path.profile).await?;
     let tag = ETag::new(
         tag_prefix,
         &[&file.key, path.task.as_str(), &path.episode.to_string()],

@@ -39,9 +39,9 @@ pub(crate) async fn list_announcements(
 pub(crate) async fn announce(
     organiser: Organiser,
     State(app): State<App>,
-    Body(new): Body<NewAnnouncement>,
+    Body(announcement): Body<NewAnnouncement>,
 ) -> Result<(StatusCode, Json<AnnouncementView>), Problem> {
-    let view = announcements::announce(&app, organiser.actor(), &new).await?;
+    let view = announcements::announce(&app, organiser.actor(), &announcement).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -72,9 +72,9 @@ pub(crate) async fn list_questions(
 pub(crate) async fn ask(
     caller: TeamCaller,
     State(app): State<App>,
-    Body(new): Body<NewQuestion>,
+    Body(question): Body<NewQuestion>,
 ) -> Result<(StatusCode, Json<QuestionView>), Problem> {
-    let view = announcements::ask(&app, &caller, &new).await?;
+    let view = announcements::ask(&app, &caller, &question).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -88,8 +88,8 @@ pub(crate) async fn answer(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<QuestionId>,
-    Body(new): Body<NewAnswer>,
+    Body(new_answer): Body<NewAnswer>,
 ) -> Result<Json<QuestionView>, Problem> {
-    let answered = announcements::answer(&app, organiser.actor(), id, &new);
+    let answered = announcements::answer(&app, organiser.actor(), id, &new_answer);
     answered.await.map(Json)
 }

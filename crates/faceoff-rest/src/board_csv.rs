@@ -27,11 +27,11 @@ const TASK_COLUMNS: [&str; 16] = [
 
 /// An empty table with `columns`, followed by [`TASK_COLUMNS`] of each task.
 fn table_with_tasks(columns: &[&str]) -> Table {
-    let mut all: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
+    let mut names: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in Task::ALL {
-        all.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
+        names.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
     }
-    let names: Vec<&str> = all.iter().map(String::as_str).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     Table::new(&names)
 }
 
@@ -112,6 +112,7 @@ pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
         "finished_at",
         "division",
         "days",
+        // The reason for an extra evaluation, under the name that readers of older versions know.
         "extra_turn",
         "released_at",
         "ruleset",
@@ -140,6 +141,7 @@ pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
     table.into_bytes()
 }
 
+/// One line per team and day.
 pub(crate) fn history_table(history: &HistoryView) -> Vec<u8> {
     let mut table = table_with_tasks(&[
         "day",

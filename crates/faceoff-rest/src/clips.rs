@@ -12,7 +12,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_api::views::clips::EpisodesView;
-use faceoff_replay::Key;
+use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,
     conditions::{Conditions, ETag},
@@ -89,7 +89,7 @@ pub(crate) async fn motion(
 ) -> Result<Response, Problem> {
     let visibility = Visibility::load(&app, viewer).await?;
     let clips = Clips::find(&app, &visibility, path.id).await?;
-    let key = Key::motion(path.task, path.episode);
+    let key = ClipKey::motion(path.task, path.episode);
     send_episode(&clips, key, "motion", path, &conditions, &headers).await
 }
 
@@ -123,13 +123,13 @@ pub(crate) async fn observed(
              public",
         ));
     }
-    let key = Key::observed(path.task, path.episode);
+    let key = ClipKey::observed(path.task, path.episode);
     send_episode(&clips, key, "observed", path, &conditions, &headers).await
 }
 
 async fn send_episode(
     clips: &Clips,
-    key: Key,
+    key: ClipKey,
     tag_prefix: &str,
     path: EpisodePath,
     conditions: &Conditions,

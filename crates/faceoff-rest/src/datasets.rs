@@ -219,8 +219,7 @@ async fn find_released(
             if let Some(removed) = &evaluation.dataset_removed
                 && !(viewer == Viewer::Organiser && exists)
             {
-                let what = "the dataset";
-                return Err(Problem::removed(what, removed));
+                return Err(Problem::removed("the dataset", removed));
             }
             archive_contents::check_included(app, dataset, "dataset").await?;
             return Ok(StoredDataset {

@@ -29,11 +29,12 @@ const MAX_SKIPPED: i64 = 1000;
 /// The client of a stream, and its filter.
 #[derive(Debug)]
 pub(crate) struct Subscription {
-    pub(crate) reader: Audience,
+    /// As whom the client may see events.
+    pub(crate) audience: Audience,
     /// The token of the request; the stream ends when it becomes invalid.
     pub(crate) token: Option<TokenId>,
     /// Which events the client wants.
-    pub(crate) about: NoticeFilter,
+    pub(crate) filter: NoticeFilter,
 }
 
 #[derive(Debug)]
@@ -45,7 +46,7 @@ pub(crate) struct EventReader {
     first_message: Option<&'static str>,
     /// Id of the last event that was read from the log.
     last_read: i64,
-    /// Id that was sent last.
+    /// Event id that was sent last.
     last_sent: i64,
     /// Earliest time of the next read of the log.
     next_read_at: Instant,
@@ -115,7 +116,7 @@ impl EventReader {
         }
         loop {
             sleep_until(self.next_read_at).await;
-            let page = self.app.feed.after(self.last_read).await?;
+            let page = self.app.feed.page_after(self.last_read).await?;
             // Checked after the log is read: a token that was revoked meanwhile gets no further event.
             if !self.is_token_valid().await? {
                 return Ok(None);
@@ -125,7 +126,7 @@ impl EventReader {
                 continue;
             };
             let events = self.matching_events(&page)?;
-            self.last_read = page.until;
+            self.last_read = page.last_event;
             // The pause applies also without matching events: a client must not make the server read the log at full speed.
             self.next_read_at = Instant::now() + BATCH_INTERVAL;
             if !events.is_empty() {
@@ -149,8 +150,8 @@ impl EventReader {
     /// The events of a page that match the subscription, in order.
     fn matching_events(&mut self, page: &Page) -> Result<Vec<Event>, Problem> {
         let matches = |notice: &&Notice| {
-            self.subscription.about.matches(notice)
-                && notice.is_visible_to(self.subscription.reader, &page.stages)
+            self.subscription.filter.matches(notice)
+                && notice.is_visible_to(self.subscription.audience, &page.stage_visibility)
         };
         let notices: Vec<&Notice> = page.notices.iter().filter(matches).collect();
         let mut events = Vec::with_capacity(notices.len());
@@ -159,10 +160,10 @@ impl EventReader {
             let event = Event::default().event("change").id(notice.id.to_string());
             events.push(event.json_data(notice.json()).map_err(Problem::internal)?);
         }
-        if events.is_empty() && page.until - self.last_sent >= MAX_SKIPPED {
-            self.last_sent = page.until;
+        if events.is_empty() && page.last_event - self.last_sent >= MAX_SKIPPED {
+            self.last_sent = page.last_event;
             // Without data browsers dispatch no event, but remember the id.
-            events.push(Event::default().id(page.until.to_string()));
+            events.push(Event::default().id(page.last_event.to_string()));
         }
         Ok(events)
     }

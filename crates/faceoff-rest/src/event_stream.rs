@@ -44,7 +44,7 @@ pub(crate) async fn follow_events(
     shutdown: Option<Extension<Shutdown>>,
     headers: HeaderMap,
 ) -> Result<impl IntoResponse, Problem> {
-    let about = match &query.about {
+    let filter = match &query.about {
         Some(about) => about
             .parse()
             .map_err(|error| Problem::invalid("about", error))?,
@@ -65,9 +65,9 @@ pub(crate) async fn follow_events(
     };
     let viewer = caller.as_ref().map_or(Viewer::Visitor, Viewer::new);
     let subscription = Subscription {
-        reader: viewer.into(),
+        audience: viewer.into(),
         token: caller.map(|caller| caller.token.id),
-        about,
+        filter,
     };
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
     let reader = EventReader::open(app, subscription, last_received, shutdown, permit).await?;

@@ -51,9 +51,9 @@ pub(crate) async fn order_test_games(
     let teams = match (requested_by, request.teams) {
         (None, None) => {
             let entrants = state.entrants.iter();
-            let opponents = entrants
+            let teams = entrants
                 .filter(|entrant| entrant.departure.is_none() && Some(entrant.team) != baseline);
-            opponents.map(|entrant| entrant.team).collect()
+            teams.map(|entrant| entrant.team).collect()
         }
         (None, Some(names)) => entrants::find_by_names(&app, "teams", &names).await?,
         (Some(own_team), None) => vec![own_team],

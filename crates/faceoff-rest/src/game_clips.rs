@@ -7,7 +7,7 @@ use super::{
     game_files::{parse_game, parse_side},
 };
 use axum::{extract::State, http::HeaderMap, response::Response};
-use faceoff_replay::Key;
+use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,
     conditions::{Conditions, ETag},
@@ -45,7 +45,7 @@ pub(crate) async fn game_motion(
         &tag,
         &conditions,
         &headers,
-        clips.clip(Key::game_motion(chunk)),
+        clips.clip(ClipKey::game_motion(chunk)),
     )
     .await
 }
@@ -94,7 +94,7 @@ pub(crate) async fn game_observed(
         &tag,
         &conditions,
         &headers,
-        clips.clip(Key::game_observed(side, chunk)),
+        clips.clip(ClipKey::game_observed(side, chunk)),
     )
     .await
 }

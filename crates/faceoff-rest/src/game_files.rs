@@ -242,11 +242,11 @@ impl StoredRecording {
             GameFile::Side(side) => visibility.is_own(&game, side),
         };
         if !is_own && !visibility.can_see_both_sides(&game) {
-            let what = match file {
+            let description = match file {
                 GameFile::BothSides => "the recording of both sides".to_owned(),
                 GameFile::Side(side) => format!("the file of side {}", side.number()),
             };
-            return Err(visibility.denial(&game, &what));
+            return Err(visibility.denial(&game, &description));
         }
         let files = stored_recording(&game)?;
         let (file_name, blake3) = match file {

@@ -34,9 +34,9 @@ use faceoff_types::InvitationId;
 pub(crate) async fn create_invitation(
     caller: Caller,
     State(app): State<App>,
-    Body(new): Body<requests::NewInvitation>,
+    Body(request): Body<requests::NewInvitation>,
 ) -> Result<(StatusCode, Json<NewInvitationView>), Problem> {
-    let view = invitations::create_invitation(&app, &caller, new).await?;
+    let view = invitations::create_invitation(&app, &caller, request).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -87,9 +87,9 @@ pub(crate) async fn revoke_invitation(
 )]
 pub(crate) async fn accept_invitation(
     State(app): State<App>,
-    Body(body): Body<JoinRequest>,
+    Body(request): Body<JoinRequest>,
 ) -> Result<(StatusCode, Json<NewAccountView>), Problem> {
-    let (joined, secret) = join(&app, body, TokenKind::ApiToken, None).await?;
+    let (joined, secret) = join(&app, request, TokenKind::ApiToken, None).await?;
     let principal = match joined.team {
         Some(team) => Principal::Member(joined.user, team),
         None => Principal::Organiser(joined.user),

@@ -26,9 +26,10 @@ use utoipa::IntoParams;
 
 /// Default validity of a link.
 const DEFAULT_VALIDITY_S: u32 = 60 * 60;
+/// Maximum validity of a link.
 const MAX_VALIDITY_S: u32 = 7 * 24 * 60 * 60;
-/// Derivation context of the signature's key; used for nothing else. Its date belongs to the text and must not change.
-const CONTEXT: &str = "faceoff 2026-11-23 links that download a file";
+/// Context string with which BLAKE3 derives the signature's key; used for nothing else. Its date must not change.
+const KEY_DERIVATION_CONTEXT: &str = "faceoff 2026-11-23 links that download a file";
 
 /// Query parameters of a signed link.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -117,7 +118,7 @@ fn sign(
     expires_s: i64,
     creator_token: TokenId,
 ) -> blake3::Hash {
-    let key = blake3::derive_key(CONTEXT, app.config.link_key.bytes());
+    let key = blake3::derive_key(KEY_DERIVATION_CONTEXT, app.config.link_key.bytes());
     blake3::Hasher::new_keyed(&key)
         .update(token_hash)
         .update(&expires_s.to_le_bytes())

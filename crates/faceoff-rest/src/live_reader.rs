@@ -50,7 +50,7 @@ pub(crate) struct LiveReader {
 
 /// State of a game in the database.
 enum StoredState {
-    /// Pending or running. The number of the running attempt.
+    /// Pending or running, with the number of the running attempt; `None` if pending.
     Open(Option<u32>),
     Over(LiveEndState),
 }

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::{fmt::Display, str::FromStr};
 use utoipa::IntoParams;
 
+/// Default and maximum number of rows of a page.
 const DEFAULT_LIMIT: u32 = 100;
 const MAX_LIMIT: u32 = 200;
 
@@ -32,7 +33,9 @@ pub(crate) struct PageQuery {
 /// A requested page of a list whose rows have ids of type `I`.
 #[derive(Debug)]
 pub(crate) struct Page<I> {
+    /// Maximum number of rows.
     pub(crate) limit: u32,
+    /// Id of the row before the page; `None` for the first page.
     pub(crate) after: Option<I>,
     /// Path and query of the list without `after`; it ends with `?` or `&`.
     list_uri: String,
@@ -63,8 +66,8 @@ where
             Problem::new(ProblemKind::InvalidRequest, detail)
         })?;
         let params = uri.query().unwrap_or_default().split('&');
-        let kept = params.filter(|param| !param.is_empty() && !param.starts_with("after="));
-        let list_uri = kept.fold(format!("{}?", uri.path()), |list_uri, param| {
+        let other_params = params.filter(|param| !param.is_empty() && !param.starts_with("after="));
+        let list_uri = other_params.fold(format!("{}?", uri.path()), |list_uri, param| {
             format!("{list_uri}{param}&")
         });
         Ok(Self {

@@ -32,7 +32,7 @@ pub(crate) async fn list_proposals(
     State(app): State<App>,
 ) -> Result<Paged<ProposalView>, Problem> {
     let page = page.select(app.store.proposals().await?, |proposal| proposal.id)?;
-    page.map_all(async |proposals| proposal::heads(&app, proposals).await)
+    page.map_all(async |proposals| proposal::list(&app, proposals).await)
         .await
 }
 

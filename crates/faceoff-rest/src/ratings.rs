@@ -32,5 +32,5 @@ pub(crate) async fn head_to_head(
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
 ) -> Result<Json<Vec<HeadToHead>>, Problem> {
-    ratings::records(&app, id).await.map(Json)
+    ratings::head_to_head_records(&app, id).await.map(Json)
 }

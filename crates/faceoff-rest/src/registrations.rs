@@ -27,9 +27,9 @@ use faceoff_types::RegistrationId;
 )]
 pub(crate) async fn register(
     State(app): State<App>,
-    Body(body): Body<RegistrationRequest>,
+    Body(request): Body<RegistrationRequest>,
 ) -> Result<(StatusCode, Json<NewRegistrationView>), Problem> {
-    let view = registrations::register(&app, body).await?;
+    let view = registrations::register(&app, request).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 

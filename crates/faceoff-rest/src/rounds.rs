@@ -1,4 +1,4 @@
-//! Rounds of a tournament: starting the next one.
+//! Rounds of a tournament: starting the next one. A round consists of matchdays, whose games can run in parallel.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::views::tournament::RoundView;

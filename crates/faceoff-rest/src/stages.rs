@@ -56,9 +56,9 @@ pub(crate) async fn stage(
 pub(crate) async fn create_stage(
     organiser: Organiser,
     State(app): State<App>,
-    Body(new): Body<NewStage>,
+    Body(request): Body<NewStage>,
 ) -> Result<(StatusCode, Json<StageView>), Problem> {
-    let view = stages::create_stage(&app, organiser.actor(), new).await?;
+    let view = stages::create_stage(&app, organiser.actor(), request).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 

@@ -29,9 +29,9 @@ use faceoff_types::{TeamId, TeamName};
 pub(crate) async fn create_team(
     organiser: Organiser,
     State(app): State<App>,
-    Body(new): Body<NewTeam>,
+    Body(request): Body<NewTeam>,
 ) -> Result<(StatusCode, Json<TeamWithToken>), Problem> {
-    let name: TeamName = new
+    let name: TeamName = request
         .name
         .parse()
         .map_err(|error| Problem::invalid("name", error))?;

@@ -30,9 +30,9 @@ pub(crate) async fn list_terms(State(app): State<App>) -> Result<Json<Vec<TermsV
 pub(crate) async fn publish_terms(
     organiser: Organiser,
     State(app): State<App>,
-    Body(new): Body<NewTerms>,
+    Body(new_terms): Body<NewTerms>,
 ) -> Result<(StatusCode, Json<TermsView>), Problem> {
-    let terms = announcements::publish_terms(&app, organiser.actor(), &new).await?;
+    let terms = announcements::publish_terms(&app, organiser.actor(), &new_terms).await?;
     Ok((StatusCode::CREATED, Json(terms)))
 }
 

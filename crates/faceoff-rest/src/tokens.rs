@@ -58,9 +58,9 @@ pub(crate) async fn list_tokens(
 pub(crate) async fn create_token(
     caller: Caller,
     State(app): State<App>,
-    Body(new): Body<requests::NewToken>,
+    Body(request): Body<requests::NewToken>,
 ) -> Result<(StatusCode, Json<NewTokenView>), Problem> {
-    let view = tokens::create_token(&app, &caller, new).await?;
+    let view = tokens::create_token(&app, &caller, request).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 

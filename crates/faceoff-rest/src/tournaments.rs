@@ -64,17 +64,17 @@ pub(crate) async fn tournament(
 pub(crate) async fn open_tournament(
     organiser: Organiser,
     State(app): State<App>,
-    Body(new): Body<NewTournament>,
+    Body(request): Body<NewTournament>,
 ) -> Result<impl IntoResponse, Problem> {
-    let name = parse_name(&new.name)?;
-    let rules = changed_rules(&app, &TournamentRules::default(), new.rules).await?;
-    let settings = changed_settings(&TournamentSettings::default(), new.settings)?;
-    let stage = match (&new.stage, &new.teams) {
+    let name = parse_name(&request.name)?;
+    let rules = changed_rules(&app, &TournamentRules::default(), request.rules).await?;
+    let settings = changed_settings(&TournamentSettings::default(), request.settings)?;
+    let stage = match (&request.stage, &request.teams) {
         (Some(stage), _) => Some(find_stage(&app, stage).await?),
         (None, Some(_)) => None,
         (None, None) => Some(stage::current(&app).await?),
     };
-    let entrants = match (&new.teams, &stage) {
+    let entrants = match (&request.teams, &stage) {
         (Some(teams), _) => entrants::find_by_names(&app, "teams", teams).await?,
         (None, Some(stage)) => entrants::qualified_teams(&app, stage).await?,
         (None, None) => Vec::new(),
@@ -252,18 +252,18 @@ fn apply_patch<T: Serialize + DeserializeOwned>(
     fields: Option<Map<String, Value>>,
 ) -> Result<T, Problem> {
     let value = serde_json::to_value(current).map_err(Problem::internal)?;
-    let Value::Object(mut all) = value else {
+    let Value::Object(mut object) = value else {
         return Err(Problem::internal(format_args!(
             "{name} are not a JSON object"
         )));
     };
     for (field, value) in fields.unwrap_or_default() {
         match value {
-            Value::Null => drop(all.remove(&field)),
-            value => drop(all.insert(field, value)),
+            Value::Null => drop(object.remove(&field)),
+            value => drop(object.insert(field, value)),
         }
     }
-    let value = Value::Object(all);
+    let value = Value::Object(object);
     objects_only::check::<T>(&value).map_err(|error| Problem::invalid(name, error))?;
     serde_path_to_error::deserialize(value).map_err(|error| Problem::invalid(name, error))
 }

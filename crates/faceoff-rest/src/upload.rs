@@ -105,13 +105,14 @@ fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
         return Ok(());
     };
     let text = value.to_str().unwrap_or("(not text)");
-    let essence = text
+    // Without parameters.
+    let media_type = text
         .split(';')
         .next()
         .unwrap_or_default()
         .trim()
         .to_ascii_lowercase();
-    if BUNDLE_TYPES.contains(&essence.as_str()) {
+    if BUNDLE_TYPES.contains(&media_type.as_str()) {
         return Ok(());
     }
     Err(Problem::new(

@@ -66,10 +66,13 @@ pub(crate) async fn set_password(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<UserId>,
-    Body(new): Body<NewPassword>,
+    Body(request): Body<NewPassword>,
 ) -> Result<Json<UserView>, Problem> {
     let user = users::find(&app, &caller, id).await?;
-    if caller.user().is_none_or(|own| own.id != id) {
+    if caller
+        .user()
+        .is_none_or(|calling_user| calling_user.id != id)
+    {
         return Err(Problem::new(
             ProblemKind::Forbidden,
             format!(
@@ -82,7 +85,7 @@ pub(crate) async fn set_password(
     let now = app.config.clock.now();
     let stored_hash = app.store.password_hash_of(user.name.as_str()).await?;
     if stored_hash.is_some() {
-        let old_password = new.old.unwrap_or_default();
+        let old_password = request.old.unwrap_or_default();
         let verified_user = app.passwords.verify(stored_hash, old_password, now).await?;
         if verified_user != Some(id) {
             return Err(Problem::new(
@@ -91,7 +94,7 @@ pub(crate) async fn set_password(
             ));
         }
     }
-    let hash = app.passwords.hash(new.password).await?;
+    let hash = app.passwords.hash(request.password).await?;
     let user = app
         .store
         .set_password(caller.actor(), id, &hash, caller.token.id, now)

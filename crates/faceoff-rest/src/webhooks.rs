@@ -100,19 +100,22 @@ pub(crate) async fn list_webhooks(
 pub(crate) async fn create_webhook(
     caller: Caller,
     State(app): State<App>,
-    Body(new): Body<requests::NewWebhook>,
+    Body(request): Body<requests::NewWebhook>,
 ) -> Result<(StatusCode, Json<NewWebhookView>), Problem> {
     check_not_team_token(&caller)?;
     let secret = WebhookSecret::generate().map_err(Problem::internal)?;
-    let new = NewWebhook {
+    let new_webhook = NewWebhook {
         team: caller.team().map(|team| team.id),
-        name: text::single_line("name", &new.name, MAX_NAME_CHARS)?,
-        url: checked_url(&app, &new.url)?,
-        topics: checked_filter(&new.about)?,
+        name: text::single_line("name", &request.name, MAX_NAME_CHARS)?,
+        url: checked_url(&app, &request.url)?,
+        topics: checked_filter(&request.about)?,
         secret: secret.bytes(),
     };
     let now = app.config.clock.now();
-    let webhook = app.store.create_webhook(caller.actor(), new, now).await?;
+    let webhook = app
+        .store
+        .create_webhook(caller.actor(), new_webhook, now)
+        .await?;
     tracing::info!(webhook = %webhook.id, actor = %caller.actor(), "webhook created");
     let view = NewWebhookView {
         webhook: webhook::view(webhook, now),
@@ -153,11 +156,11 @@ pub(crate) async fn change_webhook(
     PathParam(id): PathParam<WebhookId>,
     Body(changes): Body<requests::WebhookChanges>,
 ) -> Result<Json<WebhookView>, Problem> {
-    let before = find_changeable(&app, &caller, id).await?;
+    let webhook = find_changeable(&app, &caller, id).await?;
     let name = changes.name.as_deref();
     let url = changes.url.as_deref();
     // Only the team may change the URL of its webhook: another receiver would get messages signed with the team's secret.
-    if url.is_some() && before.team != caller.team().map(|team| team.id) {
+    if url.is_some() && webhook.team != caller.team().map(|team| team.id) {
         return Err(Problem::new(
             ProblemKind::Forbidden,
             "only a member of the team can change the address of its webhook; you can remove it (DELETE \

@@ -26,7 +26,7 @@ impl GameObserver for NullObserver {
     }
 }
 
-/// Keeps the received events, as the server's hub does.
+/// Keeps the received events, as the server does for viewers.
 #[derive(Default)]
 struct CollectingSink {
     events: Vec<LiveEvent>,
@@ -58,16 +58,16 @@ fn main() {
     let cpus = affinity::allowed_cpus().unwrap();
     let env = environment(isolation);
     // Separate CPUs for both agents and this thread, if there are three.
-    let env_of = |agent: usize| AgentEnvironment {
+    let env_on_cpu = |index: usize| AgentEnvironment {
         agent_cpus: cpus
-            .get(agent)
+            .get(index)
             .filter(|_| cpus.len() > 2)
             .into_iter()
             .copied()
             .collect(),
         ..env.clone()
     };
-    let envs = [env_of(1), env_of(2)];
+    let envs = [env_on_cpu(1), env_on_cpu(2)];
     let seed = Seed::from_number(1);
     let spec = GameSpec {
         ruleset: Ruleset::CURRENT,
@@ -80,9 +80,13 @@ fn main() {
         perturbations: Box::default(),
     };
     let out = tempfile::tempdir().unwrap();
-    let load = || fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    println!("{} CPUs; load before: {}", cpus.len(), load().trim());
-    let (started, cpu_started_s) = (Instant::now(), cpu_time_s());
+    let load_average = || fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    println!(
+        "{} CPUs; load before: {}",
+        cpus.len(),
+        load_average().trim()
+    );
+    let (started_at, cpu_time_before_s) = (Instant::now(), cpu_time_s());
     let bundles = [&agent.bundle; 2];
     let mut sink = std::env::var_os("SHOWN").map(|_| CollectingSink::default());
     let report = match &mut sink {
@@ -100,8 +104,8 @@ fn main() {
     }
     .unwrap();
     let (wall_s, cpu_s) = (
-        started.elapsed().as_secs_f64(),
-        cpu_time_s() - cpu_started_s,
+        started_at.elapsed().as_secs_f64(),
+        cpu_time_s() - cpu_time_before_s,
     );
     let outcome = &report.archives.outcome;
     println!(
@@ -131,7 +135,7 @@ fn main() {
             sink.positions
         );
     }
-    println!("load after: {}", load().trim());
+    println!("load after: {}", load_average().trim());
 }
 
 /// CPU time of this thread, without other work on the host.

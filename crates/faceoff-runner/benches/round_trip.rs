@@ -84,6 +84,7 @@ fn echo() {
     }
 }
 
+/// Measures the bare pipe and the protocol, with and without the sandbox.
 fn bench_round_trips(criterion: &mut Criterion) {
     let observation = observation();
     let mut question = Vec::new();
@@ -158,15 +159,15 @@ fn print_medians(placement: &str, evaluator_cpu: usize, agent_cpu: usize) {
     let (mut bare_s, mut protocol_s) = (Vec::new(), Vec::new());
     for round in 0..ROUNDS {
         for _ in 0..PER_ROUND {
-            let started = Instant::now();
+            let started_at = Instant::now();
             bare.round_trip(&question);
-            bare_s.push(started.elapsed().as_secs_f64());
+            bare_s.push(started_at.elapsed().as_secs_f64());
         }
         for index in 0..PER_ROUND {
             let step = u32::try_from(round * PER_ROUND + index).unwrap();
-            let started = Instant::now();
+            let started_at = Instant::now();
             session.step(step, &observation).unwrap();
-            protocol_s.push(started.elapsed().as_secs_f64());
+            protocol_s.push(started_at.elapsed().as_secs_f64());
         }
     }
     session.finish().unwrap();
@@ -280,12 +281,12 @@ fn bench_control_steps(criterion: &mut Criterion) {
     let mut steps = 0;
     let mut rounds: Vec<(f64, f64)> = (0..=RECORDING_ROUNDS)
         .map(|_| {
-            let started = cpu_time_s();
+            let cpu_time_before_s = cpu_time_s();
             steps = play_unrecorded(&agent, &env, &spec);
-            let bare_s = cpu_time_s() - started;
-            let started = cpu_time_s();
+            let bare_s = cpu_time_s() - cpu_time_before_s;
+            let cpu_time_before_s = cpu_time_s();
             run_shard(&spec, &agent.bundle, &env, out.path(), &mut NullObserver).unwrap();
-            (bare_s, cpu_time_s() - started)
+            (bare_s, cpu_time_s() - cpu_time_before_s)
         })
         .skip(1)
         .collect();

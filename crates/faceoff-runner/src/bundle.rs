@@ -1,5 +1,5 @@
-//! A *bundle*: an agent's program with its manifest `agent.toml`, as a team submits it. It is an archive, whose bytes are not trusted, a
-//! container image, or a developer's folder, which is opened in place.
+//! A *bundle*: an agent's program with its manifest `agent.toml`, as a team submits it. It is an archive, whose bytes
+//! are not trusted, a container image, or a developer's folder, which is opened in place.
 
 mod budget;
 mod entry;
@@ -164,13 +164,13 @@ fn read_archive<'a>(
         ArchiveFormat::TarGz => {
             let streams: MultiStreamReader<'_, _, flate2::bufread::GzDecoder<_>> =
                 MultiStreamReader::new(cancellable(file), budget)
-                    .map_err(BundleError::from_read_error(""))?;
+                    .map_err(BundleError::from_archive_read_error)?;
             tar_archive::unpack(streams, tree, budget)?;
         }
         ArchiveFormat::TarZst => {
             let streams: MultiStreamReader<'_, _, zstd::Decoder<'static, _>> =
                 MultiStreamReader::new(cancellable(file), budget)
-                    .map_err(BundleError::from_read_error(""))?;
+                    .map_err(BundleError::from_archive_read_error)?;
             tar_archive::unpack(streams, tree, budget)?;
         }
         ArchiveFormat::Zip => {

@@ -1,6 +1,6 @@
-//! The *noise floor* of a worker's slot: the time of a round trip (question and answer) with an agent that computes nothing. This
-//! calibration agent is a thread of the service on the agent's CPUs, which answers at once, with messages as long as those of a step.
-//! While the real agent runs, the thread waits in a read and uses no CPU time.
+//! The *noise floor* of a worker's slot: the time of a round trip (question and answer) with an agent that computes
+//! nothing. This calibration agent is a thread of the service on the agent's CPUs, which answers at once, with messages
+//! as long as those of a step. While the real agent runs, the thread waits in a read and uses no CPU time.
 
 use crate::fault::PlatformFault;
 use faceoff_sandbox::affinity::pin_current_thread;
@@ -42,6 +42,7 @@ impl CalibrationAgent {
         let (questions, to_agent) = UnixStream::pair().map_err(failed())?;
         let (from_agent, answers) = UnixStream::pair().map_err(failed())?;
         let mut question = Vec::new();
+        // An observation of 23 numbers of full precision.
         Message::step(0, &[-std::f64::consts::FRAC_1_PI; 23]).write_line(&mut question);
         let (cpus, question_bytes) = (agent_cpus.to_vec(), question.len());
         let agent = thread::Builder::new()

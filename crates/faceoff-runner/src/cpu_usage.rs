@@ -18,29 +18,29 @@ pub(crate) struct CpuUsage {
     cpu_at_question_s: Option<f64>,
     /// At the answer before the last question.
     cpu_at_earlier_answer_s: Option<f64>,
-    /// Number of CPUs that the agent can use at the same time. `None` without CPU accounting by a cgroup; then the CPU time before a
-    /// question is not measured, since summing up the processes costs too much.
+    /// Number of CPUs that the agent can use at the same time. `None` without CPU accounting by a cgroup; then the CPU
+    /// time before a question is not measured, since summing up the processes costs too much.
     max_cpus: Option<f64>,
 }
 
 impl CpuUsage {
-    /// Starts for an agent that has used `now_s`.
-    pub fn new(now_s: Option<f64>, env: &AgentEnvironment) -> Self {
+    /// Starts for an agent that has used `cpu_time_s` so far.
+    pub fn new(cpu_time_s: Option<f64>, env: &AgentEnvironment) -> Self {
         Self {
-            cpu_at_answer_s: now_s,
+            cpu_at_answer_s: cpu_time_s,
             answered_at: Instant::now(),
-            cpu_at_question_s: now_s,
-            cpu_at_earlier_answer_s: now_s,
+            cpu_at_question_s: cpu_time_s,
+            cpu_at_earlier_answer_s: cpu_time_s,
             max_cpus: env.has_cpu_accounting().then_some(env.limits.cpus),
         }
     }
 
     /// Records a question at `asked_at`. Returns the CPU time since the last answer, capped at the maximum that the agent
-    /// can have used until `asked_at`. `read` reads the CPU clock; the call may be later than `asked_at`.
+    /// can have used until `asked_at`. `read_cpu_time_s` reads the agent's CPU time, maybe later than `asked_at`.
     pub fn record_question(
         &mut self,
         asked_at: Instant,
-        read: impl FnOnce() -> Option<f64>,
+        read_cpu_time_s: impl FnOnce() -> Option<f64>,
     ) -> Duration {
         let gap = asked_at.saturating_duration_since(self.answered_at);
         self.cpu_at_earlier_answer_s = self.cpu_at_answer_s;
@@ -48,31 +48,31 @@ impl CpuUsage {
             self.cpu_at_question_s = self.cpu_at_answer_s;
             return Duration::ZERO;
         };
-        self.cpu_at_question_s = read();
+        self.cpu_at_question_s = read_cpu_time_s();
         difference_s(self.cpu_at_answer_s, self.cpu_at_question_s)
             .map(|used_s| Duration::from_secs_f64(used_s).min(gap.mul_f64(max_cpus)))
             .unwrap_or_default()
     }
 
     /// Records an answer at `answered_at`.
-    pub fn record_answer(&mut self, answered_at: Instant, now_s: Option<f64>) {
-        self.cpu_at_answer_s = now_s;
+    pub fn record_answer(&mut self, answered_at: Instant, cpu_time_s: Option<f64>) {
+        self.cpu_at_answer_s = cpu_time_s;
         self.answered_at = answered_at;
     }
 
     /// CPU time since the last question, in seconds.
-    pub fn since_question_s(&self, now_s: Option<f64>) -> Option<f64> {
-        difference_s(self.cpu_at_question_s, now_s)
+    pub fn since_question_s(&self, cpu_time_s: Option<f64>) -> Option<f64> {
+        difference_s(self.cpu_at_question_s, cpu_time_s)
     }
 
     /// CPU time since the answer before the last question, in seconds.
-    pub fn since_answer_s(&self, now_s: Option<f64>) -> Option<f64> {
-        difference_s(self.cpu_at_earlier_answer_s, now_s)
+    pub fn since_answer_s(&self, cpu_time_s: Option<f64>) -> Option<f64> {
+        difference_s(self.cpu_at_earlier_answer_s, cpu_time_s)
     }
 }
 
-fn difference_s(earlier_s: Option<f64>, now_s: Option<f64>) -> Option<f64> {
-    Some((now_s? - earlier_s?).max(0.0))
+fn difference_s(earlier_s: Option<f64>, later_s: Option<f64>) -> Option<f64> {
+    Some((later_s? - earlier_s?).max(0.0))
 }
 
 #[cfg(test)]
@@ -96,15 +96,18 @@ mod tests {
     fn cpu_time_between_answer_and_question_is_measured() {
         let mut cpu = cpu_usage(Some(2.0));
         let asked_at = cpu.answered_at + MS(10);
-        let close = |a: Duration, b: Duration| a.abs_diff(b) < Duration::from_micros(1);
-        assert!(close(cpu.record_question(asked_at, || Some(1.007)), MS(7)));
-        let now_s = Some(1.009);
-        assert!((cpu.since_question_s(now_s).unwrap() - 0.002).abs() < 1e-9);
-        assert!((cpu.since_answer_s(now_s).unwrap() - 0.009).abs() < 1e-9);
-        cpu.record_answer(asked_at + MS(5), now_s);
+        let is_close = |a: Duration, b: Duration| a.abs_diff(b) < Duration::from_micros(1);
+        assert!(is_close(
+            cpu.record_question(asked_at, || Some(1.007)),
+            MS(7)
+        ));
+        let cpu_time_s = Some(1.009);
+        assert!((cpu.since_question_s(cpu_time_s).unwrap() - 0.002).abs() < 1e-9);
+        assert!((cpu.since_answer_s(cpu_time_s).unwrap() - 0.009).abs() < 1e-9);
+        cpu.record_answer(asked_at + MS(5), cpu_time_s);
         // Time that the kernel charges late cannot have been used within the gap.
         let asked_at = cpu.answered_at + MS(1);
-        assert!(close(cpu.record_question(asked_at, || Some(1.5)), MS(2)));
+        assert!(is_close(cpu.record_question(asked_at, || Some(1.5)), MS(2)));
     }
 
     #[test]

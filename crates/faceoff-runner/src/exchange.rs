@@ -1,5 +1,6 @@
-//! The agent's process and single exchanges with it: this module sends a question (a line of the protocol), waits for the answer until
-//! its limit, and classifies failures as agent fault or platform fault. [`Session`](crate::Session) interprets the lines.
+//! The agent's process and single exchanges with it: this module sends a question (a line of the protocol), waits for
+//! the answer until its limit, and classifies failures as agent fault or platform fault. The *evaluator* is the thread
+//! that asks and waits. [`Session`](crate::Session) interprets the lines.
 
 use crate::{
     bundle::Bundle,

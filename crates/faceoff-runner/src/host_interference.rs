@@ -1,6 +1,6 @@
-//! *Host interference* in the time of an answer: the part in which the agent was ready to run, but the host let others run. It is as much
-//! as the kernel's counters prove, and is determined for late answers only. Before an answer is late, only a baseline (the counters
-//! before the question) is read, which costs a few microseconds.
+//! *Host interference* in the time of an answer: the part in which the agent was ready to run, but the host let others
+//! run. It is as much as the kernel's counters prove, and is determined for late answers only. Before an answer is
+//! late, only a baseline (the counters before the question) is read, which costs a few microseconds.
 
 use faceoff_sandbox::{Baseline, CallerCounters, CpuReading, CpuSamples};
 use std::{
@@ -8,8 +8,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// After this time an answer is late, and the counters are sampled. It is half of the shortest time that costs points. It is also the
-/// maximum lag of the kernel's counters, so that everything that a sample counts happened after the question.
+/// After this time an answer is late, and the counters are sampled. It is half of the shortest time that costs points.
+/// It is also the maximum lag of the kernel's counters, so that everything that a sample counts happened after the
+/// question.
 pub(crate) const LATE_AFTER: Duration = Duration::from_millis(10);
 /// Interval at which the evaluator wakes while an answer is late, so that its own lateness can be measured.
 pub(crate) const SAMPLE_INTERVAL: Duration = Duration::from_millis(5);
@@ -74,8 +75,8 @@ pub(crate) struct WaitCounters {
 }
 
 impl AnswerWait {
-    /// Starts a wait whose limit runs from `asked_at`. `written_at` is the time at which the non-blocking write of the question
-    /// returned.
+    /// Starts a wait whose limit runs from `asked_at`. `written_at` is the time at which the non-blocking write of the
+    /// question returned.
     pub fn begin(
         baseline: Option<Arc<Baseline>>,
         asked_at: Instant,
@@ -228,7 +229,8 @@ mod tests {
     /// `MS(5)` is 5 milliseconds.
     const MS: fn(u64) -> Duration = Duration::from_millis;
 
-    /// The counters of a wait. The evaluator's run delay is long if it has separate CPUs, and unknown otherwise.
+    /// The counters of a wait: how long others ran on the agent's CPUs, and how long the agent ran. The evaluator's run
+    /// delay is long if it has separate CPUs, and unknown otherwise.
     fn counters(
         now: Instant,
         others_ms: u64,
@@ -248,10 +250,10 @@ mod tests {
     fn agents_run_time_is_never_host_interference() {
         let asked_at = Instant::now();
         let wait = AnswerWait::begin(None, asked_at, asked_at, MS(1000));
-        let interference = |others, agent| {
+        let interference = |others_ms, agent_ms| {
             wait.interference(
                 &KernelCounters,
-                counters(asked_at + MS(10), others, agent, false),
+                counters(asked_at + MS(10), others_ms, agent_ms, false),
             )
         };
         assert_eq!(interference(4, 1), MS(4));
@@ -350,10 +352,10 @@ mod tests {
     fn absence_of_the_evaluator_is_not_charged() {
         let asked_at = Instant::now();
         let mut wait = AnswerWait::begin(None, asked_at, asked_at, MS(1000));
-        let interference = |wait: &AnswerWait, waited_ms, ran| {
+        let interference = |wait: &AnswerWait, waited_ms, agent_ms| {
             wait.interference(
                 &KernelCounters,
-                counters(asked_at + MS(waited_ms), 0, ran, false),
+                counters(asked_at + MS(waited_ms), 0, agent_ms, false),
             )
         };
         wait.add_absence(MS(500));

@@ -30,11 +30,11 @@ impl Log {
             self.text.push('\n');
         }
         if self.text.len() > self.limit_bytes {
-            let mut cut = self.text.len() - self.limit_bytes;
-            while !self.text.is_char_boundary(cut) {
-                cut += 1;
+            let mut start = self.text.len() - self.limit_bytes;
+            while !self.text.is_char_boundary(start) {
+                start += 1;
             }
-            self.text.drain(..cut);
+            self.text.drain(..start);
         }
     }
 

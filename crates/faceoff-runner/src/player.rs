@@ -1,4 +1,5 @@
-//! Runs the episodes of one task with one agent, and repeats an episode that *host interference* (other load on the machine) ended.
+//! Runs the episodes of one task with one agent, and repeats an episode that *host interference* (other load on the
+//! machine) ended.
 
 use crate::{
     budget::{EpisodeBudget, ResetBudget},
@@ -24,13 +25,13 @@ pub(crate) struct Player<'a> {
     /// `None` before the first episode and after a fault.
     session: Option<Session<'a>>,
     log: Log,
-    resets: ResetBudget,
+    reset_budget: ResetBudget,
     monitor: &'a dyn InterferenceMonitor,
     reruns: Reruns,
     /// Longest host interference in one answer, in seconds.
     longest_stall_s: f64,
     /// The wait whose timeout ended the last episode.
-    wait: Option<WaitBreakdown>,
+    last_wait: Option<WaitBreakdown>,
     on_host_interference: OnHostInterference,
 }
 
@@ -117,7 +118,7 @@ impl<'a> Player<'a> {
             arena,
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
-            resets: ResetBudget::new(&env.time, episodes),
+            reset_budget: ResetBudget::new(&env.time, episodes),
             monitor,
             reruns: Reruns {
                 count: 0,
@@ -125,14 +126,14 @@ impl<'a> Player<'a> {
                 per_episode: env.time.host_noise_reruns,
             },
             longest_stall_s: 0.0,
-            wait: None,
+            last_wait: None,
             on_host_interference,
         }
     }
 
     /// The wait for the missing answer, if a timeout ended the last episode.
     pub const fn last_wait(&self) -> Option<WaitBreakdown> {
-        self.wait
+        self.last_wait
     }
 
     /// Number of tries dropped so far because of host interference.
@@ -160,7 +161,7 @@ impl<'a> Player<'a> {
         let mut reruns = 0;
         loop {
             let Try { outcome, blame } = self.attempt(episode, max_steps, sink, cancelled)?;
-            self.wait = match blame {
+            self.last_wait = match blame {
                 Blame::Agent => None,
                 Blame::AgentTimeout(wait) | Blame::Host(wait) => Some(wait),
             };
@@ -190,6 +191,7 @@ impl<'a> Player<'a> {
         }
     }
 
+    /// Runs one try of an episode, and starts the agent if it is not running.
     fn attempt(
         &mut self,
         episode: u32,
@@ -208,7 +210,7 @@ impl<'a> Player<'a> {
         let mut session = match session {
             Ok(session) => session,
             Err(StartUpFault { fault, stderr }) => {
-                return Ok(self.fail(running, Phase::StartUp, fault, &stderr));
+                return Ok(self.end_with_fault(running, Phase::StartUp, fault, &stderr));
             }
         };
         let (phase, error) = match self.run_episode(&mut session, episode, &mut running, cancelled)
@@ -223,7 +225,7 @@ impl<'a> Player<'a> {
             Err(failure) => failure,
         };
         match TryFault::new(error) {
-            Ok(fault) => Ok(self.fail(running, phase, fault, &session.abort())),
+            Ok(fault) => Ok(self.end_with_fault(running, phase, fault, &session.abort())),
             Err(fault) => {
                 self.session = Some(session);
                 Err(fault)
@@ -232,7 +234,7 @@ impl<'a> Player<'a> {
     }
 
     /// Ends the episode with a fault, and logs it.
-    fn fail(
+    fn end_with_fault(
         &mut self,
         running: DynEpisode<'_>,
         phase: Phase,
@@ -285,7 +287,7 @@ impl<'a> Player<'a> {
     ) -> Result<EpisodeOutcome, (Phase, SessionError)> {
         self.reset(session, episode)
             .map_err(|error| (Phase::Reset, error))?;
-        self.steps(session, running, cancelled)
+        self.play_steps(session, running, cancelled)
             .and_then(|outcome| {
                 session.end(episode, outcome.steps)?;
                 Ok(outcome)
@@ -293,12 +295,13 @@ impl<'a> Player<'a> {
             .map_err(|error| (Phase::Step, error))
     }
 
-    /// Announces an episode. The time until the answer, without host interference, counts towards the budget, even if no answer comes.
+    /// Announces an episode. The time until the answer, without host interference, counts towards the budget, even if
+    /// no answer comes.
     fn reset(&mut self, session: &mut Session<'_>, episode: u32) -> Result<(), SessionError> {
-        self.resets.check()?;
+        self.reset_budget.check()?;
         let asked_at = Instant::now();
         let timing = session.reset(episode);
-        self.resets.spend(match &timing {
+        self.reset_budget.spend(match &timing {
             Ok(timing) => timing.computation_time_s,
             Err(
                 SessionError::TimedOut { wait, .. } | SessionError::HostInterference { wait, .. },
@@ -308,10 +311,11 @@ impl<'a> Player<'a> {
             }
         });
         timing?;
-        Ok(self.resets.check()?)
+        Ok(self.reset_budget.check()?)
     }
 
-    fn steps(
+    /// Plays the control steps of an episode until its end.
+    fn play_steps(
         &mut self,
         session: &mut Session<'_>,
         running: &mut DynEpisode<'_>,

@@ -1,4 +1,5 @@
-//! The *validation run* of a submission: a few episodes of each task, which show whether the agent starts, answers and keeps real time.
+//! The *validation run* of a submission: a few episodes of each task, which show whether the agent starts, answers and
+//! keeps real time.
 
 use crate::{
     bundle::Bundle,
@@ -92,9 +93,9 @@ impl fmt::Display for ValidationFailure {
 /// the episodes and their number, so that an agent cannot distinguish this run from an evaluation.
 ///
 /// # Errors
-/// Platform faults only; an agent fault is in the report. [`PlatformFault::Cancelled`] if `cancelled`, which is called before each
-/// step, returned `true`. [`PlatformFault::HostBusy`] if host interference ended an episode in all allowed tries; then there is no
-/// verdict on the agent.
+/// Platform faults only; an agent fault is in the report. [`PlatformFault::Cancelled`] if `cancelled`, which is called
+/// before each step, returned `true`. [`PlatformFault::HostBusy`] if host interference ended an episode in all allowed
+/// tries; then there is no verdict on the agent.
 pub fn validate(
     spec: &ValidationSpec,
     bundle: &Bundle,
@@ -189,6 +190,7 @@ impl TaskPlan {
     const SHARDS: u32 = 20;
 
     fn new(spec: &ValidationSpec, task: Task) -> Self {
+        // The label “smoke” is part of the seed: another one would change the episodes.
         let derived = spec.seed.derive("smoke", task.as_str().as_bytes());
         let [a, b, c, d, e, f, g, h, ..] = *derived.as_bytes();
         let shard = u32::from_le_bytes([a, b, c, d]) % Self::SHARDS;
@@ -230,6 +232,7 @@ impl Answers {
         let times = self.timings.iter().map(|timing| timing.computation_time_s);
         let mut times_s: Vec<f64> = times.collect();
         times_s.sort_unstable_by(f64::total_cmp);
+        // Nearest rank of the 99th percentile, from 1.
         let rank = (times_s.len() * 99).div_ceil(100);
         let points: f64 = outcomes
             .iter()

@@ -60,9 +60,20 @@ pub(crate) fn wire_env(agent_task: AgentTask) -> Env {
             joint_pos_limit,
             joint_vel_limit,
             joint_acc_limit,
+            // Each frame is a 4×4 matrix, stored row by row as 16 numbers.
             base_frame: base_frame
                 .iter()
-                .map(|m| [0, 4, 8, 12].map(|row| [m[row], m[row + 1], m[row + 2], m[row + 3]]))
+                .map(|matrix| {
+                    let row = |start: usize| {
+                        [
+                            matrix[start],
+                            matrix[start + 1],
+                            matrix[start + 2],
+                            matrix[start + 3],
+                        ]
+                    };
+                    [0, 4, 8, 12].map(row)
+                })
                 .collect(),
         },
         episode_steps,

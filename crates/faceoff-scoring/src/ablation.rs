@@ -1,3 +1,6 @@
+//! The ablation: how much each *profile* (set of perturbations, such as noise or loss of the puck) lowers an agent's success
+//! rate, compared with the *ideal* profile, which has no perturbations.
+
 use crate::{
     interval::wilson95,
     paired::{PairedTally, PairingError},
@@ -11,7 +14,7 @@ use std::{borrow::Borrow, collections::BTreeMap};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ProfileEffect {
-    /// Selects the perturbations.
+    /// The profile that is compared with the ideal one.
     pub profile: Profile,
     /// Episodes simulated under each of the two profiles.
     pub episodes: u32,
@@ -59,7 +62,7 @@ pub fn ablation(
     ideal.borrow().tasks.iter().map(effects_of).collect()
 }
 
-/// The ideal profile is A of `tally`, `profile` is B.
+/// The effect of `profile`. In `tally`, A is the ideal profile and B is `profile`.
 fn effect(profile: Profile, tally: &PairedTally, penalty_points: f64) -> ProfileEffect {
     let (episodes, successes) = (tally.episodes(), tally.both + tally.only_b);
     let rate = |successes: u32| f64::from(successes) / f64::from(episodes);
@@ -86,6 +89,7 @@ mod tests {
         EpisodeSummary::from_outcomes(outcomes, &Default::default()).unwrap()
     }
 
+    /// Outcomes with these successes; each failed episode has the 3 penalty points of an end effector violation.
     fn run(task: Task, successes: &[bool]) -> Vec<EpisodeOutcome> {
         (0..)
             .zip(successes)
@@ -109,13 +113,13 @@ mod tests {
     fn profile_is_compared_with_ideal_on_same_episodes() {
         let mut ideal = run(Task::Hit, &[true; 8]);
         ideal.extend(run(Task::Prepare, &[true, false]));
-        let mut lost = run(
+        let mut tracking_loss = run(
             Task::Hit,
             &[false, false, false, false, false, false, true, true],
         );
-        lost.extend(run(Task::Prepare, &[false, true]));
+        tracking_loss.extend(run(Task::Prepare, &[false, true]));
         let runs = BTreeMap::from([
-            (Profile::TrackingLoss, summary(&lost)),
+            (Profile::TrackingLoss, summary(&tracking_loss)),
             (Profile::Ideal, summary(&ideal)),
         ]);
         let tasks = ablation(&runs).unwrap();
@@ -157,7 +161,7 @@ mod tests {
             (Profile::Evaluation, other_task),
         ]);
         assert_eq!(ablation(&runs), unpaired(Task::Hit, 0));
-        let none = BTreeMap::<_, EpisodeSummary>::new();
-        assert!(ablation(&none).unwrap().is_empty());
+        let no_runs = BTreeMap::<_, EpisodeSummary>::new();
+        assert!(ablation(&no_runs).unwrap().is_empty());
     }
 }

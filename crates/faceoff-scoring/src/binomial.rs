@@ -12,8 +12,8 @@ pub(crate) struct SymmetricBinomial {
 impl SymmetricBinomial {
     pub(crate) fn new(n: u32) -> Self {
         let n = n as usize;
-        // C(n, k) relative to the middle one, from the middle outwards. Values below 1e-308 of the middle one
-        // underflow to 0, which does not matter.
+        // First the binomial coefficients C(n, k), divided by the largest one, C(n, n / 2), from the middle outwards.
+        // Quotients below 1e-308 underflow to 0, which does not matter.
         let mut pmf = vec![0.0; n + 1];
         let middle = n / 2;
         pmf[middle] = 1.0;
@@ -58,17 +58,17 @@ mod tests {
     fn tails_agree_with_exact_integers() {
         for n in 0..=60u32 {
             let tosses = SymmetricBinomial::new(n);
-            let mut choose: u128 = 1; // C(n, n)
+            let mut coefficient: u128 = 1; // C(n, k), first for k = n
             let mut tail: u128 = 0;
             for k in (0..=n).rev() {
-                tail += choose;
+                tail += coefficient;
                 let exact = tail as f64 / 2f64.powi(n as i32);
                 let got = tosses.at_least(i128::from(k));
                 assert!(
                     (got - exact).abs() <= 1e-13 * exact,
                     "n = {n}, k = {k}: {got} / {exact}"
                 );
-                choose = choose * u128::from(k) / u128::from(n - k + 1);
+                coefficient = coefficient * u128::from(k) / u128::from(n - k + 1);
             }
         }
     }
@@ -77,9 +77,10 @@ mod tests {
     fn tails_agree_with_statrs() {
         for n in [100u32, 999, 2000] {
             let tosses = SymmetricBinomial::new(n);
-            let other = Binomial::new(0.5, u64::from(n)).unwrap();
+            let reference = Binomial::new(0.5, u64::from(n)).unwrap();
             for k in (1..=n).step_by(7) {
-                let (got, want) = (tosses.at_least(i128::from(k)), other.sf(u64::from(k) - 1));
+                let got = tosses.at_least(i128::from(k));
+                let want = reference.sf(u64::from(k) - 1);
                 assert!(
                     (got - want).abs() < 1e-10,
                     "n = {n}, k = {k}: {got} / {want}"

@@ -1,7 +1,10 @@
+//! Boards: evaluations ranked by tier, score, penalty points and time of submission. A *tier* says how safe an agent is:
+//! deployable, improvable or non-deployable.
+
 use faceoff_types::{EvaluationResult, Task, Tier};
 use std::cmp::Ordering;
 
-/// An evaluation that a board ranks.
+/// An evaluation (one agent's run of all tasks) that a board ranks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardEntry<K> {
     /// Identifies the row for the caller.
@@ -36,11 +39,11 @@ impl BoardKey {
     /// Rows with a number that is not finite are last in their tier. The scoring of this crate produces none.
     pub(crate) fn new(tier: Tier, score: f64, penalty_points: f64, submitted_at_ms: i64) -> Self {
         // Adding 0 turns −0 into 0: `total_cmp` distinguishes them.
-        let finite_or = |number: f64, last: f64| {
+        let finite_or = |number: f64, worst: f64| {
             if number.is_finite() {
                 number + 0.0
             } else {
-                last
+                worst
             }
         };
         Self {
@@ -80,14 +83,15 @@ pub fn task_board<K>(task: Task, entries: Vec<BoardEntry<K>>) -> Vec<RankedEntry
     })
 }
 
+/// Ranks the entries. `sort_values` gives an entry's tier, score and penalty points, or `None` to leave the entry out.
 fn ranked<K>(
     entries: Vec<BoardEntry<K>>,
-    by: impl Fn(&EvaluationResult) -> Option<(Tier, f64, f64)>,
+    sort_values: impl Fn(&EvaluationResult) -> Option<(Tier, f64, f64)>,
 ) -> Vec<RankedEntry<K>> {
     let mut keyed: Vec<_> = entries
         .into_iter()
         .filter_map(|entry| {
-            let (tier, score, penalty_points) = by(&entry.result)?;
+            let (tier, score, penalty_points) = sort_values(&entry.result)?;
             Some((
                 BoardKey::new(tier, score, penalty_points, entry.submitted_at_ms),
                 entry,

@@ -1,3 +1,6 @@
+//! Comparison of two evaluations, A and B. On the same episodes (same seeds, rules and *profile*, which is the set of
+//! perturbations of the simulation), the comparison is paired: each episode of A is matched with the same one of B.
+
 use crate::{
     difference::{paired_difference, score_difference, unpaired_difference},
     evaluation::overall_score,
@@ -8,18 +11,18 @@ use faceoff_types::{Profile, Seed, Task, TaskWeights, Variation, deprecated_name
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// An evaluation with what a comparison depends on: rules, seeds and the results of its episodes.
+/// An evaluation for a comparison: its rules, seeds and the results of its episodes.
 #[derive(Debug, Clone, Copy)]
 pub struct ComparedEvaluation<'a> {
-    /// Name of the ruleset that it was scored by.
+    /// Name of the ruleset that scored the evaluation.
     pub ruleset: &'a str,
-    /// Selects the perturbations.
+    /// The perturbation profile: a named set of disturbances of the simulation.
     pub profile: Profile,
     /// Deviations from the ruleset in perturbations and scoring.
     pub variation: &'a Variation,
     /// The evaluation's seed; on a server, that of the evaluation day.
     pub seed: Seed,
-    /// The seed of the season's model mismatch.
+    /// The seed of the season's model mismatch: how the simulated robot differs from the robot model that teams have.
     pub mismatch_seed: Seed,
     /// Results of the episodes.
     pub summary: &'a EpisodeSummary,
@@ -99,14 +102,15 @@ pub struct TaskComparison {
     pub success_rate_b: f64,
     /// Success rate of A minus that of B.
     pub difference: f64,
-    /// Its 95 % interval for paired data: Newcombe's score interval (method 10).
+    /// 95 % interval of the difference for paired data: Newcombe's score interval (method 10).
     #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub difference_ci95: [f64; 2],
-    /// McNemar's exact test, two-sided.
+    /// P-value of McNemar's exact test, two-sided.
     pub p_value: f64,
     /// Is `p_value` at most [`SIGNIFICANCE`]?
     pub significant: bool,
 }
+// `told_apart` is the former JSON name of `significant`.
 deprecated_names!(TaskComparison { told_apart => significant });
 
 /// The overall scores of two evaluations on the same episodes.
@@ -120,7 +124,7 @@ pub struct OverallComparison {
     pub score_b: f64,
     /// Score of A minus that of B, in percentage points.
     pub difference: f64,
-    /// Its 95 % interval: the weighted intervals of the tasks, combined by the square-and-add method.
+    /// 95 % interval of the difference: the weighted intervals of the tasks, combined by the square-and-add method.
     #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub difference_ci95: [f64; 2],
     /// The exact paired test of the weighted score ([`overall_p_value`]).
@@ -128,6 +132,7 @@ pub struct OverallComparison {
     /// Is `p_value` at most [`SIGNIFICANCE`]?
     pub significant: bool,
 }
+// `told_apart` is the former JSON name of `significant`.
 deprecated_names!(OverallComparison { told_apart => significant });
 
 impl ComparedEvaluation<'_> {
@@ -176,29 +181,29 @@ impl ComparedEvaluation<'_> {
         })
     }
 
-    /// Do the two differ significantly, at [`SIGNIFICANCE`], in one task or in the overall score?
+    /// Do the two differ significantly, at [`SIGNIFICANCE`], in one task or (`None`) in the overall score?
     ///
-    /// On the same episodes this is the paired test. On other episodes of the same kind (another day) it is whether the
-    /// 95 % interval of the difference, for independent episodes, excludes zero. Under different rules or
-    /// perturbations it is always true, since there is no evidence of a tie.
+    /// On the same episodes the paired test decides. On other episodes of the same kind (another day) the 95 % interval of
+    /// the difference, for independent episodes, decides: zero must lie outside of it. Under different rules or
+    /// perturbations the result is always true, since there is no evidence of a tie.
     #[must_use]
     pub fn differs_significantly(&self, other: &Self, task: Option<Task>) -> bool {
-        let is_selected = |any: &Task| task.is_none_or(|task| task == *any);
+        let is_selected = |candidate: &Task| task.is_none_or(|task| task == *candidate);
         match self.paired_tallies(other) {
             Ok(mut tallies) => {
-                tallies.retain(|any, _| is_selected(any));
+                tallies.retain(|candidate, _| is_selected(candidate));
                 overall_p_value(&self.weights_of(task), &tallies) <= SIGNIFICANCE
             }
             Err(NotComparable::Seed | NotComparable::Episodes(..)) => {
-                let differences = self.summary.tasks.iter().filter_map(|(any, a)| {
-                    let b = other.summary.tasks.get(any)?;
-                    let counts =
-                        [a, b].map(|side| [side.successes.count(), side.successes.episodes()]);
-                    Some((*any, unpaired_difference(counts[0], counts[1])))
+                let differences = self.summary.tasks.iter().filter_map(|(candidate, a)| {
+                    let b = other.summary.tasks.get(candidate)?;
+                    let [a, b] = [a, b]
+                        .map(|summary| [summary.successes.count(), summary.successes.episodes()]);
+                    Some((*candidate, unpaired_difference(a, b)))
                 });
                 score_difference(
                     &self.weights_of(task),
-                    differences.filter(|(any, _)| is_selected(any)),
+                    differences.filter(|(candidate, _)| is_selected(candidate)),
                 )
                 .excludes_zero()
             }
@@ -206,7 +211,8 @@ impl ComparedEvaluation<'_> {
         }
     }
 
-    /// The weights for a test. For a single task its weight does not matter, even if it is zero.
+    /// The weights for a test. The default weights serve for a single task: they are not zero, and their size does not
+    /// matter.
     fn weights_of(&self, task: Option<Task>) -> TaskWeights {
         match task {
             None => self.variation.weights,
@@ -214,6 +220,7 @@ impl ComparedEvaluation<'_> {
         }
     }
 
+    /// The overall score in percent.
     fn score(&self) -> f64 {
         overall_score(
             &self.variation.weights,
@@ -225,6 +232,7 @@ impl ComparedEvaluation<'_> {
         )
     }
 
+    /// Counts for each task the episodes that both, one or neither solved.
     fn paired_tallies(&self, other: &Self) -> Result<BTreeMap<Task, PairedTally>, NotComparable> {
         if self.ruleset != other.ruleset {
             return Err(NotComparable::Ruleset(
@@ -249,10 +257,11 @@ impl ComparedEvaluation<'_> {
             return Err(NotComparable::MismatchSeed);
         }
         let (a, b) = (&self.summary.tasks, &other.summary.tasks);
-        let unshared = |a: &BTreeMap<Task, _>, b: &BTreeMap<Task, _>| {
-            a.keys().find(|task| !b.contains_key(task)).copied()
+        let first_missing = |incomplete: &BTreeMap<Task, _>, tasks: &BTreeMap<Task, _>| {
+            let mut names = tasks.keys();
+            names.find(|task| !incomplete.contains_key(task)).copied()
         };
-        if let Some(task) = unshared(a, b).or_else(|| unshared(b, a)) {
+        if let Some(task) = first_missing(b, a).or_else(|| first_missing(a, b)) {
             return Err(NotComparable::Tasks(task));
         }
         if self.seed != other.seed {

@@ -1,5 +1,7 @@
-//! Intervals of differences by the square-and-add method: the margin of a sum is the root of the summed squares of the
-//! margins of its parts (Newcombe, Statistics in Medicine 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
+//! 95 % intervals of the differences between two evaluations, A and B, in success rates and overall scores.
+//!
+//! They use the square-and-add method: the margin of a sum is the root of the summed squares of the margins of its parts
+//! (Newcombe, Statistics in Medicine 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
 
 use crate::{evaluation::weight_percent, interval::wilson95, paired::PairedTally};
 use faceoff_types::{Task, TaskWeights};
@@ -33,7 +35,7 @@ impl Estimate {
         self.high - self.value
     }
 
-    /// `a − b` of two rates whose episodes correlate with `phi`; 0 for independent ones.
+    /// `a − b` of two rates; `phi` is the correlation of their episodes' successes, 0 for independent episodes.
     fn difference(a: Self, b: Self, phi: f64) -> Self {
         let margin = |a: f64, b: f64| (a * a - 2.0 * phi * a * b + b * b).max(0.0).sqrt();
         let value = a.value - b.value;
@@ -57,8 +59,8 @@ pub(crate) fn paired_difference(tally: &PairedTally) -> Estimate {
     Estimate::difference(Estimate::rate(a, n), Estimate::rate(b, n), phi(tally))
 }
 
-/// The correlation of the successes of A and B, shrunk towards 0 if it is positive: a correlation that may be due to
-/// chance must not narrow the interval.
+/// The phi coefficient: the correlation of the successes of A and B. A positive one is shrunk towards 0, since a
+/// correlation that may be due to chance must not narrow the interval.
 fn phi(tally: &PairedTally) -> f64 {
     let [both, only_a, only_b, neither] =
         [tally.both, tally.only_a, tally.only_b, tally.neither].map(f64::from);
@@ -137,7 +139,8 @@ mod tests {
     /// The probability that the interval contains the true difference, summed over all possible results of 24 episodes.
     #[test]
     fn paired_interval_has_about_nominal_coverage() {
-        const N: u32 = 24;
+        const EPISODES: u32 = 24;
+        // Probabilities that both, only A, only B or neither solve an episode.
         for cells in [
             [0.3, 0.2, 0.2, 0.3],
             [0.5, 0.25, 0.05, 0.2],
@@ -146,21 +149,26 @@ mod tests {
             [0.05, 0.6, 0.05, 0.3],
         ] {
             let truth = cells[1] - cells[2];
-            // The cells in sequence, each conditional on the earlier ones.
+            // The multinomial probability is a product of binomial ones: both, then only A, then only B, each among the
+            // remaining episodes.
             let probability =
                 |p: f64, n: u32, k: u32| Binomial::new(p, u64::from(n)).unwrap().pmf(u64::from(k));
             let mut covered = 0.0;
-            for both in 0..=N {
-                for only_a in 0..=N - both {
-                    for only_b in 0..=N - both - only_a {
-                        let counts = tally(both, only_a, only_b, N - both - only_a - only_b);
+            for both in 0..=EPISODES {
+                for only_a in 0..=EPISODES - both {
+                    for only_b in 0..=EPISODES - both - only_a {
+                        let counts = tally(both, only_a, only_b, EPISODES - both - only_a - only_b);
                         let difference = paired_difference(&counts);
                         if difference.low <= truth && truth <= difference.high {
-                            let rest = 1.0 - cells[0];
-                            let left = N - both;
-                            covered += probability(cells[0], N, both)
-                                * probability(cells[1] / rest, left, only_a)
-                                * probability(cells[2] / (rest - cells[1]), left - only_a, only_b);
+                            let not_both = 1.0 - cells[0];
+                            let remaining = EPISODES - both;
+                            covered += probability(cells[0], EPISODES, both)
+                                * probability(cells[1] / not_both, remaining, only_a)
+                                * probability(
+                                    cells[2] / (not_both - cells[1]),
+                                    remaining - only_a,
+                                    only_b,
+                                );
                         }
                     }
                 }
@@ -171,16 +179,19 @@ mod tests {
 
     #[test]
     fn score_interval_weights_tasks() {
-        let one = Estimate {
+        let task_difference = Estimate {
             value: 0.1,
             low: 0.0,
             high: 0.3,
         };
-        let score = score_difference(&TaskWeights::default(), Task::ALL.map(|task| (task, one)));
+        let score = score_difference(
+            &TaskWeights::default(),
+            Task::ALL.map(|task| (task, task_difference)),
+        );
         assert!((score.value - 10.0).abs() < 1e-12);
-        // √(40² + 40² + 20²) = 60
+        // With the default weights 40, 40 and 20 the margins are √(40² + 40² + 20²) = 60 times those of one task.
         assert!((score.low - 4.0).abs() < 1e-12, "{score:?}");
         assert!((score.high - 22.0).abs() < 1e-12, "{score:?}");
-        assert!(score.excludes_zero() && !one.excludes_zero());
+        assert!(score.excludes_zero() && !task_difference.excludes_zero());
     }
 }

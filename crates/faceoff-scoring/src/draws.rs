@@ -5,18 +5,19 @@ use faceoff_types::Seed;
 /// Random numbers from an endless stream of bytes.
 pub(crate) struct Draws {
     stream: blake3::OutputReader,
-    buffer: Box<[u8; Self::BYTES]>,
+    buffer: Box<[u8; Self::BUFFER_BYTES]>,
+    /// Bytes of `buffer` that are consumed.
     used: usize,
 }
 
 impl Draws {
-    const BYTES: usize = 16 * 1024;
+    const BUFFER_BYTES: usize = 16 * 1024;
 
     pub(crate) fn new(stream: blake3::OutputReader) -> Self {
         Self {
             stream,
-            buffer: Box::new([0; Self::BYTES]),
-            used: Self::BYTES,
+            buffer: Box::new([0; Self::BUFFER_BYTES]),
+            used: Self::BUFFER_BYTES,
         }
     }
 
@@ -27,7 +28,7 @@ impl Draws {
 
     /// A uniform number below `n`. Its bias of at most n / 2³² is negligible for thousands of resamples.
     pub(crate) fn below(&mut self, n: u32) -> usize {
-        if self.used == Self::BYTES {
+        if self.used == Self::BUFFER_BYTES {
             self.stream.fill(&mut self.buffer[..]);
             self.used = 0;
         }
@@ -40,8 +41,8 @@ impl Draws {
     /// Shuffles `items` (Fisher and Yates).
     pub(crate) fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
-            let among = u32::try_from(last + 1).expect("a list of teams is short");
-            items.swap(last, self.below(among));
+            let candidates = u32::try_from(last + 1).expect("a list of teams is short");
+            items.swap(last, self.below(candidates));
         }
     }
 }

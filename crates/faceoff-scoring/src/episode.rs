@@ -1,3 +1,6 @@
+//! Penalty points of one episode, for violated safety limits, slow answers and agent faults (an agent that crashed or
+//! answered invalidly).
+
 use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
 
 /// Penalty points for an end effector outside its bounds (paper §2.2).
@@ -17,19 +20,19 @@ pub const MAX_EPISODE_PENALTY: f64 =
 /// One control step in seconds, the time limit of an answer.
 const STEP_S: f64 = 0.02;
 
-/// Limits of the slowest answer of an episode in seconds; beyond each the penalty is higher.
+/// Limits of the slowest answer of an episode in seconds; beyond them the penalty is 0.5, 1 and 2 points.
 pub const COMPUTATION_TIME_LIMITS_S: [f64; 3] = [STEP_S, 5.0 * STEP_S, 10.0 * STEP_S];
 
 /// Penalty points for the computation times of one episode: 0, 0.5, 1 or 2 (reference implementation, within the
 /// paper's "0.5–2 pts").
 #[must_use]
 pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
-    let [late, later, latest] = COMPUTATION_TIME_LIMITS_S;
-    if time.max_s > latest || time.mean_s > STEP_S {
+    let [half_point_s, one_point_s, two_points_s] = COMPUTATION_TIME_LIMITS_S;
+    if time.max_s > two_points_s || time.mean_s > STEP_S {
         COMPUTATION_TIME_MAX_POINTS
-    } else if time.max_s > later {
+    } else if time.max_s > one_point_s {
         1.0
-    } else if time.max_s > late {
+    } else if time.max_s > half_point_s {
         0.5
     } else {
         0.0
@@ -76,20 +79,20 @@ pub(crate) fn violation_points(violations: &Violations) -> f64 {
 mod tests {
     use super::*;
 
-    fn time(mean_s: f64, max_s: f64) -> f64 {
+    fn penalty(mean_s: f64, max_s: f64) -> f64 {
         computation_time_penalty(&ComputationTime { mean_s, max_s })
     }
 
     #[test]
     fn computation_time_penalty_uses_maximum_and_mean() {
-        assert_eq!(time(0.0, 0.0), 0.0);
-        assert_eq!(time(0.001, 0.02), 0.0, "the limit itself is in time");
-        assert_eq!(time(0.001, 0.020_000_1), 0.5);
-        assert_eq!(time(0.001, 0.1), 0.5);
-        assert_eq!(time(0.001, 0.100_000_1), 1.0);
-        assert_eq!(time(0.02, 0.2), 1.0);
-        assert_eq!(time(0.001, 0.200_000_1), 2.0);
-        assert_eq!(time(0.020_000_1, 0.021), 2.0, "late on average");
+        assert_eq!(penalty(0.0, 0.0), 0.0);
+        assert_eq!(penalty(0.001, 0.02), 0.0, "the limit itself is in time");
+        assert_eq!(penalty(0.001, 0.020_000_1), 0.5);
+        assert_eq!(penalty(0.001, 0.1), 0.5);
+        assert_eq!(penalty(0.001, 0.100_000_1), 1.0);
+        assert_eq!(penalty(0.02, 0.2), 1.0);
+        assert_eq!(penalty(0.001, 0.200_000_1), 2.0);
+        assert_eq!(penalty(0.020_000_1, 0.021), 2.0, "late on average");
     }
 
     #[test]

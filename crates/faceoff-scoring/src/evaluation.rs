@@ -1,3 +1,5 @@
+//! The score of an evaluation (a team's run of all tasks) from the results of its tasks.
+
 use faceoff_types::{
     EvaluationResult, Profile, Ruleset, Seed, Task, TaskResult, TaskWeights, Tier, Variation,
 };
@@ -5,6 +7,7 @@ use std::collections::BTreeMap;
 
 /// Weight of a task's success rate in the overall score, in percent.
 pub(crate) fn weight_percent(weights: &TaskWeights, task: Task) -> f64 {
+    // `count` is in millionths of the total weight.
     f64::from(weights.of(task).count()) / 1e4
 }
 
@@ -70,16 +73,16 @@ mod tests {
                 100.0
             );
         }
-        let defends: TaskWeights = "0,1,0".parse().unwrap();
+        let defend_only: TaskWeights = "0,1,0".parse().unwrap();
         let rates = [(Task::Hit, 0.9), (Task::Defend, 0.25)];
-        assert_eq!(overall_score(&defends, rates), 25.0);
+        assert_eq!(overall_score(&defend_only, rates), 25.0);
     }
 
     #[test]
     fn mathematically_equal_scores_are_equal() {
         let score =
             |rates| overall_score(&TaskWeights::default(), Task::ALL.into_iter().zip(rates));
-        let (one, other) = (score([0.1, 0.2, 0.3]), score([0.3, 0.1, 0.1]));
-        assert_eq!((one, other), (18.0, 18.0));
+        assert_eq!(score([0.1, 0.2, 0.3]), 18.0);
+        assert_eq!(score([0.3, 0.1, 0.1]), 18.0);
     }
 }

@@ -1,5 +1,7 @@
+//! 95 % intervals of success rates.
+
 /// The standard normal distribution's 97.5 % point.
-const Z: f64 = 1.959_963_984_540_054;
+const Z_97_5: f64 = 1.959_963_984_540_054;
 
 /// The 95 % Wilson score interval of a success rate, as fractions; [0, 1] without episodes.
 ///
@@ -23,9 +25,9 @@ pub fn wilson95_of_rate(rate: f64, episodes: u32) -> [f64; 2] {
         return [0.0, 1.0];
     }
     let n = f64::from(episodes);
-    let centre = rate + Z * Z / (2.0 * n);
-    let half_width = Z * (rate * (1.0 - rate) / n + Z * Z / (4.0 * n * n)).sqrt();
-    let scale = 1.0 + Z * Z / n;
+    let centre = rate + Z_97_5 * Z_97_5 / (2.0 * n);
+    let half_width = Z_97_5 * (rate * (1.0 - rate) / n + Z_97_5 * Z_97_5 / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + Z_97_5 * Z_97_5 / n;
     // For rates 0 and 1 one bound is exact in theory; rounding must not change it.
     let low = if rate <= 0.0 {
         0.0
@@ -51,10 +53,10 @@ mod tests {
         for (successes, episodes) in [(7, 50), (25, 50), (549, 1000), (1, 3)] {
             let n = f64::from(episodes);
             let rate = f64::from(successes) / n;
-            for end in wilson95(successes, episodes) {
-                let deviations = (rate - end).abs() / (end * (1.0 - end) / n).sqrt();
+            for bound in wilson95(successes, episodes) {
+                let deviations = (rate - bound).abs() / (bound * (1.0 - bound) / n).sqrt();
                 assert!(
-                    (deviations - Z).abs() < 1e-9,
+                    (deviations - Z_97_5).abs() < 1e-9,
                     "{successes} of {episodes}: {deviations}"
                 );
             }
@@ -74,10 +76,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn interval_contains_rate_within_0_and_1(n in 1u32..5000, part in 0.0..=1.0f64) {
-            let successes = (part * f64::from(n)) as u32;
-            let rate = f64::from(successes) / f64::from(n);
-            let [low, high] = wilson95(successes, n);
+        fn interval_contains_rate_within_0_and_1(episodes in 1u32..5000, share in 0.0..=1.0f64) {
+            let successes = (share * f64::from(episodes)) as u32;
+            let rate = f64::from(successes) / f64::from(episodes);
+            let [low, high] = wilson95(successes, episodes);
             prop_assert!(0.0 <= low && low <= rate && rate <= high && high <= 1.0);
         }
     }

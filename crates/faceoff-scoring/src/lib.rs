@@ -1,4 +1,9 @@
-//! Scoring: outcomes → penalty points → tiers → boards → standings, with intervals and paired tests.
+//! Scoring of evaluations: outcomes of episodes → penalty points → tiers → boards; and of tournaments: games → standings
+//! and ratings. Both with intervals and tests of differences.
+//!
+//! An *outcome* is the result of one simulated episode. *Penalty points* are for violated safety limits and late answers; an
+//! agent's *tier* follows from them. A *board* ranks evaluations, *standings* rank the teams of a tournament. "The paper" in this
+//! crate is the report on the robot air hockey competition of 2023, whose rules these are.
 //!
 //! All functions are pure: a stored recording can be scored again without a simulation, and anyone can check a
 //! published number. The rules are those of the rulesets of [`faceoff_types::Ruleset`]; `docs/rules.md` explains them.

@@ -12,7 +12,7 @@ use faceoff_types::{
 };
 use std::collections::BTreeMap;
 
-/// Context of the hash that represents the seeds of several days.
+/// Key derivation context (BLAKE3) of the hash that represents the seeds of several days.
 const SEED_CONTEXT: &str = "faceoff-scoring seeds of several days 1";
 
 /// The mean of evaluations with the same rules, tasks and numbers of episodes; `None` if `results` is empty. Success rates
@@ -44,6 +44,7 @@ pub fn mean_result(
     Ok(Some(mean))
 }
 
+/// The mean of one task's results; `days` has one result for each evaluation.
 fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
     let sum = |value: fn(&TaskResult) -> u32| -> u32 {
         days.iter()
@@ -127,6 +128,7 @@ mod tests {
     use crate::tier::tier_of;
     use faceoff_types::{Profile, Tier, Variation};
 
+    /// The result of an evaluation with 100 episodes of the task hit.
     fn day(seed: u64, successes: u32, penalty_points: f64) -> EvaluationResult {
         let task = TaskResult {
             episodes: 100,
@@ -173,8 +175,8 @@ mod tests {
         assert_eq!(mean.score, 20.0);
         assert_eq!((hit.violations.ee, hit.steps), (6, 2000));
         assert!((hit.computation_time_s.mean - 0.05).abs() < 1e-12);
-        let same_days = mean_result(&[&a, &b]).unwrap().unwrap();
-        assert_eq!(mean.seed, same_days.seed);
+        let repetition = mean_result(&[&a, &b]).unwrap().unwrap();
+        assert_eq!(mean.seed, repetition.seed);
         let other_order = mean_result(&[&b, &a]).unwrap().unwrap();
         assert_ne!(mean.seed, other_order.seed);
     }

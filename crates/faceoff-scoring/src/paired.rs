@@ -1,3 +1,5 @@
+//! Paired tests: do two teams, A and B, that played the same episodes differ by more than chance?
+
 use crate::{binomial::SymmetricBinomial, successes::Successes};
 use faceoff_types::{Task, TaskWeights};
 use std::collections::BTreeMap;
@@ -28,7 +30,7 @@ pub enum PairingError {
     /// An episode number was skipped.
     #[error("{0} episode {1} is missing")]
     Missing(Task, u32),
-    /// The first episode that only one agent has.
+    /// The first episode that only one agent played.
     #[error("{0} episode {1} was played by one of the two only")]
     Unpaired(Task, u32),
 }
@@ -83,15 +85,16 @@ impl PairedTally {
 pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTally>) -> f64 {
     // Tasks with weight 0 have no influence.
     let weighted = || {
-        let counts = |task: &Task, tally: &PairedTally| {
+        let has_influence = |task: &Task, tally: &PairedTally| {
             tally.episodes() > 0 && weights.of(*task).count() > 0
         };
         tallies
             .iter()
-            .filter(move |(task, tally)| counts(task, tally))
+            .filter(move |(task, tally)| has_influence(task, tally))
     };
-    let common = weighted().fold(1, |common, (_, tally)| {
-        lcm(common, i128::from(tally.episodes()))
+    // The common denominator of the tasks' success rates: with it all differences are integers.
+    let denominator = weighted().fold(1, |denominator, (_, tally)| {
+        lcm(denominator, i128::from(tally.episodes()))
     });
 
     // Tasks whose episodes have the same weight are combined.
@@ -99,7 +102,7 @@ pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTal
     let mut difference = 0;
     for (task, tally) in weighted() {
         let weight =
-            i128::from(weights.of(*task).count()) * (common / i128::from(tally.episodes()));
+            i128::from(weights.of(*task).count()) * (denominator / i128::from(tally.episodes()));
         *tosses_by_weight.entry(weight).or_default() += tally.only_a + tally.only_b;
         difference += weight * (i128::from(tally.only_a) - i128::from(tally.only_b));
     }
@@ -114,15 +117,17 @@ pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTal
             heads: SymmetricBinomial::new(tosses),
         })
         .collect();
-    // For the last group the tail is looked up, for the others all outcomes are enumerated: the largest is the last.
+    // `tail_probability` looks up the tail of the last group and enumerates all outcomes of the others: the largest group
+    // is therefore the last.
     groups.sort_by_key(|group| group.tosses);
     (2.0 * tail_probability(&groups, difference.abs())).min(1.0)
 }
 
-/// Coin tosses; heads add `weight`, tails subtract it.
+/// Fair coin tosses, one for each episode that only one team solved; heads add `weight`, tails subtract it.
 struct WeightedTosses {
     weight: i128,
     tosses: u32,
+    /// Distribution of the number of heads.
     heads: SymmetricBinomial,
 }
 
@@ -147,6 +152,7 @@ fn tail_probability(groups: &[WeightedTosses], sum: i128) -> f64 {
         .sum()
 }
 
+/// The least common multiple.
 fn lcm(a: i128, b: i128) -> i128 {
     let (mut divisor, mut rest) = (a, b);
     while rest != 0 {
@@ -195,10 +201,10 @@ mod tests {
             [tally(1, 3, 1, 5), tally(2, 0, 2, 3), tally(0, 1, 4, 7)],
             [tally(0, 5, 0, 0), tally(0, 3, 0, 1), tally(0, 0, 3, 3)],
         ];
-        let others = ["0.4,0.4,0.2", "0.2,0.3,0.5", "0,0.7,0.3", "1,0,0"];
+        let all_weights = ["0.4,0.4,0.2", "0.2,0.3,0.5", "0,0.7,0.3", "1,0,0"];
         for (tallies, weights) in cases
             .into_iter()
-            .flat_map(|tallies| others.map(|weights| (tallies, weights)))
+            .flat_map(|tallies| all_weights.map(|weights| (tallies, weights)))
         {
             let weights: TaskWeights = weights.parse().unwrap();
             let tallies: BTreeMap<_, _> = Task::ALL.into_iter().zip(tallies).collect();

@@ -1,3 +1,5 @@
+//! The board of the qualifying stage from a file of published results, `tasks.json`, without the episodes themselves.
+
 use crate::{
     board::BoardKey, episode::MAX_EPISODE_PENALTY, evaluation::overall_score,
     interval::wilson95_of_rate, tier::tier_with_bounds, unique_map::UniqueMap,
@@ -12,7 +14,7 @@ use std::collections::BTreeMap;
 /// Episodes of each task in the qualifying stage (paper §2.2).
 pub const QUALIFYING_EPISODES: u32 = 1000;
 
-/// A team's published results in one task, the minimum for a board.
+/// A team's published results in one task: the numbers that a board needs.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(try_from = "RawTaskScore")]
 pub struct TaskScore {
@@ -62,8 +64,8 @@ pub enum InvalidTaskScore {
     NoEpisodes,
     /// The penalty points are impossible under the rules.
     #[error(
-        "penalty_points: expected 0 to {most} ({MAX_EPISODE_PENALTY} for each of {episodes} episodes), got {points}",
-        most = MAX_EPISODE_PENALTY * f64::from(*.episodes)
+        "penalty_points: expected 0 to {maximum} ({MAX_EPISODE_PENALTY} for each of {episodes} episodes), got {points}",
+        maximum = MAX_EPISODE_PENALTY * f64::from(*.episodes)
     )]
     PenaltyPoints {
         /// Penalty points in the file.

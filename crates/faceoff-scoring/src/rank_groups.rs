@@ -1,3 +1,5 @@
+//! Rank groups: adjacent teams of a board that cannot be distinguished statistically.
+
 use crate::board::RankedEntry;
 
 /// Rank groups of a board: adjacent rows that are statistically tied with the leader of their group.

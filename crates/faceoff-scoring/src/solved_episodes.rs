@@ -1,3 +1,5 @@
+//! The episodes that each of two compared evaluations solved, by number.
+
 use crate::{ComparedEvaluation, NotComparable};
 use faceoff_types::Task;
 use serde::{Deserialize, Serialize};
@@ -28,8 +30,8 @@ impl ComparedEvaluation<'_> {
     ) -> Result<BTreeMap<Task, SolvedEpisodes>, NotComparable> {
         // Checks that the episodes are the same.
         self.compare(other)?;
-        let sides = self.summary.tasks.iter().zip(other.summary.tasks.values());
-        Ok(sides
+        let tasks = self.summary.tasks.iter().zip(other.summary.tasks.values());
+        Ok(tasks
             .map(|((task, a), b)| {
                 let mut lists = SolvedEpisodes::default();
                 let solved = a.successes.iter().zip(b.successes.iter());

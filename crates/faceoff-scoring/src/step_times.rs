@@ -1,14 +1,18 @@
+//! Statistics of an agent's computation times: mean, 99th percentile and maximum, without storing all times.
+
 use faceoff_types::ComputationTimeSummary;
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-/// Statistics of the computation times of a task's answered steps, in the sequence of the steps: sum, and for maximum and
-/// 99th percentile the largest hundredth of the times. The others are not stored.
+/// Statistics of the computation times of a task's answered steps, added in the sequence of the steps.
+///
+/// Stored are the sum and the largest hundredth of the times, which contains the maximum and the 99th percentile.
 #[derive(Debug, Clone, Default)]
 pub struct StepTimes {
     expected_count: u64,
     count: u64,
     sum_s: f64,
-    /// The largest times, the shortest on top, as bits: these sort like the numbers if none is negative.
+    /// The largest times, the shortest of them on top of the heap. They are stored as the bits of the floating-point
+    /// numbers, which sort like the numbers if none is negative.
     largest: BinaryHeap<Reverse<u64>>,
 }
 
@@ -44,8 +48,8 @@ impl StepTimes {
 
     /// Number of times from the nearest rank of the percentile to the maximum.
     fn retained_count(&self) -> usize {
-        let below = (self.expected_count * 99).div_ceil(100).saturating_sub(1);
-        usize::try_from(self.expected_count - below).unwrap_or(usize::MAX)
+        let below_percentile = (self.expected_count * 99).div_ceil(100).saturating_sub(1);
+        usize::try_from(self.expected_count - below_percentile).unwrap_or(usize::MAX)
     }
 
     /// Mean, 99th percentile (nearest rank) and maximum; zeros without steps.
@@ -55,7 +59,7 @@ impl StepTimes {
     pub(crate) fn summary(&self) -> ComputationTimeSummary {
         assert_eq!(
             self.count, self.expected_count,
-            "as many times are added as are expected"
+            "the number of added times differs from the expected one"
         );
         let (Some(Reverse(p99)), Some(Reverse(max))) =
             (self.largest.peek(), self.largest.iter().min())
@@ -102,6 +106,7 @@ mod tests {
     fn memory_is_a_hundredth_of_times() {
         let mut times = StepTimes::for_steps(1_000_000);
         for index in 0..1_000_000u32 {
+            // 7919 is a prime: the times 0 to 7918 repeat without a pattern that fits 1,000,000.
             times.add(f64::from(index % 7919));
             assert!(times.largest.len() <= 10_001);
         }

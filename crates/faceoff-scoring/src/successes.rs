@@ -1,3 +1,5 @@
+//! The solved episodes of a task, stored as one bit per episode.
+
 use serde::{Deserialize, Serialize};
 
 /// The solved episodes of a task as a bit set over the episodes 0, 1, … n − 1.
@@ -20,11 +22,12 @@ impl TryFrom<RawSuccesses> for Successes {
     type Error = &'static str;
 
     fn try_from(RawSuccesses { episodes, words }: RawSuccesses) -> Result<Self, Self::Error> {
-        let used = episodes % 64;
-        let stray = words
+        // Bits that the last word uses; 0 if it is full.
+        let used_bits = episodes % 64;
+        let has_surplus_bit = words
             .last()
-            .is_some_and(|last| used > 0 && last >> used != 0);
-        if words.len() != episodes.div_ceil(64) as usize || stray {
+            .is_some_and(|last| used_bits > 0 && last >> used_bits != 0);
+        if words.len() != episodes.div_ceil(64) as usize || has_surplus_bit {
             return Err("expected one bit per episode");
         }
         Ok(Self { episodes, words })
@@ -34,21 +37,21 @@ impl TryFrom<RawSuccesses> for Successes {
 impl FromIterator<bool> for Successes {
     /// Collects one value per episode, in the sequence of the episodes.
     fn from_iter<I: IntoIterator<Item = bool>>(solved: I) -> Self {
-        let mut all = Self {
+        let mut set = Self {
             episodes: 0,
             words: Vec::new(),
         };
         for solved in solved {
-            let bit = all.episodes % 64;
+            let bit = set.episodes % 64;
             if bit == 0 {
-                all.words.push(0);
+                set.words.push(0);
             }
-            if let Some(word) = all.words.last_mut() {
+            if let Some(word) = set.words.last_mut() {
                 *word |= u64::from(solved) << bit;
             }
-            all.episodes += 1;
+            set.episodes += 1;
         }
-        all
+        set
     }
 }
 

@@ -1,3 +1,5 @@
+//! Summaries of an evaluation's episodes: what boards and comparisons need, without the outcome of each episode.
+
 use crate::{
     episode::{episode_penalty, has_fault},
     paired::PairingError,
@@ -37,8 +39,8 @@ impl EpisodeSummary {
     /// previous one.
     pub const VERSION: u32 = 2;
 
-    /// Summarises an evaluation's episodes in any sequence, with tiers by `bounds`. The same episodes give bit-identical
-    /// summaries.
+    /// Summarises an evaluation's episodes, given in any sequence; `bounds` decide the tiers. The same episodes give
+    /// bit-identical summaries.
     ///
     /// # Errors
     /// If the episodes of a task are not 0, 1, … n − 1, each once.
@@ -90,7 +92,7 @@ impl EpisodeSummary {
         })
     }
 
-    /// The probability of another tier in `task`, or overall if it is `None`; 0 for a missing task.
+    /// The probability of another tier in `task`, or of another overall tier if `task` is `None`; 0 for a missing task.
     #[must_use]
     pub fn tier_change_of(&self, task: Option<Task>) -> f64 {
         match task {

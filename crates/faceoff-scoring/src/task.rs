@@ -1,3 +1,5 @@
+//! The result of one task from the outcomes of its episodes.
+
 use crate::{
     episode::{episode_penalty, has_fault, time_or_fault_penalty},
     interval::wilson95,
@@ -6,10 +8,10 @@ use crate::{
 };
 use faceoff_types::{EpisodeOutcome, TaskResult, TierBounds, ViolationCounts};
 
-/// Scores one task from its episodes, with the tier by `bounds`.
+/// Scores one task from its episodes; `bounds` decide the tier.
 ///
-/// `step_times` are the computation times of all answered steps in the sequence of the episodes, so that the result does
-/// not depend on the division into shards.
+/// `step_times` are the computation times of all answered steps in the sequence of the episodes. The result then does not
+/// depend on how the episodes were divided into jobs.
 ///
 /// An episode that ended with an agent fault is a failure and counts as a violation of the computation time.
 ///

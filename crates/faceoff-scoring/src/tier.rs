@@ -1,3 +1,6 @@
+//! Tiers: how safe an agent is, by its *deployability score*, the sum of its penalty points. An agent is deployable,
+//! improvable or non-deployable; the bounds grow with the number of episodes or, in a game, of windows of 500 control steps.
+
 use faceoff_types::{Tier, TierBounds};
 
 /// Highest mean penalty per episode of a deployable agent, in points (paper §2.2: 500 per 1000 episodes of the

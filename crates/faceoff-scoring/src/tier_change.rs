@@ -1,4 +1,5 @@
-//! Uncertainty of a tier: the bootstrap over episodes.
+//! The probability that an agent would get another tier on other episodes of the same kind, estimated by a bootstrap:
+//! many samples of the evaluation's own episodes, drawn with replacement.
 
 use crate::{draws::Draws, episode::MAX_EPISODE_PENALTY, tier::tier_with_bounds};
 use faceoff_types::{Task, Tier, TierBounds};
@@ -11,7 +12,8 @@ pub const TIER_CHANGE_RESAMPLES: u32 = 2000;
 /// Identifies the stream of random draws; a change of the method needs a new name.
 const STREAM: &str = "faceoff-scoring tier change bootstrap 1";
 
-/// Highest penalty in half points: points are multiples of one half, so in half points they are small integers.
+/// Highest penalty of an episode in half points. Penalties are multiples of half a point, so in this unit they are small
+/// integers.
 const MAX_HALVES: f64 = 2.0 * MAX_EPISODE_PENALTY;
 
 /// Probabilities of another tier on other episodes of the same kind.
@@ -50,9 +52,9 @@ impl TierChange {
             let tiers = tasks.iter().map(|(task, task_points)| {
                 let tier = task_points.resampled_tier(&mut draws);
                 if tier != task_points.tier
-                    && let Some(changed) = changed.get_mut(task)
+                    && let Some(count) = changed.get_mut(task)
                 {
-                    *changed += 1;
+                    *count += 1;
                 }
                 tier
             });
@@ -62,11 +64,11 @@ impl TierChange {
                 changed_overall += 1;
             }
         }
-        let share = |changed: u32| f64::from(changed) / f64::from(TIER_CHANGE_RESAMPLES);
+        let share = |count: u32| f64::from(count) / f64::from(TIER_CHANGE_RESAMPLES);
         Self {
             tasks: changed
                 .into_iter()
-                .map(|(task, changed)| (task, share(changed)))
+                .map(|(task, count)| (task, share(count)))
                 .collect(),
             overall: share(changed_overall),
         }
@@ -135,20 +137,21 @@ mod tests {
     /// With one kind of violation the points of a resample are binomial, so the limit of the bootstrap is known.
     #[test]
     fn bootstrap_agrees_with_exact_distribution() {
-        // 3 points each, 1000 episodes: deployable up to 166, improvable up to 500
-        for (violated, stays_low, stays_high) in [
+        // With 3 points for each violated episode and 1000 episodes, the tier is deployable up to 166 violated episodes and
+        // improvable up to 500. The last two numbers are the fewest and the most with the same tier as `violated`.
+        for (violated, fewest, most) in [
             (160, 0, 166),
             (175, 167, 500),
             (480, 167, 500),
             (520, 501, 1000),
         ] {
             let exact = Binomial::new(violated as f64 / 1000.0, 1000).unwrap();
-            let below = if stays_low == 0 {
+            let below = if fewest == 0 {
                 0.0
             } else {
-                exact.cdf(stays_low - 1)
+                exact.cdf(fewest - 1)
             };
-            let expected = 1.0 - (exact.cdf(stays_high) - below);
+            let expected = 1.0 - (exact.cdf(most) - below);
             let got = change(&[(Task::Hit, episodes(1000, violated, 3.0))]).tasks[&Task::Hit];
             assert!(
                 (got - expected).abs() < 0.035,
@@ -169,7 +172,7 @@ mod tests {
 
     #[test]
     fn worst_task_decides_overall_tier_change() {
-        let uncertain = episodes(50, 8, 3.0); // 24 of 25 points
+        let uncertain = episodes(50, 8, 3.0); // 24 points; deployable up to 25
         let alone = change(&[(Task::Hit, uncertain.clone())]);
         assert!((0.2..0.6).contains(&alone.overall), "{alone:?}");
         assert_eq!(alone.overall, alone.tasks[&Task::Hit]);

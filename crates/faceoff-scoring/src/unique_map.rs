@@ -1,3 +1,5 @@
+//! A JSON object whose keys must be unique.
+
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use std::{collections::BTreeSet, fmt, marker::PhantomData, str::FromStr};
 
@@ -30,12 +32,12 @@ where
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
         let mut entries = Vec::new();
-        let mut known = BTreeSet::new();
+        let mut seen_keys = BTreeSet::new();
         while let Some(text) = map.next_key::<String>()? {
             let key: K = text
                 .parse()
                 .map_err(|error| A::Error::custom(format_args!("{text:?}: {error}")))?;
-            if !known.insert(key.clone()) {
+            if !seen_keys.insert(key.clone()) {
                 return Err(A::Error::custom(format_args!("{key} occurs twice")));
             }
             entries.push((key, map.next_value()?));

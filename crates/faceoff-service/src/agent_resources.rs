@@ -1,4 +1,5 @@
-//! Runtimes and resources that this server offers to agents, as far as they are not in the store.
+//! What this server offers to agents: resource limits, CPUs, and runtimes. A *runtime* is an environment in which an agent
+//! runs, for example Python with its packages; its *inventory* lists what is installed in it.
 
 use faceoff_types::{AgentLimits, AgentMachine, RuntimeInventory};
 use std::sync::Arc;
@@ -14,7 +15,7 @@ pub struct AgentResources {
     inventories: watch::Receiver<Option<Arc<Vec<RuntimeInventory>>>>,
 }
 
-/// Publishes the inventories of the runtimes, once.
+/// Publishes the inventories of the runtimes once they have been inspected.
 #[derive(Debug)]
 pub struct InventoryPublisher(watch::Sender<Option<Arc<Vec<RuntimeInventory>>>>);
 
@@ -44,7 +45,7 @@ impl AgentResources {
         Self::with_inventories(AgentLimits::default(), AgentMachine::default(), Vec::new())
     }
 
-    /// Resources with known runtimes.
+    /// Resources whose runtimes have been inspected.
     #[must_use]
     pub fn with_inventories(
         limits: AgentLimits,
@@ -56,10 +57,10 @@ impl AgentResources {
         resources
     }
 
-    /// The inventories by name; waits until they are published. `None` if the inspection was aborted.
+    /// The inventories of all runtimes; waits until they are published. `None` if the inspection was aborted.
     pub(crate) async fn inventories(&self) -> Option<Arc<Vec<RuntimeInventory>>> {
         let mut inventories = self.inventories.clone();
-        let known = inventories.wait_for(Option::is_some).await;
-        known.ok()?.clone()
+        let published = inventories.wait_for(Option::is_some).await;
+        published.ok()?.clone()
     }
 }

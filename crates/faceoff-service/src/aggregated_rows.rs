@@ -1,5 +1,6 @@
-//! Aggregated board rows, and a cache of them. If a stage counts each team's best day, rows are selected from thousands
-//! of results, and change only a few times a day.
+//! Board rows aggregated from several evaluations, and a cache of them. A board ranks the teams of a stage, with one row per
+//! team. Depending on the stage, a row shows one evaluation of the team or the mean of several. Selecting each team's best
+//! evaluation means reading thousands of results, which change only a few times a day.
 
 use crate::problem::Problem;
 use faceoff_scoring::mean_result;
@@ -11,20 +12,23 @@ use std::{
     sync::{Arc, Mutex, MutexGuard},
 };
 
-/// Boards in the cache; a season has some stages, each with a few revisions and four boards.
+/// Boards in the cache. A season has some stages, each with a few revisions of its rules, and each revision has four boards:
+/// one for all tasks together and one per task.
 const MAX_BOARDS: usize = 100;
 
-/// A team's row, aggregated from its evaluations that count.
+/// A team's row, aggregated from the evaluations that count on the board.
 #[derive(Debug, Clone)]
 pub struct AggregatedRow {
     /// The newest evaluation; for a mean, with the mean as its result.
     pub record: BoardRecord,
     /// All evaluations that count, in order of their days.
     pub evaluations: Vec<EvaluationId>,
+    /// The run (all episodes of one evaluation) of each of these evaluations.
     pub runs: Vec<RunId>,
 }
 
 impl AggregatedRow {
+    /// The row of a single evaluation.
     pub fn single(record: BoardRecord) -> Self {
         Self {
             evaluations: vec![record.evaluation],
@@ -56,22 +60,25 @@ impl AggregatedRow {
     }
 }
 
+/// Everything that determines the rows of a board.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RowsKey {
     pub stage: StageId,
+    /// Number of the revision of the stage's rules.
     pub revision: u32,
-    pub by: CountingResult,
+    pub counting_result: CountingResult,
+    /// `None`: all tasks together.
     pub task: Option<Task>,
-    /// Only results that were stored up to then.
-    pub until: Option<Timestamp>,
+    /// Only results of evaluations that finished up to this time.
+    pub finished_until: Option<Timestamp>,
     /// Only results of days up to this one.
-    pub(crate) until_day: Option<Date>,
+    pub(crate) last_day: Option<Date>,
 }
 
-/// By board the rows, and the id of the newest change that they include.
+/// The rows of each board, with the id of the newest change of the season that they include.
 type Boards = HashMap<RowsKey, (i64, Arc<[AggregatedRow]>)>;
 
-/// Cache of board rows. Any change of the season may invalidate them.
+/// Cache of board rows. Each change of the season may change them.
 #[derive(Debug)]
 pub struct RowCache {
     store: Store,
@@ -86,19 +93,19 @@ impl RowCache {
         }
     }
 
-    /// The cached rows, if they include the newest change; otherwise computes them by `make` and caches them.
+    /// The cached rows, if they include the newest change; otherwise calls `compute` and caches its rows.
     pub async fn get(
         &self,
         key: RowsKey,
-        make: impl AsyncFnOnce() -> Result<Vec<AggregatedRow>, Problem>,
+        compute: impl AsyncFnOnce() -> Result<Vec<AggregatedRow>, Problem>,
     ) -> Result<Vec<AggregatedRow>, Problem> {
         // Read before the rows: a change in between invalidates the entry, though the rows may already include it.
         let change = self.store.newest_change().await?;
         let cached = self.lock().get(&key).cloned();
-        if let Some((_, rows)) = cached.filter(|(cached_at, _)| *cached_at == change) {
+        if let Some((_, rows)) = cached.filter(|(cached_change, _)| *cached_change == change) {
             return Ok(rows.to_vec());
         }
-        let rows = make().await?;
+        let rows = compute().await?;
         let mut boards = self.lock();
         if boards.len() >= MAX_BOARDS && !boards.contains_key(&key) {
             boards.clear();

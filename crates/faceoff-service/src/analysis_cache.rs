@@ -1,29 +1,31 @@
-//! Cache of game analyses.
+//! Cache of game analyses. An analysis lists goals, shots and violations of a whole game; it is computed from the game's
+//! clips, which record the motion of puck and robots.
 
 use crate::problem::Problem;
 use faceoff_replay::GameAnalysis;
 use moka::future::Cache;
 use std::sync::Arc;
 
-/// Size of the cache in bytes. Most analyses have some ten kilobytes; with a robot that shakes at a limit, some hundred.
+/// Size of the cache in bytes. Most analyses have some ten kilobytes; those of a robot that violates a limit again and again
+/// have some hundred.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// Analyses by the keys of the games' clips. The clips of a played game never change.
+/// Analyses by the artifact key of the game's clip file. The clips of a played game never change.
 #[derive(Debug)]
 pub struct AnalysisCache(Cache<String, Arc<GameAnalysis>>);
 
 impl AnalysisCache {
-    /// The cached analysis of a game, or the one that `make` computes. Concurrent requests share one computation.
+    /// The cached analysis of a game, or the result of `compute`. Concurrent requests share one computation.
     ///
     /// # Errors
-    /// That of `make`.
+    /// That of `compute`.
     pub async fn get(
         &self,
-        clips: String,
-        make: impl Future<Output = Result<GameAnalysis, Problem>>,
+        clips_key: String,
+        compute: impl Future<Output = Result<GameAnalysis, Problem>>,
     ) -> Result<Arc<GameAnalysis>, Problem> {
-        let made = async { make.await.map(Arc::new) };
-        let analysis = self.0.try_get_with(clips, made).await;
+        let computed = async { compute.await.map(Arc::new) };
+        let analysis = self.0.try_get_with(clips_key, computed).await;
         analysis.map_err(|problem| Problem::clone(&problem))
     }
 }
@@ -40,7 +42,7 @@ impl Default for AnalysisCache {
 fn size_bytes(analysis: &GameAnalysis) -> u32 {
     let positions: usize = analysis.goals.iter().map(|goal| goal.positions.len()).sum();
     let bytes = size_of::<GameAnalysis>()
-        + size_of_val(analysis.breaks.as_slice())
+        + size_of_val(analysis.rally_ends.as_slice())
         + size_of_val(analysis.goals.as_slice())
         + positions * size_of::<[f64; 2]>()
         + size_of_val(analysis.shots.as_slice())

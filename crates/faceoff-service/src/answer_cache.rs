@@ -1,5 +1,5 @@
-//! Cache of public responses, valid until the season changes and for one second at most. The number of visitors of a
-//! board must not affect running agents.
+//! Cache of public responses, valid until the season changes and for one second at most. Without it, many visitors of a board
+//! would take CPU time from the agents that run on the same machine.
 
 use crate::problem::Problem;
 use axum::{
@@ -17,7 +17,7 @@ use std::time::Duration;
 const MAX_BYTES: u64 = 32 << 20;
 /// Longer keys are not cached: visitors could fill the memory with them.
 const MAX_KEY_BYTES: usize = 1024;
-/// Lifetime of an entry. The key contains the second, so an entry is used for less.
+/// Lifetime of an entry. The key contains the current second, so an entry is used for one second at most.
 const TIME_TO_LIVE: Duration = Duration::from_secs(2);
 /// Largest response; every page and board is smaller.
 const MAX_RESPONSE_BYTES: usize = 64 << 20;
@@ -35,7 +35,7 @@ const PAGE_PREFIXES: [&str; 3] = ["/tasks/", "/teams/", "/tournaments/"];
 const RESOURCES: [&str; 4] = ["/board", "/season", "/stages", "/announcements"];
 const RESOURCE_PREFIXES: [&str; 2] = ["/board/", "/stages/"];
 
-/// Request headers that may change the response.
+/// Request headers that may change the response. A request with one of them is not answered from the cache.
 const PERSONAL_HEADERS: [HeaderName; 7] = [
     header::AUTHORIZATION,
     header::COOKIE,
@@ -50,11 +50,12 @@ const PERSONAL_HEADERS: [HeaderName; 7] = [
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct AnswerKey {
     uri: String,
+    /// Values of the headers `Accept` and `Accept-Encoding`.
     accept: Option<Vec<u8>>,
     accept_encoding: Option<Vec<u8>>,
     /// Number of changes of the season so far.
     changes: u64,
-    /// Some responses depend on the time.
+    /// The current time as a Unix timestamp: some responses depend on it.
     second: i64,
 }
 
@@ -95,7 +96,7 @@ impl CachedResponse {
     }
 
     fn bytes(&self) -> u32 {
-        // The rest is an allowance for headers and key, whose length is bounded.
+        // The second summand is an allowance for headers and key.
         u32::try_from(self.body.len() + 4 * MAX_KEY_BYTES).unwrap_or(u32::MAX)
     }
 }
@@ -114,17 +115,17 @@ impl IntoResponse for CachedResponse {
 pub struct AnswerCache(Cache<AnswerKey, CachedResponse>);
 
 impl AnswerCache {
-    /// The cached response, or the one that `make` computes. Concurrent requests share one computation. Only responses
+    /// The cached response, or the result of `compute`. Concurrent requests share one computation. Only responses
     /// with status 200 are cached.
-    pub async fn get(&self, key: AnswerKey, make: impl Future<Output = Response>) -> Response {
-        let made = self.0.try_get_with(key, async {
-            let response = CachedResponse::read(make.await).await;
+    pub async fn get(&self, key: AnswerKey, compute: impl Future<Output = Response>) -> Response {
+        let cached = self.0.try_get_with(key, async {
+            let response = CachedResponse::read(compute.await).await;
             match response.status {
                 StatusCode::OK => Ok(response),
                 _ => Err(response),
             }
         });
-        match made.await {
+        match cached.await {
             Ok(response) => response.into_response(),
             Err(uncached) => CachedResponse::clone(&uncached).into_response(),
         }
@@ -141,7 +142,8 @@ impl Default for AnswerCache {
     }
 }
 
-/// The key of a request's response, if the response is the same for everyone.
+/// The key of a request's response; `None` if the response depends on the caller. `second` is the current time as a Unix
+/// timestamp.
 pub fn cache_key(request: &Request, store: &Store, second: i64) -> Option<AnswerKey> {
     let headers = request.headers();
     let is_public = request.method() == Method::GET
@@ -149,21 +151,21 @@ pub fn cache_key(request: &Request, store: &Store, second: i64) -> Option<Answer
         && !PERSONAL_HEADERS
             .iter()
             .any(|name| headers.contains_key(name));
-    let value = |name| headers.get(name).map(|value| value.as_bytes().to_vec());
+    let header_bytes = |name| headers.get(name).map(|value| value.as_bytes().to_vec());
     if !is_public {
         return None;
     }
     let key = AnswerKey {
         uri: request.uri().to_string(),
-        accept: value(header::ACCEPT),
-        accept_encoding: value(header::ACCEPT_ENCODING),
+        accept: header_bytes(header::ACCEPT),
+        accept_encoding: header_bytes(header::ACCEPT_ENCODING),
         changes: store.change_count(),
         second,
     };
     (key.length() <= MAX_KEY_BYTES).then_some(key)
 }
 
-/// Whether a path is a board's page, for which `If-None-Match` is checked before this cache.
+/// Whether a path is a board's page. For these pages the server checks `If-None-Match` before it uses this cache.
 pub fn is_board_page(path: &str) -> bool {
     path == "/" || path.starts_with("/tasks/")
 }

@@ -1,4 +1,4 @@
-//! The state that all handlers share.
+//! The state that all request handlers share: database, configuration, caches and limits.
 
 use crate::{
     aggregated_rows::RowCache, analysis_cache::AnalysisCache, answer_cache::AnswerCache,
@@ -14,27 +14,32 @@ use std::sync::{Arc, atomic::AtomicBool};
 use tokio::sync::Semaphore;
 use uuid::Uuid;
 
-/// State of the handlers.
+/// State of the request handlers.
 #[derive(Debug)]
 pub struct AppState {
-    /// The database and the artifacts.
+    /// The database and the artifacts, which are its large files: bundles, datasets and recordings.
     pub store: Store,
     /// The server's configuration.
     pub config: HttpConfig,
+    /// Limits the concurrent uploads of each team.
     pub upload_slots: Arc<UploadSlots>,
     /// One permit per upload that is being copied into the artifacts.
     pub artifact_writes: Semaphore,
     /// One permit: only one season archive is made and sent at a time.
     pub archive_permit: Arc<Semaphore>,
-    /// Summaries of the runs that boards show.
+    /// Episode summaries of runs, from which boards compute their statistics.
     pub summaries: Summaries,
     /// Rows of boards that are aggregated over many days.
     pub row_cache: RowCache,
+    /// Responses that are the same for all visitors.
     pub answer_cache: AnswerCache,
+    /// Ratings of the submissions of a tournament.
     pub rating_cache: TournamentCache<Ratings>,
+    /// Analyses of games.
     pub(crate) analysis_cache: AnalysisCache,
+    /// How often each team wins when a tournament is replayed with other seeds.
     pub(crate) champion_share_cache: TournamentCache<ChampionSharesView>,
-    /// Whether the season is known to have a tournament. Tournaments are never removed.
+    /// Whether the season has a tournament; false until this process has seen one. Tournaments are never removed.
     pub has_tournaments: AtomicBool,
     /// One permit per reader of a live game.
     pub live_reader_permits: Arc<Semaphore>,
@@ -46,11 +51,11 @@ pub struct AppState {
     pub passwords: Passwords,
     /// Counts recent requests by address and by token.
     pub request_limiter: RequestLimiter,
-    /// Random per process. Part of tags, because the database may be another one after a restart.
+    /// Random per process. Part of entity tags (header `ETag`), because the database may be another one after a restart.
     pub process_id: Uuid,
 }
 
-/// The disk gets no faster by more copies, and each holds files open.
+/// More copies at once do not make the disk faster, and each keeps files open.
 const MAX_ARTIFACT_WRITES: usize = 4;
 
 /// The state as handlers receive it.

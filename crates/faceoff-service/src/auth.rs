@@ -1,4 +1,5 @@
-//! Authentication: extractors that turn a token or a session cookie into a user, a team or the host.
+//! Authentication: extractors that turn a token or a session cookie into a caller. A caller is a user (organiser or team
+//! member), an API client with a team's token, or the *host*: the operator of the server, who has access to its data folder.
 
 use crate::{
     app::App,
@@ -62,22 +63,23 @@ impl Caller {
         self.is_organiser() || self.team().is_some_and(|own| own.id == team)
     }
 
-    /// `found`, if the caller may see its `team`; otherwise the same error as if it did not exist.
+    /// The resource, if the caller may see the `team` that it belongs to; otherwise the same error as if it did not exist.
+    /// `kind` names the kind of resource in the message.
     pub fn visible<T>(
         &self,
-        what: &str,
-        found: Result<T, StoreError>,
+        kind: &str,
+        resource: Result<T, StoreError>,
         team: impl Fn(&T) -> TeamId,
     ) -> Result<T, Problem> {
-        match found {
-            Ok(found) if self.may_see(team(&found)) => Ok(found),
-            Ok(_) | Err(StoreError::NotFound(_)) => Err(Problem::not_found(what)),
+        match resource {
+            Ok(resource) if self.may_see(team(&resource)) => Ok(resource),
+            Ok(_) | Err(StoreError::NotFound(_)) => Err(Problem::not_found(kind)),
             Err(error) => Err(error.into()),
         }
     }
 
-    /// The caller's token, for a refusal.
-    fn description(&self) -> String {
+    /// Describes the caller's token in the message of a refusal.
+    fn token_description(&self) -> String {
         match &self.principal {
             Principal::Host => "the organiser's".into(),
             Principal::Organiser(user) => format!("that of the organiser “{}”", user.name),
@@ -104,7 +106,7 @@ impl Organiser {
             ProblemKind::Forbidden,
             format!(
                 "this request needs an organiser's token; yours is {}",
-                caller.description()
+                caller.token_description()
             ),
         ))
     }
@@ -137,7 +139,7 @@ impl TeamCaller {
                 format!(
                     "this request needs a team's token; yours is {}. Use the token that POST /api/v1/teams \
                      returned, or a member's",
-                    caller.description()
+                    caller.token_description()
                 ),
             )),
         }
@@ -148,18 +150,18 @@ impl TeamCaller {
         self.caller.actor()
     }
 
-    /// `found`, if it belongs to the team.
+    /// The resource, if it belongs to the caller's team; otherwise as [`Caller::visible`].
     pub fn visible<T>(
         &self,
-        what: &str,
-        found: Result<T, StoreError>,
+        kind: &str,
+        resource: Result<T, StoreError>,
         team: impl Fn(&T) -> TeamId,
     ) -> Result<T, Problem> {
-        self.caller.visible(what, found, team)
+        self.caller.visible(kind, resource, team)
     }
 }
 
-/// The credential of a request.
+/// The credential of a request: an API token, or the secret of a browser's session.
 enum Credential<'a> {
     Bearer(&'a str),
     Cookie(&'a str),
@@ -213,12 +215,12 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     Ok(Some(caller))
 }
 
-/// In the background: the request neither waits for it nor fails with it.
+/// Records the last use of a token in the background: the request neither waits for it nor fails with it.
 fn record_use(app: &App, token: &Token, now: Timestamp) {
-    let is_recorded = token
+    let is_recent = token
         .last_used_at
         .is_some_and(|at| now.duration_since(at) < faceoff_store::LAST_USE_INTERVAL);
-    if is_recorded {
+    if is_recent {
         return;
     }
     let (app, token) = (Arc::clone(app), token.clone());
@@ -229,9 +231,9 @@ fn record_use(app: &App, token: &Token, now: Timestamp) {
     });
 }
 
-fn token_problem(refusal: TokenRejection) -> Problem {
-    let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
-    let detail = match refusal {
+fn token_problem(rejection: TokenRejection) -> Problem {
+    let format_time = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+    let detail = match rejection {
         TokenRejection::Unknown => {
             "the token is unknown; it may have been replaced. Create a new one, or ask an organiser for one".to_owned()
         }
@@ -241,11 +243,11 @@ fn token_problem(refusal: TokenRejection) -> Problem {
         TokenRejection::Revoked(at) => format!(
             "the token was revoked or replaced, or its user's account closed, by {}. Use another one, or ask an organiser for \
              one",
-            shown(at)
+            format_time(at)
         ),
         TokenRejection::Expired(at) => format!(
             "the token expired on {}. Create a new one, or ask an organiser for one",
-            shown(at)
+            format_time(at)
         ),
     };
     Problem::new(ProblemKind::Unauthenticated, detail)
@@ -273,7 +275,7 @@ impl FromRequestParts<App> for OptionalCaller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        // Another scheme is meant for a proxy in front of the pages.
+        // A header with another scheme than Bearer is meant for a proxy in front of the server.
         let header = parts.headers.get(header::AUTHORIZATION);
         let scheme = header.and_then(|value| value.as_bytes().get(..7));
         if scheme.is_some_and(|scheme| !scheme.eq_ignore_ascii_case(b"bearer ")) {

@@ -1,4 +1,5 @@
-//! Conditional and range requests (RFC 9110): `If-None-Match`, `If-Range` and `Range`.
+//! Conditional and range requests (RFC 9110): the headers `If-None-Match`, `If-Range` and `Range`. A client sends the entity
+//! tag of the response that it already has, so that the server sends only what has changed or is missing.
 
 use axum::{
     extract::FromRequestParts,
@@ -8,12 +9,13 @@ use axum::{
 use http_range_header::{RangeUnsatisfiableError, parse_range_header};
 use std::{convert::Infallible, ops::Range};
 
-/// An entity tag: stays the same as long as the response does. Contains no character with a meaning in a header.
+/// An entity tag: stays the same as long as the response does. It contains no comma or other character that separates values
+/// in a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ETag {
-    /// With quotation marks.
+    /// The tag without the prefix `W/`, with quotation marks.
     opaque: String,
-    /// The tag does not identify every byte: the response may be compressed.
+    /// A weak tag does not identify every byte: the response may be compressed.
     is_weak: bool,
 }
 
@@ -26,7 +28,7 @@ impl ETag {
         }
     }
 
-    /// Tag of a file that never changes.
+    /// Tag of a file that never changes, from its artifact key and its size.
     pub fn for_file(key: &str, bytes: u64) -> Self {
         Self {
             is_weak: false,
@@ -34,7 +36,7 @@ impl ETag {
         }
     }
 
-    /// Tag of a response that is a function of these `parts`; `what` distinguishes kinds of responses.
+    /// Tag of a response that is a function of these `parts`; `kind` distinguishes kinds of responses.
     pub fn new(kind: &str, parts: &[&str]) -> Self {
         let mut hasher = blake3::Hasher::new();
         for part in parts {
@@ -51,7 +53,7 @@ impl ETag {
     pub fn header(&self) -> HeaderValue {
         let weak = if self.is_weak { "W/" } else { "" };
         let text = format!("{weak}{}", self.opaque);
-        HeaderValue::try_from(text).expect("names and hexadecimal digits")
+        HeaderValue::try_from(text).expect("a tag has only printable ASCII characters")
     }
 }
 
@@ -62,12 +64,12 @@ pub struct Conditions {
     headers: HeaderMap,
 }
 
-/// The part of a file that is to be sent.
+/// The part of a file that the response contains.
 #[derive(Debug, PartialEq, Eq)]
 pub enum ByteRange {
     Full,
     Partial(Range<u64>),
-    /// The range begins behind the end.
+    /// The range begins behind the end of the file.
     Unsatisfiable,
 }
 
@@ -89,12 +91,12 @@ impl<S: Sync> FromRequestParts<S> for Conditions {
 }
 
 impl Conditions {
-    /// Whether the response has a body: GET, not HEAD.
+    /// Whether the response has a body: it has none if the method is HEAD.
     pub const fn is_get(&self) -> bool {
         self.is_get
     }
 
-    /// Removes `If-None-Match` from a request's headers.
+    /// Moves `If-None-Match` from a request's headers into the conditions.
     pub fn take_from(headers: &mut HeaderMap) -> Self {
         let mut removed = HeaderMap::new();
         if let header::Entry::Occupied(values) = headers.entry(header::IF_NONE_MATCH) {
@@ -113,14 +115,14 @@ impl Conditions {
     pub fn matches(&self, tag: &HeaderValue) -> bool {
         let tag = tag.to_str().unwrap_or_default();
         let tag = tag.strip_prefix("W/").unwrap_or(tag);
-        let known = self.headers.get_all(header::IF_NONE_MATCH).into_iter();
-        // A weak comparison, as RFC 9110 requires. Our tags contain no comma, so splitting at commas is safe.
-        known
+        let values = self.headers.get_all(header::IF_NONE_MATCH).into_iter();
+        // A weak comparison, as RFC 9110 requires. An `ETag` contains no comma, so splitting at commas is safe.
+        values
             .filter_map(|value| value.to_str().ok())
             .flat_map(|value| value.split(','))
-            .map(|known| known.trim())
-            .map(|known| known.strip_prefix("W/").unwrap_or(known))
-            .any(|known| known == "*" || known == tag)
+            .map(|client_tag| client_tag.trim())
+            .map(|client_tag| client_tag.strip_prefix("W/").unwrap_or(client_tag))
+            .any(|client_tag| client_tag == "*" || client_tag == tag)
     }
 
     /// The response 304, if the client already has the response with this tag.
@@ -138,16 +140,18 @@ impl Conditions {
         let Some(range) = self.headers.get(header::RANGE).filter(|_| self.is_get) else {
             return ByteRange::Full;
         };
-        // A range of another file cannot be continued. (We send no dates, so a date never matches.)
+        // The client has a part of another file. (`If-Range` may also be a date; no response has a date, so none matches.)
         let if_range = self.headers.get(header::IF_RANGE);
-        if if_range.is_some_and(|known| tag.is_weak || known.as_bytes() != tag.opaque.as_bytes()) {
+        if if_range
+            .is_some_and(|client_tag| tag.is_weak || client_tag.as_bytes() != tag.opaque.as_bytes())
+        {
             return ByteRange::Full;
         }
         let Ok(Ok(ranges)) = range.to_str().map(parse_range_header) else {
             return ByteRange::Full;
         };
         match ranges.validate(bytes).as_deref() {
-            Ok([one]) => ByteRange::Partial(*one.start()..*one.end() + 1),
+            Ok([range]) => ByteRange::Partial(*range.start()..*range.end() + 1),
             Err(RangeUnsatisfiableError::Unsatisfiable) => ByteRange::Unsatisfiable,
             Ok(_) | Err(_) => ByteRange::Full,
         }
@@ -157,6 +161,10 @@ impl Conditions {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Length of the requested file in bytes.
+    const FILE_BYTES: u64 = 10;
+    const HASH: &str = "00";
 
     fn conditions(headers: &[(header::HeaderName, &str)]) -> Conditions {
         let headers = headers
@@ -170,7 +178,7 @@ mod tests {
 
     #[test]
     fn range_is_limited_to_file_length() {
-        let tag = ETag::from_hash("00");
+        let tag = ETag::from_hash(HASH);
         for (range, expected) in [
             ("bytes=0-0", ByteRange::Partial(0..1)),
             ("bytes=2-5", ByteRange::Partial(2..6)),
@@ -190,7 +198,7 @@ mod tests {
             ("bytes=-1-2", ByteRange::Full),
         ] {
             let request = conditions(&[(header::RANGE, range)]);
-            assert_eq!(request.byte_range(&tag, 10), expected, "{range}");
+            assert_eq!(request.byte_range(&tag, FILE_BYTES), expected, "{range}");
         }
         let empty_file = conditions(&[(header::RANGE, "bytes=0-")]);
         assert_eq!(empty_file.byte_range(&tag, 0), ByteRange::Unsatisfiable);
@@ -198,22 +206,22 @@ mod tests {
 
     #[test]
     fn range_continues_only_the_same_file() {
-        let tag = ETag::from_hash("00");
-        for (known, expected) in [
+        let tag = ETag::from_hash(HASH);
+        for (if_range, expected) in [
             ("\"blake3-00\"", ByteRange::Partial(5..10)),
             ("\"blake3-01\"", ByteRange::Full),
             ("W/\"blake3-00\"", ByteRange::Full),
             ("Wed, 21 Oct 2015 07:28:00 GMT", ByteRange::Full),
         ] {
-            let request = conditions(&[(header::RANGE, "bytes=5-"), (header::IF_RANGE, known)]);
-            assert_eq!(request.byte_range(&tag, 10), expected, "{known}");
+            let request = conditions(&[(header::RANGE, "bytes=5-"), (header::IF_RANGE, if_range)]);
+            assert_eq!(request.byte_range(&tag, FILE_BYTES), expected, "{if_range}");
         }
     }
 
     #[test]
     fn matching_tag_gives_not_modified() {
-        let tag = ETag::from_hash("00");
-        for (known, has_it) in [
+        let tag = ETag::from_hash(HASH);
+        for (if_none_match, matches) in [
             ("\"blake3-00\"", true),
             ("W/\"blake3-00\"", true),
             ("\"a\", \"blake3-00\"", true),
@@ -221,8 +229,12 @@ mod tests {
             ("\"blake3-01\"", false),
             ("blake3-00", false),
         ] {
-            let request = conditions(&[(header::IF_NONE_MATCH, known)]);
-            assert_eq!(request.not_modified(&tag).is_some(), has_it, "{known}");
+            let request = conditions(&[(header::IF_NONE_MATCH, if_none_match)]);
+            assert_eq!(
+                request.not_modified(&tag).is_some(),
+                matches,
+                "{if_none_match}"
+            );
         }
     }
 

@@ -1,4 +1,4 @@
-//! Configuration of the web server.
+//! Configuration of the web server: limits, addresses, keys, and what it shows about the machines that run jobs.
 
 use crate::{
     agent_resources::AgentResources, link_key::LinkKey, rate_limits::RateLimits,
@@ -21,13 +21,13 @@ pub struct HttpLimits {
     pub live_readers: usize,
     /// Readers of the event stream at the same time; each one holds a connection.
     pub event_readers: usize,
-    /// Longest time of a response that is not an upload or an archive.
+    /// Longest duration of a request that is not an upload or the download of a season archive.
     pub request_timeout: Duration,
     /// Minimum transfer rate of an upload.
     pub min_upload_rate: MinTransferRate,
     /// Submissions of one team that may wait for their validation run.
     pub pending_submissions: usize,
-    /// Bytes that a team may upload per day and store.
+    /// Bytes that a team may upload per day, and bytes that it may store in total.
     pub upload_quota: UploadQuota,
 }
 
@@ -49,14 +49,14 @@ impl Default for HttpLimits {
     }
 }
 
-/// What runs evaluations, as far as the web server shows it.
+/// The slots and runtimes for evaluations, as far as the web server shows them. A *slot* runs one job at a time.
 #[derive(Debug, Clone)]
 pub struct Capacity {
     /// Jobs that the server's own slots run in parallel; 0: only remote workers run jobs.
     pub slots: u32,
-    /// Time limits of agents.
+    /// Limits of an agent's computation time.
     pub time: TimeLimits,
-    /// Runtimes that agents may name.
+    /// Names of the runtimes (environments such as Python) that an agent may ask for.
     pub runtimes: Vec<String>,
 }
 
@@ -70,20 +70,20 @@ pub struct HttpConfig {
     pub public_url: Option<String>,
     /// Existing folder for unfinished uploads, on a disk with space for some bundles.
     pub upload_dir: PathBuf,
-    /// Time of everything that is stored, and the current day.
+    /// Source of the current time: tests set it.
     pub clock: Clock,
     pub limits: HttpLimits,
     /// Which addresses webhooks may have.
     pub webhooks: WebhookRules,
-    /// For forecasts of durations.
+    /// Slots and time limits, for forecasts of durations.
     pub capacity: Capacity,
     /// Runtimes and resource limits of agents.
     pub agent_resources: AgentResources,
     /// Rate limits of requests.
     pub rate_limits: RateLimits,
-    /// Signs download links.
+    /// Signs download links and seals grants of remote jobs.
     pub link_key: LinkKey,
     pub metrics: Metrics,
-    /// Resource usage of this process, from the operating system.
+    /// Reads the resource usage of this process from the operating system.
     pub process: fn() -> Process,
 }

@@ -1,14 +1,14 @@
-//! CSV tables (RFC 4180).
+//! CSV tables (RFC 4180) for downloads.
 
 use axum::{
     http::header,
     response::{IntoResponse, Response},
 };
 
-/// With the parameter of RFC 7111: the first line is a header.
+/// Media type; the parameter `header` of RFC 7111 states that the first line is a header.
 pub const MEDIA_TYPE: &str = "text/csv; charset=utf-8; header=present";
 
-/// CSV lines; fields are quoted where necessary.
+/// A table as CSV text; fields are quoted where necessary.
 pub struct Table(String);
 
 impl Table {
@@ -19,9 +19,10 @@ impl Table {
         table
     }
 
+    /// Appends a row.
     pub fn row(&mut self, fields: impl IntoIterator<Item = String>) {
-        for (number, field) in fields.into_iter().enumerate() {
-            if number > 0 {
+        for (column, field) in fields.into_iter().enumerate() {
+            if column > 0 {
                 self.0.push(',');
             }
             if field.contains([',', '"', '\n', '\r']) {
@@ -52,7 +53,7 @@ impl Table {
     }
 }
 
-/// Text from users. A leading apostrophe keeps a spreadsheet from evaluating it as a formula.
+/// A field with text from users. A leading apostrophe keeps a spreadsheet from evaluating it as a formula.
 pub fn escape_formula(text: &str) -> String {
     match text.chars().next() {
         Some('=' | '+' | '-' | '@' | '\t' | '\r') => format!("'{text}"),
@@ -60,7 +61,7 @@ pub fn escape_formula(text: &str) -> String {
     }
 }
 
-/// An empty field for `None`.
+/// The value as a field; an empty field for `None`.
 pub fn or_empty(value: Option<impl ToString>) -> String {
     value.map(|value| value.to_string()).unwrap_or_default()
 }

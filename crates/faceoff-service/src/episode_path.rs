@@ -1,4 +1,4 @@
-//! Path parameters that identify an episode.
+//! Path parameters of URLs that identify an episode: one attempt of an agent at a task.
 
 use crate::{
     extract::PathParams,
@@ -13,7 +13,7 @@ use std::{fmt::Display, str::FromStr};
 pub struct EpisodePath {
     pub id: EvaluationId,
     pub task: Task,
-    /// Its number, from 0.
+    /// Number of the episode, from 0.
     pub episode: u32,
 }
 
@@ -31,14 +31,15 @@ impl<S: Send + Sync> FromRequestParts<S> for EpisodePath {
     }
 }
 
-/// An episode of a submission's ablation: the parameters `{id}`, `{profile}`, `{task}` and `{episode}` of the path.
+/// An episode of a submission's ablation, which runs the submission under each kind of perturbation alone: the parameters
+/// `{id}`, `{profile}`, `{task}` and `{episode}` of the path.
 #[derive(Debug, Clone, Copy)]
 pub struct AblationPath {
     pub submission: SubmissionId,
-    /// The ablation's profile.
+    /// The perturbations of this episode.
     pub profile: Profile,
     pub task: Task,
-    /// Its number, from 0.
+    /// Number of the episode, from 0.
     pub episode: u32,
 }
 
@@ -57,9 +58,9 @@ impl<S: Send + Sync> FromRequestParts<S> for AblationPath {
     }
 }
 
-/// A parameter that cannot be parsed gives 404, as an unknown one does.
-fn parse<T: FromStr<Err: Display>>(text: &str, what: &str) -> Result<T, Problem> {
+/// Parses a path parameter; `name` is for the message. A parameter that cannot be parsed gives 404, as an unknown id does.
+fn parse<T: FromStr<Err: Display>>(text: &str, name: &str) -> Result<T, Problem> {
     text.parse().map_err(|error: T::Err| {
-        Problem::new(ProblemKind::NotFound, format!("{what} {text:?}: {error}"))
+        Problem::new(ProblemKind::NotFound, format!("{name} {text:?}: {error}"))
     })
 }

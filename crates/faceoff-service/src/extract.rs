@@ -1,4 +1,5 @@
-//! Extractors whose rejections are problems that name the wrong field.
+//! Extractors: they parse bodies, forms, queries and path parameters of requests. A refused request gets a problem response
+//! that names the wrong field.
 
 use crate::{
     boxed,
@@ -21,6 +22,7 @@ use std::{fmt::Display, str::FromStr};
 /// Largest JSON body; the largest legitimate one has a few hundred bytes.
 pub const MAX_JSON_BYTES: usize = 64 * 1024;
 
+/// A JSON body.
 #[derive(Debug)]
 pub struct Json<T>(pub T);
 
@@ -32,7 +34,7 @@ where
     type Rejection = Problem;
 
     async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
-        parse(read(request).await?).map(Self)
+        parse_json(read_body(request).await?).map(Self)
     }
 }
 
@@ -48,30 +50,30 @@ where
     type Rejection = Problem;
 
     async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
-        let (is_json, bytes) = read(request).await?;
+        let (is_json, bytes) = read_body(request).await?;
         if bytes.is_empty() {
             return Ok(Self(T::default()));
         }
-        parse((is_json, bytes)).map(Self)
+        parse_json((is_json, bytes)).map(Self)
     }
 }
 
-/// The body, and whether its media type is JSON.
+/// Whether the media type of the body is JSON, and the body.
 #[boxed]
-async fn read(request: Request) -> Result<(bool, Bytes), Problem> {
+async fn read_body(request: Request) -> Result<(bool, Bytes), Problem> {
     let is_json = request
         .headers()
         .get(header::CONTENT_TYPE)
         .and_then(|value| value.to_str().ok())
         .and_then(|value| value.split(';').next())
-        .is_some_and(|essence| essence.trim().eq_ignore_ascii_case("application/json"));
+        .is_some_and(|media_type| media_type.trim().eq_ignore_ascii_case("application/json"));
     let bytes = Bytes::from_request(request, &())
         .await
-        .map_err(|rejection| too_large(&rejection))?;
+        .map_err(|rejection| body_problem(&rejection))?;
     Ok((is_json, bytes))
 }
 
-fn too_large(rejection: &BytesRejection) -> Problem {
+fn body_problem(rejection: &BytesRejection) -> Problem {
     if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
         Problem::new(
             ProblemKind::TooLarge,
@@ -91,7 +93,7 @@ fn too_large(rejection: &BytesRejection) -> Problem {
     }
 }
 
-fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Problem> {
+fn parse_json<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Problem> {
     if !is_json {
         return Err(Problem::new(
             ProblemKind::UnsupportedMediaType,
@@ -105,7 +107,7 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
         )
     };
     let mut deserializer = serde_json::Deserializer::from_slice(&bytes);
-    // Error messages of some types do not name the field.
+    // The error messages of some types do not name the field, so the path to it is recorded.
     let parsed = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         if error.inner().is_data() {
             invalid_content(error)
@@ -116,14 +118,16 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
             )
         }
     })?;
-    let rest = deserializer.end();
-    let value = rest.and_then(|()| serde_json::from_slice::<Value>(&bytes));
+    // Text after the JSON value is an error, too.
+    let end = deserializer.end();
+    let value = end.and_then(|()| serde_json::from_slice::<Value>(&bytes));
     let value = value.map_err(|error| {
         Problem::new(
             ProblemKind::InvalidRequest,
             format!("the body is not valid JSON: {error}"),
         )
     })?;
+    // Serde would also accept an array of the fields in place of an object.
     objects_only::check::<T>(&value).map_err(invalid_content)?;
     Ok(parsed)
 }
@@ -151,7 +155,7 @@ where
     }
 }
 
-/// The path parameters, in order.
+/// The `N` path parameters, in order.
 #[derive(Debug)]
 pub struct PathParams<T, const N: usize>(pub [T; N]);
 
@@ -168,8 +172,11 @@ where
         let params: Vec<T> = params
             .collect::<Result<_, _>>()
             .map_err(|error: T::Err| no_such_path(&error))?;
-        params.try_into().map(Self).map_err(|other: Vec<T>| {
-            Problem::internal(format_args!("a path of {N} parameters has {}", other.len()))
+        params.try_into().map(Self).map_err(|params: Vec<T>| {
+            Problem::internal(format_args!(
+                "a path of {N} parameters has {}",
+                params.len()
+            ))
         })
     }
 }
@@ -182,12 +189,12 @@ async fn path_params(parts: &mut Parts) -> Result<Vec<String>, Problem> {
     Ok(params.iter().map(|(_, text)| text.to_owned()).collect())
 }
 
-/// An id that cannot be parsed gives 404, as an unknown one does.
-fn no_such_path(why: &dyn Display) -> Problem {
-    Problem::new(ProblemKind::NotFound, why.to_string())
+/// The problem of a path parameter that cannot be parsed: 404, as for an unknown id.
+fn no_such_path(error: &dyn Display) -> Problem {
+    Problem::new(ProblemKind::NotFound, error.to_string())
 }
 
-/// The only path parameter.
+/// The path parameter of a route with exactly one.
 #[derive(Debug)]
 pub struct PathParam<T>(pub T);
 
@@ -204,6 +211,7 @@ where
     }
 }
 
+/// The query parameters.
 #[derive(Debug)]
 pub struct QueryParams<T>(pub T);
 

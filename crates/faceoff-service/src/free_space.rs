@@ -1,4 +1,4 @@
-//! Refusals while the disk has too little free space.
+//! Refusal of requests while the server's disk has too little free space or is full.
 
 use crate::{
     app::AppState,

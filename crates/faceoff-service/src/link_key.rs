@@ -1,10 +1,11 @@
-//! The key that signs download links and grants.
+//! The server's secret key for download links and grants. A *grant* gives a remote worker access to the files of its job.
 
 use faceoff_wire::grant::GrantKey;
 use std::fmt;
 
-/// Signs download links, together with the hash of their maker's token: a copy of the database alone cannot sign any.
-/// The key of grants derives from it.
+/// The secret key of the server. The signature of a download link is computed from this key and from the hash of the token with
+/// which the link was created. The key is not in the database, so a copy of the database does not suffice to sign links. The
+/// key that seals grants derives from it.
 #[derive(Clone)]
 pub struct LinkKey([u8; 32]);
 
@@ -27,7 +28,7 @@ impl LinkKey {
         Some(Self(key))
     }
 
-    /// 64 hexadecimal digits; secret.
+    /// The key as 64 hexadecimal digits; secret.
     #[must_use]
     pub fn to_hex(&self) -> String {
         hex::encode(self.0)

@@ -1,18 +1,18 @@
-//! The network of an address, for limits per client.
+//! The network of an IP address: limits per client count all addresses of a network together.
 
 use std::net::{IpAddr, Ipv4Addr};
 
-/// Addresses that count as one client. A client with one IPv6 address usually has all 2⁶⁴ of its network.
+/// Addresses that count as one client. A client with one IPv6 address can usually use all 2⁶⁴ addresses of its network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Network {
-    /// A whole IPv4 address.
+    /// A single IPv4 address.
     V4(Ipv4Addr),
-    /// The first 64 bits of an IPv6 address.
+    /// The first 64 bits of an IPv6 address, in groups of 16 bits.
     V6([u16; 4]),
 }
 
 impl Network {
-    /// The network of an address.
+    /// The network that an address belongs to.
     pub fn from_address(address: IpAddr) -> Self {
         match address.to_canonical() {
             IpAddr::V4(address) => Self::V4(address),

@@ -1,8 +1,8 @@
 //! Passwords: hashed by Argon2id, with a delay after wrong ones.
 //!
 //! A hash takes memory and tens of milliseconds, so only few are computed at a time. After several wrong passwords for
-//! a user each further attempt has to wait longer. The delay also affects the user; tokens, sessions and links work
-//! meanwhile.
+//! a user each further attempt has to wait longer. The delay also affects the user, whose tokens, sessions and links keep
+//! working meanwhile.
 
 use crate::{
     boxed,
@@ -26,18 +26,21 @@ pub const MIN_CHARS: usize = 12;
 const MAX_BYTES: usize = 1024;
 /// Hashes that are computed in parallel; each takes 19 MiB.
 const MAX_PARALLEL: usize = 2;
-/// Requests that may wait for a hash.
+/// Requests that may wait for a hash at the same time; further ones are refused.
 const MAX_WAITING: usize = 16;
-/// Wrong passwords for a user without a delay.
+/// Number of wrong passwords for a user that cause no delay.
 const FREE_ATTEMPTS: u32 = 5;
-/// Delay after one more; doubles with each further one.
+/// Delay after the first wrong password beyond these; doubles with each further one.
 const FIRST_WAIT: SignedDuration = SignedDuration::from_secs(2);
+/// The delay does not grow beyond this.
 const LONGEST_WAIT: SignedDuration = SignedDuration::from_mins(5);
 
 /// Limits concurrent hashing, and counts wrong passwords by user.
 #[derive(Debug)]
 pub struct Passwords {
+    /// One permit per hash that is being computed.
     hashing: Semaphore,
+    /// One permit per request that waits for a hash or computes one.
     waiting: Semaphore,
     failures: Mutex<HashMap<UserId, Failures>>,
 }
@@ -46,17 +49,19 @@ pub struct Passwords {
 #[derive(Debug, Clone, Copy)]
 struct Failures {
     count: u32,
-    last: Timestamp,
+    /// When the newest one was entered.
+    last_at: Timestamp,
 }
 
 impl Failures {
+    /// The time before which further attempts are refused.
     fn wait_until(self) -> Timestamp {
         let Some(doublings) = self.count.checked_sub(FREE_ATTEMPTS) else {
             return Timestamp::MIN;
         };
         let factor = 1_i32.checked_shl(doublings).unwrap_or(i32::MAX).max(1);
         let wait = FIRST_WAIT.saturating_mul(factor).min(LONGEST_WAIT);
-        self.last.saturating_add(wait).unwrap_or(Timestamp::MAX)
+        self.last_at.saturating_add(wait).unwrap_or(Timestamp::MAX)
     }
 }
 
@@ -83,10 +88,10 @@ pub fn check(password: &str) -> Result<(), Problem> {
 }
 
 impl Passwords {
-    /// Runs `work` on a blocking thread, [`MAX_PARALLEL`] at a time.
+    /// Runs `compute_hash` on a blocking thread, [`MAX_PARALLEL`] at a time.
     async fn run_hashing<T: Send + 'static>(
         &self,
-        work: impl FnOnce() -> T + Send + 'static,
+        compute_hash: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
         let Ok(_waiting) = self.waiting.try_acquire() else {
             return Err(Problem::new(
@@ -95,12 +100,12 @@ impl Passwords {
             ));
         };
         let _permit = self.hashing.acquire().await.map_err(Problem::internal)?;
-        tokio::task::spawn_blocking(work)
+        tokio::task::spawn_blocking(compute_hash)
             .await
             .map_err(Problem::internal)
     }
 
-    /// The PHC string of a new password.
+    /// Hashes a new password. The result is a PHC string: algorithm, parameters, salt and hash in one text.
     #[boxed]
     pub async fn hash(&self, password: String) -> Result<String, Problem> {
         check(&password)?;
@@ -111,19 +116,19 @@ impl Passwords {
         hashed.await?.map_err(Problem::internal)
     }
 
-    /// Verifies a password; returns the user if it is correct. `known` is the user and their PHC string. Takes the same
-    /// time if there is no such user.
+    /// Verifies a password; returns the user if it is correct. `account` is the user with the stored hash (PHC string), or
+    /// `None` if there is no user of that name; this takes the same time, so an attacker cannot find out names.
     #[boxed]
     pub async fn verify(
         &self,
-        known: Option<(UserId, String)>,
+        account: Option<(UserId, String)>,
         password: String,
         now: Timestamp,
     ) -> Result<Option<UserId>, Problem> {
-        if let Some((id, _)) = &known {
+        if let Some((id, _)) = &account {
             self.check_wait(*id, now)?;
         }
-        let (id, hash) = known.unzip();
+        let (id, hash) = account.unzip();
         let matches = self.run_hashing(move || match hash {
             Some(hash) => PasswordHash::new(&hash).is_ok_and(|hash| {
                 Argon2::default()
@@ -143,13 +148,22 @@ impl Passwords {
             failures.remove(&id);
             return Ok(Some(id));
         }
-        let count = failures.get(&id).map_or(0, |failed| failed.count) + 1;
-        failures.insert(id, Failures { count, last: now });
+        let count = failures.get(&id).map_or(0, |failures| failures.count) + 1;
+        failures.insert(
+            id,
+            Failures {
+                count,
+                last_at: now,
+            },
+        );
         Ok(None)
     }
 
     fn check_wait(&self, id: UserId, now: Timestamp) -> Result<(), Problem> {
-        let until = self.failures().get(&id).map(|failed| failed.wait_until());
+        let until = self
+            .failures()
+            .get(&id)
+            .map(|failures| failures.wait_until());
         let Some(until) = until.filter(|until| *until > now) else {
             return Ok(());
         };
@@ -182,9 +196,9 @@ mod tests {
             .unwrap();
         assert!(hash.starts_with("$argon2id$"), "{hash}");
         let id = UserId::new();
-        let known = || Some((id, hash.clone()));
+        let account = || Some((id, hash.clone()));
         let verify =
-            async |password: &str, now| passwords.verify(known(), password.into(), now).await;
+            async |password: &str, now| passwords.verify(account(), password.into(), now).await;
         assert_eq!(
             verify("correct horse battery", now).await.unwrap(),
             Some(id)
@@ -197,7 +211,7 @@ mod tests {
         now += FIRST_WAIT;
         assert_eq!(verify("wrong", now).await.unwrap(), None);
         now += FIRST_WAIT;
-        assert!(verify("wrong", now).await.is_err(), "it doubles");
+        assert!(verify("wrong", now).await.is_err(), "the delay doubles");
         now += FIRST_WAIT;
         assert_eq!(
             verify("correct horse battery", now).await.unwrap(),
@@ -216,7 +230,10 @@ mod tests {
     fn delay_is_bounded() {
         let now = "2026-03-01T10:00:00Z".parse().unwrap();
         for count in [FREE_ATTEMPTS + 10, FREE_ATTEMPTS + 40, u32::MAX] {
-            let failures = Failures { count, last: now };
+            let failures = Failures {
+                count,
+                last_at: now,
+            };
             assert_eq!(failures.wait_until(), now + LONGEST_WAIT, "{count}");
         }
     }

@@ -1,4 +1,4 @@
-//! Rate limits of requests, by address and by token.
+//! Rate limits: how many requests per second one network address and one token may make.
 
 use crate::{
     network::Network,
@@ -16,12 +16,12 @@ use std::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
-/// A mean rate, and a burst.
+/// A mean rate of requests, and how many may arrive at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RateLimit {
     /// Mean number of requests per second.
     pub per_s: NonZeroU32,
-    /// Requests at once, after a pause.
+    /// Largest number of requests at once, after a pause.
     pub burst: NonZeroU32,
 }
 
@@ -34,10 +34,10 @@ pub struct RateLimits {
     pub token: Option<RateLimit>,
 }
 
-/// Every so many requests, clients with a full allowance are dropped from memory.
+/// Number of requests after which clients without recent requests are removed from memory.
 const CLEANUP_INTERVAL: u32 = 4096;
 
-/// Counts recent requests.
+/// Counts recent requests by network and by token.
 #[derive(Debug)]
 pub struct RequestLimiter {
     addresses: Option<KeyedLimiter<Network>>,
@@ -57,9 +57,9 @@ impl RequestLimiter {
     ///
     /// # Errors
     /// [`ProblemKind::TooManyRequests`].
-    pub fn check_address(&self, from: IpAddr) -> Result<(), Problem> {
+    pub fn check_address(&self, address: IpAddr) -> Result<(), Problem> {
         match &self.addresses {
-            Some(counted) => counted.check(&Network::from_address(from), "an address"),
+            Some(limiter) => limiter.check(&Network::from_address(address), "an address"),
             None => Ok(()),
         }
     }
@@ -70,16 +70,18 @@ impl RequestLimiter {
     /// [`ProblemKind::TooManyRequests`].
     pub(crate) fn check_token(&self, token: TokenId) -> Result<(), Problem> {
         match &self.tokens {
-            Some(counted) => counted.check(&token, "a token"),
+            Some(limiter) => limiter.check(&token, "a token"),
             None => Ok(()),
         }
     }
 }
 
+/// A limiter with a separate count for each client `K`.
 #[derive(Debug)]
 struct KeyedLimiter<K: Hash + Eq + Clone> {
     rate: RateLimit,
     limiter: DefaultKeyedRateLimiter<K>,
+    /// Number of requests since clients were last removed from memory.
     since_cleanup: AtomicU32,
 }
 
@@ -93,18 +95,19 @@ impl<K: Hash + Eq + Clone> KeyedLimiter<K> {
         }
     }
 
-    fn check(&self, client: &K, kind: &str) -> Result<(), Problem> {
+    /// Counts a request; `client_kind` names the client in the message of a refusal.
+    fn check(&self, client: &K, client_kind: &str) -> Result<(), Problem> {
         if self.since_cleanup.fetch_add(1, Ordering::Relaxed) >= CLEANUP_INTERVAL {
             self.since_cleanup.store(0, Ordering::Relaxed);
             self.limiter.retain_recent();
         }
-        self.limiter.check_key(client).map_err(|early| {
-            let wait = early.wait_time_from(DefaultClock::default().now());
+        self.limiter.check_key(client).map_err(|rejection| {
+            let wait = rejection.wait_time_from(DefaultClock::default().now());
             let RateLimit { per_s, burst } = self.rate;
             Problem::new(
                 ProblemKind::TooManyRequests,
                 format!(
-                    "{kind} may make {per_s} requests per second on average, and {burst} at once; wait, and poll less often: \
+                    "{client_kind} may make {per_s} requests per second on average, and {burst} at once; wait, and poll less often: \
                      follow the event stream (GET /api/v1/events/stream) instead"
                 ),
             )
@@ -128,7 +131,7 @@ mod tests {
             address: Some(rate),
             token: None,
         });
-        let check = |from: &str| limiter.check_address(from.parse().unwrap());
+        let check = |address: &str| limiter.check_address(address.parse().unwrap());
         // The loop takes much less than the thousand seconds after which a burst is available again.
         let refused = (0..1500).filter(|_| check("2001:db8::1").is_err()).count();
         assert!((1..=500).contains(&refused), "{refused}");

@@ -1,16 +1,17 @@
-//! Release of a day: the one rule for API and pages of what stays hidden until then.
+//! Release of an evaluation day. All evaluations of a day run on the same episodes, so data about the episodes stays hidden
+//! until the last evaluation of the day has ended; then it is released for everyone at once.
 
 use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
 };
-use faceoff_store::{Evaluation, EvaluationState};
+use faceoff_store::Evaluation;
 
 /// Refuses data about an evaluation's episodes while other evaluations of its day are pending or running.
 ///
 /// # Errors
-/// `NotYet`, with the number of these.
+/// `NotYet`, with the number of those evaluations.
 #[boxed]
 pub async fn check_released(app: &AppState, evaluation: &Evaluation) -> Result<(), Problem> {
     if evaluation.released_at.is_some() {
@@ -18,10 +19,9 @@ pub async fn check_released(app: &AppState, evaluation: &Evaluation) -> Result<(
     }
     let day = evaluation.stage_day.date;
     let day_evaluations = app.store.evaluations_of_day(evaluation.stage_day).await?;
-    let is_open = |state: &EvaluationState| !state.is_over();
     let under_way = day_evaluations
         .iter()
-        .filter(|other| is_open(&other.state))
+        .filter(|evaluation| !evaluation.state.is_over())
         .count();
     Err(Problem::new(
         ProblemKind::NotYet,

@@ -1,4 +1,4 @@
-//! Logging and metrics of requests.
+//! Logging and metrics of HTTP requests.
 
 use crate::{app::AppState, boxed};
 use axum::{
@@ -15,15 +15,18 @@ pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
 /// The kind of a request, which decides its log level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum RequestKind {
     /// Polled by monitoring, or a file that never changes.
     Probe,
+    /// Changes nothing (GET, HEAD, OPTIONS).
     Read,
     Change,
 }
 
-impl Kind {
+impl RequestKind {
+    /// The kind of a request with this method and path.
     fn new(method: &Method, path: &str) -> Self {
+        /// Beginnings of the paths of probes.
         const PROBES: [&str; 5] = [
             "/livez",
             "/readyz",
@@ -40,7 +43,7 @@ impl Kind {
         }
     }
 
-    /// Log level of such a request with this status.
+    /// Log level of a request of this kind whose response has this status.
     fn level(self, status: StatusCode) -> Level {
         match self {
             // A server that is not ready responds with 503 and has logged the reason.
@@ -60,17 +63,17 @@ pub async fn log_request(
     request: Request,
     next: Next,
 ) -> Response {
-    let began = Instant::now();
+    let started_at = Instant::now();
     let (method, path) = (request.method().clone(), request.uri().path());
-    let kind = Kind::new(&method, path);
+    let kind = RequestKind::new(&method, path);
     let span = span(&request);
     let route = request.extensions().get::<MatchedPath>().cloned();
     let response = next.run(request).instrument(span.clone()).await;
-    let (took, status) = (began.elapsed(), response.status());
+    let (duration, status) = (started_at.elapsed(), response.status());
     let route = route.as_ref().map(MatchedPath::as_str);
     let web = app.config.metrics.web();
-    web.record_response(method.as_str(), route, status.as_u16(), took);
-    span.in_scope(|| log_response(kind.level(status), status, took.as_secs_f64()));
+    web.record_response(method.as_str(), route, status.as_u16(), duration);
+    span.in_scope(|| log_response(kind.level(status), status, duration.as_secs_f64()));
     response
 }
 
@@ -93,7 +96,7 @@ fn span(request: &Request) -> Span {
         .unwrap_or_default();
     // Query and headers stay out of the log: they may contain names and tokens.
     let path = redact_code(request.uri().path());
-    let evaluation = evaluation(path);
+    let evaluation = evaluation_id(path);
     let method = request.method();
     tracing::info_span!("http", %method, path, id, evaluation, actor = field::Empty)
 }
@@ -103,17 +106,17 @@ pub fn record_actor(actor: &faceoff_store::Actor) {
     Span::current().record("actor", field::display(actor));
 }
 
-/// The evaluation in a path.
-fn evaluation(path: &str) -> Option<&str> {
+/// The id of the evaluation in a path.
+fn evaluation_id(path: &str) -> Option<&str> {
     let (_, rest) = path.split_once("/evaluations/")?;
     rest.split('/').next().filter(|id| !id.is_empty())
 }
 
 /// Removes an invitation's code: a reader of the log must not be able to accept it.
 fn redact_code(path: &str) -> &str {
-    const JOIN: &str = "/join/";
-    match path.strip_prefix(JOIN) {
-        Some(_) => JOIN,
+    const PREFIX: &str = "/join/";
+    match path.strip_prefix(PREFIX) {
+        Some(_) => PREFIX,
         None => path,
     }
 }
@@ -130,17 +133,20 @@ mod tests {
 
     #[test]
     fn evaluation_is_found_in_path() {
-        assert_eq!(evaluation("/api/v1/evaluations/01a/dataset"), Some("01a"));
-        assert_eq!(evaluation("/evaluations/01a"), Some("01a"));
-        assert_eq!(evaluation("/api/v1/evaluations"), None);
-        assert_eq!(evaluation("/api/v1/board"), None);
+        assert_eq!(
+            evaluation_id("/api/v1/evaluations/01a/dataset"),
+            Some("01a")
+        );
+        assert_eq!(evaluation_id("/evaluations/01a"), Some("01a"));
+        assert_eq!(evaluation_id("/api/v1/evaluations"), None);
+        assert_eq!(evaluation_id("/api/v1/board"), None);
     }
 
     #[test]
     fn log_level_depends_on_kind_and_status() {
         let level = |method, path, status: u16| {
             let status = StatusCode::from_u16(status).unwrap();
-            Kind::new(&method, path).level(status)
+            RequestKind::new(&method, path).level(status)
         };
         assert_eq!(level(Method::POST, "/api/v1/days", 201), Level::INFO);
         assert_eq!(level(Method::POST, "/api/v1/days", 409), Level::INFO);

@@ -1,4 +1,4 @@
-//! The session cookie, and the protection against requests from other sites (CSRF).
+//! The cookie of a browser's session, and the protection against requests that pages of other sites trigger (CSRF).
 
 use crate::{
     config::HttpConfig,
@@ -7,22 +7,23 @@ use crate::{
 use axum::http::{HeaderMap, HeaderValue, header};
 use faceoff_store::SESSION_LIFETIME;
 
-const NAME: &str = "faceoff_session";
+/// Name of the session cookie.
+const COOKIE_NAME: &str = "faceoff_session";
 
 /// The session's secret from the request's cookies.
 pub fn session_cookie(headers: &HeaderMap) -> Option<&str> {
-    cookie_value(headers, NAME)
+    cookie_value(headers, COOKIE_NAME)
 }
 
-/// Value of the cookie with this name.
-pub fn cookie_value<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
+/// Value of the cookie with this name; `None` if it is missing or empty.
+pub fn cookie_value<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     headers
         .get_all(header::COOKIE)
         .iter()
         .filter_map(|line| line.to_str().ok())
         .flat_map(|line| line.split(';'))
         .filter_map(|pair| pair.trim().split_once('='))
-        .find_map(|(name, value)| (name == wanted && !value.is_empty()).then_some(value))
+        .find_map(|(key, value)| (key == name && !value.is_empty()).then_some(value))
 }
 
 /// Value of `Set-Cookie` that stores the session in a browser, or removes it (`None`).
@@ -31,30 +32,30 @@ pub fn cookie_value<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str>
 /// `Internal`: the value is not valid in a header.
 pub fn set_cookie(config: &HttpConfig, session: Option<&str>) -> Result<HeaderValue, Problem> {
     let secure = secure_attribute(config);
-    let (value, age) = match session {
+    let (value, max_age_s) = match session {
         Some(session) => (session, SESSION_LIFETIME.as_secs()),
         None => ("", 0),
     };
     HeaderValue::try_from(format!(
-        "{NAME}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={age}{secure}"
+        "{COOKIE_NAME}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={max_age_s}{secure}"
     ))
     .map_err(Problem::internal)
 }
 
 /// The cookie attribute that restricts a cookie to TLS, if the server is reached over TLS.
 pub fn secure_attribute(config: &HttpConfig) -> &'static str {
-    let by_tls = config
+    let uses_tls = config
         .public_url
         .as_deref()
         .is_some_and(|url| url.starts_with("https://"));
-    if by_tls { "; Secure" } else { "" }
+    if uses_tls { "; Secure" } else { "" }
 }
 
-/// Refuses a request that a page of another site triggered. Browsers send the origin; a request without it is refused,
-/// too, because API clients use tokens.
+/// Refuses a request that a page of another site triggered. Browsers name the requesting site in a header. A request without
+/// this header is refused, too: it comes from an API client, and these use tokens.
 pub fn check_same_origin(headers: &HeaderMap) -> Result<(), Problem> {
     let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok());
-    let is_own = match (text("sec-fetch-site"), text("origin")) {
+    let is_same_origin = match (text("sec-fetch-site"), text("origin")) {
         (Some(site), _) => site == "same-origin",
         (None, Some(origin)) => {
             let authority = origin.split_once("://").map(|(_, authority)| authority);
@@ -62,7 +63,7 @@ pub fn check_same_origin(headers: &HeaderMap) -> Result<(), Problem> {
         }
         (None, None) => false,
     };
-    if is_own {
+    if is_same_origin {
         return Ok(());
     }
     Err(Problem::new(
@@ -85,8 +86,8 @@ mod tests {
 
     #[test]
     fn session_is_found_among_other_cookies() {
-        let both = headers(&[("cookie", "a=b; faceoff_session=x; c=d")]);
-        assert_eq!(session_cookie(&both), Some("x"));
+        let cookies = headers(&[("cookie", "a=b; faceoff_session=x; c=d")]);
+        assert_eq!(session_cookie(&cookies), Some("x"));
         assert_eq!(
             session_cookie(&headers(&[("cookie", "faceoff_session=")])),
             None
@@ -100,14 +101,14 @@ mod tests {
 
     #[test]
     fn cross_site_request_is_refused() {
-        let own = [
+        let same_origin = [
             headers(&[("sec-fetch-site", "same-origin")]),
             headers(&[("origin", "https://a.example:1"), ("host", "a.example:1")]),
         ];
-        for headers in own {
+        for headers in same_origin {
             assert!(check_same_origin(&headers).is_ok(), "{headers:?}");
         }
-        let foreign = [
+        let cross_site = [
             HeaderMap::new(),
             headers(&[("sec-fetch-site", "cross-site")]),
             headers(&[("sec-fetch-site", "same-site")]),
@@ -120,7 +121,7 @@ mod tests {
                 ("host", "a"),
             ]),
         ];
-        for headers in foreign {
+        for headers in cross_site {
             assert!(check_same_origin(&headers).is_err(), "{headers:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! Shutdown signal for streams, which do not end by themselves.
+//! Signal of the server's shutdown. Streaming responses (events, live games) have no end, so they wait for it and then end.
 
 use crate::boxed;
 use std::future::pending;
@@ -15,7 +15,7 @@ impl Shutdown {
         (sender, Self(receiver))
     }
 
-    /// Waits for the shutdown; forever without a signal.
+    /// Waits for the shutdown; without a signal (`None`) forever.
     #[boxed]
     pub async fn wait(shutdown: Option<&mut Self>) {
         match shutdown {

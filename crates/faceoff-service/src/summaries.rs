@@ -1,5 +1,6 @@
-//! Episode summaries of completed runs: computed once from the stored outcomes, then stored in the database and in
-//! memory. A board or an ablation never reads outcomes twice.
+//! Episode summaries of completed runs. A *run* is all episodes of one submission under the same conditions; its summary
+//! condenses the outcomes of the episodes. It is computed once from the stored outcomes, then kept in the database and in
+//! memory, so that a board or an ablation never reads outcomes twice.
 
 use crate::{boxed, problem::Problem};
 use faceoff_scoring::EpisodeSummary;
@@ -10,12 +11,13 @@ use std::{
     sync::{Arc, Mutex, MutexGuard},
 };
 
-/// Summaries in memory; enough for the boards of several seasons.
-const CACHED: usize = 1000;
+/// Largest number of summaries in memory; enough for the boards of several seasons.
+const MAX_CACHED: usize = 1000;
 
 /// Summaries by run. A completed run never changes, so neither does its summary.
 pub type RunSummaries = HashMap<RunId, Arc<EpisodeSummary>>;
 
+/// Loads summaries from memory or the database, or computes them.
 #[derive(Debug)]
 pub struct Summaries {
     store: Store,
@@ -47,11 +49,11 @@ impl Summaries {
             let missing = runs.iter().filter(|run| !summaries.contains_key(run));
             missing.copied().collect()
         };
-        let unread = missing(&summaries);
-        if !unread.is_empty() {
+        let not_cached = missing(&summaries);
+        if !not_cached.is_empty() {
             let stored = self
                 .store
-                .episode_summaries(&unread, EpisodeSummary::VERSION)
+                .episode_summaries(&not_cached, EpisodeSummary::VERSION)
                 .await?;
             for (run, json) in stored {
                 match serde_json::from_str(&json) {
@@ -71,18 +73,19 @@ impl Summaries {
 
     async fn summarise(&self, run: RunId) -> Result<EpisodeSummary, Problem> {
         let outcomes = self.store.outcomes(run).await?;
-        let bounds = self.store.run_variation(run).await?.tier_bounds;
+        let tier_bounds = self.store.run_variation(run).await?.tier_bounds;
         // Takes some ten milliseconds, so it runs off the threads that handle requests.
-        let summary =
-            tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds))
-                .await
-                .map_err(Problem::internal)?
-                .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;
+        let summary = tokio::task::spawn_blocking(move || {
+            EpisodeSummary::from_outcomes(&outcomes, &tier_bounds)
+        })
+        .await
+        .map_err(Problem::internal)?
+        .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;
         let json = serde_json::to_string(&summary).map_err(Problem::internal)?;
         let stored =
             self.store
                 .store_episode_summary(run, EpisodeSummary::VERSION, &json, self.clock.now());
-        // It can be computed again, and is in memory: no page fails because the disk is full.
+        // The summary can be computed again, so a full disk is no reason to fail the request.
         if let Err(error) = stored.await {
             tracing::warn!(%run, %error, "a summary could not be stored");
         }
@@ -91,15 +94,15 @@ impl Summaries {
 
     fn cached(&self, runs: &[RunId]) -> RunSummaries {
         let cached = self.lock();
-        let known = |run: &RunId| Some((*run, Arc::clone(cached.get(run)?)));
-        runs.iter().filter_map(known).collect()
+        let entry = |run: &RunId| Some((*run, Arc::clone(cached.get(run)?)));
+        runs.iter().filter_map(entry).collect()
     }
 
     fn insert(&self, summaries: &mut RunSummaries, run: RunId, summary: EpisodeSummary) {
         let summary = Arc::new(summary);
         let mut cached = self.lock();
-        if cached.len() >= CACHED {
-            // Rare, and all summaries are in the database.
+        if cached.len() >= MAX_CACHED {
+            // This is rare, and all summaries are in the database.
             cached.clear();
         }
         cached.insert(run, Arc::clone(&summary));

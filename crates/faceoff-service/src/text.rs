@@ -1,46 +1,49 @@
-//! Validation of text from users: trimmed, limited in length, and without control characters.
+//! Validation of text from users. The functions return the trimmed text, or a problem that names the field.
 
 use crate::problem::Problem;
 
-/// Text of one line.
-pub fn single_line(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
+/// One line of text with 1 to `max_chars` printable characters.
+pub fn single_line(field: &str, text: &str, max_chars: usize) -> Result<String, Problem> {
     let text = text.trim();
     let chars = text.chars().count();
-    if !(1..=most_chars).contains(&chars) {
-        let detail = format!("expected 1 to {most_chars} characters, got {chars}");
+    if !(1..=max_chars).contains(&chars) {
+        let detail = format!("expected 1 to {max_chars} characters, got {chars}");
         return Err(Problem::invalid(field, detail));
     }
     match text.chars().find(|c| !faceoff_types::is_printable(*c)) {
-        Some(bad) => Err(Problem::invalid(
+        Some(character) => Err(Problem::invalid(
             field,
-            format!("expected one line of text, got the character {bad:?}"),
+            format!("expected one line of text, got the character {character:?}"),
         )),
         None => Ok(text.to_owned()),
     }
 }
 
-/// Text of one or more lines.
-pub fn multi_line(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
+/// One or more lines of text with 1 to `max_chars` characters: printable ones, line breaks and tabs.
+pub fn multi_line(field: &str, text: &str, max_chars: usize) -> Result<String, Problem> {
     let text = text.replace("\r\n", "\n");
     let text = text.trim();
     let chars = text.chars().count();
-    if !(1..=most_chars).contains(&chars) {
-        let detail = format!("expected 1 to {most_chars} characters, got {chars}");
+    if !(1..=max_chars).contains(&chars) {
+        let detail = format!("expected 1 to {max_chars} characters, got {chars}");
         return Err(Problem::invalid(field, detail));
     }
-    let is_fine = |c: char| matches!(c, '\n' | '\t') || faceoff_types::is_printable(c);
-    match text.chars().find(|c| !is_fine(*c)) {
-        Some(bad) => Err(Problem::invalid(
+    let is_allowed = |c: char| matches!(c, '\n' | '\t') || faceoff_types::is_printable(c);
+    match text.chars().find(|c| !is_allowed(*c)) {
+        Some(character) => Err(Problem::invalid(
             field,
-            format!("expected plain text, got the character {bad:?}"),
+            format!("expected plain text, got the character {character:?}"),
         )),
         None => Ok(text.to_owned()),
     }
 }
 
+/// Longest address of a link.
+const MAX_LINK_CHARS: usize = 300;
+
 /// An http or https address for a link on a page.
 pub fn link(field: &str, text: &str) -> Result<String, Problem> {
-    let text = single_line(field, text, 300)?;
+    let text = single_line(field, text, MAX_LINK_CHARS)?;
     let rest = text
         .strip_prefix("https://")
         .or_else(|| text.strip_prefix("http://"));

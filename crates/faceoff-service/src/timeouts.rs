@@ -1,4 +1,4 @@
-//! Time limit of handlers.
+//! Time limit of request handlers.
 
 use crate::{
     boxed,

@@ -6,11 +6,11 @@ use faceoff_types::TournamentId;
 use std::{collections::HashMap, sync::Arc};
 use tokio::sync::Mutex;
 
-/// Entries in the cache; a season has a few tournaments.
+/// Largest number of entries in the cache; a season has a few tournaments.
 const MAX_ENTRIES: usize = 20;
 
-/// By tournament the result, and the id of the newest change that it includes. Only one result is computed at a time:
-/// the slots need the CPUs.
+/// The result for each tournament, with the id of the newest change of the season that it includes. Only one result is computed
+/// at a time: the slots that run evaluations and games need the CPUs.
 #[derive(Debug)]
 pub struct TournamentCache<T> {
     entries: Mutex<HashMap<TournamentId, (i64, Arc<T>)>>,
@@ -25,23 +25,23 @@ impl<T> Default for TournamentCache<T> {
 }
 
 impl<T> TournamentCache<T> {
-    /// The cached result, if it includes the newest change; otherwise computes it by `make` and caches it.
+    /// The cached result, if it includes the newest change; otherwise calls `compute` and caches its result.
     pub async fn get(
         &self,
         store: &Store,
         id: TournamentId,
-        make: impl AsyncFnOnce() -> Result<T, Problem>,
+        compute: impl AsyncFnOnce() -> Result<T, Problem>,
     ) -> Result<Arc<T>, Problem> {
         let mut entries = self.entries.lock().await;
         // Read before the computation: a change in between invalidates the entry.
         let change = store.newest_change().await?;
         let cached = entries
             .get(&id)
-            .filter(|(cached_at, _)| *cached_at == change);
+            .filter(|(cached_change, _)| *cached_change == change);
         if let Some((_, result)) = cached {
             return Ok(Arc::clone(result));
         }
-        let result = Arc::new(make().await?);
+        let result = Arc::new(compute().await?);
         if entries.len() >= MAX_ENTRIES && !entries.contains_key(&id) {
             entries.clear();
         }

@@ -1,4 +1,4 @@
-//! Minimum transfer rate of a peer: a connection that is too slow for too long is closed.
+//! Minimum transfer rate of a connection: if the peer (the client) is too slow for too long, the connection is closed.
 
 use std::time::Duration;
 
@@ -12,11 +12,12 @@ pub struct MinTransferRate {
 }
 
 /// Measures how far a peer is behind its minimum rate. Only the time counts in which the server waits for the peer.
-/// Waiting uses up the grace; each byte adds the time that it may take, up to the whole grace. So a pause costs as much
-/// as a trickle with the same mean, and the server's own work costs nothing.
+/// Waiting uses up the grace; each byte adds the time that it may take, up to the whole grace. So a slow trickle is treated
+/// like a pause followed by a burst if their mean rate is the same.
 #[derive(Debug)]
 pub struct TransferRateGuard {
     rate: MinTransferRate,
+    /// The part of the grace that is not used up.
     remaining: Duration,
 }
 
@@ -29,18 +30,18 @@ impl TransferRateGuard {
         }
     }
 
-    /// Remaining time if the peer transfers nothing.
+    /// How long the server still waits if the peer transfers nothing.
     pub const fn remaining(&self) -> Duration {
         self.remaining
     }
 
-    /// Subtracts time in which the server waited for the peer.
+    /// Subtracts the time in which the server waited for the peer.
     pub fn record_wait(&mut self, time: Duration) {
         self.remaining = self.remaining.saturating_sub(time);
     }
 
-    /// Adds the time that these bytes may take.
-    pub fn transferred(&mut self, bytes: usize) {
+    /// Adds the time that these bytes may take at the minimum rate.
+    pub fn record_bytes(&mut self, bytes: usize) {
         let earned = bytes as f64 / self.rate.bytes_per_s.max(1) as f64;
         let grace = self.rate.grace;
         let earned = Duration::try_from_secs_f64(earned).unwrap_or(grace);
@@ -52,21 +53,22 @@ impl TransferRateGuard {
 mod tests {
     use super::*;
 
+    // The expected seconds below follow from these values.
     const RATE: MinTransferRate = MinTransferRate {
         bytes_per_s: 1000,
         grace: Duration::from_secs(30),
     };
 
-    /// Seconds until a peer that transfers `bytes` every `every_s` seconds is disconnected; `None` if it never is.
-    fn seconds_until_disconnect(bytes: usize, every_s: u64) -> Option<u64> {
+    /// Seconds until a peer that transfers `bytes` at once every `interval_s` seconds is disconnected; `None` if it never is.
+    fn seconds_until_disconnect(bytes: usize, interval_s: u64) -> Option<u64> {
         let mut guard = TransferRateGuard::new(RATE);
-        let every = Duration::from_secs(every_s);
+        let interval = Duration::from_secs(interval_s);
         for round in 0..10_000 {
-            if guard.remaining() < every {
-                return Some(round * every_s + guard.remaining().as_secs());
+            if guard.remaining() < interval {
+                return Some(round * interval_s + guard.remaining().as_secs());
             }
-            guard.record_wait(every);
-            guard.transferred(bytes);
+            guard.record_wait(interval);
+            guard.record_bytes(bytes);
         }
         None
     }
@@ -76,12 +78,12 @@ mod tests {
         assert_eq!(seconds_until_disconnect(0, 1), Some(30), "nothing at all");
         let trickle = seconds_until_disconnect(1, 20);
         assert!(
-            trickle.is_some_and(|s| s <= 31),
+            trickle.is_some_and(|seconds| seconds <= 31),
             "a byte in 20 s: {trickle:?}"
         );
         let half = seconds_until_disconnect(500, 1);
         assert!(
-            half.is_some_and(|s| (58..=62).contains(&s)),
+            half.is_some_and(|seconds| (58..=62).contains(&seconds)),
             "half the rate: {half:?}"
         );
         assert_eq!(seconds_until_disconnect(1001, 1), None);
@@ -95,15 +97,15 @@ mod tests {
     #[test]
     fn fast_transfer_earns_at_most_the_grace() {
         let mut guard = TransferRateGuard::new(RATE);
-        guard.transferred(usize::MAX);
+        guard.record_bytes(usize::MAX);
         assert_eq!(guard.remaining(), RATE.grace);
-        let none = MinTransferRate {
+        let no_minimum = MinTransferRate {
             bytes_per_s: 0,
             ..RATE
         };
-        let mut guard = TransferRateGuard::new(none);
+        let mut guard = TransferRateGuard::new(no_minimum);
         guard.record_wait(RATE.grace);
-        guard.transferred(1);
+        guard.record_bytes(1);
         assert_eq!(guard.remaining(), Duration::from_secs(1));
     }
 }

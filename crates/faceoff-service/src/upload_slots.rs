@@ -1,4 +1,4 @@
-//! Limit of concurrent uploads per team.
+//! Limit of concurrent uploads per team. An upload occupies one of the team's *slots* until it ends.
 
 use faceoff_types::TeamId;
 use std::{
@@ -9,7 +9,9 @@ use std::{
 /// Each team has its own slots, so one team's uploads never block another's.
 #[derive(Debug)]
 pub struct UploadSlots {
+    /// Slots of each team.
     per_team: usize,
+    /// Running uploads of each team.
     running: Mutex<HashMap<TeamId, usize>>,
 }
 
@@ -42,7 +44,7 @@ impl UploadSlots {
         })
     }
 
-    /// A panic cannot leave a count half-written.
+    /// The counts; a panic of another thread cannot leave one half-written.
     fn running(&self) -> MutexGuard<'_, HashMap<TeamId, usize>> {
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -67,15 +69,18 @@ mod tests {
     #[test]
     fn upload_slots_are_counted_per_team() {
         let slots = Arc::new(UploadSlots::new(2));
-        let (one, other) = (TeamId::new(), TeamId::new());
-        let held = [slots.acquire(one), slots.acquire(one)];
-        assert!(held.iter().all(Option::is_some));
-        assert!(slots.acquire(one).is_none());
-        let others = slots.acquire(other);
-        assert!(others.is_some());
-        drop(held);
-        assert!(slots.acquire(one).is_some());
-        drop(others);
-        assert!(slots.running().is_empty(), "idle teams are forgotten");
+        let (team, other_team) = (TeamId::new(), TeamId::new());
+        let acquired = [slots.acquire(team), slots.acquire(team)];
+        assert!(acquired.iter().all(Option::is_some));
+        assert!(slots.acquire(team).is_none());
+        let other_slot = slots.acquire(other_team);
+        assert!(other_slot.is_some());
+        drop(acquired);
+        assert!(slots.acquire(team).is_some());
+        drop(other_slot);
+        assert!(
+            slots.running().is_empty(),
+            "teams without uploads are removed"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! The viewer of a public resource: no token is needed, and an organiser's shows more.
+//! The viewer of a public resource: an organiser, a team, or a visitor without a token. Organisers and teams may see more.
 
 use crate::{
     app::App,
@@ -19,7 +19,7 @@ pub enum Viewer {
 }
 
 impl Viewer {
-    /// A caller with a token.
+    /// The viewer that a caller with a token is.
     pub fn new(caller: &Caller) -> Self {
         match caller.team() {
             None => Self::Organiser,
@@ -35,17 +35,17 @@ impl Viewer {
         }
     }
 
-    /// Refuses all viewers but organisers; `what` names the resource.
+    /// Refuses all viewers but organisers; `resource` is its name in the message.
     ///
     /// # Errors
     /// `Unauthenticated` or `Forbidden`.
-    pub(crate) fn check_organiser(self, what: &str) -> Result<(), Problem> {
+    pub(crate) fn check_organiser(self, resource: &str) -> Result<(), Problem> {
         if self == Self::Organiser {
             return Ok(());
         }
         Err(Problem::new(
             self.denial_kind(),
-            format!("{what} is for organisers only: it needs an organiser's token"),
+            format!("{resource} is for organisers only: it needs an organiser's token"),
         ))
     }
 }

@@ -1,4 +1,4 @@
-//! Control steps per second of a held arm: single episodes, a game, and many worlds at once.
+//! Benchmark: control steps per second while the arms hold their position, in single episodes, in a game, and in many episodes at once.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::{
@@ -8,10 +8,11 @@ use faceoff_sim::{
 use faceoff_types::{Factors, Seed, Task};
 use std::hint::black_box;
 
-/// Control steps of one sample.
+/// Control steps of one measured run.
 const STEPS: u64 = 50;
 
-fn held_arm(c: &mut Criterion) {
+/// Control steps of single episodes, with and without perturbations.
+fn episode(c: &mut Criterion) {
     let mut hold = [0.0; 2 * JOINTS];
     hold[..JOINTS].copy_from_slice(&INITIAL_Q);
     let settings = PerturbationSettings::default();
@@ -44,7 +45,7 @@ fn held_arm(c: &mut Criterion) {
     group.finish();
 }
 
-/// One control step of two agents.
+/// A control step of a game.
 fn game(c: &mut Criterion) {
     let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let mut game = Game::new(GameSetup {
@@ -62,7 +63,7 @@ fn game(c: &mut Criterion) {
     group.finish();
 }
 
-/// A control step of many worlds, on one thread and on all.
+/// A control step of a batch (many episodes at once), on one thread and on all.
 fn batch(c: &mut Criterion) {
     const WORLDS: u32 = 64;
     let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
@@ -93,5 +94,5 @@ fn batch(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, held_arm, game, batch);
+criterion_group!(benches, episode, game, batch);
 criterion_main!(benches);

@@ -1,4 +1,5 @@
-//! Draws the differences between the simulator and the reference's recordings: the figures of `docs/simulator.md`.
+//! Draws the differences between the simulator and recordings of the *reference* (the challenge's own simulator): the figures of
+//! `docs/simulator.md`. A *replay* is a simulated episode with the recorded actions.
 //!
 //! `cargo run -p faceoff-sim --example fidelity -- docs/images/fidelity`
 
@@ -22,7 +23,7 @@ use std::{error::Error, ops::Range, path::Path};
 
 type DrawResult = Result<(), Box<dyn Error>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// A named line of a chart.
+/// A line of a chart: name and points.
 type Line = (String, Vec<(f64, f64)>);
 
 /// Differences below this are drawn at this value: the recordings have 9 digits.
@@ -51,33 +52,39 @@ fn main() -> DrawResult {
     Ok(())
 }
 
-/// Joint differences of the motions over time, and one motion as recorded and as simulated.
+/// Draws one recorded motion of the arm with the simulated one, and the largest joint difference of each motion over time.
 fn draw_arm(file: &Path) -> DrawResult {
+    const CONTROL_STEP_S: f64 = 0.02;
     let recording = recording("arm_tracking");
-    let init: [f64; 7] = array(&recording["init_q"]);
+    let initial_q: [f64; 7] = array(&recording["init_q"]);
     let mut lines = vec![];
-    let mut sample: Vec<Line> = vec![];
+    let mut sample_motion: Vec<Line> = vec![];
     for case in recording["cases"].as_array().unwrap() {
         let interpolation = Interpolation::from_code(case["interpolation_order"].as_i64()).unwrap();
-        let mut world = World::new(&Plant::nominal(), &[init], [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let mut world = World::new(
+            &Plant::nominal(),
+            &[initial_q],
+            [0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
+        );
         let recorded: Vec<[f64; 7]> = rows(&case["q"]);
         let mut line = vec![];
         let mut simulated = vec![];
         for (step, action) in case["actions"].as_array().unwrap().iter().enumerate() {
             world.command(0, interpolation, &flat(action));
             world.control_step(|_| [0.0; 2]);
-            let t = 0.02 * (step + 1) as f64;
+            let t = CONTROL_STEP_S * (step + 1) as f64;
             let difference = max_difference(&recorded[step + 1], &world.joints(0));
             line.push((t, difference.max(FLOOR)));
             simulated.push((t, world.joints(0)));
         }
-        if sample.is_empty() && interpolation == Interpolation::Quintic {
+        if sample_motion.is_empty() && interpolation == Interpolation::Quintic {
             for joint in 0..4 {
                 let recorded_line = recorded.iter().enumerate();
-                let recorded_line = recorded_line.map(|(k, q)| (0.02 * k as f64, q[joint]));
-                sample.push((format!("joint {}", joint + 1), recorded_line.collect()));
+                let recorded_line =
+                    recorded_line.map(|(k, q)| (CONTROL_STEP_S * k as f64, q[joint]));
+                sample_motion.push((format!("joint {}", joint + 1), recorded_line.collect()));
                 let simulated_line = simulated.iter().map(|(t, q)| (*t, q[joint]));
-                sample.push((String::new(), simulated_line.collect()));
+                sample_motion.push((String::new(), simulated_line.collect()));
             }
         }
         lines.push((String::new(), line));
@@ -99,7 +106,7 @@ fn draw_arm(file: &Path) -> DrawResult {
             &left,
             "one motion: recorded (wide) and simulated (thin)",
             ["t, s", "q, rad"],
-            &sample,
+            &sample_motion,
         )?;
         logarithmic(
             &right,
@@ -112,22 +119,26 @@ fn draw_arm(file: &Path) -> DrawResult {
     })
 }
 
-/// Cumulative distributions of the velocity's difference after a contact.
+/// Draws cumulative distributions of the difference in the puck's velocity after a contact.
 fn draw_contacts(file: &Path) -> DrawResult {
     let (bounces, impacts) = (bounces(), impacts());
-    let errors_of = |kinds: &[&str]| -> Vec<f64> {
-        let of_kind = bounces.iter().filter(|b| kinds.contains(&b.kind.as_str()));
-        of_kind.map(|bounce| bounce.errors().0).collect()
+    let bounce_errors = |kinds: &[&str]| -> Vec<f64> {
+        let selected = bounces
+            .iter()
+            .filter(|bounce| kinds.contains(&bounce.kind.as_str()));
+        selected.map(|bounce| bounce.errors().0).collect()
     };
-    let impacts_by = |arm: bool| -> Vec<f64> {
-        let selected = impacts.iter().filter(|impact| impact.by_arm() == arm);
-        selected.map(|impact| impact.velocity).collect()
+    let impact_errors = |moved_by_arm: bool| -> Vec<f64> {
+        let selected = impacts
+            .iter()
+            .filter(|impact| impact.is_moved_by_arm() == moved_by_arm);
+        selected.map(|impact| impact.velocity_error).collect()
     };
     let lines = [
-        ("rim", errors_of(&["wall", "wall_spin"])),
-        ("corner", errors_of(&["corner"])),
-        ("mallet, moved by the arm", impacts_by(true)),
-        ("mallet, imposed", impacts_by(false)),
+        ("rim", bounce_errors(&["wall", "wall_spin"])),
+        ("corner", bounce_errors(&["corner"])),
+        ("mallet, moved by the arm", impact_errors(true)),
+        ("mallet, imposed", impact_errors(false)),
     ]
     .map(|(name, mut errors)| {
         let (median, p90) = (quantile(&mut errors, 0.5), quantile(&mut errors, 0.9));
@@ -174,30 +185,35 @@ fn draw_contacts(file: &Path) -> DrawResult {
     })
 }
 
-/// Puck and joints of the replayed episodes, from the first impact on.
+/// Draws the differences of puck and joints in the replays, around the puck's first impact and the first contact with the mallet.
 fn draw_episodes(file: &Path, replays: &[Replay]) -> DrawResult {
-    let line = |replay: &Replay, from: usize, value: &dyn Fn(usize) -> f64| -> Line {
-        let first = from.saturating_sub(10).min(replay.steps.len());
-        let points = (first..replay.steps.len().min(from.saturating_add(60)))
-            .map(|step| (step as f64 - from as f64, value(step).max(FLOOR)));
+    // From 10 control steps before `zero_step` to 60 after it.
+    let line = |replay: &Replay, zero_step: usize, value: &dyn Fn(usize) -> f64| -> Line {
+        let first = zero_step.saturating_sub(10).min(replay.steps.len());
+        let points = (first..replay.steps.len().min(zero_step.saturating_add(60)))
+            .map(|step| (step as f64 - zero_step as f64, value(step).max(FLOOR)));
         (String::new(), points.collect())
     };
     let pucks: Vec<Line> = replays
         .iter()
-        .map(|replay| line(replay, replay.impact, &|step| replay.steps[step].puck_m))
+        .map(|replay| {
+            line(replay, replay.first_impact_step, &|step| {
+                replay.steps[step].puck_m
+            })
+        })
         .collect();
     let joints: Vec<Line> = replays
         .iter()
-        .filter(|replay| replay.contact != usize::MAX)
+        .filter(|replay| replay.first_contact_step != usize::MAX)
         .map(|replay| {
-            line(replay, replay.contact, &|step| {
+            line(replay, replay.first_contact_step, &|step| {
                 replay.steps[step].joints_rad
             })
         })
         .collect();
     let mut distances: Vec<f64> = replays
         .iter()
-        .map(|replay| replay.largest(|step| step <= replay.impact + 8, |d| d.puck_m))
+        .map(|replay| replay.largest(|step| step <= replay.first_impact_step + 8, |d| d.puck_m))
         .collect();
     println!(
         "episodes: puck until 8 steps after its first impact: median {:.1e} m, 90th percentile {:.1e} m, \
@@ -228,7 +244,7 @@ fn draw_episodes(file: &Path, replays: &[Replay]) -> DrawResult {
     })
 }
 
-/// The paths of some pucks over the table.
+/// Draws the paths of some pucks over the table.
 fn draw_paths(file: &Path, replays: &[Replay]) -> DrawResult {
     let path = |puck: &[[f64; 6]]| puck.iter().map(|p| (p[0], p[1])).collect();
     let mut lines = vec![];
@@ -247,6 +263,7 @@ fn draw_paths(file: &Path, replays: &[Replay]) -> DrawResult {
     })
 }
 
+/// Creates an SVG file of `size` pixels and draws into it.
 fn picture(
     file: &Path,
     size: (u32, u32),
@@ -259,7 +276,7 @@ fn picture(
     Ok(())
 }
 
-/// Pairs of lines: the recorded one wide and pale, the simulated one thin on top.
+/// Draws pairs of lines: the recorded one wide and pale, the simulated one thin on top.
 fn overlay(area: &Area<'_>, caption: &str, [x, y]: [&str; 2], lines: &[Line]) -> DrawResult {
     let points = || lines.iter().flat_map(|(_, line)| line);
     let mut chart = ChartBuilder::on(area)
@@ -298,22 +315,22 @@ fn overlay(area: &Area<'_>, caption: &str, [x, y]: [&str; 2], lines: &[Line]) ->
     Ok(())
 }
 
-/// Many lines over a logarithmic axis, and a bound.
+/// Draws many lines over a logarithmic axis, and a bound.
 fn logarithmic(
     area: &Area<'_>,
     caption: &str,
     [x, y]: [&str; 2],
-    height: Range<f64>,
+    y_range: Range<f64>,
     lines: &[Line],
     bound: Option<(f64, &str)>,
 ) -> DrawResult {
-    let width = range(lines.iter().flat_map(|(_, line)| line).map(|(x, _)| *x));
+    let x_range = range(lines.iter().flat_map(|(_, line)| line).map(|(x, _)| *x));
     let mut chart = ChartBuilder::on(area)
         .caption(caption, ("sans-serif", 16))
         .margin(12)
         .x_label_area_size(36)
         .y_label_area_size(60)
-        .build_cartesian_2d(width.clone(), height.log_scale())?;
+        .build_cartesian_2d(x_range.clone(), y_range.log_scale())?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -325,7 +342,7 @@ fn logarithmic(
         chart.draw_series(LineSeries::new(line.iter().copied(), BLUE_LINE.mix(0.35)))?;
     }
     if let Some((value, name)) = bound {
-        let ends = [(width.start, value), (width.end, value)];
+        let ends = [(x_range.start, value), (x_range.end, value)];
         chart
             .draw_series(LineSeries::new(ends, RED.stroke_width(2)))?
             .label(name)

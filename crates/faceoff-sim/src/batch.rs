@@ -1,8 +1,8 @@
-//! Many episodes stepped at once, for training.
+//! A batch: many episodes of one task, stepped at once for training.
 //!
-//! Observations and actions are one array each, a row per world. A world whose episode ends starts its
-//! next episode at once. The episodes of a world depend only on its row, not on the threads. The threads
-//! come from rayon's current pool: callers set their number with `ThreadPool::install`.
+//! A batch has a fixed number of *worlds*, each of which runs one episode at a time. Observations and actions are one array each, a
+//! row per world. A world whose episode ends starts its next episode at once. The episodes of a world depend only on its row, not on
+//! the threads. The threads come from rayon's current pool: callers set their number with `ThreadPool::install`.
 
 use crate::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
@@ -14,7 +14,7 @@ use crate::{
 use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed, Task};
 use rayon::prelude::*;
 
-/// Worlds that one thread steps at once.
+/// Number of worlds that one thread steps at once.
 const WORLDS_PER_CHUNK: usize = 4;
 
 /// Task, perturbations and seed of a batch.
@@ -23,36 +23,40 @@ pub struct BatchSetup {
     pub task: Task,
     /// How actions become trajectories.
     pub interpolation: Interpolation,
+    /// The active kinds of perturbations.
     pub factors: Factors,
+    /// Magnitudes of the perturbations.
     pub settings: PerturbationSettings,
-    /// The arms; nominal unless the factors contain the model mismatch.
+    /// The physical properties of the arms; nominal unless the factors contain the model mismatch.
     pub plant: Plant,
-    /// The episodes are those of an evaluation with this seed.
+    /// Seed of the evaluation whose episodes the batch runs.
     pub seed: Seed,
     /// Number of worlds; at least 1.
     pub worlds: u32,
 }
 
-/// Worlds of one task. World `w` of `n` runs the episodes w, w + n, w + 2 n, …
+/// Worlds of one task. Of `n` worlds, the world in row `w` runs the episodes w, w + n, w + 2 n, …
 #[derive(Debug, Clone)]
 pub struct Batch {
     setup: BatchSetup,
-    worlds: Vec<World>,
+    worlds: Vec<BatchWorld>,
     observations: Vec<f64>,
     outcomes: Vec<BatchOutcome>,
     simd_level: SimdLevel,
 }
 
+/// A world of a batch: its current episode.
 #[derive(Debug, Clone)]
-struct World {
+struct BatchWorld {
     episode: Episode,
-    number: u32,
+    /// Index of the episode within the evaluation.
+    episode_index: u32,
 }
 
 /// Result of a control step of one world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchOutcome {
-    /// The episode that the step belongs to.
+    /// Index, within the evaluation, of the episode that the step belongs to.
     pub episode: u32,
     /// The end of the episode, if this step ended it, and the constraint values.
     pub step: StepOutcome,
@@ -82,9 +86,9 @@ impl Batch {
     /// All worlds at the start of their first episode.
     #[must_use]
     pub fn new(setup: BatchSetup) -> Self {
-        let worlds: Vec<World> = (0..setup.worlds.max(1))
+        let worlds: Vec<BatchWorld> = (0..setup.worlds.max(1))
             .into_par_iter()
-            .map(|number| setup.start(number))
+            .map(|episode_index| setup.start_world(episode_index))
             .collect();
         let mut observations = Vec::with_capacity(worlds.len() * setup.observation_len());
         for world in &worlds {
@@ -118,13 +122,13 @@ impl Batch {
         self.setup.interpolation.len()
     }
 
-    /// The agents' observations: [worlds][[`Batch::observation_len`]].
+    /// The agents' observations, row-major: worlds × [`Batch::observation_len`].
     #[must_use]
     pub fn observations(&self) -> &[f64] {
         &self.observations
     }
 
-    /// One control step of every world. `actions` is [worlds][[`Batch::action_len`]], finite. Returns an
+    /// One control step of every world. `actions` is row-major, worlds × [`Batch::action_len`], and finite. Returns an
     /// outcome per world.
     ///
     /// # Panics
@@ -168,8 +172,8 @@ impl Batch {
 }
 
 impl BatchSetup {
-    fn start(&self, number: u32) -> World {
-        let seed = self.seed.episode(self.task, number);
+    fn start_world(&self, episode_index: u32) -> BatchWorld {
+        let seed = self.seed.episode(self.task, episode_index);
         let episode = Episode::new(
             self.task,
             self.interpolation,
@@ -178,7 +182,10 @@ impl BatchSetup {
             &self.plant,
             seed,
         );
-        World { episode, number }
+        BatchWorld {
+            episode,
+            episode_index,
+        }
     }
 
     fn observation_len(&self) -> usize {
@@ -186,20 +193,20 @@ impl BatchSetup {
     }
 }
 
-impl World {
-    /// The result of a step. After an end it starts the next episode.
+impl BatchWorld {
+    /// The result of a step. If the step ended the episode, the world starts its next one.
     fn end_step(&mut self, setup: &BatchSetup, step: StepOutcome) -> BatchOutcome {
         let mut last_observation = [0.0; OBSERVATION_WITH_OPPONENT_LEN];
         let observation = self.episode.observation();
         last_observation[..observation.len()].copy_from_slice(observation);
         let outcome = BatchOutcome {
-            episode: self.number,
+            episode: self.episode_index,
             step,
             success: self.episode.success(),
             last_observation,
         };
         if step.end.is_some() {
-            *self = setup.start(self.number.wrapping_add(setup.worlds.max(1)));
+            *self = setup.start_world(self.episode_index.wrapping_add(setup.worlds.max(1)));
         }
         outcome
     }

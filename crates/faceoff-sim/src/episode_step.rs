@@ -1,8 +1,8 @@
-//! One control step of several episodes at once.
+//! One control step of several episodes at once, in SIMD registers.
 //!
 //! In an arm's equations each link depends on the previous one, so that a single arm leaves most of a core's
-//! arithmetic units idle. Arms of different worlds are independent: four of them share the lanes of a register
-//! and are computed at once, for any tasks, plants and step numbers.
+//! arithmetic units idle. Arms of different worlds are independent: four of them share the *lanes* (number slots)
+//! of a register and are computed at once, for any tasks, plants (physical properties of the arms) and step numbers.
 
 use crate::{
     dynamics::simd_level::SimdLevel,
@@ -41,19 +41,21 @@ pub fn step_episodes_on(
     assert_eq!(
         episodes.len(),
         outcomes.len(),
-        "expected room for each episode's outcome"
+        "expected an outcome for each episode"
     );
     for (episode, action) in episodes.iter_mut().zip(actions) {
         episode.command(action);
     }
     // Worlds with the same number of robots share the lanes, so that only the last group can leave lanes empty.
     for robots in 1..=2 {
-        let mut same_size = episodes
+        let mut same_robot_count = episodes
             .iter_mut()
             .filter(|episode| episode.world().robots() == robots)
             .peekable();
-        while same_size.peek().is_some() {
-            let worlds = same_size.by_ref().take(simd_level.worlds_at_once(robots));
+        while same_robot_count.peek().is_some() {
+            let worlds = same_robot_count
+                .by_ref()
+                .take(simd_level.worlds_at_once(robots));
             World::control_step_all(
                 simd_level,
                 worlds.map(|episode| episode.world_and_air_force()),

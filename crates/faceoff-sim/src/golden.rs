@@ -1,4 +1,4 @@
-//! Golden episodes and games with contacts, and the hashes of their observations and states. A changed hash
+//! *Golden* episodes and games: a few fixed ones, with contacts, whose observations and states are hashed. A changed hash
 //! means changed behaviour of the simulator, and so of the ruleset.
 //!
 //! `tests/golden/simulator.txt` holds the hashes. This crate's tests compare what the library computes;
@@ -14,13 +14,13 @@ use crate::{
 use faceoff_types::{Interpolation, PerturbationSettings, Profile, Seed, Task};
 use std::fmt;
 
-/// Without perturbations, and with those of the evaluation.
+/// The perturbation profiles: without perturbations, and with those of an evaluation.
 const PROFILES: [Profile; 2] = [Profile::Ideal, Profile::Evaluation];
 
-/// Control steps of a golden game: several rallies, and goals.
+/// Control steps of a golden game: enough for several rallies (the parts of a game from a serve to a goal or foul), and for goals.
 const GAME_STEPS: u32 = 3000;
 
-/// Control steps of one stroke.
+/// Control steps of one stroke of [`strike`].
 const STROKE_STEPS: u32 = 40;
 
 /// Seed of all golden episodes and games.
@@ -29,9 +29,9 @@ const SEED: u64 = 1;
 /// A golden episode or game.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Golden {
-    /// The task or `game`, and the profile: `hit ideal`.
+    /// The task or `game`, and the profile, e.g. `hit ideal`.
     pub name: String,
-    /// The first 16 hexadecimal digits of the BLAKE3 hash of its numbers, little-endian.
+    /// The first 16 hexadecimal digits of the BLAKE3 hash of its numbers, which are hashed as little-endian bytes.
     pub hash: String,
 }
 
@@ -42,7 +42,7 @@ impl fmt::Display for Golden {
     }
 }
 
-/// All golden episodes and games, in the order of the file.
+/// All golden episodes and games, in the order of `tests/golden/simulator.txt`.
 pub fn all() -> impl Iterator<Item = Golden> {
     let episodes = PROFILES
         .into_iter()
@@ -120,7 +120,8 @@ pub fn episode_hash(mut episode: Episode) -> String {
 }
 
 /// Continues a game for `steps` control steps, both robots with [`strike`]; returns the hash of
-/// observations, pucks and judgements.
+/// observations, pucks, ends of rallies and windows (counts of violations). The last two are hashed as their `Debug` text, so a field of
+/// these types cannot be renamed without a change of the hash.
 pub fn game_hash(game: &mut Game, steps: u32) -> String {
     let mut hash = Hash::default();
     for _ in 0..steps {
@@ -135,28 +136,29 @@ pub fn game_hash(game: &mut Game, steps: u32) -> String {
     hash.digits()
 }
 
-/// A simple agent, so that the hashes cover contacts: it repeatedly moves behind the puck and through it.
-/// `observation` is in the robot's own frame; the action is positions and velocities, rad and rad/s.
+/// A simple agent, so that the hashes cover contacts: in strokes of 40 control steps it moves the mallet from behind the
+/// puck through the puck's position. `observation` is in the robot's base frame and starts with the puck's x, y (m); the joint positions
+/// start at index 6. The action is seven positions (rad) and seven velocities (rad/s). The constants are chosen, not derived.
 #[must_use]
 pub fn strike(observation: &[f64], step: u32) -> [f64; 2 * JOINTS] {
     let q: [f64; JOINTS] = std::array::from_fn(|i| observation[6 + i]);
-    let through = 0.35 * f64::from(step % STROKE_STEPS) / f64::from(STROKE_STEPS);
+    let stroke_m = 0.35 * f64::from(step % STROKE_STEPS) / f64::from(STROKE_STEPS);
     let target = [
-        (observation[0] - 0.15 + through).clamp(0.6, 1.35),
+        (observation[0] - 0.15 + stroke_m).clamp(0.6, 1.35),
         observation[1].clamp(-0.4, 0.4),
         EE_DESIRED_HEIGHT_M,
     ];
     let next = inverse_kinematics(target, &q);
     let mut action = [0.0; 2 * JOINTS];
     for i in 0..JOINTS {
-        // Half way, so that the mallet stays at its height.
+        // Only a fifth of the way, so that the mallet stays at its height; the velocity covers that way in a control step.
         action[i] = q[i] + 0.2 * (next[i] - q[i]);
         action[JOINTS + i] = 0.2 * (next[i] - q[i]) / 0.02;
     }
     action
 }
 
-/// BLAKE3 of numbers and text.
+/// BLAKE3 hash of numbers and text.
 #[derive(Default)]
 struct Hash(blake3::Hasher);
 

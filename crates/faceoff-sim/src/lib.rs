@@ -1,11 +1,14 @@
-//! The air-hockey simulator: two KUKA arms, a table and a puck, as in the challenge's reference simulator
-//! (MODEL).
+//! The air-hockey simulator: two KUKA arms, a table and a puck, as in the *reference*, the simulator of the 2023 Robot Air Hockey
+//! Challenge (MuJoCo). `docs/simulator.md` describes its parts.
 //!
 //! The arm's dynamics, its 1 kHz torque controller and the soft contacts follow the reference's
 //! equations, so that trajectories agree with its recordings; tests check each kind of recording.
 //! Everything is deterministic: the same seed gives the same bits in debug and release builds and on
-//! any number of threads. Sines and cosines are its own polynomials; other transcendental functions come from
+//! any number of threads. Sines and cosines are polynomials of this crate; other transcendental functions come from
 //! `libm`, never from the platform.
+//!
+//! Symbols in the whole crate: `q` are joint positions, `dq` joint velocities, `ddq` joint accelerations (rad, rad/s, rad/s²), and
+//! `ee` is the end effector. A *substep* is one step of physics (1 ms), a *control step* one action of an agent (20 substeps).
 //!
 //! This crate reads no clock and no environment and does no I/O. It does not handle agent processes or
 //! scores.

@@ -1,12 +1,13 @@
-//! The numbers of the KUKA LBR iiwa 14 with rod and mallet (MODEL, "Arm").
+//! The numbers of the robot: a KUKA LBR iiwa 14 arm with a rod, at whose end a mallet hangs on a *universal joint* (two hinges). They
+//! are read from the *reference*, the challenge's own simulator; `docs/robot.md` lists them.
 
 pub use faceoff_types::{CONTROL_STEP_S, JOINTS, SUBSTEPS};
 
-/// Degrees of freedom of the plant: the driven joints and the two hinges of the universal joint.
+/// Degrees of freedom of the *plant* (the simulated arm): the seven driven joints and the two hinges of the universal joint.
 pub const DOFS: usize = 9;
 
 /// Rotation of a link's frame against its parent's at joint angle 0. Only exact quarter and half turns occur,
-/// which cost no arithmetic.
+/// which cost no arithmetic. Quaternions are (w, x, y, z).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
     /// Quaternion (1, 0, 0, 0).
@@ -17,7 +18,7 @@ pub enum Mount {
     QuarterTurnX,
 }
 
-/// Position of a link's joint on its parent.
+/// Position of a link's joint in the frame of its parent (the previous link, or the base).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Offset {
     /// Along the parent's y, m.
@@ -39,11 +40,11 @@ pub struct Link {
     pub centre_m: [f64; 3],
     /// Inertia about the centre of mass, link's axes: xx, yy, zz, xy, xz, yz, kg m².
     pub inertia_kg_m2: [f64; 6],
-    /// Joint range ±, rad.
+    /// Joint range ±, rad; its ends are the joint's stops.
     pub range_rad: f64,
     /// Viscous joint damping, N m s/rad.
     pub damping: f64,
-    /// Dry friction, N m.
+    /// Largest torque ± of the joint's dry friction, N m.
     pub friction_n_m: f64,
     /// Rotor inertia reflected to the joint, kg m².
     pub armature_kg_m2: f64,
@@ -57,9 +58,10 @@ pub struct Link {
     pub kd: f64,
 }
 
+/// One degree, rad.
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
-/// The seven driven links, base to tip (MODEL's tables; read from the reference simulator's model).
+/// The seven driven links, base to tip.
 pub const LINKS: [Link; JOINTS] = [
     Link {
         offset: Offset::Z(0.1575),
@@ -217,10 +219,11 @@ pub const LINKS: [Link; JOINTS] = [
     },
 ];
 
-/// The tool on link 7: the end effector (fixed) and the mallet (on the universal joint).
+/// The tool on link 7: the end effector, the fixed end of the rod, and the mallet, which hangs on it by the universal joint. The
+/// mallet's z axis points from the universal joint to the mallet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tool {
-    /// End effector ("striker joint link") along link 7's z, m.
+    /// Position of the end effector (the reference's "striker joint link") along link 7's z, m.
     pub end_effector_z_m: f64,
     /// Mass of the end effector, centred on its origin, kg.
     pub end_effector_mass_kg: f64,
@@ -228,11 +231,11 @@ pub struct Tool {
     pub end_effector_inertia_kg_m2: f64,
     /// Mass of the mallet, kg.
     pub mallet_mass_kg: f64,
-    /// Centre of mass along the mallet's z, m.
+    /// The mallet's centre of mass along its z, m.
     pub mallet_centre_z_m: f64,
     /// Its inertia about the centre of mass, the same about every axis, kg m².
     pub mallet_inertia_kg_m2: f64,
-    /// Centre of the striking cylinder along the mallet's z, m.
+    /// Centre of the striking cylinder, the mallet's part that touches the puck, along the mallet's z, m.
     pub cylinder_centre_z_m: f64,
     /// Radius of the striking cylinder, m.
     pub cylinder_radius_m: f64,
@@ -240,7 +243,6 @@ pub struct Tool {
     pub cylinder_half_height_m: f64,
 }
 
-/// The end effector and the mallet (MODEL, "Arm").
 pub const TOOL: Tool = Tool {
     end_effector_z_m: 0.585,
     end_effector_mass_kg: 0.1,
@@ -256,15 +258,15 @@ pub const TOOL: Tool = Tool {
 /// Gravity along −z, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
 
-/// The length of a physics step, s.
+/// The length of a substep, a step of physics and controller, s.
 pub const SUBSTEP_S: f64 = 0.001;
 
-/// Joint positions at the start of an episode, rad: the reference's inverse kinematics for the mallet
-/// at (0.65, 0, 0.1645), to the digits of its recordings (RULES, "Tasks").
+/// Joint positions at the start of an episode, rad: the reference's inverse kinematics for the end effector
+/// at (0.65, 0, 0.1645) m in the base frame, to the digits of its recordings.
 pub const INITIAL_Q: [f64; JOINTS] = [0.0, -0.196067345, 0.0, -1.84363898, 0.0, 0.970422238, 0.0];
 
-/// The rules apply joint limits at this fraction of the physical ones (RULES, "Constraints").
+/// The rules apply joint limits at this fraction of the physical ones (`docs/rules.md`, "Penalty points").
 pub const LIMIT_FRACTION: f64 = 0.95;
 
-/// Height of the mallet plane above the robot's base frame, m (ref: `ee_desired_height`).
+/// Height at which the rules want the end effector, m, in the robot's base frame (the reference's `ee_desired_height`).
 pub const EE_DESIRED_HEIGHT_M: f64 = 0.1645;

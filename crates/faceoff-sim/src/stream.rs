@@ -1,23 +1,23 @@
-//! Random draws with the same bits on every machine.
+//! Streams of random numbers, with the same bits on every machine.
 
 use faceoff_types::Seed;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 
-/// One independent stream of random numbers: ChaCha8 with a seed that is derived by label, so that draws of one
-/// consumer never affect another.
+/// One stream of random numbers: ChaCha8 with a seed that is derived from a root seed and a label. Each consumer has its own label, so
+/// that its draws never affect those of another.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Stream(ChaCha8Rng);
+pub struct RandomStream(ChaCha8Rng);
 
-impl Stream {
-    /// The stream of one purpose.
+impl RandomStream {
+    /// The stream of the consumer that `label` names, e.g. `initial_state`.
     #[must_use]
     pub fn new(seed: &Seed, label: &str) -> Self {
         Self(ChaCha8Rng::from_seed(*seed.derive(label, &[]).as_bytes()))
     }
 
-    /// Uniform in [0, 1), 53 bits.
+    /// Uniform in [0, 1), with 53 random bits.
     pub fn unit(&mut self) -> f64 {
         const SCALE: f64 = 1.0 / (1u64 << 53) as f64;
         (self.0.next_u64() >> 11) as f64 * SCALE

@@ -1,4 +1,4 @@
-//! Shared setup of tests of several crates.
+//! Shared setup of tests of several crates: a *store*, which is the database and files of a season, in an empty folder.
 #![expect(
     clippy::expect_used,
     reason = "helpers of tests fail as tests do: by panicking"
@@ -18,7 +18,7 @@ use std::{
 /// # Panics
 /// If there is a database already, or the folder cannot be written.
 pub async fn new_store(data_dir: &Path) -> Store {
-    let template = Store::template(&templates())
+    let template = Store::template(&template_folder())
         .await
         .expect("an empty database can be created next to the test program");
     fs::create_dir_all(data_dir).expect("the data folder can be created");
@@ -31,7 +31,7 @@ pub async fn new_store(data_dir: &Path) -> Store {
 }
 
 /// Folder of the templates: inside the target folder, so that `cargo clean` removes them.
-fn templates() -> PathBuf {
+fn template_folder() -> PathBuf {
     let program = env::current_exe().expect("the path of the test program is known");
     let folder = program.parent().expect("the test program is in a folder");
     folder.join("databases")

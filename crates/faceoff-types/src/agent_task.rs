@@ -1,3 +1,6 @@
+//! The task that an agent is given: a qualifying task (hit, defend or prepare), or one side of a game against another
+//! agent.
+
 use crate::Task;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -5,7 +8,7 @@ use std::fmt;
 /// The task of an agent: a qualifying task, or one side of a game. Its JSON is `{"task":"hit"}` or
 /// `{"task":"tournament","side":2}`, for use with `#[serde(flatten)]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(try_from = "Fields", into = "Fields")]
+#[serde(try_from = "AgentTaskFields", into = "AgentTaskFields")]
 pub enum AgentTask {
     /// Episodes of a qualifying task.
     Qualifying(Task),
@@ -53,7 +56,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Both sides, in the order of pairs.
+    /// Both sides, in the order of all arrays with one item per side.
     pub const BOTH: [Self; 2] = [Self::First, Self::Second];
 
     #[must_use]
@@ -73,7 +76,7 @@ impl Side {
         }
     }
 
-    /// Index in pairs: 0 or 1.
+    /// Index in an array with one item per side: 0 or 1.
     #[must_use]
     pub const fn index(self) -> usize {
         match self {
@@ -102,42 +105,42 @@ impl TryFrom<u32> for Side {
 
 /// The JSON form of [`AgentTask`].
 #[derive(Serialize, Deserialize)]
-struct Fields {
-    task: Name,
+struct AgentTaskFields {
+    task: TaskName,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     side: Option<Side>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Name {
+enum TaskName {
     Hit,
     Defend,
     Prepare,
     Tournament,
 }
 
-impl From<AgentTask> for Fields {
+impl From<AgentTask> for AgentTaskFields {
     fn from(agent_task: AgentTask) -> Self {
         let (task, side) = match agent_task {
-            AgentTask::Qualifying(Task::Hit) => (Name::Hit, None),
-            AgentTask::Qualifying(Task::Defend) => (Name::Defend, None),
-            AgentTask::Qualifying(Task::Prepare) => (Name::Prepare, None),
-            AgentTask::Game { side } => (Name::Tournament, Some(side)),
+            AgentTask::Qualifying(Task::Hit) => (TaskName::Hit, None),
+            AgentTask::Qualifying(Task::Defend) => (TaskName::Defend, None),
+            AgentTask::Qualifying(Task::Prepare) => (TaskName::Prepare, None),
+            AgentTask::Game { side } => (TaskName::Tournament, Some(side)),
         };
         Self { task, side }
     }
 }
 
-impl TryFrom<Fields> for AgentTask {
+impl TryFrom<AgentTaskFields> for AgentTask {
     type Error = &'static str;
-    fn try_from(Fields { task, side }: Fields) -> Result<Self, Self::Error> {
+    fn try_from(AgentTaskFields { task, side }: AgentTaskFields) -> Result<Self, Self::Error> {
         match (task, side) {
-            (Name::Hit, None) => Ok(Self::Qualifying(Task::Hit)),
-            (Name::Defend, None) => Ok(Self::Qualifying(Task::Defend)),
-            (Name::Prepare, None) => Ok(Self::Qualifying(Task::Prepare)),
-            (Name::Tournament, Some(side)) => Ok(Self::Game { side }),
-            (Name::Tournament, None) => Err("a tournament needs a side, 1 or 2"),
+            (TaskName::Hit, None) => Ok(Self::Qualifying(Task::Hit)),
+            (TaskName::Defend, None) => Ok(Self::Qualifying(Task::Defend)),
+            (TaskName::Prepare, None) => Ok(Self::Qualifying(Task::Prepare)),
+            (TaskName::Tournament, Some(side)) => Ok(Self::Game { side }),
+            (TaskName::Tournament, None) => Err("a tournament needs a side, 1 or 2"),
             (_, Some(_)) => Err("only a tournament has sides"),
         }
     }

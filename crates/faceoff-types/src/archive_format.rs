@@ -1,3 +1,5 @@
+//! Formats of the archives that teams upload. A *bundle* is such an archive: an agent's files, or a container image.
+
 /// Archive formats that bundles are accepted in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArchiveFormat {
@@ -12,21 +14,21 @@ pub enum ArchiveFormat {
 }
 
 impl ArchiveFormat {
-    /// Bytes from an archive's start that suffice to detect every format. All but [`Self::Tar`] need only
-    /// four, so [`Self::detect`] takes shorter heads too.
-    pub const LONGEST_MAGIC: usize = TAR_MAGIC_AT + TAR_MAGIC.len();
+    /// Number of bytes from an archive's start that suffice to detect every format. All but [`Self::Tar`] need only
+    /// four, so [`Self::detect`] also accepts fewer.
+    pub const LONGEST_MAGIC: usize = TAR_MAGIC_OFFSET + TAR_MAGIC.len();
 
     /// Detects the format from an archive's first bytes; file names are not trusted.
     #[must_use]
     pub fn detect(head: &[u8]) -> Option<Self> {
         match head {
             [0x1f, 0x8b, ..] => Some(Self::TarGz),
-            // Some compressors begin with a skippable frame.
+            // The second pattern is a skippable frame, with which some compressors begin.
             [0x28, 0xb5, 0x2f, 0xfd, ..] | [0x50..=0x5f, 0x2a, 0x4d, 0x18, ..] => {
                 Some(Self::TarZst)
             }
             [b'P', b'K', 3, 4, ..] => Some(Self::Zip),
-            _ => (head.get(TAR_MAGIC_AT..Self::LONGEST_MAGIC) == Some(TAR_MAGIC))
+            _ => (head.get(TAR_MAGIC_OFFSET..Self::LONGEST_MAGIC) == Some(TAR_MAGIC))
                 .then_some(Self::Tar),
         }
     }
@@ -54,9 +56,10 @@ impl ArchiveFormat {
     }
 }
 
-/// Magic in the header of the first entry. The bytes after it differ between GNU and POSIX tar.
+/// Magic bytes in the header of the first entry. The bytes after them differ between GNU and POSIX tar.
 const TAR_MAGIC: &[u8] = b"ustar";
-const TAR_MAGIC_AT: usize = 257;
+/// Offset of these bytes from the start of the archive.
+const TAR_MAGIC_OFFSET: usize = 257;
 
 #[cfg(test)]
 mod tests {

@@ -1,3 +1,5 @@
+//! A reference to a stored bundle: the archive with an agent's files, or the container image, that a team uploaded.
+
 use serde::{Deserialize, Serialize};
 
 /// An uploaded bundle: where it is stored and what it must hash to.

@@ -1,3 +1,5 @@
+//! The clock that is passed in, so that libraries do not read the system's time themselves.
+
 use jiff::Timestamp;
 use std::{fmt, sync::Arc};
 

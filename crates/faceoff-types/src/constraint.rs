@@ -1,3 +1,5 @@
+//! Constraints on the robot's motion and on the agent's answer times, and which of them an episode violated.
+
 use serde::{Deserialize, Serialize};
 
 /// A constraint whose violation costs penalty points (RULES, "Constraints and penalty points").
@@ -16,13 +18,16 @@ pub enum Constraint {
     ComputationTime,
 }
 
-/// Which constraints the robot's motion broke at least once in an episode. Computation time is
+/// Which constraints the robot's motion violated at least once in an episode. Computation time is
 /// judged from [`ComputationTime`](crate::ComputationTime), not here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub struct Violations {
+    /// End-effector position.
     pub ee: bool,
     /// Elbow and wrist height.
     pub link: bool,
+    /// Joint positions.
     pub joint_pos: bool,
+    /// Joint velocities.
     pub joint_vel: bool,
 }

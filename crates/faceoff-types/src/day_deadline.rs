@@ -1,10 +1,13 @@
+//! The deadline of an evaluation day, which is all evaluations that start at one *cutoff*: the moment at which each team's
+//! active submission is fixed.
+
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
 /// The longest deadline in hours: 31 days.
 pub const MAX_DEADLINE_H: u32 = 744;
 
-/// When an evaluation day ends. Episodes that have not been played by then are not played any more.
+/// When an evaluation day ends. Episodes that have not been played by then are never played.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]

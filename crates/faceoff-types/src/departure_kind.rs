@@ -1,3 +1,5 @@
+//! The ways in which a team leaves a tournament.
+
 use serde::{Deserialize, Serialize};
 
 /// How a team left a tournament.

@@ -1,5 +1,5 @@
-//! Old names of response fields. Responses send them beside the new names, and both are read, until the next minor
-//! version.
+//! Old names of renamed response fields. Until the next minor version, responses contain each renamed field under both
+//! names, and clients accept either name.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _, ser::Error as _};
 use serde_json::{Error, Value, value};
@@ -52,7 +52,7 @@ pub fn serialize<T: DeprecatedNames, S: Serializer>(
     json.serialize(serializer)
 }
 
-/// Deserialises a value with old names, new names or both; of both, the new one is read. `from_json` reads the new ones.
+/// Deserialises a value with old names, new names or both; if a field has both, the new name wins. `from_json` reads the new ones.
 pub fn deserialize<'de, T: DeprecatedNames, D: Deserializer<'de>>(
     from_json: impl FnOnce(Value) -> Result<T, Error>,
     deserializer: D,

@@ -1,3 +1,5 @@
+//! Agent faults: what an agent did against the protocol, or which limit it exceeded.
+
 use crate::AgentTask;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -45,7 +47,7 @@ pub enum AgentFaultKind {
         phase: Phase,
         limit_s: f64,
     },
-    /// Each answer came in time, but their sum exceeded the budget.
+    /// Each answer came in time, but all together took longer than their budget.
     TimeBudget {
         /// What the budget is for: the steps of an episode, or the resets of a shard.
         phase: Phase,
@@ -107,14 +109,14 @@ impl fmt::Display for AgentFaultKind {
                 used_s,
                 limit_s,
             } => {
-                let all = match phase {
+                let answers = match phase {
                     Phase::Step => "the answers of this episode",
                     Phase::Reset => "the resets of this shard",
                     Phase::StartUp => "the start-ups",
                 };
                 write!(
                     f,
-                    "time budget: {all} took {used_s:.2} s in all, and {limit_s:.2} s are allowed"
+                    "time budget: {answers} took {used_s:.2} s in all, and {limit_s:.2} s are allowed"
                 )
             }
             Self::ClosedOutput => f.write_str("the agent closed its standard output"),
@@ -152,7 +154,7 @@ const fn signal_note(signal: i32) -> &'static str {
     }
 }
 
-/// The kinds of answers that an agent owes.
+/// The answer that the evaluator waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
@@ -160,6 +162,7 @@ pub enum Phase {
     StartUp,
     /// Getting ready for an episode: the answer to `reset`.
     Reset,
+    /// The answer to `step`.
     Step,
 }
 

@@ -1,3 +1,5 @@
+//! Recognition of errors that mean a full disk.
+
 use std::{
     error::Error,
     io::{self, ErrorKind},
@@ -31,28 +33,33 @@ pub fn is_full_disk(error: &(dyn Error + 'static)) -> bool {
 mod tests {
     use super::*;
 
+    // Linux error numbers.
+    const EIO: i32 = 5;
+    const ENOSPC: i32 = 28;
+    const EDQUOT: i32 = 122;
+
     #[derive(Debug, thiserror::Error)]
     #[error("copying: {source}")]
-    struct Copying {
+    struct CopyError {
         source: io::Error,
     }
 
     #[test]
     fn full_disk_is_recognised_through_wrappers() {
-        let no_space = || io::Error::from_raw_os_error(28);
+        let no_space = || io::Error::from_raw_os_error(ENOSPC);
         assert!(is_full_disk(&no_space()));
-        assert!(is_full_disk(&Copying { source: no_space() }));
-        let wrapped = Copying {
-            source: io::Error::other(Copying { source: no_space() }),
+        assert!(is_full_disk(&CopyError { source: no_space() }));
+        let wrapped = CopyError {
+            source: io::Error::other(CopyError { source: no_space() }),
         };
         assert!(is_full_disk(&wrapped));
-        let over_quota = io::Error::from_raw_os_error(122);
+        let over_quota = io::Error::from_raw_os_error(EDQUOT);
         assert!(is_full_disk(&over_quota));
     }
 
     #[test]
     fn other_io_errors_are_not_full_disk() {
-        assert!(!is_full_disk(&io::Error::from_raw_os_error(5)));
+        assert!(!is_full_disk(&io::Error::from_raw_os_error(EIO)));
         assert!(!is_full_disk(&io::Error::other("no space left on device")));
     }
 }

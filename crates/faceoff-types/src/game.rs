@@ -1,4 +1,5 @@
-//! The outcome of a game, with all that scoring needs.
+//! The outcome of a game, with all that scoring needs. A game is a series of *rallies*, each of which ends with a goal, a
+//! foul or the like. For penalty points it is divided into *windows* of 500 control steps.
 
 use crate::{AgentFault, ComputationTime, Side, Violations};
 use serde::{Deserialize, Serialize};
@@ -7,7 +8,9 @@ use std::fmt;
 /// The outcome of a game. In pairs, the first side comes first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameOutcome {
+    /// Control steps played.
     pub steps: u32,
+    /// Rallies started.
     pub rallies: u32,
     pub end: GameEnd,
     pub sides: [SideOutcome; 2],
@@ -21,11 +24,12 @@ pub enum GameEnd {
     Played,
     /// One side exceeded its allowed faults or time.
     Forfeit {
+        /// The side that forfeited.
         by: Side,
-        /// What the side exceeded.
+        /// What it exceeded.
         cause: ForfeitCause,
     },
-    /// Both sides did so, in the same control step or while getting ready for the same rally.
+    /// Both sides exceeded theirs, in the same control step or while getting ready for the same rally.
     BothForfeit {
         /// What each side exceeded.
         causes: [ForfeitCause; 2],
@@ -55,7 +59,9 @@ impl GameEnd {
                 by: Side::Second,
                 cause,
             } => [None, Some(*cause)],
-            Self::BothForfeit { causes: [a, b] } => [Some(*a), Some(*b)],
+            Self::BothForfeit {
+                causes: [first, second],
+            } => [Some(*first), Some(*second)],
         }
     }
 }
@@ -99,7 +105,7 @@ pub struct SideOutcome {
     /// Goals scored, without points for the opponent's fouls.
     pub goals: u32,
     pub fouls: u32,
-    /// In windows of 500 control steps, in order; the last may be shorter.
+    /// The side's windows of 500 control steps, in order; the last may be shorter.
     pub windows: Vec<GameWindow>,
     /// Control steps that were answered, in time or not.
     pub answers: u32,
@@ -114,8 +120,9 @@ pub struct SideOutcome {
 /// One window of one side: the game's equivalent of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct GameWindow {
+    /// Control steps of the window.
     pub steps: u32,
-    /// Constraints broken at least once.
+    /// Constraints violated at least once.
     pub violations: Violations,
     /// Includes answers that came too late to take effect.
     pub computation_time: ComputationTime,

@@ -1,6 +1,8 @@
+//! Limits that apply to a whole game between two agents.
+
 use serde::{Deserialize, Serialize};
 
-/// Limits of each side of a game, in addition to those of single answers (RULES, "Tournament").
+/// Limits of each side of a game, in addition to the time limits of single answers (RULES, "Tournament").
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]

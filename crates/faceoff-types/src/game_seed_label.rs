@@ -1,27 +1,30 @@
+//! Seed labels of games. A *meeting* is the pairing of two teams in a round of a tournament; a *replay* repeats the whole
+//! schedule with other seeds.
+
 use crate::{GameId, RoundNumber, Seed};
 use std::{fmt, str::FromStr};
 
 /// What the seed of a game is derived from, together with the season secret: the position of the game in its
-/// tournament, independent of the teams and of repetitions. Examples of its text are
+/// tournament, independent of the teams and of reruns. Examples of its text are
 /// `tournament/1/round/2/meeting/5`, `tournament/1/replay/3/round/2/meeting/5` and `game/ID`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum GameSeedLabel {
-    /// A pairing of a round; both games of a mirrored pairing have the same seed.
+    /// A meeting of a round; both games of a mirrored pairing have the same seed.
     Fixture {
         /// The number of the tournament in its season, from 1.
         tournament: u32,
         round: RoundNumber,
-        /// Number of the pairing in the round, from 1, in the order of the draw.
+        /// Number of the meeting in the round, from 1, in the order of the draw.
         meeting: u32,
     },
-    /// The same pairing in a repetition of the whole schedule.
+    /// The same meeting in a replay.
     Replay {
         /// The number of the tournament in its season, from 1.
         tournament: u32,
-        /// Number of the repetition, from 1.
+        /// Number of the replay, from 1.
         replay: u32,
         round: RoundNumber,
-        /// Number of the pairing in the round, from 1.
+        /// Number of the meeting in the round, from 1.
         meeting: u32,
     },
     /// A test game or friendly game outside of the schedule; each has its own seed.
@@ -96,17 +99,17 @@ pub struct ParseGameSeedLabelError;
 impl FromStr for GameSeedLabel {
     type Err = ParseGameSeedLabelError;
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        fn number(text: &str) -> Result<u32, ParseGameSeedLabelError> {
+        fn parse_number(text: &str) -> Result<u32, ParseGameSeedLabelError> {
             text.parse().map_err(|_| ParseGameSeedLabelError)
         }
-        let round =
-            |text| RoundNumber::try_from(number(text)?).map_err(|_| ParseGameSeedLabelError);
+        let parse_round =
+            |text| RoundNumber::try_from(parse_number(text)?).map_err(|_| ParseGameSeedLabelError);
         let parts: Vec<&str> = s.split('/').collect();
         Ok(match parts[..] {
-            ["tournament", tournament, "round", at, "meeting", meeting] => Self::Fixture {
-                tournament: number(tournament)?,
-                round: round(at)?,
-                meeting: number(meeting)?,
+            ["tournament", tournament, "round", round, "meeting", meeting] => Self::Fixture {
+                tournament: parse_number(tournament)?,
+                round: parse_round(round)?,
+                meeting: parse_number(meeting)?,
             },
             [
                 "tournament",
@@ -114,14 +117,14 @@ impl FromStr for GameSeedLabel {
                 "replay",
                 replay,
                 "round",
-                at,
+                round,
                 "meeting",
                 meeting,
             ] => Self::Replay {
-                tournament: number(tournament)?,
-                replay: number(replay)?,
-                round: round(at)?,
-                meeting: number(meeting)?,
+                tournament: parse_number(tournament)?,
+                replay: parse_number(replay)?,
+                round: parse_round(round)?,
+                meeting: parse_number(meeting)?,
             },
             ["game", id] => Self::Standalone(id.parse().map_err(|_| ParseGameSeedLabelError)?),
             _ => return Err(ParseGameSeedLabelError),

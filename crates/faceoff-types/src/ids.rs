@@ -1,3 +1,5 @@
+//! Ids of teams, submissions, evaluations and other resources: one type per kind of resource, each a UUID.
+
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 use uuid::Uuid;
@@ -62,7 +64,7 @@ macro_rules! id {
 
 id!(TeamId, "team");
 id!(
-    /// A part of a season with its own days, rules and board. Seeds of its days follow from it.
+    /// A part of a season with its own days, rules and board. The seeds of its days derive from its id.
     StageId,
     "stage"
 );
@@ -73,7 +75,7 @@ id!(
     "evaluation"
 );
 id!(
-    /// A submission under each perturbation alone.
+    /// A submission evaluated under each perturbation of the simulator alone.
     AblationId,
     "ablation"
 );

@@ -1,3 +1,5 @@
+//! Interpolations: how the numbers of an agent's action become a trajectory of the robot's joints.
+
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -96,6 +98,7 @@ impl Interpolation {
     #[must_use]
     pub fn hold_position(self, position: &[f64; JOINTS]) -> [f64; MAX_ACTION_LEN] {
         let mut action = [0.0; MAX_ACTION_LEN];
+        // A trajectory has one point per substep; all other actions consist of a single one. A point begins with the position.
         let point_len = match self {
             Self::Trajectory => 3 * JOINTS,
             _ => MAX_ACTION_LEN,
@@ -135,6 +138,7 @@ mod tests {
 
     #[test]
     fn interpolation_codes_are_seven() {
+        // The seventh is null.
         let known: Vec<i64> = (-300..300)
             .filter(|code| Interpolation::from_code(Some(*code)).is_ok())
             .collect();

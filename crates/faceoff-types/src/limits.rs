@@ -1,4 +1,5 @@
-//! Limits of an agent's resources and times. They are part of a job; the slot that runs it enforces them.
+//! Limits of an agent's resources and times. They are part of each job; the *slot*, the place in a worker that runs the
+//! job, enforces them.
 
 use crate::{CONTROL_STEP_S, EPISODE_STEPS};
 use serde::{Deserialize, Serialize};
@@ -8,7 +9,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct AgentLimits {
-    /// Limits of its archive.
+    /// Limits of its bundle, the archive with its files.
     pub bundle: BundleLimits,
     /// Limits of its process tree.
     pub resources: ResourceLimits,
@@ -92,7 +93,7 @@ pub struct TimeLimits {
     pub reset_s: f64,
     /// To answer one `step`.
     pub step_s: f64,
-    /// Mean answer time in a validation run, for each task.
+    /// Largest mean answer time per task in a validation run, which checks an upload.
     pub mean_s: f64,
     /// Budget for the answers of an episode: this factor times the control time of its steps …
     pub episode_control_times: f64,
@@ -160,8 +161,8 @@ impl TimeLimits {
     /// whatever the configuration says.
     #[must_use]
     pub fn duration(limit_s: f64) -> Duration {
-        let given = Duration::try_from_secs_f64(limit_s);
-        given.map_or(Self::MAX_WAIT, |limit| limit.min(Self::MAX_WAIT))
+        let limit = Duration::try_from_secs_f64(limit_s);
+        limit.map_or(Self::MAX_WAIT, |limit| limit.min(Self::MAX_WAIT))
     }
 }
 
@@ -171,8 +172,10 @@ mod tests {
 
     #[test]
     fn longest_shard_is_as_documented() {
-        // docs/monitoring.md: 11 × 125 + 50 + 50 × 23 = 2575 s
-        let longest_s = TimeLimits::default().max_slot_time_s(50, 1, 10);
-        assert!((longest_s - 2575.0).abs() < 1e-9, "{longest_s}");
+        // From docs/monitoring.md: 11 processes × 125 s + 50 s for resets + 50 episodes × 23 s.
+        const DOCUMENTED_S: f64 = 2575.0;
+        let (episodes, shards, max_faults) = (50, 1, 10);
+        let longest_s = TimeLimits::default().max_slot_time_s(episodes, shards, max_faults);
+        assert!((longest_s - DOCUMENTED_S).abs() < 1e-9, "{longest_s}");
     }
 }

@@ -1,9 +1,10 @@
-//! Live view of a running game. It has no influence on the result.
+//! Live view of a running game: its score, the positions of puck and robots, and its events. The view has no influence on
+//! the result. A *rally* is a part of the game, which ends with a goal, a foul or the like.
 
 use crate::{ForfeitCause, GameId, Side};
 use serde::{Deserialize, Serialize};
 
-/// An event of a running game. No event is left out.
+/// An event of a running game. Viewers get all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LiveEvent {

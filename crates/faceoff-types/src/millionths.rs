@@ -1,3 +1,5 @@
+//! Exact decimal numbers: at most six decimals, stored as a whole number of millionths.
+
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -12,7 +14,7 @@ pub struct Millionths(u32);
 #[error("expected a number from 0 to 4294 with at most six decimals, got {0}")]
 pub struct NotMillionths(pub f64);
 
-const ONE: f64 = 1e6;
+const MILLIONTHS_PER_ONE: f64 = 1e6;
 
 impl Millionths {
     /// From a count of millionths.
@@ -29,16 +31,16 @@ impl Millionths {
 
     #[must_use]
     pub fn as_f64(self) -> f64 {
-        f64::from(self.0) / ONE
+        f64::from(self.0) / MILLIONTHS_PER_ONE
     }
 }
 
 impl TryFrom<f64> for Millionths {
     type Error = NotMillionths;
     fn try_from(number: f64) -> Result<Self, NotMillionths> {
-        let count = (number * ONE).round();
+        let count = (number * MILLIONTHS_PER_ONE).round();
         // A number with six decimals equals `count / 1e6` to the last bit.
-        if (0.0..=f64::from(u32::MAX)).contains(&count) && count / ONE == number {
+        if (0.0..=f64::from(u32::MAX)).contains(&count) && count / MILLIONTHS_PER_ONE == number {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,

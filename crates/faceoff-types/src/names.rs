@@ -1,3 +1,5 @@
+//! Names that people choose for teams, stages, divisions and users, with the same rules for all.
+
 use crate::is_printable;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
@@ -25,16 +27,16 @@ enum NameProblem {
     Space,
 }
 
-fn check(s: &str) -> Result<(), NameProblem> {
-    let chars = s.chars().count();
+fn check(text: &str) -> Result<(), NameProblem> {
+    let chars = text.chars().count();
     if !(1..=MAX_CHARS).contains(&chars) {
         return Err(NameProblem::Length(chars));
     }
     let allowed = |c: &char| " ._-".contains(*c) || (c.is_alphanumeric() && is_printable(*c));
-    if let Some(bad) = s.chars().find(|c| !allowed(c)) {
-        return Err(NameProblem::Character(bad));
+    if let Some(character) = text.chars().find(|c| !allowed(c)) {
+        return Err(NameProblem::Character(character));
     }
-    if s.starts_with(' ') || s.ends_with(' ') {
+    if text.starts_with(' ') || text.ends_with(' ') {
         return Err(NameProblem::Space);
     }
     Ok(())
@@ -126,7 +128,10 @@ mod tests {
     #[test]
     fn unprintable_or_padded_names_are_refused() {
         assert_eq!(check(""), Err(NameProblem::Length(0)));
-        assert_eq!(check(&"a".repeat(41)), Err(NameProblem::Length(41)));
+        assert_eq!(
+            check(&"a".repeat(MAX_CHARS + 1)),
+            Err(NameProblem::Length(41))
+        );
         assert_eq!(check("<b>"), Err(NameProblem::Character('<')));
         for invisible in ['\u{202e}', '\u{200f}', '\u{3164}', '\u{1b}', '\u{9b}'] {
             assert_eq!(

@@ -1,3 +1,5 @@
+//! The outcome of an episode: how it ended, and what its score is computed from.
+
 use crate::{AgentFault, ComputationTime, Task, Violations};
 use serde::{Deserialize, Serialize};
 
@@ -41,11 +43,12 @@ pub struct EpisodeOutcome {
     pub task: Task,
     /// Index of the episode within the evaluation, from 0.
     pub episode: u32,
+    /// Control steps played.
     pub steps: u32,
     pub end: EpisodeEnd,
     /// Success, tested on the last true state of the simulator; always false after an agent fault.
     pub success: bool,
-    /// Constraints broken at least once.
+    /// Constraints violated at least once.
     pub violations: Violations,
     pub computation_time: ComputationTime,
     /// The fault that ended the episode, if any.

@@ -1,4 +1,5 @@
-//! Magnitudes of the factors (RULES, "Perturbation profiles").
+//! Magnitudes of the perturbation factors, such as noise (RULES, "Perturbation profiles"). The *plant* is the robot in the
+//! evaluator's simulator, and the *nominal model* is the one that teams have.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct PerturbationSettings {
-    /// Deviation of the season's plant from the nominal model.
+    /// Deviation of the plant, which is drawn once per season, from the nominal model.
     pub model_mismatch: MismatchSettings,
     /// Noise on the observations.
     pub observation_noise: NoiseSettings,
@@ -82,9 +83,9 @@ impl Default for NoiseSettings {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DisturbanceSettings {
-    /// Stationary standard deviation per axis, N per m/s.
+    /// Standard deviation of the force per axis, in N per m/s of the puck's speed.
     pub sigma_n_per_m_s: f64,
-    /// Correlation time, s.
+    /// Time constant with which the force changes, s.
     pub correlation_time_s: f64,
 }
 

@@ -1,3 +1,6 @@
+//! Profiles: named sets of perturbations, that is, of deliberate differences between the evaluator's simulator and the
+//! one that teams have. Each single perturbation is called a factor.
+
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
@@ -13,7 +16,8 @@ pub enum Factor {
     Disturbance,
     /// The puck's pose freezes for some steps.
     TrackingLoss,
-    /// Delays and table of the real laboratory. Not in [`Factor::ALL`], since only the rehearsal uses it.
+    /// Delays and table of the real laboratory. Not in [`Factor::ALL`], since only the profile
+    /// `delay` uses it.
     Delay,
 }
 
@@ -75,7 +79,7 @@ impl Factors {
 
 /// A named set of perturbations.
 ///
-/// Of the rehearsal profile of the rules, only the delays are implemented, not the safety layer.
+/// The rules also define a rehearsal profile. Only its delays are implemented, as [`Profile::Delay`], not its safety layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]

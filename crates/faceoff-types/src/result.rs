@@ -1,3 +1,5 @@
+//! The score of an evaluation, overall and by task.
+
 use crate::{Profile, Seed, SlotTiming, Task, Tier, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,3 +1,6 @@
+//! Retention: how long the large files of a stage are kept. A stage is *signed off* when an organiser declares its result
+//! final.
+
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -29,12 +32,12 @@ pub struct Retention {
 /// An invalid retention.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidRetention {
-    #[error("last: expected 1 to {MAX_LAST}, got {0}; to keep nothing, say `until` when")]
+    #[error("last: expected 1 to {MAX_LAST}, got {0}; to keep nothing, set `until`")]
     Last(u32),
     #[error("days_after_sign_off: expected 1 to {MAX_DAYS_AFTER_SIGN_OFF}, got {0}")]
     Days(u32),
     #[error("until and days_after_sign_off: expected one of them at most, got both")]
-    TwoEnds,
+    UntilAndDays,
 }
 
 impl Retention {
@@ -52,7 +55,7 @@ impl Retention {
             (Some(last), _, _) if !(1..=MAX_LAST).contains(&last) => {
                 Err(InvalidRetention::Last(last))
             }
-            (_, Some(_), Some(_)) => Err(InvalidRetention::TwoEnds),
+            (_, Some(_), Some(_)) => Err(InvalidRetention::UntilAndDays),
             (_, _, Some(days)) if !(1..=MAX_DAYS_AFTER_SIGN_OFF).contains(&days) => {
                 Err(InvalidRetention::Days(days))
             }

@@ -1,3 +1,5 @@
+//! Numbers of the rounds of a tournament.
+
 use serde::{Deserialize, Serialize};
 use std::{fmt, num::NonZeroU32};
 

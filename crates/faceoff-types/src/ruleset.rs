@@ -1,17 +1,20 @@
+//! Rulesets: versions of the simulator and of the scoring, and the constants that all of them share.
+
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
 /// The rules and the simulator behaviour that a published score refers to.
 ///
-/// A change of behaviour (a constant of the simulator, the pinned contact finder, a bound of a tier)
-/// is a new ruleset. Recordings and running evaluations keep the ruleset that they started with.
+/// A change of behaviour (a constant of the simulator, the version of the contact detection library, a bound
+/// of a tier)
+/// needs a new ruleset. Recordings and running evaluations keep the ruleset that they started with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Ruleset {
     /// Numbers in actions must be finite, and velocities are unbounded.
     #[serde(rename = "airhockey-2023.1")]
     First,
     /// Adds the daily cutoff, bounds on numbers and on the simulated world, and time budgets. The clock of a
-    /// step starts at the first attempt to write.
+    /// step starts at the first attempt to write the `step` line.
     #[serde(rename = "airhockey-2023.2")]
     Second,
     /// Changes the timing of steps; the simulation is the one of the second ruleset.

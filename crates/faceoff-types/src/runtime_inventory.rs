@@ -1,3 +1,5 @@
+//! The contents of runtimes, the environments in which agents run, and the machine that runs them.
+
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -58,8 +60,8 @@ impl PythonInventory {
     /// Major and minor version, e.g. `3.11`; compiled packages depend on it.
     #[must_use]
     pub fn minor_version(&self) -> &str {
-        let end = self.version.match_indices('.').nth(1);
-        end.map_or(&self.version, |(at, _)| &self.version[..at])
+        let minor_end = self.version.match_indices('.').nth(1);
+        minor_end.map_or(&self.version, |(second_dot, _)| &self.version[..second_dot])
     }
 }
 

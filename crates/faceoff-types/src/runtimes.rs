@@ -1,3 +1,5 @@
+//! Selections of runtimes, the environments in which agents run, and the check that a stage accepts an agent's runtime.
+
 use crate::StageName;
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeSet, fmt};
@@ -79,13 +81,13 @@ pub struct StageRuntimes {
 
 /// An agent is refused by a stage because of its runtime.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the stage “{}” takes agents of the runtime {} only, and {}", .by.stage, .by.runtimes, describe(.runtime.as_deref()))]
+#[error("the stage “{}” takes agents of the runtime {} only, and {}", .refuser.stage, .refuser.runtimes, describe_runtime(.runtime.as_deref()))]
 pub struct RuntimeRefused {
-    by: StageRuntimes,
+    refuser: StageRuntimes,
     runtime: Option<String>,
 }
 
-fn describe(runtime: Option<&str>) -> String {
+fn describe_runtime(runtime: Option<&str>) -> String {
     match runtime {
         Some(runtime) => format!("this one names {runtime} in agent.toml"),
         None => "the runtime of this one is unknown: it was validated before stages had a list of runtimes; upload it again".to_owned(),
@@ -101,7 +103,7 @@ impl StageRuntimes {
         match runtime {
             Some(runtime) if self.runtimes.contains(runtime) => Ok(()),
             _ => Err(RuntimeRefused {
-                by: self.clone(),
+                refuser: self.clone(),
                 runtime: runtime.map(str::to_owned),
             }),
         }
@@ -162,7 +164,7 @@ mod tests {
         let check = |names: &[&str]| stage("Main", names).runtimes.check();
         assert_eq!(check(&["python3", "my.runtime_2-x"]), Ok(()));
         assert_eq!(check(&[]), Err(InvalidRuntimes::None));
-        for wrong in ["", "../x", "a b", &"a".repeat(41)] {
+        for wrong in ["", "../x", "a b", &"a".repeat(MAX_NAME_CHARS + 1)] {
             assert_eq!(
                 check(&["native", wrong]),
                 Err(InvalidRuntimes::Name(wrong.to_owned()))

@@ -1,3 +1,6 @@
+//! Schedules: when the evaluation days of a stage start. A day starts with its *cutoff*, the moment at which each team's
+//! active submission is fixed.
+
 use crate::Zone;
 use croner::{
     Cron,
@@ -12,16 +15,16 @@ use serde::{Deserialize, Serialize};
 
 /// The dates and times at which the evaluation days of a stage start, at most one per date, in the stage's zone.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "Fields", into = "Fields")]
+#[serde(try_from = "ScheduleFields", into = "ScheduleFields")]
 pub struct Schedule {
-    at: Recurrence,
+    recurrence: Recurrence,
     days_off: Vec<Date>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Recurrence {
     Daily(Time),
-    /// The expression as text; parsed, it would take 100 times the memory.
+    /// The cron expression as text; the parsed form would take 100 times the memory.
     Cron(String),
 }
 
@@ -29,7 +32,7 @@ enum Recurrence {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
-struct Fields {
+struct ScheduleFields {
     /// Every day at this time; excludes `cron`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<String>, example = "06:00:00"))]
@@ -46,7 +49,7 @@ struct Fields {
 #[cfg(feature = "openapi")]
 impl utoipa::PartialSchema for Schedule {
     fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::Schema> {
-        Fields::schema()
+        ScheduleFields::schema()
     }
 }
 
@@ -63,9 +66,9 @@ pub enum InvalidSchedule {
     OneKindExpected,
     /// Not a cron expression, or one that never matches.
     #[error(
-        "{pattern:?} is no schedule of five fields (minute, hour, day of the month, month, day of the week): {why}"
+        "{pattern:?} is no schedule of five fields (minute, hour, day of the month, month, day of the week): {reason}"
     )]
-    Cron { pattern: String, why: String },
+    Cron { pattern: String, reason: String },
 }
 
 /// How far ahead to search for a cutoff: beyond the gap between two leap days, and any holidays.
@@ -74,9 +77,9 @@ const HORIZON_DAYS: i64 = 366 * 9;
 impl Schedule {
     /// Every day at a time.
     #[must_use]
-    pub const fn daily(at: Time) -> Self {
+    pub const fn daily(time: Time) -> Self {
         Self {
-            at: Recurrence::Daily(at),
+            recurrence: Recurrence::Daily(time),
             days_off: Vec::new(),
         }
     }
@@ -86,23 +89,23 @@ impl Schedule {
     /// # Errors
     /// If the expression is invalid, or no date matches it.
     pub fn cron(pattern: &str) -> Result<Self, InvalidSchedule> {
-        let wrong = |why: String| InvalidSchedule::Cron {
+        let invalid = |reason: String| InvalidSchedule::Cron {
             pattern: pattern.to_owned(),
-            why,
+            reason,
         };
-        parse(pattern).map_err(|error| wrong(error.to_string()))?;
+        parse(pattern).map_err(|error| invalid(error.to_string()))?;
         let schedule = Self {
-            at: Recurrence::Cron(pattern.to_owned()),
+            recurrence: Recurrence::Cron(pattern.to_owned()),
             days_off: Vec::new(),
         };
-        // 29 February recurs within eight years.
+        // Every date recurs within eight years, even 29 February.
         match schedule.next(
             jiff::civil::date(2000, 1, 1),
             Timestamp::UNIX_EPOCH,
             &Zone::UTC,
         ) {
             Some(_) => Ok(schedule),
-            None => Err(wrong("there is no such date".to_owned())),
+            None => Err(invalid("there is no such date".to_owned())),
         }
     }
 
@@ -142,9 +145,9 @@ impl Schedule {
         earliest: Timestamp,
         zone: &Zone,
     ) -> Option<(Date, Timestamp)> {
-        match &self.at {
-            Recurrence::Daily(at) => {
-                let start = from.to_datetime(*at).to_zoned(zone.time_zone()).ok()?;
+        match &self.recurrence {
+            Recurrence::Daily(time) => {
+                let start = from.to_datetime(*time).to_zoned(zone.time_zone()).ok()?;
                 Some((from, start.timestamp()))
             }
             Recurrence::Cron(pattern) => {
@@ -166,11 +169,11 @@ fn parse(pattern: &str) -> Result<Cron, CronError> {
         .parse(pattern)
 }
 
-impl TryFrom<Fields> for Schedule {
+impl TryFrom<ScheduleFields> for Schedule {
     type Error = InvalidSchedule;
-    fn try_from(fields: Fields) -> Result<Self, InvalidSchedule> {
+    fn try_from(fields: ScheduleFields) -> Result<Self, InvalidSchedule> {
         let schedule = match (fields.daily, fields.cron) {
-            (Some(at), None) => Self::daily(at),
+            (Some(time), None) => Self::daily(time),
             (None, Some(pattern)) => Self::cron(&pattern)?,
             _ => return Err(InvalidSchedule::OneKindExpected),
         };
@@ -178,10 +181,15 @@ impl TryFrom<Fields> for Schedule {
     }
 }
 
-impl From<Schedule> for Fields {
-    fn from(Schedule { at, days_off }: Schedule) -> Self {
-        let (daily, cron) = match at {
-            Recurrence::Daily(at) => (Some(at), None),
+impl From<Schedule> for ScheduleFields {
+    fn from(
+        Schedule {
+            recurrence,
+            days_off,
+        }: Schedule,
+    ) -> Self {
+        let (daily, cron) = match recurrence {
+            Recurrence::Daily(time) => (Some(time), None),
             Recurrence::Cron(pattern) => (None, Some(pattern)),
         };
         Self {
@@ -197,6 +205,7 @@ mod tests {
     use super::*;
     use jiff::civil::date;
 
+    /// The first `count` starts on or after the date `from`, as the local date and the instant.
     fn starts(schedule: &Schedule, zone: &str, from: Date, count: usize) -> Vec<String> {
         let zone: Zone = zone.parse().unwrap();
         let mut from = from;
@@ -210,9 +219,9 @@ mod tests {
 
     #[test]
     fn daily_start_follows_the_zone_through_dst_changes() {
-        let at = Schedule::daily("02:30".parse().unwrap());
+        let half_past_two = Schedule::daily("02:30".parse().unwrap());
         assert_eq!(
-            starts(&at, "Europe/Berlin", date(2026, 3, 28), 3),
+            starts(&half_past_two, "Europe/Berlin", date(2026, 3, 28), 3),
             [
                 "2026-03-28 2026-03-28T01:30:00Z",
                 // There is no 02:30 on that date: the clocks go from 02:00 to 03:00.
@@ -222,7 +231,7 @@ mod tests {
         );
         // 02:30 occurs twice: the first counts.
         assert_eq!(
-            starts(&at, "Europe/Berlin", date(2026, 10, 25), 1),
+            starts(&half_past_two, "Europe/Berlin", date(2026, 10, 25), 1),
             ["2026-10-25 2026-10-25T00:30:00Z"]
         );
     }
@@ -274,7 +283,7 @@ mod tests {
             let schedule: Schedule = serde_json::from_str(text).unwrap();
             assert_eq!(serde_json::to_string(&schedule).unwrap(), text);
         }
-        for (wrong, named) in [
+        for (wrong, words) in [
             ("{}", "either `daily`"),
             (r#"{"daily":"06:00","cron":"0 6 * * *"}"#, "either `daily`"),
             (r#"{"cron":"0 6 * *"}"#, "five fields"),
@@ -285,7 +294,7 @@ mod tests {
             (r#"{"dayly":"05:00"}"#, "dayly"),
         ] {
             let error = serde_json::from_str::<Schedule>(wrong).unwrap_err();
-            assert!(error.to_string().contains(named), "{wrong}: {error}");
+            assert!(error.to_string().contains(words), "{wrong}: {error}");
         }
     }
 }

@@ -1,3 +1,5 @@
+//! Seeds, and the derivation of each seed from a secret one. Each season has one secret seed, the *season secret*.
+
 use crate::{EvaluationId, ProposalId, StageId, SubmissionId, Task};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize, de::Error as _};
@@ -47,13 +49,14 @@ impl Seed {
     }
 
     /// A stage's seed → the seed of all evaluations of one day. In a season without stages, and in the first stage of
-    /// a season that once had none, the season secret takes the place of the stage's seed.
+    /// a season that began without stages, the season secret takes the place of the stage's seed.
     #[must_use]
     pub fn day(&self, day: Date) -> Self {
         self.derive("day", day.to_string().as_bytes())
     }
 
-    /// Season secret → the seed of all ablations. It differs from every day's seed, whose episodes may still count.
+    /// Season secret → the seed of all ablations, which evaluate a submission under each perturbation alone. It
+    /// differs from every day's seed, whose episodes may still count.
     #[must_use]
     pub fn ablation(&self) -> Self {
         self.derive("ablation", &[])
@@ -62,6 +65,7 @@ impl Seed {
     /// Season secret → the seed of a submission's validation run.
     #[must_use]
     pub fn validation(&self, submission: SubmissionId) -> Self {
+        // The label is older than the term "validation run".
         self.derive("smoke", submission.as_uuid().as_bytes())
     }
 
@@ -71,7 +75,7 @@ impl Seed {
         self.derive("extra", evaluation.as_uuid().as_bytes())
     }
 
-    /// Season secret → the seed of all evaluations of a trial.
+    /// Season secret → the seed of all evaluations of a trial, which do not count.
     #[must_use]
     pub fn trial(&self, proposal: ProposalId) -> Self {
         self.derive("trial", proposal.as_uuid().as_bytes())

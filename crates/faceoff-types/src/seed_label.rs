@@ -1,9 +1,11 @@
+//! Labels of seeds: what the episodes of an evaluation or ablation are derived from. Labels are stored and published
+//! instead of the secret seed.
+
 use crate::{EvaluationId, ProposalId, StageDay, seed::Seed};
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};
 
-/// What the seed of a run is derived from, together with the season secret. Runs with the same label have the same
-/// episodes.
+/// What a seed is derived from, together with the season secret. Evaluations with the same label play the same episodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SeedLabel {
     /// The counting evaluations of one day in a season without stages, or in its first stage if that predates stages.
@@ -79,10 +81,10 @@ mod tests {
         assert_eq!(SeedLabel::Ablation.seed(&secret), secret.ablation());
         let label = |stage| SeedLabel::StageDay(StageDay { stage, date: day });
         let stage = StageId::new();
-        let staged = label(stage);
-        assert_eq!(staged.seed(&secret), secret.stage(stage).day(day));
-        assert_ne!(staged.seed(&secret), secret.day(day));
-        assert_ne!(staged.seed(&secret), label(StageId::new()).seed(&secret));
+        let stage_day = label(stage);
+        assert_eq!(stage_day.seed(&secret), secret.stage(stage).day(day));
+        assert_ne!(stage_day.seed(&secret), secret.day(day));
+        assert_ne!(stage_day.seed(&secret), label(StageId::new()).seed(&secret));
         let [extra, trial] = [
             SeedLabel::Extra(EvaluationId::new()),
             SeedLabel::Trial(ProposalId::new()),
@@ -92,7 +94,7 @@ mod tests {
         assert_ne!(extra.seed(&secret), another.seed(&secret));
         for label in [
             SeedLabel::Day(day),
-            staged,
+            stage_day,
             SeedLabel::Ablation,
             extra,
             trial,

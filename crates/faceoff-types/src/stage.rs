@@ -1,6 +1,9 @@
+//! A stage is a part of a season with its own rules, evaluation days and board (table of results). This module has its
+//! rules and the id of one of its days.
+
 use crate::{
     MAX_EPISODES_PER_TASK, Profile, Ruleset, Runtimes, StageId, StageLimits, Task, Variation,
-    stage_bounds::InvalidStageRules,
+    invalid_stage_rules::InvalidStageRules,
 };
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};

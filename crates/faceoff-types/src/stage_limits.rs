@@ -1,3 +1,5 @@
+//! The limits of agents and the upload quotas that a stage may set in place of the server's.
+
 use crate::AgentLimits;
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +29,7 @@ pub struct StageLimits {
     /// Seconds to answer one `step`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_s: Option<f64>,
-    /// Mean answer time in a validation run for each task, in seconds.
+    /// Largest mean answer time per task in a validation run, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_s: Option<f64>,
     /// Budget for the answers of an episode: this factor times the control time of its steps …
@@ -110,25 +112,25 @@ impl StageLimits {
     pub fn apply_to(&self, server: &AgentLimits) -> AgentLimits {
         let mut limits = server.clone();
         let (resources, time) = (&mut limits.resources, &mut limits.time);
-        set(&mut resources.memory_bytes, self.memory_bytes);
-        set(&mut resources.pids, self.pids);
-        set(&mut resources.scratch_bytes, self.scratch_bytes);
-        set(&mut resources.cpus, self.cpus);
-        set(&mut time.startup_s, self.startup_s);
-        set(&mut time.reset_s, self.reset_s);
-        set(&mut time.step_s, self.step_s);
-        set(&mut time.mean_s, self.mean_s);
-        set(&mut time.episode_control_times, self.episode_control_times);
-        set(&mut time.episode_extra_s, self.episode_extra_s);
-        set(&mut time.reset_mean_s, self.reset_mean_s);
-        set(&mut time.resets_extra_s, self.resets_extra_s);
+        replace(&mut resources.memory_bytes, self.memory_bytes);
+        replace(&mut resources.pids, self.pids);
+        replace(&mut resources.scratch_bytes, self.scratch_bytes);
+        replace(&mut resources.cpus, self.cpus);
+        replace(&mut time.startup_s, self.startup_s);
+        replace(&mut time.reset_s, self.reset_s);
+        replace(&mut time.step_s, self.step_s);
+        replace(&mut time.mean_s, self.mean_s);
+        replace(&mut time.episode_control_times, self.episode_control_times);
+        replace(&mut time.episode_extra_s, self.episode_extra_s);
+        replace(&mut time.reset_mean_s, self.reset_mean_s);
+        replace(&mut time.resets_extra_s, self.resets_extra_s);
         limits
     }
 }
 
-fn set<T>(limit: &mut T, own: Option<T>) {
-    if let Some(own) = own {
-        *limit = own;
+fn replace<T>(limit: &mut T, stage_limit: Option<T>) {
+    if let Some(stage_limit) = stage_limit {
+        *limit = stage_limit;
     }
 }
 
@@ -189,13 +191,13 @@ mod tests {
         assert_eq!(serde_json::to_string(&none).unwrap(), "{}");
         let server = AgentLimits::default();
         assert_eq!(none.apply_to(&server), server);
-        let own: StageLimits =
+        let limits: StageLimits =
             serde_json::from_str(r#"{"memory_bytes":33554432,"step_s":0.5}"#).unwrap();
-        assert_eq!(own.check(), Ok(()));
+        assert_eq!(limits.check(), Ok(()));
         let mut expected = server.clone();
         expected.resources.memory_bytes = 32 << 20;
         expected.time.step_s = 0.5;
-        assert_eq!(own.apply_to(&server), expected);
+        assert_eq!(limits.apply_to(&server), expected);
     }
 
     #[test]

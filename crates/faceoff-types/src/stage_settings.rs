@@ -1,6 +1,8 @@
+//! Settings of a stage: when its days start and end, which results count, and what is public.
+
 use crate::{
     DayDeadline, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK, Schedule, StageUploadLimits,
-    stage_bounds::{InvalidStageRules, MAX_MEAN_DAYS},
+    invalid_stage_rules::{InvalidStageRules, MAX_MEAN_DAYS},
 };
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
@@ -15,11 +17,11 @@ pub struct StageSettings {
     /// Episodes per task and profile of the ablation that the schedule creates for every submission it evaluates;
     /// 0: no ablations.
     pub ablation_episodes: u32,
-    /// Episodes per shard; at least 1.
+    /// Episodes per shard, the part of a task that one job plays; at least 1.
     pub episodes_per_shard: u32,
     /// When its days end.
     pub day_deadline: DayDeadline,
-    /// Are scores visible to organisers only?
+    /// Are scores visible only to organisers, until they reveal them?
     pub blind: bool,
     /// When its datasets become public.
     pub publishes: Publication,
@@ -129,7 +131,7 @@ impl FromStr for Publication {
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
         Self::ALL
             .into_iter()
-            .find(|one| one.as_str() == text)
+            .find(|publication| publication.as_str() == text)
             .ok_or_else(|| UnknownSetting {
                 expected: "never, at_close or at_release",
                 got: text.to_owned(),
@@ -143,13 +145,15 @@ impl fmt::Display for Publication {
     }
 }
 
-const MEAN: &str = "mean_of_last:";
+const MEAN_PREFIX: &str = "mean_of_last:";
 
 /// The form used on the command line; a mean is `mean_of_last:5`.
 impl FromStr for CountingResult {
     type Err = UnknownSetting;
     fn from_str(text: &str) -> Result<Self, UnknownSetting> {
-        let days = text.strip_prefix(MEAN).and_then(|days| days.parse().ok());
+        let days = text
+            .strip_prefix(MEAN_PREFIX)
+            .and_then(|days| days.parse().ok());
         match (text, days) {
             ("latest", _) => Ok(Self::Latest),
             ("best", _) => Ok(Self::Best),
@@ -168,7 +172,7 @@ impl fmt::Display for CountingResult {
         match self {
             Self::Latest => f.pad("latest"),
             Self::Best => f.pad("best"),
-            Self::MeanOfLast(days) => write!(f, "{MEAN}{days}"),
+            Self::MeanOfLast(days) => write!(f, "{MEAN_PREFIX}{days}"),
             Self::Final => f.pad("final"),
         }
     }
@@ -183,22 +187,25 @@ mod tests {
         let settings: StageSettings = serde_json::from_str("{}").unwrap();
         assert_eq!(settings, StageSettings::default());
         assert_eq!(settings.check(), Ok(()));
-        let none = StageSettings {
+        let no_episodes = StageSettings {
             episodes_per_shard: 0,
             ..settings.clone()
         };
-        assert_eq!(none.check(), Err(InvalidStageRules::Shards(0)));
-        let many = StageSettings {
+        assert_eq!(no_episodes.check(), Err(InvalidStageRules::Shards(0)));
+        let too_many = StageSettings {
             ablation_episodes: u32::MAX,
             ..settings.clone()
         };
-        assert_eq!(many.check(), Err(InvalidStageRules::Ablations(u32::MAX)));
+        assert_eq!(
+            too_many.check(),
+            Err(InvalidStageRules::Ablations(u32::MAX))
+        );
         for hours in [0, MAX_DEADLINE_H + 1] {
-            let none = StageSettings {
+            let wrong = StageSettings {
                 day_deadline: DayDeadline::Hours(hours),
                 ..settings.clone()
             };
-            assert_eq!(none.check(), Err(InvalidStageRules::Deadline(hours)));
+            assert_eq!(wrong.check(), Err(InvalidStageRules::Deadline(hours)));
         }
         for days in [0, MAX_MEAN_DAYS + 1] {
             let mean = StageSettings {

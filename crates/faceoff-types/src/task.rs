@@ -1,3 +1,5 @@
+//! The tasks of the qualifying stage, each of which an agent plays in many episodes.
+
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
@@ -18,7 +20,7 @@ pub const MAX_EPISODES_PER_TASK: u32 = 100_000;
 pub enum Task {
     /// Score a goal against an opponent that moves in a fixed pattern.
     Hit,
-    /// Stop an incoming puck on the own side.
+    /// Stop an incoming puck on the agent's own side.
     Defend,
     /// Move a puck from the border to a good hitting position.
     Prepare,

@@ -1,3 +1,5 @@
+//! Deployability tiers: how safe an agent would be on the real robot, judged by its penalty points.
+
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -1,3 +1,5 @@
+//! The timing quality of slots. A *slot* is the place in a worker that runs one job at a time.
+
 use serde::{Deserialize, Serialize};
 
 /// Round-trip times to an agent that answers at once, in seconds: the overhead of a slot in every answer time.
@@ -71,7 +73,7 @@ mod tests {
 
     #[test]
     fn worse_timing_takes_maxima_and_adds_reruns() {
-        let trips = |p50, max| RoundTrips {
+        let round_trips = |p50, max| RoundTrips {
             count: 10,
             p50,
             p99: max,
@@ -84,15 +86,15 @@ mod tests {
             host_noise_reruns,
             platform_retries: 2 * host_noise_reruns,
         };
-        let worse = slot(trips(1.0, 9.0), trips(4.0, 5.0), 0.1, 1).worse(slot(
-            trips(2.0, 3.0),
-            trips(1.0, 8.0),
+        let worse = slot(round_trips(1.0, 9.0), round_trips(4.0, 5.0), 0.1, 1).worse(slot(
+            round_trips(2.0, 3.0),
+            round_trips(1.0, 8.0),
             0.3,
             2,
         ));
         let both = |p50, max| RoundTrips {
             count: 20,
-            ..trips(p50, max)
+            ..round_trips(p50, max)
         };
         assert_eq!(worse, slot(both(2.0, 9.0), both(4.0, 8.0), 0.3, 3));
     }

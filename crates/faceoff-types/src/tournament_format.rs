@@ -1,3 +1,5 @@
+//! Formats of a tournament: the ways to decide which teams play each other in each round.
+
 use crate::RoundNumber;
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,13 @@
+//! Rules and settings of a tournament, in which the agents of two teams play each game. Rules affect the results;
+//! settings do not.
+
 use crate::{
     GAME_WINDOWS, GameLimits, InvalidLimit, InvalidPerturbation, PerturbationSettings, Profile,
     Publication, Ruleset, Runtimes, StageLimits, TournamentFormat, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
-/// The longest game, in control steps.
+/// The longest game, in control steps: ten times that of the original challenge.
 pub const MAX_GAME_STEPS: u32 = 10 * GAME_WINDOWS * WINDOW_STEPS;
 /// Maximum number of test games and friendly games per team and day.
 pub const MAX_FREE_GAMES: u32 = 1000;

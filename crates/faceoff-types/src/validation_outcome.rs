@@ -1,3 +1,5 @@
+//! The outcome of a validation run: the short test of a new submission, which decides whether it may be evaluated.
+
 use crate::Task;
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub enum ValidationOutcome {
     /// The agent starts, answers, and does so in time.
     Valid {
-        /// Runtime named in its manifest.
+        /// Runtime named in its manifest, `agent.toml`.
         runtime: String,
         /// Name of the agent in its manifest.
         agent_name: String,
@@ -16,6 +18,7 @@ pub enum ValidationOutcome {
         /// Tail of its standard error.
         log: String,
     },
+    /// The bundle is faulty, or the agent fails or is too slow.
     Invalid {
         /// Runtime named in its manifest, if that could be read.
         runtime: Option<String>,

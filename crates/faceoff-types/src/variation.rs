@@ -1,3 +1,5 @@
+//! Variations: a stage's deviations from the ruleset that affect scores.
+
 use crate::{Millionths, PerturbationSettings, Task, millionths::NotMillionths};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
@@ -85,7 +87,7 @@ struct WeightFields {
     prepare: Millionths,
 }
 
-const WHOLE: u64 = 1_000_000;
+const MILLIONTHS_PER_ONE: u64 = 1_000_000;
 
 impl TaskWeights {
     /// From the weights of `hit`, `defend` and `prepare`.
@@ -101,7 +103,7 @@ impl TaskWeights {
             .map(|weight| u64::from(weight.count()))
             .iter()
             .sum();
-        if sum == WHOLE {
+        if sum == MILLIONTHS_PER_ONE {
             Ok(Self {
                 hit,
                 defend,
@@ -163,7 +165,7 @@ impl fmt::Display for TaskWeights {
 impl FromStr for TaskWeights {
     type Err = InvalidVariation;
     fn from_str(text: &str) -> Result<Self, InvalidVariation> {
-        let [hit, defend, prepare] = numbers(text, "0.4,0.4,0.2")?;
+        let [hit, defend, prepare] = parse_numbers(text, "0.4,0.4,0.2")?;
         Self::new(hit, defend, prepare)
     }
 }
@@ -255,25 +257,26 @@ impl fmt::Display for TierBounds {
 impl FromStr for TierBounds {
     type Err = InvalidVariation;
     fn from_str(text: &str) -> Result<Self, InvalidVariation> {
-        let [deployable, improvable] = numbers(text, "0.5,1.5")?;
+        let [deployable, improvable] = parse_numbers(text, "0.5,1.5")?;
         Self::new(deployable, improvable)
     }
 }
 
-fn numbers<const N: usize>(
+/// Parses `N` numbers with commas between them.
+fn parse_numbers<const N: usize>(
     text: &str,
     example: &'static str,
 ) -> Result<[Millionths; N], InvalidVariation> {
-    let count = || InvalidVariation::Count {
+    let wrong_count = || InvalidVariation::Count {
         expected: N,
         example,
         got: text.to_owned(),
     };
     let numbers = text
         .split(',')
-        .map(|part| part.trim().parse::<f64>().map_err(|_| count()));
+        .map(|part| part.trim().parse::<f64>().map_err(|_| wrong_count()));
     let numbers: Vec<f64> = numbers.collect::<Result<_, _>>()?;
-    let numbers: [f64; N] = numbers.try_into().map_err(|_| count())?;
+    let numbers: [f64; N] = numbers.try_into().map_err(|_| wrong_count())?;
     let mut exact = [Millionths::new(0); N];
     for (exact, number) in exact.iter_mut().zip(numbers) {
         *exact = Millionths::try_from(number)?;

@@ -1,3 +1,5 @@
+//! Time zones of stages.
+
 use jiff::{Timestamp, civil::Date, tz::TimeZone};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
@@ -18,8 +20,8 @@ impl Zone {
 
     /// The local date at an instant.
     #[must_use]
-    pub fn date(&self, at: Timestamp) -> Date {
-        at.to_zoned(self.time_zone()).date()
+    pub fn date(&self, instant: Timestamp) -> Date {
+        instant.to_zoned(self.time_zone()).date()
     }
 }
 
@@ -31,7 +33,7 @@ impl Default for Zone {
 
 impl fmt::Display for Zone {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Only named zones are parsed.
+        // `from_str` accepts only zones with a name.
         f.pad(self.0.iana_name().unwrap_or("UTC"))
     }
 }
@@ -76,8 +78,13 @@ mod tests {
 
     #[test]
     fn zone_gives_the_local_date() {
-        let at: Timestamp = "2026-03-01T23:30:00Z".parse().unwrap();
-        let date = |name: &str| name.parse::<Zone>().unwrap().date(at).to_string();
+        let half_past_eleven: Timestamp = "2026-03-01T23:30:00Z".parse().unwrap();
+        let date = |name: &str| {
+            name.parse::<Zone>()
+                .unwrap()
+                .date(half_past_eleven)
+                .to_string()
+        };
         assert_eq!(date("UTC"), "2026-03-01");
         assert_eq!(date("Europe/Berlin"), "2026-03-02");
         assert_eq!(date("America/Los_Angeles"), "2026-03-01");

@@ -69,6 +69,7 @@ impl GrantKey {
     /// Derives the key from the server's secret.
     #[must_use]
     pub fn from_secret(secret: &[u8; 32]) -> Self {
+        // The context text is part of the key, so it cannot change.
         Self(blake3::derive_key("faceoff: grants of work orders", secret))
     }
 

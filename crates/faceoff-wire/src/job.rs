@@ -93,7 +93,7 @@ pub enum JobPayload {
         game: GameId,
         /// Number of the attempt, from 1.
         attempt: u32,
-        /// Two agents with valid bundles, the home side's first. They may be the same agent.
+        /// Two agents with valid bundles, that of the home side (side 1) first. They may be the same agent.
         agents: Box<[AgentSpec; 2]>,
         /// The rules, length and seeds of the game.
         spec: GameSpec,

@@ -105,13 +105,13 @@ impl Manifest {
             "command",
             "must not contain NUL characters",
         )?;
-        let runtime_ok = (1..=40).contains(&self.runtime.len())
+        let is_runtime_name = (1..=40).contains(&self.runtime.len())
             && self
                 .runtime
                 .bytes()
                 .all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b));
         require(
-            runtime_ok,
+            is_runtime_name,
             "runtime",
             "must be a runtime's name: letters, digits, dots, dashes and underscores",
         )?;

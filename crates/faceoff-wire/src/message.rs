@@ -1,4 +1,5 @@
-//! Messages from the evaluator to an agent, one JSON object per line.
+//! Messages from the evaluator to an agent, one JSON object per line. An agent plays *episodes* of a qualifying task, or a game, which is a
+//! sequence of *rallies*.
 
 use crate::protocol::PROTOCOL_VERSION;
 use faceoff_types::{AgentTask, JOINTS, Task};
@@ -45,21 +46,21 @@ pub enum Message<'a> {
         /// The constants of the simulation.
         env: Box<Env>,
     },
-    /// Sent before each episode; answered by `ready`.
+    /// Sent before each episode, and before each rally of a game; answered by `ready`.
     Reset {
-        /// Index of the episode within the evaluation.
+        /// Index of the episode within the evaluation; in a game, number of the rally.
         episode: u32,
     },
-    /// Sent for each control step; answered by `act`.
+    /// Sent for each control step (20 ms); answered by `act`.
     Step {
-        /// Index of the step within the episode, from 0.
+        /// Index of the step within the episode or rally, from 0.
         step: u32,
         /// The observation: 20 numbers, or 23 with an opponent on the table.
         obs: Cow<'a, [f64]>,
     },
-    /// Sent after each episode; not answered.
+    /// Sent after each episode or rally; not answered.
     End {
-        /// Index of the episode.
+        /// Index of the episode, or number of the rally.
         episode: u32,
         /// Number of control steps played.
         steps: u32,

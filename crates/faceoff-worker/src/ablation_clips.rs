@@ -1,4 +1,6 @@
-//! Stores clips of an ablation's episodes that end differently than in the ideal simulator, with the ideal counterparts.
+//! Stores the clips of ablations. An *ablation* plays the same episodes in several simulator profiles. Each of its shards
+//! stores a *part*, a pack with the clips (motions for replays) of its episodes. Kept are the clips of the episodes that end
+//! differently than in the ideal simulator, with their ideal counterparts.
 
 use anyhow::Context as _;
 use faceoff_replay::{merged_index, select_episodes};
@@ -9,10 +11,11 @@ use std::{
     path::PathBuf,
 };
 
-/// Values by profile: the packs of its shards, or the pack of the selected episodes.
+/// A value per simulator profile: the parts of its shards, or the pack of the selected episodes.
 type ByProfile<T> = BTreeMap<Profile, T>;
 
-/// Joins the parts of finished ablations and removes them. Failures are logged, and retried by the next call.
+/// Joins the parts of each finished ablation into one pack per profile, and removes the parts. Failures are logged, and
+/// retried by the next call.
 pub(crate) async fn join_parts(store: &Store) {
     let ablations = match store.artifacts().ablations_with_parts().await {
         Ok(ablations) => ablations,
@@ -31,7 +34,7 @@ pub(crate) async fn join_parts(store: &Store) {
 async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
     let state = match store.ablation(id).await {
         Ok(ablation) => Some(ablation.state),
-        // The database may have been restored to an earlier state.
+        // The files are newer than the database if it was restored to an earlier state.
         Err(StoreError::NotFound(_)) => None,
         Err(error) => return Err(error.into()),
     };
@@ -40,7 +43,7 @@ async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
         Some(AblationState::Open { .. }) => return Ok(()),
         // A worker that had lost its lease may add a late part: joined clips are not changed.
         Some(AblationState::Finished { .. }) if !is_joined(artifacts, id).await? => {
-            let parts = parts(artifacts, id).await?;
+            let parts = parts_by_profile(artifacts, id).await?;
             let packs = tokio::task::spawn_blocking(move || select_clips(&parts)).await??;
             // The pack of the ideal profile comes last: its presence means that all packs are stored.
             for (profile, pack) in packs.into_iter().rev() {
@@ -50,8 +53,8 @@ async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
         }
         Some(AblationState::Finished { .. } | AblationState::Failed { .. }) | None => {}
     }
-    let parts = Artifacts::ablation_parts_prefix(id);
-    Ok(artifacts.delete_folder(&parts).await?)
+    let parts_folder = Artifacts::ablation_parts_prefix(id);
+    Ok(artifacts.delete_folder(&parts_folder).await?)
 }
 
 async fn is_joined(artifacts: &Artifacts, id: AblationId) -> anyhow::Result<bool> {
@@ -59,7 +62,10 @@ async fn is_joined(artifacts: &Artifacts, id: AblationId) -> anyhow::Result<bool
     Ok(artifacts.size_bytes(&ideal).await?.is_some())
 }
 
-async fn parts(artifacts: &Artifacts, id: AblationId) -> anyhow::Result<ByProfile<Vec<PathBuf>>> {
+async fn parts_by_profile(
+    artifacts: &Artifacts,
+    id: AblationId,
+) -> anyhow::Result<ByProfile<Vec<PathBuf>>> {
     let mut parts: ByProfile<Vec<PathBuf>> = BTreeMap::new();
     for (profile, key) in artifacts.list_ablation_parts(id).await? {
         parts
@@ -70,6 +76,8 @@ async fn parts(artifacts: &Artifacts, id: AblationId) -> anyhow::Result<ByProfil
     Ok(parts)
 }
 
+/// The pack of each profile's episodes that end differently than in the ideal simulator. The ideal profile's pack has all
+/// their counterparts. Profiles without a difference have no pack.
 fn select_clips(parts: &ByProfile<Vec<PathBuf>>) -> anyhow::Result<ByProfile<Vec<u8>>> {
     let ideal = parts
         .get(&Profile::Ideal)

@@ -1,3 +1,5 @@
+//! The cache of a slot's unpacked bundles. A *bundle* is what a team submits: an archive or container image with its agent.
+
 use crate::{evaluator::Evaluator, lease::Progress, server::JobServer};
 use anyhow::Context as _;
 use faceoff_runner::{
@@ -8,11 +10,11 @@ use faceoff_wire::job::AgentSpec;
 use fs_err as fs;
 use std::path::{Path, PathBuf};
 
-/// The result of unpacking a team's archive.
+/// The result of unpacking a team's bundle.
 #[derive(Debug)]
 pub(crate) enum Unpacked {
     Bundle(Bundle),
-    /// Not a valid bundle, by the team's fault; the text says what is wrong.
+    /// The bundle is not valid, by the team's fault; the text says what is wrong.
     Invalid(String),
 }
 
@@ -42,9 +44,9 @@ impl BundleCache {
         }
     }
 
-    /// The unpacked bundle, fetched if it is not in the cache. All other bundles are removed, except that of the
-    /// `opponent`. The content is what was uploaded: the hash is checked on every fetch, and agents see the folder
-    /// read-only. An error is a platform fault, or `progress` was stopped.
+    /// Returns the unpacked bundle of `agent`, and fetches it if it is not in the cache. All other bundles are removed,
+    /// except that of the `opponent` in a game. The content is what was uploaded: the hash is checked on every fetch, and
+    /// agents see the folder read-only. An error is a platform fault, or `progress` was stopped.
     pub(crate) fn get(
         &mut self,
         agent: &AgentSpec,

@@ -8,7 +8,7 @@ use jiff::{SignedDuration, Timestamp};
 /// Upper bound of the time that writing an artifact takes.
 const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 
-/// Removes obsolete recordings, the data of old runs and half-written files, and keeps the database's log short.
+/// Removes obsolete recordings, the data of old runs and half-written files, and keeps the database's write-ahead log short.
 /// Failures are logged, and retried by the next call.
 #[boxed]
 pub async fn clean_up(store: &Store, now: Timestamp) {
@@ -30,7 +30,7 @@ pub async fn clean_up(store: &Store, now: Timestamp) {
     ablation_clips::join_parts(store).await;
     apply_retentions(store, now).await;
     if let Err(error) = store.checkpoint().await {
-        tracing::warn!(%error, "the database's log could not be copied");
+        tracing::warn!(%error, "the database's write-ahead log could not be copied into the database");
     }
     let abandoned = store.artifacts().remove_abandoned(now - LONGEST_WRITE);
     if let Err(error) = abandoned.await {
@@ -70,7 +70,8 @@ pub(crate) async fn remove_invalid_bundles(store: &Store, now: Timestamp) {
     }
 }
 
-/// Clears finished runs, each in its own transaction, so that a failure does not affect the others.
+/// Clears finished runs: removes their shards from the database. Each is cleared in its own transaction, so that a failure
+/// does not affect the others. A *run* is the episodes of a submission under one plan, divided into shards.
 async fn clear_runs(store: &Store, now: Timestamp) -> anyhow::Result<()> {
     for clearable in store.clearable_runs(EpisodeSummary::VERSION, now).await? {
         let run = clearable.run;
@@ -83,11 +84,8 @@ async fn clear_runs(store: &Store, now: Timestamp) -> anyhow::Result<()> {
 
 /// Clears a run after storing a summary of its episodes, if it has none.
 async fn clear_run(store: &Store, clearable: ClearableRun, now: Timestamp) -> anyhow::Result<()> {
-    let ClearableRun {
-        run,
-        needs_summary: wants_summary,
-    } = clearable;
-    if wants_summary {
+    let ClearableRun { run, needs_summary } = clearable;
+    if needs_summary {
         let outcomes = store.outcomes(run).await?;
         let bounds = store.run_variation(run).await?.tier_bounds;
         let summary =

@@ -1,3 +1,5 @@
+//! Division of the host's CPUs among the slots of a worker (each runs one job at a time), their agents and the server.
+
 use faceoff_sandbox::affinity;
 
 /// The CPUs of one slot.
@@ -89,8 +91,8 @@ impl CpuLayout {
         }
     }
 
-    /// [`Self::divide`] for a host that also runs a server. If slots leave CPUs over, the server has up to a quarter of
-    /// all CPUs, but at least one, for itself: the first ones, which handle most device interrupts. Otherwise it
+    /// [`Self::divide`] for a host that also runs a server. If slots leave CPUs over, up to a quarter of all CPUs, but at
+    /// least one, is reserved for the server: the first ones, which handle most device interrupts. Otherwise the server
     /// shares the simulators' CPUs, never an agent's.
     #[must_use]
     pub fn with_service(cpus: &[usize], slots: usize, agents: usize) -> Self {
@@ -100,7 +102,7 @@ impl CpuLayout {
         if !layout.shared {
             layout.service = match service {
                 [] => layout.simulators(),
-                own => own.to_vec(),
+                reserved => reserved.to_vec(),
             };
         }
         layout
@@ -154,12 +156,12 @@ impl CpuLayout {
     }
 
     fn simulators(&self) -> Vec<usize> {
-        let each = self.slots.iter().flat_map(|slot| &slot.simulator);
-        each.copied().collect()
+        let cpus = self.slots.iter().flat_map(|slot| &slot.simulator);
+        cpus.copied().collect()
     }
 }
 
-/// Pins the calling thread. Without it timings vary more, but results are the same.
+/// Pins the calling thread to these CPUs. On a failure timings vary more, but results are the same.
 pub(crate) fn pin_simulator(cpus: &[usize]) {
     if let Err(error) = affinity::pin_current_thread(cpus) {
         tracing::warn!(%error, ?cpus, "cannot pin the simulator's thread");
@@ -177,13 +179,14 @@ mod tests {
         }
     }
 
-    fn first(cpus: usize) -> Vec<usize> {
-        (0..cpus).collect()
+    /// The CPUs from 0 on.
+    fn first_cpus(count: usize) -> Vec<usize> {
+        (0..count).collect()
     }
 
     #[test]
     fn two_cpus_separate_simulator_and_agent() {
-        let layout = CpuLayout::divide(&first(2), 1, 1);
+        let layout = CpuLayout::divide(&first_cpus(2), 1, 1);
         let slots = vec![slot(&[0], &[&[1]])];
         assert_eq!(
             layout,
@@ -197,7 +200,7 @@ mod tests {
 
     #[test]
     fn opponents_have_equally_many_cpus() {
-        let layout = CpuLayout::divide(&first(6), 1, 2);
+        let layout = CpuLayout::divide(&first_cpus(6), 1, 2);
         assert_eq!(layout.slots, [slot(&[0], &[&[1, 2], &[3, 4]])]);
         assert_eq!(layout.slots[0].agent_cpus(1), [3, 4]);
     }
@@ -220,7 +223,7 @@ mod tests {
         assert_eq!(side_cpus(&[], &[&[]]), (none.clone(), none));
         // As recommended in docs/monitoring.md.
         for cpus in 7..=16 {
-            let layout = CpuLayout::with_service(&first(cpus), 2, 1);
+            let layout = CpuLayout::with_service(&first_cpus(cpus), 2, 1);
             for slot in &layout.slots {
                 let [first, second] = slot.side_cpus();
                 assert!(!first.is_empty() && !second.is_empty(), "{cpus}");
@@ -233,7 +236,7 @@ mod tests {
     #[test]
     fn too_few_cpus_are_shared_unpinned() {
         for (cpus, slots, agents) in [(1, 1, 1), (2, 2, 1), (3, 2, 1), (0, 1, 1), (2, 1, 2)] {
-            let layout = CpuLayout::divide(&first(cpus), slots, agents);
+            let layout = CpuLayout::divide(&first_cpus(cpus), slots, agents);
             let unpinned = slot(&[], &vec![&[][..]; agents]);
             let slots = vec![unpinned; slots];
             assert_eq!(
@@ -251,7 +254,7 @@ mod tests {
     fn cpus_are_not_assigned_twice() {
         for cpus in 2..20 {
             for (slots, agents) in (1..=cpus / 2).flat_map(|slots| [(slots, 1), (slots, 2)]) {
-                let layout = CpuLayout::divide(&first(cpus), slots, agents);
+                let layout = CpuLayout::divide(&first_cpus(cpus), slots, agents);
                 assert_eq!(layout.slots.len(), slots);
                 let mut used: Vec<usize> = layout
                     .slots
@@ -279,7 +282,7 @@ mod tests {
             (8, 3, &[0, 1]),
             (9, 4, &[0]),
         ] {
-            let layout = CpuLayout::with_service(&first(cpus), slots, 1);
+            let layout = CpuLayout::with_service(&first_cpus(cpus), slots, 1);
             assert_eq!(layout.service, service, "{cpus} CPUs, {slots} slots");
             assert_eq!(layout.slots.len(), slots);
             let agents: Vec<_> = layout.slots.iter().flat_map(|s| &s.agents[0]).collect();
@@ -294,13 +297,17 @@ mod tests {
     #[test]
     fn configured_agent_cpus_leave_the_rest_to_others() {
         let layout = |agents: &[usize], cpus, slots| {
-            let layout = CpuLayout::with_agents_on(agents, &first(cpus), slots);
+            let layout = CpuLayout::with_agents_on(agents, &first_cpus(cpus), slots);
             (layout.simulators(), layout.service)
         };
         assert_eq!(layout(&[1], 2, 1), (vec![], vec![0]));
         assert_eq!(layout(&[3], 4, 1), (vec![2], vec![0, 1]));
         assert_eq!(layout(&[2, 3], 4, 2), (vec![], vec![0, 1]));
-        assert_eq!(layout(&[0], 1, 1), (vec![], vec![]), "it has no other");
+        assert_eq!(
+            layout(&[0], 1, 1),
+            (vec![], vec![]),
+            "there is no other CPU"
+        );
     }
 
     #[test]

@@ -1,3 +1,6 @@
+//! The evaluator: what a slot calls to unpack bundles and to run validations, shards, games and scorings. A *shard* is a
+//! range of episodes of one task; an evaluation is played in shards.
+
 use faceoff_runner::{
     AgentEnvironment, AssembledDataset, EvaluationMeta, GameReport, GameSpec, LiveFeed,
     LiveFeedSink, Observer, POSITION_INTERVAL, PlatformFault, ShardReport, ShardSpec,
@@ -44,10 +47,10 @@ pub(crate) trait Evaluator: Send + Sync {
         bundles: [&Bundle; 2],
         envs: [&AgentEnvironment; 2],
         out: &Path,
-        audience: &mut dyn LiveFeedSink,
+        live_updates: &mut dyn LiveFeedSink,
     ) -> Result<GameReport, PlatformFault>;
 
-    /// Merges recordings into a dataset and scores them.
+    /// Merges the recordings of an evaluation's shards into a dataset, and scores it.
     fn assemble(
         &self,
         meta: &EvaluationMeta,
@@ -57,7 +60,7 @@ pub(crate) trait Evaluator: Send + Sync {
     ) -> Result<AssembledDataset, PlatformFault>;
 }
 
-/// The evaluator that `faceoff eval` also uses.
+/// The evaluator of `faceoff-runner`, which `faceoff eval` also uses.
 #[derive(Debug)]
 pub(crate) struct Runner;
 
@@ -99,11 +102,11 @@ impl Evaluator for Runner {
         bundles: [&Bundle; 2],
         envs: [&AgentEnvironment; 2],
         out: &Path,
-        audience: &mut dyn LiveFeedSink,
+        live_updates: &mut dyn LiveFeedSink,
     ) -> Result<GameReport, PlatformFault> {
-        let mut commentary = LiveFeed::new(audience, POSITION_INTERVAL);
-        let report = faceoff_runner::run_game(spec, bundles, envs, out, &mut commentary)?;
-        commentary.end(&report);
+        let mut live_feed = LiveFeed::new(live_updates, POSITION_INTERVAL);
+        let report = faceoff_runner::run_game(spec, bundles, envs, out, &mut live_feed)?;
+        live_feed.end(&report);
         Ok(report)
     }
 

@@ -40,12 +40,13 @@ pub(crate) struct Executor {
 pub(crate) struct AgentHost {
     pub(crate) isolation: Isolation,
     pub(crate) runtimes: BTreeMap<String, Runtime>,
+    /// May agents be container images?
     pub(crate) images: bool,
     pub(crate) cpus: SlotCpus,
 }
 
 impl AgentHost {
-    /// The environment of a single agent.
+    /// The environment of the only agent of a job.
     fn environment(&self, limits: &AgentLimits, progress: &Progress) -> AgentEnvironment {
         self.environment_on(self.cpus.agent_cpus(0).to_vec(), limits, progress)
     }
@@ -106,7 +107,7 @@ impl Executor {
         }
     }
 
-    fn bundle(
+    fn unpacked_bundle(
         &mut self,
         agent: &AgentSpec,
         opponent: Option<&AgentSpec>,
@@ -123,7 +124,7 @@ impl Executor {
         opponent: Option<&AgentSpec>,
         progress: &Progress,
     ) -> anyhow::Result<Bundle> {
-        match self.bundle(agent, opponent, progress)? {
+        match self.unpacked_bundle(agent, opponent, progress)? {
             Unpacked::Bundle(bundle) => Ok(bundle),
             Unpacked::Invalid(reason) => anyhow::bail!(reason),
         }
@@ -145,7 +146,7 @@ impl Executor {
         runtimes: &[StageRuntimes],
         progress: &Progress,
     ) -> anyhow::Result<ValidationOutcome> {
-        let bundle = match self.bundle(agent, None, progress)? {
+        let bundle = match self.unpacked_bundle(agent, None, progress)? {
             Unpacked::Bundle(bundle) => bundle,
             Unpacked::Invalid(reason) => {
                 return Ok(ValidationOutcome::Invalid {
@@ -168,11 +169,11 @@ impl Executor {
             });
         }
         let environment = self.host.environment(&agent.limits, progress);
-        let found = self
+        let validated = self
             .evaluator
             .validate(spec, &bundle, &environment, &|| progress.stopped())?;
-        let (agent_name, timing, log) = (bundle.manifest.name, found.timing, found.log);
-        Ok(match found.failure {
+        let (agent_name, timing, log) = (bundle.manifest.name, validated.timing, validated.log);
+        Ok(match validated.failure {
             None => ValidationOutcome::Valid {
                 agent_name,
                 runtime,
@@ -203,7 +204,7 @@ impl Executor {
         let played =
             self.evaluator
                 .play_shard(spec, &bundle, &environment, out.path(), &mut progress)?;
-        // The steps after this one depend on whether the slot is local or remote.
+        // The time from here to the commit depends on whether the slot is local or remote.
         tracing::debug!("played");
         let recording = match output {
             OutputFiles::None => None,

@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn full_disk_is_recognised_in_all_job_errors() {
-        let failed = [
+        let errors = [
             anyhow::Error::from(StoreError::DiskFull("the queue".into())),
             PlatformFault::FullDisk("steps.parquet".into()).into(),
             BundleError::Io(full()).into(),
@@ -66,8 +66,8 @@ mod tests {
             .into(),
             full().into(),
         ];
-        for error in failed {
-            let error = Err::<(), _>(error).context("doing this").unwrap_err();
+        for error in errors {
+            let error = Err::<(), _>(error).context("running a job").unwrap_err();
             assert!(is_cause_of(&error), "{error:#}");
         }
         let damaged = BundleError::Io(ErrorKind::InvalidData.into());

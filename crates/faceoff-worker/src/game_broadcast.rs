@@ -1,3 +1,5 @@
+//! Live updates of a running game: a slot sends them to the server, which shows them to viewers.
+
 use crate::{
     lease::Progress,
     server::{GameUpdate, JobServer},

@@ -1,3 +1,6 @@
+//! Keeping a lease while a job runs. A *lease* is the right of a slot to run a job for some seconds; without renewals it
+//! expires, and another slot may claim the job.
+
 use crate::server::{JobServer, LeaseStatus, ReleaseReason};
 use faceoff_types::{EpisodeOutcome, WINDOW_STEPS};
 use faceoff_wire::job::Lease;
@@ -12,7 +15,7 @@ use std::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// How often progress is checked, so that progress bars move.
+/// How often the keeper checks for progress, which it reports at once, so that progress bars move.
 const PROGRESS_TICK: Duration = Duration::from_secs(1);
 
 /// Keeps the lease of a job while a slot runs it. A thread renews the lease, reports progress and notices the loss of the
@@ -21,7 +24,7 @@ const PROGRESS_TICK: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub(crate) struct LeaseKeeper {
     progress: Progress,
-    done: CancellationToken,
+    job_done: CancellationToken,
     /// `None` only while it is being dropped.
     thread: Option<JoinHandle<()>>,
 }
@@ -29,29 +32,30 @@ pub(crate) struct LeaseKeeper {
 /// State shared by the slot's thread and the keeper's.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
-    /// Episodes of a shard; in a game, windows of control steps.
+    /// Number of finished episodes of a shard; in a game, of finished windows of [`WINDOW_STEPS`] control steps.
     episodes_done: Arc<AtomicU32>,
     stop: CancellationToken,
 }
 
 impl LeaseKeeper {
     /// Starts the keeper. Fails if no thread can be started.
-    pub(crate) fn keep(
+    pub(crate) fn start(
         server: Arc<dyn JobServer>,
         lease: Lease,
         shutdown: &CancellationToken,
     ) -> io::Result<Self> {
         let progress = Progress::default();
-        let done = shutdown.child_token();
+        let job_done = shutdown.child_token();
         let thread = thread::Builder::new()
             .name("faceoff-lease".to_owned())
             .spawn({
-                let (progress, done, shutdown) = (progress.clone(), done.clone(), shutdown.clone());
-                move || keep(&*server, &lease, &progress, &done, &shutdown)
+                let (progress, job_done, shutdown) =
+                    (progress.clone(), job_done.clone(), shutdown.clone());
+                move || keep_lease(&*server, &lease, &progress, &job_done, &shutdown)
             })?;
         Ok(Self {
             progress,
-            done,
+            job_done,
             thread: Some(thread),
         })
     }
@@ -64,7 +68,7 @@ impl LeaseKeeper {
 
 impl Drop for LeaseKeeper {
     fn drop(&mut self) {
-        self.done.cancel();
+        self.job_done.cancel();
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {
@@ -96,20 +100,21 @@ impl faceoff_runner::Observer for Progress {
     }
 }
 
-/// Runs until the job is done (`done`), the lease is lost or the server shuts down, which also cancels `done`.
-fn keep(
+/// Renews the lease until the job is done (`job_done` is cancelled), the lease is lost or the process shuts down
+/// (`shutdown` is cancelled, and with it `job_done`).
+fn keep_lease(
     server: &dyn JobServer,
     lease: &Lease,
     progress: &Progress,
-    done: &CancellationToken,
+    job_done: &CancellationToken,
     shutdown: &CancellationToken,
 ) {
     let interval = server.renewal_interval(lease);
-    let mut reported = 0;
+    let mut reported_episodes = 0;
     let mut renewed_at = Instant::now();
     let mut failing = false;
     loop {
-        server.wait(done, interval.min(PROGRESS_TICK), None);
+        server.wait(job_done, interval.min(PROGRESS_TICK), None);
         if shutdown.is_cancelled() {
             progress.stop.cancel();
             if let Err(error) = server.release(lease, ReleaseReason::Shutdown) {
@@ -117,16 +122,16 @@ fn keep(
             }
             return;
         }
-        if done.is_cancelled() {
+        if job_done.is_cancelled() {
             return;
         }
         let episodes_done = progress.episodes_done.load(Ordering::Relaxed);
-        if episodes_done == reported && renewed_at.elapsed() < interval {
+        if episodes_done == reported_episodes && renewed_at.elapsed() < interval {
             continue;
         }
         match server.renew(lease, episodes_done) {
             Ok(LeaseStatus::Held) => {
-                reported = episodes_done;
+                reported_episodes = episodes_done;
                 renewed_at = Instant::now();
                 failing = false;
             }

@@ -21,7 +21,7 @@ use std::{path::Path, time::Duration};
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
-/// A store, and the configuration for all jobs.
+/// The job server on a store, with the configuration for all jobs.
 #[derive(Debug, Clone)]
 pub(crate) struct LocalServer {
     pub(crate) store: Store,
@@ -29,14 +29,15 @@ pub(crate) struct LocalServer {
     pub(crate) clock: Clock,
     /// Duration of a lease without renewal, seconds.
     pub(crate) lease_s: u32,
+    /// The server's limits of agents; a stage may have others.
     pub(crate) limits: AgentLimits,
-    pub(crate) pause: ClaimPause,
+    pub(crate) claim_pause: ClaimPause,
     /// The kinds of jobs that its slots claim.
     pub(crate) job_filter: JobFilter,
 }
 
 impl LocalServer {
-    /// Ends the leases of a dead worker, so that its jobs need not wait for their expiry.
+    /// Ends the leases of a worker whose process has ended, so that its jobs need not wait for their expiry.
     pub(crate) async fn end_leases_of(&self, worker: &str) -> Result<u64, StoreError> {
         self.store.end_leases_of(worker, self.clock.now()).await
     }
@@ -158,10 +159,10 @@ impl LocalServer {
         JobSpec { lease, payload }
     }
 
-    fn agent(&self, bundle: BundleRef, own: &StageLimits) -> AgentSpec {
+    fn agent(&self, bundle: BundleRef, stage_limits: &StageLimits) -> AgentSpec {
         AgentSpec {
             bundle,
-            limits: own.apply_to(&self.limits),
+            limits: stage_limits.apply_to(&self.limits),
         }
     }
 
@@ -170,10 +171,10 @@ impl LocalServer {
     async fn commit_shard(
         &self,
         claim: &JobClaim,
-        played: ShardCommit,
+        commit: ShardCommit,
     ) -> anyhow::Result<LeaseStatus> {
-        let recording = played.recording.clone();
-        let committed = self.store.commit_shard(claim, played, self.clock.now());
+        let recording = commit.recording.clone();
+        let committed = self.store.commit_shard(claim, commit, self.clock.now());
         let status = lease_status(committed.await?);
         if status == LeaseStatus::Lost
             && let Some(recording) = recording
@@ -190,14 +191,14 @@ impl LocalServer {
     async fn commit_game(
         &self,
         claim: &JobClaim,
-        played: GameCommit,
+        commit: GameCommit,
     ) -> anyhow::Result<LeaseStatus> {
         let committed = self
             .store
-            .commit_game(claim, &played, self.clock.now())
+            .commit_game(claim, &commit, self.clock.now())
             .await?;
         let artifacts = self.store.artifacts();
-        let key = played.recording.map(|recording| recording.key);
+        let key = commit.recording.map(|recording| recording.key);
         if let Some(key) = key {
             let cleaned = match (committed, key.rsplit_once('/')) {
                 (CommitOutcome::Stored, Some((game_prefix, _))) => {
@@ -214,8 +215,8 @@ impl LocalServer {
         Ok(lease_status(committed))
     }
 
-    /// Commits a score and its dataset. The dataset is removed only if the commit certainly failed. After another error it
-    /// may be in use; if it is not, the next scoring removes it.
+    /// Commits a score and its dataset. The dataset is removed only if the commit certainly failed. After another error the
+    /// dataset may be in use; if it is not, the next scoring removes it.
     async fn commit_score(
         &self,
         claim: &JobClaim,
@@ -234,7 +235,7 @@ impl LocalServer {
                 artifacts.delete_others(datasets, dataset).await
             }
             (LeaseStatus::Held, None) => Ok(()),
-            // No other lease uses this key.
+            // The key contains the lease's nonce, so no other lease uses this dataset.
             (LeaseStatus::Lost, _) => artifacts.delete_dataset(dataset).await,
         };
         if let Err(error) = cleaned {
@@ -246,11 +247,15 @@ impl LocalServer {
 
 impl JobServer for LocalServer {
     fn claim(&self, slot: &str) -> anyhow::Result<ClaimResult> {
-        let queue = QueueVersion(*self.store.job_signal().borrow());
+        let queue_version = QueueVersion(*self.store.job_signal().borrow());
         self.runtime.block_on(async {
             let now = self.clock.now();
-            if self.pause.is_active(&self.store, self.lease_s, now).await? {
-                return Ok(ClaimResult::Empty { queue });
+            if self
+                .claim_pause
+                .is_active(&self.store, self.lease_s, now)
+                .await?
+            {
+                return Ok(ClaimResult::Empty { queue_version });
             }
             let claimed = self
                 .store
@@ -259,7 +264,7 @@ impl JobServer for LocalServer {
             self.store.record_poll(now);
             Ok(match claimed {
                 Some(claimed) => ClaimResult::Job(Box::new(self.job_spec(claimed))),
-                None => ClaimResult::Empty { queue },
+                None => ClaimResult::Empty { queue_version },
             })
         })
     }
@@ -303,13 +308,13 @@ impl JobServer for LocalServer {
                     stopped_by_faults,
                     recording,
                 } => {
-                    let played = ShardCommit {
+                    let commit = ShardCommit {
                         outcomes,
                         log,
                         stopped_by_faults,
                         recording,
                     };
-                    self.commit_shard(&claim, played).await
+                    self.commit_shard(&claim, commit).await
                 }
                 JobReport::Game {
                     score,
@@ -317,12 +322,12 @@ impl JobServer for LocalServer {
                     logs,
                 } => {
                     let recording = recording.map(game_recording);
-                    let played = GameCommit {
+                    let commit = GameCommit {
                         score,
                         recording,
                         logs,
                     };
-                    self.commit_game(&claim, played).await
+                    self.commit_game(&claim, commit).await
                 }
                 JobReport::Scoring {
                     dataset,
@@ -347,15 +352,22 @@ impl JobServer for LocalServer {
     }
 
     fn is_full_disk(&self, error: &anyhow::Error) -> bool {
-        // Any failure while the disk is short of space may be due to that: the job is tried again later.
+        // While the disk is short of space, that may be the cause of any failure: the job is tried again later.
         full_disk::is_cause_of(error) || self.store.free_space().is_short()
     }
 
-    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>) {
+    fn wait(
+        &self,
+        stop: &CancellationToken,
+        timeout: Duration,
+        queue_version: Option<QueueVersion>,
+    ) {
         let mut signal = self.store.job_signal();
         let changed = async {
-            match queue {
-                Some(QueueVersion(seen)) => drop(signal.wait_for(|version| *version != seen).await),
+            match queue_version {
+                Some(QueueVersion(known)) => {
+                    drop(signal.wait_for(|version| *version != known).await);
+                }
                 None => std::future::pending().await,
             }
         };
@@ -363,7 +375,7 @@ impl JobServer for LocalServer {
             tokio::select! {
                 () = stop.cancelled() => {}
                 () = changed => {}
-                () = tokio::time::sleep(at_most) => {}
+                () = tokio::time::sleep(timeout) => {}
             }
         });
     }

@@ -1,11 +1,12 @@
-//! Remote workers. The store's queue stays the only queue: the server claims as many jobs as free remote slots request, and
-//! NATS carries jobs to the workers and results back.
+//! Remote workers, which run jobs on other machines. The store's queue stays the only queue: the server claims as many jobs
+//! as free remote slots request, and NATS (a message broker, which stores messages in *streams*) carries jobs to the workers
+//! and results back.
 //!
-//! A job's lease alone decides which slot has the job. A job that NATS loses is released earlier, or when its lease
-//! expires, and is sent again. A job that NATS delivers twice is started once, by the first worker that asks to start it,
-//! and committed once.
+//! A job's lease (the right to run it for a time) alone decides which slot has the job. A job that NATS loses is
+//! released earlier, or when its lease expires, and is sent again. A job that NATS delivers twice is started once, by
+//! the first worker that asks to start it, and committed once.
 //!
-//! Both sides: `names.rs` has the names of streams and subjects, and `connection.rs` the connection to NATS.
+//! For both sides, `names.rs` has the names of streams and subjects, and `connection.rs` the connection to NATS.
 //!
 //! The server's side:
 //! * `streams.rs` sets up the streams;

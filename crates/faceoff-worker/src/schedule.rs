@@ -1,3 +1,6 @@
+//! The daily schedule. At a stage's *cutoff* its submissions are frozen, and the evaluations of that *day* start. A day whose
+//! deadline has passed is ended.
+
 use crate::boxed;
 use anyhow::Context as _;
 use faceoff_store::{Actor, Evaluation, RunPlan, Stage, Store};
@@ -10,9 +13,9 @@ use tokio_util::sync::CancellationToken;
 /// the second that pages show.
 const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
-/// Ends overdue days and starts scheduled days at their times, each once, until `shutdown` is cancelled. A day that
-/// became due while the server was down starts when the server is up again, if the date is still the same. After a
-/// database error it tries again every second.
+/// Ends days whose deadline has passed and starts scheduled days at their cutoffs, each once, until `shutdown` is
+/// cancelled. A day that became due while the server was down starts when the server is up again, if the date is still
+/// the same. After a database error it tries again every second.
 #[boxed]
 pub async fn run_schedule(
     store: Store,
@@ -22,10 +25,10 @@ pub async fn run_schedule(
     let mut failed = false;
     loop {
         let now = clock.now();
-        let next = match start_due(&store, now).await {
-            Ok(next) => {
+        let next_start = match start_due(&store, now).await {
+            Ok(next_start) => {
                 failed = false;
-                next
+                next_start
             }
             Err(error) => {
                 // Logged once, since it recurs every second.
@@ -39,8 +42,8 @@ pub async fn run_schedule(
                 None
             }
         };
-        let wait = next.map_or(LONGEST_SLEEP, |at| {
-            Duration::try_from(at.duration_since(now)).unwrap_or(Duration::ZERO)
+        let wait = next_start.map_or(LONGEST_SLEEP, |start| {
+            Duration::try_from(start.duration_since(now)).unwrap_or(Duration::ZERO)
         });
         tokio::select! {
             () = shutdown.cancelled() => return Ok(()),
@@ -55,36 +58,36 @@ pub async fn run_schedule(
 pub async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
     // A failure to end a day must not prevent others from starting.
     let ended = end_overdue(store, now).await;
-    let mut first = None;
+    let mut earliest = None;
     let stages = store.stages().await.context("reading the stages")?;
     for stage in stages {
         let next = match next_cutoff(store, &stage, now).await? {
-            Some(at) if at <= now => {
+            Some(cutoff_at) if cutoff_at <= now => {
                 let started = store.start_scheduled_day(stage.id, now).await;
                 let started = started.with_context(|| format!("the stage {}", stage.name))?;
                 if let Some(started) = started {
                     tracing::info!(stage = %stage.name, evaluations = started.len(), "day started");
                     create_ablations(store, &stage, &started, now).await;
                 }
-                // If it is still due, something lasting prevents the start: do not retry at once.
+                // If the cutoff is still due, something lasting prevents the start: do not retry at once.
                 let next = next_cutoff(store, &stage, now).await?;
-                next.filter(|at| *at > now)
+                next.filter(|cutoff_at| *cutoff_at > now)
             }
             next => next,
         };
-        first = match (first, next) {
-            (Some(first), Some(next)) => Some(std::cmp::min::<Timestamp>(first, next)),
-            (first, next) => first.or(next),
+        earliest = match (earliest, next) {
+            (Some(earliest), Some(next)) => Some(std::cmp::min::<Timestamp>(earliest, next)),
+            (earliest, next) => earliest.or(next),
         };
     }
-    ended.map(|()| first)
+    ended.map(|()| earliest)
 }
 
 async fn end_overdue(store: &Store, now: Timestamp) -> anyhow::Result<()> {
     let ended = store.end_overdue_days(now).await;
-    for (of, not_played) in ended.context("ending the days whose deadline has come")? {
+    for (day, not_played) in ended.context("ending the days whose deadline has come")? {
         tracing::warn!(
-            stage = %of.stage, day = %of.date, not_played,
+            stage = %day.stage, day = %day.date, not_played,
             "the day's deadline passed with evaluations not played"
         );
     }
@@ -105,7 +108,8 @@ async fn next_cutoff(
     Ok(next.and_then(|(_, at)| at))
 }
 
-/// Creates an ablation for each submission that has none, if the stage is configured so. Failures are only logged, since
+/// Creates an ablation (a comparison of the agent in several simulator profiles) for each submission that has none, if the
+/// stage is configured so. Failures are only logged, since
 /// counting evaluations must not depend on them; organisers can create the ablation by hand.
 async fn create_ablations(store: &Store, stage: &Stage, started: &[Evaluation], now: Timestamp) {
     let Some(episodes) = NonZeroU32::new(stage.settings.ablation_episodes) else {

@@ -1,3 +1,5 @@
+//! A worker's scratch folder: temporary files of its slots, and the lock that reserves the folder for one process.
+
 use anyhow::Context as _;
 use fs_err::{self as fs, File};
 use std::{
@@ -91,7 +93,7 @@ mod tests {
     #[test]
     fn scratch_removes_leftovers_but_no_other_files() {
         let folder = tempfile::tempdir().unwrap();
-        fs::create_dir_all(folder.path().join("slot-7/bundle/x")).unwrap();
+        fs::create_dir_all(folder.path().join("slot-7/leftover")).unwrap();
         fs::write(folder.path().join("notes.txt"), "a file of the user").unwrap();
         let scratch = Scratch::take(folder.path()).unwrap();
         assert!(!folder.path().join("slot-7").exists());

@@ -1,3 +1,5 @@
+//! The interface between a slot, which runs jobs, and the server, which owns the queue of jobs and their files.
+
 use faceoff_types::{BundleRef, GameId, LiveEvent, LivePosition};
 use faceoff_wire::job::{JobReport, JobSpec, Lease};
 use std::{path::Path, time::Duration};
@@ -19,21 +21,26 @@ pub(crate) trait JobServer: Send + Sync {
         Duration::from_secs(lease.duration_s.into()) / 3
     }
 
-    /// Publishes a live update of a game. Cheap and best-effort: over a slow or broken connection, updates may get lost.
+    /// Publishes a live update of an attempt (its number) at a game. Over a slow or broken connection, updates may get lost.
     fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: GameUpdate);
 
-    /// Stores the result of a job; idempotent under the same lease. Files that were uploaded under a lost lease are
-    /// removed.
+    /// Stores the result of a job; a repetition under the same lease has no effect. Files that were uploaded under a lost
+    /// lease are removed.
     fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus>;
 
     /// Puts a job back into the queue. For a lost lease nothing is recorded.
     fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()>;
 
-    /// Was a full disk of the slot or the server the cause of this error? Then the attempt does not count.
+    /// Was a full disk, of the slot's or the server's host, the cause of this error? Then the attempt does not count.
     fn is_full_disk(&self, error: &anyhow::Error) -> bool;
 
-    /// Waits until `stop` is cancelled, `at_most` has passed or, given a version, jobs were added to the queue since.
-    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>);
+    /// Waits until `stop` is cancelled, `timeout` has passed or, if a queue version is given, jobs were added since it.
+    fn wait(
+        &self,
+        stop: &CancellationToken,
+        timeout: Duration,
+        queue_version: Option<QueueVersion>,
+    );
 
     /// Copies an uploaded bundle to a new file.
     fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()>;
@@ -41,10 +48,10 @@ pub(crate) trait JobServer: Send + Sync {
     /// Copies the files of a committed recording into an empty folder.
     fn fetch_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()>;
 
-    /// Stores the files of a folder as a recording.
+    /// Stores the files of a folder as a recording (of a shard or a game).
     fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()>;
 
-    /// Stores the clips of a shard's episodes, replacing earlier ones.
+    /// Stores the clips (motions for replays) of a shard's episodes, replacing earlier ones.
     fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()>;
 
     /// Stores a dataset, with the clips for replays. It becomes visible with the commit that names it.
@@ -58,7 +65,7 @@ pub(crate) enum ClaimResult {
     /// No job can be claimed now.
     Empty {
         /// Version of the queue before the claim, so that no later addition is missed.
-        queue: QueueVersion,
+        queue_version: QueueVersion,
     },
 }
 

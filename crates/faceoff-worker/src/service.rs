@@ -1,3 +1,5 @@
+//! Starts and supervises the slots of a worker process; each slot is a thread that runs one job at a time.
+
 use crate::{
     boxed,
     bundle_cache::BundleCache,
@@ -108,7 +110,7 @@ impl WorkerConfig {
             runtime: Handle::current(),
             clock,
             lease_s: self.lease_s,
-            pause: ClaimPause::default(),
+            claim_pause: ClaimPause::default(),
             limits: AgentLimits {
                 bundle: self.bundle_limits,
                 resources: self.slots.agent.limits.clone(),
@@ -134,11 +136,11 @@ pub(crate) async fn run_with(
 
     match server.end_leases_of(scratch.worker()).await {
         Ok(0) => {}
-        Ok(ended) => tracing::info!(
-            jobs = ended,
+        Ok(released) => tracing::info!(
+            jobs = released,
             "released the jobs of this worker's previous process"
         ),
-        // They expire anyway.
+        // These leases expire anyway.
         Err(error @ StoreError::DiskFull(_)) => {
             tracing::warn!(%error, "the leases of this worker's previous process remain until they expire");
         }
@@ -146,22 +148,22 @@ pub(crate) async fn run_with(
     }
 
     let cleanup = tokio::spawn(run_cleanup(server, intervals.cleanup, shutdown.clone()));
-    let slot_servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
+    let servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
         slot: format!("{}/slot-{index}", scratch.worker()),
         server: Arc::clone(&slots_server),
     });
-    let slot_servers = slot_servers.collect();
-    let ended = run_slots(
+    let servers = servers.collect();
+    let result = run_slots(
         config.slots,
         &scratch,
-        slot_servers,
+        servers,
         evaluator,
         intervals,
         shutdown,
     )
     .await;
     cleanup.abort();
-    ended
+    result
 }
 
 /// The name of a slot, and the server from which it gets jobs.
@@ -188,8 +190,8 @@ pub(crate) async fn run_slots(
     let _stop = stop.clone().drop_guard();
     tokio::spawn(report_stalled_slots(config.metrics.clone(), stop.clone()));
     let mut slots = JoinSet::new();
-    let all = config.cpus.slots.into_iter().zip(servers);
-    for (index, (cpus, SlotServer { slot: name, server })) in all.enumerate() {
+    let cpus_and_servers = config.cpus.slots.into_iter().zip(servers);
+    for (index, (cpus, SlotServer { slot: name, server })) in cpus_and_servers.enumerate() {
         let folder = scratch.slot(index)?;
         let slot = Slot {
             name,
@@ -214,6 +216,7 @@ pub(crate) async fn run_slots(
             shutdown: stop.clone(),
         };
         let end = start(&config.threads, index, slot)?;
+        // The task fails with the slot's index if its thread panics.
         slots.spawn(async move { end.await.map_err(|_| index) });
     }
     wait_for(slots, intervals.shutdown_grace, &stop).await
@@ -240,7 +243,7 @@ async fn wait_for(
     shutdown_grace: Duration,
     stop: &CancellationToken,
 ) -> anyhow::Result<()> {
-    let all = async {
+    let all_ended = async {
         let mut died = Vec::new();
         while let Some(ended) = slots.join_next().await {
             if let Ok(Err(index)) = ended {
@@ -256,7 +259,7 @@ async fn wait_for(
         tokio::time::sleep(shutdown_grace).await;
     };
     tokio::select! {
-        died = all => {
+        died = all_ended => {
             anyhow::ensure!(died.is_empty(), "slots {died:?} died");
             Ok(())
         }
@@ -269,23 +272,23 @@ async fn wait_for(
 
 /// Keeps the metric of stalled slots up to date; the server's health depends on it.
 async fn report_stalled_slots(metrics: Metrics, stop: CancellationToken) {
-    const EVERY: Duration = Duration::from_secs(1);
+    const INTERVAL: Duration = Duration::from_secs(1);
     loop {
         metrics.slots().set_stuck(faceoff_runner::stuck_threads());
         tokio::select! {
             () = stop.cancelled() => return,
-            () = tokio::time::sleep(EVERY) => {}
+            () = tokio::time::sleep(INTERVAL) => {}
         }
     }
 }
 
 /// Removes obsolete data periodically.
-async fn run_cleanup(server: LocalServer, every: Duration, shutdown: CancellationToken) {
+async fn run_cleanup(server: LocalServer, interval: Duration, shutdown: CancellationToken) {
     loop {
         cleanup::clean_up(&server.store, server.clock.now()).await;
         tokio::select! {
             () = shutdown.cancelled() => return,
-            () = tokio::time::sleep(every) => {}
+            () = tokio::time::sleep(interval) => {}
         }
     }
 }

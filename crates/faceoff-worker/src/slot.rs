@@ -1,3 +1,6 @@
+//! A slot: the place in a worker that runs one job at a time, on its own thread. Here are its loop (claim, run, commit or
+//! release) and its pauses after platform faults. A *platform fault* is a failure that the agent did not cause.
+
 use crate::{
     executor::Executor,
     lease::{LeaseKeeper, Progress},
@@ -36,7 +39,7 @@ impl Backoff {
 /// A slot: claims and runs jobs, one at a time, on its own thread.
 pub(crate) struct Slot {
     pub(crate) name: String,
-    /// Label of the slot in metrics.
+    /// Number of the slot, its label in metrics.
     pub(crate) number: String,
     pub(crate) metrics: Metrics,
     /// How often an idle slot polls the queue for jobs that became claimable without a signal: by an expired lease, at
@@ -51,12 +54,12 @@ pub(crate) struct Slot {
 impl Slot {
     /// Runs jobs until the shutdown.
     pub(crate) fn run(mut self) {
-        // Only the first of several failures in a row is logged.
+        // Did the last claim fail? Only the first of several failures in a row is logged.
         let mut failing = false;
         // Platform faults in a row.
         let mut faults = 0;
         while !self.shutdown.is_cancelled() {
-            let queue = match self.server.claim(&self.name) {
+            let queue_version = match self.server.claim(&self.name) {
                 Ok(ClaimResult::Job(job)) => {
                     failing = false;
                     match self.run_job(&job) {
@@ -69,9 +72,9 @@ impl Slot {
                     }
                     continue;
                 }
-                Ok(ClaimResult::Empty { queue }) => {
+                Ok(ClaimResult::Empty { queue_version }) => {
                     failing = false;
-                    Some(queue)
+                    Some(queue_version)
                 }
                 Err(error) => {
                     if !failing {
@@ -84,7 +87,8 @@ impl Slot {
                     None
                 }
             };
-            self.server.wait(&self.shutdown, self.idle_poll, queue);
+            self.server
+                .wait(&self.shutdown, self.idle_poll, queue_version);
         }
     }
 
@@ -112,19 +116,19 @@ impl Slot {
         // All log lines of this thread carry the job's ids until the span ends.
         let _span = span(job).entered();
         tracing::info!(job = %id, description = %payload, "started");
-        let (busy, began) = (
-            self.metrics.slots().start_job(kind(payload)),
+        let (job_metrics, started_at) = (
+            self.metrics.slots().start_job(kind_label(payload)),
             Instant::now(),
         );
         // A panic in the evaluator must end neither the slot nor the evaluation.
-        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.execute(job)))
+        let result = std::panic::catch_unwind(AssertUnwindSafe(|| self.execute(job)))
             .unwrap_or_else(|panic| {
                 Err(anyhow::anyhow!(
                     "the evaluator failed: {}",
                     panic_message(&*panic)
                 ))
             });
-        let end = match ended {
+        let end = match result {
             Ok(LeaseStatus::Held) => {
                 tracing::info!(job = %id, description = %payload, "committed");
                 JobEnd::Committed
@@ -143,26 +147,26 @@ impl Slot {
                 end
             }
         };
-        busy.end(end, began.elapsed());
+        job_metrics.end(end, started_at.elapsed());
         end
     }
 
     /// Runs and commits a job. An error is a platform fault.
     fn execute(&mut self, job: &JobSpec) -> anyhow::Result<LeaseStatus> {
         let keeper =
-            LeaseKeeper::keep(Arc::clone(&self.server), job.lease.clone(), &self.shutdown)?;
+            LeaseKeeper::start(Arc::clone(&self.server), job.lease.clone(), &self.shutdown)?;
         let progress = keeper.progress();
         let committed = self.executor.run(job, &progress).and_then(|report| {
             let status = self.commit(job, &report, &progress)?;
             if status == LeaseStatus::Held {
-                self.count(&report);
+                self.record_metrics(&report);
             }
             Ok(status)
         });
-        // Waits for a renewal in progress: an error after the lease was lost is not a platform fault.
+        // The drop waits for a renewal in progress: if it shows that the lease is lost, the error is not a platform fault.
         drop(keeper);
         match committed {
-            // Not a fault: the job was released, or another slot has it.
+            // This is no fault: the job was released, or another slot has it.
             Err(error) if progress.stopped() => {
                 tracing::info!(job = %job.lease.job_id, cause = format!("{error:#}"), "stopped");
                 Ok(LeaseStatus::Lost)
@@ -171,8 +175,8 @@ impl Slot {
         }
     }
 
-    /// Counts the result of a job in the metrics.
-    fn count(&self, report: &JobReport) {
+    /// Records the episodes of a shard in the metrics.
+    fn record_metrics(&self, report: &JobReport) {
         if let (JobReport::Shard { outcomes, .. }, Some(timing)) = (report, &self.executor.timing) {
             let slots = self.metrics.slots();
             slots.record_episodes(&self.number, outcomes, timing);
@@ -219,7 +223,7 @@ impl Slot {
         loop {
             match self.server.release(&job.lease, reason) {
                 Ok(()) => return,
-                // Otherwise the lease would expire, and the attempt would count.
+                // Without a release the lease would expire, and the attempt would count.
                 Err(error) if self.server.is_full_disk(&error) && !self.shutdown.is_cancelled() => {
                     self.server.wait(&self.shutdown, self.idle_poll, None);
                 }
@@ -250,8 +254,8 @@ fn span(job: &JobSpec) -> tracing::Span {
     }
 }
 
-/// Label of the kind of job in metrics.
-const fn kind(payload: &JobPayload) -> &'static str {
+/// Label of the kind of job in metrics. Dashboards filter by these labels, so they stay as they were introduced.
+const fn kind_label(payload: &JobPayload) -> &'static str {
     match payload {
         JobPayload::Validation { .. } => "smoke",
         JobPayload::Shard { .. } => "play",

@@ -1,4 +1,4 @@
-//! Starts the threads of slots.
+//! Starts the threads of slots. A slot is the place in a worker that runs one job at a time.
 //!
 //! A thread inherits the CPUs and the priority of the thread that starts it, and may not raise its priority. A server
 //! answers requests on threads of low priority, so it starts its slots from a separate thread.
@@ -9,19 +9,19 @@ use std::{
     thread,
 };
 
-type Body = Box<dyn FnOnce() + Send>;
-
+/// A request to start a thread.
 #[derive(Debug)]
-struct Request {
+struct StartRequest {
     name: String,
-    body: BodyOf,
-    started: Sender<io::Result<()>>,
+    body: ThreadBody,
+    /// Where the result is sent.
+    reply: Sender<io::Result<()>>,
 }
 
 /// A thread's closure, with a `Debug` implementation.
-struct BodyOf(Body);
+struct ThreadBody(Box<dyn FnOnce() + Send>);
 
-impl std::fmt::Debug for BodyOf {
+impl std::fmt::Debug for ThreadBody {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("…")
     }
@@ -33,26 +33,29 @@ pub struct SlotThreads(Starter);
 
 #[derive(Debug, Clone)]
 enum Starter {
-    Caller,
-    Other(Sender<Request>),
+    CallingThread,
+    StarterThread(Sender<StartRequest>),
 }
 
-/// [Runs](Self::run) on the thread whose CPUs and priority the slots inherit.
+/// Receives the requests to start threads. It [runs](Self::run) on the thread whose CPUs and priority the slots inherit.
 #[derive(Debug)]
-pub struct SlotStarter(Receiver<Request>);
+pub struct SlotStarter(Receiver<StartRequest>);
 
 impl SlotThreads {
     /// Threads are started by the calling thread.
     #[must_use]
     pub const fn from_caller() -> Self {
-        Self(Starter::Caller)
+        Self(Starter::CallingThread)
     }
 
     /// Threads are started by the thread that runs the returned [`SlotStarter`].
     #[must_use]
     pub fn from_starter() -> (Self, SlotStarter) {
-        let (requests, starter) = mpsc::channel();
-        (Self(Starter::Other(requests)), SlotStarter(starter))
+        let (requests, receiver) = mpsc::channel();
+        (
+            Self(Starter::StarterThread(requests)),
+            SlotStarter(receiver),
+        )
     }
 
     /// Starts a named thread.
@@ -62,18 +65,14 @@ impl SlotThreads {
         body: impl FnOnce() + Send + 'static,
     ) -> io::Result<()> {
         match &self.0 {
-            Starter::Caller => spawn(name, body),
-            Starter::Other(requests) => {
-                let gone = || io::Error::other("the thread that starts slots has ended");
-                let (started, answer) = mpsc::channel();
-                let body = BodyOf(Box::new(body));
-                let request = Request {
-                    name,
-                    body,
-                    started,
-                };
-                requests.send(request).map_err(|_| gone())?;
-                answer.recv().map_err(|_| gone())?
+            Starter::CallingThread => spawn(name, body),
+            Starter::StarterThread(requests) => {
+                let starter_ended = || io::Error::other("the thread that starts slots has ended");
+                let (reply, started) = mpsc::channel();
+                let body = ThreadBody(Box::new(body));
+                let request = StartRequest { name, body, reply };
+                requests.send(request).map_err(|_| starter_ended())?;
+                started.recv().map_err(|_| starter_ended())?
             }
         }
     }
@@ -82,14 +81,9 @@ impl SlotThreads {
 impl SlotStarter {
     /// Starts the requested threads until all [`SlotThreads`] are dropped.
     pub fn run(self) {
-        for Request {
-            name,
-            body,
-            started,
-        } in self.0
-        {
-            // The requester may be gone.
-            let _ = started.send(spawn(name, body.0));
+        for StartRequest { name, body, reply } in self.0 {
+            // The requester may have ended.
+            let _ = reply.send(spawn(name, body.0));
         }
     }
 }
@@ -106,17 +100,17 @@ mod tests {
     #[test]
     fn slot_threads_inherit_from_the_starter() {
         let (threads, starter) = SlotThreads::from_starter();
-        let all = affinity::allowed_cpus().unwrap();
+        let cpus = affinity::allowed_cpus().unwrap();
         let requester = thread::spawn(move || {
-            affinity::lower_priority(&all[..1]).unwrap();
+            affinity::lower_priority(&cpus[..1]).unwrap();
             let (sender, receiver) = mpsc::channel();
             threads
                 .start("requested".into(), move || {
-                    let seen = (
+                    let inherited = (
                         affinity::allowed_cpus().unwrap(),
                         affinity::niceness().unwrap(),
                     );
-                    sender.send(seen).unwrap();
+                    sender.send(inherited).unwrap();
                 })
                 .unwrap();
             (receiver.recv().unwrap(), affinity::niceness().unwrap())

@@ -2,6 +2,7 @@
 //!
 //! The API's words: a *season* has *stages*, each with its own rules. At a *cutoff* of a stage an *evaluation day* starts:
 //! the active *submission* of each team is run on all *tasks*, which is the team's *evaluation*. *Boards* rank the results.
+//! A comment that begins with "Organiser:" or "Team:" names the caller whose token the server expects.
 
 mod archive;
 mod download;
@@ -61,13 +62,13 @@ const READ_TIMEOUT: Duration = Duration::from_secs(60);
 #[error("the server refused ({status}, {title}): {detail}")]
 pub struct ApiError {
     pub status: StatusCode,
-    /// The kind of problem, readable.
+    /// The kind of problem in words.
     pub title: String,
     /// Expected and received value, and the remedy.
     pub detail: String,
 }
 
-/// No answer, or an answer that no Faceoff server gives. The error's source has the cause.
+/// The server did not answer, or answered as no Faceoff server does. The error's source has the cause.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{0}")]
 pub struct Unreachable(pub String);
@@ -231,7 +232,7 @@ impl Client {
         read_json(self.send(request).await?).await
     }
 
-    /// Organiser: starts an evaluation day that was missed.
+    /// Organiser: starts an evaluation day for a past date that had no cutoff.
     pub async fn start_missed_day(
         &self,
         id: StageId,
@@ -268,7 +269,7 @@ impl Client {
         read_json(self.send(request.json(change)).await?).await
     }
 
-    /// Organiser: starts a stage's final day.
+    /// Organiser: starts a stage's final day, the evaluation day after its close whose results decide it.
     pub async fn start_final_day(&self, id: StageId) -> anyhow::Result<DayView> {
         let request = self.request(Method::POST, &format!("/stages/{id}/final"));
         read_json(self.send(request).await?).await

@@ -1,8 +1,7 @@
 //! The configuration: one TOML file in which every field may be left out.
 //!
-//! The defaults are the `Default` implementations below and of the types that the sections hold, so
-//! that the file, the documentation (`docs/configuration.md`, held to them by a test) and the code
-//! cannot state different ones.
+//! The defaults are the `Default` implementations of the sections and of their types. Tests compare the commented file and
+//! the documentation (`docs/configuration.md`) with them.
 
 use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, MinTransferRate};
@@ -100,7 +99,8 @@ pub struct SeasonConfig {
     pub name: Option<String>,
 }
 
-/// `[evaluation]`: rules and settings of the season's first stage, until they are changed through the API.
+/// `[evaluation]`: rules and settings of the season's first *stage*, a period with its own board, until they are changed through
+/// the API. At a *cutoff*, an evaluation of each team's submission starts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
@@ -108,8 +108,8 @@ pub struct EvaluationConfig {
     pub tasks: Vec<Task>,
     /// Episodes per task.
     pub episodes_per_task: u32,
-    /// Episodes per shard. Scores do not depend on it; smaller shards lose less when a worker dies, larger ones
-    /// start fewer agents.
+    /// Episodes per shard, the job that one slot runs at a time. Scores do not depend on it; smaller shards lose less when a
+    /// worker dies, larger ones start fewer agents.
     pub episodes_per_shard: u32,
     /// Time of the daily cutoff in `zone`; left out, `cron` applies, or organisers start each day.
     pub at: Option<Time>,
@@ -128,9 +128,9 @@ pub struct EvaluationConfig {
     pub ablation_episodes: u32,
     /// Weights of the tasks' success rates in the score.
     pub weights: TaskWeights,
-    /// Most penalty points per episode of each tier.
+    /// Most penalty points per episode of the tiers (classes of agents) deployable and improvable.
     pub tier_bounds: TierBounds,
-    /// Magnitudes of the perturbations that the profile enables; left out, the ruleset's.
+    /// Magnitudes of the perturbations that the profile enables; left out, those of the ruleset (the simulator's version).
     pub perturbations: Option<Box<PerturbationSettings>>,
     /// When the datasets of released days are published.
     pub publishes: Publication,
@@ -165,8 +165,8 @@ impl Default for EvaluationConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorkersConfig {
-    /// Parallel evaluations; left out, one per two CPUs after one CPU is reserved, so that an agent, its simulator
-    /// and the rest of the server each have a CPU.
+    /// Slots, each of which runs one job at a time; left out, one per two CPUs after one CPU is reserved, so that an agent,
+    /// its simulator and the rest of the server each have a CPU.
     pub slots: Option<usize>,
     /// Seconds after which the jobs of a dead worker are given to another one.
     pub lease_s: u32,
@@ -214,14 +214,14 @@ impl Default for UploadsConfig {
     fn default() -> Self {
         let HttpLimits {
             team_uploads,
-            min_upload_rate: upload_rate,
+            min_upload_rate,
             upload_quota,
             ..
         } = HttpLimits::default();
         Self {
             at_once: team_uploads,
-            least_bytes_per_s: upload_rate.bytes_per_s,
-            grace_s: upload_rate.grace.as_secs_f64(),
+            least_bytes_per_s: min_upload_rate.bytes_per_s,
+            grace_s: min_upload_rate.grace.as_secs_f64(),
             day_bytes: upload_quota.day_bytes,
             stored_bytes: upload_quota.stored_bytes,
         }
@@ -271,16 +271,16 @@ impl Default for ConnectionsConfig {
             open,
             per_address,
             exempt,
-            head_timeout: head,
-            min_read_rate: reading,
+            head_timeout,
+            min_read_rate,
         } = ConnectionLimits::default();
         Self {
             most: open,
             per_address,
             exempt,
-            head_s: head.as_secs_f64(),
-            least_bytes_per_s: reading.bytes_per_s,
-            grace_s: reading.grace.as_secs_f64(),
+            head_s: head_timeout.as_secs_f64(),
+            least_bytes_per_s: min_read_rate.bytes_per_s,
+            grace_s: min_read_rate.grace.as_secs_f64(),
         }
     }
 }
@@ -306,7 +306,7 @@ impl ConnectionsConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SandboxConfig {
-    /// Layers of the sandbox that are not used.
+    /// Layers (single protections) of the sandbox that are not used.
     pub given_up: Vec<Layer>,
     /// The runtimes' files are copied into memory if they are at most this large; 0: never.
     pub resident_bytes: u64,
@@ -398,7 +398,7 @@ impl Config {
         let evaluation = &self.evaluation;
         let schedule = match (evaluation.at, &evaluation.cron) {
             (None, None) => None,
-            (Some(at), None) => Some(Schedule::daily(at)),
+            (Some(time_of_day), None) => Some(Schedule::daily(time_of_day)),
             (None, Some(pattern)) => Some(Schedule::cron(pattern)?),
             (Some(_), Some(_)) => return Err(InvalidSchedule::OneKindExpected),
         };
@@ -419,8 +419,8 @@ impl Config {
     pub fn agent_environment(&self) -> AgentEnvironment {
         let mut runtimes = BTreeMap::from([("native".to_owned(), Runtime::native())]);
         runtimes.extend(Runtime::python3().map(|python| ("python3".to_owned(), python)));
-        let own = self.runtimes.iter();
-        runtimes.extend(own.map(|(name, own)| (name.clone(), own.runtime())));
+        let configured = self.runtimes.iter();
+        runtimes.extend(configured.map(|(name, config)| (name.clone(), config.runtime())));
         AgentEnvironment {
             limits: self.limits.clone(),
             time: self.time.clone(),
@@ -466,7 +466,7 @@ impl Config {
         })
     }
 
-    /// Number of slots that do not disturb each other or the server on so many CPUs; at least one.
+    /// Number of slots that do not disturb each other or the server on a host with `cpus` CPUs; at least one.
     #[must_use]
     pub const fn slots_on(cpus: usize) -> usize {
         if cpus < 3 { 1 } else { (cpus - 1) / 2 }

@@ -26,8 +26,12 @@ pub struct Credentials {
 pub struct Login {
     pub token: String,
     /// The token was created by signing in, so signing out revokes it.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub made_here: bool,
+    #[serde(
+        default,
+        rename = "made_here",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub created_by_login: bool,
     /// Certificate authorities of the server, in addition to the machine's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ca_file: Option<PathBuf>,
@@ -57,7 +61,7 @@ pub fn path() -> anyhow::Result<PathBuf> {
 }
 
 /// The normalised address of a server.
-fn key(server: &str) -> String {
+fn normalise(server: &str) -> String {
     match reqwest::Url::parse(server) {
         Ok(url) => url.as_str().trim_end_matches('/').to_owned(),
         // The request with this address reports the error.
@@ -119,28 +123,28 @@ impl Credentials {
 
     /// This is the server of commands without `--server`.
     pub fn is_default(&self, server: &str) -> bool {
-        self.default == Some(key(server))
+        self.default == Some(normalise(server))
     }
 
     /// The login to a server.
     pub fn login(&self, server: &str) -> Option<&Login> {
-        self.servers.get(&key(server))
+        self.servers.get(&normalise(server))
     }
 
     /// Adds or replaces a login. Its server becomes the default if `is_default`, or if there is no other default.
     pub fn add(&mut self, server: &str, login: Login, is_default: bool) {
-        let key = key(server);
+        let server = normalise(server);
         if is_default || self.default.is_none() {
-            self.default = Some(key.clone());
+            self.default = Some(server.clone());
         }
-        self.servers.insert(key, login);
+        self.servers.insert(server, login);
     }
 
     /// Removes a login. If it was the default, the only remaining server becomes the default.
     pub fn remove(&mut self, server: &str) -> Option<Login> {
-        let key = key(server);
-        let removed = self.servers.remove(&key)?;
-        if self.default.as_ref() == Some(&key) {
+        let server = normalise(server);
+        let removed = self.servers.remove(&server)?;
+        if self.default.as_ref() == Some(&server) {
             let mut remaining = self.servers.keys();
             self.default = match (remaining.next(), remaining.next()) {
                 (Some(only), None) => Some(only.clone()),
@@ -163,7 +167,7 @@ mod tests {
     fn login(token: &str) -> Login {
         Login {
             token: token.to_owned(),
-            made_here: false,
+            created_by_login: false,
             ca_file: None,
         }
     }

@@ -1,4 +1,5 @@
-//! File descriptors: the limit of this process, and its division between evaluations and connections.
+//! File descriptors: the limit of this process, and its division between connections and worker slots, each of which runs one
+//! evaluation or game at a time.
 
 use faceoff_http::ConnectionLimits;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -8,16 +9,16 @@ use serde::Serialize;
 /// iterate over all descriptors would become slow.
 const MAX_LIMIT: u64 = 1 << 16;
 /// Descriptors of the service itself: database, log, runtime, listener.
-const SERVICE: u64 = 64;
+const SERVICE_DESCRIPTORS: u64 = 64;
 /// Most descriptors of a slot. Each of its two agents has sockets, kernel counters (two files for each of its first 16
 /// threads) and files for its termination; the slot has an unpacked bundle, recordings and datasets.
-const PER_SLOT: u64 = 160;
+const DESCRIPTORS_PER_SLOT: u64 = 160;
 /// Descriptors per connection: the socket, and a file that is sent, or two handles of a file that is received.
-const PER_CONNECTION: u64 = 3;
+const DESCRIPTORS_PER_CONNECTION: u64 = 3;
 /// With fewer connections, the server is not usable.
 const MIN_CONNECTIONS: usize = 8;
-/// One address gets at most this fraction (1/4) of the connections, so that it cannot occupy all of them.
-const ADDRESS_SHARE: usize = 4;
+/// One address gets at most the connections divided by this number, so that it cannot occupy all of them.
+const ADDRESS_DIVISOR: usize = 4;
 
 /// Division of the descriptors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -63,9 +64,9 @@ impl Descriptors {
     /// # Errors
     /// If too few are left for connections.
     pub fn divide(limit: u64, slots: usize, requested: &ConnectionLimits) -> anyhow::Result<Self> {
-        let reserved = SERVICE + PER_SLOT * slots as u64;
-        let left = limit.saturating_sub(reserved) / PER_CONNECTION;
-        let connections = usize::try_from(left)
+        let reserved = SERVICE_DESCRIPTORS + DESCRIPTORS_PER_SLOT * slots as u64;
+        let possible = limit.saturating_sub(reserved) / DESCRIPTORS_PER_CONNECTION;
+        let connections = usize::try_from(possible)
             .unwrap_or(usize::MAX)
             .min(requested.open);
         anyhow::ensure!(
@@ -73,7 +74,7 @@ impl Descriptors {
             "{limit} file descriptors are too few: evaluations in {slots} slot(s) and the service need \
              {reserved}, and {MIN_CONNECTIONS} connections need {} more; raise the limit (ulimit -n, LimitNOFILE= of \
              systemd) or set fewer workers.slots",
-            MIN_CONNECTIONS as u64 * PER_CONNECTION
+            MIN_CONNECTIONS as u64 * DESCRIPTORS_PER_CONNECTION
         );
         Ok(Self {
             limit,
@@ -81,7 +82,7 @@ impl Descriptors {
             connections,
             per_address: requested
                 .per_address
-                .min((connections / ADDRESS_SHARE).max(1)),
+                .min((connections / ADDRESS_DIVISOR).max(1)),
         })
     }
 
@@ -106,6 +107,7 @@ mod tests {
         let divide = |limit, slots| Descriptors::divide(limit, slots, &requested);
         let large = divide(65_536, 4).unwrap();
         assert_eq!((large.connections, large.per_address), (1024, 64));
+        // 300 - 64 - 160 descriptors remain for 25 connections, of which an address gets a quarter.
         let small = divide(300, 1).unwrap();
         assert_eq!(
             (small.reserved, small.connections, small.per_address),

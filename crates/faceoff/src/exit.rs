@@ -130,13 +130,14 @@ mod tests {
         assert_eq!(Exit::from_outcome(Err(connection)), Exit::Unreachable);
     }
 
-    fn refused(status: u16) -> Exit {
+    /// The exit status after a response with this HTTP status.
+    fn exit_after(status: u16) -> Exit {
         let error = ApiError {
             status: StatusCode::from_u16(status).unwrap(),
             title: "Title".into(),
             detail: "detail".into(),
         };
-        Exit::of(&anyhow::Error::from(error).context("asking"))
+        Exit::of(&anyhow::Error::from(error).context("requesting"))
     }
 
     #[test]
@@ -150,12 +151,12 @@ mod tests {
             (500, Exit::Unreachable),
             (503, Exit::Unreachable),
         ] {
-            assert_eq!(refused(status), exit, "{status}");
+            assert_eq!(exit_after(status), exit, "{status}");
         }
         let unreachable: anyhow::Result<()> =
             Err(anyhow!("connection refused").context(Unreachable("x".into())));
         assert_eq!(
-            Exit::of(&unreachable.context("asking").unwrap_err()),
+            Exit::of(&unreachable.context("requesting").unwrap_err()),
             Exit::Unreachable
         );
         assert_eq!(

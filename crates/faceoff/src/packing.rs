@@ -1,5 +1,5 @@
-//! Packs the folder of a bundle into an archive. The same files always give the same bytes. `submit` uploads the
-//! archive, `eval` and `play` unpack it like the server.
+//! Packs the folder of a *bundle*, the files of an agent, into an archive. The same files always give the same bytes. `submit`
+//! uploads the archive, `eval` and `play` unpack it like the server.
 
 mod bundle_file;
 mod rules;
@@ -7,7 +7,7 @@ mod selection;
 mod sized_reader;
 pub use bundle_file::BundleFile;
 pub use rules::IGNORE_FILE;
-pub use selection::{Kind, Selection};
+pub use selection::{EntryKind, Selection};
 use sized_reader::SizedReader;
 
 use anyhow::Context;
@@ -26,9 +26,9 @@ impl Selection {
     ///
     /// # Errors
     /// If a file cannot be read, or its size has changed since the selection.
-    pub fn pack(&self, to: File) -> anyhow::Result<()> {
+    pub fn pack(&self, target: File) -> anyhow::Result<()> {
         // The header contains no name and no time.
-        let gzip = GzBuilder::new().write(BufWriter::new(to), Compression::default());
+        let gzip = GzBuilder::new().write(BufWriter::new(target), Compression::default());
         let mut archive = tar::Builder::new(gzip);
         for entry in self.entries() {
             self.append(&mut archive, &entry.path, &entry.kind)
@@ -49,7 +49,7 @@ impl Selection {
         &self,
         archive: &mut tar::Builder<W>,
         path: &Path,
-        kind: &Kind,
+        kind: &EntryKind,
     ) -> io::Result<()> {
         let mut header = tar::Header::new_gnu();
         // Time and owner are left out, so that the archive only depends on the files.
@@ -57,28 +57,28 @@ impl Selection {
         header.set_uid(0);
         header.set_gid(0);
         match kind {
-            Kind::Folder => {
+            EntryKind::Folder => {
                 header.set_entry_type(tar::EntryType::Directory);
                 header.set_mode(0o755);
                 header.set_size(0);
                 archive.append_data(&mut header, path, io::empty())
             }
-            Kind::File {
+            EntryKind::File {
                 bytes, executable, ..
             } => {
                 header.set_mode(if *executable { 0o755 } else { 0o644 });
                 header.set_size(*bytes);
                 let file = File::open(self.folder().join(path))?;
-                let found = file.metadata()?.len();
-                if found != *bytes {
+                let current_bytes = file.metadata()?.len();
+                if current_bytes != *bytes {
                     return Err(io::Error::other(format!(
-                        "its size changed from {bytes} to {found} bytes; is another program still writing it?"
+                        "its size changed from {bytes} to {current_bytes} bytes; is another program still writing it?"
                     )));
                 }
                 archive.append_data(&mut header, path, SizedReader::new(file, *bytes))
             }
             // The link itself is packed, because its target could be outside of the folder.
-            Kind::Link { target } => {
+            EntryKind::Link { target } => {
                 header.set_entry_type(tar::EntryType::Symlink);
                 header.set_mode(0o777);
                 header.set_size(0);

@@ -32,7 +32,7 @@ impl AllowedDependencies {
     }
 }
 
-/// The members of the workspace, from `cargo metadata`.
+/// The crates of the workspace, from `cargo metadata`.
 pub fn members() -> Vec<Member> {
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .args([
@@ -73,8 +73,9 @@ pub fn members() -> Vec<Member> {
         .collect()
 }
 
-/// The table of `ARCHITECTURE.md`: the first column is the crate, the last the crates it may use.
-pub fn allowed() -> BTreeMap<String, AllowedDependencies> {
+/// The table of `ARCHITECTURE.md` by crate. Its first column names the crate, its last the crates that it may use, without the
+/// prefix `faceoff-`.
+pub fn allowed_dependencies() -> BTreeMap<String, AllowedDependencies> {
     let text = fs::read_to_string(repository().join("ARCHITECTURE.md"))
         .expect("ARCHITECTURE.md can be read");
     let mut allowed = BTreeMap::new();
@@ -82,17 +83,18 @@ pub fn allowed() -> BTreeMap<String, AllowedDependencies> {
         .lines()
         .skip_while(|line| !line.starts_with("| crate |"))
         .take_while(|line| line.starts_with('|'))
+        // the headings and the line below them
         .skip(2);
     for row in rows {
         let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
-        let (Some(name), Some(uses)) = (cells.first(), cells.last()) else {
+        let (Some(name), Some(dependencies)) = (cells.first(), cells.last()) else {
             continue;
         };
         let name = match name.trim_matches('`') {
             "tests" => "faceoff-tests",
             name => name.trim_start_matches("agents/"),
         };
-        let uses = match *uses {
+        let dependencies = match *dependencies {
             "any" => AllowedDependencies::Any,
             "–" => AllowedDependencies::Listed(BTreeSet::new()),
             list => AllowedDependencies::Listed(
@@ -104,8 +106,8 @@ pub fn allowed() -> BTreeMap<String, AllowedDependencies> {
                     .collect(),
             ),
         };
-        let earlier = allowed.insert(name.to_owned(), uses);
-        assert!(earlier.is_none(), "{name} has two rows");
+        let earlier_row = allowed.insert(name.to_owned(), dependencies);
+        assert!(earlier_row.is_none(), "{name} has two rows");
     }
     allowed
 }

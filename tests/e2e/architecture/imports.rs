@@ -1,4 +1,5 @@
-//! Imports between the files of a crate.
+//! Imports between the files of a crate, found in their source text. Paths are resolved as the compiler does it, through
+//! re-exports and `*`, but without macros.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,21 +11,26 @@ use syn::{
     visit::{self, Visit},
 };
 
+/// Imported modules that are followed for the start of one path; more are a loop.
+const MAX_IMPORTED_MODULES: usize = 8;
+/// Re-exports that are followed for one item; more are a loop.
+const MAX_RE_EXPORTS: usize = 16;
+
 /// A module's path from the crate's root.
 type Module = Vec<String>;
 
 /// One file of a crate.
-struct Source {
+struct SourceFile {
     path: PathBuf,
-    parsed: syn::File,
+    syntax: syn::File,
     scope: Scope,
 }
 
-/// The names of a file.
+/// The names that a file defines or imports.
 #[derive(Default)]
 struct Scope {
     /// Names of the items that the file defines.
-    defines: BTreeSet<String>,
+    definitions: BTreeSet<String>,
     /// Names that it imports or re-exports, with the path as written.
     imports: BTreeMap<String, Vec<String>>,
     /// Modules imported with `*`.
@@ -33,25 +39,25 @@ struct Scope {
 
 /// The files of a crate, by module.
 pub struct Crate {
-    files: BTreeMap<Module, Source>,
+    files: BTreeMap<Module, SourceFile>,
 }
 
 impl Crate {
     /// Reads every file except tests, from the crate whose root is in `folder`.
     pub fn read(folder: &Path) -> Self {
-        let mut found = Vec::new();
-        collect(folder, &mut Vec::new(), &mut found);
-        let files = found
+        let mut modules = Vec::new();
+        collect_modules(folder, &mut Vec::new(), &mut modules);
+        let files = modules
             .into_iter()
             .map(|(module, path)| {
                 let text = fs::read_to_string(&path).expect("a source file can be read");
-                let parsed = syn::parse_file(&text)
+                let syntax = syn::parse_file(&text)
                     .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
                 let mut scope = Scope::default();
-                scope.add_items(&parsed.items);
-                let source = Source {
+                scope.add_items(&syntax.items);
+                let source = SourceFile {
                     path,
-                    parsed,
+                    syntax,
                     scope,
                 };
                 (module, source)
@@ -65,18 +71,18 @@ impl Crate {
         self.files
             .iter()
             .map(|(module, source)| {
-                let mut walk = PathVisitor::default();
-                walk.visit_file(&source.parsed);
+                let mut visitor = PathVisitor::default();
+                visitor.visit_file(&source.syntax);
                 let mut targets = BTreeMap::new();
-                for path in walk.paths {
-                    if let Some(file) = self.owner(module, &path, 0)
+                for path in visitor.paths {
+                    if let Some(file) = self.defining_file(module, &path, 0)
                         && file != source.path
                     {
                         targets.entry(file).or_insert_with(|| path.join("::"));
                     }
                 }
                 for path in &source.scope.globs {
-                    if let Some(target) = self.module(module, path)
+                    if let Some(target) = self.resolve_module(module, path)
                         && let Some(target) = self.files.get(&target)
                         && target.path != source.path
                     {
@@ -90,20 +96,26 @@ impl Crate {
             .collect()
     }
 
-    /// The module that a path in another module means.
-    fn module(&self, from: &Module, path: &[String]) -> Option<Module> {
-        let (mut at, rest) = self.start(from, path, 0)?;
-        for segment in rest {
-            at.push(segment.clone());
-            if !self.files.contains_key(&at) {
+    /// The module that a path in the module `from` means.
+    fn resolve_module(&self, from: &Module, path: &[String]) -> Option<Module> {
+        let (start, rest) = self.resolve_start(from, path, 0)?;
+        self.submodule(start, rest)
+    }
+
+    /// The module below `module` with this relative path, if the crate has it.
+    fn submodule(&self, mut module: Module, path: &[String]) -> Option<Module> {
+        for segment in path {
+            module.push(segment.clone());
+            if !self.files.contains_key(&module) {
                 return None;
             }
         }
-        Some(at)
+        Some(module)
     }
 
-    /// The module where a path begins, and the rest of the path.
-    fn start<'a>(
+    /// The module that the first segment of a path in the module `from` means, and the rest of the path. `depth` counts the
+    /// imported modules on the way.
+    fn resolve_start<'a>(
         &self,
         from: &Module,
         path: &'a [String],
@@ -114,16 +126,16 @@ impl Crate {
             "crate" => Some((Vec::new(), rest)),
             "self" => Some((from.clone(), rest)),
             "super" => {
-                let mut at = from.clone();
-                at.pop()?;
+                let mut parent = from.clone();
+                parent.pop()?;
                 let mut rest = rest;
                 while let Some((next, after)) = rest.split_first()
                     && next == "super"
                 {
-                    at.pop()?;
+                    parent.pop()?;
                     rest = after;
                 }
-                Some((at, rest))
+                Some((parent, rest))
             }
             name => {
                 let mut child = from.clone();
@@ -131,55 +143,51 @@ impl Crate {
                 if self.files.contains_key(&child) {
                     return Some((child, rest));
                 }
-                // an imported module, by its name
+                // The first segment may be the name of an imported module.
                 let import = self.files.get(from)?.scope.imports.get(name)?;
-                if depth > 8 || import.first().is_some_and(|first| first == name) {
+                if depth > MAX_IMPORTED_MODULES || import.first().is_some_and(|first| first == name)
+                {
                     return None;
                 }
-                let (mut at, remaining) = self.start(from, import, depth + 1)?;
-                for segment in remaining {
-                    at.push(segment.clone());
-                    if !self.files.contains_key(&at) {
-                        return None;
-                    }
-                }
-                Some((at, rest))
+                let (start, import_rest) = self.resolve_start(from, import, depth + 1)?;
+                Some((self.submodule(start, import_rest)?, rest))
             }
         }
     }
 
-    /// The file that defines the item of a path, through re-exports; `None` for a module or an item of another crate.
-    fn owner(&self, from: &Module, path: &[String], depth: usize) -> Option<PathBuf> {
-        if depth > 16 {
+    /// The file that defines the item of a path in the module `from`; `None` for a module or an item of another crate. `depth`
+    /// counts the re-exports on the way.
+    fn defining_file(&self, from: &Module, path: &[String], depth: usize) -> Option<PathBuf> {
+        if depth > MAX_RE_EXPORTS {
             return None;
         }
-        let (mut at, rest) = self.start(from, path, 0)?;
+        let (mut module, rest) = self.resolve_start(from, path, 0)?;
         for segment in rest {
-            let mut deeper = at.clone();
-            deeper.push(segment.clone());
-            if self.files.contains_key(&deeper) {
-                at = deeper;
+            let mut child = module.clone();
+            child.push(segment.clone());
+            if self.files.contains_key(&child) {
+                module = child;
                 continue;
             }
-            let source = self.files.get(&at)?;
-            if source.scope.defines.contains(segment) {
+            let source = self.files.get(&module)?;
+            if source.scope.definitions.contains(segment) {
                 return Some(source.path.clone());
             }
             if let Some(import) = source.scope.imports.get(segment) {
-                return self.owner(&at, import, depth + 1);
+                return self.defining_file(&module, import, depth + 1);
             }
             return source.scope.globs.iter().find_map(|glob| {
-                let mut through = glob.clone();
-                through.push(segment.clone());
-                self.owner(&at, &through, depth + 1)
+                let mut path = glob.clone();
+                path.push(segment.clone());
+                self.defining_file(&module, &path, depth + 1)
             });
         }
         None
     }
 }
 
-/// Collects the modules below a folder, without tests.
-fn collect(folder: &Path, module: &mut Module, found: &mut Vec<(Module, PathBuf)>) {
+/// Adds the modules in `folder`, which belongs to the module `parent`, with their files; tests are left out.
+fn collect_modules(folder: &Path, parent: &mut Module, modules: &mut Vec<(Module, PathBuf)>) {
     let mut entries: Vec<PathBuf> = fs::read_dir(folder)
         .map(|entries| {
             entries
@@ -198,16 +206,16 @@ fn collect(folder: &Path, module: &mut Module, found: &mut Vec<(Module, PathBuf)
             continue;
         }
         if path.is_dir() {
-            module.push(stem);
-            collect(&path, module, found);
-            module.pop();
+            parent.push(stem);
+            collect_modules(&path, parent, modules);
+            parent.pop();
         } else if path.extension().is_some_and(|extension| extension == "rs") {
-            let mut own = module.clone();
-            let is_root = module.is_empty() && (stem == "lib" || stem == "main");
+            let mut module = parent.clone();
+            let is_root = parent.is_empty() && (stem == "lib" || stem == "main");
             if !is_root && stem != "mod" {
-                own.push(stem);
+                module.push(stem);
             }
-            found.push((own, path));
+            modules.push((module, path));
         }
     }
 }
@@ -229,27 +237,27 @@ impl Scope {
                     None => continue,
                 },
                 Item::Use(item) if !is_test(&item.attrs) => {
-                    flatten(&item.tree, &mut Vec::new(), self);
+                    add_use_tree(&item.tree, &mut Vec::new(), self);
                     continue;
                 }
                 _ => continue,
             };
-            self.defines.insert(name.to_string());
+            self.definitions.insert(name.to_string());
         }
     }
 }
 
-/// Adds the names that a `use` imports.
-fn flatten(tree: &UseTree, path: &mut Vec<String>, scope: &mut Scope) {
+/// Adds the names that a `use` imports, or a part of its braces; `path` is the path before the part.
+fn add_use_tree(tree: &UseTree, path: &mut Vec<String>, scope: &mut Scope) {
     match tree {
         UseTree::Path(part) => {
             path.push(part.ident.to_string());
-            flatten(&part.tree, path, scope);
+            add_use_tree(&part.tree, path, scope);
             path.pop();
         }
         UseTree::Group(group) => {
             for tree in &group.items {
-                flatten(tree, path, scope);
+                add_use_tree(tree, path, scope);
             }
         }
         UseTree::Glob(_) => scope.globs.push(path.clone()),
@@ -263,17 +271,19 @@ fn flatten(tree: &UseTree, path: &mut Vec<String>, scope: &mut Scope) {
     }
 }
 
-fn add_import(name: &str, renamed: Option<String>, path: &[String], scope: &mut Scope) {
-    let mut whole = path.to_vec();
+/// Adds the import of `name` in `path`, under the name `alias` if there is one.
+fn add_import(name: &str, alias: Option<String>, path: &[String], scope: &mut Scope) {
+    let mut full_path = path.to_vec();
     if name != "self" {
-        whole.push(name.to_owned());
+        full_path.push(name.to_owned());
     }
-    let as_name = renamed.or_else(|| whole.last().cloned());
-    if let Some(as_name) = as_name {
-        scope.imports.insert(as_name, whole);
+    let local_name = alias.or_else(|| full_path.last().cloned());
+    if let Some(local_name) = local_name {
+        scope.imports.insert(local_name, full_path);
     }
 }
 
+/// Whether an item has `#[test]` or `#[cfg(test)]`.
 fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("test")
@@ -284,10 +294,11 @@ fn is_test(attributes: &[Attribute]) -> bool {
     })
 }
 
-/// Every path in a file except those of its tests: imports and inline paths.
+/// Collects the paths in a file, except those of its tests: imports and inline paths.
 #[derive(Default)]
 struct PathVisitor {
     paths: Vec<Vec<String>>,
+    /// The path before the present part of a `use`.
     prefix: Vec<String>,
 }
 

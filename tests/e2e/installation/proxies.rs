@@ -1,5 +1,5 @@
-//! The proxy configurations in `docker/proxy`, each in front of a real server. Tests change only name, addresses and
-//! certificate.
+//! The example configurations of TLS proxies in `docker/proxy`, each in front of a real server. Tests change only the site's
+//! name, addresses and certificate.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{
@@ -18,11 +18,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A running proxy.
+/// A running proxy, with the certificate that it uses.
 struct Proxy {
     process: Child,
-    http: u16,
-    https: u16,
+    http_port: u16,
+    https_port: u16,
     certificate: rcgen::Certificate,
 }
 
@@ -40,7 +40,7 @@ fn free_port() -> u16 {
     address.port()
 }
 
-// Files of a proxy's scratch folder. Configurations name them relative to it: its own path may have spaces.
+// Files of a proxy's scratch folder. Configurations name them relative to that folder, since its path may have spaces.
 const CERTIFICATE: &str = "certificate.pem";
 const KEY: &str = "key.pem";
 
@@ -57,28 +57,31 @@ fn make_certificate(scratch: &Path) -> rcgen::Certificate {
     made.cert
 }
 
+/// The text of an example configuration.
 fn example(name: &str) -> String {
     let file = repository().join("docker/proxy").join(name);
     fs::read_to_string(file).expect("there is an example")
 }
 
-/// The text with these replacements, each of which must be found.
-fn replace_all(text: &str, changes: &[(&str, String)]) -> String {
-    changes.iter().fold(text.to_owned(), |text, (from, to)| {
-        assert!(text.contains(from), "{from} is not in the example");
-        text.replace(from, to)
-    })
+/// The text with these replacements (old, new); each old part must be found.
+fn replace_all(text: &str, replacements: &[(&str, String)]) -> String {
+    replacements
+        .iter()
+        .fold(text.to_owned(), |text, (old, new)| {
+            assert!(text.contains(old), "{old} is not in the text");
+            text.replace(old, new)
+        })
 }
 
 impl Proxy {
     fn nginx(server: &Server, scratch: &Path) -> Self {
         let certificate = make_certificate(scratch);
-        let (http, https) = (free_port(), free_port());
+        let (http_port, https_port) = (free_port(), free_port());
         let site = replace_all(
             &example("nginx.conf"),
             &[
-                ("listen 80;", format!("listen 127.0.0.1:{http};")),
-                ("listen 443 ", format!("listen 127.0.0.1:{https} ")),
+                ("listen 80;", format!("listen 127.0.0.1:{http_port};")),
+                ("listen 443 ", format!("listen 127.0.0.1:{https_port} ")),
                 ("faceoff.example.org", "localhost".to_owned()),
                 ("/var/log/nginx/", String::new()),
                 ("127.0.0.1:8080", server.address().to_string()),
@@ -87,57 +90,59 @@ impl Proxy {
             ],
         );
         fs::write(scratch.join("site.conf"), site).expect("a scratch file can be written");
-        // The main configuration, which a distribution's nginx.conf provides.
-        let whole = "daemon off; master_process off; pid pid; error_log stderr;\n\
+        // The main configuration, which a distribution provides and which includes the site's.
+        let main_config = "daemon off; master_process off; pid pid; error_log stderr;\n\
                      events {}\n\
                      http {\n\
                      access_log off; client_body_temp_path body; proxy_temp_path proxy;\n\
                      fastcgi_temp_path fastcgi; uwsgi_temp_path uwsgi; scgi_temp_path scgi;\n\
                      include site.conf;\n\
                      }\n";
-        let file = scratch.join("nginx.conf");
-        fs::write(&file, whole).expect("a scratch file can be written");
+        let config_file = scratch.join("nginx.conf");
+        fs::write(&config_file, main_config).expect("a scratch file can be written");
         let mut nginx = Command::new("nginx");
         // Debian installs nginx in /usr/sbin, which is not in the PATH of ordinary users.
         let path = std::env::var("PATH").unwrap_or_default();
         nginx.env("PATH", format!("{path}:/usr/sbin"));
-        nginx.arg("-c").arg(&file).arg("-p").arg(scratch);
-        Self::run(nginx, scratch, (http, https), certificate)
+        nginx.arg("-c").arg(&config_file).arg("-p").arg(scratch);
+        Self::run(nginx, scratch, (http_port, https_port), certificate)
     }
 
     fn caddy(server: &Server, scratch: &Path) -> Self {
         let certificate = make_certificate(scratch);
-        let (http, https) = (free_port(), free_port());
+        let (http_port, https_port) = (free_port(), free_port());
         let site = replace_all(
             &example("Caddyfile"),
             &[
                 (
                     "\nfaceoff.example.org {",
-                    // Without this, Caddy requests a certificate.
+                    // Without the line `tls`, Caddy requests a certificate from an authority.
                     format!("\nlocalhost {{\n\tbind 127.0.0.1\n\ttls {CERTIFICATE} {KEY}\n"),
                 ),
                 ("127.0.0.1:8080", server.address().to_string()),
             ],
         );
-        let site = format!("{{\n\tadmin off\n\thttp_port {http}\n\thttps_port {https}\n}}\n{site}");
-        let config = scratch.join("Caddyfile");
-        fs::write(&config, site).expect("a scratch file can be written");
+        let site = format!(
+            "{{\n\tadmin off\n\thttp_port {http_port}\n\thttps_port {https_port}\n}}\n{site}"
+        );
+        let config_file = scratch.join("Caddyfile");
+        fs::write(&config_file, site).expect("a scratch file can be written");
         let mut caddy = Command::new("caddy");
         caddy
             .args(["run", "--adapter", "caddyfile", "--config"])
-            .arg(&config)
+            .arg(&config_file)
             .current_dir(scratch)
             .env("HOME", scratch)
             .env("XDG_DATA_HOME", scratch)
             .env("XDG_CONFIG_HOME", scratch);
-        Self::run(caddy, scratch, (http, https), certificate)
+        Self::run(caddy, scratch, (http_port, https_port), certificate)
     }
 
     /// Starts the proxy and waits until it accepts connections.
     fn run(
         mut command: Command,
         scratch: &Path,
-        (http, https): (u16, u16),
+        (http_port, https_port): (u16, u16),
         certificate: rcgen::Certificate,
     ) -> Self {
         let log = fs::File::create(scratch.join("log")).expect("a scratch file can be made");
@@ -148,48 +153,52 @@ impl Proxy {
             .spawn();
         let mut proxy = Self {
             process: process.expect("docker/setup.sh installs the proxies"),
-            http,
-            https,
+            http_port,
+            https_port,
             certificate,
         };
         let started = Instant::now();
-        while TcpStream::connect((Ipv4Addr::LOCALHOST, https)).is_err() {
-            let ended = proxy.process.try_wait().expect("a child can be asked");
+        while TcpStream::connect((Ipv4Addr::LOCALHOST, https_port)).is_err() {
+            let ended = proxy
+                .process
+                .try_wait()
+                .expect("the state of a child can be read");
             let log = || fs::read_to_string(scratch.join("log")).unwrap_or_default();
             assert!(ended.is_none(), "{ended:?}: {}", log());
             assert!(started.elapsed() < TIMEOUT, "{}", log());
-            // The proxy does not signal when it listens.
+            // The proxy does not say when it listens, so the test tries to connect again.
             thread::sleep(Duration::from_millis(20));
         }
         proxy
     }
 
-    /// A client with this loopback address that trusts the certificate.
-    fn visitor(&self, last: u8) -> Client {
+    /// An HTTP client with the address `127.0.0.{last_byte}` that trusts the proxy's certificate.
+    fn visitor(&self, last_byte: u8) -> Client {
         let mut roots = RootCertStore::empty();
         let certificate = self.certificate.der().clone();
         roots.add(certificate).expect("it is a certificate");
-        let trusting = ClientConfig::builder()
+        let tls_config = ClientConfig::builder()
             .with_root_certificates(roots)
             .with_no_client_auth();
-        let proxy = SocketAddr::from((Ipv4Addr::LOCALHOST, self.https));
+        let proxy = SocketAddr::from((Ipv4Addr::LOCALHOST, self.https_port));
         Client::builder()
-            .tls_backend_preconfigured(trusting)
-            .local_address(IpAddr::from([127, 0, 0, last]))
+            .tls_backend_preconfigured(tls_config)
+            .local_address(IpAddr::from([127, 0, 0, last_byte]))
             .resolve("localhost", proxy)
             .redirect(Policy::none())
             .timeout(TIMEOUT)
             .build()
-            .expect("a client needs nothing more")
+            .expect("an HTTP client can be made")
     }
 
     fn url(&self, path: &str) -> String {
-        format!("https://localhost:{}{path}", self.https)
+        format!("https://localhost:{}{path}", self.https_port)
     }
 }
 
-/// Checks pages, internal routes, redirects, event streams, uploads and the addresses of visitors.
-fn check_proxy(start: impl Fn(&Server, &Path) -> Proxy) {
+/// Checks a proxy that `start_proxy` starts: pages, internal routes, redirects, event streams, uploads and the addresses of
+/// visitors.
+fn check_proxy(start_proxy: impl Fn(&Server, &Path) -> Proxy) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let config = replace_all(
         CONFIG,
@@ -199,31 +208,39 @@ fn check_proxy(start: impl Fn(&Server, &Path) -> Proxy) {
         )],
     );
     let server = Server::start(&scratch.path().join("data"), &config);
-    let proxy = start(&server, scratch.path());
+    let proxy = start_proxy(&server, scratch.path());
 
     let visitor = proxy.visitor(2);
-    let board = visitor.get(proxy.url("/")).send().expect("it answers");
+    let board = visitor
+        .get(proxy.url("/"))
+        .send()
+        .expect("the proxy answers");
     assert_eq!(board.status(), 200);
     assert!(board.headers().contains_key("strict-transport-security"));
     assert!(board.text().expect("a page").contains("<html"));
-    let get = |path: &str| visitor.get(proxy.url(path)).send().expect("it answers");
+    let get = |path: &str| {
+        visitor
+            .get(proxy.url(path))
+            .send()
+            .expect("the proxy answers")
+    };
     assert_eq!(get("/readyz").status(), 200);
     assert_eq!(get("/metrics").status(), 404);
-    let plain = format!("http://localhost:{}/season", proxy.http);
-    let to_http = SocketAddr::from((Ipv4Addr::LOCALHOST, proxy.http));
-    let plain = faceoff_tests::server::http()
-        .resolve("localhost", to_http)
+    let http_url = format!("http://localhost:{}/season", proxy.http_port);
+    let http_address = SocketAddr::from((Ipv4Addr::LOCALHOST, proxy.http_port));
+    let redirect = faceoff_tests::server::http()
+        .resolve("localhost", http_address)
         .redirect(Policy::none())
         .build()
-        .expect("a client needs nothing")
-        .get(plain)
+        .expect("an HTTP client can be made")
+        .get(http_url)
         .send()
-        .expect("it answers");
-    assert!(plain.status().is_redirection(), "{}", plain.status());
-    let to = plain.headers()["location"].to_str().expect("an address");
-    assert!(to.starts_with("https://localhost"), "{to}");
+        .expect("the proxy answers");
+    assert!(redirect.status().is_redirection(), "{}", redirect.status());
+    let location = redirect.headers()["location"].to_str().expect("an address");
+    assert!(location.starts_with("https://localhost"), "{location}");
 
-    // Events arrive at once, although the response continues.
+    // The proxy passes events on immediately, although the response does not end.
     let mut events = get("/api/v1/events/stream");
     assert_eq!(events.status(), 200);
     let mut first_byte = [0; 1];
@@ -232,7 +249,8 @@ fn check_proxy(start: impl Fn(&Server, &Path) -> Proxy) {
         .expect("the stream has data");
     drop(events);
 
-    // Several megabytes that do not compress are uploaded and downloaded.
+    // A bundle of several megabytes is uploaded and downloaded. Its noise from a linear congruential generator does not
+    // compress.
     let team = Team::create(&server, "Alpha");
     let source = bundle::python_agent("say(hold)");
     let agent = bundle::python_bundle(scratch.path(), "agent", &source);
@@ -251,22 +269,26 @@ fn check_proxy(start: impl Fn(&Server, &Path) -> Proxy) {
         .header("content-type", "application/octet-stream")
         .body(archive.clone())
         .send()
-        .expect("it answers");
+        .expect("the proxy answers");
     assert_eq!(uploaded.status(), 201);
     let uploaded: serde_json::Value = uploaded.json().expect("the API speaks JSON");
     let id = uploaded["id"].as_str().expect("it has an id");
-    let back = visitor
+    let downloaded = visitor
         .get(proxy.url(&format!("/api/v1/submissions/{id}/bundle")))
         .bearer_auth(&team.token)
         .send()
-        .expect("it answers");
-    assert_eq!(back.bytes().expect("a file"), archive);
+        .expect("the proxy answers");
+    assert_eq!(downloaded.bytes().expect("a file"), archive);
 
-    // The rate limit applies to the visitor's real address, whatever X-Forwarded-For says, and not to other visitors.
-    let request_status = |visitor: &Client, claimed: u32| {
+    // The rate limit applies to the visitor's real address, whatever address the visitor claims in
+    // X-Forwarded-For, and not to other visitors.
+    let request_status = |visitor: &Client, claimed_address: u32| {
         let request = visitor.get(proxy.url("/livez"));
-        let request = request.header("x-forwarded-for", format!("192.0.2.{}", claimed % 250));
-        request.send().expect("it answers").status().as_u16()
+        let request = request.header(
+            "x-forwarded-for",
+            format!("192.0.2.{}", claimed_address % 250),
+        );
+        request.send().expect("the proxy answers").status().as_u16()
     };
     let refused = (0..100_000)
         .map(|number| request_status(&visitor, number))

@@ -1,4 +1,5 @@
-//! The systemd units: systemd accepts them, and the server's command notifies as its type requires.
+//! The systemd units in `docker/systemd`: systemd accepts them, and the server notifies systemd when it is ready and when it
+//! stops, as the unit's `Type=notify` requires.
 
 use faceoff_tests::{
     program, repository,
@@ -14,31 +15,31 @@ use std::{
     time::{Duration, Instant},
 };
 
-const SERVER: &str = "faceoff.service";
-const WORKER: &str = "faceoff-worker.service";
-/// Path of the program in the units.
-const PROGRAM: &str = "/usr/local/bin/faceoff";
+const SERVER_UNIT: &str = "faceoff.service";
+const WORKER_UNIT: &str = "faceoff-worker.service";
+/// Path of the program `faceoff` in the units.
+const INSTALLED_PROGRAM: &str = "/usr/local/bin/faceoff";
 
-fn unit(name: &str) -> PathBuf {
+fn unit_path(name: &str) -> PathBuf {
     repository().join("docker/systemd").join(name)
 }
 
-fn text(name: &str) -> String {
-    fs::read_to_string(unit(name)).expect("there is a unit")
+fn unit_text(name: &str) -> String {
+    fs::read_to_string(unit_path(name)).expect("there is a unit")
 }
 
-/// The unit's text with the path of the built program, in quotes, since it may have spaces.
-fn with_program(name: &str) -> String {
+/// The unit's text with the path of the program under test, in quotes, since it may have spaces.
+fn with_tested_program(name: &str) -> String {
     let program = format!("\"{}\"", program("faceoff").display());
-    text(name).replace(PROGRAM, &program)
+    unit_text(name).replace(INSTALLED_PROGRAM, &program)
 }
 
 #[test]
 fn systemd_accepts_units_without_warnings() {
-    for name in [SERVER, WORKER] {
+    for name in [SERVER_UNIT, WORKER_UNIT] {
         let scratch = tempfile::tempdir().expect("a scratch folder can be made");
         let file = scratch.path().join(name);
-        fs::write(&file, with_program(name)).expect("a scratch file can be written");
+        fs::write(&file, with_tested_program(name)).expect("a scratch file can be written");
         let verified = Command::new("systemd-analyze")
             .args(["verify", "--man=no", "--recursive-errors=no"])
             .arg(&file)
@@ -50,14 +51,14 @@ fn systemd_accepts_units_without_warnings() {
     }
 }
 
-/// A service manager that receives the server's notifications.
+/// The part of systemd that these tests imitate: it has started the server and receives its notifications.
 struct ServiceManager {
     socket: UnixDatagram,
     server: Child,
 }
 
 impl ServiceManager {
-    /// Waits for a state of the notification protocol.
+    /// Waits for a state of the notification protocol, such as `READY=1`.
     fn wait_for(&mut self, state: &str) {
         let started = Instant::now();
         let mut message = [0; 4096];
@@ -72,10 +73,16 @@ impl ServiceManager {
                 Err(error)
                     if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
                 {
-                    let ended = self.server.try_wait().expect("a child can be asked");
-                    assert!(ended.is_none(), "it ended with {ended:?} before {state}");
+                    let ended = self
+                        .server
+                        .try_wait()
+                        .expect("the state of a child can be read");
+                    assert!(
+                        ended.is_none(),
+                        "the server ended with {ended:?} before {state}"
+                    );
                 }
-                Err(error) => panic!("the socket: {error}"),
+                Err(error) => panic!("reading notifications: {error}"),
             }
         }
         panic!("still waiting for {state}");
@@ -90,20 +97,20 @@ impl Drop for ServiceManager {
     }
 }
 
-/// The unit's command, with paths in a scratch folder.
-fn command(scratch: &Path) -> Command {
-    let unit = text(SERVER);
+/// The command of the server's unit, with its paths replaced by ones in a scratch folder.
+fn server_command(scratch: &Path) -> Command {
+    let unit = unit_text(SERVER_UNIT);
     let line = unit
         .lines()
         .find_map(|line| line.strip_prefix("ExecStart="));
     let line = line.expect("a unit has a command");
-    let config = scratch.join("faceoff.toml");
-    let text =
+    let config_file = scratch.join("faceoff.toml");
+    let config =
         "[server]\nlisten = \"127.0.0.1:0\"\n[workers]\nslots = 1\n[sandbox]\nresident_bytes = 0\n";
-    fs::write(&config, text).expect("a scratch file can be written");
+    fs::write(&config_file, config).expect("a scratch file can be written");
     let mut words = line.split(' ').map(|word| match word {
-        PROGRAM => program("faceoff"),
-        "/etc/faceoff/faceoff.toml" => config.clone(),
+        INSTALLED_PROGRAM => program("faceoff"),
+        "/etc/faceoff/faceoff.toml" => config_file.clone(),
         "/var/lib/faceoff" => scratch.join("data"),
         word => PathBuf::from(word),
     });
@@ -114,15 +121,19 @@ fn command(scratch: &Path) -> Command {
 
 #[test]
 fn server_unit_notifies_ready_and_stopping() {
-    assert!(text(SERVER).lines().any(|line| line == "Type=notify"));
+    assert!(
+        unit_text(SERVER_UNIT)
+            .lines()
+            .any(|line| line == "Type=notify")
+    );
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let address = scratch.path().join("notify");
-    let socket = UnixDatagram::bind(&address).expect("a socket can be made");
+    let socket_path = scratch.path().join("notify");
+    let socket = UnixDatagram::bind(&socket_path).expect("a socket can be made");
     socket
         .set_read_timeout(Some(Duration::from_millis(200)))
-        .expect("a socket has a time to wait");
-    let server = command(scratch.path())
-        .env("NOTIFY_SOCKET", &address)
+        .expect("a read timeout can be set");
+    let server = server_command(scratch.path())
+        .env("NOTIFY_SOCKET", &socket_path)
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn();
@@ -134,23 +145,29 @@ fn server_unit_notifies_ready_and_stopping() {
     let output = manager.server.stdout.take().expect("it is piped");
     let url = BufReader::new(output).lines().next();
     let url = url
-        .expect("it prints its address")
+        .expect("the server prints its address")
         .expect("a pipe can be read");
-    let client = http().timeout(TIMEOUT).build().expect("a client");
+    let client = http()
+        .timeout(TIMEOUT)
+        .build()
+        .expect("an HTTP client can be made");
     for path in ["/livez", "/readyz"] {
         let answer = client.get(format!("{url}{path}")).send();
-        assert_eq!(answer.expect("it answers").status(), 200, "{path}");
+        assert_eq!(answer.expect("the server answers").status(), 200, "{path}");
     }
     let process = i32::try_from(manager.server.id()).expect("an id is small");
     let process = Pid::from_raw(process).expect("an id is not 0");
     kill_process(process, Signal::TERM).expect("a child can be signalled");
+    // The server may end before the test reads the notification; the socket keeps the notification.
     let mut ended = None;
-    // It may end before the notification is read; the socket keeps it.
     let started = Instant::now();
     while ended.is_none() && started.elapsed() < TIMEOUT {
-        ended = manager.server.try_wait().expect("a child can be asked");
+        ended = manager
+            .server
+            .try_wait()
+            .expect("the state of a child can be read");
         std::thread::sleep(Duration::from_millis(20));
     }
-    assert!(ended.expect("it ends").success());
+    assert!(ended.expect("the server ends").success());
     manager.wait_for("STOPPING=1");
 }

@@ -1,4 +1,4 @@
-//! Results of remote workers equal those of one local slot, bit for bit.
+//! Results of remote workers equal those of one local slot, bit for bit. A *slot* is the place in a process for one running job.
 
 use super::{
     EPISODES, ReferenceRun, many_shards, resume, server_config, wait_for_workers, worker_config,
@@ -12,11 +12,11 @@ use futures::StreamExt as _;
 use std::{thread, time::Duration};
 use tokio::runtime::Runtime;
 
-/// Numbers of slots: of the server, and of each worker.
+/// Numbers of slots: in the server (0 or 1), and in each worker.
 struct Setup {
     name: &'static str,
-    server: usize,
-    workers: &'static [usize],
+    server_slots: usize,
+    worker_slots: &'static [usize],
 }
 
 #[test]
@@ -26,42 +26,42 @@ fn remote_results_equal_local_results() {
     let nats = Nats::start(&scratch.path().join("nats"));
     let setups = [
         Setup {
-            name: "one",
-            server: 0,
-            workers: &[1],
+            name: "one-worker",
+            server_slots: 0,
+            worker_slots: &[1],
         },
         Setup {
-            name: "two-slots",
-            server: 0,
-            workers: &[2],
+            name: "one-worker-with-two-slots",
+            server_slots: 0,
+            worker_slots: &[2],
         },
         Setup {
-            name: "beside-the-server",
-            server: 1,
-            workers: &[1, 1],
+            name: "two-workers-and-server",
+            server_slots: 1,
+            worker_slots: &[1, 1],
         },
         Setup {
-            name: "four",
-            server: 0,
-            workers: &[1, 1, 1, 1],
+            name: "four-workers",
+            server_slots: 0,
+            worker_slots: &[1, 1, 1, 1],
         },
     ];
     for setup in setups {
         let folder = scratch.path().join(setup.name);
-        let data = folder.join("data");
-        copy_folder(&reference_run.data, &data);
-        let files = Relay::start();
-        // Each setup has separate streams.
+        let data_dir = folder.join("data");
+        copy_folder(&reference_run.data_dir, &data_dir);
+        let file_relay = Relay::start();
+        // All setups share one NATS server; each has its own streams there, which the setting `name` distinguishes.
         let with_name = |config: String| {
             config.replace("[nats]", &format!("[nats]\nname = \"{}\"", setup.name))
         };
-        let mut config = many_shards(&with_name(server_config(&nats, files.address())));
-        if setup.server > 0 {
+        let mut config = many_shards(&with_name(server_config(&nats, file_relay.address())));
+        if setup.server_slots > 0 {
             config = config.replace("play = false", "play = true");
         }
-        let server = Server::start(&data, &config);
-        files.set_target(server.address().into());
-        let workers = (0..).zip(setup.workers).map(|(index, slots)| {
+        let server = Server::start(&data_dir, &config);
+        file_relay.set_target(server.address().into());
+        let workers = (0..).zip(setup.worker_slots).map(|(index, slots)| {
             let config = with_name(worker_config(nats.address(), *slots));
             Worker::start(&folder, &format!("worker-{index}"), &config)
         });
@@ -69,7 +69,7 @@ fn remote_results_equal_local_results() {
         wait_for_workers(&server, workers.len());
         resume(&server);
         reference_run.assert_equal_result(&server);
-        for (worker, slots) in workers.into_iter().zip(setup.workers) {
+        for (worker, slots) in workers.into_iter().zip(setup.worker_slots) {
             let log = worker.log();
             for slot in 0..*slots {
                 let committed = log.lines().any(|line| {
@@ -89,23 +89,26 @@ fn remote_results_equal_local_results() {
             .any(|line| line.contains("committed") && line.contains(" episodes "));
         assert_eq!(
             has_local_episodes,
-            setup.server > 0,
+            setup.server_slots > 0,
             "{}:\n{log}",
             setup.name
         );
     }
 }
 
+/// The subject of a message that the test sends to itself after all others.
+const END_SUBJECT: &str = "faceoff.over";
+
 #[test]
 fn idle_worker_starts_the_first_job_it_receives() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = Server::start(
         &scratch.path().join("data"),
-        &server_config(&nats, files.address()),
+        &server_config(&nats, file_relay.address()),
     );
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));
     let runtime = Runtime::new().expect("a runtime starts");
@@ -122,31 +125,34 @@ fn idle_worker_starts_the_first_job_it_receives() {
             .is_some_and(|message| is_job_request(&message))
         {}
     });
-    // Most of the time that a request for a job stays open.
+    // The job is published near the end of the time that a request for a job stays open.
     thread::sleep(Duration::from_secs(3));
     let evaluation = team.evaluate(&server, &submission);
     let finished = team.wait_until_finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     worker.stop();
-    let (mut published, mut started) = (Vec::new(), Vec::new());
+    // The nonce is the random part of a lease, which is the right to run a job once.
+    let (mut published_nonces, mut started_nonces) = (Vec::new(), Vec::new());
     runtime.block_on(async {
-        let end_marker = client.publish("faceoff.over", Bytes::new());
+        let end_marker = client.publish(END_SUBJECT, Bytes::new());
         end_marker.await.expect("NATS is there");
         while let Some(message) = messages.next().await {
             match message.subject.as_str() {
-                "faceoff.over" => break,
+                END_SUBJECT => break,
+                // Jobs that the server publishes.
                 "faceoff.orders" => {
                     let job: RemoteJob =
                         serde_json::from_slice(&message.payload).expect("it is a job");
-                    published.push(job.job.lease.nonce);
+                    published_nonces.push(job.job.lease.nonce);
                 }
+                // Requests of the worker named `worker`.
                 "faceoff.asks.worker" => {
                     let request = serde_json::from_slice(&message.payload);
                     if let WorkerRequest::StartJob { lease, .. } = request.expect("it is a request")
                     {
                         // A worker repeats a request that is not answered soon.
-                        if started.last() != Some(&lease.nonce) {
-                            started.push(lease.nonce);
+                        if started_nonces.last() != Some(&lease.nonce) {
+                            started_nonces.push(lease.nonce);
                         }
                     }
                 }
@@ -155,9 +161,9 @@ fn idle_worker_starts_the_first_job_it_receives() {
         }
     });
     assert!(
-        published.len() >= 3 * EPISODES as usize,
+        published_nonces.len() >= 3 * EPISODES as usize,
         "{}",
-        published.len()
+        published_nonces.len()
     );
-    assert_eq!(started, published);
+    assert_eq!(started_nonces, published_nonces);
 }

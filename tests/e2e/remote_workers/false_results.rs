@@ -157,9 +157,9 @@ impl OtherSeasonResult {
         let data = folder.join("data");
         let _ = queue_evaluation(&data, folder, &local_config());
         let nats = Nats::start(&folder.join("nats"));
-        let files = Relay::start();
-        let server = Server::start(&data, &server_config(&nats, files.address()));
-        files.set_target(server.address().into());
+        let file_relay = Relay::start();
+        let server = Server::start(&data, &server_config(&nats, file_relay.address()));
+        file_relay.set_target(server.address().into());
         let runtime = Runtime::new().expect("a runtime starts");
         let mut messages = runtime.block_on(async {
             let client = async_nats::connect(nats.url()).await;
@@ -244,11 +244,11 @@ fn recording_of_other_episodes_is_rejected_and_worker_banned() {
     let reference_run = ReferenceRun::prepare(scratch.path());
     let other_result = OtherSeasonResult::compute(&scratch.path().join("another"));
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = start_server(
         &reference_run,
-        &server_config(&nats, files.address()),
-        &files,
+        &server_config(&nats, file_relay.address()),
+        &file_relay,
     );
     resume(&server);
     let runtime = Runtime::new().expect("a runtime starts");
@@ -283,11 +283,11 @@ fn missing_result_message_requeues_job() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = start_server(
         &reference_run,
-        &server_config(&nats, files.address()),
-        &files,
+        &server_config(&nats, file_relay.address()),
+        &file_relay,
     );
     resume(&server);
     let runtime = Runtime::new().expect("a runtime starts");
@@ -309,11 +309,11 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = start_server(
         &reference_run,
-        &server_config(&nats, files.address()),
-        &files,
+        &server_config(&nats, file_relay.address()),
+        &file_relay,
     );
     let runtime = Runtime::new().expect("a runtime starts");
     let (fake, mut messages) = runtime.block_on(async {
@@ -388,10 +388,10 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
-    let config = server_config(&nats, files.address());
-    let server = Server::start(&reference_run.data, &config);
-    files.set_target(server.address().into());
+    let file_relay = Relay::start();
+    let config = server_config(&nats, file_relay.address());
+    let server = Server::start(&reference_run.data_dir, &config);
+    file_relay.set_target(server.address().into());
     resume(&server);
     let runtime = Runtime::new().expect("a runtime starts");
     let may_work = json!({
@@ -425,8 +425,8 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
 
     // The ban survives a restart.
     server.kill();
-    let server = Server::start(&reference_run.data, &config);
-    files.set_target(server.address().into());
+    let server = Server::start(&reference_run.data_dir, &config);
+    file_relay.set_target(server.address().into());
     let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
     reference_run.assert_equal_result(&server);
     let answer = runtime.block_on(fake.request(&may_work));
@@ -451,12 +451,12 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
 fn false_game_result_bans_worker_and_real_one_is_accepted() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = Server::start(
         &scratch.path().join("data"),
-        &server_config(&nats, files.address()),
+        &server_config(&nats, file_relay.address()),
     );
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     for name in ["Ada", "Bob"] {
         let team = Team::create(&server, name);
         let submission = team.submit(&server, &repository().join("agents/hold"));

@@ -12,11 +12,11 @@ use std::{fs, process::Command};
 fn worker_without_required_runtime_gets_no_jobs() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let runtime = "[runtimes.other]\nread_only_paths = [\"/usr/lib\", \"/lib\", \"/lib64\"]\npath = \"/usr/bin\"\n";
-    let config = server_config(&nats, files.address()) + runtime;
+    let config = server_config(&nats, file_relay.address()) + runtime;
     let server = Server::start(&scratch.path().join("data"), &config);
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     let lacks = Worker::start(scratch.path(), "lacks", &worker_config(nats.address(), 1));
     lacks.wait_for_log("lacks runtimes that the server offers to agents: other", 1);
     // `doctor` reports the same before a worker is started.

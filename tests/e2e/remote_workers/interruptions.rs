@@ -22,26 +22,26 @@ fn disconnected_worker_stops_and_another_gets_its_job() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let (files, link) = (Relay::start(), Relay::start());
-    link.set_target(nats.address());
+    let (file_relay, nats_relay) = (Relay::start(), Relay::start());
+    nats_relay.set_target(nats.address());
     let server = start_server(
         &reference_run,
-        &server_config(&nats, files.address()),
-        &files,
+        &server_config(&nats, file_relay.address()),
+        &file_relay,
     );
     let disconnected = Worker::start(
         scratch.path(),
         "disconnected",
-        &worker_config(link.address(), 1),
+        &worker_config(nats_relay.address(), 1),
     );
     resume(&server);
     disconnected.wait_for_log("committed", 1);
     disconnected.wait_for_log("started job=", 2);
     // The worker cannot send the result of its current job in time.
-    link.disconnect();
+    nats_relay.disconnect();
     let other = Worker::start(scratch.path(), "other", &worker_config(nats.address(), 1));
     reference_run.assert_equal_result(&server);
-    link.set_target(nats.address());
+    nats_relay.set_target(nats.address());
     other.stop();
     disconnected.stop();
 }
@@ -51,42 +51,42 @@ fn slow_and_breaking_links_lose_no_result() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = start_server(
         &reference_run,
-        &server_config(&nats, files.address()),
-        &files,
+        &server_config(&nats, file_relay.address()),
+        &file_relay,
     );
-    let links = [Relay::start(), Relay::start()];
-    for (seed, link) in (0..).zip(&links) {
-        link.set_target(nats.address());
-        link.set_breaks(ConnectionBreaks {
+    let nats_relays = [Relay::start(), Relay::start()];
+    for (seed, relay) in (0..).zip(&nats_relays) {
+        relay.set_target(nats.address());
+        relay.set_breaks(ConnectionBreaks {
             seed,
             refused_percent: 5,
             max_bytes: 64 << 10,
         });
-        link.set_delay(Duration::from_millis(200));
+        relay.set_delay(Duration::from_millis(200));
     }
-    files.set_breaks(ConnectionBreaks {
+    file_relay.set_breaks(ConnectionBreaks {
         seed: SEED_BREAKING_BUNDLE,
         refused_percent: 5,
         max_bytes: 16 << 20,
     });
-    files.set_delay(Duration::from_millis(200));
+    file_relay.set_delay(Duration::from_millis(200));
     let workers = [0, 1].map(|index: usize| {
         let name = format!("worker-{index}");
         Worker::start(
             scratch.path(),
             &name,
-            &worker_config(links[index].address(), 1),
+            &worker_config(nats_relays[index].address(), 1),
         )
     });
     resume(&server);
     reference_run.assert_equal_result(&server);
-    for link in links.iter().chain([&files]) {
+    for relay in nats_relays.iter().chain([&file_relay]) {
         assert!(
-            link.broken_connections() > 0,
-            "a link had no broken connection"
+            relay.broken_connections() > 0,
+            "a relay had no broken connection"
         );
     }
     for worker in workers {
@@ -100,11 +100,11 @@ fn worker_with_full_disk_releases_jobs_until_it_has_space() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = start_server(
         &reference_run,
-        &server_config(&nats, files.address()),
-        &files,
+        &server_config(&nats, file_relay.address()),
+        &file_relay,
     );
     let disk = MountedDisk::at(&scratch.path().join("full/scratch"), SCRATCH_BYTES);
     let mut command = disk.namespace_command();
@@ -155,11 +155,11 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let server = start_server(
         &reference_run,
-        &server_config(&nats, files.address()),
-        &files,
+        &server_config(&nats, file_relay.address()),
+        &file_relay,
     );
     let began = Timestamp::now();
     let workers = [("early", "-3600"), ("late", "+3600")].map(|(name, offset)| {

@@ -28,14 +28,14 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
     let reference_run = ReferenceRun::prepare_many_shards(scratch.path());
     let mut nats = Nats::start(&scratch.path().join("nats"));
     let nats_address = nats.address();
-    let (files, link) = (Relay::start(), Relay::start());
-    link.set_target(nats_address);
-    let config = many_shards(&server_config(&nats, files.address()));
-    let mut server = Server::start(&reference_run.data, &config);
-    files.set_target(server.address().into());
+    let (file_relay, nats_relay) = (Relay::start(), Relay::start());
+    nats_relay.set_target(nats_address);
+    let config = many_shards(&server_config(&nats, file_relay.address()));
+    let mut server = Server::start(&reference_run.data_dir, &config);
+    file_relay.set_target(server.address().into());
     let start_killed = || Worker::start(scratch.path(), "killed", &worker_config(nats_address, 1));
     let mut killed_worker = start_killed();
-    let _other_worker = Worker::start(scratch.path(), "other", &worker_config(link.address(), 1));
+    let _other_worker = Worker::start(scratch.path(), "other", &worker_config(nats_relay.address(), 1));
     resume(&server);
 
     // Order and moments of the faults are drawn: each after some shards, and some time into the next.
@@ -80,18 +80,18 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
             // The new server has another port; the relay's address stays the same.
             Fault::Server => {
                 server.kill();
-                server = Server::start(&reference_run.data, &config);
-                files.set_target(server.address().into());
+                server = Server::start(&reference_run.data_dir, &config);
+                file_relay.set_target(server.address().into());
             }
             Fault::Nats => nats.kill_and_restart(),
             Fault::NatsAndStreams => nats.lose_streams_and_restart(),
             Fault::NatsAndMessages => nats.lose_messages_and_restart(),
             // The link is cut for some time, and slow afterwards.
             Fault::Link => {
-                link.disconnect();
+                nats_relay.disconnect();
                 std::thread::sleep(Duration::from_secs_f64(3.0 * next_draw()));
-                link.set_target(nats_address);
-                link.set_delay(Duration::from_millis(200));
+                nats_relay.set_target(nats_address);
+                nats_relay.set_delay(Duration::from_millis(200));
             }
         }
     }

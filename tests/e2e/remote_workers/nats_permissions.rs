@@ -42,12 +42,12 @@ fn shipped_permissions_allow_only_what_workers_need() {
         .replace("KEY_OF_THE_SERVER", &make_key(&server_key))
         .replace("KEY_OF_RACK_1", &make_key(&worker_key));
     let nats = Nats::start_with_config(&scratch.path().join("nats"), &config);
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let with_key =
         |config: String, key: &Path| format!("{config}nkey_file = \"{}\"\n", key.display());
-    let config = with_key(server_config(&nats, files.address()), &server_key);
+    let config = with_key(server_config(&nats, file_relay.address()), &server_key);
     let server = Server::start(&scratch.path().join("data"), &config);
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));
     let evaluation = team.evaluate(&server, &submission);

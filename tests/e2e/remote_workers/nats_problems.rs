@@ -2,7 +2,7 @@
 //! continue once it is fixed.
 
 use super::{
-    COMMON, ReferenceRun, resume, server_config, start_server, wait_for_workers, with_episodes,
+    COMMON_CONFIG, ReferenceRun, resume, server_config, start_server, wait_for_workers, with_episodes,
     worker_config,
 };
 use crate::Team;
@@ -95,9 +95,9 @@ fn result_waits_while_stream_is_full() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
-    let config = server_config(&nats, files.address());
-    let server = start_server(&reference_run, &config, &files);
+    let file_relay = Relay::start();
+    let config = server_config(&nats, file_relay.address());
+    let server = start_server(&reference_run, &config, &file_relay);
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
     wait_for_workers(&server, 1);
     let administrator = Administrator::connect(&nats);
@@ -159,10 +159,10 @@ fn failing_agent(scratch: &Path) -> PathBuf {
 fn oversized_result_is_platform_fault_and_evaluation_is_rerun() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let mut nats = Nats::start_with_config(&scratch.path().join("nats"), "max_payload: 8192\n");
-    let files = Relay::start();
-    let config = with_large_result(&server_config(&nats, files.address()));
+    let file_relay = Relay::start();
+    let config = with_large_result(&server_config(&nats, file_relay.address()));
     let server = Server::start(&scratch.path().join("data"), &config);
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
     let agent = failing_agent(scratch.path());
     let submission = team.submit(&server, &agent);
@@ -191,12 +191,12 @@ fn oversized_result_is_platform_fault_and_evaluation_is_rerun() {
 fn oversized_result_waits_until_limit_is_raised() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let mut nats = Nats::start_with_config(&scratch.path().join("nats"), "max_payload: 8192\n");
-    let files = Relay::start();
+    let file_relay = Relay::start();
     // The lease is long enough for slow machines.
-    let config = with_large_result(&server_config(&nats, files.address()))
+    let config = with_large_result(&server_config(&nats, file_relay.address()))
         .replace("lease_s = 10", "lease_s = 3600");
     let server = Server::start(&scratch.path().join("data"), &config);
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
     let agent = failing_agent(scratch.path());
     let submission = team.submit(&server, &agent);
@@ -250,14 +250,14 @@ fn nats_certificate_is_verified_with_configured_authority() {
         file("nats.key", &key.serialize_pem())
     );
     let nats = Nats::start_with_config(&scratch.path().join("nats"), &nats);
-    let files = Relay::start();
+    let file_relay = Relay::start();
     let with_authority = |config: String, authority: &Path| {
         let config = config.replace("nats://", "tls://");
         format!("{config}ca_file = {authority:?}\n")
     };
     let refused = "NATS cannot be reached: its certificate is not trusted";
     let server_config_with =
-        |authority: &Path| with_authority(server_config(&nats, files.address()), authority);
+        |authority: &Path| with_authority(server_config(&nats, file_relay.address()), authority);
     let worker_config_with =
         |authority: &Path| with_authority(worker_config(nats.address(), 1), authority);
 
@@ -269,7 +269,7 @@ fn nats_certificate_is_verified_with_configured_authority() {
     // The worker still stops when it is asked to.
     worker.stop();
 
-    let server = start_server(&reference_run, &server_config_with(&right), &files);
+    let server = start_server(&reference_run, &server_config_with(&right), &file_relay);
     let worker = Worker::start(scratch.path(), "worker", &worker_config_with(&right));
     resume(&server);
     reference_run.assert_equal_result(&server);
@@ -281,9 +281,9 @@ fn stream_with_other_settings_is_reported_then_recreated() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
-    let config = server_config(&nats, files.address());
-    let server = start_server(&reference_run, &config, &files);
+    let file_relay = Relay::start();
+    let config = server_config(&nats, file_relay.address());
+    let server = start_server(&reference_run, &config, &file_relay);
     let administrator = Administrator::connect(&nats);
     let streams = ["faceoff-orders", "faceoff-outcomes"]
         .map(|name| (name, administrator.stream_config(name)));
@@ -295,7 +295,7 @@ fn stream_with_other_settings_is_reported_then_recreated() {
             ..stream
         });
     }
-    let server = start_server(&reference_run, &config, &files);
+    let server = start_server(&reference_run, &config, &file_relay);
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
     wait_for_workers(&server, 1);
     resume(&server);
@@ -321,14 +321,14 @@ fn stream_with_other_settings_is_reported_then_recreated() {
 #[test]
 fn server_without_nats_starts_and_continues_once_connected() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (files, link) = (Relay::start(), Relay::start());
+    let (file_relay, nats_relay) = (Relay::start(), Relay::start());
     let config = format!(
-        "{COMMON}[workers]\nslots = 1\nplay = false\n[nats]\nurl = \"nats://{}\"\nfiles_url = \"http://{}\"\n",
-        link.address(),
-        files.address()
+        "{COMMON_CONFIG}[workers]\nslots = 1\nplay = false\n[nats]\nurl = \"nats://{}\"\nfiles_url = \"http://{}\"\n",
+        nats_relay.address(),
+        file_relay.address()
     );
     let server = Server::start(&scratch.path().join("data"), &config);
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     server.wait_for_log("NATS cannot be reached", 1);
     // The health endpoint reports it, since no job would run.
     let not_ready = |word: &str| {
@@ -340,13 +340,13 @@ fn server_without_nats_starts_and_continues_once_connected() {
         assert_eq!(health["status"], 503, "{health:#}");
     };
     not_ready("The server cannot reach NATS: nats://");
-    let worker = Worker::start(scratch.path(), "worker", &worker_config(link.address(), 1));
+    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats_relay.address(), 1));
     worker.wait_for_log("NATS cannot be reached", 1);
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));
     let evaluation = team.evaluate(&server, &submission);
     let nats = Nats::start(&scratch.path().join("nats"));
-    link.set_target(nats.address());
+    nats_relay.set_target(nats.address());
     let finished = team.wait_until_finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     // A worker with --drain-after-idle stops when no job is left.
@@ -354,7 +354,7 @@ fn server_without_nats_starts_and_continues_once_connected() {
     Worker::start_with_arguments(
         scratch.path(),
         "idle",
-        &worker_config(link.address(), 1),
+        &worker_config(nats_relay.address(), 1),
         &options,
     )
     .wait_for_exit();

@@ -16,12 +16,12 @@ fn job_waiting_for_bundle_is_released_and_rerun_after_restart() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     // This listener accepts connections and never answers.
     let silent = TcpListener::bind(("127.0.0.1", 0)).expect("there is a port");
-    files.set_target(silent.local_addr().expect("it is bound"));
-    let config = with_hour_leases(&server_config(&nats, files.address()));
-    let server = Server::start(&reference_run.data, &config);
+    file_relay.set_target(silent.local_addr().expect("it is bound"));
+    let config = with_hour_leases(&server_config(&nats, file_relay.address()));
+    let server = Server::start(&reference_run.data_dir, &config);
     let config = worker_config(nats.address(), 1);
     let worker = Worker::start(scratch.path(), "worker", &config);
     resume(&server);
@@ -34,7 +34,7 @@ fn job_waiting_for_bundle_is_released_and_rerun_after_restart() {
     assert!(!log.contains("platform fault"), "{log}");
     assert!(!log.contains("committed"), "{log}");
 
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     let restarted = Worker::start(scratch.path(), "worker", &config);
     let (evaluation, token) = (
         reference_run.evaluation.clone(),
@@ -59,16 +59,16 @@ fn job_waiting_for_bundle_is_released_and_rerun_after_restart() {
 fn running_job_is_released_and_started_by_another_worker() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
+    let file_relay = Relay::start();
     // One shard of one task.
     let config = with_episodes(
-        &with_hour_leases(&server_config(&nats, files.address())),
+        &with_hour_leases(&server_config(&nats, file_relay.address())),
         40,
         40,
     )
     .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]");
     let server = Server::start(&scratch.path().join("data"), &config);
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     // The agent hangs after 3000 control steps: validation runs are shorter, the shard is longer.
     let hangs = bundle::python_agent(
         "seen = globals().setdefault('seen', [0])\nseen[0] += 1\nif seen[0] > 3000: time.sleep(600)\nsay(hold)",
@@ -98,10 +98,10 @@ fn running_job_is_released_and_started_by_another_worker() {
 fn cancelled_job_stops_on_worker_and_frees_its_slot() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let nats = Nats::start(&scratch.path().join("nats"));
-    let files = Relay::start();
-    let config = with_episodes(&server_config(&nats, files.address()), 40, 40);
+    let file_relay = Relay::start();
+    let config = with_episodes(&server_config(&nats, file_relay.address()), 40, 40);
     let server = Server::start(&scratch.path().join("data"), &config);
-    files.set_target(server.address().into());
+    file_relay.set_target(server.address().into());
     // The agent hangs after 3000 control steps: validation runs are shorter, each shard is longer.
     let hangs = bundle::python_agent(
         "seen = globals().setdefault('seen', [0])\nseen[0] += 1\nif seen[0] > 3000: time.sleep(600)\nsay(hold)",

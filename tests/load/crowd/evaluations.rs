@@ -1,4 +1,5 @@
-//! The progress of each evaluation, so that its last shard can end it without a score.
+//! The progress of each evaluation, so that its last *shard* (a group of episodes, which a worker runs as one job) can end it
+//! without a score.
 
 use std::{
     collections::HashMap,
@@ -10,14 +11,17 @@ use uuid::Uuid;
 /// The progress of all evaluations, by id.
 #[derive(Debug)]
 pub(crate) struct Evaluations {
+    /// Shards of one evaluation.
     shards: u32,
-    all: Mutex<HashMap<Uuid, Progress>>,
+    progress: Mutex<HashMap<Uuid, Progress>>,
     changed: Notify,
 }
 
 #[derive(Debug, Default)]
 struct Progress {
+    /// Shards that workers have run.
     played: u32,
+    /// Results that NATS has stored.
     results: u32,
 }
 
@@ -25,22 +29,22 @@ impl Evaluations {
     pub(crate) fn new(shards: u32) -> Self {
         Self {
             shards,
-            all: Mutex::default(),
+            progress: Mutex::default(),
             changed: Notify::new(),
         }
     }
 
     /// Counts a shard as played. Is it the evaluation's last one?
     pub(crate) fn record_played(&self, id: Uuid) -> bool {
-        let mut all = self.all();
-        let shards = all.entry(id).or_default();
-        shards.played += 1;
-        shards.played >= self.shards
+        let mut progress = self.progress();
+        let evaluation = progress.entry(id).or_default();
+        evaluation.played += 1;
+        evaluation.played >= self.shards
     }
 
     /// Counts a shard's result as stored in NATS, which delivers results in this order.
     pub(crate) fn record_result(&self, id: Uuid) {
-        self.all().entry(id).or_default().results += 1;
+        self.progress().entry(id).or_default().results += 1;
         self.changed.notify_waiters();
     }
 
@@ -56,13 +60,14 @@ impl Evaluations {
     }
 
     fn has_other_results(&self, id: Uuid) -> bool {
-        let all = self.all();
-        all.get(&id)
-            .is_some_and(|shards| shards.results + 1 >= self.shards)
+        let progress = self.progress();
+        progress
+            .get(&id)
+            .is_some_and(|evaluation| evaluation.results + 1 >= self.shards)
     }
 
     /// Ignores poisoning: the counts are consistent even after a panic.
-    fn all(&self) -> MutexGuard<'_, HashMap<Uuid, Progress>> {
-        self.all.lock().unwrap_or_else(PoisonError::into_inner)
+    fn progress(&self) -> MutexGuard<'_, HashMap<Uuid, Progress>> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

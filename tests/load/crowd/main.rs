@@ -1,7 +1,8 @@
 //! Measures how many remote workers one server can serve: `make crowd`.
 //!
 //! Starts a real nats-server and a real `faceoff serve` without slots of its own, and queues evaluations of the default
-//! size. Workers in this process ([`stub`]) use the protocol of `faceoff worker`, but sleep instead of running agents. So the
+//! size. An evaluation is split into shards, groups of episodes; each is a job for a slot of a worker. Workers in this
+//! process ([`simulated_worker`]) use the protocol of `faceoff worker`, but sleep instead of running agents. So the
 //! measurement shows what the server, NATS and SQLite need for a shard, and how long a free slot waits. The first phases
 //! have a few workers, to see how the times grow with their number; the last phase has all of them.
 //!
@@ -15,16 +16,17 @@
 #![expect(clippy::print_stdout, reason = "the program prints its measurements")]
 
 mod evaluations;
-mod figures;
-mod stub;
+mod phase;
+mod simulated_worker;
 mod usage;
 
 use anyhow::{Context as _, ensure};
 use evaluations::Evaluations;
 use faceoff_tests::{bundle, nats::Nats, program, repository, server::Server};
 use faceoff_wire::remote::WorkerCapabilities;
-use figures::Phase;
+use phase::Phase;
 use serde_json::{Value, json};
+use simulated_worker::{Measurements, Plan, SimulatedWorker, Workload};
 use std::{
     collections::BTreeMap,
     env, fs,
@@ -35,7 +37,6 @@ use std::{
     thread,
     time::{Duration, Instant},
 };
-use stub::{Measurements, Plan, Stub, Workload};
 use tokio::{runtime::Runtime, task::JoinSet};
 use usage::{Threads, Usage};
 
@@ -52,12 +53,13 @@ const FEW_WORKERS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Shards of each worker in a first phase, and the time of each.
 const ROUNDS: u32 = 10;
 const FEW_SLEEP: Duration = Duration::from_secs(2);
-/// Durations of shards vary. With equal durations all workers would always request jobs at the same time.
+/// The largest relative deviation of a shard's duration. With equal durations all workers would always request jobs at the same
+/// time.
 const SPREAD: f64 = 0.5;
 /// How often the CPU time of threads is read.
 const SAMPLE_INTERVAL: Duration = Duration::from_secs(1);
 /// The name of the database's threads, as the kernel truncates it.
-const DATABASE: &str = "sqlx-sqlite";
+const DATABASE_THREAD: &str = "sqlx-sqlite";
 
 struct Settings {
     shards: u32,
@@ -109,21 +111,21 @@ fn main() -> anyhow::Result<()> {
     let runtime = Runtime::new()?;
     let evaluations = Arc::new(Evaluations::new(SHARDS));
     let (capabilities, url) = (worker_capabilities(&server)?, nats.url());
-    let mut stubs = Vec::new();
+    let mut simulated_workers = Vec::new();
     for number in 0..settings.workers.max(FEW_WORKERS[FEW_WORKERS.len() - 1]) {
-        let connecting = Stub::connect(
+        let connecting = SimulatedWorker::connect(
             number,
             &url,
             capabilities.clone(),
             settings.recording_bytes,
             Arc::clone(&evaluations),
         );
-        stubs.push(runtime.block_on(connecting)?);
+        simulated_workers.push(runtime.block_on(connecting)?);
     }
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     ensure!(resumed.status().is_success(), "{}", resumed.status());
 
-    let few_phases = few_phases(&runtime, &mut stubs)?;
+    let few_phases = few_phases(&runtime, &mut simulated_workers)?;
     let plan = Plan {
         sleep: settings.sleep,
         spread: SPREAD,
@@ -132,7 +134,7 @@ fn main() -> anyhow::Result<()> {
     let processes = [server.process_id(), nats.process_id(), process::id()];
     let many = FullPhase::measure(
         &runtime,
-        (&mut stubs, settings.workers),
+        (&mut simulated_workers, settings.workers),
         plan,
         processes,
         || evaluations_queued.wait_for_end(&server),
@@ -239,34 +241,41 @@ fn worker_capabilities(server: &Server) -> anyhow::Result<WorkerCapabilities> {
     }))?)
 }
 
-fn few_phases(runtime: &Runtime, stubs: &mut Vec<Stub>) -> anyhow::Result<Vec<Phase>> {
-    let run_phase = |workers| {
+fn few_phases(
+    runtime: &Runtime,
+    simulated_workers: &mut Vec<SimulatedWorker>,
+) -> anyhow::Result<Vec<Phase>> {
+    let run = |workers| {
         let plan = Plan {
             sleep: FEW_SLEEP,
             spread: 0.0,
             workload: Workload::PerWorker(ROUNDS),
         };
-        runtime.block_on(phase(stubs, workers, plan))
+        runtime.block_on(run_phase(simulated_workers, workers, plan))
     };
-    FEW_WORKERS.into_iter().map(run_phase).collect()
+    FEW_WORKERS.into_iter().map(run).collect()
 }
 
-async fn phase(stubs: &mut Vec<Stub>, workers: usize, plan: Plan) -> anyhow::Result<Phase> {
+async fn run_phase(
+    simulated_workers: &mut Vec<SimulatedWorker>,
+    workers: usize,
+    plan: Plan,
+) -> anyhow::Result<Phase> {
     let plan = Arc::new(plan);
     let started = Instant::now();
     let mut working = JoinSet::new();
-    for stub in stubs.drain(..workers) {
-        working.spawn(stub.work(Arc::clone(&plan)));
+    for worker in simulated_workers.drain(..workers) {
+        working.spawn(worker.work(Arc::clone(&plan)));
     }
     let mut measurements = Measurements::default();
     while let Some(worked) = working.join_next().await {
-        let (stub, own) = worked??;
-        stubs.push(stub);
+        let (worker, own) = worked??;
+        simulated_workers.push(worker);
         measurements.add(own);
     }
     Ok(Phase {
         workers,
-        took: started.elapsed(),
+        duration: started.elapsed(),
         measurements,
     })
 }
@@ -285,10 +294,10 @@ struct FullPhase {
 impl FullPhase {
     fn measure(
         runtime: &Runtime,
-        (stubs, workers): (&mut Vec<Stub>, usize),
+        (simulated_workers, workers): (&mut Vec<SimulatedWorker>, usize),
         plan: Plan,
         processes: [u32; 3],
-        stored: impl FnOnce() -> anyhow::Result<()>,
+        wait_until_stored: impl FnOnce() -> anyhow::Result<()>,
     ) -> anyhow::Result<Self> {
         let [server, _, _] = processes;
         let mut threads = Threads::default();
@@ -296,7 +305,7 @@ impl FullPhase {
         let before = (threads.clone(), usages(processes)?);
         let started = Instant::now();
         let phase = runtime.block_on(async {
-            let mut running = pin!(phase(stubs, workers, plan));
+            let mut running = pin!(run_phase(simulated_workers, workers, plan));
             let mut interval = tokio::time::interval(SAMPLE_INTERVAL);
             loop {
                 tokio::select! {
@@ -305,19 +314,19 @@ impl FullPhase {
                 }
             }
         })?;
-        stored()?;
+        wait_until_stored()?;
         let stored = started.elapsed();
         threads.sample(server)?;
         let after = usages(processes)?;
-        let [server_before, nats_before, stubs_before] = before.1;
-        let [server_after, nats_after, stubs_after] = after;
+        let [server_before, nats_before, workers_before] = before.1;
+        let [server_after, nats_after, workers_after] = after;
         Ok(Self {
             phase,
             stored,
             used: [
                 (server_before, server_after),
                 (nats_before, nats_after),
-                (stubs_before, stubs_after),
+                (workers_before, workers_after),
             ],
             threads: threads.since(&before.0),
         })
@@ -332,7 +341,7 @@ impl FullPhase {
     /// CPU seconds of the database's threads, for statements and pages. Waiting for the disk takes no CPU time.
     fn database_s(&self) -> f64 {
         let database = self.threads.iter();
-        let database = database.filter(|(name, _)| name.starts_with(DATABASE));
+        let database = database.filter(|(name, _)| name.starts_with(DATABASE_THREAD));
         database.map(|(_, cpu_s)| cpu_s).sum()
     }
 }
@@ -342,6 +351,7 @@ fn usages(processes: [u32; 3]) -> anyhow::Result<[Usage; 3]> {
     Ok([Usage::of(server)?, Usage::of(nats)?, Usage::of(own)?])
 }
 
+/// Names of the processes whose usage is measured, in this order.
 const PROCESSES: [&str; 3] = ["server", "nats-server", "workers (this process)"];
 
 fn report(settings: &Settings, few: &[Phase], many: &FullPhase) -> anyhow::Result<()> {

@@ -23,9 +23,11 @@ pub(crate) struct Usage {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Threads(BTreeMap<(u32, u64), (String, f64)>);
 
+/// Fields of a `stat` file of a process or thread.
 struct Stat {
     name: String,
     cpu_s: f64,
+    /// Ticks since the machine's start.
     started: u64,
 }
 
@@ -74,8 +76,8 @@ impl Threads {
     pub(crate) fn since(&self, before: &Self) -> BTreeMap<String, f64> {
         let mut by_name = BTreeMap::new();
         for (thread, (name, cpu_s)) in &self.0 {
-            let already = before.0.get(thread).map_or(0.0, |(_, cpu_s)| *cpu_s);
-            *by_name.entry(name.clone()).or_insert(0.0) += cpu_s - already;
+            let earlier_cpu_s = before.0.get(thread).map_or(0.0, |(_, cpu_s)| *cpu_s);
+            *by_name.entry(name.clone()).or_insert(0.0) += cpu_s - earlier_cpu_s;
         }
         by_name
     }
@@ -100,6 +102,7 @@ fn stat(text: &str) -> anyhow::Result<Stat> {
     })
 }
 
+/// The number in the line that begins with `name`.
 fn number(text: &str, name: &str) -> anyhow::Result<u64> {
     let mut found = text.lines().filter_map(|line| line.strip_prefix(name));
     let value = found.next().and_then(|rest| rest.split_whitespace().next());

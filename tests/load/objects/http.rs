@@ -17,6 +17,7 @@ use tokio::{
     net::TcpListener,
 };
 
+/// Files are read in chunks of this size.
 const CHUNK_BYTES: usize = 64 << 10;
 
 /// Serves a folder in the background. Returns the listening address.

@@ -14,6 +14,7 @@ use tokio::{
 
 /// The largest amount of data in flight in each direction: as much as Linux buffers of one connection (`net.ipv4.tcp_wmem`).
 pub(crate) const IN_FLIGHT_BYTES: u32 = 4 << 20;
+/// Largest amount of data that is forwarded at once.
 const CHUNK_BYTES: usize = 64 << 10;
 
 /// Forwards connections to `target` in the background. Returns the listening address.
@@ -21,24 +22,27 @@ pub(crate) async fn forward(target: SocketAddr, delay: Duration) -> anyhow::Resu
     let listener = TcpListener::bind(("127.0.0.1", 0)).await?;
     let address = listener.local_addr()?;
     tokio::spawn(async move {
-        while let Ok((near, _)) = listener.accept().await {
-            let Ok(far) = TcpStream::connect(target).await else {
+        while let Ok((client, _)) = listener.accept().await {
+            let Ok(server) = TcpStream::connect(target).await else {
                 continue;
             };
             // A chunk waits for its delay only.
-            for end in [&near, &far] {
+            for end in [&client, &server] {
                 // A failure makes measurements slower, but not wrong.
                 let _ = end.set_nodelay(true);
             }
-            let ((near_in, near_out), (far_in, far_out)) = (near.into_split(), far.into_split());
-            tokio::spawn(one_way(near_in, far_out, delay));
-            tokio::spawn(one_way(far_in, near_out, delay));
+            let (from_client, to_client) = client.into_split();
+            let (from_server, to_server) = server.into_split();
+            tokio::spawn(forward_one_way(from_client, to_server, delay));
+            tokio::spawn(forward_one_way(from_server, to_client, delay));
         }
     });
     Ok(address)
 }
 
+/// Data on the link.
 struct Chunk {
+    /// When it arrives.
     due: Instant,
     bytes: Vec<u8>,
     /// Its part of the data in flight.
@@ -46,13 +50,13 @@ struct Chunk {
 }
 
 /// Forwards one direction until its source is closed. Closes the target once all data has arrived.
-async fn one_way(mut from: OwnedReadHalf, mut to: OwnedWriteHalf, delay: Duration) {
+async fn forward_one_way(mut source: OwnedReadHalf, mut target: OwnedWriteHalf, delay: Duration) {
     let permits = Arc::new(Semaphore::new(IN_FLIGHT_BYTES as usize));
     // Bounded by the permits of its chunks.
     let (send, mut sent) = mpsc::unbounded_channel::<Chunk>();
     let reading = async move {
         let mut chunk = vec![0; CHUNK_BYTES];
-        while let Ok(bytes @ 1..) = from.read(&mut chunk).await {
+        while let Ok(bytes @ 1..) = source.read(&mut chunk).await {
             let count = u32::try_from(bytes).unwrap_or(IN_FLIGHT_BYTES);
             let Ok(permit) = Arc::clone(&permits).acquire_many_owned(count).await else {
                 break;
@@ -72,12 +76,12 @@ async fn one_way(mut from: OwnedReadHalf, mut to: OwnedWriteHalf, delay: Duratio
             if !delay.is_zero() {
                 tokio::time::sleep_until(chunk.due).await;
             }
-            if to.write_all(&chunk.bytes).await.is_err() {
+            if target.write_all(&chunk.bytes).await.is_err() {
                 break;
             }
         }
         // The connection may be closed already.
-        let _ = to.shutdown().await;
+        let _ = target.shutdown().await;
     };
     tokio::join!(reading, writing);
 }

@@ -82,9 +82,9 @@ async fn measure_link(
     let (mut http_pings, mut nats_pings) = (Vec::new(), Vec::new());
     files.ping().await?;
     for _ in 0..PINGS {
-        http_pings.push(seconds(files.ping()).await?.1);
+        http_pings.push(measure_seconds(files.ping()).await?.1);
         let request = async { Ok(jetstream.get_stream(&stream).await?) };
-        nats_pings.push(seconds(request).await?.1);
+        nats_pings.push(measure_seconds(request).await?.1);
     }
     let (http_pings, nats_pings) = (median(http_pings), median(nats_pings));
     println!(
@@ -191,18 +191,18 @@ async fn compare(
             ..ObjectMetadata::default()
         };
         let put = async { Ok(store.put(object, &mut &bytes[..]).await?) };
-        let (info, put_by_nats) = seconds(put).await?;
+        let (info, put_by_nats) = measure_seconds(put).await?;
         chunks = info.chunks;
-        let ((), put_by_http) = seconds(files.put(&name, bytes.clone())).await?;
+        let ((), put_by_http) = measure_seconds(files.put(&name, bytes.clone())).await?;
         puts.push((put_by_nats, put_by_http));
         let get = async {
             let mut received = Vec::with_capacity(bytes.len());
             store.get(&name).await?.read_to_end(&mut received).await?;
             Ok(received)
         };
-        let (received, get_by_nats) = seconds(get).await?;
+        let (received, get_by_nats) = measure_seconds(get).await?;
         ensure!(received == bytes, "NATS returned other bytes");
-        let (received, get_by_http) = seconds(files.get(&name)).await?;
+        let (received, get_by_http) = measure_seconds(files.get(&name)).await?;
         ensure!(received == bytes, "HTTP returned other bytes");
         gets.push((get_by_nats, get_by_http));
         // The next round must not find the object.
@@ -216,7 +216,10 @@ async fn compare(
     })
 }
 
-async fn seconds<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<(T, f64)> {
+/// The result of a transfer, and its duration in seconds.
+async fn measure_seconds<T>(
+    work: impl Future<Output = anyhow::Result<T>>,
+) -> anyhow::Result<(T, f64)> {
     let started = Instant::now();
     let done = timeout(TRANSFER_TIMEOUT, work)
         .await

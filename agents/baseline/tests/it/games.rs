@@ -1,29 +1,36 @@
-//! Whole games, shortened.
+//! Short games of the baseline against `striker`, the strong reference agent, and against `hold`, which does not move.
 
 use baseline::Baseline;
 use faceoff_types::Profile;
 use striker::Agent as Striker;
 
-use crate::support::game::{Player, Tally, game, play};
+use crate::support::game::{Player, Tally, new_game, play};
 
+/// Two minutes, in control steps.
 const STEPS: u32 = 6000;
-/// *Deployable*: half a point per window of 500 steps.
-const POINTS_MAX: u32 = STEPS / 1000;
+/// Penalty points up to which the rules call an agent *deployable*: half a point per window of 500 steps.
+const DEPLOYABLE_POINTS_MAX: u32 = STEPS / 1000;
 
 fn play_game(seed: u64, mut players: [Player; 2]) -> Tally {
-    let mut game = game(Profile::Evaluation, seed);
+    let mut game = new_game(Profile::Evaluation, seed);
     play(&mut game, &mut players, STEPS, |_, _, _| {})
 }
 
-/// Seeds are fixed: a game of two minutes can go either way. Results of full games are in the README.
+/// The seeds are fixed because `striker` may lose a game as short as two minutes. Results of full games are in the README.
 #[test]
 fn striker_beats_baseline_from_either_side() {
-    let striker = |own| Player::agent(Striker::new, own);
-    let baseline = |own| Player::agent(Baseline::new, own);
-    let first = play_game(2, [striker(0), baseline(1)]);
-    assert!(first.score[0] > first.score[1], "{first:?}");
-    let second = play_game(4, [baseline(0), striker(1)]);
-    assert!(second.score[1] > second.score[0], "{second:?}");
+    let striker = |robot_index| Player::agent(Striker::new, robot_index);
+    let baseline = |robot_index| Player::agent(Baseline::new, robot_index);
+    let striker_first = play_game(2, [striker(0), baseline(1)]);
+    assert!(
+        striker_first.score[0] > striker_first.score[1],
+        "{striker_first:?}"
+    );
+    let striker_second = play_game(4, [baseline(0), striker(1)]);
+    assert!(
+        striker_second.score[1] > striker_second.score[0],
+        "{striker_second:?}"
+    );
 }
 
 #[test]
@@ -31,5 +38,8 @@ fn baseline_beats_hold_and_stays_deployable() {
     let tally = play_game(2023, [Player::agent(Baseline::new, 0), Player::Hold(None)]);
     assert!(tally.score[0] > tally.score[1], "{tally:?}");
     assert!(tally.goals[0] >= 1, "{tally:?}");
-    assert!(tally.points[0] <= POINTS_MAX, "{tally:?}");
+    assert!(
+        tally.penalty_points[0] <= DEPLOYABLE_POINTS_MAX,
+        "{tally:?}"
+    );
 }

@@ -1,4 +1,4 @@
-//! A bundle's program as a policy, over pipes.
+//! Runs the program of an agent's bundle as a policy, over pipes and in the messages of the evaluator's protocol.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -9,18 +9,20 @@ use faceoff_sim::env_info_for;
 use serde_json::{Value, json};
 use striker::{Action, Policy, WrongLength};
 
-/// A running agent program after `hello`.
+/// A running agent program that has answered the message `hello`.
 pub struct Program {
     child: Child,
     input: ChildStdin,
     output: BufReader<ChildStdout>,
+    /// Rallies begun.
     rally: u32,
+    /// Control steps in the rally.
     step: u32,
 }
 
 impl Program {
-    /// Starts the bundle in `folder` as the agent of robot `own` (0 or 1) in a game.
-    pub fn start(folder: &Path, own: usize) -> anyhow::Result<Self> {
+    /// Starts the bundle in `folder` as the agent of the robot with index 0 or 1 in a game.
+    pub fn start(folder: &Path, robot_index: usize) -> anyhow::Result<Self> {
         let manifest = std::fs::read_to_string(folder.join("agent.toml"))
             .with_context(|| format!("read {}", folder.join("agent.toml").display()))?;
         let manifest: toml::Table = manifest.parse()?;
@@ -47,12 +49,13 @@ impl Program {
             rally: 0,
             step: 0,
         };
-        program.ask(&hello(own));
+        program.ask(&hello(robot_index));
         Ok(program)
     }
 
-    fn ask(&mut self, question: &Value) -> Value {
-        writeln!(self.input, "{question}").expect("the program reads");
+    /// Sends a message and returns the answer.
+    fn ask(&mut self, message: &Value) -> Value {
+        writeln!(self.input, "{message}").expect("the program reads");
         let mut line = String::new();
         self.output
             .read_line(&mut line)
@@ -88,9 +91,10 @@ impl Drop for Program {
     }
 }
 
-fn hello(own: usize) -> Value {
-    let info = env_info_for(2, own);
-    json!({"type": "hello", "protocol": 1, "task": "tournament", "agent_id": own + 1, "env": {
+/// The message that starts an agent.
+fn hello(robot_index: usize) -> Value {
+    let info = env_info_for(2, robot_index);
+    json!({"type": "hello", "protocol": 1, "task": "tournament", "agent_id": robot_index + 1, "env": {
         "dt": info.dt, "n_agents": info.n_agents,
         "puck_pos_ids": [0, 1, 2], "puck_vel_ids": [3, 4, 5],
         "joint_pos_ids": [6, 7, 8, 9, 10, 11, 12], "joint_vel_ids": [13, 14, 15, 16, 17, 18, 19],

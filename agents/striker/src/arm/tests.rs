@@ -1,9 +1,16 @@
+//! Tests of the arm's references: limits, postures, distribution of speeds over the joints, correction of a sagging arm.
+
 use super::*;
 use crate::redundancy::weighted_least_squares;
 use crate::testing::env;
 
 /// The joint angles at which every episode starts.
 const START: [f64; JOINTS] = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0];
+
+/// Height of the mallet that `env` demands, metres.
+const HEIGHT_M: f64 = 0.1645;
+/// Control period, seconds.
+const DT: f64 = 0.02;
 
 fn arm() -> Arm {
     let mut arm = Arm::new(&env());
@@ -19,7 +26,7 @@ fn pose(arm: &Arm) -> crate::Pose {
 fn references_follow_circle_at_constant_height_within_limits() {
     let mut arm = arm();
     // The circle starts at rest at (0.65, 0) and extends a third of a metre in all directions.
-    let at = |time: f64| {
+    let circle_at = |time: f64| {
         let growth = 0.5 - 0.5 * (std::f64::consts::PI * (time / 2.0).min(1.0)).cos();
         let phase = 2.0 * time;
         Vec2::new(
@@ -28,9 +35,9 @@ fn references_follow_circle_at_constant_height_within_limits() {
         )
     };
     for k in 1..400 {
-        let time = 0.02 * f64::from(k);
-        let position = at(time);
-        let velocity = (at(time + 1e-5) - position) / 1e-5;
+        let time = DT * f64::from(k);
+        let position = circle_at(time);
+        let velocity = (circle_at(time + 1e-5) - position) / 1e-5;
         let reached = arm.advance(position, velocity, Posture::Ready(Side::Right));
         assert!(
             (reached.velocity - velocity).norm() < 0.02,
@@ -38,7 +45,7 @@ fn references_follow_circle_at_constant_height_within_limits() {
         );
         let tip = pose(&arm).tip;
         assert!(
-            (tip.z - 0.1645).abs() < 1e-4,
+            (tip.z - HEIGHT_M).abs() < 1e-4,
             "height {} at step {k}",
             tip.z
         );
@@ -52,7 +59,7 @@ fn references_follow_circle_at_constant_height_within_limits() {
 }
 
 #[test]
-fn motions_above_speed_limits_are_slowed_not_bent() {
+fn motions_above_speed_limits_are_slowed_on_a_straight_path() {
     let mut arm = arm();
     let start = pose(&arm).tip;
     for _ in 0..5 {
@@ -66,7 +73,7 @@ fn motions_above_speed_limits_are_slowed_not_bent() {
     let tip = pose(&arm).tip;
     assert!(tip.x > start.x + 0.05 && tip.x < start.x + 0.25, "{tip:?}");
     assert!(
-        tip.y.abs() < 1e-3 && (tip.z - 0.1645).abs() < 1e-3,
+        tip.y.abs() < 1e-3 && (tip.z - HEIGHT_M).abs() < 1e-3,
         "{tip:?}"
     );
     assert!(arm.dq.component_div(&arm.speed_max).amax() <= 1.0 + 1e-9);
@@ -81,7 +88,7 @@ fn strike_postures_place_mallet_at_target() {
                 let q = arm.strike_posture(Vec2::new(x, y), side);
                 let pose = forward(&q);
                 assert!(
-                    (pose.tip - Vector3::new(x, y, 0.1645)).norm() < 1e-6,
+                    (pose.tip - Vector3::new(x, y, HEIGHT_M)).norm() < 1e-6,
                     "{x} {y} {side:?}: {:?}",
                     pose.tip
                 );
@@ -100,16 +107,22 @@ fn least_peak_beats_least_squares_at_same_tip_velocity() {
     let pose = forward(&arm.strike_posture(Vec2::new(0.9, 0.1), Side::Right));
     let velocity = Vector3::new(1.0, -0.1, 0.0);
     let peak = |speeds: &Joints| speeds.component_div(&arm.speed_max).amax();
-    let square = weighted_least_squares(
+    let least_squares = weighted_least_squares(
         &pose.jacobian,
         &velocity,
         &arm.speed_max.component_mul(&arm.speed_max),
     );
     let even = even_speeds(&pose.jacobian, &velocity, &arm.speed_max);
-    let mut balance = arm.speed_max.component_mul(&arm.speed_max);
-    let least = least_peak(&pose.jacobian, &velocity, &arm.speed_max, &mut balance, 12);
+    let mut strike_compliance = arm.speed_max.component_mul(&arm.speed_max);
+    let least = least_peak(
+        &pose.jacobian,
+        &velocity,
+        &arm.speed_max,
+        &mut strike_compliance,
+        12,
+    );
     assert!((pose.jacobian * least - velocity).norm() < 1e-6);
-    assert!(peak(&least) < peak(&even) && peak(&even) < peak(&square));
+    assert!(peak(&least) < peak(&even) && peak(&even) < peak(&least_squares));
 }
 
 #[test]
@@ -124,5 +137,5 @@ fn sagging_arm_is_corrected() {
         arm.advance(Vec2::new(tip.x, tip.y), Vec2::zeros(), Posture::Free);
     }
     let reached = Joints::from(arm.action()[0]) + sag;
-    assert!((forward(&reached).tip.z - 0.1645).abs() < 1e-3);
+    assert!((forward(&reached).tip.z - HEIGHT_M).abs() < 1e-3);
 }

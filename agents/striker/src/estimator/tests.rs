@@ -1,28 +1,41 @@
+//! Tests of the puck's estimate: noisy observations, lost tracking, a sudden strike.
+
 use super::*;
 use crate::testing::env;
 
-const FAR: MalletState = MalletState {
+/// Control period, seconds.
+const DT: f64 = 0.02;
+/// A mallet that the puck does not reach.
+const DISTANT_MALLET: MalletState = MalletState {
     pos: Vec2::new(-0.9, 0.0),
     vel: Vec2::new(0.0, 0.0),
 };
 
 /// Reproducible noise with a standard deviation of about one.
-struct Noise(u64);
+struct Noise {
+    state: u64,
+}
 
 impl Noise {
+    fn seeded(seed: u64) -> Self {
+        Self { state: seed }
+    }
+
     fn next(&mut self) -> f64 {
+        // The sum of twelve uniform numbers has variance 1.
         let mut sum = -6.0;
         for _ in 0..12 {
-            self.0 = self
-                .0
+            self.state = self
+                .state
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1_442_695_040_888_963_407);
-            sum += (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
+            sum += (self.state >> 11) as f64 / (1_u64 << 53) as f64;
         }
         sum
     }
 }
 
+/// The observation of a puck, with the noise of evaluations.
 fn observation(puck: &Puck, noise: &mut Noise) -> PuckObservation {
     PuckObservation {
         pose: [
@@ -41,21 +54,22 @@ fn observation(puck: &Puck, noise: &mut Noise) -> PuckObservation {
 #[test]
 fn velocity_estimate_is_better_than_observations() {
     let field = Field::new(&env());
-    let mut noise = Noise(7);
-    let mut filter = Estimator::new(&field, 0.02);
+    let mut noise = Noise::seeded(7);
+    let mut filter = Estimator::new(&field, DT);
     let mut puck = Puck {
         pos: Vec2::new(0.6, 0.1),
         vel: Vec2::new(-1.0, 0.3),
         spin: 0.0,
     };
     let mut worst: f64 = 0.0;
-    for k in 0..40 {
-        let estimate = filter.observe(&observation(&puck, &mut noise), FAR);
-        if k > 12 {
+    for step in 0..40 {
+        let estimate = filter.observe(&observation(&puck, &mut noise), DISTANT_MALLET);
+        // The filter has converged.
+        if step > 12 {
             worst = worst.max((estimate.vel - puck.vel).norm());
             assert!((estimate.pos - puck.pos).norm() < 4e-3);
         }
-        puck.advance(&field, 0.02);
+        puck.advance(&field, DT);
     }
     assert!(worst < 0.12, "velocity off by {worst} m/s");
 }
@@ -63,17 +77,18 @@ fn velocity_estimate_is_better_than_observations() {
 #[test]
 fn lost_puck_moves_on_and_bounces() {
     let field = Field::new(&env());
-    let mut noise = Noise(3);
-    let mut filter = Estimator::new(&field, 0.02);
+    let mut noise = Noise::seeded(3);
+    let mut filter = Estimator::new(&field, DT);
     let mut puck = Puck {
         pos: Vec2::new(0.3, 0.3),
         vel: Vec2::new(-1.0, 0.9),
         spin: 0.0,
     };
     for _ in 0..9 {
-        filter.observe(&observation(&puck, &mut noise), FAR);
-        puck.advance(&field, 0.02);
+        filter.observe(&observation(&puck, &mut noise), DISTANT_MALLET);
+        puck.advance(&field, DT);
     }
+    // While tracking is lost, the last pose is repeated with zero velocity.
     let frozen = PuckObservation {
         velocity: [0.0; 3],
         ..observation(&puck, &mut noise)
@@ -83,12 +98,12 @@ fn lost_puck_moves_on_and_bounces() {
             velocity: [puck.vel.x, puck.vel.y, 0.0],
             ..frozen
         },
-        FAR,
+        DISTANT_MALLET,
     );
     let mut estimate = puck;
     for _ in 0..14 {
-        puck.advance(&field, 0.02);
-        estimate = filter.observe(&frozen, FAR);
+        puck.advance(&field, DT);
+        estimate = filter.observe(&frozen, DISTANT_MALLET);
     }
     assert!(puck.vel.y < 0.0, "the case includes a bounce");
     assert!(
@@ -100,21 +115,21 @@ fn lost_puck_moves_on_and_bounces() {
 #[test]
 fn struck_puck_is_tracked_within_five_steps() {
     let field = Field::new(&env());
-    let mut noise = Noise(11);
-    let mut filter = Estimator::new(&field, 0.02);
+    let mut noise = Noise::seeded(11);
+    let mut filter = Estimator::new(&field, DT);
     let mut puck = Puck {
         pos: Vec2::new(-0.4, 0.0),
         vel: Vec2::zeros(),
         spin: 0.0,
     };
     for _ in 0..30 {
-        filter.observe(&observation(&puck, &mut noise), FAR);
+        filter.observe(&observation(&puck, &mut noise), DISTANT_MALLET);
     }
     puck.vel = Vec2::new(2.0, 0.5);
     let mut estimate = puck;
     for _ in 0..5 {
-        puck.advance(&field, 0.02);
-        estimate = filter.observe(&observation(&puck, &mut noise), FAR);
+        puck.advance(&field, DT);
+        estimate = filter.observe(&observation(&puck, &mut noise), DISTANT_MALLET);
     }
     assert!(
         (estimate.vel - puck.vel).norm() < 0.2,

@@ -1,7 +1,7 @@
 //! Stops an incoming puck.
 //!
-//! The puck is intercepted so that it stops ([`Absorb`]). If it will come to rest in the zone without
-//! a contact, the mallet keeps clear of it.
+//! The puck is intercepted so that it stops ([`Absorb`]). The task `defend` succeeds if the puck rests in the *zone*, a range of x on the
+//! own half. If it will come to rest there without a contact, the mallet keeps clear of it.
 
 use super::absorb::Absorb;
 use crate::field::{Field, Vec2};
@@ -9,10 +9,10 @@ use crate::motion::Pace;
 use crate::puck::{DRAG, Puck};
 use crate::scene::{MalletCommand, Scene};
 
-/// The zone along x in which a puck may come to rest, with a margin.
-const SAFE_X: (f64, f64) = (-0.74, -0.27);
+/// The zone's range of x, reduced by a margin, metres.
+const ZONE_X: (f64, f64) = (-0.74, -0.27);
 /// Speed at which a puck counts as stopped, m/s.
-const STOPPED: f64 = 0.1;
+const STOPPED_SPEED: f64 = 0.1;
 
 #[derive(Debug, Clone)]
 pub struct Defend {
@@ -60,14 +60,14 @@ fn will_rest_in_zone(field: &Field, mut puck: Puck) -> bool {
     if puck.pos.x > 0.0 || speed > 0.8 {
         return false;
     }
-    if speed > STOPPED {
-        let time = (speed / STOPPED).ln() / DRAG;
-        // Rims on the way do not matter as long as it stays in the zone.
+    if speed > STOPPED_SPEED {
+        let time = (speed / STOPPED_SPEED).ln() / DRAG;
+        // Rims on the way do not matter as long as the puck stays on the own half.
         for _ in 0..8 {
             if !puck.advance(field, time / 8.0) || puck.pos.x > -0.05 {
                 return false;
             }
         }
     }
-    puck.pos.x > SAFE_X.0 && puck.pos.x < SAFE_X.1
+    puck.pos.x > ZONE_X.0 && puck.pos.x < ZONE_X.1
 }

@@ -1,4 +1,5 @@
-//! Skills that control the mallet: one module per task, and shared parts.
+//! Skills: the decisions where the mallet moves. One module per task (`hit`, `defend`, `prepare`, and `tournament` for whole games),
+//! and shared parts.
 
 mod absorb;
 mod aim;

@@ -1,4 +1,4 @@
-//! Moves a puck from the rim to an area from which it can be shot.
+//! Moves a puck from the table's rim to an area from which it can be shot: the puck is then *prepared*.
 //!
 //! The mallet does not fit between puck and rim, so the puck must leave the rim by a bounce. Many
 //! strikes are simulated with the puck model, the promising ones with variations of uncertain
@@ -15,22 +15,34 @@ use crate::scene::{MalletCommand, Scene, waypoint};
 use strike::{BRAKE, NORMALS, Strike, is_prepared, run_up, slide_value, try_normal};
 
 /// Puck speed below which a strike may be planned, m/s.
-const CALM_PUCK: f64 = 0.1;
-/// A rolling puck with a lower expected value than this is stopped.
-const MIN_PROSPECT: f64 = 0.2;
-/// Planning lead of strikes, about the time of the approach, seconds.
-const LEAD: f64 = 0.9;
+const CALM_PUCK_SPEED: f64 = 0.1;
+/// A rolling puck is stopped if the value of its result is lower than this. Values are from 0, a failure, to 1, a prepared puck.
+const MIN_VALUE: f64 = 0.2;
+/// A strike is planned for the puck's position this much later, about the time of the approach, seconds.
+const LEAD_TIME: f64 = 0.9;
 /// A puck this far from its expected position requires a new plan, metres.
-const MISPLACED: f64 = 0.03;
-/// Contact normals evaluated per control step.
-const PER_STEP: usize = 2;
+const PUCK_TOLERANCE: f64 = 0.03;
+/// Contact normals (directions from mallet to puck) evaluated per control step.
+const NORMALS_PER_STEP: usize = 2;
+
+/// A puck closer to the middle than this |y| is not stopped, because crossing the middle ends the episode, metres.
+const MIN_MIDDLE_DISTANCE: f64 = 0.05;
+/// Time of the retreat after a strike, seconds: the puck's motion becomes known.
+const RETREAT_TIME: f64 = 0.25;
 
 #[derive(Debug, Clone, Copy)]
 enum Phase {
-    Search { next: usize, best: Option<Strike> },
+    /// Evaluates contact normals, `next_normal` being the index of the next one; `best` is the best strike so far.
+    Search {
+        next_normal: usize,
+        best: Option<Strike>,
+    },
+    /// Moves to the start of the run-up. `puck` is the position for which the strike is planned.
     Approach { strike: Strike, puck: Vec2 },
-    Run { strike: Strike, contact: f64 },
-    Retreat { until: f64 },
+    /// Accelerates, strikes and brakes. Times are in seconds since the episode's start.
+    Run { strike: Strike, contact_time: f64 },
+    /// Keeps clear of the puck until `end_time`.
+    Retreat { end_time: f64 },
 }
 
 #[derive(Debug, Clone)]
@@ -44,10 +56,10 @@ impl Prepare {
     pub fn new() -> Self {
         Self {
             phase: Phase::Search {
-                next: 0,
+                next_normal: 0,
                 best: None,
             },
-            absorb: Absorb::new(0.05),
+            absorb: Absorb::new(MIN_MIDDLE_DISTANCE),
         }
     }
 
@@ -59,13 +71,16 @@ impl Prepare {
     /// The command for this control step.
     pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
         match self.phase {
-            Phase::Search { next, best } => self.search(scene, next, best),
+            Phase::Search { next_normal, best } => self.search(scene, next_normal, best),
             Phase::Approach { strike, puck } => self.approach(scene, strike, puck),
-            Phase::Run { strike, contact } => self.run(scene, strike, contact),
-            Phase::Retreat { until } => {
-                if scene.time > until {
+            Phase::Run {
+                strike,
+                contact_time,
+            } => self.run(scene, strike, contact_time),
+            Phase::Retreat { end_time } => {
+                if scene.time > end_time {
                     self.phase = Phase::Search {
-                        next: 0,
+                        next_normal: 0,
                         best: None,
                     };
                 }
@@ -77,18 +92,18 @@ impl Prepare {
     fn search(
         &mut self,
         scene: &Scene<'_>,
-        next: usize,
+        next_normal: usize,
         mut best: Option<Strike>,
     ) -> MalletCommand {
         let puck = &scene.puck;
-        let moving = puck.vel.norm() > CALM_PUCK || scene.puck_speed_deviation.norm() > 0.05;
+        let moving = puck.vel.norm() > CALM_PUCK_SPEED || scene.puck_speed_deviation.norm() > 0.05;
         if moving || is_prepared(puck) {
             self.phase = Phase::Search {
-                next: 0,
+                next_normal: 0,
                 best: None,
             };
             if moving
-                && slide_value(scene.field, *puck) < MIN_PROSPECT
+                && slide_value(scene.field, *puck) < MIN_VALUE
                 && let Some(command) = self.absorb.decide(scene)
             {
                 return command;
@@ -100,21 +115,21 @@ impl Prepare {
             };
         }
         let mut expected = *puck;
-        expected.advance(scene.field, LEAD);
-        for k in next..(next + PER_STEP).min(NORMALS) {
+        expected.advance(scene.field, LEAD_TIME);
+        for k in next_normal..(next_normal + NORMALS_PER_STEP).min(NORMALS) {
             try_normal(scene.field, &expected, k, &mut best);
         }
         self.phase = match best {
-            Some(strike) if next + PER_STEP >= NORMALS => Phase::Approach {
+            Some(strike) if next_normal + NORMALS_PER_STEP >= NORMALS => Phase::Approach {
                 strike,
                 puck: expected.pos,
             },
-            None if next + PER_STEP >= NORMALS => Phase::Search {
-                next: 0,
+            None if next_normal + NORMALS_PER_STEP >= NORMALS => Phase::Search {
+                next_normal: 0,
                 best: None,
             },
             _ => Phase::Search {
-                next: next + PER_STEP,
+                next_normal: next_normal + NORMALS_PER_STEP,
                 best,
             },
         };
@@ -124,34 +139,36 @@ impl Prepare {
     fn approach(&mut self, scene: &Scene<'_>, strike: Strike, planned: Vec2) -> MalletCommand {
         let field = scene.field;
         let mut expected = scene.puck;
-        expected.advance(field, 0.5 * LEAD);
-        if scene.puck.vel.norm() > 1.5 * CALM_PUCK || (expected.pos - planned).norm() > MISPLACED {
+        expected.advance(field, 0.5 * LEAD_TIME);
+        if scene.puck.vel.norm() > 1.5 * CALM_PUCK_SPEED
+            || (expected.pos - planned).norm() > PUCK_TOLERANCE
+        {
             self.phase = Phase::Search {
-                next: 0,
+                next_normal: 0,
                 best: None,
             };
             return retreat(scene);
         }
-        let mut there = scene.puck;
-        there.advance(
+        let mut puck_at_contact = scene.puck;
+        puck_at_contact.advance(
             field,
             run_up(&strike.velocity).norm() * 2.0 / strike.velocity.norm(),
         );
-        let contact = there.pos - field.contact() * strike.normal;
+        let contact = puck_at_contact.pos - field.contact_distance() * strike.normal;
         let start = field.clamp_mallet(contact - run_up(&strike.velocity));
-        let way = waypoint(scene, start, field.contact() + 0.012);
+        let next_point = waypoint(scene, start, field.contact_distance() + 0.012);
         let distance = (scene.mallet.pos - start).norm();
-        if way == start && distance < 0.004 && scene.mallet.vel.norm() < 0.05 {
+        if next_point == start && distance < 0.004 && scene.mallet.vel.norm() < 0.05 {
             let time = 2.0 * (contact - start).norm() / strike.velocity.norm();
             self.phase = Phase::Run {
                 strike,
-                contact: scene.time + time.max(2.0 * scene.dt),
+                contact_time: scene.time + time.max(2.0 * scene.dt),
             };
         }
         // Fast at a distance, slow beside the puck.
         MalletCommand::stop(
             scene,
-            way,
+            next_point,
             if distance > 0.15 {
                 Pace::QUICK
             } else {
@@ -160,49 +177,49 @@ impl Prepare {
         )
     }
 
-    fn run(&mut self, scene: &Scene<'_>, strike: Strike, contact: f64) -> MalletCommand {
-        let left = contact - scene.time;
-        if left <= 0.5 * scene.dt {
+    fn run(&mut self, scene: &Scene<'_>, strike: Strike, contact_time: f64) -> MalletCommand {
+        let time_left = contact_time - scene.time;
+        if time_left <= 0.5 * scene.dt {
             // Brake at once; the puck leaves faster than the mallet.
             let time = 2.0 * strike.velocity.norm() / BRAKE;
-            if -left >= time {
+            if -time_left >= time {
                 self.phase = Phase::Retreat {
-                    until: scene.time + 0.25,
+                    end_time: scene.time + RETREAT_TIME,
                 };
                 return retreat(scene);
             }
-            let rest = (time + left).max(scene.dt);
-            let pos = scene.mallet.pos + 0.5 * rest * scene.mallet.vel;
+            let braking_left = (time + time_left).max(scene.dt);
+            let pos = scene.mallet.pos + 0.5 * braking_left * scene.mallet.vel;
             return MalletCommand::new(
                 Target {
                     pos,
                     vel: Vec2::zeros(),
-                    time: rest,
+                    time: braking_left,
                 },
                 Posture::Free,
             );
         }
-        let mut there = scene.puck;
-        there.advance(scene.field, left);
-        let pos = there.pos - scene.field.contact() * strike.normal;
+        let mut puck_at_contact = scene.puck;
+        puck_at_contact.advance(scene.field, time_left);
+        let pos = puck_at_contact.pos - scene.field.contact_distance() * strike.normal;
         MalletCommand::new(
             Target {
                 pos,
                 vel: strike.velocity,
-                time: left,
+                time: time_left,
             },
             Posture::Free,
         )
     }
 }
 
-/// Keeps clear of the puck: to the other half along y, in front of the goal.
+/// Moves away from the puck: to a point in front of the goal, on the other side of the middle in y.
 fn retreat(scene: &Scene<'_>) -> MalletCommand {
     let y = if scene.puck.pos.y > 0.0 { -0.12 } else { 0.12 };
     let pos = Vec2::new(-0.8, y);
     MalletCommand::stop(
         scene,
-        waypoint(scene, pos, scene.field.contact() + 0.03),
+        waypoint(scene, pos, scene.field.contact_distance() + 0.03),
         Pace::QUICK,
     )
 }

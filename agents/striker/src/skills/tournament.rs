@@ -1,12 +1,15 @@
-//! The skill for whole games: defends, frees the puck from the rim, and shoots.
+//! The skill for whole games against another agent: defends the goal, frees the puck from the table's rim, and shoots.
 
 use super::{Defend, Hit, Prepare};
 use crate::field::Vec2;
 use crate::motion::Pace;
 use crate::scene::{MalletCommand, Scene};
 
-/// After this time on the own half, the puck is shot from positions that are avoided otherwise, seconds.
-const URGENT_AFTER: f64 = 6.0;
+/// After the puck has been on the own half for this time, it is shot also from positions that are avoided otherwise, seconds.
+const URGENT_TIME: f64 = 6.0;
+
+/// A mode that waits for a strike ends after this time, seconds.
+const STRIKE_TIMEOUT: f64 = 6.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
@@ -20,8 +23,9 @@ enum Mode {
 #[derive(Debug, Clone)]
 pub struct Tournament {
     mode: Mode,
+    /// Time at which the mode began, seconds since the rally's start.
     mode_since: f64,
-    /// Time at which the puck came to the own half; a foul follows after 15 s.
+    /// Time at which the puck came to the own half, seconds since the rally's start. Staying there for 15 s is a foul.
     own_half_since: f64,
     hit: Hit,
     defend: Defend,
@@ -82,19 +86,20 @@ impl Tournament {
         if incoming || (self.mode == Mode::Defend && puck.vel.norm() > 0.5) {
             return Mode::Defend;
         }
-        // Near a rim the mallet does not fit behind the puck.
-        let urgent = scene.time - self.own_half_since > URGENT_AFTER;
-        let margin = match (self.mode, urgent) {
+        // Near a rim the mallet does not fit behind the puck: beyond this |y|, metres, the puck is freed first. The bound depends on the
+        // mode, so that a puck near it does not switch modes at each step.
+        let urgent = scene.time - self.own_half_since > URGENT_TIME;
+        let shot_y_max = match (self.mode, urgent) {
             (Mode::Prepare, false) => 0.4,
             (Mode::Prepare, true) => 0.45,
             (_, false) => 0.445,
             (_, true) => 0.47,
         };
-        if puck.pos.y.abs() > margin || puck.pos.x < -0.86 {
+        if puck.pos.y.abs() > shot_y_max || puck.pos.x < -0.86 {
             return Mode::Prepare;
         }
         // No strike was possible for a long time: move the puck to avoid a foul.
-        if self.mode == Mode::Hit && scene.time - self.mode_since > 6.0 {
+        if self.mode == Mode::Hit && scene.time - self.mode_since > STRIKE_TIMEOUT {
             return Mode::Prepare;
         }
         Mode::Hit

@@ -3,27 +3,35 @@
 use faceoff_types::Profile;
 use striker::Agent;
 
-use crate::support::game::{Player, Tally, game, play};
+use crate::support::game::{Player, Tally, new_game, play};
 
-/// Two and a half minutes.
+/// Two and a half minutes, in control steps.
 const STEPS: u32 = 7500;
-/// *Deployable*: half a point per window of 500 steps.
-const POINTS_MAX: u32 = STEPS / 1000;
+/// Penalty points up to which the rules call an agent *deployable*: half a point per window of 500 steps.
+const DEPLOYABLE_POINTS_MAX: u32 = STEPS / 1000;
 
 fn play_game(profile: Profile, seed: u64, mut players: [Player; 2]) -> Tally {
-    play(&mut game(profile, seed), &mut players, STEPS, |_, _, _| {})
+    play(
+        &mut new_game(profile, seed),
+        &mut players,
+        STEPS,
+        |_, _, _| {},
+    )
 }
 
 #[test]
 fn striker_beats_hold_from_either_side() {
-    for own in [0, 1] {
+    for robot_index in [0, 1] {
         let mut players = [Player::Hold(None), Player::Hold(None)];
-        players[own] = Player::agent(Agent::new, own);
+        players[robot_index] = Player::agent(Agent::new, robot_index);
         let tally = play_game(Profile::Evaluation, 2, players);
-        assert!(tally.goals[own] >= 2, "{tally:?}");
-        assert_eq!(tally.goals[1 - own], 0, "{tally:?}");
-        assert_eq!(tally.fouls[own], 0, "{tally:?}");
-        assert!(tally.points[own] <= POINTS_MAX, "{tally:?}");
+        assert!(tally.goals[robot_index] >= 2, "{tally:?}");
+        assert_eq!(tally.goals[1 - robot_index], 0, "{tally:?}");
+        assert_eq!(tally.fouls[robot_index], 0, "{tally:?}");
+        assert!(
+            tally.penalty_points[robot_index] <= DEPLOYABLE_POINTS_MAX,
+            "{tally:?}"
+        );
     }
 }
 
@@ -32,13 +40,19 @@ fn two_strikers_commit_no_fouls_and_stay_deployable() {
     let players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
     let tally = play_game(Profile::Evaluation, 2, players);
     assert_eq!(tally.fouls, [0, 0], "{tally:?}");
-    assert!(tally.points.iter().all(|p| *p <= POINTS_MAX), "{tally:?}");
+    assert!(
+        tally
+            .penalty_points
+            .iter()
+            .all(|points| *points <= DEPLOYABLE_POINTS_MAX),
+        "{tally:?}"
+    );
 }
 
 #[test]
 fn game_is_reproducible() {
     let run = || {
-        let mut game = game(Profile::Evaluation, 7);
+        let mut game = new_game(Profile::Evaluation, 7);
         let mut players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
         let tally = play(&mut game, &mut players, 1000, |_, _, _| {});
         (tally, game.world().puck().pose)

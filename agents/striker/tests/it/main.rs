@@ -1,4 +1,4 @@
-//! The agent over the protocol, and in whole simulated episodes.
+//! Tests the agent over the evaluator's protocol, and in whole simulated episodes and games.
 
 mod episodes;
 mod games;

@@ -1,11 +1,11 @@
-//! The `env` of `hello`, made from the simulator's constants.
+//! The description of table and robot that the evaluator sends as `env` in the message `hello`, made from the simulator's constants.
 
 use faceoff_sim::env_info_for;
 use striker::{BaseFrame, Env, RadiusInfo, RobotInfo, TableInfo};
 
-/// The `env` for the agent of robot `own` (0 or 1) of `robots`.
-pub fn env(robots: u32, own: usize) -> Env {
-    let info = env_info_for(robots, own);
+/// The `env` for the agent of the robot with index 0 or 1, on a table with `robots` robots.
+pub fn env(robots: u32, robot_index: usize) -> Env {
+    let info = env_info_for(robots, robot_index);
     Env {
         dt: info.dt,
         table: TableInfo {

@@ -1,4 +1,4 @@
-//! Games in this process, without pipes, clocks and sandbox.
+//! Plays games of two robots in this process, without pipes, clocks and sandbox.
 
 use faceoff_sim::{Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
 use faceoff_sim::{PerturbationSettings, Plant};
@@ -9,16 +9,22 @@ use super::env::env;
 
 /// Control of a robot.
 pub enum Player {
-    /// Keeps the first pose of a rally, as `agents/hold` does.
+    /// Keeps the first pose of a rally, as `agents/hold` does: 7 joint positions and 7 zero velocities; `None` before the first step.
     Hold(Option<[f64; 14]>),
     /// An agent in this process.
     Agent(Box<dyn Policy>),
 }
 
 impl Player {
-    /// An agent for robot `own` (0 or 1).
-    pub fn agent<P: Policy + 'static>(make: impl Fn(Task, &Env) -> P, own: usize) -> Self {
-        Self::Agent(Box::new(make(Task::Tournament, &env(2, own))))
+    /// An agent for the robot with index 0 or 1 (robot 1 or 2).
+    pub fn agent<P: Policy + 'static>(
+        make_policy: impl Fn(Task, &Env) -> P,
+        robot_index: usize,
+    ) -> Self {
+        Self::Agent(Box::new(make_policy(
+            Task::Tournament,
+            &env(2, robot_index),
+        )))
     }
 
     pub fn reset(&mut self) {
@@ -41,36 +47,39 @@ impl Player {
     }
 }
 
+/// Penalty points of a window with each violation, in the order of [`Tally::violated_windows`].
+const POINTS: [u32; 4] = [3, 3, 2, 1];
+
 /// Result of a game. In pairs robot 1 comes first.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     pub score: [u32; 2],
     pub goals: [u32; 2],
     pub fouls: [u32; 2],
-    /// Rallies that ended with a stuck puck.
+    /// Rallies (from one serve to the next) that ended with a stuck puck.
     pub stuck: u32,
     /// Rallies that ended with the puck off the table.
-    pub left: u32,
-    /// Penalty points over all windows, without computation time.
-    pub points: [u32; 2],
+    pub left_table: u32,
+    /// Penalty points over all windows (stretches of 500 control steps), without those for computation time.
+    pub penalty_points: [u32; 2],
     /// Windows with each violation: end effector, link, joint position, joint velocity.
-    pub windows: [[u32; 4]; 2],
+    pub violated_windows: [[u32; 4]; 2],
 }
 
 impl Tally {
-    fn window(&mut self, violations: &[Violations; 2]) {
+    fn count_window(&mut self, violations: &[Violations; 2]) {
         for (robot, v) in violations.iter().enumerate() {
             let violated = [v.ee, v.link, v.joint_pos, v.joint_vel];
-            for (k, (is_violated, points)) in violated.into_iter().zip([3, 3, 2, 1]).enumerate() {
-                self.windows[robot][k] += u32::from(is_violated);
-                self.points[robot] += u32::from(is_violated) * points;
+            for (k, (is_violated, points)) in violated.into_iter().zip(POINTS).enumerate() {
+                self.violated_windows[robot][k] += u32::from(is_violated);
+                self.penalty_points[robot] += u32::from(is_violated) * points;
             }
         }
     }
 }
 
-/// The game of a seed.
-pub fn game(profile: Profile, seed: u64) -> Game {
+/// A new game with the perturbations of `profile`; the seed determines all random draws.
+pub fn new_game(profile: Profile, seed: u64) -> Game {
     let seed = Seed::from_number(seed);
     let settings = PerturbationSettings::default();
     Game::new(GameSetup {
@@ -82,12 +91,12 @@ pub fn game(profile: Profile, seed: u64) -> Game {
     })
 }
 
-/// Plays `steps` control steps; `watch` is called after each of them.
+/// Plays `steps` control steps; `on_step` is called after each of them.
 pub fn play(
     game: &mut Game,
     players: &mut [Player; 2],
     steps: u32,
-    mut watch: impl FnMut(&Game, &[Player; 2], &GameStep),
+    mut on_step: impl FnMut(&Game, &[Player; 2], &GameStep),
 ) -> Tally {
     let mut tally = Tally::default();
     for player in players.iter_mut() {
@@ -96,13 +105,13 @@ pub fn play(
     for _ in 0..steps {
         let actions = [0, 1].map(|robot| players[robot].act(game.observation(robot)));
         let step = game.step([Command::Act(&actions[0]), Command::Act(&actions[1])]);
-        watch(game, players, &step);
+        on_step(game, players, &step);
         if let Some(violations) = &step.window {
-            tally.window(violations);
+            tally.count_window(violations);
         }
         if let Some(end) = step.rally_end {
             tally.stuck += u32::from(end == RallyEnd::Stuck);
-            tally.left += u32::from(end == RallyEnd::LeftTable);
+            tally.left_table += u32::from(end == RallyEnd::LeftTable);
             for player in players.iter_mut() {
                 player.reset();
             }

@@ -1,10 +1,10 @@
-//! Filter of an evaluation's episodes, for the page that lists them.
+//! Filter of an evaluation's episodes, for the page that lists them: by task, outcome, violated limit and end.
 
 use faceoff_replay::{EpisodeLine, Group};
 use faceoff_types::{EpisodeEnd, Task};
 use serde::{Deserialize, Serialize};
 
-/// The episodes of an evaluation that a page shows. An empty form field selects all.
+/// Query of the page with an evaluation's episodes. An empty form field selects all episodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpisodesQuery {
@@ -14,7 +14,7 @@ pub struct EpisodesQuery {
     /// `success` or `failure`.
     #[serde(default, alias = "went", skip_serializing_if = "String::is_empty")]
     pub outcome: String,
-    /// The limit that the episode exceeds: a constraint on the end effector (`ee`), a robot link (`link`), a joint position
+    /// The limit that the episode violated: a constraint on the end effector (`ee`), a robot link (`link`), a joint position
     /// (`joint_pos`) or a joint velocity (`joint_vel`), `any` of these, or the time of an answer (`late`).
     #[serde(default, alias = "broke", skip_serializing_if = "String::is_empty")]
     pub violated: String,
@@ -33,15 +33,15 @@ pub struct EpisodeFilter {
     pub task: Option<Task>,
     /// Whether the episode succeeded.
     pub success: Option<bool>,
-    /// The limit that the episode exceeds.
-    pub violated: Option<BrokenLimit>,
+    /// The limit that the episode violated.
+    pub violated: Option<ViolatedLimit>,
     /// How the episode ended.
     pub end: Option<EpisodeEnd>,
 }
 
-/// A limit that an episode exceeds.
+/// A limit that an episode violated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BrokenLimit {
+pub enum ViolatedLimit {
     /// At least one constraint.
     Any,
     /// A constraint of this group.
@@ -63,9 +63,9 @@ impl EpisodesQuery {
             if text.is_empty() {
                 return Ok(None);
             }
-            let word: serde::de::value::StrDeserializer<'a, serde::de::value::Error> =
+            let deserializer: serde::de::value::StrDeserializer<'a, serde::de::value::Error> =
                 serde::de::IntoDeserializer::into_deserializer(text);
-            T::deserialize(word).map(Some).map_err(|_| field)
+            T::deserialize(deserializer).map(Some).map_err(|_| field)
         }
         Ok(EpisodeFilter {
             task: parse_field(&self.task, "task")?,
@@ -77,9 +77,9 @@ impl EpisodesQuery {
             },
             violated: match self.violated.as_str() {
                 "" => None,
-                "any" => Some(BrokenLimit::Any),
-                "late" => Some(BrokenLimit::Late),
-                group => parse_field(group, "violated")?.map(BrokenLimit::One),
+                "any" => Some(ViolatedLimit::Any),
+                "late" => Some(ViolatedLimit::Late),
+                group => parse_field(group, "violated")?.map(ViolatedLimit::One),
             },
             end: parse_field(&self.end, "end")?,
         })
@@ -88,15 +88,17 @@ impl EpisodesQuery {
 
 impl EpisodeFilter {
     /// Whether the episode matches all conditions.
-    pub fn matches(self, line: &EpisodeLine) -> bool {
-        let exceeds = |limit| match limit {
-            BrokenLimit::Any => !line.broken.is_empty(),
-            BrokenLimit::One(group) => line.broken.iter().any(|broken| broken.group == group),
-            BrokenLimit::Late => line.late > 0,
+    pub fn matches(self, episode: &EpisodeLine) -> bool {
+        let violates = |limit| match limit {
+            ViolatedLimit::Any => !episode.broken.is_empty(),
+            ViolatedLimit::One(group) => episode.broken.iter().any(|broken| broken.group == group),
+            ViolatedLimit::Late => episode.late > 0,
         };
-        self.task.is_none_or(|task| task == line.task)
-            && self.success.is_none_or(|success| success == line.success)
-            && self.violated.is_none_or(exceeds)
-            && self.end.is_none_or(|end| end == line.end)
+        self.task.is_none_or(|task| task == episode.task)
+            && self
+                .success
+                .is_none_or(|success| success == episode.success)
+            && self.violated.is_none_or(violates)
+            && self.end.is_none_or(|end| end == episode.end)
     }
 }

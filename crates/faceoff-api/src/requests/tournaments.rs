@@ -44,7 +44,7 @@ pub struct TournamentChange {
     /// 1 to 40 characters: letters, digits, spaces and . _ -
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// A JSON merge patch of the rules, before the first round only. null restores the default of an optional field.
+    /// A JSON merge patch (RFC 7396) of the rules, before the first round only. null restores the default of an optional field.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<RulesPatch>)]
     pub rules: Option<Map<String, Value>>,
@@ -108,7 +108,7 @@ pub struct NewFriendlyGame {
     pub opponent: TeamName,
 }
 
-/// Replays of a tournament's schedule.
+/// Replays of a tournament's schedule with other seeds. They do not count; they show how certain the champion is.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewReplays {

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewToken {
-    /// What the token is used for. 1 to 80 characters.
+    /// What the token is used for, as a label in lists. 1 to 80 characters.
     pub name: String,
     /// When the token expires. Default: never.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -60,8 +60,8 @@ pub struct NewInvitation {
 pub struct JoinRequest {
     /// The code at the end of the invitation link.
     pub code: String,
-    /// The new user's name, which also signs in. 1 to 40 characters: letters, digits, spaces and . _ - Left out for the
-    /// role `return`.
+    /// The new user's name, with which the user also signs in. 1 to 40 characters: letters, digits, spaces and `. _ -`.
+    /// Left out for the role `return`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<UserName>,
     /// At least 12 characters. Without one the user signs in by links and tokens only.

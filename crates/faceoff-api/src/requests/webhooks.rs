@@ -1,4 +1,5 @@
-//! Requests about webhooks.
+//! Requests about webhooks. A webhook is an Internet address to which the server sends events; it is *dead* once deliveries
+//! have failed for too long.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

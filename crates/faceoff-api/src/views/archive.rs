@@ -1,4 +1,4 @@
-//! The season archive that a server shows.
+//! The season archive that a server shows. A season archive is a file with the whole state of a season.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};

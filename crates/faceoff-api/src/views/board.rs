@@ -1,5 +1,6 @@
 //! Boards: ranks of a stage's teams, and their statistical uncertainty. If the stage counts the mean of several days, a row
-//! shows a mean of several evaluations.
+//! shows a mean of several evaluations. A *revision* is one version of the stage's rules. While an organiser has *frozen*
+//! the boards, they do not show new results.
 
 use crate::views::{
     baseline::BaselineRow, ruling::RulingView, sign_off::SignOffView, task::TaskView,

@@ -53,7 +53,7 @@ pub enum Fit {
     Surely,
     /// Yes, by the measured durations; not if every agent uses up its time limits.
     Probably,
-    /// Nothing was measured, and not if every agent uses up its time limits.
+    /// No durations are measured yet, and the evaluations do not finish if every agent uses up its time limits.
     Unknown,
     /// No, not even by the measured durations.
     Not,

@@ -1,4 +1,4 @@
-//! How certain a tournament's champion is, from replays of the schedule.
+//! How certain a tournament's champion is. To estimate this, all games of the schedule are *replayed* with other seeds.
 
 use faceoff_scoring::tournament::ChampionShare;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Paired comparison of two evaluations on the same episodes.
+//! Paired comparison of two evaluations, A and B, on the same episodes: which agent solves more, and how certain that is.
 
 use faceoff_scoring::{OverallComparison, SolvedEpisodes, TaskComparison};
 use faceoff_types::{EvaluationId, Profile, Task, TeamName};

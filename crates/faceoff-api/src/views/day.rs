@@ -44,8 +44,8 @@ pub struct NextCutoff {
 impl fmt::Display for NextCutoff {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.at {
-            Some(at) => {
-                let local = at.to_zoned(self.zone.time_zone());
+            Some(cutoff_at) => {
+                let local = cutoff_at.to_zoned(self.zone.time_zone());
                 write!(
                     f,
                     "{} {}",

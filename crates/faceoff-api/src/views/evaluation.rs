@@ -1,4 +1,5 @@
-//! Evaluations and their progress.
+//! Evaluations and their progress. An evaluation runs one team's submission over all tasks of an *evaluation day*, whose
+//! results are *released* (made public) once all its evaluations have ended.
 
 pub use crate::views::evaluation_status::{EvaluationStatus, FaultView, ResultView};
 use crate::views::{queue::QueueView, ruling::RulingView};

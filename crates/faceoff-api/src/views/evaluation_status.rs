@@ -1,4 +1,5 @@
-//! States of an evaluation, with its result or failure, and what happens next.
+//! States of an evaluation, with its result or failure, and what happens next. The results of an evaluation day are
+//! *released* (made public) once all its evaluations have ended.
 
 use crate::views::{printable, task::TaskView};
 use faceoff_types::{
@@ -76,8 +77,8 @@ impl EvaluationStatus {
     pub const DONE: &'static str = "Done. The team can download the dataset and verify the score.";
 
     /// What happens next to an evaluation, in words.
-    pub const fn next(&self, released: bool, voided: bool) -> &'static str {
-        if voided {
+    pub const fn next(&self, is_released: bool, is_voided: bool) -> &'static str {
+        if is_voided {
             return "It no longer counts as the team's evaluation of the day. An organiser can rerun it.";
         }
         match self {
@@ -90,17 +91,17 @@ impl EvaluationStatus {
              the evaluation is ended and does not count."
             }
             Self::Finalising => "The score is computed and published automatically.",
-            Self::Finished { .. } if released => Self::DONE,
+            Self::Finished { .. } if is_released => Self::DONE,
             Self::Finished { .. } => {
                 "Dataset and details are released when the day's last evaluation has ended."
             }
-            Self::AgentFailed { .. } if released => {
+            Self::AgentFailed { .. } if is_released => {
                 "Done. Faults and log show what to correct; a corrected submission is evaluated on the next day."
             }
             Self::AgentFailed { .. } => {
                 "The team sees faults and log when the day's last evaluation has ended."
             }
-            Self::PlatformFailed { .. } if released => {
+            Self::PlatformFailed { .. } if is_released => {
                 "It does not count as the team's evaluation of the day. An organiser can repeat it with the same \
              submission on the same episodes."
             }
@@ -156,28 +157,28 @@ pub struct ResultView {
     pub penalty_points: f64,
     /// The worst of the tasks' tiers.
     pub tier: Tier,
-    /// Timing noise floor and repeated episodes of the slots; absent until the day is released, and in results of older
-    /// versions.
+    /// How exactly the slots (places that run jobs) measured answer times, and how many episodes they repeated; absent
+    /// until the day is released, and in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timing: Option<SlotTiming>,
 }
 
 impl ResultView {
-    /// Leaves out everything that depends on the day's episodes unless the day is `released`.
-    pub fn new(result: EvaluationResult, released: bool) -> Self {
+    /// The view of a result. The details are left out unless the day is released.
+    pub fn new(result: EvaluationResult, is_released: bool) -> Self {
         let tasks = result.tasks.iter();
         Self {
             ruleset: result.ruleset,
             profile: result.profile,
             variation: result.variation,
-            seed: released.then_some(result.seed),
+            seed: is_released.then_some(result.seed),
             tasks: tasks
-                .map(|(task, result)| (*task, TaskView::new(result, released)))
+                .map(|(task, result)| (*task, TaskView::new(result, is_released)))
                 .collect(),
             score: result.score,
             penalty_points: result.penalty_points,
             tier: result.tier,
-            timing: result.timing.filter(|_| released),
+            timing: result.timing.filter(|_| is_released),
         }
     }
 }
@@ -250,7 +251,7 @@ mod tests {
             finished_at,
             reason: reason(),
         };
-        for (status, released, voided, words) in [
+        for (status, is_released, is_voided, words) in [
             (
                 &EvaluationStatus::Queued,
                 false,
@@ -279,7 +280,7 @@ mod tests {
             (&not_played, true, false, "earlier day stays on the board"),
             (&cancelled, true, false, "does not count"),
         ] {
-            let text = status.next(released, voided);
+            let text = status.next(is_released, is_voided);
             assert!(text.contains(words), "{words} is not in {text}");
         }
     }

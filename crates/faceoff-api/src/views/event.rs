@@ -1,4 +1,5 @@
-//! The event log, as organisers read it.
+//! The event log, as organisers read it. It lists every change of the season with its *actor* (who or what made it) and its
+//! *subject* (what was changed).
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -12,13 +13,14 @@ pub struct EventView {
     pub id: i64,
     /// When it happened.
     pub at: Timestamp,
-    /// `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME` or `server`.
+    /// Who or what made the change: `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME`
+    /// or `server`.
     #[schema(example = "organiser")]
     pub actor: String,
     /// Name of the user or the team; absent for other actors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub actor_name: Option<String>,
-    /// `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`,
+    /// What was changed: `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`,
     /// `ablation:ID`, `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`, `tournament:ID`,
     /// `game:ID`.
     #[schema(example = "day:2026-03-01")]

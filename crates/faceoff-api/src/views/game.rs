@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A game. In pairs the home side comes first; it controls the first robot.
+/// A game. In arrays with one item per side the home side comes first; it controls the first robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(remote = "Self")]
 pub struct GameView {
@@ -140,7 +140,7 @@ pub enum GameStatus {
     },
 }
 
-/// Result of a game. In pairs the home side comes first.
+/// Result of a game. In arrays with one item per side the home side comes first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct GameResultView {
     /// Final score, which counts: includes points for the opponent's fouls; 10 : 0 after a forfeit.

@@ -1,10 +1,10 @@
-//! Liveness and readiness of the server.
+//! Liveness and readiness of the server: whether its process responds, and whether it can also serve requests and run jobs.
 
 use crate::views::ruling::RulingView;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The server is ready.
+/// Readiness: the server serves requests and can run jobs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct HealthView {
     /// Always `ok`; otherwise the response is a problem with status 503.
@@ -21,7 +21,7 @@ pub struct HealthView {
     pub paused: Option<RulingView>,
 }
 
-/// The server process responds.
+/// Liveness: the server process responds.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct LiveView {
     /// Always `alive`.

@@ -1,4 +1,4 @@
-//! Board history: results and ranks of all teams, day by day.
+//! Board history: results and ranks of all teams of a stage, day by day. A *baseline* is a reference agent of the organisers.
 
 use crate::views::{ruling::RulingView, task::TaskView};
 use faceoff_types::{

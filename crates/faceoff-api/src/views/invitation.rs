@@ -1,4 +1,5 @@
-//! Invitations and registrations.
+//! Invitations, with which a person joins as an organiser or a team's member, and registrations, with which a new team asks
+//! to take part.
 
 use crate::requests::InvitedRole;
 use faceoff_types::{DivisionName, InvitationId, RegistrationId, TeamId, TeamName, UserId};

@@ -1,4 +1,5 @@
-//! A team's own status: today's evaluation and the submission for the next cutoff.
+//! A team's own status: today's evaluation, and the submission for the next *cutoff*, the moment at which the next
+//! evaluation day starts.
 
 use crate::views::{day::NextCutoff, exclusion::StageExclusion, queue::QueueView, team::TeamView};
 use faceoff_types::{EvaluationId, StageId, SubmissionId, deprecated_names};

@@ -25,7 +25,7 @@ pub struct ProposalView {
     pub stage_name: StageName,
     /// Revision of the stage's rules.
     pub revision: u32,
-    /// Which evaluations it consists of.
+    /// What it evaluates.
     pub kind: ProposalKindView,
     /// The day whose results it would change; null for a trial.
     pub day: Option<Date>,
@@ -51,7 +51,7 @@ deprecated_names!(ProposalView { settled_at => decided_at });
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ProposalKindView {
-    /// Active submissions on episodes of their own; never counts.
+    /// Active submissions on episodes of the trial's own; never counts.
     Trial,
     /// One evaluation, repeated on the same episodes.
     Evaluation,

@@ -1,4 +1,5 @@
-//! The season: its commitment, stages and days, and the seeds that are revealed.
+//! The season: its stages and days, the seeds that are revealed, and its *commitment*, the published hash of the secret from
+//! which all seeds derive.
 
 use crate::views::{archive::ArchiveView, day::NextCutoff, ruling::RulingView, stage::StageView};
 use faceoff_types::{DivisionName, Seed, StageId, deprecated_names};

@@ -1,4 +1,5 @@
-//! Stages: opening times, rules and the next cutoff.
+//! Stages: parts of the season, each with its own evaluation days, rules and board (table of results). Each day starts at
+//! a *cutoff*, when the submissions to evaluate are fixed.
 
 use crate::views::{capacity::DayLoad, day::NextCutoff, ruling::RulingView, sign_off::SignOffView};
 use faceoff_types::{
@@ -8,7 +9,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A part of the season with its own days, rules and board.
+/// A stage of the season.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(remote = "Self")]
 pub struct StageView {
@@ -59,7 +60,7 @@ deprecated_names!(StageView { next_cut => next_cutoff });
 pub enum PhaseView {
     /// It has not opened yet.
     Upcoming,
-    /// Its days start.
+    /// It has opened and not closed: its days can start.
     Open,
     /// It has closed.
     Closed,

@@ -41,7 +41,7 @@ pub struct SubmissionView {
     /// The team's name for it; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
-    /// The team's notes; absent without one.
+    /// The team's note about it; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
     /// The team's first submission of an identical bundle; absent otherwise.
@@ -102,17 +102,17 @@ pub enum SubmissionStatus {
 
 impl SubmissionStatus {
     /// What happens next to a submission, automatically or by its team, in words.
-    pub const fn next(&self, active: bool, withdrawn: bool) -> &'static str {
+    pub const fn next(&self, is_active: bool, is_withdrawn: bool) -> &'static str {
         match self {
             Self::Validating => {
                 "A validation run checks whether it starts, answers and keeps the time limits. If it is valid and the \
              newest submission, it is activated automatically."
             }
-            Self::Valid { .. } if active => {
+            Self::Valid { .. } if is_active => {
                 "It is evaluated at the next cutoff, unless a newer submission becomes valid or the team activates \
              another one before."
             }
-            Self::Valid { .. } if withdrawn => {
+            Self::Valid { .. } if is_withdrawn => {
                 "It is not evaluated again, unless the team activates it. An evaluation whose cutoff has passed continues."
             }
             Self::Valid { .. } => "Not in use: it is evaluated only if the team activates it.",
@@ -172,8 +172,8 @@ mod tests {
             ),
         ];
         let mut texts = BTreeSet::new();
-        for (status, active, withdrawn, words) in &states {
-            let text = status.next(*active, *withdrawn);
+        for (status, is_active, is_withdrawn, words) in &states {
+            let text = status.next(*is_active, *is_withdrawn);
             assert!(text.contains(words), "{words} is not in {text}");
             texts.insert(text);
         }

@@ -1,10 +1,11 @@
-//! Results of one task.
+//! The result of one task (hit, defend or prepare) in an evaluation. Details are absent until the evaluation day is
+//! *released*, that is, made public.
 
 use faceoff_types::{ComputationTimeSummary, TaskResult, Tier, ViolationCounts};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Result of one task: score and points; once the day is released, all that `results.json` contains.
+/// Result of one task: success rate and penalty points; once the day is released, all that `results.json` contains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TaskView {
     /// Episodes evaluated.
@@ -32,8 +33,8 @@ pub struct TaskView {
 }
 
 impl TaskView {
-    /// Leaves out everything that depends on the day's episodes unless the day is `released`.
-    pub fn new(result: &TaskResult, released: bool) -> Self {
+    /// The view of a result. The details are left out unless the day is released.
+    pub fn new(result: &TaskResult, is_released: bool) -> Self {
         Self {
             episodes: result.episodes,
             successes: result.successes,
@@ -41,9 +42,9 @@ impl TaskView {
             success_ci95: result.success_ci95,
             penalty_points: result.penalty_points,
             tier: result.tier,
-            violations: released.then_some(result.violations),
-            steps: released.then_some(result.steps),
-            computation_time_s: released.then_some(result.computation_time_s),
+            violations: is_released.then_some(result.violations),
+            steps: is_released.then_some(result.steps),
+            computation_time_s: is_released.then_some(result.computation_time_s),
         }
     }
 }

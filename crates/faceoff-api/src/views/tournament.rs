@@ -1,4 +1,5 @@
-//! Tournaments: rules, entrants, rounds and standings.
+//! Tournaments: rules, entrants (the teams that take part), rounds and standings. A round is divided into *matchdays*, on
+//! each of which a team meets at most one opponent; a team without an opponent on a matchday has a *bye*.
 
 use crate::views::ruling::RulingView;
 use faceoff_scoring::tournament::schedule::Table;
@@ -29,7 +30,7 @@ pub struct TournamentHead {
     pub paused: Option<RulingView>,
     /// When it was closed and became final; null before.
     pub closed_at: Option<Timestamp>,
-    /// The first team of the deciding table, once all rounds are over; null before.
+    /// The first team of the table that decides the tournament, once all rounds are over; null before.
     pub champion: Option<TeamName>,
     /// What happens next, in words.
     pub next: String,
@@ -54,7 +55,7 @@ pub enum TournamentPhase {
 /// A tournament without its games.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TournamentView {
-    /// The fields that lists have.
+    /// The fields that also appear in lists of tournaments.
     #[serde(flatten)]
     pub head: TournamentHead,
     /// What results depend on; fixed from the first round on.
@@ -67,7 +68,8 @@ pub struct TournamentView {
     pub entrants: Vec<EntrantView>,
     /// The started rounds, in order.
     pub rounds: Vec<RoundView>,
-    /// The standings, the deciding table first: one table, or the final's and each group's.
+    /// The standings: one table; in a tournament with groups, the table of the final, which decides the tournament, then
+    /// that of each group.
     pub tables: Vec<Table>,
 }
 

@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 pub struct UserView {
     /// Id of the user.
     pub id: UserId,
-    /// The user's name, which also signs in.
+    /// The user's name, with which the user also signs in.
     pub name: UserName,
     /// `organiser` or `member`.
     #[schema(example = "member")]
@@ -26,7 +26,7 @@ pub struct UserView {
     pub accepted_terms: Option<u32>,
 }
 
-/// The caller.
+/// The caller: the user or API client that sent the request.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CallerView {
     /// `organiser`, `member`, `team` (an API client with a team's token) or `host` (the token in the data folder, with

@@ -1,4 +1,5 @@
-//! Violations of an evaluation, episode by episode: the contents of the dataset's `violations.json`.
+//! Violations of the safety constraints in an evaluation, episode by episode: the contents of the dataset's
+//! `violations.json`.
 
 use faceoff_types::Task;
 use faceoff_wire::dataset::TaskViolations;
@@ -6,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// Violations of an evaluation whose day is released, by task and constraint.
+/// Violations of an evaluation whose day is released (made public), by task and constraint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ViolationsView {
     /// By task: hit, defend, prepare.

@@ -1,4 +1,5 @@
-//! Webhooks, without their secrets, and their deliveries.
+//! Webhooks, without their secrets, and their deliveries. A webhook is an HTTP address that a team or the organisers
+//! registered; the server sends it a message, the *delivery*, for each event that its filters match.
 
 use faceoff_types::{DeliveryId, TeamId, WebhookId, deprecated_names};
 use jiff::Timestamp;
@@ -24,7 +25,7 @@ pub struct WebhookView {
     /// Until when the previous secret also signs deliveries; absent after that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub old_secret_until: Option<Timestamp>,
-    /// Whether the receiver accepts deliveries.
+    /// Whether deliveries succeed.
     #[serde(flatten)]
     pub state: WebhookState,
 }
@@ -35,7 +36,7 @@ pub struct WebhookView {
 pub enum WebhookState {
     /// The last delivery succeeded, or there was none yet.
     Alive,
-    /// Deliveries have failed since then and are retried.
+    /// Deliveries fail and are retried.
     Failing {
         /// Time of the first failure.
         since: Timestamp,

@@ -1,4 +1,4 @@
-//! Hostile and damaged archives.
+//! Refusal of hostile and damaged archives.
 
 use super::*;
 use faceoff_archive::{ArchiveError, check, unpack};
@@ -13,6 +13,7 @@ struct RawEntry {
     content: Vec<u8>,
 }
 
+/// The entry of a regular file.
 fn file(path: &'static str, content: &[u8]) -> RawEntry {
     RawEntry {
         kind: EntryType::Regular,
@@ -22,6 +23,7 @@ fn file(path: &'static str, content: &[u8]) -> RawEntry {
     }
 }
 
+/// A compressed archive of a manifest and these entries, which need not match it.
 fn pack(manifest: &[u8], entries: &[RawEntry]) -> Vec<u8> {
     let mut tar = tar::Builder::new(Vec::new());
     let mut add = |raw: &RawEntry| {
@@ -39,6 +41,9 @@ fn pack(manifest: &[u8], entries: &[RawEntry]) -> Vec<u8> {
     zstd::encode_all(tar.into_inner().unwrap().as_slice(), 3).unwrap()
 }
 
+/// Words that every error message contains.
+const ANY_REASON: &str = "";
+
 fn json(manifest: &Manifest) -> Vec<u8> {
     serde_json::to_vec(manifest).unwrap()
 }
@@ -49,15 +54,19 @@ fn assert_refused(archive: &[u8], words: &str) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("hostile.tar.zst");
     fs::write(&file, archive).unwrap();
-    let into = folder.path().join("a/b");
-    fs::create_dir_all(&into).unwrap();
-    for error in [check(&file).unwrap_err(), unpack(&file, &into).unwrap_err()] {
+    let target = folder.path().join("a/b");
+    fs::create_dir_all(&target).unwrap();
+    for error in [
+        check(&file).unwrap_err(),
+        unpack(&file, &target).unwrap_err(),
+    ] {
         assert!(!matches!(error, ArchiveError::Io(_)), "{error}");
         let message = error.to_string();
         assert!(message.contains(words), "{words:?} is not in {message:?}");
     }
-    let beside: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
-    assert_eq!(beside.len(), 2, "{beside:?}");
+    // The archive and `a`.
+    let items: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+    assert_eq!(items.len(), 2, "{items:?}");
     assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
 }
 
@@ -98,33 +107,36 @@ fn entries_other_than_files_are_refused() {
 #[test]
 fn difference_from_manifest_is_refused() {
     let manifest_json = json(&manifest(vec![entry("a", b"one"), entry("b", b"two")]));
-    let (a, b) = (|| file("a", b"one"), || file("b", b"two"));
+    let (file_a, file_b) = (|| file("a", b"one"), || file("b", b"two"));
     assert_refused(
-        &pack(&manifest_json, &[a(), file("b", b"owt")]),
+        &pack(&manifest_json, &[file_a(), file("b", b"owt")]),
         "has the hash",
     );
     assert_refused(
-        &pack(&manifest_json, &[a(), file("b", b"more")]),
+        &pack(&manifest_json, &[file_a(), file("b", b"more")]),
         "has 4 bytes",
     );
     assert_refused(
-        &pack(&manifest_json, &[a()]),
+        &pack(&manifest_json, &[file_a()]),
         "ends before 1 of its files, \"b\"",
     );
     assert_refused(
-        &pack(&manifest_json, &[a(), b(), file("c", b"")]),
+        &pack(&manifest_json, &[file_a(), file_b(), file("c", b"")]),
         "does not name",
     );
     assert_refused(
-        &pack(&manifest_json, &[a(), a(), b()]),
+        &pack(&manifest_json, &[file_a(), file_a(), file_b()]),
         "or contains it twice",
     );
 
     let twice = json(&manifest(vec![entry("a", b"one"), entry("a", b"one")]));
-    assert_refused(&pack(&twice, &[a()]), "twice");
+    assert_refused(&pack(&twice, &[file_a()]), "twice");
     let mut unhashed = manifest(vec![entry("a", b"one")]);
     unhashed.files[0].blake3 = "00".into();
-    assert_refused(&pack(&json(&unhashed), &[a()]), "64 hexadecimal digits");
+    assert_refused(
+        &pack(&json(&unhashed), &[file_a()]),
+        "64 hexadecimal digits",
+    );
     assert_refused(&pack(b"{}", &[]), "missing field `format`");
     assert_refused(&pack(b"no JSON", &[]), "not the manifest");
 }
@@ -141,19 +153,19 @@ fn truncated_or_damaged_archive_is_refused() {
     let (archive, _) = valid_archive(folder.path());
     let whole = fs::read(&archive).unwrap();
     for length in [8, 100, whole.len() / 2, whole.len() - 5, whole.len() - 1] {
-        assert_refused(&whole[..length], "");
+        assert_refused(&whole[..length], ANY_REASON);
     }
     assert_refused(&[], "expected a .tar.zst");
     assert_refused(b"PK\x03\x04 a zip", "expected a .tar.zst");
     let mut damaged = whole.clone();
     let middle = damaged.len() / 2;
     damaged[middle] ^= 0x10;
-    assert_refused(&damaged, "");
+    assert_refused(&damaged, ANY_REASON);
 }
 
 #[test]
 fn archive_bomb_is_not_unpacked() {
-    // Its manifest states a length that is impossible for the packed length.
+    // The manifest of the first archive states a length that is impossible for the packed length.
     let zeros = vec![0; 1 << 20];
     let mut large = entry("zeros", &zeros);
     large.bytes = 1 << 40;
@@ -163,7 +175,7 @@ fn archive_bomb_is_not_unpacked() {
         "too many for an archive",
     );
 
-    // Its data is longer than the manifest says: reading stops there.
+    // The second archive continues with 512 MiB of zeros after the files of its manifest.
     let manifest_json = json(&manifest(vec![entry("a", b"x")]));
     let mut tar = zstd::decode_all(pack(&manifest_json, &[file("a", b"x")]).as_slice()).unwrap();
     tar.resize(tar.len() + (512 << 20), 0);
@@ -171,7 +183,7 @@ fn archive_bomb_is_not_unpacked() {
     encoder.write_all(&tar).unwrap();
     assert_refused(&encoder.finish().unwrap(), "longer than its manifest says");
 
-    // The manifest is too long.
+    // The manifest is one byte too long.
     let long = vec![b' '; (64 << 20) + 1];
     assert_refused(&pack(&long, &[]), "at most 67108864 are allowed");
 }

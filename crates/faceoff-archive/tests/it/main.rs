@@ -1,4 +1,4 @@
-//! Valid and hostile archives.
+//! Tests of archives of a season: valid ones, and hostile or damaged ones.
 #![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
 
 mod hostile;
@@ -16,6 +16,7 @@ fn entry(path: &str, content: &[u8]) -> Entry {
     }
 }
 
+/// The manifest of an archive with these files.
 fn manifest(files: Vec<Entry>) -> Manifest {
     Manifest {
         format: FORMAT,
@@ -34,7 +35,8 @@ fn contents() -> Vec<(&'static str, Vec<u8>)> {
         ("README.txt", b"read me\n".to_vec()),
         ("results/1-qualifying/board.json", b"{}".to_vec()),
         ("empty", Vec::new()),
-        // Longer than a buffer, and no multiple of a tar block.
+        // Longer than a read buffer, and no multiple of a tar block. The content repeats with a prime period, so that
+        // all blocks differ.
         (
             "artifacts/datasets/a.zip",
             (0..700_001_u32).map(|n| (n % 251) as u8).collect(),

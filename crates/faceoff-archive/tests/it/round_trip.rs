@@ -1,3 +1,5 @@
+//! Writing and reading of valid archives.
+
 use super::*;
 use faceoff_archive::{ArchiveError, check, unpack};
 use std::{fs, process::Command};
@@ -7,13 +9,13 @@ fn archive_round_trips() {
     let folder = tempfile::tempdir().unwrap();
     let (archive, manifest) = valid_archive(folder.path());
     assert_eq!(check(&archive).unwrap(), manifest);
-    let into = folder.path().join("into");
-    fs::create_dir(&into).unwrap();
-    assert_eq!(unpack(&archive, &into).unwrap(), manifest);
+    let target = folder.path().join("unpacked");
+    fs::create_dir(&target).unwrap();
+    assert_eq!(unpack(&archive, &target).unwrap(), manifest);
     for (path, content) in contents() {
-        assert_eq!(fs::read(into.join(path)).unwrap(), content, "{path}");
+        assert_eq!(fs::read(target.join(path)).unwrap(), content, "{path}");
     }
-    let error = unpack(&archive, &into).unwrap_err();
+    let error = unpack(&archive, &target).unwrap_err();
     assert!(
         matches!(error, ArchiveError::Io(_)),
         "nothing is overwritten: {error}"

@@ -1,3 +1,5 @@
+//! The place of a dataset's files: a folder, or a zip archive.
+
 use super::{
     file_range::{FileRange, open},
     seal::{self, Seal},
@@ -12,7 +14,7 @@ use std::{
 };
 use zip::{CompressionMethod, ZipArchive};
 
-/// Size limit of files that are read into memory; tables are not.
+/// Size limit of files that are read into memory as a whole. Tables are read in parts and have no limit.
 const SMALL_FILE_BYTES: u64 = 512 << 20;
 
 /// The folder or archive of a dataset's files.
@@ -101,7 +103,7 @@ impl Container {
         self.read(name, |reader| digest::of_reader(reader))
     }
 
-    /// A file for random access.
+    /// The part of the container with a file's bytes, for random access.
     pub fn range(&self, name: &str) -> Result<FileRange, DatasetError> {
         match self {
             Self::Folder(dir) => FileRange::whole(&dir.join(name)),
@@ -118,7 +120,8 @@ impl Container {
                 Ok(FileRange {
                     file: file.clone(),
                     start,
-                    // Of the two sizes in a zip entry, the one that also bounds streams.
+                    // An entry that is not compressed states its size twice. Streamed reads end at the compressed
+                    // size, so random access uses it too.
                     bytes: entry.compressed_size(),
                 })
             }

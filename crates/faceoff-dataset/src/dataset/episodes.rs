@@ -1,3 +1,5 @@
+//! Reads `episodes.parquet`, a dataset's table with one row per episode.
+
 use super::{file_range::FileRange, footer, steps::check_columns};
 use crate::{error::DatasetError, files::EPISODES_FILE, table::EpisodeRows};
 use arrow_array::{
@@ -33,7 +35,7 @@ pub struct EpisodeRecord {
     pub initial_ee: [f64; 3],
 }
 
-/// The unparsed table in batches, after a check of its columns.
+/// The table as Arrow batches, after a check of its columns.
 pub(crate) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError> {
     let bytes = table.bytes;
     let builder = ParquetRecordBatchReaderBuilder::try_new(table)
@@ -56,8 +58,8 @@ pub(super) fn records(batches: &[RecordBatch]) -> Result<Vec<EpisodeRecord>, Dat
     for batch in batches {
         let columns = Columns(batch);
         for row in 0..batch.num_rows() {
-            let read = columns.record(row);
-            records.push(read.map_err(DatasetError::unreadable(format!(
+            let record = columns.record(row);
+            records.push(record.map_err(DatasetError::unreadable(format!(
                 "{EPISODES_FILE}, row {}",
                 records.len()
             )))?);

@@ -1,3 +1,5 @@
+//! A range of a file that the Parquet library reads as if it were a whole file: a table within an archive is not unpacked.
+
 use crate::error::DatasetError;
 use bytes::Bytes;
 use parquet::{
@@ -16,14 +18,17 @@ use std::{
 #[derive(Debug, Clone)]
 pub(crate) struct FileRange {
     pub file: Arc<File>,
+    /// Offset of the range in the file.
     pub start: u64,
+    /// Length of the range.
     pub bytes: u64,
 }
 
 /// Reads a range from an offset, without moving the file's position.
 pub(crate) struct FileRangeReader {
     range: FileRange,
-    at: u64,
+    /// Offset of the next byte from the start of the range.
+    position: u64,
 }
 
 /// Opens a regular file; refuses everything else.
@@ -50,25 +55,25 @@ impl FileRange {
         })
     }
 
-    pub fn reader(&self, at: u64) -> FileRangeReader {
+    pub fn reader(&self, position: u64) -> FileRangeReader {
         FileRangeReader {
             range: self.clone(),
-            at,
+            position,
         }
     }
 }
 
 impl Read for FileRangeReader {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        let remaining = self.range.bytes.saturating_sub(self.at);
+        let remaining = self.range.bytes.saturating_sub(self.position);
         let length = out
             .len()
             .min(usize::try_from(remaining).unwrap_or(usize::MAX));
         let read = self
             .range
             .file
-            .read_at(&mut out[..length], self.range.start + self.at)?;
-        self.at += read as u64;
+            .read_at(&mut out[..length], self.range.start + self.position)?;
+        self.position += read as u64;
         Ok(read)
     }
 }

@@ -1,16 +1,20 @@
-//! Checks the positions of columns in a table's footer. The library trusts them, so they are checked before it
-//! reads columns.
+//! Checks the footer of a Parquet table, which states where each column lies. The Parquet library trusts these positions,
+//! so they are checked before it reads columns.
 
 use parquet::{
     errors::{ParquetError, Result},
     file::metadata::{ColumnChunkMetaData, ParquetMetaData},
 };
 
-/// Refuses negative counts, and columns that are not within the table's `bytes`.
-pub(crate) fn check(footer: &ParquetMetaData, bytes: u64) -> Result<()> {
+/// Refuses negative numbers, and columns that are not within the table, whose size is `table_bytes`.
+pub(crate) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
     for (number, group) in footer.row_groups().iter().enumerate() {
         let columns = group.columns().iter();
-        if group.num_rows() < 0 || !columns.into_iter().all(|column| lies_within(column, bytes)) {
+        if group.num_rows() < 0
+            || !columns
+                .into_iter()
+                .all(|column| lies_within(column, table_bytes))
+        {
             return Err(ParquetError::General(format!(
                 "the columns of row group {number} do not lie within the table"
             )));
@@ -19,20 +23,21 @@ pub(crate) fn check(footer: &ParquetMetaData, bytes: u64) -> Result<()> {
     Ok(())
 }
 
-fn lies_within(column: &ColumnChunkMetaData, bytes: u64) -> bool {
-    let first = column.dictionary_page_offset();
-    let start = first.unwrap_or(column.data_page_offset());
+fn lies_within(column: &ColumnChunkMetaData, table_bytes: u64) -> bool {
+    // A column begins with its dictionary, if it has one.
+    let dictionary = column.dictionary_page_offset();
+    let start = dictionary.unwrap_or(column.data_page_offset());
     let end = start.checked_add(column.compressed_size());
-    let counts = [
+    let numbers = [
         start,
         column.data_page_offset(),
         column.compressed_size(),
         column.uncompressed_size(),
         column.num_values(),
     ];
-    counts.iter().all(|count| *count >= 0)
-        && end.is_some_and(|end| end.unsigned_abs() <= bytes)
-        && column.data_page_offset().unsigned_abs() <= bytes
+    numbers.iter().all(|number| *number >= 0)
+        && end.is_some_and(|end| end.unsigned_abs() <= table_bytes)
+        && column.data_page_offset().unsigned_abs() <= table_bytes
 }
 
 #[cfg(test)]
@@ -45,7 +50,11 @@ mod tests {
     };
     use std::sync::Arc;
 
-    /// A footer of one column, at `start` and of `length` bytes.
+    /// Size of the table that the tests assume.
+    const TABLE_BYTES: u64 = 100;
+
+    /// A footer of one column. Its data begin at offset `start`, its dictionary at offset `dictionary`; both together have
+    /// `length` bytes.
     fn footer(rows: i64, start: i64, length: i64, dictionary: Option<i64>) -> ParquetMetaData {
         let field = Type::primitive_type_builder("puck_x", PhysicalType::DOUBLE)
             .build()
@@ -72,8 +81,8 @@ mod tests {
 
     #[test]
     fn columns_outside_of_the_table_are_refused() {
-        assert!(check(&footer(3, 4, 96, None), 100).is_ok());
-        assert!(check(&footer(3, 50, 96, Some(4)), 100).is_ok());
+        assert!(check(&footer(3, 4, 96, None), TABLE_BYTES).is_ok());
+        assert!(check(&footer(3, 50, 96, Some(4)), TABLE_BYTES).is_ok());
         for (rows, start, length, dictionary) in [
             (3, -1, 50, None),
             (3, 4, -1, None),
@@ -84,8 +93,8 @@ mod tests {
             (3, 101, 10, Some(4)),
             (-3, 4, 96, None),
         ] {
-            let refused = check(&footer(rows, start, length, dictionary), 100);
-            assert!(refused.is_err(), "{rows} {start} {length} {dictionary:?}");
+            let checked = check(&footer(rows, start, length, dictionary), TABLE_BYTES);
+            assert!(checked.is_err(), "{rows} {start} {length} {dictionary:?}");
         }
     }
 }

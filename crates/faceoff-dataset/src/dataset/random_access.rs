@@ -1,5 +1,8 @@
-//! Reads an episode's rows without the others: finds row groups by the bounds of `task` and `episode`, rows by these
-//! two columns, and pages by the page index. Of tables without bounds or index more is read.
+//! Reads the rows of one episode from `steps.parquet` without the others.
+//!
+//! A Parquet table consists of row groups, and each column of a row group of pages. The bounds of the columns `task` and
+//! `episode` select the row groups, the values of these columns the rows, and the page index the pages. Tables without
+//! bounds or index need more reading.
 
 use super::{footer, steps::reader};
 use crate::{error::DatasetError, files::STEPS_FILE};
@@ -32,13 +35,13 @@ pub(super) fn episode<R: ChunkReader + Clone + 'static>(
     let unreadable = || DatasetError::unreadable::<ParquetError>(STEPS_FILE);
     let (metadata, groups) = row_groups(&table, task, episode).map_err(unreadable())?;
 
-    let keys = ["task".to_owned(), "episode".to_owned()];
-    let keys = reader(table.clone(), &metadata, Some(&keys))?
+    let key_columns = ["task".to_owned(), "episode".to_owned()];
+    let keys = reader(table.clone(), &metadata, Some(&key_columns))?
         .with_row_groups(groups.clone())
         .build()
         .map_err(unreadable())?;
     let filters = keys
-        .map(|batch| Ok(rows(&batch?, task, episode)))
+        .map(|batch| Ok(episode_filter(&batch?, task, episode)))
         .collect::<Result<Vec<BooleanArray>>>()
         .map_err(unreadable())?;
     let count: usize = filters.iter().map(BooleanArray::true_count).sum();
@@ -54,7 +57,7 @@ pub(super) fn episode<R: ChunkReader + Clone + 'static>(
         .with_row_selection(RowSelection::from_filters(&filters))
         .build()
         .map_err(unreadable())?;
-    // A batch can hold more rows than an episode has.
+    // One batch is enough: it can hold more rows than an episode has.
     match batches.next() {
         Some(batch) => batch.map_err(DatasetError::unreadable(STEPS_FILE)),
         None => Ok(RecordBatch::new_empty(batches.schema())),
@@ -116,7 +119,8 @@ fn may_contain(group: &RowGroupMetaData, task: Task, episode: u32) -> bool {
     task_matches && episode_matches
 }
 
-fn rows(batch: &RecordBatch, task: Task, episode: u32) -> BooleanArray {
+/// Whether each row belongs to the episode.
+fn episode_filter(batch: &RecordBatch, task: Task, episode: u32) -> BooleanArray {
     let tasks: &StringArray = batch["task"].as_string();
     let episodes: &UInt32Array = batch["episode"].as_primitive();
     (0..batch.num_rows())

@@ -1,4 +1,4 @@
-//! In layout 2 the archive's comment holds the BLAKE3 hash of all bytes before that hash.
+//! The seal of an archive of layout 2: a BLAKE3 hash of all earlier bytes, at the end of the file in the zip comment.
 
 use super::layout::Layout;
 use std::{
@@ -6,14 +6,15 @@ use std::{
     io::{self, Read, Seek, SeekFrom},
 };
 
-/// Hexadecimal digits of a hash.
-const DIGITS: u64 = 64;
+/// Hexadecimal digits of a BLAKE3 hash.
+const HASH_DIGITS: u64 = 64;
 
 /// State of an archive's seal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Seal {
     /// The bytes match the seal.
     Intact,
+    /// The bytes do not match the seal.
     Broken,
     /// The file does not end with a seal.
     Absent,
@@ -23,7 +24,7 @@ pub(super) enum Seal {
 pub(super) fn check(mut file: &File) -> io::Result<Seal> {
     let label = format!("{} blake3 ", Layout::Two.schema());
     let length = file.metadata()?.len();
-    let Some(start) = length.checked_sub(DIGITS + label.len() as u64) else {
+    let Some(start) = length.checked_sub(HASH_DIGITS + label.len() as u64) else {
         return Ok(Seal::Absent);
     };
     file.seek(SeekFrom::Start(start))?;
@@ -32,7 +33,7 @@ pub(super) fn check(mut file: &File) -> io::Result<Seal> {
     let Some(sealed) = end.strip_prefix(label.as_bytes()) else {
         return Ok(Seal::Absent);
     };
-    let found = hash(file, length - DIGITS)?;
+    let found = hash(file, length - HASH_DIGITS)?;
     Ok(if sealed == found.as_bytes() {
         Seal::Intact
     } else {
@@ -40,9 +41,10 @@ pub(super) fn check(mut file: &File) -> io::Result<Seal> {
     })
 }
 
-fn hash(mut file: &File, covered: u64) -> io::Result<String> {
+/// Hash of the file's first `covered_bytes`.
+fn hash(mut file: &File, covered_bytes: u64) -> io::Result<String> {
     file.seek(SeekFrom::Start(0))?;
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(file.take(covered))?;
+    hasher.update_reader(file.take(covered_bytes))?;
     Ok(hasher.finalize().to_hex().to_string())
 }

@@ -1,3 +1,5 @@
+//! Reads `steps.parquet`, a dataset's table with one row per control step.
+
 use super::{file_range::FileRange, footer};
 use crate::{
     error::DatasetError,
@@ -46,7 +48,8 @@ pub(crate) fn check_columns(
     Ok(())
 }
 
-/// Is it a table of a layout before 4, without the column for host interference?
+/// Is it a table of a layout before 4, without the column for host interference (the time that other programs on the
+/// evaluator's machine took)?
 fn lacks_host_time(found: &Schema) -> bool {
     found.column_with_name(HOST_TIME).is_none()
 }
@@ -76,14 +79,14 @@ pub(super) fn reader<R: ChunkReader + 'static>(
         Some(names) => {
             for name in names {
                 if found.column_with_name(name).is_none() {
-                    let known: Vec<&str> = found
+                    let existing: Vec<&str> = found
                         .fields()
                         .iter()
                         .map(|field| field.name().as_str())
                         .collect();
                     return Err(DatasetError::Absent(format!(
                         "there is no column {name:?}; there are {}",
-                        known.join(", ")
+                        existing.join(", ")
                     )));
                 }
             }
@@ -115,7 +118,7 @@ impl StepTable {
         Ok(Self { table, metadata })
     }
 
-    /// Does it record host interference, as since layout 4?
+    /// Does the table record host interference? Tables since layout 4 do.
     pub(crate) fn has_host_time(&self) -> bool {
         !lacks_host_time(self.metadata.schema())
     }
@@ -148,7 +151,9 @@ impl StepTable {
 /// Rows of `steps.parquet`, in order.
 pub struct StepBatches {
     reader: ParquetRecordBatchReader,
+    /// Is the missing column for host interference added, with zeros?
     adds_zero_host_time: bool,
+    /// Rows that [`StepBatches::take_rows`] has read but not returned.
     unread: VecDeque<RecordBatch>,
 }
 
@@ -183,12 +188,12 @@ impl StepBatches {
     /// As [`StepBatches::next_batch`].
     pub fn take_rows(&mut self, count: usize) -> Result<Vec<RecordBatch>, DatasetError> {
         let mut batches = Vec::new();
-        let mut missing = count;
-        while missing > 0 {
+        let mut remaining = count;
+        while remaining > 0 {
             let Some(batch) = self.next_batch()? else {
                 break;
             };
-            let taken = missing.min(batch.num_rows());
+            let taken = remaining.min(batch.num_rows());
             if taken < batch.num_rows() {
                 self.unread
                     .push_front(batch.slice(taken, batch.num_rows() - taken));
@@ -196,7 +201,7 @@ impl StepBatches {
             if taken > 0 {
                 batches.push(batch.slice(0, taken));
             }
-            missing -= taken;
+            remaining -= taken;
         }
         Ok(batches)
     }

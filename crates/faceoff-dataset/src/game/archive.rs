@@ -1,4 +1,4 @@
-//! The archives of a game: the whole recording, and the part that each side may have.
+//! Writes the archives of a game: the whole recording, and for each side (one of the two agents) the part that it may see.
 
 use super::{
     files::{
@@ -69,7 +69,7 @@ pub(super) fn game_settings(spec: &GameSpec, agents: &[String; 2]) -> GameSettin
 
 impl RecordedGame<'_> {
     /// Scores the game and writes `game.zip`, `side-1.zip` and `side-2.zip` to the folder `out`, each under a
-    /// temporary name first. The tables are removed.
+    /// temporary name first. The recorder's tables, which are then in the archives, are removed.
     ///
     /// # Errors
     /// [`RecordingError`].
@@ -85,7 +85,7 @@ impl RecordedGame<'_> {
             &outcome,
             &answer_times_s,
         );
-        let files = ArchiveContents {
+        let contents = ArchiveContents {
             spec: self.spec,
             agents: self.agents,
             tables: &tables,
@@ -95,11 +95,11 @@ impl RecordedGame<'_> {
             outcome: &outcome,
         };
         let game = partial(GAME_FILE, out);
-        files.write_game(&game)?;
+        contents.write_game(&game)?;
         let mut archives = Vec::new();
         for side in Side::BOTH {
             let name = side_file(side);
-            files.write_side(side, &partial(name, out))?;
+            contents.write_side(side, &partial(name, out))?;
             archives.push((name, digest::of_file(&partial(name, out))?));
         }
         let game = digest::of_file(&game)?;

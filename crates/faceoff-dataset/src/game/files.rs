@@ -4,9 +4,11 @@ use faceoff_types::Side;
 
 /// The whole recording in the folder that `faceoff play` writes.
 pub const GAME_FILE: &str = "game.zip";
-/// Pack of clips for replays of the game.
+/// Pack of clips (compact recordings of 500 control steps each) for replays of the game in the browser.
 pub(super) const CLIPS_FILE: &str = "clips";
+/// True motion of the puck and both robots in each control step.
 pub(super) const MOTION_FILE: &str = "motion.parquet";
+/// A row per rally: the play from a serve to a goal or another end.
 pub(super) const RALLIES_FILE: &str = "rallies.parquet";
 /// The outcome: all data for scoring except the times.
 pub(super) const OUTCOME_FILE: &str = "outcome.json";
@@ -38,7 +40,7 @@ pub(super) const fn steps_file(side: Side) -> &'static str {
     }
 }
 
-/// Start and reset of a side before each rally.
+/// How a side entered each rally: the start of its agent, if necessary, and the agent's reset.
 pub(super) const fn entries_file(side: Side) -> &'static str {
     match side {
         Side::First => "entries-1.parquet",

@@ -40,7 +40,7 @@ impl RowLocation {
     }
 }
 
-/// Start and reset of one side for a rally, and its fault in it.
+/// How one side entered a rally (start and reset of its agent), and the side's fault in the rally.
 #[derive(Debug)]
 pub(super) struct RecordedEntry {
     pub entry: RallyEntry,
@@ -54,24 +54,24 @@ impl RecordedEntry {
         row: &RecordBatch,
         side: Side,
         must_start: bool,
-        at: RowLocation,
+        location: RowLocation,
     ) -> Result<Self, Difference> {
         let columns = Columns(row);
         let fault = columns
             .text("fault", 0)
             .map(serde_json::from_str::<AgentFault>)
             .transpose()
-            .map_err(|error| at.difference("fault", error.to_string(), "a fault as JSON"))?;
+            .map_err(|error| location.difference("fault", error.to_string(), "a fault as JSON"))?;
         if let Some(fault) = &fault {
             let is_own = fault.agent_task == AgentTask::Game { side };
             let is_current = match (fault.episode, fault.step) {
                 (None, None) => true,
-                (Some(rally), _) => rally == at.rally,
+                (Some(rally), _) => rally == location.rally,
                 (None, Some(_)) => false,
             };
             if !(is_own && is_current) {
                 let expected = format!("a fault of side {} in this rally", side.number());
-                return Err(at.difference("fault", fault.to_string(), expected));
+                return Err(location.difference("fault", fault.to_string(), expected));
             }
         }
         // A divergence is caused by an answer, and the simulation of that answer shows it.
@@ -80,33 +80,33 @@ impl RecordedEntry {
             && fault.step.is_none()
         {
             let expected = "a fault of the agent at its start or reset";
-            return Err(at.difference("fault", fault.to_string(), expected));
+            return Err(location.difference("fault", fault.to_string(), expected));
         }
-        let startup_s = read_time(row, "startup_ns", 0, at)?;
-        let reset_s = read_time(row, "reset_ns", 0, at)?;
+        let startup_s = read_time(row, "startup_ns", 0, location)?;
+        let reset_s = read_time(row, "reset_ns", 0, location)?;
         let interpolation = columns
             .text("interpolation", 0)
             .map(|text| {
                 interpolation_text::parse(text)
-                    .ok_or_else(|| at.difference("interpolation", text, "1 to 5, -1 or null"))
+                    .ok_or_else(|| location.difference("interpolation", text, "1 to 5, -1 or null"))
             })
             .transpose()?;
         match (startup_s.is_some(), must_start) {
             (true, false) => {
                 let expected = "nothing: the agent was already running";
-                return Err(at.difference("startup_ns", "a time", expected));
+                return Err(location.difference("startup_ns", "a time", expected));
             }
             (false, true) => {
                 let expected = "a time: the agent had to be started";
-                return Err(at.difference("startup_ns", "nothing", expected));
+                return Err(location.difference("startup_ns", "nothing", expected));
             }
             _ => {}
         }
         let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
-        let (entry, later) = match (startup_s, interpolation, reset_s) {
+        let (entry, step_fault) = match (startup_s, interpolation, reset_s) {
             (Some(startup_s), None, None) if !started => {
                 let fault = fault.map(side_fault).ok_or_else(|| {
-                    at.difference("fault", "nothing", "the fault that prevented the start")
+                    location.difference("fault", "nothing", "the fault that prevented the start")
                 })?;
                 (RallyEntry::StartFailed { startup_s, fault }, None)
             }
@@ -120,13 +120,13 @@ impl RecordedEntry {
                     };
                     (entry, None)
                 }
-                later => {
+                step_fault => {
                     let entry = RallyEntry::Ready {
                         startup_s,
                         interpolation,
                         reset_s,
                     };
-                    (entry, later)
+                    (entry, step_fault)
                 }
             },
             (_, interpolation, _) => {
@@ -136,13 +136,10 @@ impl RecordedEntry {
                 } else {
                     "nothing, and no time of a reset: the agent had not started"
                 };
-                return Err(at.difference("interpolation", recorded, expected));
+                return Err(location.difference("interpolation", recorded, expected));
             }
         };
-        Ok(Self {
-            entry,
-            step_fault: later,
-        })
+        Ok(Self { entry, step_fault })
     }
 }
 
@@ -164,33 +161,35 @@ pub(super) enum RecordedResponse {
         fault: SideFault,
         timing: AnswerTiming,
     },
+    /// No answer: the side had a fault earlier in the rally, and its robot holds still.
     Held,
 }
 
 impl RecordedResponse {
-    /// Reads a row of the side's steps. `active`: had the side no fault before? `fault` is the fault in its entry.
+    /// Reads a row of the side's steps. `is_active` is true if the side had no fault earlier in the rally; `fault` is the
+    /// fault in the side's [`RecordedEntry`].
     pub fn read(
         steps: &RecordBatch,
         row: usize,
         interpolation: Interpolation,
-        active: bool,
+        is_active: bool,
         fault: Option<&AgentFault>,
-        at: RowLocation,
+        location: RowLocation,
     ) -> Result<Self, Difference> {
         let text = Columns(steps).text("effect", row).unwrap_or("nothing");
         let effect = Effect::ALL
             .into_iter()
             .find(|effect| effect.as_str() == text);
-        let wrong = |expected: &str| Err(at.difference("effect", text, expected));
+        let wrong = |expected: &str| Err(location.difference("effect", text, expected));
         match effect {
             None => wrong("in_time, late, fault or held"),
-            Some(Effect::Held) if active => {
+            Some(Effect::Held) if is_active => {
                 wrong("in_time, late or fault: the side had no fault before")
             }
             Some(Effect::Held) => Ok(Self::Held),
-            Some(_) if !active => wrong("held, after its fault"),
+            Some(_) if !is_active => wrong("held, after its fault"),
             Some(Effect::Fault) => {
-                let fault = fault.filter(|fault| fault.step == at.step);
+                let fault = fault.filter(|fault| fault.step == location.step);
                 let Some(fault) = fault.cloned() else {
                     return wrong("in_time or late: no fault of this step is recorded");
                 };
@@ -199,12 +198,12 @@ impl RecordedResponse {
                 }
                 Ok(Self::Fault {
                     fault: side_fault(fault),
-                    timing: read_timing(steps, row, at)?,
+                    timing: read_timing(steps, row, location)?,
                 })
             }
             Some(Effect::InTime | Effect::Late) => Ok(Self::Answer {
-                action: read_action(steps, row, interpolation, at)?,
-                timing: read_timing(steps, row, at)?,
+                action: read_action(steps, row, interpolation, location)?,
+                timing: read_timing(steps, row, location)?,
             }),
         }
     }
@@ -229,7 +228,7 @@ fn read_action(
     steps: &RecordBatch,
     row: usize,
     interpolation: Interpolation,
-    at: RowLocation,
+    location: RowLocation,
 ) -> Result<Float64Array, Difference> {
     let expected = format!(
         "{} numbers of at most {ACTION_LIMIT} in magnitude",
@@ -237,17 +236,17 @@ fn read_action(
     );
     let actions: &ListArray = steps["action"].as_list();
     if actions.is_null(row) {
-        return Err(at.difference("action", "nothing", expected));
+        return Err(location.difference("action", "nothing", expected));
     }
     let values = actions.value(row);
     let action: &Float64Array = values.as_primitive::<Float64Type>();
     let present = action.len() - action.null_count();
     if present != interpolation.len() || action.null_count() > 0 {
-        return Err(at.difference("action", format!("{present} numbers"), expected));
+        return Err(location.difference("action", format!("{present} numbers"), expected));
     }
     let allowed = |number: &&f64| number.abs() <= ACTION_LIMIT;
     match action.values().iter().find(|number| !allowed(number)) {
-        Some(number) => Err(at.difference("action", format!("{number:?}"), expected)),
+        Some(number) => Err(location.difference("action", format!("{number:?}"), expected)),
         None => Ok(action.clone()),
     }
 }
@@ -255,32 +254,33 @@ fn read_action(
 fn read_timing(
     steps: &RecordBatch,
     row: usize,
-    at: RowLocation,
+    location: RowLocation,
 ) -> Result<AnswerTiming, Difference> {
     let [computation, host, cpu] = SIDE_TIMES;
-    let needed = |name: &str| {
-        read_time(steps, name, row, at)?.ok_or_else(|| at.difference(name, "nothing", "a time"))
+    let required_time = |name: &str| {
+        read_time(steps, name, row, location)?
+            .ok_or_else(|| location.difference(name, "nothing", "a time"))
     };
     Ok(AnswerTiming {
-        computation_time_s: needed(computation)?,
-        host_time_s: needed(host)?,
-        cpu_time_s: read_time(steps, cpu, row, at)?,
+        computation_time_s: required_time(computation)?,
+        host_time_s: required_time(host)?,
+        cpu_time_s: read_time(steps, cpu, row, location)?,
     })
 }
 
-/// A recorded time, s.
+/// A recorded time in seconds; `None` if the column is null.
 fn read_time(
     rows: &RecordBatch,
     name: &str,
     row: usize,
-    at: RowLocation,
+    location: RowLocation,
 ) -> Result<Option<f64>, Difference> {
     let column: &Int64Array = rows[name].as_primitive::<Int64Type>();
     if column.is_null(row) {
         return Ok(None);
     }
     match column.value(row) {
-        negative @ ..0 => Err(at.difference(name, negative.to_string(), "at least 0")),
+        negative @ ..0 => Err(location.difference(name, negative.to_string(), "at least 0")),
         time => Ok(Some(seconds(time))),
     }
 }

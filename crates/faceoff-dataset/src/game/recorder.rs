@@ -1,3 +1,6 @@
+//! Records a game while it is played: its tables, and the clips for replays (a clip is a compact recording of 500 control
+//! steps).
+
 use super::{
     files::{CLIPS_FILE, MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
     rows::{GameRows, record_error},
@@ -21,8 +24,10 @@ pub struct GameRecorder {
     dir: PathBuf,
     rows: GameRows,
     motion: TableWriter,
+    /// Observations and actions of each side.
     sides: [TableWriter; 2],
     rallies: TableWriter,
+    /// Start and reset of each side before each rally.
     entries: [TableWriter; 2],
     clips: GameClipRecorder<BufWriter<File>>,
 }
@@ -48,7 +53,7 @@ impl Tables {
 }
 
 impl GameRecorder {
-    /// Opens the tables in a folder, which is created or emptied.
+    /// Creates the tables in a folder, which is created or emptied.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
@@ -59,20 +64,21 @@ impl GameRecorder {
         }
         fs::create_dir_all(dir)?;
         let rows = GameRows::new();
-        let open =
-            |name: &str, schema| TableWriter::create_as(GAME_SCHEMA, &dir.join(name), schema);
+        let create = |name: &str, schema| {
+            TableWriter::create_with_layout(GAME_SCHEMA, &dir.join(name), schema)
+        };
         let [first, second] = Side::BOTH;
         Ok(Self {
             dir: dir.to_owned(),
-            motion: open(MOTION_FILE, rows.motion.schema())?,
+            motion: create(MOTION_FILE, rows.motion.schema())?,
             sides: [
-                open(steps_file(first), rows.sides[0].schema())?,
-                open(steps_file(second), rows.sides[1].schema())?,
+                create(steps_file(first), rows.sides[0].schema())?,
+                create(steps_file(second), rows.sides[1].schema())?,
             ],
-            rallies: open(RALLIES_FILE, rows.rallies.schema())?,
+            rallies: create(RALLIES_FILE, rows.rallies.schema())?,
             entries: [
-                open(entries_file(first), rows.entries[0].schema())?,
-                open(entries_file(second), rows.entries[1].schema())?,
+                create(entries_file(first), rows.entries[0].schema())?,
+                create(entries_file(second), rows.entries[1].schema())?,
             ],
             clips: GameClipRecorder::new(BufWriter::new(File::create(dir.join(CLIPS_FILE))?))?,
             rows,

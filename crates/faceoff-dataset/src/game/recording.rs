@@ -1,3 +1,5 @@
+//! Reads the recording of a game, `game.zip`.
+
 use super::{
     files::{
         GAME_FILE, MOTION_FILE, OUTCOME_FILE, RALLIES_FILE, entries_file, log_file, steps_file,
@@ -55,7 +57,7 @@ struct ManifestSchema {
 }
 
 impl GameRecording {
-    /// Does the manifest name this as the recording of a game or a side's archive? The recording may still be invalid.
+    /// Is there a recording of a game or a side's archive at `path`, by its manifest? The recording may still be invalid.
     ///
     /// # Errors
     /// [`DatasetError::Unreadable`] if a folder holds a game and an evaluation.
@@ -83,9 +85,8 @@ impl GameRecording {
         Ok(schema.is_some_and(|manifest| manifest.schema.starts_with("faceoff-game")))
     }
 
-    /// Opens `game.zip`, an unpacked folder, or a folder with a `game.zip`, and compares every file with its
-    /// hash, so that a damaged or truncated recording is never partly
-    /// read.
+    /// Opens `game.zip`, an unpacked folder, or a folder with a `game.zip`, and compares every file with its hash, so that
+    /// a damaged or truncated recording is never partly read.
     ///
     /// # Errors
     /// [`DatasetError`].
@@ -100,7 +101,7 @@ impl GameRecording {
             check_results_copy(&path.join(RESULTS_FILE), &container)?;
             (archive, container)
         };
-        let manifest = manifest(&container)?;
+        let manifest = read_manifest(&container)?;
         let listed: BTreeSet<&str> = manifest.files.keys().map(String::as_str).collect();
         if listed != BTreeSet::from(FILES) {
             return Err(DatasetError::Altered(format!(
@@ -172,7 +173,7 @@ impl GameRecording {
     }
 }
 
-fn manifest(container: &Container) -> Result<GameManifest, DatasetError> {
+fn read_manifest(container: &Container) -> Result<GameManifest, DatasetError> {
     let bytes = container.bytes(MANIFEST_FILE)?;
     // Check the layout first: a manifest of another layout may lack fields.
     let ManifestSchema { schema } =

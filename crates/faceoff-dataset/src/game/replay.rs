@@ -1,3 +1,6 @@
+//! Simulates a recorded game again: the recording gives the inputs (answers, times, faults), and every simulated row is
+//! compared with the recorded one.
+
 use super::{
     files::{MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
     recorded_inputs::{RecordedEntry, RecordedResponse, RowLocation},
@@ -26,7 +29,7 @@ pub(super) struct GameReplay {
 
 /// Recorded data of both sides for the current rally.
 struct RecordedRally {
-    /// Start and reset of both sides.
+    /// For each side the row of its start and reset.
     entries: [RecordBatch; 2],
     interpolations: [Interpolation; 2],
     faults: [Option<AgentFault>; 2],
@@ -62,21 +65,21 @@ impl GameReplay {
             self.replay_rally(&rally, progress)?;
         }
         let number = self.game.rally();
-        let at = |file| RowLocation {
+        let location_in = |file| RowLocation {
             file,
             rally: number,
             step: None,
         };
         if self.game.end().is_none() {
             let expected = "another rally: the game has not ended";
-            return Err(at(RALLIES_FILE)
+            return Err(location_in(RALLIES_FILE)
                 .difference("rows", "no more", expected)
                 .into());
         }
         for table in &mut self.entries {
             if table.fill()? > 0 {
-                let at = at(table.name());
-                return Err(at
+                let location = location_in(table.name());
+                return Err(location
                     .difference("rows", "another row", "no more rallies")
                     .into());
             }
@@ -84,49 +87,56 @@ impl GameReplay {
         let [first, second] = &mut self.steps;
         for table in [&mut self.motion, first, second] {
             if table.fill()? > 0 {
-                let at = at(table.name());
-                return Err(at.difference("rows", "another row", "no more steps").into());
+                let location = location_in(table.name());
+                return Err(location
+                    .difference("rows", "another row", "no more steps")
+                    .into());
             }
         }
         Ok(self.game.finish())
     }
 
+    /// Simulates one rally; `row` is its row in the table of rallies.
     fn replay_rally(
         &mut self,
         row: &RecordBatch,
         progress: &dyn Fn(u64),
     ) -> Result<(), VerifyError> {
         let number = self.game.rally();
-        let at = RowLocation {
+        let location = RowLocation {
             file: RALLIES_FILE,
             rally: number,
             step: None,
         };
         if self.game.end().is_some() {
             let expected = "no more: the game has ended";
-            return Err(at.difference("rows", "another rally", expected).into());
+            return Err(location
+                .difference("rows", "another rally", expected)
+                .into());
         }
         let recorded = self.start_rally(number)?;
         let count = Columns(row).int("steps", 0).unwrap_or_default();
-        let mut left = count as usize;
-        while left > 0 {
-            let played = self.replay_steps(left, number, &recorded)?;
+        let mut remaining = count as usize;
+        while remaining > 0 {
+            let played = self.replay_steps(remaining, number, &recorded)?;
             progress(played as u64);
-            left -= played;
+            remaining -= played;
         }
         if self.game.is_in_rally() {
             let expected = "more: the rally has not ended";
-            return Err(at.difference("steps", count.to_string(), expected).into());
+            return Err(location
+                .difference("steps", count.to_string(), expected)
+                .into());
         }
         let rows = self.game.sink();
         let played = batch(rows.rallies.take(), rows.rallies.schema());
-        check_same(at, row, &played)?;
+        check_same(location, row, &played)?;
         for side in Side::BOTH {
             let rows = &mut rows.entries[side.index()];
             let played = batch(rows.take(), rows.schema());
             let file = entries_file(side);
             check_same(
-                RowLocation { file, ..at },
+                RowLocation { file, ..location },
                 &recorded.entries[side.index()],
                 &played,
             )?;
@@ -137,14 +147,15 @@ impl GameReplay {
     /// Starts a rally with the recorded start and reset of both sides.
     fn start_rally(&mut self, rally: u32) -> Result<RecordedRally, VerifyError> {
         let mut read = |side: Side| -> Result<(RecordBatch, RecordedEntry), VerifyError> {
-            let at = RowLocation {
+            let location = RowLocation {
                 file: entries_file(side),
                 rally,
                 step: None,
             };
             let row = self.entries[side.index()].next_row()?;
-            let row = row.ok_or_else(|| at.difference("rows", "no more", "a row of this rally"))?;
-            let entry = RecordedEntry::read(&row, side, self.game.needs_start(side), at)?;
+            let row =
+                row.ok_or_else(|| location.difference("rows", "no more", "a row of this rally"))?;
+            let entry = RecordedEntry::read(&row, side, self.game.needs_start(side), location)?;
             Ok((row, entry))
         };
         let [(first_row, first), (second_row, second)] = [read(Side::First)?, read(Side::Second)?];
@@ -162,25 +173,25 @@ impl GameReplay {
         Ok(recorded)
     }
 
-    /// Simulates up to `most` steps of a rally and compares the resulting rows.
+    /// Simulates up to `max_steps` steps of a rally and compares the resulting rows.
     fn replay_steps(
         &mut self,
-        most: usize,
+        max_steps: usize,
         rally: u32,
         recorded: &RecordedRally,
     ) -> Result<usize, VerifyError> {
         let first_step = self.game.rally_steps();
-        let mut count = most;
+        let mut count = max_steps;
         let [first, second] = &mut self.steps;
         for table in [&mut self.motion, first, second] {
             count = count.min(table.fill()?);
             if count == 0 {
-                let at = RowLocation {
+                let location = RowLocation {
                     file: table.name(),
                     rally,
                     step: Some(first_step),
                 };
-                return Err(at
+                return Err(location
                     .difference("rows", "no more", "a row of this step")
                     .into());
             }
@@ -204,17 +215,18 @@ impl GameReplay {
             })
             .min_by_key(|(_, cell)| cell.row);
         if let Some((file, cell)) = earliest {
-            let at = RowLocation {
+            let location = RowLocation {
                 file,
                 rally,
                 step: Some(first_step.saturating_add(u32::try_from(cell.row).unwrap_or(u32::MAX))),
             };
-            let difference = at.difference(&cell.field, cell.recorded, cell.expected);
+            let difference = location.difference(&cell.field, cell.recorded, cell.expected);
             return Err(difference.into());
         }
         error.map_or(Ok(count), Err)
     }
 
+    /// Simulates one step with the answers in row `row` of both sides' tables.
     fn step(
         &mut self,
         sides: &[RecordBatch; 2],
@@ -224,16 +236,18 @@ impl GameReplay {
     ) -> Result<(), VerifyError> {
         let step = Some(self.game.rally_steps());
         if !self.game.is_in_rally() {
-            let at = RowLocation {
+            let location = RowLocation {
                 file: RALLIES_FILE,
                 rally,
                 step,
             };
             let expected = "no more steps: the rally has ended";
-            return Err(at.difference("steps", "another step", expected).into());
+            return Err(location
+                .difference("steps", "another step", expected)
+                .into());
         }
         let read = |side: Side| {
-            let at = RowLocation {
+            let location = RowLocation {
                 file: steps_file(side),
                 rally,
                 step,
@@ -245,7 +259,7 @@ impl GameReplay {
                 recorded.interpolations[index],
                 self.game.fault(side).is_none(),
                 recorded.faults[index].as_ref(),
-                at,
+                location,
             )
         };
         let [first, second] = [read(Side::First)?, read(Side::Second)?];
@@ -265,17 +279,19 @@ fn batch(columns: Vec<ArrayRef>, schema: &SchemaRef) -> RecordBatch {
     RecordBatch::try_new(schema.clone(), columns).expect("the rows are built by their own schema")
 }
 
+/// Refuses a simulated row that differs from the recorded one.
 fn check_same(
-    at: RowLocation,
+    location: RowLocation,
     recorded: &RecordBatch,
     played: &RecordBatch,
 ) -> Result<(), Difference> {
     match compare::first_row_difference(recorded, played) {
         None => Ok(()),
-        Some(cell) => Err(at.difference(&cell.field, cell.recorded, cell.expected)),
+        Some(cell) => Err(location.difference(&cell.field, cell.recorded, cell.expected)),
     }
 }
 
+/// An error of [`GameRows`], which cannot build a row from the recorded values.
 fn unbuildable_row(error: RecordError) -> VerifyError {
     DatasetError::Unreadable(error.to_string()).into()
 }

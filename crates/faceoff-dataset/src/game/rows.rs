@@ -1,3 +1,5 @@
+//! Collects the rows of all tables of a game in memory.
+
 use crate::{
     error::RecordingError,
     table::{EntryRows, MotionRows, RallyRows, SideRows},
@@ -8,8 +10,10 @@ use faceoff_types::Side;
 /// The rows of all tables of a game.
 pub(super) struct GameRows {
     pub motion: MotionRows,
+    /// Observations and actions of each side.
     pub sides: [SideRows; 2],
     pub rallies: RallyRows,
+    /// Start and reset of each side before each rally.
     pub entries: [EntryRows; 2],
 }
 

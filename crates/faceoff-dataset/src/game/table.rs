@@ -1,3 +1,5 @@
+//! Reads a table of a game's recording row by row.
+
 use crate::{
     dataset::{BATCH_ROWS, FileRange, check_columns, check_footer},
     error::DatasetError,
@@ -10,7 +12,7 @@ use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchR
 pub(super) struct GameTable {
     name: &'static str,
     reader: ParquetRecordBatchReader,
-    /// Rows that were read but not used yet; not empty after [`Self::fill`] has found a row.
+    /// Rows that were read but not taken yet; not empty after [`Self::fill`] has found a row.
     buffered: Option<RecordBatch>,
 }
 
@@ -48,7 +50,7 @@ impl GameTable {
         self.name
     }
 
-    /// Number of rows that can be taken at once; 0 after the last row.
+    /// Reads rows if none are buffered. Returns the number of rows that can be taken at once; 0 after the last row.
     pub fn fill(&mut self) -> Result<usize, DatasetError> {
         while self
             .buffered
@@ -66,9 +68,9 @@ impl GameTable {
 
     /// Takes `count` of the buffered rows.
     pub fn take(&mut self, count: usize) -> Option<RecordBatch> {
-        let ahead = self.buffered.take()?;
-        let taken = ahead.slice(0, count);
-        self.buffered = Some(ahead.slice(count, ahead.num_rows() - count));
+        let buffered = self.buffered.take()?;
+        let taken = buffered.slice(0, count);
+        self.buffered = Some(buffered.slice(count, buffered.num_rows() - count));
         Some(taken)
     }
 

@@ -1,3 +1,5 @@
+//! Verification of a game: simulates it again from its recording and compares every number.
+
 use super::{
     archive::game_settings, files::OUTCOME_FILE, recording::GameRecording, replay::GameReplay,
 };
@@ -21,12 +23,12 @@ pub struct VerifiedGame {
     pub score: GameScore,
 }
 
-/// Simulates a game again from its seed and recorded answers, late ones and faults included, and compares
-/// every recorded number bit for bit; then scores it again. Times, texts of faults and logs cannot be simulated;
-/// values that follow from them are recomputed. `progress` receives numbers of simulated control steps.
+/// Simulates a game again from its seed and its recorded answers (late ones and faults included), compares every recorded
+/// number bit for bit, and then scores the game again. Times, texts of faults and logs cannot be simulated; values that
+/// follow from them are recomputed. `progress` receives numbers of simulated control steps.
 ///
 /// # Errors
-/// [`VerifyError::Differs`] with the first difference in order of play; otherwise the reason why nothing could be compared.
+/// [`VerifyError::Differs`] with the first difference in order of play, or the reason why the game cannot be verified.
 pub fn verify_game(
     recording: &GameRecording,
     progress: &dyn Fn(u64),
@@ -61,7 +63,9 @@ fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
     let (manifest, current) = (recording.manifest(), simulator_id());
     let ruleset = manifest.spec.ruleset;
     if !ruleset.has_games() {
-        let with_games = Ruleset::ALL.into_iter().filter(|one| one.has_games());
+        let with_games = Ruleset::ALL
+            .into_iter()
+            .filter(|ruleset| ruleset.has_games());
         let names: Vec<_> = with_games.map(Ruleset::as_str).collect();
         return Err(DatasetError::Foreign(format!(
             "the game states {ruleset}; only {} have games",

@@ -1,3 +1,5 @@
+//! Columns of floating-point numbers of a table.
+
 use arrow_array::{ArrayRef, builder::Float64Builder};
 use arrow_schema::{DataType, Field};
 use faceoff_sim::EpisodeState;
@@ -8,6 +10,7 @@ use std::sync::Arc;
 pub(super) struct FloatColumns {
     fields: Vec<Field>,
     builders: Vec<Float64Builder>,
+    /// Index of the column of the next value.
     next: usize,
 }
 
@@ -22,8 +25,9 @@ impl FloatColumns {
         self
     }
 
-    /// Adds the columns of a true state to the right, with names after `prefix`. The filtered velocities are left
-    /// out: they follow from the other columns, and would add a tenth to the size of a dataset.
+    /// Adds the columns of the simulation's true state (without observation noise) to the right; `prefix` begins their
+    /// names. The filtered velocities are left out: they follow from the other columns, and would add a tenth to the size
+    /// of a dataset.
     pub fn with_state(self, prefix: &str) -> Self {
         let name = |suffix: &str| format!("{prefix}{suffix}");
         self.with(

@@ -1,3 +1,5 @@
+//! Rows of `episodes.parquet`, the table with one row per episode.
+
 use super::{
     columns::FloatColumns,
     steps::{observation_columns, put_observation},
@@ -29,15 +31,19 @@ pub(crate) struct EpisodeRows {
     ends: StringBuilder,
     successes: BooleanBuilder,
     violations: [BooleanBuilder; 4],
+    /// Penalty points and computation times.
     times: FloatColumns,
     faults: StringBuilder,
     actions_blake3: StringBuilder,
     times_blake3: StringBuilder,
     host_noise_reruns: UInt32Builder,
+    /// The true state before the first step.
     initial: FloatColumns,
+    /// The observation after the last answered step.
     last: FloatColumns,
 }
 
+/// Values of an episode's row that are known at its start.
 struct StartedEpisode {
     seed: String,
     interpolation: Option<String>,
@@ -146,13 +152,14 @@ impl EpisodeRows {
         self.steps.append_value(outcome.steps);
         self.ends.append_value(outcome.end.as_str());
         self.successes.append_value(outcome.success);
-        let v = outcome.violations;
-        for (column, value) in
-            self.violations
-                .iter_mut()
-                .zip([v.ee, v.link, v.joint_pos, v.joint_vel])
-        {
-            column.append_value(value);
+        let violations = outcome.violations;
+        for (column, violated) in self.violations.iter_mut().zip([
+            violations.ee,
+            violations.link,
+            violations.joint_pos,
+            violations.joint_vel,
+        ]) {
+            column.append_value(violated);
         }
         self.times.put(&[
             faceoff_scoring::episode_penalty(outcome),

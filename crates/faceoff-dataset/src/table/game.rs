@@ -1,5 +1,5 @@
-//! The tables of a game: the true motion, observations and actions of each side, the rallies, and the start and reset
-//! of each side for them.
+//! The tables of a game of two agents (its *sides*): the true motion, the observations and actions of each side, the
+//! rallies, and the *entries*: how each side entered each rally, with the start and reset of its agent.
 
 use super::{
     columns::{FloatColumns, joints},
@@ -109,13 +109,15 @@ pub(crate) struct SideRows {
     numbers: StepNumbers,
     observations: FloatColumns,
     actions: ListBuilder<Float64Builder>,
+    /// What each answer did: in time, late, fault or held (no answer, after a fault).
     effects: StringBuilder,
-    /// Computation time, host interference, CPU time.
+    /// In the order of [`SIDE_TIMES`].
     times: [Int64Builder; 3],
     constraints: FloatColumns,
 }
 
-/// Columns of a side's answer times, ns: computation time without host interference, host interference, CPU time.
+/// Columns of a side's answer times, ns: computation time without host interference, host interference (time that other
+/// programs on the evaluator's machine took), CPU time.
 pub(crate) const SIDE_TIMES: [&str; 3] = ["computation_time_ns", "host_time_ns", "cpu_time_ns"];
 
 impl SideRows {
@@ -160,12 +162,16 @@ impl SideRows {
         self.effects.append_value(side.effect.as_str());
         let timing = side.timing.as_ref();
         let [computation, host, cpu] = &mut self.times;
-        computation.append_option(timing.map(|a| nanoseconds(a.computation_time_s)));
-        host.append_option(timing.map(|a| nanoseconds(a.host_time_s)));
-        cpu.append_option(timing.and_then(|a| a.cpu_time_s).map(nanoseconds));
-        let c = side.constraints;
-        self.constraints
-            .put(&[c.joint_pos, c.joint_vel, c.ee, c.link]);
+        computation.append_option(timing.map(|timing| nanoseconds(timing.computation_time_s)));
+        host.append_option(timing.map(|timing| nanoseconds(timing.host_time_s)));
+        cpu.append_option(timing.and_then(|timing| timing.cpu_time_s).map(nanoseconds));
+        let constraints = side.constraints;
+        self.constraints.put(&[
+            constraints.joint_pos,
+            constraints.joint_vel,
+            constraints.ee,
+            constraints.link,
+        ]);
         self.constraints.end_row();
     }
 
@@ -184,15 +190,16 @@ impl SideRows {
     }
 }
 
-/// Rows of the rallies, which are public.
+/// Rows of the rallies. Both sides and the public may see them.
 pub(crate) struct RallyRows {
     schema: SchemaRef,
     rallies: UInt32Builder,
     game_steps: UInt32Builder,
-    serves: UInt32Builder,
+    serving_sides: UInt32Builder,
     steps: UInt32Builder,
     ends: StringBuilder,
-    by: UInt32Builder,
+    /// Column `by`: the side that scored the goal or committed the foul; null if the rally ended otherwise.
+    responsible_sides: UInt32Builder,
     scores: [UInt32Builder; 2],
     initial: FloatColumns,
 }
@@ -219,10 +226,10 @@ impl RallyRows {
             schema: Arc::new(Schema::new(fields)),
             rallies: UInt32Builder::new(),
             game_steps: UInt32Builder::new(),
-            serves: UInt32Builder::new(),
+            serving_sides: UInt32Builder::new(),
             steps: UInt32Builder::new(),
             ends: StringBuilder::new(),
-            by: UInt32Builder::new(),
+            responsible_sides: UInt32Builder::new(),
             scores: Default::default(),
             initial,
         }
@@ -235,7 +242,7 @@ impl RallyRows {
     pub fn begin(&mut self, start: &RallyStart<'_>) {
         self.rallies.append_value(start.rally);
         self.game_steps.append_value(start.game_step);
-        self.serves.append_value(start.serves.number());
+        self.serving_sides.append_value(start.serving_side.number());
         self.initial.put(&start.state.puck);
         self.initial.end_row();
     }
@@ -243,7 +250,7 @@ impl RallyRows {
     pub fn end(&mut self, row: &RallyRow<'_>) {
         self.steps.append_value(row.steps);
         self.ends.append_value(row.ending.as_str());
-        self.by
+        self.responsible_sides
             .append_option(row.ending.responsible_side().map(|side| side.number()));
         for (column, score) in self.scores.iter_mut().zip(row.score) {
             column.append_value(score);
@@ -255,10 +262,10 @@ impl RallyRows {
         let mut columns: Vec<ArrayRef> = vec![
             Arc::new(self.rallies.finish()),
             Arc::new(self.game_steps.finish()),
-            Arc::new(self.serves.finish()),
+            Arc::new(self.serving_sides.finish()),
             Arc::new(self.steps.finish()),
             Arc::new(self.ends.finish()),
-            Arc::new(self.by.finish()),
+            Arc::new(self.responsible_sides.finish()),
             Arc::new(first.finish()),
             Arc::new(second.finish()),
         ];
@@ -267,7 +274,7 @@ impl RallyRows {
     }
 }
 
-/// Rows of start and reset of one side for each rally, and of its fault in it.
+/// Rows of one side's entries: for each rally the start and reset of the agent, and its fault in the rally.
 pub(crate) struct EntryRows {
     schema: SchemaRef,
     side: Side,

@@ -1,3 +1,5 @@
+//! Joins the tables of an evaluation's shards (recordings of a part of its episodes) to one table.
+
 use super::{
     steps::{HOST_TIME, schema_with_host_time, with_zero_host_time},
     writer::{TableWriter, schema_metadata},
@@ -24,9 +26,9 @@ use std::{
 /// A table of a shard.
 #[derive(Debug, Clone)]
 pub(crate) enum ShardTable {
-    /// In the current layout: its bytes are copied.
+    /// A table in the current layout: its bytes are copied.
     Current(PathBuf),
-    /// In an earlier layout: its rows are rewritten.
+    /// A table in an earlier layout: its rows are rewritten.
     Earlier(PathBuf),
 }
 
@@ -40,10 +42,10 @@ impl ShardTable {
 }
 
 /// Writes the row groups of several tables with one schema to one file. Tables of earlier layouts are first rewritten
-/// to an unnamed file in the folder `scratch`.
+/// to an unnamed file in the folder `temporary_dir`.
 pub(crate) fn join<W: Write + Send>(
     tables: &[ShardTable],
-    scratch: &Path,
+    temporary_dir: &Path,
     out: W,
 ) -> Result<(), RecordingError> {
     let mut writer: Option<SerializedFileWriter<W>> = None;
@@ -52,7 +54,7 @@ pub(crate) fn join<W: Write + Send>(
         let path = table.path();
         let file = match table {
             ShardTable::Current(path) => File::open(path)?.into_file(),
-            ShardTable::Earlier(path) => rewrite(path, scratch)?,
+            ShardTable::Earlier(path) => rewrite(path, temporary_dir)?,
         };
         let join_error = || RecordingError::unusable(format!("joining {}", path.display()));
         let metadata = ParquetMetaDataReader::new()
@@ -83,6 +85,7 @@ pub(crate) fn join<W: Write + Send>(
     }
 }
 
+/// Begins a table with the columns of the first shard's table.
 fn begin<W: Write + Send>(
     first: &ParquetMetaData,
     out: W,
@@ -106,6 +109,7 @@ fn begin<W: Write + Send>(
     SerializedFileWriter::new(out, schema, Arc::new(properties))
 }
 
+/// Copies all row groups of a table.
 fn append<W: Write + Send>(
     metadata: &ParquetMetaData,
     file: &fs::File,
@@ -131,13 +135,13 @@ fn append<W: Write + Send>(
 }
 
 /// Rewrites a table in the current layout.
-fn rewrite(path: &Path, scratch: &Path) -> Result<fs::File, RecordingError> {
+fn rewrite(path: &Path, temporary_dir: &Path) -> Result<fs::File, RecordingError> {
     let context = format!("reading {}", path.display());
     let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?.into_file())
         .map_err(RecordingError::unusable(&context))?;
-    let file = tempfile::tempfile_in(scratch)?;
+    let file = tempfile::tempfile_in(temporary_dir)?;
     let copy = File::from_parts(file.try_clone()?, path);
-    // Otherwise layouts differ only in properties of the writer.
+    // Apart from this column, the layouts differ only in how the Parquet writer encodes them.
     let lacks_host_time =
         path.ends_with(STEPS_FILE) && builder.schema().column_with_name(HOST_TIME).is_none();
     let schema = if lacks_host_time {

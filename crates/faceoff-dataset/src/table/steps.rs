@@ -1,3 +1,5 @@
+//! Rows of `steps.parquet`, the table with one row per answered control step.
+
 use super::columns::{FloatColumns, joints};
 use crate::times::nanoseconds;
 use arrow_array::{
@@ -9,8 +11,8 @@ use faceoff_episode::StepRow;
 use faceoff_types::Task;
 use std::sync::Arc;
 
-/// Numbers of an observation with an opponent on the table.
-const OBSERVATION_MAX: usize = 23;
+/// Length of the longest observation, which includes the position of an opponent.
+const MAX_OBSERVATION_NUMBERS: usize = 23;
 
 /// Columns of an observation in the protocol's order, with names after `prefix`; absent numbers are null.
 pub(super) fn observation_columns(prefix: &str, nullable: bool) -> FloatColumns {
@@ -30,7 +32,7 @@ pub(super) fn observation_columns(prefix: &str, nullable: bool) -> FloatColumns 
 /// Appends an observation to its columns; an empty observation gives nulls.
 pub(super) fn put_observation(columns: &mut FloatColumns, observation: &[f64]) {
     columns.put(observation);
-    columns.put_absent(OBSERVATION_MAX - observation.len());
+    columns.put_absent(MAX_OBSERVATION_NUMBERS - observation.len());
 }
 
 /// Rows of the table of control steps: one per answered step.
@@ -119,8 +121,13 @@ impl StepRows {
             .append_option(row.timing.cpu_time_s.map(nanoseconds));
         let state_and_constraints = &mut self.state_and_constraints;
         state_and_constraints.put_state(row.state);
-        let c = row.constraints;
-        state_and_constraints.put(&[c.joint_pos, c.joint_vel, c.ee, c.link]);
+        let constraints = row.constraints;
+        state_and_constraints.put(&[
+            constraints.joint_pos,
+            constraints.joint_vel,
+            constraints.ee,
+            constraints.link,
+        ]);
         state_and_constraints.end_row();
     }
 
@@ -144,8 +151,9 @@ impl StepRows {
     }
 }
 
+/// Column of computation times, ns.
 const COMPUTATION_TIME: &str = "computation_time_ns";
-/// Column of host interference, ns; since layout 4.
+/// Column of host interference, ns: time that other programs on the evaluator's machine took. It exists since layout 4.
 pub(crate) const HOST_TIME: &str = "host_time_ns";
 
 /// Adds the column for host interference to the schema of an earlier layout's table of control steps.
@@ -170,7 +178,7 @@ fn host_time_index(schema: &Schema) -> usize {
     times.map_or(schema.fields().len(), |(index, _)| index + 1)
 }
 
-/// Constraint values per step, in the order of the columns.
+/// Columns of the constraint values, in their order in the table. A constraint is violated if its value is above 0.
 pub(crate) const CONSTRAINTS: [&str; 4] = [
     "constraint_joint_pos",
     "constraint_joint_vel",

@@ -1,3 +1,5 @@
+//! Writes a Parquet table, with row groups and pages of a size that lets readers find one episode quickly.
+
 use crate::error::RecordingError;
 use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::{DataType, Schema, SchemaRef};
@@ -19,12 +21,13 @@ const ROW_GROUP_ROWS: usize = 32_768;
 /// Rows after which a page is closed. Reading one episode decompresses one or two pages per column; smaller pages
 /// would make datasets larger for little gain.
 const PAGE_ROWS: usize = 1024;
-/// Most CPU time of a recording is the search for repetitions in noise; higher levels search longer and gain one
-/// percent.
+/// Compression level. Higher levels search longer for repetitions, which noisy measurements do not have: they would cost
+/// most of a recording's CPU time, for files that are one percent smaller.
 const ZSTD_LEVEL: i32 = 1;
 
 /// Writer of one Parquet file.
 pub(crate) struct TableWriter {
+    /// What the writer does, for error messages.
     context: String,
     schema: SchemaRef,
     writer: ArrowWriter<File>,
@@ -32,23 +35,27 @@ pub(crate) struct TableWriter {
 
 impl TableWriter {
     pub fn create(path: &Path, schema: &SchemaRef) -> Result<Self, RecordingError> {
-        Self::create_as(DATASET_SCHEMA, path, schema)
+        Self::create_with_layout(DATASET_SCHEMA, path, schema)
     }
 
     /// Creates a table with the name of a layout in its metadata.
-    pub fn create_as(
+    pub fn create_with_layout(
         layout: &str,
         path: &Path,
         schema: &SchemaRef,
     ) -> Result<Self, RecordingError> {
-        Self::new_as(layout, File::create(path)?, schema)
+        Self::new_with_layout(layout, File::create(path)?, schema)
     }
 
     pub fn new(file: File, schema: &SchemaRef) -> Result<Self, RecordingError> {
-        Self::new_as(DATASET_SCHEMA, file, schema)
+        Self::new_with_layout(DATASET_SCHEMA, file, schema)
     }
 
-    fn new_as(layout: &str, file: File, schema: &SchemaRef) -> Result<Self, RecordingError> {
+    fn new_with_layout(
+        layout: &str,
+        file: File,
+        schema: &SchemaRef,
+    ) -> Result<Self, RecordingError> {
         let context = format!("writing {}", file.path().display());
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties(layout, schema)?))
             .map_err(RecordingError::unusable(&context))?;

@@ -1,4 +1,5 @@
-//! Compares bit for bit: −0 differs from 0, and a missing value differs from every value.
+//! Finds the first difference between a recorded table or JSON file and the expected one. Values are compared bit for bit:
+//! −0 differs from 0, and a missing value differs from every value.
 
 use super::difference::Difference;
 use arrow_array::{
@@ -29,8 +30,9 @@ pub(crate) fn first_row_difference(
         let rows = first.map_or(expected.num_rows(), |(row, _)| row);
         let column = recorded.column_by_name(field.name());
         let differs = |row: &usize| {
-            column
-                .is_none_or(|column| !same(column.as_ref(), expected.column(index).as_ref(), *row))
+            column.is_none_or(|column| {
+                !equal_cells(column.as_ref(), expected.column(index).as_ref(), *row)
+            })
         };
         if let Some(row) = (0..rows).find(differs) {
             first = Some((row, index));
@@ -40,16 +42,17 @@ pub(crate) fn first_row_difference(
         let name = schema.field(index).name().clone();
         CellDifference {
             row,
-            recorded: recorded
-                .column_by_name(&name)
-                .map_or_else(|| "nothing".to_owned(), |column| text(column.as_ref(), row)),
-            expected: text(expected.column(index).as_ref(), row),
+            recorded: recorded.column_by_name(&name).map_or_else(
+                || "nothing".to_owned(),
+                |column| cell_text(column.as_ref(), row),
+            ),
+            expected: cell_text(expected.column(index).as_ref(), row),
             field: name,
         }
     })
 }
 
-fn same(a: &dyn Array, b: &dyn Array, row: usize) -> bool {
+fn equal_cells(a: &dyn Array, b: &dyn Array, row: usize) -> bool {
     if row >= a.len() || a.is_null(row) != b.is_null(row) {
         return false;
     }
@@ -57,7 +60,7 @@ fn same(a: &dyn Array, b: &dyn Array, row: usize) -> bool {
         return true;
     }
     match b.data_type() {
-        DataType::Float64 => float(a, row) == float(b, row),
+        DataType::Float64 => float_bits(a, row) == float_bits(b, row),
         DataType::Int64 => {
             a.as_primitive::<Int64Type>().value(row) == b.as_primitive::<Int64Type>().value(row)
         }
@@ -68,27 +71,27 @@ fn same(a: &dyn Array, b: &dyn Array, row: usize) -> bool {
         DataType::Utf8 => a.as_string::<i32>().value(row) == b.as_string::<i32>().value(row),
         DataType::List(_) => {
             let (a, b) = (a.as_list::<i32>().value(row), b.as_list::<i32>().value(row));
-            a.len() == b.len() && (0..a.len()).all(|i| same(a.as_ref(), b.as_ref(), i))
+            a.len() == b.len() && (0..a.len()).all(|i| equal_cells(a.as_ref(), b.as_ref(), i))
         }
         other => unreachable!("no table has a column of {other}"),
     }
 }
 
-fn float(array: &dyn Array, row: usize) -> u64 {
+fn float_bits(array: &dyn Array, row: usize) -> u64 {
     array.as_primitive::<Float64Type>().value(row).to_bits()
 }
 
-fn text(array: &dyn Array, row: usize) -> String {
+fn cell_text(array: &dyn Array, row: usize) -> String {
     if row >= array.len() || array.is_null(row) {
         return "nothing".to_owned();
     }
     match array.data_type() {
-        DataType::Float64 => format!("{:?}", f64::from_bits(float(array, row))),
+        DataType::Float64 => format!("{:?}", f64::from_bits(float_bits(array, row))),
         DataType::Int64 => array.as_primitive::<Int64Type>().value(row).to_string(),
         DataType::UInt32 => array.as_primitive::<UInt32Type>().value(row).to_string(),
         DataType::Boolean => array.as_boolean().value(row).to_string(),
         DataType::Utf8 => format!("{:?}", array.as_string::<i32>().value(row)),
-        _ => "another list".to_owned(),
+        _ => "a list with other values".to_owned(),
     }
 }
 
@@ -107,15 +110,15 @@ pub(crate) fn json_difference(
         _ => None,
     };
     let (field, recorded, expected) = found.unwrap_or_else(|| {
-        let at = recorded
+        let offset = recorded
             .iter()
             .zip(expected)
             .position(|(a, b)| a != b)
             .unwrap_or_else(|| recorded.len().min(expected.len()));
         (
-            format!("byte {at}"),
+            format!("byte {offset}"),
             format!("a file of {} bytes", recorded.len()),
-            format!("another one of {} bytes", expected.len()),
+            format!("another file of {} bytes", expected.len()),
         )
     });
     Some(Difference {
@@ -130,24 +133,25 @@ pub(crate) fn json_difference(
     })
 }
 
+/// The path of the first different value (`path` is that of the given values), its recorded text and its expected text.
 fn first_json_difference(
     recorded: &Value,
     expected: &Value,
-    at: String,
+    path: String,
 ) -> Option<(String, String, String)> {
     match (recorded, expected) {
         (Value::Object(a), Value::Object(b)) => {
             let missing = a.keys().find(|key| !b.contains_key(*key));
             b.keys().chain(missing).find_map(|key| {
-                let at = if at.is_empty() {
+                let key_path = if path.is_empty() {
                     key.clone()
                 } else {
-                    format!("{at}.{key}")
+                    format!("{path}.{key}")
                 };
                 first_json_difference(
                     a.get(key).unwrap_or(&Value::Null),
                     b.get(key).unwrap_or(&Value::Null),
-                    at,
+                    key_path,
                 )
             })
         }
@@ -155,13 +159,13 @@ fn first_json_difference(
             first_json_difference(
                 a.get(i).unwrap_or(&Value::Null),
                 b.get(i).unwrap_or(&Value::Null),
-                format!("{at}[{i}]"),
+                format!("{path}[{i}]"),
             )
         }),
         // Compare as text, so that −0 differs from 0.
         (a, b) => {
             let (a, b) = (a.to_string(), b.to_string());
-            (a != b).then_some((at, a, b))
+            (a != b).then_some((path, a, b))
         }
     }
 }

@@ -1,3 +1,5 @@
+//! A difference that verification found.
+
 use faceoff_types::Task;
 use serde::Serialize;
 use std::fmt;

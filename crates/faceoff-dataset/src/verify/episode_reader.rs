@@ -1,3 +1,5 @@
+//! Reads the recorded episodes of a dataset or shard one after the other, for their verification.
+
 use super::{difference::Difference, error::VerifyError};
 use crate::{
     dataset::{Columns, Dataset, FileRange, StepBatches, StepTable, episode_batches},
@@ -13,8 +15,9 @@ use std::{collections::BTreeMap, path::Path};
 pub(super) struct RecordedEpisode {
     pub task: Task,
     pub episode: u32,
+    /// The episode's row of `episodes.parquet`.
     pub row: RecordBatch,
-    /// Its steps, as many as the row states.
+    /// The steps of the episode, as many as its row states.
     pub steps: Vec<RecordBatch>,
 }
 
@@ -35,7 +38,9 @@ impl Default for EpisodeBatch {
 
 /// Reads the episodes of a dataset, and checks their order.
 pub(super) struct EpisodeReader<'a> {
+    /// Task and number of the remaining episodes, by the manifest or the shard's specification.
     expected: Box<dyn Iterator<Item = (Task, u32)> + Send + 'a>,
+    /// The remaining rows of `episodes.parquet`.
     rows: Box<dyn Iterator<Item = RecordBatch> + Send>,
     steps: StepBatches,
     steps_of_tasks: BTreeMap<Task, u64>,
@@ -55,7 +60,8 @@ impl<'a> EpisodeReader<'a> {
         ))
     }
 
-    /// Opens a shard that holds the first `played` of the specified episodes.
+    /// Opens a shard (a range of episodes of one task), of whose specified episodes the first `played` were played. The
+    /// paths are those of its two tables.
     pub fn open_shard(
         spec: &ShardSpec,
         played: usize,
@@ -105,24 +111,24 @@ impl<'a> EpisodeReader<'a> {
 
     /// The next `count` episodes; empty after the last.
     pub fn next_episodes(&mut self, count: usize) -> EpisodeBatch {
-        let mut episodes = EpisodeBatch::default();
-        while episodes.episodes.len() < count {
+        let mut batch = EpisodeBatch::default();
+        while batch.episodes.len() < count {
             match self.next_episode() {
-                Ok(Some(episode)) => episodes.episodes.push(episode),
+                Ok(Some(episode)) => batch.episodes.push(episode),
                 Ok(None) => break,
                 Err(error) => {
-                    episodes.result = Err(error);
+                    batch.result = Err(error);
                     break;
                 }
             }
         }
-        episodes
+        batch
     }
 
     /// The next episode; `None` after the last.
     ///
     /// # Errors
-    /// A difference if an episode is missing, repeated or surplus; otherwise a table that cannot be read.
+    /// A difference if an episode is missing, repeated or surplus; another error if a table cannot be read.
     fn next_episode(&mut self) -> Result<Option<RecordedEpisode>, VerifyError> {
         let (task, episode, row) = match (self.expected.next(), self.rows.next()) {
             (None, None) => {

@@ -1,10 +1,12 @@
+//! Errors of a verification.
+
 use super::difference::Difference;
 use crate::error::{DatasetError, RecordingError};
 
 /// Reason why a dataset is not verified.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
-    /// It cannot be read, or this version cannot simulate it.
+    /// The dataset cannot be read, or this version cannot simulate it.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
     /// The recording of a shard is damaged, incomplete, or of another layout or simulator.

@@ -1,3 +1,5 @@
+//! Simulates a recorded episode again with its recorded actions, and compares every number with the recorded one.
+
 use super::{compare, difference::Difference, episode_reader::RecordedEpisode};
 use crate::{
     dataset::Columns,
@@ -26,8 +28,9 @@ pub(super) struct Replayer {
 /// A replayed episode without differences.
 pub(super) struct ReplayedEpisode {
     pub outcome: EpisodeOutcome,
-    /// Data of its steps for scoring.
+    /// Data of the episode's steps for scoring.
     pub steps: Vec<StepMeasurement>,
+    /// How often the episode was played again because other programs disturbed the host.
     pub host_noise_reruns: u32,
 }
 
@@ -39,7 +42,7 @@ struct EpisodeReplay<'a> {
     running: RunningEpisode<ReplayRows>,
 }
 
-/// The expected rows of the episode.
+/// The rows that the simulation gives, which the recording must equal.
 struct ReplayRows {
     steps: StepRows,
     episodes: EpisodeRows,
@@ -59,10 +62,15 @@ impl StepSink for ReplayRows {
     fn step(&mut self, row: &StepRow<'_>) {
         self.steps.push(row);
         self.episodes.step(row);
-        let c = row.constraints;
+        let constraints = row.constraints;
         self.measured.push(StepMeasurement {
             timing: row.timing,
-            constraints: [c.joint_pos, c.joint_vel, c.ee, c.link],
+            constraints: [
+                constraints.joint_pos,
+                constraints.joint_vel,
+                constraints.ee,
+                constraints.link,
+            ],
         });
     }
 
@@ -103,22 +111,22 @@ impl Replayer {
             interpolation: inputs.interpolation.unwrap_or(Interpolation::Cubic),
             running: RunningEpisode::begin(&self.arena, task, episode, inputs.interpolation, rows),
         };
-        let mut ended = None;
+        let mut outcome = None;
         for batch in &recorded.steps {
-            ended = replay.replay_batch(batch)?.or(ended);
+            outcome = replay.replay_batch(batch)?.or(outcome);
         }
-        replay.end(ended, inputs.fault)
+        replay.end(outcome, inputs.fault)
     }
 }
 
 impl EpisodeReplay<'_> {
-    /// Applies the actions of some steps and compares the resulting rows.
+    /// Applies the actions of some steps and compares the resulting rows. Returns the outcome if the episode ended.
     fn replay_batch(&mut self, batch: &RecordBatch) -> Result<Option<EpisodeOutcome>, Difference> {
         let first = self.running.steps();
-        let mut ended = None;
+        let mut outcome = None;
         let error = (0..batch.num_rows()).find_map(|row| match self.step(batch, row) {
-            Ok(outcome) => {
-                ended = outcome.or(ended.take());
+            Ok(step_outcome) => {
+                outcome = step_outcome.or(outcome.take());
                 None
             }
             Err(difference) => Some(difference),
@@ -131,7 +139,7 @@ impl EpisodeReplay<'_> {
             let step = first.saturating_add(u32::try_from(cell.row).unwrap_or(u32::MAX));
             return Err(self.step_difference(step, &cell.field, cell.recorded, cell.expected));
         }
-        error.map_or(Ok(ended), Err)
+        error.map_or(Ok(outcome), Err)
     }
 
     fn step(
@@ -190,7 +198,7 @@ impl EpisodeReplay<'_> {
         }
     }
 
-    /// The recorded times.
+    /// The recorded times, checked.
     fn read_timing(
         &self,
         batch: &RecordBatch,
@@ -231,12 +239,12 @@ impl EpisodeReplay<'_> {
     /// Determines the outcome from the replay and the recorded fault, and compares the episode's row.
     fn end(
         mut self,
-        ended: Option<EpisodeOutcome>,
+        simulated_outcome: Option<EpisodeOutcome>,
         fault: Option<AgentFault>,
     ) -> Result<ReplayedEpisode, Difference> {
         let (recorded, steps) = (self.recorded, self.running.steps());
         let diverged = self.running.diverged().map(ToString::to_string);
-        let outcome = match (ended, fault) {
+        let outcome = match (simulated_outcome, fault) {
             (Some(outcome), None) => outcome,
             (None, Some(fault)) => {
                 let recorded_fault = fault.to_string();
@@ -272,7 +280,7 @@ impl EpisodeReplay<'_> {
                 ));
             }
         };
-        // Cannot be simulated.
+        // The number of re-runs cannot be simulated.
         let reruns = Columns(&recorded.row).int("host_noise_reruns", 0);
         let host_noise_reruns = reruns.unwrap_or_default();
         let rows = self.running.sink();

@@ -1,3 +1,6 @@
+//! Checks that the seeds of a dataset follow from the secret of its season. The secret's hash (the commitment) is published
+//! before the season, the secret at its end.
+
 use faceoff_types::{Seed, StageId};
 use faceoff_wire::dataset::DatasetManifest;
 use jiff::civil::Date;
@@ -12,7 +15,7 @@ pub struct SeasonClaim {
     /// The stage of the evaluation; `None` for a season without stages, or for a first stage that began before stages
     /// existed.
     pub stage: Option<StageId>,
-    /// The date of the evaluation's day.
+    /// The date of the evaluation.
     pub day: Date,
 }
 

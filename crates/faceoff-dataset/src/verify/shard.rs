@@ -1,4 +1,4 @@
-//! Verifies the recording of a shard before it is accepted.
+//! Verifies the recording of a shard (a range of episodes of one task) from a remote worker before it is accepted.
 
 use super::{
     difference::Difference, episode_reader::EpisodeReader, error::VerifyError, replay::Replayer,
@@ -23,8 +23,8 @@ use std::path::Path;
 /// agent's actions.
 ///
 /// # Errors
-/// [`VerifyError::Differs`] with the first difference; [`VerifyError::Recording`] and [`VerifyError::Dataset`] if it is damaged,
-/// incomplete, or of another job.
+/// [`VerifyError::Differs`] with the first difference; [`VerifyError::Recording`] and [`VerifyError::Dataset`] if the recording
+/// is damaged, incomplete, or of another job.
 pub fn verify_shard(
     dir: &Path,
     spec: &ShardSpec,
@@ -46,7 +46,7 @@ pub fn verify_shard(
         spec.seed,
         spec.mismatch_seed,
     );
-    let replay = Replayer::new(spec.ruleset, arena);
+    let replayer = Replayer::new(spec.ruleset, arena);
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
     let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps)?;
     for outcome in outcomes {
@@ -58,7 +58,7 @@ pub fn verify_shard(
         };
         check_outcome(&recorded.row, outcome)?;
         if sample.contains(&outcome.episode) {
-            replay.episode(recorded)?;
+            replayer.episode(recorded)?;
         }
     }
     // No episode may follow.

@@ -1,3 +1,5 @@
+//! Tests of joining shards (recordings of ranges of episodes) to a dataset, and of its score.
+
 use crate::recordings::{Agent, Evaluation, hold_still, json, play, spec, swing_arm, table, unzip};
 use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
 use faceoff_dataset::RecordingError;
@@ -23,18 +25,21 @@ fn two_tasks(agent: Agent) -> Evaluation {
     Evaluation::play(Some(agent), &shards)
 }
 
+/// Asserts that assembling fails with a message that contains `needle`.
 #[track_caller]
-fn refused(evaluation: &Evaluation, needle: &str) {
+fn assert_refused(evaluation: &Evaluation, needle: &str) {
     match evaluation.assemble("refused.zip") {
         Err(RecordingError::Unusable(message)) => {
             assert!(message.contains(needle), "{message:?} lacks {needle:?}");
         }
         other => panic!("{other:?}"),
     }
-    let left = evaluation.dir.path().read_dir().unwrap();
-    let left = left.map(|entry| entry.unwrap().file_name());
+    // No archive is left, complete or not.
+    let entries = evaluation.dir.path().read_dir().unwrap();
+    let names = entries.map(|entry| entry.unwrap().file_name());
     assert_eq!(
-        left.filter(|name| name.to_string_lossy().contains(".zip"))
+        names
+            .filter(|name| name.to_string_lossy().contains(".zip"))
             .count(),
         0
     );
@@ -43,17 +48,17 @@ fn refused(evaluation: &Evaluation, needle: &str) {
 #[test]
 fn dataset_is_complete_and_has_the_direct_score() {
     let mut evaluation = two_tasks(swing_arm);
-    let (one, archive) = evaluation.assemble("one.zip").unwrap();
-    let result = one.result.clone();
+    let (dataset, archive) = evaluation.assemble("one.zip").unwrap();
+    let result = dataset.result.clone();
 
     // Neither the shards' order nor the time has an effect.
     evaluation.shards.reverse();
-    let (again, second) = evaluation.assemble("two.zip").unwrap();
-    assert_eq!(one, again);
+    let (second_dataset, second_archive) = evaluation.assemble("two.zip").unwrap();
+    assert_eq!(dataset, second_dataset);
     let bytes = fs::read(&archive).unwrap();
-    assert!(bytes == fs::read(second).unwrap(), "the same bytes");
+    assert!(bytes == fs::read(second_archive).unwrap(), "the same bytes");
     assert_eq!(
-        (one.archive.bytes, one.archive.blake3),
+        (dataset.archive.bytes, dataset.archive.blake3),
         (
             bytes.len() as u64,
             blake3::hash(&bytes).to_hex().to_string()
@@ -85,10 +90,10 @@ fn dataset_is_complete_and_has_the_direct_score() {
             .iter()
             .flat_map(|report| report.outcomes.iter().filter(|o| o.task == task).cloned())
             .collect();
-        let of_task: &StringArray = steps["task"].as_string();
+        let step_tasks: &StringArray = steps["task"].as_string();
         let nanoseconds = steps["computation_time_ns"].as_primitive::<Int64Type>();
         let mut times = StepTimes::for_steps(outcomes.iter().map(|o| u64::from(o.steps)).sum());
-        for row in (0..steps.num_rows()).filter(|row| of_task.value(*row) == task.as_str()) {
+        for row in (0..steps.num_rows()).filter(|row| step_tasks.value(*row) == task.as_str()) {
             let time = Duration::from_nanos(nanoseconds.value(row).unsigned_abs());
             times.add(time.as_secs_f64());
         }
@@ -150,9 +155,9 @@ fn dataset_is_complete_and_has_the_direct_score() {
 #[test]
 fn violations_name_episode_and_step() {
     // Joint 1 swings to its limit: position, velocity and end effector are violated.
-    let evaluation = two_tasks(|turn| {
-        let mut action = [turn.held, [0.0; 7]];
-        action[0][0] += 0.3 * f64::from(turn.step.unwrap_or(0));
+    let evaluation = two_tasks(|question| {
+        let mut action = [question.initial_joints, [0.0; 7]];
+        action[0][0] += 0.3 * f64::from(question.step.unwrap_or(0));
         action[1][0] = 15.0;
         Some(action)
     });
@@ -160,7 +165,7 @@ fn violations_name_episode_and_step() {
     let dir = evaluation.dir.path().join("dataset");
     unzip(&archive, &dir);
     let file: ViolationsFile = json(&dir.join("violations.json"));
-    for (task, found) in &file.tasks {
+    for (task, violations) in &file.tasks {
         let outcomes: Vec<&EpisodeOutcome> = evaluation
             .reports
             .iter()
@@ -175,10 +180,10 @@ fn violations_name_episode_and_step() {
                 .collect()
         };
         for (listed, flagged) in [
-            (&found.ee, flagged(|o| o.violations.ee)),
-            (&found.link, flagged(|o| o.violations.link)),
-            (&found.joint_pos, flagged(|o| o.violations.joint_pos)),
-            (&found.joint_vel, flagged(|o| o.violations.joint_vel)),
+            (&violations.ee, flagged(|o| o.violations.ee)),
+            (&violations.link, flagged(|o| o.violations.link)),
+            (&violations.joint_pos, flagged(|o| o.violations.joint_pos)),
+            (&violations.joint_vel, flagged(|o| o.violations.joint_vel)),
         ] {
             assert_eq!(
                 listed.iter().map(|v| v.episode).collect::<Vec<_>>(),
@@ -188,14 +193,14 @@ fn violations_name_episode_and_step() {
             assert!(listed.iter().all(|v| v.max > 0.0 && v.steps > 0));
         }
         assert_eq!(
-            found.joint_vel.len(),
+            violations.joint_vel.len(),
             outcomes.len(),
             "the swing is too fast in every episode"
         );
         assert!(
-            found.joint_vel.iter().all(|v| v.first_step < 20),
+            violations.joint_vel.iter().all(|v| v.first_step < 20),
             "{:?}",
-            found.joint_vel
+            violations.joint_vel
         );
     }
 }
@@ -203,30 +208,30 @@ fn violations_name_episode_and_step() {
 #[test]
 fn missing_repeated_and_foreign_shards_are_refused() {
     let mut evaluation = two_tasks(hold_still);
-    let whole = evaluation.shards.clone();
+    let all_shards = evaluation.shards.clone();
     evaluation.shards.remove(2);
-    refused(
+    assert_refused(
         &evaluation,
-        "shard prepare 3..4 does not follow on episode 1",
+        "shard prepare 3..4 does not start at episode 1",
     );
-    evaluation.shards = whole.clone();
-    evaluation.shards.push(whole[2].clone());
-    refused(&evaluation, "episodes are missing or twice");
-    evaluation.shards = whole[2..].to_vec();
-    refused(
+    evaluation.shards = all_shards.clone();
+    evaluation.shards.push(all_shards[2].clone());
+    assert_refused(&evaluation, "episodes are missing or recorded twice");
+    evaluation.shards = all_shards[2..].to_vec();
+    assert_refused(
         &evaluation,
-        "shard prepare 1..3 does not follow on episode 0",
+        "shard prepare 1..3 does not start at episode 0",
     );
     evaluation.shards = Vec::new();
-    refused(&evaluation, "an evaluation without shards");
-    evaluation.shards = whole;
+    assert_refused(&evaluation, "an evaluation without shards");
+    evaluation.shards = all_shards;
     evaluation.meta.ruleset = Ruleset::First;
-    refused(
+    assert_refused(
         &evaluation,
         "was played by airhockey-2023.3, the evaluation by airhockey-2023.1",
     );
     evaluation.meta.seed = evaluation.meta.seed.model_mismatch();
-    refused(&evaluation, "belongs to another evaluation");
+    assert_refused(&evaluation, "belongs to another evaluation");
 }
 
 #[test]
@@ -240,24 +245,24 @@ fn damaged_shards_are_refused() {
         "agent.log",
     ] {
         let path = shard.join(name);
-        let good = fs::read(&path).unwrap();
-        let mut flipped = good.clone();
-        flipped[good.len() / 2] ^= 1;
+        let intact = fs::read(&path).unwrap();
+        let mut flipped = intact.clone();
+        flipped[intact.len() / 2] ^= 1;
         fs::write(&path, &flipped).unwrap();
-        refused(&evaluation, &format!("damaged or incomplete: {name} has"));
-        fs::write(&path, &good[..good.len() - 1]).unwrap();
-        refused(&evaluation, &format!("damaged or incomplete: {name} has"));
+        assert_refused(&evaluation, &format!("damaged or incomplete: {name} has"));
+        fs::write(&path, &intact[..intact.len() - 1]).unwrap();
+        assert_refused(&evaluation, &format!("damaged or incomplete: {name} has"));
         fs::remove_file(&path).unwrap();
-        refused(&evaluation, &format!("{name} is missing"));
-        fs::write(&path, &good).unwrap();
+        assert_refused(&evaluation, &format!("{name} is missing"));
+        fs::write(&path, &intact).unwrap();
     }
     let path = shard.join("shard.json");
-    let good = fs::read(&path).unwrap();
-    fs::write(&path, &good[..good.len() / 2]).unwrap();
-    refused(&evaluation, "damaged or incomplete: shard.json");
+    let intact = fs::read(&path).unwrap();
+    fs::write(&path, &intact[..intact.len() / 2]).unwrap();
+    assert_refused(&evaluation, "damaged or incomplete: shard.json");
     fs::remove_file(&path).unwrap();
-    refused(&evaluation, "damaged or incomplete: shard.json");
-    fs::write(&path, &good).unwrap();
+    assert_refused(&evaluation, "damaged or incomplete: shard.json");
+    fs::write(&path, &intact).unwrap();
     evaluation.assemble("whole.zip").unwrap();
     assert!(evaluation.dir.path().join("whole.zip").exists());
 }
@@ -265,13 +270,18 @@ fn damaged_shards_are_refused() {
 #[test]
 fn evaluation_stopped_by_faults_has_no_score() {
     let evaluation = two_tasks(hold_still);
-    let quits: Agent = |turn| turn.step.is_none().then_some([turn.held, [0.0; 7]]);
+    let faults_in_first_step: Agent = |question| {
+        question
+            .step
+            .is_none()
+            .then_some([question.initial_joints, [0.0; 7]])
+    };
     play(
         &spec(Task::Prepare, 0..4),
-        Some(quits),
+        Some(faults_in_first_step),
         &evaluation.shards[1],
     );
-    refused(&evaluation, "there is no score");
+    assert_refused(&evaluation, "there is no score");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::recordings::{Evaluation, swing_arm};
 use arrow_array::{Array, Int64Array, cast::AsArray, types::Float64Type};
 use faceoff_dataset::{Dataset, assemble};
-use faceoff_replay::{Clip, ContactWith, Group, Key, Pack};
+use faceoff_replay::{Clip, ClipKey, ContactWith, Group, Pack};
 use faceoff_types::Task;
 use std::path::PathBuf;
 
@@ -14,6 +14,10 @@ const SHARDS: [(Task, std::ops::Range<u32>); 4] = [
     (Task::Prepare, 0..2),
 ];
 
+/// Distance of a robot's base from the centre of the table: observations are in the base frame, clips in the table frame.
+const BASE_X_M: f64 = 1.51;
+
+/// A recorded evaluation with its dataset and the pack of its clips.
 struct Fixture {
     evaluation: Evaluation,
     dataset: Dataset,
@@ -25,8 +29,8 @@ fn fixture(name: &str) -> Fixture {
     let evaluation = Evaluation::play(Some(swing_arm), &SHARDS);
     let clips = evaluation.dir.path().join(name);
     let archive = evaluation.archive();
-    let fixture = assemble(&evaluation.meta, &evaluation.shards, &archive, Some(&clips));
-    assert!(fixture.unwrap().clips);
+    let assembled = assemble(&evaluation.meta, &evaluation.shards, &archive, Some(&clips));
+    assert!(assembled.unwrap().clips);
     Fixture {
         dataset: Dataset::open(&archive).unwrap(),
         pack: Pack::open(&clips).unwrap(),
@@ -35,7 +39,7 @@ fn fixture(name: &str) -> Fixture {
     }
 }
 
-fn clip(pack: &Pack, key: Key) -> Clip {
+fn clip(pack: &Pack, key: ClipKey) -> Clip {
     Clip::read(&pack.clip(key).unwrap().expect("the clip is there")).unwrap()
 }
 
@@ -46,8 +50,8 @@ fn samples_match_the_dataset_within_their_resolution() {
         for outcome in &report.outcomes {
             let (task, episode) = (outcome.task, outcome.episode);
             let rows = fixture.dataset.episode(task, episode, None).unwrap();
-            let motion = clip(&fixture.pack, Key::motion(task, episode));
-            let observed = clip(&fixture.pack, Key::observed(task, episode));
+            let motion = clip(&fixture.pack, ClipKey::motion(task, episode));
+            let observed = clip(&fixture.pack, ClipKey::observed(task, episode));
             assert_eq!(motion.header.samples, outcome.steps + 1);
             assert_eq!(motion.column("opponent_q_1").is_some(), task == Task::Hit);
             let mut compared = 0;
@@ -56,7 +60,10 @@ fn samples_match_the_dataset_within_their_resolution() {
                 let name = column.name.as_str();
                 let (expected, skip): (Vec<f64>, usize) = match name {
                     // Observations before each step; the last sample follows the last step.
-                    "seen_x" => (float("obs_puck_x").iter().map(|x| x - 1.51).collect(), 0),
+                    "seen_x" => (
+                        float("obs_puck_x").iter().map(|x| x - BASE_X_M).collect(),
+                        0,
+                    ),
                     "seen_y" => (float("obs_puck_y"), 0),
                     "seen_yaw" => (float("obs_puck_yaw"), 0),
                     "computation_time" => {
@@ -105,8 +112,8 @@ fn contacts_are_near_the_neighbouring_samples() {
     let mut bodies = Vec::new();
     for (task, range) in SHARDS {
         for episode in range {
-            let motion = clip(&fixture.pack, Key::motion(task, episode));
-            let places: Vec<[f64; 2]> = {
+            let motion = clip(&fixture.pack, ClipKey::motion(task, episode));
+            let positions: Vec<[f64; 2]> = {
                 let column = |name: &str| motion.column(name).unwrap().values();
                 column("puck_x")
                     .zip(column("puck_y"))
@@ -115,7 +122,7 @@ fn contacts_are_near_the_neighbouring_samples() {
             };
             for contact in &motion.header.contacts {
                 let step = (contact.t / motion.header.step_s).floor() as usize;
-                for [x, y] in places[step..=step + 1].iter() {
+                for [x, y] in positions[step..=step + 1].iter() {
                     let distance = (x - contact.x).hypot(y - contact.y);
                     assert!(
                         distance < 0.1,
@@ -123,8 +130,9 @@ fn contacts_are_near_the_neighbouring_samples() {
                     );
                 }
                 if contact.what == ContactWith::Rim {
-                    let at_rim = contact.y.abs() > 0.45 || contact.x.abs() > 0.9;
-                    assert!(at_rim, "{contact:?}");
+                    // The rims are at |y| = 0.52 m and |x| = 0.97 m; the puck's radius is 0.03 m.
+                    let is_near_rim = contact.y.abs() > 0.45 || contact.x.abs() > 0.9;
+                    assert!(is_near_rim, "{contact:?}");
                 }
                 bodies.push(contact.what);
             }
@@ -147,7 +155,7 @@ fn clip_index_matches_the_dataset_for_each_episode() {
         .collect();
     assert_eq!(index.episodes.len(), outcomes.len());
     let violations = fixture.dataset.violations().unwrap();
-    let mut broken = 0;
+    let mut compared = 0;
     for outcome in &outcomes {
         let line = index.line(outcome.task, outcome.episode).unwrap();
         assert_eq!(
@@ -155,30 +163,38 @@ fn clip_index_matches_the_dataset_for_each_episode() {
             (outcome.steps, outcome.success, outcome.end)
         );
         assert!(!line.why.is_empty());
-        let motion = clip(&fixture.pack, Key::motion(outcome.task, outcome.episode));
+        let motion = clip(
+            &fixture.pack,
+            ClipKey::motion(outcome.task, outcome.episode),
+        );
         assert_eq!(motion.header.end.unwrap().why, line.why);
-        let of_task = &violations.tasks[&outcome.task];
+        let task_violations = &violations.tasks[&outcome.task];
         for (group, recorded) in [
-            (Group::Ee, &of_task.ee),
-            (Group::Link, &of_task.link),
-            (Group::JointPos, &of_task.joint_pos),
-            (Group::JointVel, &of_task.joint_vel),
+            (Group::Ee, &task_violations.ee),
+            (Group::Link, &task_violations.link),
+            (Group::JointPos, &task_violations.joint_pos),
+            (Group::JointVel, &task_violations.joint_vel),
         ] {
-            let recorded = recorded.iter().find(|one| one.episode == outcome.episode);
-            let found = line.broken.iter().find(|broken| broken.group == group);
+            let recorded = recorded
+                .iter()
+                .find(|violation| violation.episode == outcome.episode);
+            let found = line
+                .broken
+                .iter()
+                .find(|violation| violation.group == group);
             match (recorded, found) {
                 (None, None) => {}
                 (Some(recorded), Some(found)) => {
                     assert_eq!(found.from, recorded.first_step + 1);
                     assert_eq!(found.samples, recorded.steps);
                     assert_eq!(found.worst, recorded.max);
-                    broken += 1;
+                    compared += 1;
                 }
                 (recorded, found) => panic!("{group:?}: {recorded:?} but {found:?}"),
             }
         }
     }
-    assert!(broken > 0, "no violation in the recording");
+    assert!(compared > 0, "no violation in the recording");
     for (task, times) in &index.times {
         let steps: u32 = outcomes
             .iter()
@@ -206,16 +222,16 @@ fn clips_are_at_most_a_quarter_of_the_dataset_size() {
 #[test]
 fn clips_are_the_same_bytes_for_any_order_of_shards() {
     let mut fixture = fixture("clips");
-    let again = fixture.evaluation.dir.path().join("again");
+    let second_pack = fixture.evaluation.dir.path().join("again");
     fixture.evaluation.shards.reverse();
     assemble(
         &fixture.evaluation.meta,
         &fixture.evaluation.shards,
         &fixture.evaluation.archive(),
-        Some(&again),
+        Some(&second_pack),
     )
     .unwrap();
-    assert!(std::fs::read(&fixture.clips).unwrap() == std::fs::read(again).unwrap());
+    assert!(std::fs::read(&fixture.clips).unwrap() == std::fs::read(second_pack).unwrap());
 }
 
 #[test]
@@ -223,33 +239,33 @@ fn truncated_or_overwritten_pack_is_refused() {
     let fixture = fixture("clips");
     let bytes = std::fs::read(&fixture.clips).unwrap();
     let path = fixture.evaluation.dir.path().join("damaged");
-    let refused = |bytes: &[u8]| {
+    let opening_error = |bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
         Pack::open(&path).err().map(|error| error.to_string())
     };
     for length in [0, 10, 31, bytes.len() / 2, bytes.len() - 1] {
-        let message = refused(&bytes[..length]).expect("it is cut off");
+        let message = opening_error(&bytes[..length]).expect("it is cut off");
         assert!(message.contains("cut off"), "{message}");
     }
     let mut other = bytes.clone();
     other[0] ^= 1;
     assert!(
-        refused(&other)
+        opening_error(&other)
             .unwrap()
             .contains("it is not a pack of clips")
     );
-    // The last clip's offset, in the index.
+    // The offset of the last clip, in the last 12 bytes of the index. A footer of 16 bytes follows the index.
     let mut other = bytes.clone();
-    let place = bytes.len() - 16 - 12;
-    other[place + 4] = 0xff;
-    assert!(refused(&other).unwrap().contains("index is damaged"));
-    assert!(refused(&bytes).is_none());
-    // A clip of zeros is refused.
+    let offset_field = bytes.len() - 16 - 12;
+    other[offset_field + 4] = 0xff;
+    assert!(opening_error(&other).unwrap().contains("index is damaged"));
+    assert!(opening_error(&bytes).is_none());
+    // The first clip begins after the 16 bytes that identify a pack. A clip of zeros is refused.
     let mut other = bytes.clone();
     other[16..80].fill(0);
     std::fs::write(&path, &other).unwrap();
     let pack = Pack::open(&path).unwrap();
-    let first = pack.clip(Key::motion(Task::Hit, 0)).unwrap().unwrap();
+    let first = pack.clip(ClipKey::motion(Task::Hit, 0)).unwrap().unwrap();
     let message = Clip::read(&first).unwrap_err().to_string();
     assert!(message.contains("is not a clip"), "{message}");
 }
@@ -266,13 +282,13 @@ fn shards_of_the_previous_layout_have_no_clips() {
     file["files"].as_object_mut().unwrap().remove("clips");
     std::fs::write(&path, file.to_string()).unwrap();
     let clips = evaluation.dir.path().join("clips");
-    let fixture = assemble(
+    let assembled = assemble(
         &evaluation.meta,
         &evaluation.shards,
         &evaluation.archive(),
         Some(&clips),
     )
     .unwrap();
-    assert!(!fixture.clips);
+    assert!(!assembled.clips);
     assert!(!clips.exists());
 }

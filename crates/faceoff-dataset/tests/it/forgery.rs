@@ -1,4 +1,4 @@
-//! Recordings with one changed value and matching hashes.
+//! Helpers that forge recordings: they change a value and update the hashes.
 
 use crate::recordings::table;
 use arrow_array::{
@@ -22,7 +22,7 @@ pub struct Forgery {
 }
 
 impl Forgery {
-    pub fn of(folder: &Path) -> Self {
+    pub fn copy_of(folder: &Path) -> Self {
         let dir = tempfile::tempdir().unwrap();
         for entry in folder.read_dir().unwrap() {
             let entry = entry.unwrap();
@@ -35,7 +35,8 @@ impl Forgery {
         self.dir.path().join(name)
     }
 
-    pub fn table(&self, name: &str, change: impl FnOnce(RecordBatch) -> RecordBatch) {
+    /// Rewrites a table.
+    pub fn change_table(&self, name: &str, change: impl FnOnce(RecordBatch) -> RecordBatch) {
         let path = self.path(name);
         let batch = change(table(&path));
         let mut writer =
@@ -44,18 +45,18 @@ impl Forgery {
         writer.close().unwrap();
     }
 
-    /// Rewrites a text file.
-    pub fn text(&self, name: &str, from: &str, to: &str) {
+    /// Replaces the first occurrence of `from` in a text file.
+    pub fn replace_text(&self, name: &str, from: &str, to: &str) {
         let path = self.path(name);
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.contains(from), "{name} lacks {from:?}: {text}");
         fs::write(&path, text.replacen(from, to, 1)).unwrap();
     }
 
-    /// Updates the manifest's sizes and hashes.
-    pub fn reseal(self) -> Self {
+    /// Updates the manifest's sizes and hashes, so that only the simulation can find the forgery.
+    pub fn update_manifest(self) -> Self {
         let path = self.path("manifest.json");
-        // Works for any layout.
+        // Parsed as plain JSON, which works for any layout.
         let mut manifest: serde_json::Value =
             serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
         for (name, digest) in manifest["files"].as_object_mut().unwrap() {
@@ -124,9 +125,9 @@ fn flip(column: &ArrayRef, row: usize) -> ArrayRef {
             for i in 0..column.len() {
                 let values = column.value(i);
                 let values: &Float64Array = values.as_primitive();
-                for (k, value) in values.values().iter().enumerate() {
-                    // The last number: the velocity of the last joint.
-                    let last = k + 1 == values.len();
+                for (index, value) in values.values().iter().enumerate() {
+                    // The last number of an action is the velocity of the last joint.
+                    let last = index + 1 == values.len();
                     out.values()
                         .append_value(if last { flip_float(i, *value) } else { *value });
                 }
@@ -154,7 +155,7 @@ pub fn flipped(batch: &RecordBatch, name: &str, row: usize) -> RecordBatch {
 
 /// Concatenates batches.
 pub fn concat(parts: &[RecordBatch]) -> RecordBatch {
-    // Through a file, like a forger.
+    // Written to a file and read again, as a forger would.
     let file = tempfile::NamedTempFile::new().unwrap();
     let mut writer = ArrowWriter::try_new(file.reopen().unwrap(), parts[0].schema(), None).unwrap();
     for part in parts {

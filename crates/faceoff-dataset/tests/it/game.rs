@@ -1,4 +1,4 @@
-//! Verification of recorded games, forged games and damaged ones.
+//! Tests of the recording of games: verification of genuine, forged and damaged recordings, and clips for replays.
 
 use crate::{
     forgery::{Forgery, flipped},
@@ -10,7 +10,7 @@ use faceoff_dataset::{
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
 };
 use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame, SideFault};
-use faceoff_replay::{CHUNK_STEPS, Clip, Key, Pack};
+use faceoff_replay::{CHUNK_STEPS, Clip, ClipKey, Pack};
 use faceoff_types::{
     AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
 };
@@ -22,6 +22,7 @@ use std::{
 use tempfile::TempDir;
 use zip::ZipArchive;
 
+/// Control steps of the recorded game.
 const STEPS: u32 = 1600;
 
 fn spec() -> GameSpec {
@@ -83,12 +84,13 @@ fn record(out: &Path) {
             let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {
                 let question = game.question(side).unwrap()?;
-                let mut held: [f64; 7] = question.observation[6..13].try_into().unwrap();
-                held[0] += 0.001 * f64::from(step % 30);
+                let mut joints: [f64; 7] = question.observation[6..13].try_into().unwrap();
+                joints[0] += 0.001 * f64::from(step % 30);
                 let interpolation = interpolations[side.index()].unwrap();
-                Some(interpolation.hold_position(&held)[..interpolation.len()].to_vec())
+                Some(interpolation.hold_position(&joints)[..interpolation.len()].to_vec())
             });
             let responses = [0, 1].map(|side| {
+                // Some answers take longer than a control step of 0.02 s and are late.
                 let computation_time_s = if step % 100 == 7 {
                     0.03125
                 } else {
@@ -129,6 +131,7 @@ fn record(out: &Path) {
     recorded.write(out).unwrap();
 }
 
+/// The folder of a recorded game, and a folder with its unpacked archive.
 fn recorded() -> (TempDir, TempDir) {
     let (out, unpacked) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     record(out.path());
@@ -138,6 +141,7 @@ fn recorded() -> (TempDir, TempDir) {
     (out, unpacked)
 }
 
+/// The number of verified steps, or the text of the error.
 fn verify(path: &Path) -> Result<u32, String> {
     let recording = GameRecording::open(path).map_err(|error| error.to_string())?;
     verify_game(&recording, &|_| ())
@@ -155,9 +159,9 @@ fn recording_verifies_and_is_reproducible() {
     let faults = outcome.sides.each_ref().map(|side| side.faults.len());
     assert!(faults[0] >= 2 && faults[1] >= 2, "{outcome:?}");
     assert!(outcome.sides.iter().all(|side| side.late_answers > 0));
-    let (again, _) = recorded();
+    let (second_out, _) = recorded();
     for name in [GAME_FILE, side_file(Side::First), side_file(Side::Second)] {
-        let bytes = [&out, &again].map(|dir| fs::read(dir.path().join(name)).unwrap());
+        let bytes = [&out, &second_out].map(|dir| fs::read(dir.path().join(name)).unwrap());
         assert!(bytes[0] == bytes[1], "{name}");
         assert!(GameRecording::is_at(&out.path().join(name)).unwrap());
     }
@@ -167,11 +171,11 @@ fn recording_verifies_and_is_reproducible() {
 #[test]
 fn games_of_the_second_ruleset_verify() {
     let (_out, unpacked) = recorded();
-    let earlier = Forgery::of(unpacked.path());
+    let earlier = Forgery::copy_of(unpacked.path());
     for name in ["manifest.json", "results.json"] {
-        earlier.text(name, "airhockey-2023.3", "airhockey-2023.2");
+        earlier.replace_text(name, "airhockey-2023.3", "airhockey-2023.2");
     }
-    assert_eq!(verify(earlier.reseal().dir.path()), Ok(STEPS));
+    assert_eq!(verify(earlier.update_manifest().dir.path()), Ok(STEPS));
 }
 
 /// Forgeries with updated hashes differ from the simulation.
@@ -195,19 +199,19 @@ fn forged_value_in_any_column_is_found() {
             if ["host_time_ns", "cpu_time_ns"].contains(&column.as_str()) {
                 continue;
             }
-            let forged = Forgery::of(unpacked.path());
-            let mut same = false;
-            forged.table(name, |batch| {
+            let forged = Forgery::copy_of(unpacked.path());
+            let mut is_unchanged = false;
+            forged.change_table(name, |batch| {
                 let changed = flipped(&batch, &column, row);
-                same = batch.column_by_name(&column).unwrap().to_data()
+                is_unchanged = batch.column_by_name(&column).unwrap().to_data()
                     == changed.column_by_name(&column).unwrap().to_data();
                 changed
             });
-            if same {
+            if is_unchanged {
                 // The row has no value in this column.
                 continue;
             }
-            let found = verify(forged.reseal().dir.path());
+            let found = verify(forged.update_manifest().dir.path());
             let message = found.expect_err(&format!("{name}, {column}"));
             assert!(!message.is_empty(), "{name}, {column}");
         }
@@ -218,9 +222,9 @@ fn forged_value_in_any_column_is_found() {
 fn difference_names_location_and_field() {
     let (_out, unpacked) = recorded();
     let error_of = |name: &str, change: fn(RecordBatch) -> RecordBatch| {
-        let forged = Forgery::of(unpacked.path());
-        forged.table(name, change);
-        verify(forged.reseal().dir.path()).unwrap_err()
+        let forged = Forgery::copy_of(unpacked.path());
+        forged.change_table(name, change);
+        verify(forged.update_manifest().dir.path()).unwrap_err()
     };
     let message = error_of("motion.parquet", |batch| flipped(&batch, "puck_x", 30));
     assert!(
@@ -237,16 +241,16 @@ fn difference_names_location_and_field() {
         "{message}"
     );
 
-    let forged = Forgery::of(unpacked.path());
-    forged.text("results.json", "\"goals\": 0", "\"goals\": 7");
-    let message = verify(forged.reseal().dir.path()).unwrap_err();
+    let forged = Forgery::copy_of(unpacked.path());
+    forged.replace_text("results.json", "\"goals\": 0", "\"goals\": 7");
+    let message = verify(forged.update_manifest().dir.path()).unwrap_err();
     assert!(
         message.contains("results.json, sides[0].goals"),
         "{message}"
     );
-    let forged = Forgery::of(unpacked.path());
+    let forged = Forgery::copy_of(unpacked.path());
     let seed = spec().seed.to_string();
-    forged.text("manifest.json", &seed, &Seed::from_number(12).to_string());
+    forged.replace_text("manifest.json", &seed, &Seed::from_number(12).to_string());
     let message = verify(forged.dir.path()).unwrap_err();
     assert!(message.contains("rally 0"), "{message}");
 }
@@ -261,7 +265,7 @@ fn damaged_and_foreign_recordings_have_different_errors() {
         GameRecording::open(&archive),
         Err(DatasetError::Unreadable(_))
     ));
-    let forged = Forgery::of(unpacked.path());
+    let forged = Forgery::copy_of(unpacked.path());
     fs::write(forged.path("agent-1.log"), "another log\n").unwrap();
     let altered = GameRecording::open(forged.dir.path()).unwrap_err();
     assert!(matches!(altered, DatasetError::Altered(_)));
@@ -279,8 +283,8 @@ fn damaged_and_foreign_recordings_have_different_errors() {
             "`airhockey-2023.1`, `airhockey-2023.2`, `airhockey-2023.3`",
         ),
     ] {
-        let forged = Forgery::of(unpacked.path());
-        forged.text("manifest.json", from, to);
+        let forged = Forgery::copy_of(unpacked.path());
+        forged.replace_text("manifest.json", from, to);
         let message = verify(forged.dir.path()).unwrap_err();
         assert!(message.contains(expected), "{message}");
     }
@@ -305,7 +309,7 @@ fn clips_of_a_game_match_its_motion() {
     let mut previous_last: Option<f64> = None;
     let mut rallies = 0;
     for chunk in 0..STEPS.div_ceil(CHUNK_STEPS) {
-        let clip = pack.clip(Key::game_motion(chunk)).unwrap().unwrap();
+        let clip = pack.clip(ClipKey::game_motion(chunk)).unwrap().unwrap();
         let clip = Clip::read(&clip).unwrap();
         let first = chunk * CHUNK_STEPS;
         let samples = (STEPS - first).min(CHUNK_STEPS) + 1;
@@ -320,7 +324,7 @@ fn clips_of_a_game_match_its_motion() {
         ] {
             let column = clip.column(column).unwrap();
             let recorded = &float(recorded)[first as usize..(first + samples - 1) as usize];
-            // After the first sample of the chunk.
+            // The first sample repeats the end of the previous chunk.
             for (found, expected) in column.values().skip(1).zip(recorded) {
                 let difference = (found - expected).abs();
                 assert!(difference <= 0.5001 * column.scale, "{}", column.name);
@@ -334,25 +338,32 @@ fn clips_of_a_game_match_its_motion() {
             );
         }
         previous_last = positions.last().copied();
-        for one in &clip.header.breaks {
-            assert!((first + 1..=first + samples).contains(&one.sample));
-            score = one.score;
+        for end in &clip.header.breaks {
+            assert!((first + 1..=first + samples).contains(&end.sample));
+            score = end.score;
             rallies += 1;
         }
         for side in Side::BOTH {
-            let observed = pack.clip(Key::game_observed(side, chunk)).unwrap().unwrap();
+            let observed = pack
+                .clip(ClipKey::game_observed(side, chunk))
+                .unwrap()
+                .unwrap();
             let observed = Clip::read(&observed).unwrap();
             let times = observed.column("computation_time").unwrap();
             assert_eq!(times.counts.len(), samples as usize - 1);
             // The clip has each side's observation in the table frame.
-            let seen = observed.column("seen_x").unwrap();
-            for (seen, place) in seen.values().zip(&positions) {
-                assert!(seen.abs() < 1.2, "{seen} where the puck is at {place}");
+            let observed_x = observed.column("seen_x").unwrap();
+            for (observed_x, true_x) in observed_x.values().zip(&positions) {
+                // Half a table is 0.97 m; in the base frame values would be up to 2.5 m.
+                assert!(
+                    observed_x.abs() < 1.2,
+                    "{observed_x} where the puck is at {true_x}"
+                );
             }
         }
     }
-    let after = Key::game_motion(STEPS.div_ceil(CHUNK_STEPS));
-    assert!(pack.clip(after).unwrap().is_none());
+    let after_last = ClipKey::game_motion(STEPS.div_ceil(CHUNK_STEPS));
+    assert!(pack.clip(after_last).unwrap().is_none());
     let recorded = table(&unpacked.path().join("rallies.parquet"));
     assert_eq!(rallies, recorded.num_rows(), "one end per rally");
 }

@@ -1,4 +1,4 @@
-//! Data of commit e67a08c (layout 2): archives are read, and shards are joined.
+//! Tests that recordings in layout 2 of earlier versions (written by commit e67a08c) are read, verified and joined.
 
 use crate::{
     recordings::{Evaluation, fixture, play, spec, table},
@@ -45,29 +45,30 @@ fn archive_is_read_and_verified() {
             (defend, 1, 53)
         ]
     );
-    let lazily = Dataset::open_lazily(&fixture(ARCHIVE)).unwrap();
+    let lazy_dataset = Dataset::open_lazily(&fixture(ARCHIVE)).unwrap();
     for (task, episode, steps) in steps {
-        let rows = lazily.episode(task, episode, None).unwrap();
+        let rows = lazy_dataset.episode(task, episode, None).unwrap();
         assert_eq!(rows.num_rows(), steps as usize);
     }
 }
 
 #[test]
 fn broken_seal_is_refused() {
-    let good = fs::read(fixture(ARCHIVE)).unwrap();
+    let intact = fs::read(fixture(ARCHIVE)).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("dataset.zip");
-    let tail = good.len() - 2048;
+    // Every byte at both ends, where the archive's structure is, and some of the rest.
+    let tail = intact.len() - 2048;
     let offsets = (0..128)
         .chain((128..tail).step_by(tail / 200))
-        .chain(tail..good.len());
-    let flipped = offsets.map(|at| {
-        let mut bytes = good.clone();
-        bytes[at] ^= 1 << (at % 8);
+        .chain(tail..intact.len());
+    let flipped = offsets.map(|offset| {
+        let mut bytes = intact.clone();
+        bytes[offset] ^= 1 << (offset % 8);
         bytes
     });
-    let truncated = [0, good.len() / 2, good.len() - 1].map(|length| good[..length].to_vec());
-    let longer = [&good[..], b"x"].concat();
+    let truncated = [0, intact.len() / 2, intact.len() - 1].map(|length| intact[..length].to_vec());
+    let longer = [&intact[..], b"x"].concat();
     for (index, bytes) in flipped.chain(truncated).chain([longer]).enumerate() {
         fs::write(&path, bytes).unwrap();
         let opened = Dataset::open(&path);
@@ -79,7 +80,7 @@ fn broken_seal_is_refused() {
             "{index}: {opened:?}"
         );
     }
-    fs::write(&path, &good).unwrap();
+    fs::write(&path, &intact).unwrap();
     Dataset::open(&path).unwrap();
 }
 
@@ -148,7 +149,9 @@ fn assert_only_floats_are_split_by_bytes(path: &Path) {
     let reader = SerializedFileReader::new(fs::File::open(path).unwrap()).unwrap();
     for group in reader.metadata().row_groups() {
         for column in group.columns() {
-            let split = column.encodings().any(|e| e == Encoding::BYTE_STREAM_SPLIT);
+            let split = column
+                .encodings()
+                .any(|encoding| encoding == Encoding::BYTE_STREAM_SPLIT);
             let float = column.column_type() == parquet::basic::Type::DOUBLE;
             assert_eq!(split, float, "{}", column.column_path());
         }

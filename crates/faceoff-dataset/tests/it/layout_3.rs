@@ -1,4 +1,4 @@
-//! Data of commit d418cdf (layout 3): archives without host interference verify.
+//! Tests that datasets in layout 3 (written by commit d418cdf) are read and verified. They do not record host interference.
 
 use crate::{
     recordings::{fixture, table},

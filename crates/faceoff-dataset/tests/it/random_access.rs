@@ -1,3 +1,5 @@
+//! Tests of reading one episode of a dataset without the others.
+
 use crate::recordings::{Evaluation, hold_still, table};
 use arrow_array::{UInt32Array, cast::AsArray};
 use faceoff_dataset::{Dataset, DatasetError};
@@ -41,10 +43,10 @@ fn episode_equals_its_rows_in_the_whole_table() {
         };
         assert!(absent(Task::Prepare, 0, None).contains("no episode of prepare"));
         assert!(absent(Task::Defend, 5, None).contains("there are 5, from 0"));
-        let unknown = absent(Task::Hit, 0, Some(&["speed".to_owned()]));
+        let unknown_column = absent(Task::Hit, 0, Some(&["speed".to_owned()]));
         assert!(
-            unknown.starts_with("there is no column \"speed\""),
-            "{unknown}"
+            unknown_column.starts_with("there is no column \"speed\""),
+            "{unknown_column}"
         );
     }
 }

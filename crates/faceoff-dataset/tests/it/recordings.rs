@@ -1,4 +1,4 @@
-//! Evaluations of agents that are functions: no process, no clock, the same numbers on every machine.
+//! Helpers that record evaluations. Their agents are functions: no process, no clock, the same numbers on every machine.
 
 use arrow_array::RecordBatch;
 use faceoff_dataset::{
@@ -26,23 +26,25 @@ pub struct Question {
     pub episode: u32,
     /// `None` at the reset.
     pub step: Option<u32>,
-    /// The pose in the episode's first observation.
-    pub held: [f64; 7],
+    /// Joint positions in the episode's first observation, rad.
+    pub initial_joints: [f64; 7],
 }
 
 /// Answers with joint positions and velocities, or with a fault (`None`).
 pub type Agent = fn(&Question) -> Option<[[f64; 7]; 2]>;
 
+/// Commands the initial joint positions in each step.
 pub fn hold_still(question: &Question) -> Option<[[f64; 7]; 2]> {
-    Some([question.held, [0.0; 7]])
+    Some([question.initial_joints, [0.0; 7]])
 }
 
 /// Moves the arm, so that every column changes.
 pub fn swing_arm(question: &Question) -> Option<[[f64; 7]; 2]> {
     let offset = 0.002 * f64::from(question.step.unwrap_or(0) % 7);
-    Some([question.held.map(|q| q + offset), [0.1; 7]])
+    Some([question.initial_joints.map(|q| q + offset), [0.1; 7]])
 }
 
+/// The specification of a shard under the current ruleset.
 pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
     let seed = Seed::from_number(7);
     ShardSpec {
@@ -68,7 +70,7 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
     for episode in spec.episodes.clone() {
         let seed = spec.seed.episode(spec.task, episode);
         let factors = spec.profile.factors();
-        let mut world = Episode::new(
+        let mut simulation = Episode::new(
             spec.task,
             Interpolation::Cubic,
             factors,
@@ -80,11 +82,11 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
             episode,
             seed,
             interpolation: agent.map(|_| Interpolation::Cubic),
-            state: &world.state(),
+            state: &simulation.state(),
         });
         let outcome = match agent {
-            Some(agent) => play_episode(spec.task, episode, agent, &mut world, &mut recorder),
-            None => failed(spec.task, None, None, episode, &world, &[]),
+            Some(agent) => play_episode(spec.task, episode, agent, &mut simulation, &mut recorder),
+            None => outcome_after_fault(spec.task, None, None, episode, &simulation, &[]),
         };
         recorder.end(&outcome, 0).unwrap();
         outcomes.push(outcome);
@@ -94,7 +96,7 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
         }
     }
     recorder.finish().unwrap();
-    let trips = RoundTrips {
+    let round_trips = RoundTrips {
         count: 10,
         p50: 1e-5,
         p99: 2e-5,
@@ -105,8 +107,8 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
         outcomes,
         log: "goodbye\n".to_owned(),
         timing: SlotTiming {
-            before_s: trips,
-            during_s: trips,
+            before_s: round_trips,
+            during_s: round_trips,
             longest_stall_s: 0.0,
             host_noise_reruns: 0,
             platform_retries: spec.platform_retries,
@@ -120,32 +122,40 @@ fn play_episode(
     task: Task,
     episode: u32,
     agent: Agent,
-    world: &mut Episode,
+    simulation: &mut Episode,
     recorder: &mut Recorder,
 ) -> EpisodeOutcome {
-    let mut held = [0.0; 7];
+    let mut initial_joints = [0.0; 7];
     // Joint positions follow the puck's six numbers.
-    held.copy_from_slice(&world.observation()[6..13]);
+    initial_joints.copy_from_slice(&simulation.observation()[6..13]);
     let ask = |step| {
         agent(&Question {
             episode,
             step,
-            held,
+            initial_joints,
         })
     };
     if ask(None).is_none() {
-        return failed(task, Some(episode), None, episode, world, &[]);
+        return outcome_after_fault(task, Some(episode), None, episode, simulation, &[]);
     }
     let mut times_s = Vec::new();
     loop {
-        let step = world.steps();
+        let step = simulation.steps();
         let Some(action) = ask(Some(step)) else {
-            return failed(task, Some(episode), Some(step), episode, world, &times_s);
+            return outcome_after_fault(
+                task,
+                Some(episode),
+                Some(step),
+                episode,
+                simulation,
+                &times_s,
+            );
         };
+        // Times around 0.1 ms that differ from step to step: two primes make them look irregular.
         let time = Duration::from_nanos(100_000 + u64::from(step) * 7919 % 977);
         times_s.push(time.as_secs_f64());
-        recorder.observe(world.observation());
-        let outcome = world.step(action.as_flattened());
+        recorder.observe(simulation.observation());
+        let outcome = simulation.step(action.as_flattened());
         recorder.step(&StepRow {
             step,
             action: action.as_flattened(),
@@ -154,14 +164,21 @@ fn play_episode(
                 host_time_s: 0.0,
                 cpu_time_s: (!step.is_multiple_of(5)).then(|| (time / 2).as_secs_f64()),
             },
-            state: &world.state(),
+            state: &simulation.state(),
             constraints: outcome.constraints,
-            next_observation: world.observation(),
-            puck_lost: world.is_puck_lost(),
-            impacts: world.world().impacts(),
+            next_observation: simulation.observation(),
+            puck_lost: simulation.is_puck_lost(),
+            impacts: simulation.world().impacts(),
         });
-        if let Some(divergence) = world.divergence() {
-            let mut outcome = failed(task, Some(episode), Some(step), episode, world, &times_s);
+        if let Some(divergence) = simulation.divergence() {
+            let mut outcome = outcome_after_fault(
+                task,
+                Some(episode),
+                Some(step),
+                episode,
+                simulation,
+                &times_s,
+            );
             let detail = divergence.cause.to_string();
             let fault = AgentFaultKind::Diverged { detail };
             outcome.fault.as_mut().unwrap().fault = fault;
@@ -171,10 +188,10 @@ fn play_episode(
             return EpisodeOutcome {
                 task,
                 episode,
-                steps: world.steps(),
+                steps: simulation.steps(),
                 end,
-                success: world.success(),
-                violations: world.violations(),
+                success: simulation.success(),
+                violations: simulation.violations(),
                 computation_time: summary(&times_s),
                 fault: None,
             };
@@ -182,27 +199,29 @@ fn play_episode(
     }
 }
 
-fn failed(
+/// The outcome of an episode that an agent fault ended. `fault_episode` and `fault_step` are those of the fault: `None` for a
+/// fault at the agent's start or at the reset.
+fn outcome_after_fault(
     task: Task,
-    during: Option<u32>,
-    step: Option<u32>,
+    fault_episode: Option<u32>,
+    fault_step: Option<u32>,
     episode: u32,
-    world: &Episode,
+    simulation: &Episode,
     times_s: &[f64],
 ) -> EpisodeOutcome {
     EpisodeOutcome {
         task,
         episode,
-        steps: world.steps(),
+        steps: simulation.steps(),
         end: EpisodeEnd::AgentFault,
         success: false,
-        violations: world.violations(),
+        violations: simulation.violations(),
         computation_time: summary(times_s),
         fault: Some(AgentFault {
             fault: AgentFaultKind::NonFinite,
             agent_task: task.into(),
-            episode: during,
-            step,
+            episode: fault_episode,
+            step: fault_step,
             line: None,
         }),
     }
@@ -285,6 +304,7 @@ impl Evaluation {
     }
 }
 
+/// Unpacks an archive and returns the names of its files, in order.
 pub fn unzip(archive: &Path, into: &Path) -> Vec<String> {
     let mut zip = ZipArchive::new(File::open(archive).unwrap()).unwrap();
     zip.extract(into).unwrap();

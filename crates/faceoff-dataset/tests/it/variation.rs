@@ -1,5 +1,5 @@
-//! Evaluations with other weights, bounds and magnitudes than the ruleset's: they are recorded in the dataset, and
-//! verification uses them.
+//! Tests of evaluations with a variation: weights of tasks, bounds of tiers and magnitudes of perturbations other than the
+//! ruleset's. The dataset records them, and verification uses them.
 
 use crate::{
     forgery::Forgery,
@@ -13,7 +13,8 @@ use serde_json::{Value, json};
 
 const SHARDS: [(Task, std::ops::Range<u32>); 2] = [(Task::Hit, 0..2), (Task::Defend, 0..2)];
 
-fn wild() -> Variation {
+/// A variation that differs from the ruleset in all respects.
+fn large_variation() -> Variation {
     serde_json::from_value(json!({
         "weights": { "hit": 0.125, "defend": 0.875, "prepare": 0.0 },
         "tier_bounds": { "deployable": 5.0, "improvable": 10.0 },
@@ -29,11 +30,12 @@ fn wild() -> Variation {
 
 #[test]
 fn dataset_records_its_variation_and_verifies_with_it() {
-    let played = Evaluation::play_with_variation(wild(), Some(swing_arm), &SHARDS).assembled();
+    let played =
+        Evaluation::play_with_variation(large_variation(), Some(swing_arm), &SHARDS).assembled();
     let verified = check(&played.archive(), 2).unwrap();
-    assert_eq!(verified.result.variation, wild());
+    assert_eq!(verified.result.variation, large_variation());
     let dataset = Dataset::open(&played.archive()).unwrap();
-    assert_eq!(dataset.manifest().variation, wild());
+    assert_eq!(dataset.manifest().variation, large_variation());
     for name in ["manifest.json", "results.json"] {
         let file: Value = json(&played.folder().join(name));
         assert_eq!(file["weights"]["defend"], 0.875, "{name}");
@@ -61,29 +63,38 @@ fn dataset_records_its_variation_and_verifies_with_it() {
 
 #[test]
 fn forged_variation_is_found() {
-    let played = Evaluation::play_with_variation(wild(), Some(swing_arm), &SHARDS).assembled();
+    let played =
+        Evaluation::play_with_variation(large_variation(), Some(swing_arm), &SHARDS).assembled();
     let forged = |change: &dyn Fn(&mut Variation)| {
-        let forgery = Forgery::of(&played.folder());
+        let forgery = Forgery::copy_of(&played.folder());
         let path = forgery.path("manifest.json");
         let mut manifest: DatasetManifest = json(&path);
         change(&mut manifest.variation);
         std::fs::write(&path, serde_json::to_vec(&manifest).unwrap()).unwrap();
-        check(forgery.reseal().dir.path(), 2)
+        check(forgery.update_manifest().dir.path(), 2)
     };
-    let calmer = forged(&|variation| variation.perturbations.tracking_loss.probability = 0.03);
-    assert!(matches!(calmer, Err(VerifyError::Differs(_))), "{calmer:?}");
+    let fewer_losses =
+        forged(&|variation| variation.perturbations.tracking_loss.probability = 0.03);
+    assert!(
+        matches!(fewer_losses, Err(VerifyError::Differs(_))),
+        "{fewer_losses:?}"
+    );
     let weights = forged(&|variation| variation.weights = Default::default());
     assert!(
         matches!(weights, Err(VerifyError::Differs(_))),
         "{weights:?}"
     );
-    let nowhere = forged(&|variation| variation.perturbations.delay.tilt_m_s2 = 1e9).unwrap_err();
-    assert!(nowhere.to_string().contains("delay.tilt_m_s2"), "{nowhere}");
+    let impossible_tilt =
+        forged(&|variation| variation.perturbations.delay.tilt_m_s2 = 1e9).unwrap_err();
+    assert!(
+        impossible_tilt.to_string().contains("delay.tilt_m_s2"),
+        "{impossible_tilt}"
+    );
 }
 
 #[test]
 fn shards_of_other_magnitudes_are_not_joined() {
-    let mut played = Evaluation::play_with_variation(wild(), Some(swing_arm), &SHARDS);
+    let mut played = Evaluation::play_with_variation(large_variation(), Some(swing_arm), &SHARDS);
     *played.meta.variation.perturbations = PerturbationSettings::default();
     let refused = played.assemble("dataset.zip").unwrap_err().to_string();
     assert!(refused.contains("other magnitudes"), "{refused}");
@@ -94,7 +105,7 @@ fn unreachable_plant_ranges_are_detected_in_advance() {
     let seed = faceoff_types::Seed::from_number(7).model_mismatch();
     let mut settings = PerturbationSettings::default();
     assert!(can_draw_plant(&settings, seed));
-    assert!(can_draw_plant(&wild().perturbations, seed));
+    assert!(can_draw_plant(&large_variation().perturbations, seed));
     settings.model_mismatch.static_error_m = [0.9, 1.0];
     assert!(
         !can_draw_plant(&settings, seed),

@@ -36,9 +36,10 @@ fn played() -> &'static Evaluation {
 }
 
 fn forgery() -> Forgery {
-    Forgery::of(&played().folder())
+    Forgery::copy_of(&played().folder())
 }
 
+/// Opens and verifies a dataset on `workers` threads.
 pub fn check(path: &Path, workers: usize) -> Result<VerifiedDataset, VerifyError> {
     verify(
         &Dataset::open(path)?,
@@ -55,7 +56,8 @@ fn difference(path: &Path, workers: usize) -> Difference {
     }
 }
 
-fn names(file: &str) -> Vec<String> {
+/// Names of the columns of a table.
+fn column_names(file: &str) -> Vec<String> {
     let batch = table(&played().folder().join(file));
     let schema = batch.schema();
     schema
@@ -68,32 +70,36 @@ fn names(file: &str) -> Vec<String> {
 #[test]
 fn recording_verifies_packed_unpacked_and_on_any_threads() {
     let played = played();
-    let done = AtomicU32::new(0);
+    let progress_calls = AtomicU32::new(0);
     let dataset = Dataset::open(&played.archive()).unwrap();
-    let one = verify(&dataset, NonZero::<usize>::MIN, &|| {
-        done.fetch_add(1, Ordering::Relaxed);
+    let verified = verify(&dataset, NonZero::<usize>::MIN, &|| {
+        progress_calls.fetch_add(1, Ordering::Relaxed);
     })
     .unwrap();
-    assert_eq!((one.episodes, done.into_inner()), (4, 4));
-    assert_eq!(one.result, dataset.results().unwrap());
+    assert_eq!((verified.episodes, progress_calls.into_inner()), (4, 4));
+    assert_eq!(verified.result, dataset.results().unwrap());
     assert_eq!(
-        one.steps,
-        one.result
+        verified.steps,
+        verified
+            .result
             .tasks
             .values()
             .map(|task| task.steps)
             .sum::<u64>()
     );
-    assert_eq!(check(&played.folder(), 8).unwrap(), one);
+    assert_eq!(check(&played.folder(), 8).unwrap(), verified);
     assert_eq!(
         check(played.dir.path(), 3).unwrap(),
-        one,
+        verified,
         "as `faceoff eval` leaves it"
     );
     // A table rewritten by another program with the same numbers verifies too.
     let rewritten = forgery();
-    rewritten.table("steps.parquet", |batch| batch);
-    assert_eq!(check(rewritten.reseal().dir.path(), 2).unwrap(), one);
+    rewritten.change_table("steps.parquet", |batch| batch);
+    assert_eq!(
+        check(rewritten.update_manifest().dir.path(), 2).unwrap(),
+        verified
+    );
 }
 
 #[test]
@@ -116,17 +122,17 @@ fn flipped_bit_in_any_step_column_is_located() {
         .find(|row| tasks.value(*row) == "hit" && episodes.value(*row) == 1)
         .unwrap();
     let row = start + 17;
-    for name in names("steps.parquet") {
+    for name in column_names("steps.parquet") {
         let forgery = forgery();
-        forgery.table("steps.parquet", |batch| flipped(&batch, &name, row));
-        let found = difference(forgery.reseal().dir.path(), 2);
+        forgery.change_table("steps.parquet", |batch| flipped(&batch, &name, row));
+        let found = difference(forgery.update_manifest().dir.path(), 2);
         assert_eq!(
             (found.task, found.episode),
             (Some(Task::Hit), Some(1)),
             "{name}: {found}"
         );
         match name.as_str() {
-            // The digest detects changes without effect on other numbers.
+            // The hashes of actions and times detect changes without effect on other numbers.
             "computation_time_ns" | "host_time_ns" | "cpu_time_ns" => {
                 assert_eq!(found.step, None, "{found}");
                 let fields = ["computation_time_mean_s", "times_blake3"];
@@ -144,23 +150,24 @@ fn flipped_bit_in_any_step_column_is_located() {
 #[test]
 fn changed_action_is_found_at_its_step() {
     let forgery = forgery();
-    forgery.table("steps.parquet", |batch| {
+    forgery.change_table("steps.parquet", |batch| {
         let (index, _) = batch
             .schema()
             .column_with_name("action")
-            .map(|(i, f)| (i, f.clone()))
+            .map(|(index, field)| (index, field.clone()))
             .unwrap();
         let column: &ListArray = batch.column(index).as_list();
         let DataType::List(item) = column.data_type() else {
             panic!("actions are lists");
         };
         let mut out = ListBuilder::new(Float64Builder::new()).with_field(item.clone());
-        for i in 0..column.len() {
-            let values = column.value(i);
+        for step in 0..column.len() {
+            let values = column.value(step);
             let values: &Float64Array = values.as_primitive();
-            for (k, value) in values.values().iter().enumerate() {
+            for (index, value) in values.values().iter().enumerate() {
+                let is_changed = (step, index) == (5, 0);
                 out.values()
-                    .append_value(value + if (i, k) == (5, 0) { 1e-9 } else { 0.0 });
+                    .append_value(value + if is_changed { 1e-9 } else { 0.0 });
             }
             out.append(true);
         }
@@ -168,7 +175,7 @@ fn changed_action_is_found_at_its_step() {
         columns[index] = Arc::new(out.finish());
         RecordBatch::try_new(batch.schema(), columns).unwrap()
     });
-    let forgery = forgery.reseal();
+    let forgery = forgery.update_manifest();
     let found = difference(forgery.dir.path(), 1);
     assert_eq!(
         (found.task, found.episode, found.step),
@@ -189,13 +196,13 @@ fn changed_action_is_found_at_its_step() {
 
 #[test]
 fn flipped_bit_in_any_episode_column_is_found() {
-    for name in names("episodes.parquet") {
+    for name in column_names("episodes.parquet") {
         // The opponent's columns are absent in `defend`: take `hit`.
         let forgery = forgery();
-        forgery.table("episodes.parquet", |batch| flipped(&batch, &name, 1));
-        let found = difference(forgery.reseal().dir.path(), 2);
+        forgery.change_table("episodes.parquet", |batch| flipped(&batch, &name, 1));
+        let found = difference(forgery.update_manifest().dir.path(), 2);
         if name == "host_noise_reruns" {
-            // Only the slots' count shows the change.
+            // Only the total in the timing measurements of the slots shows the change.
             assert_eq!((&found.field, found.file), (&name, "calibration.json"));
             continue;
         }
@@ -242,13 +249,13 @@ fn forged_scores_are_found() {
         ),
     ] {
         let forgery = forgery();
-        forgery.text(name, from, to);
+        forgery.replace_text(name, from, to);
         // The hash shows the change; with updated hashes, the simulation does.
         match Dataset::open(forgery.dir.path()) {
             Err(DatasetError::Altered(message)) => assert!(message.starts_with(name), "{message}"),
             other => panic!("{other:?}"),
         }
-        let found = difference(forgery.reseal().dir.path(), 2);
+        let found = difference(forgery.update_manifest().dir.path(), 2);
         assert_eq!(found.file, name);
         assert_eq!(found.field, field, "{found}");
     }
@@ -266,7 +273,7 @@ fn forged_seeds_and_profiles_are_found() {
         ),
     ] {
         let forgery = forgery();
-        forgery.text("manifest.json", &from, &to);
+        forgery.replace_text("manifest.json", &from, &to);
         let found = difference(forgery.dir.path(), 2);
         assert_eq!(
             (found.task, found.episode, found.step),
@@ -278,57 +285,63 @@ fn forged_seeds_and_profiles_are_found() {
 
 #[test]
 fn missing_repeated_and_surplus_rows_are_found() {
-    let without = |table: &str, row: usize| {
+    let without_row = |table: &str, row: usize| {
         let forgery = forgery();
-        forgery.table(table, |batch| {
+        forgery.change_table(table, |batch| {
             let parts = [
                 batch.slice(0, row),
                 batch.slice(row + 1, batch.num_rows() - row - 1),
             ];
             concat(&parts)
         });
-        difference(forgery.reseal().dir.path(), 2)
+        difference(forgery.update_manifest().dir.path(), 2)
     };
-    let twice = |table: &str, row: usize| {
+    let with_row_twice = |table: &str, row: usize| {
         let forgery = forgery();
-        forgery.table(table, |batch| {
+        forgery.change_table(table, |batch| {
             concat(&[
                 batch.slice(0, row + 1),
                 batch.slice(row, batch.num_rows() - row),
             ])
         });
-        difference(forgery.reseal().dir.path(), 2)
+        difference(forgery.update_manifest().dir.path(), 2)
     };
     let last = table(&played().folder().join("steps.parquet")).num_rows() - 1;
-    let place = |found: &Difference| (found.task, found.episode, found.step);
+    let location = |found: &Difference| (found.task, found.episode, found.step);
     let (hit, defend) = (Some(Task::Hit), Some(Task::Defend));
-    assert_eq!(place(&without("steps.parquet", 3)), (hit, Some(0), Some(3)));
-    assert_eq!(place(&twice("steps.parquet", 3)), (hit, Some(0), Some(4)));
-    let found = without("steps.parquet", last);
+    assert_eq!(
+        location(&without_row("steps.parquet", 3)),
+        (hit, Some(0), Some(3))
+    );
+    assert_eq!(
+        location(&with_row_twice("steps.parquet", 3)),
+        (hit, Some(0), Some(4))
+    );
+    let found = without_row("steps.parquet", last);
     assert_eq!((found.task, found.episode), (defend, Some(1)), "{found}");
-    let found = twice("steps.parquet", last);
+    let found = with_row_twice("steps.parquet", last);
     assert_eq!(
         (found.task, found.episode, &*found.field),
         (defend, Some(1), "rows")
     );
-    let found = without("episodes.parquet", 1);
+    let found = without_row("episodes.parquet", 1);
     assert_eq!(
-        (place(&found), &*found.field),
+        (location(&found), &*found.field),
         ((hit, Some(1), None), "task")
     );
-    let found = twice("episodes.parquet", 0);
+    let found = with_row_twice("episodes.parquet", 0);
     assert_eq!(
-        (place(&found), &*found.field),
+        (location(&found), &*found.field),
         ((hit, Some(1), None), "episode")
     );
-    let found = without("episodes.parquet", 3);
+    let found = without_row("episodes.parquet", 3);
     assert_eq!(
-        (place(&found), &*found.recorded),
+        (location(&found), &*found.recorded),
         ((defend, Some(1), None), "nothing")
     );
-    let found = twice("episodes.parquet", 3);
+    let found = with_row_twice("episodes.parquet", 3);
     assert_eq!(
-        (place(&found), &*found.field),
+        (location(&found), &*found.field),
         ((defend, Some(1), None), "rows")
     );
 }
@@ -345,32 +358,39 @@ fn contents(dataset: &Dataset) -> (EvaluationResult, Vec<EpisodeRecord>, Dataset
 
 #[test]
 fn damaged_archive_is_refused_or_has_intact_files() {
-    let good = fs::read(played().archive()).unwrap();
+    let intact = fs::read(played().archive()).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("dataset.zip");
     let whole = Dataset::open(&played().archive()).unwrap();
     let hash = whole.archive().unwrap().unwrap().blake3;
     let whole = contents(&whole);
     // Every byte at both ends, where the archive's structure is, and some of the rest.
-    let tail = good.len() - 2048;
+    let tail = intact.len() - 2048;
     let offsets = (0..128)
         .chain((128..tail).step_by(tail / 200))
-        .chain(tail..good.len());
-    for at in offsets {
-        let mut bytes = good.clone();
-        bytes[at] ^= 1 << (at % 8);
+        .chain(tail..intact.len());
+    for offset in offsets {
+        let mut bytes = intact.clone();
+        bytes[offset] ^= 1 << (offset % 8);
         fs::write(&path, &bytes).unwrap();
         match Dataset::open(&path) {
             Err(DatasetError::Altered(_) | DatasetError::Unreadable(_)) => {}
-            Err(other) => panic!("byte {at} flipped: {other:?}"),
+            Err(other) => panic!("byte {offset} flipped: {other:?}"),
             Ok(dataset) => {
-                assert_eq!(contents(&dataset), whole, "byte {at} flipped");
+                assert_eq!(contents(&dataset), whole, "byte {offset} flipped");
                 assert_ne!(dataset.archive().unwrap().unwrap().blake3, hash);
             }
         }
     }
-    for length in [0, 1, 100, good.len() / 2, good.len() - 100, good.len() - 1] {
-        fs::write(&path, &good[..length]).unwrap();
+    for length in [
+        0,
+        1,
+        100,
+        intact.len() / 2,
+        intact.len() - 100,
+        intact.len() - 1,
+    ] {
+        fs::write(&path, &intact[..length]).unwrap();
         let refused = Dataset::open(&path);
         assert!(
             matches!(
@@ -391,9 +411,9 @@ fn lazily_opened_files_are_checked_when_read() {
         "results.json",
         "calibration.json",
     ] {
-        let good = fs::read(forgery.path(name)).unwrap();
-        let mut bytes = good.clone();
-        bytes[good.len() / 2] ^= 1;
+        let intact = fs::read(forgery.path(name)).unwrap();
+        let mut bytes = intact.clone();
+        bytes[intact.len() / 2] ^= 1;
         fs::write(forgery.path(name), &bytes).unwrap();
         let dataset = Dataset::open_lazily(forgery.dir.path()).unwrap();
         let read = [
@@ -410,7 +430,7 @@ fn lazily_opened_files_are_checked_when_read() {
                 other => assert!(other.is_ok() && file != name, "{file}: {other:?}"),
             }
         }
-        fs::write(forgery.path(name), &good).unwrap();
+        fs::write(forgery.path(name), &intact).unwrap();
     }
 }
 
@@ -423,14 +443,14 @@ fn damaged_files_in_a_folder_are_refused() {
         "results.json",
     ] {
         let forgery = forgery();
-        let good = fs::read(forgery.path(name)).unwrap();
-        for at in (0..good.len()).step_by(good.len().div_ceil(40)) {
-            let mut bytes = good.clone();
-            bytes[at] ^= 0x10;
+        let intact = fs::read(forgery.path(name)).unwrap();
+        for offset in (0..intact.len()).step_by(intact.len().div_ceil(40)) {
+            let mut bytes = intact.clone();
+            bytes[offset] ^= 0x10;
             fs::write(forgery.path(name), &bytes).unwrap();
             match Dataset::open(forgery.dir.path()) {
                 Err(DatasetError::Altered(text)) => assert!(text.starts_with(name), "{text}"),
-                other => panic!("{name}, byte {at}: {other:?}"),
+                other => panic!("{name}, byte {offset}: {other:?}"),
             }
         }
         fs::remove_file(forgery.path(name)).unwrap();
@@ -443,7 +463,7 @@ fn damaged_files_in_a_folder_are_refused() {
     let forgery = forgery();
     let steps = fs::read(forgery.path("steps.parquet")).unwrap();
     fs::write(forgery.path("steps.parquet"), &steps[..steps.len() / 2]).unwrap();
-    let result = check(forgery.reseal().dir.path(), 2);
+    let result = check(forgery.update_manifest().dir.path(), 2);
     assert!(
         matches!(
             result,
@@ -480,7 +500,7 @@ fn foreign_layouts_rulesets_and_simulators_are_named() {
         ),
     ] {
         let forgery = forgery();
-        forgery.text("manifest.json", from, to);
+        forgery.replace_text("manifest.json", from, to);
         match check(forgery.dir.path(), 1) {
             Err(VerifyError::Dataset(DatasetError::Foreign(message))) => {
                 assert!(message.contains(expected), "{message}");
@@ -495,9 +515,9 @@ fn datasets_of_earlier_rulesets_verify() {
     for earlier in ["airhockey-2023.1", "airhockey-2023.2"] {
         let forgery = forgery();
         for name in ["manifest.json", "results.json"] {
-            forgery.text(name, "airhockey-2023.3", earlier);
+            forgery.replace_text(name, "airhockey-2023.3", earlier);
         }
-        let verified = check(forgery.reseal().dir.path(), 2).unwrap();
+        let verified = check(forgery.update_manifest().dir.path(), 2).unwrap();
         assert_eq!(verified.result.ruleset, earlier);
         assert_eq!(verified.episodes, 4);
     }
@@ -507,15 +527,15 @@ fn datasets_of_earlier_rulesets_verify() {
 fn datasets_with_agent_faults_verify() {
     let agent: Agent = |question| match (question.episode, question.step) {
         (1, Some(4)) | (2, None) => None,
-        _ => Some([question.held, [0.0; 7]]),
+        _ => Some([question.initial_joints, [0.0; 7]]),
     };
     let faulty = Evaluation::play(Some(agent), &[(Task::Prepare, 0..4)]).assembled();
     let verified = check(&faulty.archive(), 2).unwrap();
     assert_eq!(verified.episodes, 4);
     let violations = &verified.result.tasks[&Task::Prepare].violations;
     assert_eq!(violations.computation_time, 2, "the two faults");
-    let silent = Evaluation::play(None, &[(Task::Hit, 0..2)]).assembled();
-    assert_eq!(check(&silent.archive(), 1).unwrap().steps, 0);
+    let never_started = Evaluation::play(None, &[(Task::Hit, 0..2)]).assembled();
+    assert_eq!(check(&never_started.archive(), 1).unwrap().steps, 0);
 }
 
 #[test]
@@ -535,20 +555,23 @@ fn seeds_follow_from_the_revealed_secret() {
         day,
     };
     assert_eq!(claim.check(&manifest), Ok(()));
-    let failed =
+    let failed_claim =
         |claim: &SeasonClaim, manifest: &DatasetManifest| claim.check(manifest).unwrap_err().claim;
     let other_day = SeasonClaim {
         day: "2026-11-22".parse().unwrap(),
         ..claim.clone()
     };
-    assert_eq!(failed(&other_day, &manifest), "the evaluation's seed");
-    let broken = SeasonClaim {
+    assert_eq!(failed_claim(&other_day, &manifest), "the evaluation's seed");
+    let wrong_commitment = SeasonClaim {
         commitment: Some("00".repeat(32)),
         ..claim.clone()
     };
-    assert_eq!(failed(&broken, &manifest), "the commitment");
+    assert_eq!(failed_claim(&wrong_commitment, &manifest), "the commitment");
     manifest.mismatch_seed = manifest.seed;
-    assert_eq!(failed(&claim, &manifest), "the seed of the model mismatch");
+    assert_eq!(
+        failed_claim(&claim, &manifest),
+        "the seed of the model mismatch"
+    );
 }
 
 /// An agent that commands extreme positions from its 4th step on.
@@ -557,7 +580,7 @@ fn command_extremes(question: &Question) -> Option<[[f64; 7]; 2]> {
     let sign = if step.is_multiple_of(2) { 1e4 } else { -1e4 };
     Some(match (question.episode, step) {
         (1, 4..) => [[sign; 7], [-sign; 7]],
-        _ => [question.held, [0.0; 7]],
+        _ => [question.initial_joints, [0.0; 7]],
     })
 }
 
@@ -565,9 +588,9 @@ fn command_extremes(question: &Question) -> Option<[[f64; 7]; 2]> {
 fn actions_beyond_the_limit_of_the_ruleset_are_found() {
     let forge = |ruleset: &str| {
         let forgery = forgery();
-        forgery.text("manifest.json", "airhockey-2023.3", ruleset);
-        forgery.text("results.json", "airhockey-2023.3", ruleset);
-        forgery.table("steps.parquet", |batch| {
+        forgery.replace_text("manifest.json", "airhockey-2023.3", ruleset);
+        forgery.replace_text("results.json", "airhockey-2023.3", ruleset);
+        forgery.change_table("steps.parquet", |batch| {
             let mut columns = batch.columns().to_vec();
             let index = batch.schema().index_of("action").unwrap();
             let actions: &ListArray = batch["action"].as_list();
@@ -579,19 +602,19 @@ fn actions_beyond_the_limit_of_the_ruleset_are_found() {
             for row in 0..batch.num_rows() {
                 let values = actions.value(row);
                 let values: &Float64Array = values.as_primitive();
-                for (i, value) in values.values().iter().enumerate() {
-                    // The last step of the table: no later row depends on it.
-                    let last = row + 1 == batch.num_rows() && i == 9;
+                for (index, value) in values.values().iter().enumerate() {
+                    // One number of the last step of the table: no later row depends on it.
+                    let is_changed = row + 1 == batch.num_rows() && index == 9;
                     changed
                         .values()
-                        .append_value(if last { 2e4 } else { *value });
+                        .append_value(if is_changed { 2e4 } else { *value });
                 }
                 changed.append(true);
             }
             columns[index] = Arc::new(changed.finish());
             RecordBatch::try_new(batch.schema(), columns).unwrap()
         });
-        difference(forgery.reseal().dir.path(), 2)
+        difference(forgery.update_manifest().dir.path(), 2)
     };
     for bounded in ["airhockey-2023.2", "airhockey-2023.3"] {
         let found = forge(bounded);
@@ -612,11 +635,12 @@ fn datasets_with_extreme_commands_verify() {
 
 #[test]
 fn invented_divergence_is_found() {
-    let quits: Agent = |question| (question.step != Some(3)).then_some([question.held, [0.0; 7]]);
-    let evaluation = Evaluation::play(Some(quits), &[(Task::Prepare, 0..2)]).assembled();
+    let faults_in_step_3: Agent =
+        |question| (question.step != Some(3)).then_some([question.initial_joints, [0.0; 7]]);
+    let evaluation = Evaluation::play(Some(faults_in_step_3), &[(Task::Prepare, 0..2)]).assembled();
     check(&evaluation.archive(), 2).unwrap();
-    let forgery = Forgery::of(&evaluation.folder());
-    forgery.table("episodes.parquet", |batch| {
+    let forgery = Forgery::copy_of(&evaluation.folder());
+    forgery.change_table("episodes.parquet", |batch| {
         let mut columns = batch.columns().to_vec();
         let index = batch.schema().index_of("fault").unwrap();
         let faults: &StringArray = batch["fault"].as_string();
@@ -628,7 +652,7 @@ fn invented_divergence_is_found() {
         columns[index] = Arc::new(forged);
         RecordBatch::try_new(batch.schema(), columns).unwrap()
     });
-    let found = difference(forgery.reseal().dir.path(), 2);
+    let found = difference(forgery.update_manifest().dir.path(), 2);
     assert_eq!(
         (&*found.field, found.episode),
         ("fault", Some(0)),

@@ -13,17 +13,18 @@ use faceoff_wire::job::ShardSpec;
 use serde_json::Value;
 use std::{fs, path::Path};
 
-struct Played {
+/// The folder of a recorded shard with its specification and report.
+struct RecordedShard {
     folder: tempfile::TempDir,
     spec: ShardSpec,
     report: ShardReport,
 }
 
-fn played() -> Played {
+fn record_shard() -> RecordedShard {
     let folder = tempfile::tempdir().unwrap();
     let spec = spec(Task::Defend, 4..8);
     let report = play(&spec, Some(swing_arm), folder.path());
-    Played {
+    RecordedShard {
         folder,
         spec,
         report,
@@ -31,7 +32,7 @@ fn played() -> Played {
 }
 
 /// Updates the sizes and hashes in `shard.json`.
-fn reseal(folder: &Path) {
+fn update_shard_file(folder: &Path) {
     let path = folder.join("shard.json");
     let mut shard: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
     for (name, digest) in shard["files"].as_object_mut().unwrap() {
@@ -48,24 +49,36 @@ fn error_text(found: Result<(), VerifyError>) -> String {
 
 #[test]
 fn genuine_recording_verifies_with_any_sample() {
-    let all = played();
+    let recorded = record_shard();
     for sample in [&[][..], &[4], &[5, 7], &[4, 5, 6, 7]] {
-        verify_shard(all.folder.path(), &all.spec, &all.report.outcomes, sample).unwrap();
+        verify_shard(
+            recorded.folder.path(),
+            &recorded.spec,
+            &recorded.report.outcomes,
+            sample,
+        )
+        .unwrap();
     }
 }
 
 #[test]
 fn changed_number_in_a_sampled_episode_is_found() {
-    let all = played();
-    let steps = Forgery::of(all.folder.path());
-    let first = all.report.outcomes[0].steps;
-    // A bit of the second episode's first step.
-    steps.table("steps.parquet", |rows| {
+    let recorded = record_shard();
+    let steps = Forgery::copy_of(recorded.folder.path());
+    let first = recorded.report.outcomes[0].steps;
+    // A flipped bit in the first step of the second episode.
+    steps.change_table("steps.parquet", |rows| {
         flipped(&rows, "puck_x", first as usize)
     });
-    reseal(steps.dir.path());
-    let verify =
-        |sample: &[u32]| verify_shard(steps.dir.path(), &all.spec, &all.report.outcomes, sample);
+    update_shard_file(steps.dir.path());
+    let verify = |sample: &[u32]| {
+        verify_shard(
+            steps.dir.path(),
+            &recorded.spec,
+            &recorded.report.outcomes,
+            sample,
+        )
+    };
     let found = error_text(verify(&[4, 5]));
     assert!(
         found.contains("episode 5, step 0") && found.contains("puck_x"),
@@ -77,14 +90,14 @@ fn changed_number_in_a_sampled_episode_is_found() {
 
 #[test]
 fn outcomes_that_differ_from_the_rows_are_found() {
-    let all = played();
-    let mut claimed = all.report.outcomes.clone();
+    let recorded = record_shard();
+    let mut claimed = recorded.report.outcomes.clone();
     claimed[3].success = !claimed[3].success;
     let verify =
-        |folder: &Path, outcomes| error_text(verify_shard(folder, &all.spec, outcomes, &[]));
-    assert!(verify(all.folder.path(), &claimed).contains("different outcomes"));
+        |folder: &Path, outcomes| error_text(verify_shard(folder, &recorded.spec, outcomes, &[]));
+    assert!(verify(recorded.folder.path(), &claimed).contains("different outcomes"));
     // With the same claim in the recording's report.
-    let forged = Forgery::of(all.folder.path());
+    let forged = Forgery::copy_of(recorded.folder.path());
     let mut report: Value =
         serde_json::from_slice(&fs::read(forged.path("report.json")).unwrap()).unwrap();
     report["outcomes"] = serde_json::to_value(&claimed).unwrap();
@@ -94,14 +107,14 @@ fn outcomes_that_differ_from_the_rows_are_found() {
     )
     .unwrap();
     assert!(verify(forged.dir.path(), &claimed).contains("report.json has"));
-    reseal(forged.dir.path());
+    update_shard_file(forged.dir.path());
     let found = verify(forged.dir.path(), &claimed);
     assert!(found.contains("episode 7, outcome"), "{found}");
     // Fewer outcomes than episodes of the job, not ended by faults.
     let fewer = error_text(verify_shard(
-        all.folder.path(),
-        &all.spec,
-        &all.report.outcomes[..3],
+        recorded.folder.path(),
+        &recorded.spec,
+        &recorded.report.outcomes[..3],
         &[],
     ));
     assert!(fewer.contains("different outcomes"), "{fewer}");
@@ -109,22 +122,32 @@ fn outcomes_that_differ_from_the_rows_are_found() {
 
 #[test]
 fn recording_of_another_job_is_refused() {
-    let all = played();
+    let recorded = record_shard();
     let others = [
         ShardSpec {
             seed: Seed::from_number(8),
-            ..all.spec.clone()
+            ..recorded.spec.clone()
         },
         ShardSpec {
             episodes: 0..4,
-            ..all.spec.clone()
+            ..recorded.spec.clone()
         },
     ];
     for other in others {
-        let found = verify_shard(all.folder.path(), &other, &all.report.outcomes, &[]);
+        let found = verify_shard(
+            recorded.folder.path(),
+            &other,
+            &recorded.report.outcomes,
+            &[],
+        );
         assert!(error_text(found).contains("other episodes than the job"));
     }
-    let none = tempfile::tempdir().unwrap();
-    let found = verify_shard(none.path(), &all.spec, &all.report.outcomes, &[4]);
+    let empty_folder = tempfile::tempdir().unwrap();
+    let found = verify_shard(
+        empty_folder.path(),
+        &recorded.spec,
+        &recorded.report.outcomes,
+        &[4],
+    );
     assert!(error_text(found).contains("damaged or incomplete"));
 }

@@ -15,6 +15,9 @@ use std::ops::Range;
 const JOINT_POSITIONS: Range<usize> = 6..13;
 const JOINT_VELOCITIES: Range<usize> = 13..20;
 
+/// Control steps of a game of full length, which ends earlier in these tests.
+const FULL_GAME_STEPS: u32 = 45_000;
+
 fn arena() -> Arena {
     let seed = Seed::from_number(3); // arbitrary
     Arena::new(Profile::Ideal, seed, seed.model_mismatch())
@@ -258,7 +261,7 @@ fn too_many_faults_forfeit_and_both_sides_draw() {
         max_faults: 1,
         ..GameLimits::default()
     };
-    let game = play(45_000, limits.clone(), [hold, always_fault]);
+    let game = play(FULL_GAME_STEPS, limits.clone(), [hold, always_fault]);
     let cause = ForfeitCause::Faults {
         count: 2,
         allowed: 1,
@@ -267,7 +270,7 @@ fn too_many_faults_forfeit_and_both_sides_draw() {
     assert_eq!(game.outcome.end, GameEnd::Forfeit { by, cause });
     // The second fault is in the first step of the second rally.
     assert_eq!(game.outcome.steps, 753);
-    let game = play(45_000, limits, [always_fault, always_fault]);
+    let game = play(FULL_GAME_STEPS, limits, [always_fault, always_fault]);
     let causes = [cause; 2];
     assert_eq!(game.outcome.end, GameEnd::BothForfeit { causes });
 }
@@ -281,7 +284,7 @@ fn sides_have_separate_time_budgets() {
         total_s: 10.0,
         ..GameLimits::default()
     };
-    let game = play(45_000, limits.clone(), [slow, hold]);
+    let game = play(FULL_GAME_STEPS, limits.clone(), [slow, hold]);
     let GameEnd::Forfeit {
         by: Side::First,
         cause: ForfeitCause::Time { used_s, allowed_s },
@@ -292,7 +295,7 @@ fn sides_have_separate_time_budgets() {
     // Includes 0.75 s for start and reset.
     assert_eq!((used_s, allowed_s, game.outcome.steps), (10.25, 10.0, 19));
     assert!(game.outcome.sides[1].time_used_s < 1.0);
-    let game = play(45_000, limits, [slow, slow]);
+    let game = play(FULL_GAME_STEPS, limits, [slow, slow]);
     assert!(matches!(game.outcome.end, GameEnd::BothForfeit { .. }));
 }
 

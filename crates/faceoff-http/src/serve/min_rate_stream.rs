@@ -18,8 +18,8 @@ pub(super) struct MinRateStream<S> {
     stream: S,
     rate_guard: TransferRateGuard,
     pending: Option<PendingWrite>,
-    /// Called before a write to a slow client fails, to reset the connection.
-    reset: fn(&S),
+    /// Called before a write to a slow client fails: makes closing reset the connection.
+    reset_on_close: fn(&S),
 }
 
 /// A write that waits for the client to read.
@@ -30,12 +30,12 @@ struct PendingWrite {
 }
 
 impl<S> MinRateStream<S> {
-    pub(super) const fn new(stream: S, rate: MinTransferRate, reset: fn(&S)) -> Self {
+    pub(super) const fn new(stream: S, rate: MinTransferRate, reset_on_close: fn(&S)) -> Self {
         Self {
             stream,
             rate_guard: TransferRateGuard::new(rate),
             pending: None,
-            reset,
+            reset_on_close,
         }
     }
 
@@ -50,7 +50,7 @@ impl<S> MinRateStream<S> {
                 self.rate_guard.record_wait(pending.since.elapsed());
             }
             let bytes = written?;
-            self.rate_guard.transferred(bytes);
+            self.rate_guard.record_bytes(bytes);
             return Poll::Ready(Ok(bytes));
         }
         let remaining = self.rate_guard.remaining();
@@ -59,7 +59,7 @@ impl<S> MinRateStream<S> {
             deadline: Box::pin(tokio::time::sleep(remaining)),
         });
         ready!(pending.deadline.as_mut().poll(context));
-        (self.reset)(&self.stream);
+        (self.reset_on_close)(&self.stream);
         Poll::Ready(Err(io::Error::new(
             io::ErrorKind::TimedOut,
             "the client reads the response too slowly",
@@ -115,7 +115,7 @@ mod tests {
     use std::time::Duration;
     use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
-    const RATE: MinTransferRate = MinTransferRate {
+    const MIN_RATE: MinTransferRate = MinTransferRate {
         bytes_per_s: 1000,
         grace: Duration::from_secs(30),
     };
@@ -123,10 +123,10 @@ mod tests {
     /// Bytes between the stream and its client that are written and not yet read.
     const BUFFER_BYTES: usize = 100;
 
-    /// A stream with [`RATE`], and its client's end.
+    /// A stream with [`MIN_RATE`], and its client's end.
     fn stream_with_client() -> (MinRateStream<DuplexStream>, DuplexStream) {
         let (server, client) = duplex(BUFFER_BYTES);
-        (MinRateStream::new(server, RATE, |_| {}), client)
+        (MinRateStream::new(server, MIN_RATE, |_| {}), client)
     }
 
     #[tokio::test(start_paused = true)]

@@ -51,7 +51,7 @@ impl Season {
             .iter()
             .find(|team| team["name"] == "Alpha");
         let id = string(&alpha.unwrap()["id"]);
-        site.team("Never here").await;
+        site.team("Never played").await;
         let replaced = post(&site, &format!("/api/v1/teams/{id}/token"), json!({})).await;
         let alpha = TestTeam {
             id: id.clone(),
@@ -85,12 +85,12 @@ impl Season {
                 .status,
             201
         );
-        for (words, public) in [("a private question", false), ("a public question", true)] {
+        for (text, public) in [("a private question", false), ("a public question", true)] {
             let response = site
                 .post(
                     "/api/v1/questions",
                     Some(&alpha.token),
-                    &json!({ "text": words }),
+                    &json!({ "text": text }),
                 )
                 .await;
             let path = format!(
@@ -121,7 +121,7 @@ impl Season {
                     blake3::hash(&GZIP).to_string().into_bytes(),
                 ),
                 ("a worker's name", b"slot 0".to_vec()),
-                ("a team that never played", b"Never here".to_vec()),
+                ("a team that never played", b"Never played".to_vec()),
             ],
         };
         let secret = season.site.store.season().await.unwrap().secret;
@@ -253,7 +253,7 @@ async fn imported_archive_is_shown_byte_for_byte() {
         assert_eq!(day.as_array().unwrap().len(), 2);
 
         let imported = import(exported).await;
-        let [a, b] = season.evaluations;
+        let [alpha_evaluation, beta_evaluation] = season.evaluations;
         let mut compared: Vec<String> = [
             "/board",
             "/board/hit",
@@ -265,29 +265,30 @@ async fn imported_archive_is_shown_byte_for_byte() {
         .into();
         compared.extend([
             format!("/api/v1/teams/{}", season.alpha.id),
-            format!("/api/v1/evaluations/{a}/compare/{b}"),
+            format!("/api/v1/evaluations/{alpha_evaluation}/compare/{beta_evaluation}"),
         ]);
         if token.is_some() {
             compared.extend([
-                format!("/api/v1/evaluations/{a}"),
+                format!("/api/v1/evaluations/{alpha_evaluation}"),
                 "/api/v1/evaluations?day=2026-03-01".into(),
-                format!("/api/v1/evaluations/{a}/dataset"),
+                format!("/api/v1/evaluations/{alpha_evaluation}/dataset"),
                 "/api/v1/people".into(),
                 "/api/v1/registrations".into(),
                 "/api/v1/questions".into(),
             ]);
         }
         for path in compared {
-            let (before, after) = (
-                site.get(&path, token).await,
-                imported.get(&path, token).await,
+            let original_answer = site.get(&path, token).await;
+            let imported_answer = imported.get(&path, token).await;
+            assert_eq!(original_answer.status, 200, "{path}: {original_answer:?}");
+            assert_eq!(
+                imported_answer.body, original_answer.body,
+                "{edition}: {path}"
             );
-            assert_eq!(before.status, 200, "{path}: {before:?}");
-            assert_eq!(after.body, before.body, "{edition}: {path}");
         }
         let path = format!("/api/v1/stages/{stage}");
-        let mut before = site.get(&path, token).await.json(200);
-        let forecast = before.as_object_mut().unwrap().remove("capacity");
+        let mut original_stage = site.get(&path, token).await.json(200);
+        let forecast = original_stage.as_object_mut().unwrap().remove("capacity");
         assert_eq!(
             forecast.is_some(),
             token.is_some(),
@@ -295,11 +296,11 @@ async fn imported_archive_is_shown_byte_for_byte() {
         );
         assert_eq!(
             imported.get(&path, token).await.json(200),
-            before,
+            original_stage,
             "an archive forecasts no day"
         );
         let stages = imported.get("/api/v1/stages", token).await.json(200);
-        assert_eq!(stages, json!([before]));
+        assert_eq!(stages, json!([original_stage]));
         let mut seasons = Vec::new();
         for site in [site, &imported] {
             let mut season = site.get("/api/v1/season", token).await.json(200);
@@ -322,7 +323,7 @@ async fn imported_archive_is_shown_byte_for_byte() {
         for page in [
             "/",
             "/season",
-            &format!("/evaluations/{a}"),
+            &format!("/evaluations/{alpha_evaluation}"),
             "/announcements",
         ] {
             let page = imported.get(page, None).await;
@@ -331,10 +332,10 @@ async fn imported_archive_is_shown_byte_for_byte() {
         }
         assert!(!site.get("/", None).await.body.contains("Archived season"));
         // An archive of the imported season has the same board.
-        let again = self::export(&imported, "public").await;
+        let second_export = self::export(&imported, "public").await;
         let board = imported.get("/api/v1/board", None).await;
         assert_eq!(
-            read_file(&again.0, "results/1-qualifying/board.json"),
+            read_file(&second_export.0, "results/1-qualifying/board.json"),
             board.body
         );
     }
@@ -344,14 +345,16 @@ async fn imported_archive_is_shown_byte_for_byte() {
 async fn public_archive_has_no_private_data() {
     let mut season = Season::start().await;
     let open = season.add_unfinished_day().await;
-    let hidden = season
+    let dataset_paths = season
         .evaluations
         .map(|id| format!("artifacts/datasets/{id}.zip"));
 
     let (folder, manifest) = export(&season.site, "organiser").await;
     let listed = paths(&manifest);
     assert!(
-        hidden.iter().all(|path| listed.contains(&path.as_str())),
+        dataset_paths
+            .iter()
+            .all(|path| listed.contains(&path.as_str())),
         "{listed:?}"
     );
     assert_eq!(
@@ -362,13 +365,13 @@ async fn public_archive_has_no_private_data() {
         2
     );
     assert!(manifest.left_out[0].contains("1 evaluations that were queued or running"));
-    let all: Vec<_> = files_of(&folder.path().join("archive"));
-    let content: Vec<Vec<u8>> = all
+    let files: Vec<_> = files_of(&folder.path().join("archive"));
+    let content: Vec<Vec<u8>> = files
         .iter()
         .map(|file| std::fs::read(file).unwrap())
         .collect();
     let is_found = |part: &[u8]| content.iter().any(|content| contains_bytes(content, part));
-    for (file, content) in all.iter().zip(&content) {
+    for (file, content) in files.iter().zip(&content) {
         // The log mentions that the evaluation was queued.
         let is_log = ["events.jsonl", "database.sqlite3"]
             .iter()
@@ -393,13 +396,13 @@ async fn public_archive_has_no_private_data() {
         "the organiser's archive has names: the search works"
     );
     for (description, part) in &season.secrets {
-        let expected = [
+        let kept_by_organisers = [
             "an agent's log",
             "an agent's output",
             "a contact",
             "a worker's name",
         ];
-        if expected.contains(description) {
+        if kept_by_organisers.contains(description) {
             assert!(
                 is_found(part),
                 "{description} is not in the organiser's archive"
@@ -476,12 +479,12 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
     let blinded = request(json!({ "blind": true, "publishes": "at_release" }));
     let blinded = Answer::read(blinded.send().await.unwrap()).await;
     assert_eq!(blinded.status, 200, "{blinded:?}");
-    let before = site.run_day(3, [("Alpha", &good_outcome)]).await[0];
+    let evaluation_before_freeze = site.run_day(3, [("Alpha", &good_outcome)]).await[0];
     let (folder, manifest) = export(&site, "public").await;
     for file in files_of(&folder.path().join("archive")) {
         let content = std::fs::read(&file).unwrap();
         assert!(
-            !contains_bytes(&content, before.to_string().as_bytes()),
+            !contains_bytes(&content, evaluation_before_freeze.to_string().as_bytes()),
             "{}",
             file.display()
         );
@@ -504,24 +507,25 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
         "the seed of a blind day is hidden"
     );
 
-    let opened = Answer::read(request(json!({ "blind": false })).send().await.unwrap()).await;
-    assert_eq!(opened.status, 200, "{opened:?}");
+    let revealed = Answer::read(request(json!({ "blind": false })).send().await.unwrap()).await;
+    assert_eq!(revealed.status, 200, "{revealed:?}");
     let freeze = format!("/api/v1/stages/{stage}/freeze");
     post(&site, &freeze, json!({ "reason": "the ceremony" })).await;
     site.next_day();
     post(&site, "/api/v1/days", json!({})).await;
-    let after = site.run_evaluation(weak_outcome).await;
+    let evaluation_after_freeze = site.run_evaluation(weak_outcome).await;
     let (folder, manifest) = export(&site, "public").await;
     let listed = paths(&manifest).join("\n");
     assert!(
-        listed.contains(&before.to_string()) && !listed.contains(&after.to_string()),
+        listed.contains(&evaluation_before_freeze.to_string())
+            && !listed.contains(&evaluation_after_freeze.to_string()),
         "{listed}"
     );
     let imported = import((folder, manifest)).await;
     let original_board = site.get("/api/v1/board", None).await;
     let imported_board = imported.get("/api/v1/board", Some(ADMIN)).await;
     assert_eq!(imported_board.body, original_board.body);
-    let dataset = format!("/api/v1/evaluations/{before}/dataset");
+    let dataset = format!("/api/v1/evaluations/{evaluation_before_freeze}/dataset");
     assert_eq!(
         imported.get(&dataset, None).await.body,
         site.get(&dataset, None).await.body
@@ -533,7 +537,7 @@ async fn archived_season_is_read_only_for_all_roles() {
     let season = Season::start().await;
     let imported = import(export(&season.site, "organiser").await).await;
     let document = imported.get("/api/v1/openapi.json", None).await.json(200);
-    let mut refused = 0;
+    let mut refused_requests = 0;
     for (path, item) in document["paths"].as_object().unwrap() {
         let path = path.replace("{id}", &season.evaluations[0].to_string());
         for method in item.as_object().unwrap().keys() {
@@ -552,11 +556,11 @@ async fn archived_season_is_read_only_for_all_roles() {
                     problem["imported_at"], "2027-01-01T00:00:00Z",
                     "{method} {path}"
                 );
-                refused += 1;
+                refused_requests += 1;
             }
         }
     }
-    assert!(refused > 100, "{refused}");
+    assert!(refused_requests > 100, "{refused_requests}");
     for page in ["/sign-in", "/sign-out", "/register", "/join/fo_invite_x"] {
         let request = imported
             .request(Method::POST, page, None)

@@ -170,8 +170,11 @@ async fn blind_results_are_visible_to_organisers_only() {
         (&board["blind"], board["rows"].as_array().unwrap().len()),
         (&json!(true), 2)
     );
-    let full = site.get(&alpha_evaluation, Some(ADMIN)).await.json(200);
-    assert_eq!(full["result"]["tasks"]["hit"]["success_rate"], 0.511);
+    let organiser_view = site.get(&alpha_evaluation, Some(ADMIN)).await.json(200);
+    assert_eq!(
+        organiser_view["result"]["tasks"]["hit"]["success_rate"],
+        0.511
+    );
     assert_eq!(site.get(&compared, Some(ADMIN)).await.status, 200);
     let page = site.get("/", Some(ADMIN)).await.body;
     assert!(
@@ -183,10 +186,10 @@ async fn blind_results_are_visible_to_organisers_only() {
         .problem(401, "unauthenticated", &[]);
 
     // Once revealed, results cannot be hidden again.
-    let opened = change_stage(&site, json!({ "blind": false }))
+    let revealed = change_stage(&site, json!({ "blind": false }))
         .await
         .json(200);
-    assert_eq!(opened["blind"], false);
+    assert_eq!(revealed["blind"], false);
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(
         (&board["blind"], board["rows"].as_array().unwrap().len()),
@@ -260,9 +263,9 @@ async fn faults_of_a_blind_stage_are_hidden() {
 async fn blind_setting_is_validated_and_for_organisers_only() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let new = json!({ "name": "Final", "blind": true, "publishes": "never", "standings": { "mean_of_last": 3 } });
+    let new_stage = json!({ "name": "Final", "blind": true, "publishes": "never", "standings": { "mean_of_last": 3 } });
     let created = site
-        .post("/api/v1/stages", Some(ADMIN), &new)
+        .post("/api/v1/stages", Some(ADMIN), &new_stage)
         .await
         .json(201);
     assert_eq!(created["blind"], true);

@@ -1,4 +1,4 @@
-//! A browser for tests of pages and forms. It runs no scripts: it opens pages, submits forms and keeps one cookie.
+//! A browser for tests of pages and forms: it opens pages, submits forms and keeps one cookie. It runs no scripts.
 
 use crate::site::{ADMIN, Answer, Site, client_builder, string};
 use reqwest::redirect::Policy;

@@ -174,9 +174,12 @@ async fn pending_jobs_show_position_time_and_next_step() {
     for team in [&alpha, &beta] {
         submissions.push(site.valid_submission(team, "a").await);
     }
-    let upload = site.upload(&alpha.token, crate::site::GZIP.to_vec()).await;
-    let upload = format!("/api/v1/submissions/{}", string(&upload.json(201)["id"]));
-    let waiting = site.get(&upload, Some(&alpha.token)).await.json(200);
+    let uploaded = site.upload(&alpha.token, crate::site::GZIP.to_vec()).await;
+    let new_submission = format!("/api/v1/submissions/{}", string(&uploaded.json(201)["id"]));
+    let waiting = site
+        .get(&new_submission, Some(&alpha.token))
+        .await
+        .json(200);
     assert_eq!(
         waiting["queue"],
         json!({ "position": 1, "place": 1, "total": 1, "of": 1, "expected_at": null })
@@ -204,9 +207,12 @@ async fn pending_jobs_show_position_time_and_next_step() {
         .commit_validation(&validation.claim, outcome, site.now())
         .await
         .unwrap();
-    let refused = site.get(&upload, Some(&alpha.token)).await.json(200);
-    assert_eq!(refused["queue"], Value::Null);
-    assert!(string(&refused["next"]).contains("upload again"));
+    let invalid = site
+        .get(&new_submission, Some(&alpha.token))
+        .await
+        .json(200);
+    assert_eq!(invalid["queue"], Value::Null);
+    assert!(string(&invalid["next"]).contains("upload again"));
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(me["validating"], json!([]));
 

@@ -64,11 +64,11 @@ async fn day_starts_once_and_lists_teams_without_submission() {
     }
     let today = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
     assert_eq!(today.as_array().unwrap().len(), 2);
-    let before = site
+    let earlier_evaluations = site
         .get("/api/v1/evaluations?day=2026-02-28", Some(ADMIN))
         .await
         .json(200);
-    assert_eq!(before, json!([]));
+    assert_eq!(earlier_evaluations, json!([]));
     site.next_day();
     let next = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
     assert_eq!(next.json(200)["created"].as_array().unwrap().len(), 3);

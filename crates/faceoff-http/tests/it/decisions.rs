@@ -11,7 +11,7 @@ async fn frozen_board_hides_later_results_from_the_public() {
     let site = Site::start().await;
     site.ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
         .await;
-    let before = site.get("/api/v1/board", None).await.json(200);
+    let board_before_freeze = site.get("/api/v1/board", None).await.json(200);
     let stage = site.stage().await;
     let decision_path = |decision: &str| format!("/api/v1/stages/{stage}/{decision}");
     let team = site.team("Beta").await;
@@ -91,7 +91,7 @@ async fn frozen_board_hides_later_results_from_the_public() {
     assert_eq!(frozen_board["rows"].as_array().unwrap().len(), 1);
     assert_eq!(
         frozen_board["rows"][0]["evaluation"],
-        before["rows"][0]["evaluation"]
+        board_before_freeze["rows"][0]["evaluation"]
     );
     let task_board = site.get("/api/v1/board/hit", None).await.json(200);
     assert_eq!(task_board["rows"].as_array().unwrap().len(), 1);
@@ -311,16 +311,25 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     assert_ne!(row("Beta")["seed"], row("Alpha")["seed"]);
     let page = site.get("/", None).await.body;
     assert!(page.contains("extra evaluation: joined late"), "{page}");
-    let [a, b] = ["Alpha", "Beta"].map(|name| string(&row(name)["evaluation"]));
+    let [alpha_evaluation, beta_evaluation] =
+        ["Alpha", "Beta"].map(|name| string(&row(name)["evaluation"]));
     let compared = site
-        .get(&format!("/api/v1/evaluations/{a}/compare/{b}"), None)
+        .get(
+            &format!("/api/v1/evaluations/{alpha_evaluation}/compare/{beta_evaluation}"),
+            None,
+        )
         .await;
     let problem = compared.problem(409, "not-paired", &["same episodes"]);
     assert_eq!(problem["field"], "seed", "{problem}");
-    let page = site.get(&format!("/evaluations/{b}"), None).await.body;
+    let page = site
+        .get(&format!("/evaluations/{beta_evaluation}"), None)
+        .await
+        .body;
     assert!(page.contains("Extra evaluation"), "{page}");
     assert!(
-        !page.contains(&format!("/evaluations/{b}/compare/{a}")),
+        !page.contains(&format!(
+            "/evaluations/{beta_evaluation}/compare/{alpha_evaluation}"
+        )),
         "{page}"
     );
 
@@ -345,7 +354,10 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     confirmed["confirm"] = json!("Alpha");
     site.post(&path, Some(ADMIN), &confirmed).await.json(201);
     let replaced = site
-        .get(&format!("/api/v1/evaluations/{a}"), Some(ADMIN))
+        .get(
+            &format!("/api/v1/evaluations/{alpha_evaluation}"),
+            Some(ADMIN),
+        )
         .await
         .json(200);
     assert_eq!(
@@ -356,9 +368,9 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     let disqualify = format!("/api/v1/teams/{}/disqualify", beta.id);
     let ruling = json!({ "reason": "cheating", "confirm": "Beta" });
     site.post(&disqualify, Some(ADMIN), &ruling).await.json(200);
-    let mut again = beta_request.clone();
-    again["confirm"] = json!("Beta");
-    site.post(&path, Some(ADMIN), &again)
+    let mut confirmed_request = beta_request.clone();
+    confirmed_request["confirm"] = json!("Beta");
+    site.post(&path, Some(ADMIN), &confirmed_request)
         .await
         .problem(403, "disqualified", &[]);
 }

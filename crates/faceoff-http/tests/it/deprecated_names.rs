@@ -25,9 +25,9 @@ async fn old_route_answers_like_its_new_one() {
     assert_eq!(site.get(url, None).await.status, 200);
 
     site.team("Beta").await;
-    let new_cup = json!({ "name": "Cup", "teams": ["Alpha", "Beta"] });
+    let tournament = json!({ "name": "Cup", "teams": ["Alpha", "Beta"] });
     let cup = site
-        .post("/api/v1/tournaments", Some(ADMIN), &new_cup)
+        .post("/api/v1/tournaments", Some(ADMIN), &tournament)
         .await
         .json(201);
     let path = format!("/api/v1/tournaments/{}", cup["id"].as_str().unwrap());

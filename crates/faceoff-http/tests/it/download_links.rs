@@ -159,15 +159,15 @@ async fn link_is_valid_while_its_creator_may_download() {
     site.get(&team_link, None)
         .await
         .problem(403, "link-invalid", &["was rotated"]);
-    let again = create_link(&site, &dataset, &secret).await;
-    assert_eq!(status(&again).await, 200);
+    let new_link = create_link(&site, &dataset, &secret).await;
+    assert_eq!(status(&new_link).await, 200);
     let revoke = site.request(
         Method::DELETE,
         &format!("/api/v1/tokens/{token}"),
         Some(&secret),
     );
     assert_eq!(revoke.send().await.unwrap().status(), 200);
-    site.get(&again, None)
+    site.get(&new_link, None)
         .await
         .problem(403, "link-invalid", &["was revoked"]);
     assert_eq!(
@@ -197,9 +197,9 @@ async fn game_recordings_have_links() {
     let [home, _] = cup.names(&game).await;
     let path = format!("/api/v1/games/{}", game.id);
     let site = &cup.site;
-    let both = create_link(site, &format!("{path}/recording"), ADMIN).await;
-    let side = create_link(site, &format!("{path}/sides/1"), cup.token(&home)).await;
-    for url in [&both, &side] {
+    let recording_link = create_link(site, &format!("{path}/recording"), ADMIN).await;
+    let side_link = create_link(site, &format!("{path}/sides/1"), cup.token(&home)).await;
+    for url in [&recording_link, &side_link] {
         let answer = site.get(url, None).await;
         assert_eq!(answer.status, 200, "{url}");
         let hash = blake3::hash(answer.body.as_bytes()).to_string();

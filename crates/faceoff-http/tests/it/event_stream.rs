@@ -9,7 +9,7 @@ use faceoff_http::HttpLimits;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-const PATH: &str = "/api/v1/events/stream";
+const STREAM_PATH: &str = "/api/v1/events/stream";
 
 /// Publishes an announcement, whose event (kind `announced`) ends the events that a test reads.
 async fn announce(site: &Site) {
@@ -26,7 +26,7 @@ async fn change_stage(site: &Site, body: Value) {
 
 /// All events from the beginning of the season until the announcement.
 async fn events_until_announcement(site: &Site, query: &str, token: Option<&str>) -> Vec<Event> {
-    let mut stream = Stream::open(site, &format!("{PATH}{query}"), token, Some("0")).await;
+    let mut stream = Stream::open(site, &format!("{STREAM_PATH}{query}"), token, Some("0")).await;
     let mut events = Vec::new();
     loop {
         let event = stream.next().await.unwrap();
@@ -68,7 +68,7 @@ async fn two_teams(site: &Site) -> [TestTeam; 2] {
 #[tokio::test]
 async fn resumed_stream_has_each_event_once_in_order() {
     let site = Site::start().await;
-    let mut live = Stream::open(&site, PATH, Some(ADMIN), None).await;
+    let mut live = Stream::open(&site, STREAM_PATH, Some(ADMIN), None).await;
     let now = live.next().await.unwrap();
     assert_eq!(now.name, "now");
     assert_eq!(now.id, Some(now.data["id"].to_string()));
@@ -85,7 +85,7 @@ async fn resumed_stream_has_each_event_once_in_order() {
     // Each connection reads three events, and the next one resumes after them.
     let (mut received, mut last_id) = (Vec::new(), "0".to_owned());
     while received.len() < ids.len() {
-        let mut stream = Stream::open(&site, PATH, Some(ADMIN), Some(&last_id)).await;
+        let mut stream = Stream::open(&site, STREAM_PATH, Some(ADMIN), Some(&last_id)).await;
         for _ in 0..3.min(ids.len() - received.len()) {
             let event = stream.next().await.unwrap();
             last_id = event.id.unwrap();
@@ -293,12 +293,12 @@ async fn stream_is_filtered_by_topics() {
 #[tokio::test]
 async fn unknown_topic_or_event_id_is_refused() {
     let site = Site::start().await;
-    let path = format!("{PATH}?about=board,nothing");
+    let path = format!("{STREAM_PATH}?about=board,nothing");
     site.get(&path, None)
         .await
         .problem(422, "invalid-content", &["about", "queue", "nothing"]);
     for wrong in ["seventeen", "-1", "1.17", ""] {
-        let request = site.request(Method::GET, PATH, None);
+        let request = site.request(Method::GET, STREAM_PATH, None);
         let request = request.header("last-event-id", wrong);
         Answer::read(request.send().await.unwrap()).await.problem(
             400,
@@ -307,7 +307,7 @@ async fn unknown_topic_or_event_id_is_refused() {
         );
     }
     // An id that is too high comes from data that was replaced by a backup.
-    let mut stream = Stream::open(&site, PATH, None, Some("4711000")).await;
+    let mut stream = Stream::open(&site, STREAM_PATH, None, Some("4711000")).await;
     let reset = stream.next().await.unwrap();
     assert_eq!(reset.name, "reset");
     let newest = site.store.newest_event().await.unwrap();
@@ -324,9 +324,9 @@ async fn number_of_event_readers_is_limited() {
         ..generous_limits()
     };
     let mut site = Site::start_with(limits).await;
-    let mut stream = Stream::open(&site, PATH, None, None).await;
+    let mut stream = Stream::open(&site, STREAM_PATH, None, None).await;
     assert_eq!(stream.next().await.unwrap().name, "now");
-    let busy = site.get(PATH, None).await;
+    let busy = site.get(STREAM_PATH, None).await;
     busy.problem(503, "busy", &["1 readers"]);
     assert_eq!(busy.header("retry-after"), "2");
     site.shut_down().await;
@@ -341,8 +341,8 @@ async fn number_of_event_readers_is_limited() {
 async fn stream_ends_when_its_token_is_replaced() {
     let site = Site::start().await;
     let [alpha, beta] = two_teams(&site).await;
-    let mut alpha_stream = Stream::open(&site, PATH, Some(&alpha.token), None).await;
-    let mut beta_stream = Stream::open(&site, PATH, Some(&beta.token), None).await;
+    let mut alpha_stream = Stream::open(&site, STREAM_PATH, Some(&alpha.token), None).await;
+    let mut beta_stream = Stream::open(&site, STREAM_PATH, Some(&beta.token), None).await;
     assert_eq!(alpha_stream.next().await.unwrap().name, "now");
     assert_eq!(beta_stream.next().await.unwrap().name, "now");
     let replace = format!("/api/v1/teams/{}/token", alpha.id);

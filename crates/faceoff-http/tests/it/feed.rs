@@ -5,10 +5,10 @@ use atom_syndication::Feed;
 use reqwest::Method;
 use serde_json::json;
 
-const PATH: &str = "/feed.atom";
+const FEED_PATH: &str = "/feed.atom";
 
 async fn fetch_feed(site: &Site) -> (Answer, Feed) {
-    let answer = site.get(PATH, None).await;
+    let answer = site.get(FEED_PATH, None).await;
     assert_eq!(answer.status, 200, "{}", answer.body);
     assert_eq!(
         answer.header("content-type"),
@@ -28,9 +28,9 @@ fn titles(feed: &Feed) -> Vec<String> {
 #[tokio::test]
 async fn feed_lists_news_newest_first_with_stable_ids() {
     let site = Site::start().await;
-    let (_, before) = fetch_feed(&site).await;
-    assert_eq!(before.title().as_str(), "Test season · Faceoff");
-    assert_eq!(titles(&before), ["Qualifying is open"]);
+    let (_, first_feed) = fetch_feed(&site).await;
+    assert_eq!(first_feed.title().as_str(), "Test season · Faceoff");
+    assert_eq!(titles(&first_feed), ["Qualifying is open"]);
     site.advance(60);
     site.ranked_teams(&[
         ("Alpha", result([0.511; 3], 10.0)),
@@ -64,8 +64,8 @@ async fn feed_lists_news_newest_first_with_stable_ids() {
         ]
     );
     assert!(!answer.body.contains("51.1"), "no score");
-    assert_eq!(feed.id(), before.id());
-    assert_eq!(feed.entries()[4].id(), before.entries()[0].id());
+    assert_eq!(feed.id(), first_feed.id());
+    assert_eq!(feed.entries()[4].id(), first_feed.entries()[0].id());
     let announced = &feed.entries()[2];
     let content = announced.content().unwrap();
     assert_eq!(content.content_type(), Some("text"));
@@ -97,7 +97,9 @@ async fn unchanged_feed_answers_not_modified() {
     let (tag, modified) = (answer.header("etag"), answer.header("last-modified"));
     assert_eq!(modified, "Sun, 01 Mar 2026 10:00:00 GMT");
     let get_with_header = async |name: &str, value: &str| {
-        let request = site.request(Method::GET, PATH, None).header(name, value);
+        let request = site
+            .request(Method::GET, FEED_PATH, None)
+            .header(name, value);
         Answer::read(request.send().await.unwrap()).await
     };
     for (name, value) in [

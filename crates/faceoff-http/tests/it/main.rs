@@ -1,4 +1,4 @@
-//! The API and the pages over real HTTP, on a real store in a temporary folder.
+//! Tests of the API and the pages over real HTTP, on a real store (database and files) in a temporary folder.
 #![expect(
     clippy::unwrap_used,
     reason = "test helpers fail as tests do: by panicking"

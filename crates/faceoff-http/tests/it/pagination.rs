@@ -63,8 +63,8 @@ async fn pages_list_each_row_once_while_rows_are_added() {
     };
     let path = "/api/v1/teams?limit=2";
     let found = collect_pages(&site, path, Some(ADMIN), "name", add).await;
-    let once: BTreeSet<&String> = found.iter().collect();
-    assert_eq!(once.len(), found.len(), "{found:?}");
+    let distinct: BTreeSet<&String> = found.iter().collect();
+    assert_eq!(distinct.len(), found.len(), "{found:?}");
     for name in names {
         assert!(
             found.iter().any(|listed| listed == name),
@@ -140,8 +140,10 @@ async fn growing_lists_are_paginated() {
     let site = &cup.site;
     cup.start_round().await;
     for title in ["one", "two"] {
-        let new = json!({ "title": title, "text": title });
-        let announced = site.post("/api/v1/announcements", Some(ADMIN), &new).await;
+        let announcement = json!({ "title": title, "text": title });
+        let announced = site
+            .post("/api/v1/announcements", Some(ADMIN), &announcement)
+            .await;
         announced.json(201);
         let question = json!({ "text": title });
         let asked = site

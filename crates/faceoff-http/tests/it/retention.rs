@@ -200,8 +200,8 @@ async fn invalid_retention_is_refused_with_valid_values() {
     ] {
         let changed = change_stage(&site, json!({ "retention": wrong })).await;
         changed.problem(422, "invalid-content", &[words]);
-        let new = json!({ "name": "Other", "retention": wrong });
-        let refused = site.post("/api/v1/stages", Some(ADMIN), &new).await;
+        let new_stage = json!({ "name": "Other", "retention": wrong });
+        let refused = site.post("/api/v1/stages", Some(ADMIN), &new_stage).await;
         refused.problem(422, "invalid-content", &[words]);
     }
     assert_eq!(stage_view(&site).await["retention"], json!({}));

@@ -8,7 +8,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// The roles, in the order of the table's columns.
+/// The roles, in the order of the table's columns. The host is the operator of the server, whose token needs no user.
 const ROLES: [&str; 7] = [
     "visitor",
     "another team's token",
@@ -239,8 +239,8 @@ fn harmless_body(route: &str) -> Value {
 async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     let baseline_team = site.team("Organisers").await;
     let baseline = site.valid_submission(&baseline_team, "baseline").await;
-    let new = json!({ "name": "Cup", "teams": ["Alpha"] });
-    let opened = site.post("/api/v1/tournaments", Some(ADMIN), &new).await;
+    let cup = json!({ "name": "Cup", "teams": ["Alpha"] });
+    let opened = site.post("/api/v1/tournaments", Some(ADMIN), &cup).await;
     let path = opened.header("location").to_owned();
     let baseline = json!({ "baseline": baseline.rsplit('/').next().unwrap() });
     let change = site

@@ -247,8 +247,8 @@ async fn invalid_runtimes_are_refused_by_name() {
         change_stage(&site, body)
             .await
             .problem(422, "invalid-content", words);
-        let new = json!({ "name": "Final", "runtimes": runtimes });
-        site.post("/api/v1/stages", Some(ADMIN), &new)
+        let new_stage = json!({ "name": "Final", "runtimes": runtimes });
+        site.post("/api/v1/stages", Some(ADMIN), &new_stage)
             .await
             .problem(422, "invalid-content", words);
     }

@@ -82,8 +82,8 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
         ] {
             assert!(!visible_text.contains(part), "{part}");
         }
-        let after = site.store.events_after(0, 1000).await.unwrap();
-        assert_eq!(after, events, "reading changes nothing");
+        let later_events = site.store.events_after(0, 1000).await.unwrap();
+        assert_eq!(later_events, events, "reading changes nothing");
         let (claim, ..) = site.claim_shard().await;
         site.store.release(&claim, site.now()).await.unwrap();
     }

@@ -580,7 +580,9 @@ impl Site {
         let mut by_name = BTreeMap::new();
         for evaluation in &started {
             let name = self.store.team(evaluation.team).await.unwrap().name;
-            let outcome_fn = teams.iter().find(|(new, _)| *new == name.as_str());
+            let outcome_fn = teams
+                .iter()
+                .find(|(new_name, _)| *new_name == name.as_str());
             let (_, outcome_fn) = outcome_fn.unwrap_or(&teams[0]);
             assert_eq!(self.run_evaluation(outcome_fn).await, evaluation.id);
             by_name.insert(name.to_string(), evaluation.id);

@@ -35,7 +35,7 @@ fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn team_page_shows_rank_history_and_fouls() {
+async fn team_page_shows_rank_history_and_violations() {
     let site = Site::start().await;
     let [alpha, beta] = three_days(&site).await;
     let html = page(&site, &format!("/teams/{}", alpha.id)).await;

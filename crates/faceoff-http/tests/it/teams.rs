@@ -113,9 +113,9 @@ async fn invalid_or_taken_team_name_is_refused_with_reason() {
 async fn missing_or_wrong_token_gets_an_explanation() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
-    let new = json!({ "name": "Beta" });
+    let new_team = json!({ "name": "Beta" });
 
-    let without_token = site.post("/api/v1/teams", None, &new).await;
+    let without_token = site.post("/api/v1/teams", None, &new_team).await;
     without_token.problem(401, "unauthenticated", &["Authorization: Bearer"]);
     assert!(
         without_token
@@ -123,11 +123,11 @@ async fn missing_or_wrong_token_gets_an_explanation() {
             .starts_with("Bearer")
     );
     for wrong in ["fo_team_wrong", "fo_admin_wrong", "x"] {
-        site.post("/api/v1/teams", Some(wrong), &new)
+        site.post("/api/v1/teams", Some(wrong), &new_team)
             .await
             .problem(401, "unauthenticated", &[]);
     }
-    site.post("/api/v1/teams", Some(&team.token), &new)
+    site.post("/api/v1/teams", Some(&team.token), &new_team)
         .await
         .problem(403, "forbidden", &["organiser's token", "Alpha"]);
     site.get("/api/v1/me", Some(ADMIN))

@@ -47,10 +47,10 @@ async fn member(site: &Site, team: &TestTeam, name: &str) -> String {
     string(&site.post(path, None, &join).await.json(201)["secret"])
 }
 
-/// Creates a webhook for the events that match one of the filters `about`. Returns its path and its secret.
-async fn create_webhook(site: &Site, token: &str, url: &str, about: &[&str]) -> (String, String) {
-    let new = json!({ "name": "test hook", "url": url, "about": about });
-    let created = site.post("/api/v1/webhooks", Some(token), &new).await;
+/// Creates a webhook for the events of these topics; of all topics if there are none. Returns its path and its secret.
+async fn create_webhook(site: &Site, token: &str, url: &str, topics: &[&str]) -> (String, String) {
+    let webhook = json!({ "name": "test hook", "url": url, "about": topics });
+    let created = site.post("/api/v1/webhooks", Some(token), &webhook).await;
     let created = created.json(201);
     let secret = string(&created["secret"]);
     assert!(secret.starts_with("whsec_"));
@@ -329,8 +329,8 @@ async fn private_addresses_are_refused() {
         ("ftp://example.org/", "https://"),
         ("nowhere", "https://example.org"),
     ] {
-        let new = json!({ "name": "test hook", "url": url });
-        let answer = site.post("/api/v1/webhooks", Some(ADMIN), &new).await;
+        let webhook = json!({ "name": "test hook", "url": url });
+        let answer = site.post("/api/v1/webhooks", Some(ADMIN), &webhook).await;
         answer.problem(422, "invalid-content", &["url", words]);
     }
     // A host name is resolved at delivery, so it is refused only then.
@@ -406,15 +406,15 @@ async fn webhooks_are_limited_and_created_by_members_only() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha, "Ada").await;
-    let new = json!({ "name": "test hook", "url": "https://example.org/faceoff" });
+    let new_webhook = json!({ "name": "test hook", "url": "https://example.org/faceoff" });
     let webhooks = "/api/v1/webhooks";
-    site.post(webhooks, Some(&alpha.token), &new)
+    site.post(webhooks, Some(&alpha.token), &new_webhook)
         .await
         .problem(403, "forbidden", &["member"]);
     for _ in 0..5 {
         create_webhook(&site, &ada, "https://example.org/faceoff", &[]).await;
     }
-    site.post(webhooks, Some(&ada), &new)
+    site.post(webhooks, Some(&ada), &new_webhook)
         .await
         .problem(409, "conflict", &["5 webhooks"]);
     let listed = site.get(webhooks, Some(&alpha.token)).await.json(200);

@@ -77,9 +77,9 @@ impl Possession {
             figures::one_decimal(100.0 * f64::from(steps) / f64::from(analysis.steps.max(1)))
         };
         Self {
-            halves: analysis.halves.map(share),
-            touched: analysis.touched.map(share),
-            untouched: share(analysis.untouched),
+            halves: analysis.steps_in_half.map(share),
+            touched: analysis.steps_after_touch.map(share),
+            untouched: share(analysis.steps_before_touch),
         }
     }
 }
@@ -89,9 +89,9 @@ impl Shots {
         let shots = analysis.shots_of(side);
         let positions = |goal: bool| -> Vec<Position> {
             let matching = shots.iter().filter(|shot| shot.goal == goal);
-            matching.map(|shot| shot.at).collect()
+            matching.map(|shot| shot.touch_position).collect()
         };
-        let speeds = || shots.iter().map(|shot| shot.speed);
+        let speeds = || shots.iter().map(|shot| shot.speed_m_s);
         let fastest = speeds().reduce(f64::max);
         let count = u32::try_from(shots.len()).unwrap_or(u32::MAX);
         Self {
@@ -113,7 +113,7 @@ impl Speeds {
     pub(super) fn new(analysis: &GameAnalysis, teams: &[String; 2]) -> Option<Self> {
         let speeds = [0, 1].map(|side| -> Vec<f64> {
             let shots = analysis.shots_of(side).into_iter();
-            shots.map(|shot| shot.speed).collect()
+            shots.map(|shot| shot.speed_m_s).collect()
         });
         let all = || speeds.iter().flatten().copied();
         all().next()?;
@@ -136,10 +136,10 @@ impl Speeds {
 impl ShotRow {
     fn new(shot: &Shot) -> Self {
         Self {
-            time: game_clock(step(shot.t)),
-            link: replay_link(step(shot.t)),
-            position: position_text(shot.at),
-            speed: figures::one_decimal(shot.speed),
+            time: game_clock(step(shot.touch_s)),
+            link: replay_link(step(shot.touch_s)),
+            position: position_text(shot.touch_position),
+            speed: figures::one_decimal(shot.speed_m_s),
             goal: shot.goal,
         }
     }
@@ -154,7 +154,9 @@ impl Violations {
             .collect();
         let group_positions = |group: Group| {
             let matching = own.iter().filter(|violation| violation.group == group);
-            matching.map(|violation| violation.at).collect()
+            matching
+                .map(|violation| violation.mallet_position)
+                .collect()
         };
         Self {
             team: team.to_owned(),
@@ -164,15 +166,16 @@ impl Violations {
                 .iter()
                 .take(MAX_ROWS)
                 .map(|violation| ViolationRow {
-                    time: game_clock(violation.from),
-                    link: replay_link(violation.from),
+                    time: game_clock(violation.first_sample),
+                    link: replay_link(violation.first_sample),
                     limit: group_label(violation.group),
                     duration_s: format!(
                         "{:.2}",
-                        f64::from(violation.to + 1 - violation.from) * CONTROL_STEP_S
+                        f64::from(violation.last_sample + 1 - violation.first_sample)
+                            * CONTROL_STEP_S
                     ),
                     max_excess: max_excess(violation),
-                    position: position_text(violation.at),
+                    position: position_text(violation.mallet_position),
                 })
                 .collect(),
         }
@@ -181,9 +184,11 @@ impl Violations {
 
 fn max_excess(violation: &LocatedViolation) -> String {
     match violation.group {
-        Group::Ee | Group::Link => format!("{} mm", figures::one_decimal(1e3 * violation.worst)),
-        Group::JointPos => format!("{:.3} rad", violation.worst),
-        Group::JointVel => format!("{:.3} rad/s", violation.worst),
+        Group::Ee | Group::Link => {
+            format!("{} mm", figures::one_decimal(1e3 * violation.max_excess))
+        }
+        Group::JointPos => format!("{:.3} rad", violation.max_excess),
+        Group::JointVel => format!("{:.3} rad/s", violation.max_excess),
     }
 }
 

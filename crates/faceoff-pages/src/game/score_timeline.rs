@@ -26,14 +26,16 @@ pub(super) struct Row {
 
 impl ScoreTimeline {
     pub(super) fn new(analysis: &GameAnalysis, teams: &[String; 2]) -> Self {
-        let GameAnalysis { breaks, steps, .. } = analysis;
+        let GameAnalysis {
+            rally_ends, steps, ..
+        } = analysis;
         let goal_paths = [0, 1].map(|side| {
             let goals = analysis.goals.iter().filter(|goal| goal.side == side);
             goals.map(|goal| path(&goal.positions)).collect()
         });
         let changes_score =
             |end: &&RallyEndEvent| matches!(end.what, RallyEndKind::Goal | RallyEndKind::Foul);
-        let rows: Vec<Row> = breaks
+        let rows: Vec<Row> = rally_ends
             .iter()
             .filter(|end| end.what != RallyEndKind::GameOver)
             .map(|end| Row {
@@ -51,7 +53,7 @@ impl ScoreTimeline {
         Self {
             chart: ScoreChart::new(
                 *steps,
-                breaks.iter().filter(changes_score).map(|end| {
+                rally_ends.iter().filter(changes_score).map(|end| {
                     let foul_by = (end.what == RallyEndKind::Foul)
                         .then_some(end.by)
                         .flatten()
@@ -60,7 +62,7 @@ impl ScoreTimeline {
                 }),
                 teams,
             ),
-            others: breaks.iter().filter(|end| !changes_score(end)).count(),
+            others: rally_ends.iter().filter(|end| !changes_score(end)).count(),
             goal_paths,
             rows,
         }

@@ -4,7 +4,7 @@ Importing this package is cheap: the simulator and other packages are imported o
 
 - :mod:`faceoff.agent`: the protocol loop of an agent, standard library only.
 - :mod:`faceoff.kinematics`: the robot's geometry.
-- :mod:`faceoff.gym`: Gymnasium environments of the three tasks, one world or many.
+- :mod:`faceoff.gym`: Gymnasium environments of the three tasks, with one world (a simulated table) or many.
 - :mod:`faceoff.game`: the game of two robots, for PettingZoo and self-play.
 - :mod:`faceoff.sb3`: the vector environment as Stable-Baselines3 expects it.
 - :mod:`faceoff.dataset`: recorded episodes.

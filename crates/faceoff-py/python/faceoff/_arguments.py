@@ -1,4 +1,7 @@
-"""Checks of arguments, and the environment setup that the native half reads."""
+"""Checks of arguments, and the environment setup that the native half reads.
+
+A *factor* is one kind of perturbation, a difference from the ideal simulator; a *profile* is a set of active factors.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +31,9 @@ PROFILES: dict[str, tuple[str, ...]] = {
 SEED_BOUND = 2**63
 
 
-def one_of(name: str, value: object, known: Iterable[str]) -> str:
-    """``value`` if it is one of ``known``."""
-    names = list(known)
+def one_of(name: str, value: object, choices: Iterable[str]) -> str:
+    """``value`` if it is one of ``choices``; ``name`` is the argument's, for the error message."""
+    names = list(choices)
     if not isinstance(value, str):
         raise ArgumentTypeError(f"{name}: expected one of {', '.join(names)}, got {value!r}")
     if value not in names:
@@ -38,14 +41,14 @@ def one_of(name: str, value: object, known: Iterable[str]) -> str:
     return value
 
 
-def integer(name: str, value: object, least: int, most: int) -> int:
-    """``value`` as an int from ``least`` to ``most``, both included; a bool is refused."""
+def integer(name: str, value: object, lowest: int, highest: int) -> int:
+    """``value`` as an int from ``lowest`` to ``highest``, both included; a bool is refused."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise ArgumentTypeError(
-            f"{name}: expected a whole number from {least} to {most}, got {value!r}"
+            f"{name}: expected a whole number from {lowest} to {highest}, got {value!r}"
         )
-    if not least <= value <= most:
-        raise ArgumentError(f"{name}: expected a whole number from {least} to {most}, got {value}")
+    if not lowest <= value <= highest:
+        raise ArgumentError(f"{name}: expected a whole number from {lowest} to {highest}, got {value}")
     return int(value)
 
 

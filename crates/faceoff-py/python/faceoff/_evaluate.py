@@ -1,4 +1,4 @@
-"""The competition's evaluator with a policy in this process."""
+"""The competition's evaluator with a policy (a function from an observation to an action) in this process."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def evaluate(
             one policy per task. A method ``reset(task, episode)``, if there is one, is called before each episode.
         tasks: one or more of ``hit``, ``defend`` and ``prepare``.
         episodes: number per task; the same episodes as those of ``faceoff eval --episodes N --seed S``.
-        profile: name of the profile of perturbations.
+        profile: name of a set of perturbations, such as ``ideal`` (none) or ``evaluation`` (as on the server).
         seed: a number, or 64 hexadecimal digits.
         mismatch_seed: seed of the arm's deviation from its model; derived from ``seed`` by default.
         interpolation, action_mode, clip_actions: as for the environments; ``raw`` actions are those that an agent
@@ -97,13 +97,13 @@ def evaluate(
             outcomes += _run_episodes(evaluation, setup, policies[task], task, indices)
     else:
         with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-            shards = [
-                pool.submit(_run_in_worker, setup, policies[task], task, indices)
+            futures = [
+                pool.submit(_run_in_process, setup, policies[task], task, indices)
                 for task, indices in jobs
                 if len(indices) > 0
             ]
-            for shard in shards:
-                outcomes += shard.result()
+            for future in futures:
+                outcomes += future.result()
     result: dict[str, Any] = json.loads(evaluation.score(outcomes))
     for task_result in result["tasks"].values():
         task_result["computation_time_s"] = None
@@ -162,7 +162,7 @@ def _perturbations_text(perturbations: object) -> str:
         raise ArgumentError(f"perturbations: expected finite numbers in mappings, got {error}") from None
 
 
-def _run_in_worker(setup: _Setup, policy: Policy, task: str, episodes: range) -> list[str]:
+def _run_in_process(setup: _Setup, policy: Policy, task: str, episodes: range) -> list[str]:
     return _run_episodes(setup.evaluation(), setup, policy, task, episodes)
 
 

@@ -7,7 +7,9 @@ import numpy.typing as npt
 
 __version__: str
 ENDS: list[str]
+#: Numbers in a world's row of facts; ``faceoff.gym.rows.Rows`` names them.
 FACTS: int
+#: Numbers in a true state; ``faceoff.gym.reward.State`` names them.
 STATE_LEN: int
 EPISODE_STEPS: int
 

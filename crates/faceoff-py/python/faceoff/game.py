@@ -1,4 +1,7 @@
-"""The game of two robots: a PettingZoo environment, and one side of it as a Gymnasium environment for self-play."""
+"""The game of two robots: a PettingZoo environment, and one side of it as a Gymnasium environment for self-play.
+
+A game consists of rallies: each lasts until a goal, a foul or another reason to put the puck down again.
+"""
 
 from __future__ import annotations
 
@@ -158,7 +161,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         """(n,) float32 by the agent's interpolation; the same object on each call."""
         return self._action_spaces[one_of("agent", agent, AGENTS)]
 
-    def _open(self) -> _native.Game:
+    def _require_game(self) -> _native.Game:
         if self._game is None:
             raise ClosedError("expected an open environment, got one that was closed: make a new one")
         return self._game
@@ -167,7 +170,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Begins the first game of ``seed``; without one, the next game of the last seed. ``options`` are ignored."""
-        game = self._open()
+        game = self._require_game()
         if seed is not None:
             self._seed, self._number = seed_number("seed", seed), 0
         elif self._seed is None:
@@ -196,7 +199,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         Infos have ``constraints``, ``score``, ``goals`` and ``fouls`` (robot 1 first), and ``rally_end`` if a rally
         has ended.
         """
-        game = self._open()
+        game = self._require_game()
         if not self.agents:
             raise OrderError("step: expected a game under way, got one that has ended: call reset() first")
         if not isinstance(actions, Mapping):
@@ -271,7 +274,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
             )
         from faceoff.gym.render import draw
 
-        puck, robots = self._open().state()
+        puck, robots = self._require_game().state()
         array = np.zeros(_native.STATE_LEN)
         array[:6], array[27:30], array[30:33] = puck, robots[0][14:], robots[1][14:]
         frame = draw(State(array), has_opponent=True)
@@ -307,7 +310,7 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
             method ``reset()``, if there is one, is called when a game begins.
         side: ``robot_1``, ``robot_2``, or ``random`` to draw the side of each game.
         max_steps: control steps of a game; the default is one minute.
-        others: as for :class:`AirHockeyGame`; with ``random`` sides both robots must have the same action space.
+        game_arguments: as for :class:`AirHockeyGame`; with ``random`` sides both robots must have the same action space.
 
     The pool may grow during training: ``env.unwrapped.opponents.append(policy)`` takes effect at the next reset.
     """
@@ -324,12 +327,12 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
         side: str = "robot_1",
         max_steps: int = 3_000,
         render_mode: str | None = None,
-        **others: Any,
+        **game_arguments: Any,
     ) -> None:
         self.opponents: list[Opponent] = list(opponents)
         self._check_pool()
         self._side = one_of("side", side, [*AGENTS, "random"])
-        self.game = AirHockeyGame(max_steps=max_steps, render_mode=render_mode, **others)
+        self.game = AirHockeyGame(max_steps=max_steps, render_mode=render_mode, **game_arguments)
         self.render_mode = render_mode
         spaces = [self.game.action_space(agent) for agent in AGENTS]
         if side == "random" and spaces[0] != spaces[1]:

@@ -151,18 +151,18 @@ def split_infos(batched: dict[str, Any], count: int) -> list[dict[str, Any]]:
     return infos
 
 
-def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = None, **others: Any) -> Any:
+def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = None, **env_arguments: Any) -> Any:
     """A ``stable_baselines3.common.vec_env.VecEnv`` of ``n_envs`` worlds.
 
     Args:
-        task, others: as for :class:`faceoff.gym.AirHockeyVectorEnv`, without ``autoreset_mode``.
+        task, env_arguments: as for :class:`faceoff.gym.AirHockeyVectorEnv`, without ``autoreset_mode``.
         n_envs: number of worlds.
         seed: s for the seeds s, s + 1, … of the first reset.
 
     Raises:
         MissingError: if Stable-Baselines3 is not installed.
     """
-    if "autoreset_mode" in others:
+    if "autoreset_mode" in env_arguments:
         raise ArgumentError("autoreset_mode: expected no value, since Stable-Baselines3 has a single mode, got one")
     try:
         from stable_baselines3.common.vec_env import VecEnv
@@ -175,7 +175,7 @@ def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = No
         def _init_spaces(self, envs: AirHockeyVectorEnv) -> None:
             VecEnv.__init__(self, envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
-    env = FaceoffVecEnv(AirHockeyVectorEnv(n_envs, task, autoreset_mode="SameStep", **others))  # type: ignore[arg-type]
+    env = FaceoffVecEnv(AirHockeyVectorEnv(n_envs, task, autoreset_mode="SameStep", **env_arguments))  # type: ignore[arg-type]
     if seed is not None:
         env.seed(seed)
     return env

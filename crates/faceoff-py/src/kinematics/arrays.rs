@@ -1,4 +1,4 @@
-//! Access to NumPy arrays as rows of numbers.
+//! Access to NumPy arrays as rows of numbers: an array of shape (2, 5, 7) has 10 rows of 7 numbers.
 
 use crate::errors::{argument_error, catch_panic};
 use numpy::{Element, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
@@ -51,7 +51,7 @@ pub fn map_rows<const N: usize, const M: usize>(
 /// Computes an output row from each pair of input rows, without the interpreter's lock.
 ///
 /// # Errors
-/// As of [`each`].
+/// See [`map_rows`].
 pub fn map_row_pairs<const N: usize, const K: usize, const M: usize>(
     py: Python<'_>,
     (first, second): (&Input<'_>, &Input<'_>),

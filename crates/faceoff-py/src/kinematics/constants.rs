@@ -15,16 +15,17 @@ use std::{array::from_fn, sync::LazyLock};
 pub const JOINT_MARGIN_RAD: f64 = 0.01;
 /// Margin of elbow and wrist to their minimum height.
 pub const HEIGHT_MARGIN_M: f64 = 0.01;
-/// A pose is a solution if its end effector is this close to the point.
+/// A *pose* (the angles of all joints) is a solution if its end effector is this close to the point.
 pub const TOLERANCE_M: f64 = 1e-6;
-/// The iteration stops at this distance.
+/// The least-squares iteration stops when the end effector is this close to the point.
 pub const GOAL_M: f64 = 1e-10;
+/// Most iterations of the least squares.
 pub const ITERATIONS: usize = 100;
 /// Longest step of an iteration, in joint space.
 pub const STEP_LIMIT_RAD: f64 = 0.3;
-/// Added to the diagonal of the normal equations.
+/// Added to the diagonal of the normal equations of the least squares, so that they always have a solution.
 pub const DAMPING: f64 = 1e-6;
-/// Decrease of the hand's angle from straight up per metre of reach.
+/// Decrease of the hand's angle from straight up per metre of reach. The *hand* is the part from joint 6 to the end effector.
 pub const HAND_PER_REACH_RAD_M: f64 = 0.85;
 /// The hand's angle from straight up in the start pose.
 pub const START_HAND_RAD: f64 = INITIAL_Q[1] - INITIAL_Q[3] + INITIAL_Q[5];

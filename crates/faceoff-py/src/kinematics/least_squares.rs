@@ -24,7 +24,7 @@ pub fn solve_near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; J
         }
         let linearisation = Linearisation {
             columns: jacobian(&kinematics),
-            rise: from_fn(|joint| kinematics.axes[joint].at(wrist).z),
+            rise: from_fn(|joint| kinematics.axes[joint].velocity_at(wrist).z),
             error,
             deficit,
         };

@@ -1,4 +1,4 @@
-//! Forward kinematics and Jacobian of the simulator.
+//! Forward kinematics and Jacobian of the simulator, at one *pose*: the angles of the seven joints.
 
 use faceoff_sim::{
     JOINTS,
@@ -16,7 +16,7 @@ pub fn kinematics_at(q: &[f64; JOINTS]) -> Kinematics<f64> {
 
 /// Derivative of the end effector's position by each joint, m/rad.
 pub fn jacobian(kinematics: &Kinematics<f64>) -> [Vec3<f64>; JOINTS] {
-    from_fn(|joint| kinematics.axes[joint].at(kinematics.end_effector.origin))
+    from_fn(|joint| kinematics.axes[joint].velocity_at(kinematics.end_effector.origin))
 }
 
 /// Heights of the origins of links 4 and 7, m.

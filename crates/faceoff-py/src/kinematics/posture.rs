@@ -1,4 +1,5 @@
-//! Inverse kinematics in closed form: one posture per point, in a vertical plane, elbow up.
+//! Inverse kinematics in closed form: one *posture* (joint angles) per point, in a vertical plane, elbow up. The arm in that
+//! plane is a chain of upper arm, forearm and hand (from joint 6 to the end effector).
 
 use super::constants::{
     Arm, FOREARM_M, HAND_M, HAND_PER_REACH_RAD_M, SHOULDER_M, START_HAND_RAD, UPPER_ARM_M,
@@ -11,6 +12,7 @@ pub fn posture(arm: &Arm, [x, y, z]: [f64; 3]) -> [f64; JOINTS] {
     let reach = libm::hypot(x, y);
     let hand = START_HAND_RAD - HAND_PER_REACH_RAD_M * (reach - arm.start_reach_m);
     let (sin_hand, cos_hand) = libm::sincos(hand);
+    // The wrist from the shoulder, horizontally and vertically.
     let ahead = reach - HAND_M * sin_hand;
     let above = z - HAND_M * cos_hand - SHOULDER_M;
     // Shoulder, elbow and wrist are a triangle of known sides.

@@ -21,11 +21,11 @@ const TASK_COLUMNS: [&str; 7] = [
 
 /// `columns`, followed by [`TASK_COLUMNS`] of each task.
 fn columns_with_tasks(columns: &[&str]) -> Vec<String> {
-    let mut all: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
+    let mut names: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in Task::ALL {
-        all.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
+        names.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
     }
-    all
+    names
 }
 
 /// The values of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
@@ -54,6 +54,7 @@ pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
         "team_id",
         "state",
         "voided",
+        // The reason for an extra evaluation, under the name that readers of older versions know.
         "extra_turn",
         "finished_at",
         "score",

@@ -20,13 +20,13 @@ pub(super) async fn put(app: &AppState, files: &mut Files) -> Result<(), Problem
         .map_err(free_space::write_problem)?;
     let mut writer = BufWriter::new(file);
     let names = actor_names(app).await?;
-    let mut after = 0;
+    let mut last_id = 0;
     loop {
-        let events = app.store.events_after(after, PAGE_EVENTS).await?;
+        let events = app.store.events_after(last_id, PAGE_EVENTS).await?;
         let Some(last) = events.last() else {
             break;
         };
-        after = last.id;
+        last_id = last.id;
         for event in events {
             let mut view = event::view(event);
             view.actor_name = names.get(&view.actor).cloned();

@@ -30,7 +30,7 @@ mod send;
 const PROGRAM: &str = concat!("faceoff ", env!("CARGO_PKG_VERSION"));
 
 /// File name of the database in an archive.
-const DATABASE: &str = "database.sqlite3";
+const DATABASE_FILE: &str = "database.sqlite3";
 
 /// A prepared archive, whose files are known and hashed, and only have to be sent.
 pub(crate) struct PreparedArchive {
@@ -124,9 +124,9 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
             });
         }
     }
-    let database = folder.path().join(DATABASE);
+    let database = folder.path().join(DATABASE_FILE);
     snapshot.finish(&database).await?;
-    files.add(DATABASE, database).await?;
+    files.add(DATABASE_FILE, database).await?;
     results::add_artifacts(app, artifacts, &mut files, &mut left_out).await?;
 
     let (entries, local_paths) = files.into_parts();

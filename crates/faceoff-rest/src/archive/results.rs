@@ -62,13 +62,16 @@ impl ArtifactRow {
     }
 }
 
-/// A name as part of a path: lower-case letters, digits and hyphens, 60 characters at most.
+/// Maximum length of a name in a path.
+const MAX_SLUG_CHARS: usize = 60;
+
+/// A name as part of a path: lower-case letters, digits and hyphens, [`MAX_SLUG_CHARS`] at most.
 pub(super) fn slug(name: &str) -> String {
     let chars = name.chars().map(|c| match c {
         c if c.is_ascii_alphanumeric() => c.to_ascii_lowercase(),
         _ => '-',
     });
-    let text: String = chars.take(60).collect();
+    let text: String = chars.take(MAX_SLUG_CHARS).collect();
     match text.trim_matches('-') {
         "" => "season".to_owned(),
         text => text.to_owned(),
@@ -206,7 +209,7 @@ async fn day_datasets(
     stage: &Stage,
     stage_day: StageDay,
 ) -> Result<Vec<ArtifactRow>, Problem> {
-    let mut found = Vec::new();
+    let mut datasets = Vec::new();
     for evaluation in app.store.evaluations_of_day(stage_day).await? {
         let public = visibility.is_public(&evaluation);
         if !public && viewer != Viewer::Organiser || evaluation.dataset_removed.is_some() {
@@ -220,7 +223,7 @@ async fn day_datasets(
         else {
             continue;
         };
-        found.push(ArtifactRow {
+        datasets.push(ArtifactRow {
             key: dataset,
             blake3: dataset_blake3,
             kind: "evaluation",
@@ -231,7 +234,7 @@ async fn day_datasets(
             public,
         });
     }
-    Ok(found)
+    Ok(datasets)
 }
 
 /// Adds the questions with their answers: the organiser's edition contains all, the public one those with a public answer.

@@ -137,13 +137,13 @@ impl OperationTraits<'_> {
         self.method != HttpMethod::Get
     }
 
-    fn has_parameter_in(&self, place: &ParameterIn) -> bool {
+    fn has_parameter_in(&self, location: &ParameterIn) -> bool {
         let parameters = self.operation.parameters.iter().flatten();
         let mut inline = parameters.filter_map(|parameter| match parameter {
             RefOr::T(parameter) => Some(parameter),
             RefOr::Ref(_) => None,
         });
-        inline.any(|parameter| parameter.parameter_in == *place)
+        inline.any(|parameter| parameter.parameter_in == *location)
     }
 
     fn has_query(&self) -> bool {

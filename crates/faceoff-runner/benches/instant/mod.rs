@@ -1,4 +1,4 @@
-//! An agent that answers at once: the benchmark's program, started with `--agent`.
+//! The benchmarks' agent, which answers at once: the benchmark's own program, started with `--agent`.
 
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
@@ -76,6 +76,7 @@ impl InstantAgent {
     }
 }
 
+/// The default limits, with this isolation.
 pub fn environment(isolation: Isolation) -> AgentEnvironment {
     AgentEnvironment {
         limits: Limits::default(),

@@ -32,8 +32,8 @@ const MAX_LOOKUP_BYTES: u64 = 256 << 20;
 /// A name counts as this many additional bytes, because a short name also costs time.
 const LOOKUP_BYTES_PER_NAME: u64 = 16;
 
-/// Clock; a parameter, so that tests can set the time.
-pub(super) type Now<'a> = &'a dyn Fn() -> Instant;
+/// The clock is a parameter, so that tests can set the time.
+pub(super) type Clock<'a> = &'a dyn Fn() -> Instant;
 
 /// Counts all work that reading an archive causes, and stops at a limit: bytes from the decompressor, entries of any
 /// kind, successive streams, seeks.
@@ -46,7 +46,7 @@ pub(super) type Now<'a> = &'a dyn Fn() -> Instant;
 pub(super) struct Budget<'a> {
     limits: BundleLimits,
     deadline: Instant,
-    now: Now<'a>,
+    now: Clock<'a>,
     cancelled: &'a dyn Fn() -> bool,
     /// Bytes read through [`MeteredReader`]: everything that the archive consists of.
     read_bytes: Cell<u64>,
@@ -78,7 +78,7 @@ impl<'a> Budget<'a> {
     /// An unused budget. `cancelled` is called for every piece that is read, so it must be cheap.
     pub(super) fn new(
         limits: &BundleLimits,
-        now: Now<'a>,
+        now: Clock<'a>,
         cancelled: &'a dyn Fn() -> bool,
     ) -> Self {
         Self {
@@ -267,8 +267,12 @@ impl<'a> Budget<'a> {
 
     /// Refuses compressed data that is larger than its content: empty blocks cost as much time as others.
     fn check_compression(&self) -> Result<(), BundleError> {
-        let explained = OVERHEAD_BYTES + (self.streams.get() + 1) * PACKED_BYTES_PER_STREAM;
-        if self.packed_bytes.get() > self.decompressed_bytes.get().saturating_add(explained) {
+        let allowed_overhead = OVERHEAD_BYTES + (self.streams.get() + 1) * PACKED_BYTES_PER_STREAM;
+        let max = self
+            .decompressed_bytes
+            .get()
+            .saturating_add(allowed_overhead);
+        if self.packed_bytes.get() > max {
             return self.refuse(format!(
                 "the archive is larger than its content: {} compressed bytes contain {} bytes",
                 self.packed_bytes.get(),

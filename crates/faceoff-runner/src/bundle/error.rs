@@ -18,16 +18,25 @@ pub enum BundleError {
 }
 
 impl BundleError {
-    /// Converts an error of reading `entry` of an archive (empty: of the archive itself). If the disk failed, the error has a system
-    /// error number; otherwise the bytes are invalid. Errors of `fs_err` do not have the number, so readers use plain files.
-    pub(super) fn from_read_error(entry: &str) -> impl FnOnce(io::Error) -> Self + '_ {
-        move |source| match source.raw_os_error() {
+    /// Converts an error of reading an archive, outside of its entries. If the disk failed, the error has a system error
+    /// number; otherwise the bytes are invalid. Errors of `fs_err` do not have the number, so readers use plain files.
+    pub(super) fn from_archive_read_error(source: io::Error) -> Self {
+        match source.raw_os_error() {
             Some(_) => Self::Io(io::Error::new(
                 source.kind(),
                 format!("reading the archive: {source}"),
             )),
-            None if entry.is_empty() => Self::Invalid(format!("the archive is damaged: {source}")),
-            None => Self::Invalid(format!("the archive is damaged at {entry:?}: {source}")),
+            None => Self::Invalid(format!("the archive is damaged: {source}")),
+        }
+    }
+
+    /// Converts an error of reading `entry` of an archive, as [`Self::from_archive_read_error`] does.
+    pub(super) fn from_read_error(entry: &str) -> impl FnOnce(io::Error) -> Self + '_ {
+        move |source| match source.raw_os_error() {
+            None if !entry.is_empty() => {
+                Self::Invalid(format!("the archive is damaged at {entry:?}: {source}"))
+            }
+            _ => Self::from_archive_read_error(source),
         }
     }
 }

@@ -5,14 +5,19 @@ use std::io::Read;
 
 /// Receives the entries of an archive.
 pub(super) trait Sink {
-    fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError>;
+    fn add_folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError>;
     /// A file, its content streamed.
-    fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError>;
-    fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
+    fn add_file(
+        &mut self,
+        entry: &str,
+        mode: u32,
+        content: &mut dyn Read,
+    ) -> Result<(), BundleError>;
+    fn add_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
     /// Another name of a file.
-    fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
+    fn add_hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
     /// An entry of any other kind.
-    fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError>;
+    fn add_special(&mut self, entry: &str, special: Special) -> Result<(), BundleError>;
 }
 
 /// The kind of an entry that is neither file, folder nor link.

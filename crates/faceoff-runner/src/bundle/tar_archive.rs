@@ -9,8 +9,8 @@ use super::{
 use std::io::{self, Read};
 use tar::{Archive, EntryType, Header};
 
-/// Longest *extension header*: one that only describes the next entry (long names, extended attributes). Headers are held in memory,
-/// and no ordinary bundle has a longer one.
+/// Longest *extension header*: one that only describes the next entry (long names, extended attributes). Headers are
+/// held in memory, and no ordinary bundle has a longer one.
 const EXTENSION_MAX_BYTES: u64 = 1 << 20;
 
 /// Values of extension headers for the following entry.
@@ -35,10 +35,10 @@ pub(super) fn unpack<'a>(
     let mut extensions = Extensions::default();
     for entry in archive
         .entries()
-        .map_err(BundleError::from_read_error(""))?
+        .map_err(BundleError::from_archive_read_error)?
         .raw(true)
     {
-        let mut entry = entry.map_err(BundleError::from_read_error(""))?;
+        let mut entry = entry.map_err(BundleError::from_archive_read_error)?;
         budget.count_entry()?;
         let kind = entry.header().entry_type();
         match kind {
@@ -78,19 +78,19 @@ pub(super) fn unpack<'a>(
                 match kind {
                     EntryType::Regular | EntryType::Continuous if name.ends_with('/') => {
                         // Old archives mark a folder by its name only.
-                        sink.folder(&name, mode)?;
+                        sink.add_folder(&name, mode)?;
                     }
                     EntryType::Regular | EntryType::Continuous => {
                         budget.allow(entry.size());
-                        sink.file(&name, mode, &mut entry)?;
+                        sink.add_file(&name, mode, &mut entry)?;
                         count_rest(&name, &mut entry, budget)?;
                     }
-                    EntryType::Directory => sink.folder(&name, mode)?,
+                    EntryType::Directory => sink.add_folder(&name, mode)?,
                     EntryType::Symlink => {
-                        sink.link(&name, &utf8_name(link.unwrap_or_default())?)?
+                        sink.add_link(&name, &utf8_name(link.unwrap_or_default())?)?
                     }
                     EntryType::Link => {
-                        sink.hard_link(&name, &utf8_name(link.unwrap_or_default())?)?
+                        sink.add_hard_link(&name, &utf8_name(link.unwrap_or_default())?)?
                     }
                     EntryType::Char | EntryType::Block => {
                         // An empty field is 0.
@@ -104,9 +104,9 @@ pub(super) fn unpack<'a>(
                         } else {
                             Special::Device
                         };
-                        sink.special(&name, special)?;
+                        sink.add_special(&name, special)?;
                     }
-                    EntryType::Fifo => sink.special(&name, Special::Pipe)?,
+                    EntryType::Fifo => sink.add_special(&name, Special::Pipe)?,
                     EntryType::GNUSparse => return Err(sparse_error(&name)),
                     _ => return Err(unusable(&name, "of an unknown kind")),
                 }
@@ -126,7 +126,7 @@ fn read_extension(entry: &mut tar::Entry<'_, impl Read>) -> Result<Vec<u8>, Bund
     let mut bytes = Vec::new();
     entry
         .read_to_end(&mut bytes)
-        .map_err(BundleError::from_read_error(""))?;
+        .map_err(BundleError::from_archive_read_error)?;
     Ok(bytes)
 }
 
@@ -179,8 +179,8 @@ fn read_pax(mut bytes: &[u8], extensions: &mut Extensions) -> Result<(), BundleE
         match key {
             b"path" => extensions.path = Some(value.to_vec()),
             b"linkpath" => extensions.link = Some(value.to_vec()),
-            // An invalid number becomes a size that no header has.
-            b"size" => extensions.size = Some(number(value).unwrap_or(u64::MAX)),
+            // An invalid parse_number becomes a size that no header has.
+            b"size" => extensions.size = Some(parse_number(value).unwrap_or(u64::MAX)),
             key if key.starts_with(b"GNU.sparse") => extensions.is_sparse = true,
             _ => {}
         }
@@ -191,7 +191,7 @@ fn read_pax(mut bytes: &[u8], extensions: &mut Extensions) -> Result<(), BundleE
 /// Key, value, and the remaining bytes.
 fn pax_record(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     let space = bytes.iter().position(|&byte| byte == b' ')?;
-    let length = usize::try_from(number(&bytes[..space])?).ok()?;
+    let length = usize::try_from(parse_number(&bytes[..space])?).ok()?;
     let (record, rest) = bytes.split_at_checked(length)?;
     let (key_and_value, end) = record
         .get(space + 1..)?
@@ -200,7 +200,7 @@ fn pax_record(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     (end == b"\n").then_some((&key_and_value[..equals], &key_and_value[equals + 1..], rest))
 }
 
-fn number(digits: &[u8]) -> Option<u64> {
+fn parse_number(digits: &[u8]) -> Option<u64> {
     std::str::from_utf8(digits).ok()?.parse().ok()
 }
 

@@ -45,7 +45,8 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// The plan. If an archive has a directory (a list of its entries), it is checked with the plan before anything is written.
+    /// The plan. If an archive has a directory (a list of its entries), it is checked with the plan before anything is
+    /// written.
     pub fn plan_mut(&mut self) -> &mut Plan {
         &mut self.plan
     }
@@ -140,30 +141,35 @@ impl<'a> Tree<'a> {
 
 impl Sink for Tree<'_> {
     /// The folder is created by [`Tree::finish`], or with the first file in it.
-    fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
+    fn add_folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
         self.plan.add_folder(entry, mode)
     }
 
-    fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError> {
+    fn add_file(
+        &mut self,
+        entry: &str,
+        mode: u32,
+        content: &mut dyn Read,
+    ) -> Result<(), BundleError> {
         let path = self.plan.add_file(entry, mode)?;
         let path_on_disk = self.make_parents(&path)?;
         write_new(entry, &path_on_disk, mode, content, self.budget)
     }
 
     /// The link is checked and created by [`Tree::finish`].
-    fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+    fn add_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         check_target(entry, target)?;
         self.plan.add_link(entry, target)
     }
 
     /// The target must be an earlier file of the archive.
-    fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+    fn add_hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         let (existing, path) = self.plan.add_hard_link(entry, target)?;
         let path_on_disk = self.make_parents(&path)?;
         add_hard_link(entry, &self.dir.join(existing), &path_on_disk)
     }
 
-    fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {
+    fn add_special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {
         Err(unusable(
             entry,
             match special {

@@ -97,21 +97,20 @@ pub(super) fn unpack<'a>(
     // a prefix of the archive is a search. The allowance per entry covers the seeks of both passes.
     budget.allow(3 * packed_bytes);
     let file = MeteredReader::new(file, budget);
-    let mut archive =
-        ZipIterable::try_new(file, Config::default()).map_err(|error| damaged("", error))?;
+    let mut archive = ZipIterable::try_new(file, Config::default()).map_err(damaged_archive)?;
     check_directory(&mut archive, tree.plan_mut(), budget)?;
     tree.reset_plan();
     let mut archive = archive.enforce_header_consistency(true);
-    let files = archive.files().map_err(|error| damaged("", error))?;
+    let files = archive.files().map_err(damaged_archive)?;
     while let Some(entry) = files.next() {
-        let entry = entry.map_err(|error| damaged("", error))?;
+        let entry = entry.map_err(damaged_archive)?;
         let Header { name, mode, kind } = Header::from_entry(&entry)?;
         let mut content = entry
             .with_reader(files.reader_mut(), ZipReadOptions::new())
-            .map_err(|error| damaged(&name, error))?;
+            .map_err(|error| damaged_entry(&name, error))?;
         match kind {
-            Kind::Folder => tree.folder(&name, mode)?,
-            Kind::File => tree.file(&name, mode, &mut content)?,
+            Kind::Folder => tree.add_folder(&name, mode)?,
+            Kind::File => tree.add_file(&name, mode, &mut content)?,
             Kind::Link => {
                 let mut target = Vec::new();
                 (&mut content)
@@ -120,7 +119,7 @@ pub(super) fn unpack<'a>(
                     .map_err(BundleError::from_read_error(&name))?;
                 let target = String::from_utf8(target)
                     .map_err(|_| unusable(&name, "a link to a name that is not UTF-8"))?;
-                tree.link(&name, &target)?;
+                tree.add_link(&name, &target)?;
             }
         }
     }
@@ -134,8 +133,8 @@ fn check_directory<R: Read + Seek>(
     plan: &mut Plan,
     budget: &Budget<'_>,
 ) -> Result<(), BundleError> {
-    for entry in archive.files().map_err(|error| damaged("", error))? {
-        let entry = entry.map_err(|error| damaged("", error))?;
+    for entry in archive.files().map_err(damaged_archive)? {
+        let entry = entry.map_err(damaged_archive)?;
         budget.count_entry()?;
         let Header { name, mode, kind } = Header::from_entry(&entry)?;
         match kind {
@@ -151,12 +150,17 @@ fn check_directory<R: Read + Seek>(
     Ok(())
 }
 
-fn damaged(entry: &str, error: ZipError) -> BundleError {
+fn damaged_archive(error: ZipError) -> BundleError {
+    match error {
+        ZipError::Io(error) => BundleError::from_archive_read_error(error),
+        error => BundleError::Invalid(format!("the archive is damaged: {error}")),
+    }
+}
+
+fn damaged_entry(entry: &str, error: ZipError) -> BundleError {
     match error {
         ZipError::Io(error) => BundleError::from_read_error(entry)(error),
-        other if entry.is_empty() => {
-            BundleError::Invalid(format!("the archive is damaged: {other}"))
-        }
-        other => BundleError::Invalid(format!("the archive is damaged at {entry:?}: {other}")),
+        error if entry.is_empty() => damaged_archive(error),
+        error => BundleError::Invalid(format!("the archive is damaged at {entry:?}: {error}")),
     }
 }

@@ -1,4 +1,5 @@
-//! Live feed of a game for viewers: all events, and positions at intervals.
+//! Live feed of a game for viewers: all events, and positions at intervals. A game consists of *rallies*, each from a
+//! serve to a goal, a foul or another end.
 
 use super::report::{GameObserver, GameReport};
 use faceoff_episode::{GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart};
@@ -79,7 +80,7 @@ impl GameObserver for LiveFeed<'_> {
             .map(|(side, _)| GameEvent::Restarted { side });
         let rally_begun = GameEvent::RallyBegun {
             rally: start.rally,
-            serves: start.serves,
+            serves: start.serving_side,
         };
         let step = start.game_step;
         let events = restarted.chain([rally_begun]);

@@ -174,7 +174,7 @@ pub fn play_game<S: GameSink>(
         after_answer,
         |observed| observed.observer.cancelled(),
     );
-    let ended = played.map(|()| {
+    let finished = played.map(|()| {
         let FinishedGame {
             outcome,
             answer_times_s,
@@ -196,7 +196,7 @@ pub fn play_game<S: GameSink>(
             second.finish(second_stall_s, 0, spec.platform_retries),
         ],
     };
-    Ok((ended?, calibration, [first_log, second_log]))
+    Ok((finished?, calibration, [first_log, second_log]))
 }
 
 /// A sink that also notifies an observer.

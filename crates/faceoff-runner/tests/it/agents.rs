@@ -6,8 +6,7 @@ use faceoff_wire::Manifest;
 use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
 use tempfile::TempDir;
 
-/// A complete agent that holds its initial pose, with hooks for misbehaviour: `on_hello(hello)`, `on_reset(episode)`
-/// and
+/// A complete agent that keeps its initial pose, with hooks for misbehaviour: `on_hello(hello)`, `on_reset(episode)` and
 /// `on_step(step, answer)`, which returns the line to send, or `None` for no answer.
 const FRAME: &str = r#"
 import json, os, sys, time
@@ -19,7 +18,7 @@ def say(line):
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
 #HOOKS
-held = None
+start_position = None
 for line in sys.stdin:
     message = json.loads(line)
     kind = message["type"]
@@ -28,14 +27,14 @@ for line in sys.stdin:
         on_hello(message)
         say(json.dumps({"type": "ready", "protocol": 1, "interpolation": INTERPOLATION}))
     elif kind == "reset":
-        held = None
+        start_position = None
         on_reset(message["episode"])
         say(json.dumps({"type": "ready", "episode": message["episode"]}))
     elif kind == "step":
         obs = message["obs"]
-        if held is None:
-            held = [obs[i] for i in env["joint_pos_ids"]]
-        action = {1: held, 3: [held, [0.0] * 7]}.get(INTERPOLATION)
+        if start_position is None:
+            start_position = [obs[i] for i in env["joint_pos_ids"]]
+        action = {1: start_position, 3: [start_position, [0.0] * 7]}.get(INTERPOLATION)
         answer = on_step(message["step"], {"type": "act", "step": message["step"], "action": action})
         if answer is not None:
             say(answer)
@@ -51,14 +50,17 @@ pub struct Agent {
 }
 
 impl Agent {
+    /// An agent without misbehaviour.
     pub fn behaving() -> Self {
         Self::with("")
     }
 
+    /// An agent with these hooks, in Python.
     pub fn with(hooks: &str) -> Self {
         Self::script(&FRAME.replace("#HOOKS", hooks))
     }
 
+    /// An agent with this Python program instead of [`FRAME`].
     pub fn script(script: &str) -> Self {
         let dir = tempfile::Builder::new()
             .permissions(fs::Permissions::from_mode(0o755))
@@ -80,13 +82,14 @@ impl Agent {
         Self { _dir: dir, bundle }
     }
 
+    /// Changes the agent's manifest.
     pub fn manifest(mut self, change: impl FnOnce(&mut Manifest)) -> Self {
         change(&mut self.bundle.manifest);
         self
     }
 }
 
-/// The full sandbox with deadlines that only a dead machine reaches.
+/// The full sandbox, with deadlines so long that load on the machine does not matter.
 pub fn sandboxed() -> AgentEnvironment {
     AgentEnvironment {
         limits: Limits {
@@ -123,7 +126,7 @@ pub fn sandboxed() -> AgentEnvironment {
 }
 
 /// The sandbox with a short step limit, for agents that never answer.
-pub fn impatient() -> AgentEnvironment {
+pub fn with_short_step_limit() -> AgentEnvironment {
     let mut env = sandboxed();
     env.time.step_s = 0.5;
     env

@@ -1,4 +1,4 @@
-//! Archives as teams and attackers make them.
+//! Builders of archives (tar, zip) as teams and attackers make them.
 
 use flate2::{Compression, write::GzEncoder};
 use std::{
@@ -9,6 +9,7 @@ use std::{
 use tar::{EntryType, Header};
 use zip::{ZipWriter, write::SimpleFileOptions};
 
+/// A valid `agent.toml`.
 pub const MANIFEST: &str =
     "name = \"test\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
 
@@ -21,11 +22,12 @@ impl Tar {
         Self(Vec::new())
     }
 
-    /// With an `agent.toml` at the root.
+    /// An archive with an `agent.toml` at its root.
     pub fn with_manifest() -> Self {
         Self::new().file("agent.toml", 0o644, MANIFEST.as_bytes())
     }
 
+    /// Adds an entry of any kind; `link` is the target of a link.
     pub fn entry(
         mut self,
         kind: EntryType,
@@ -66,6 +68,7 @@ impl Tar {
         self.entry(EntryType::Symlink, name, 0o777, target, b"")
     }
 
+    /// The finished archive, uncompressed.
     pub fn bytes(mut self) -> Vec<u8> {
         self.0.extend_from_slice(&[0; 1024]);
         self.0

@@ -11,7 +11,7 @@ use tar::EntryType;
 use zip::{ZipWriter, write::FullFileOptions};
 
 const MIB: usize = 1 << 20;
-/// The reason for archives with too much overhead.
+/// Part of the refusal of archives with too much overhead.
 const TOO_MUCH: &str = "more bytes than its files explain";
 
 /// The result of unpacking an archive.
@@ -19,6 +19,7 @@ fn verdict(bytes: &[u8]) -> Result<(), BundleError> {
     verdict_unless(bytes, &|| false)
 }
 
+/// The result of unpacking an archive, which stops when `cancelled` returns true.
 fn verdict_unless(bytes: &[u8], cancelled: &dyn Fn() -> bool) -> Result<(), BundleError> {
     let dir = tempfile::tempdir().unwrap();
     let archive = write(dir.path(), "upload", bytes);
@@ -27,7 +28,7 @@ fn verdict_unless(bytes: &[u8], cancelled: &dyn Fn() -> bool) -> Result<(), Bund
 }
 
 #[track_caller]
-fn refused(bytes: &[u8], needle: &str) {
+fn assert_refused(bytes: &[u8], needle: &str) {
     match verdict(bytes) {
         Err(BundleError::Invalid(message)) => assert!(message.contains(needle), "{message:?}"),
         other => panic!("expected a refusal with {needle:?}, got {other:?}"),
@@ -56,23 +57,23 @@ fn headers_without_entries_are_counted() {
     for kind in [EntryType::XHeader, EntryType::XGlobalHeader] {
         let bomb = repeated(kind, &comment, 20).gz();
         assert!(bomb.len() < MIB, "{} bytes", bomb.len());
-        refused(&bomb, TOO_MUCH);
+        assert_refused(&bomb, TOO_MUCH);
     }
     for kind in [EntryType::GNULongName, EntryType::GNULongLink] {
-        refused(&repeated(kind, &vec![b'n'; MIB], 20).gz(), TOO_MUCH);
-        refused(&repeated(kind, &vec![b'n'; MIB], 20).zst(), TOO_MUCH);
+        assert_refused(&repeated(kind, &vec![b'n'; MIB], 20).gz(), TOO_MUCH);
+        assert_refused(&repeated(kind, &vec![b'n'; MIB], 20).zst(), TOO_MUCH);
     }
 }
 
 #[test]
 fn skipped_content_is_counted() {
-    // The library skips it, by reading it.
+    // The tar library skips this content by reading it.
     for kind in [EntryType::Directory, EntryType::Symlink] {
-        refused(&repeated(kind, &vec![0; 30 * MIB], 1).gz(), TOO_MUCH);
+        assert_refused(&repeated(kind, &vec![0; 30 * MIB], 1).gz(), TOO_MUCH);
     }
     // Sparse files are refused by their header, before their content is read.
     let sparse = repeated(EntryType::GNUSparse, &[0; 512], 1).gz();
-    refused(&sparse, "sparse");
+    assert_refused(&sparse, "sparse");
     let sparse = Tar::with_manifest()
         .entry(
             EntryType::XHeader,
@@ -82,14 +83,14 @@ fn skipped_content_is_counted() {
             b"22 GNU.sparse.major=1\n",
         )
         .file("x", 0o644, b"");
-    refused(&sparse.gz(), "sparse");
+    assert_refused(&sparse.gz(), "sparse");
 }
 
 #[test]
 fn entries_without_effect_are_counted() {
     // Entries for the archive's root are not refused as duplicates.
     let roots = (0..200_001).fold(Tar::with_manifest(), |tar, _| tar.folder("./"));
-    refused(&roots.gz(), "more than 200000 entries");
+    assert_refused(&roots.gz(), "more than 200000 entries");
 }
 
 #[test]
@@ -102,10 +103,10 @@ fn empty_streams_are_counted() {
     for (empty, whole) in [(empty_gzip, tar().gz()), (empty_zstd, tar().zst())] {
         let mut bomb = empty.repeat(200_001);
         bomb.extend_from_slice(&whole);
-        refused(&bomb, "more than 200000 compressed streams");
-        let mut some = empty.repeat(100);
-        some.extend_from_slice(&whole);
-        verdict(&some).unwrap();
+        assert_refused(&bomb, "more than 200000 compressed streams");
+        let mut accepted = empty.repeat(100);
+        accepted.extend_from_slice(&whole);
+        verdict(&accepted).unwrap();
     }
 }
 
@@ -125,7 +126,7 @@ fn empty_blocks_are_counted() {
     };
     let with = |blocks: usize| [stream(blocks), whole()].concat();
     verdict(&with(1 << 20)).unwrap();
-    refused(&with(4 << 20), "larger than its content");
+    assert_refused(&with(4 << 20), "larger than its content");
     // Incompressible content is accepted, and so is the padding of a tape block.
     let mut state = 1_u32;
     let random_bytes: Vec<u8> = (0..20 * MIB)
@@ -138,6 +139,7 @@ fn empty_blocks_are_counted() {
     verdict(&random_tar().gz()).unwrap();
     verdict(&random_tar().zst()).unwrap();
     verdict(&[whole(), vec![0; 10_240]].concat()).unwrap();
+    // A skippable frame of Zstandard.
     let skipped = b"\x50\x2a\x4d\x18\x04\0\0\0size".to_vec();
     let tar = Tar::with_manifest().file("agent.py", 0o644, b"print()");
     verdict(&[skipped, tar.zst()].concat()).unwrap();
@@ -185,15 +187,16 @@ fn cancellation_stops_unpacking_at_any_point() {
     let headers = repeated(EntryType::XHeader, &pax_comment(), 10).gz();
     let shared = shared_zip(50, MIB);
     for bytes in [large().gz(), large().zst(), headers, shared] {
-        for at in [0, 3, 20] {
-            let asked = Cell::new(0);
+        for checks_before in [0, 3, 20] {
+            let checks = Cell::new(0);
             let cancelled = || {
-                asked.set(asked.get() + 1);
-                asked.get() > at
+                checks.set(checks.get() + 1);
+                checks.get() > checks_before
             };
             let result = verdict_unless(&bytes, &cancelled);
             assert!(matches!(result, Err(BundleError::Cancelled)), "{result:?}");
-            assert_eq!(asked.get(), at + 1, "it continues after the cancellation");
+            let message = "unpacking continues after the cancellation";
+            assert_eq!(checks.get(), checks_before + 1, "{message}");
         }
     }
 }
@@ -254,7 +257,7 @@ fn shared_zip(files: usize, tail: usize) -> Vec<u8> {
     for (file, fields, from_end) in headers.iter().rev() {
         directory.extend_from_slice(b"PK\x01\x02\x14\x03");
         directory.extend_from_slice(fields);
-        // Comment, disk, attributes, offset.
+        // Comment and disk, attributes, offset.
         directory.extend_from_slice(&[0; 6]);
         directory.extend_from_slice(&(0o100_644_u32 << 16).to_le_bytes());
         let offset = u32::try_from(data.len() - from_end).unwrap();
@@ -279,11 +282,11 @@ fn shared_zip(files: usize, tail: usize) -> Vec<u8> {
 
 #[test]
 fn zip_with_shared_bytes_is_refused() {
-    // With three files it is a valid archive, except for its manifest.
-    refused(&shared_zip(3, 1000), "agent.toml: ");
+    // With three files the archive is valid, except for its manifest.
+    assert_refused(&shared_zip(3, 1000), "agent.toml: ");
     let bomb = shared_zip(200, MIB);
     assert!(bomb.len() < MIB + MIB / 8, "{} bytes", bomb.len());
-    refused(&bomb, TOO_MUCH);
+    assert_refused(&bomb, TOO_MUCH);
 }
 
 #[test]
@@ -314,5 +317,5 @@ fn link_chains_are_counted() {
         })
     };
     verdict(&links(20).gz()).unwrap();
-    refused(&links(1000).gz(), "lead through too many others");
+    assert_refused(&links(1000).gz(), "lead through too many others");
 }

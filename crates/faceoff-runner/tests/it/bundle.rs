@@ -1,3 +1,5 @@
+//! Unpacking of bundles (archives with an agent and its `agent.toml`): accepted formats, and attacks that must fail.
+
 use crate::archives::{MANIFEST, Tar, write, zip};
 use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, open, unpack};
 use std::{
@@ -15,14 +17,16 @@ fn try_unpack(bytes: &[u8], limits: BundleLimits) -> (TempDir, Result<Bundle, Bu
     (dir, result)
 }
 
+/// Unpacks a valid bundle.
 #[track_caller]
-fn accepted(bytes: &[u8]) -> (TempDir, Bundle) {
+fn unpack_valid(bytes: &[u8]) -> (TempDir, Bundle) {
     let (dir, result) = try_unpack(bytes, BundleLimits::default());
     (dir, result.unwrap())
 }
 
+/// Asserts that the archive is refused with a message that contains `needle`. Returns the folder with the leftovers.
 #[track_caller]
-fn refused_with(bytes: &[u8], limits: BundleLimits, needle: &str) -> TempDir {
+fn assert_refused_with_limits(bytes: &[u8], limits: BundleLimits, needle: &str) -> TempDir {
     let (dir, result) = try_unpack(bytes, limits);
     match result {
         Err(BundleError::Invalid(message)) => {
@@ -34,14 +38,14 @@ fn refused_with(bytes: &[u8], limits: BundleLimits, needle: &str) -> TempDir {
 }
 
 #[track_caller]
-fn refused(bytes: &[u8], needle: &str) -> TempDir {
-    refused_with(bytes, BundleLimits::default(), needle)
+fn assert_refused(bytes: &[u8], needle: &str) -> TempDir {
+    assert_refused_with_limits(bytes, BundleLimits::default(), needle)
 }
 
 /// Asserts a refusal before anything was written.
 #[track_caller]
-fn refused_unwritten(bytes: &[u8], limits: BundleLimits, needle: &str) {
-    let dir = refused_with(bytes, limits, needle);
+fn assert_refused_unwritten(bytes: &[u8], limits: BundleLimits, needle: &str) {
+    let dir = assert_refused_with_limits(bytes, limits, needle);
     let written: Vec<_> = fs::read_dir(dir.path().join("out")).unwrap().collect();
     assert!(written.is_empty(), "{needle:?} after {written:?}");
 }
@@ -65,7 +69,7 @@ fn archive_formats_are_detected_by_their_bytes() {
         ("weights/w.bin", 0o600, &[7; 100_000]),
     ]);
     for bytes in [tar().gz(), tar().zst(), zip] {
-        let (_dir, bundle) = accepted(&bytes);
+        let (_dir, bundle) = unpack_valid(&bytes);
         assert_eq!(bundle.manifest.name, "test");
         assert_eq!(
             fs::read(bundle.dir.join("weights/w.bin")).unwrap(),
@@ -75,13 +79,13 @@ fn archive_formats_are_detected_by_their_bytes() {
         assert_eq!(mode(&bundle.dir.join("weights/w.bin")), 0o644);
         assert_eq!(mode(&bundle.dir.join("weights")), 0o755);
     }
-    refused(b"", "expected .tar.gz, .tar.zst or .zip");
-    refused(b"#!/bin/sh\n", "expected .tar.gz, .tar.zst or .zip");
+    assert_refused(b"", "expected .tar.gz, .tar.zst or .zip");
+    assert_refused(b"#!/bin/sh\n", "expected .tar.gz, .tar.zst or .zip");
 }
 
 #[test]
 fn single_top_folder_is_the_bundle() {
-    let (_dir, bundle) = accepted(
+    let (_dir, bundle) = unpack_valid(
         &Tar::new()
             .file("striker-1.2/agent.toml", 0o644, MANIFEST.as_bytes())
             .gz(),
@@ -90,31 +94,31 @@ fn single_top_folder_is_the_bundle() {
     let two = Tar::new()
         .file("a/agent.toml", 0o644, MANIFEST.as_bytes())
         .file("b/x", 0o644, b"");
-    refused(&two.gz(), "there is no agent.toml");
-    refused(
+    assert_refused(&two.gz(), "there is no agent.toml");
+    assert_refused(
         &Tar::new().file("agent.py", 0o644, b"").gz(),
         "there is no agent.toml",
     );
-    refused(
+    assert_refused(
         &Tar::new().file("a/b/agent.toml", 0o644, b"").gz(),
         "there is no agent.toml",
     );
-    refused(&Tar::new().gz(), "there is no agent.toml");
+    assert_refused(&Tar::new().gz(), "there is no agent.toml");
 }
 
 #[test]
 fn wrong_manifest_key_is_named() {
     let tar = |text: &str| Tar::new().file("agent.toml", 0o644, text.as_bytes()).gz();
-    refused(&tar("name = 3"), "agent.toml:");
-    refused(
+    assert_refused(&tar("name = 3"), "agent.toml:");
+    assert_refused(
         &tar(&MANIFEST.replace("[\"python3\", \"agent.py\"]", "[]")),
         "command must name",
     );
-    refused(&tar(&"#".repeat(100_000)), "longer than 65536 bytes");
+    assert_refused(&tar(&"#".repeat(100_000)), "longer than 65536 bytes");
     let not_utf8 = Tar::new()
         .file("agent.toml", 0o644, b"name = \"\xff\"")
         .gz();
-    refused(&not_utf8, "agent.toml: not UTF-8");
+    assert_refused(&not_utf8, "agent.toml: not UTF-8");
 }
 
 #[test]
@@ -125,10 +129,10 @@ fn paths_outside_the_bundle_are_refused() {
         ("a/../../x", "'..'"),
         ("a/..", "'..'"),
     ] {
-        let dir = refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), reason);
+        let dir = assert_refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), reason);
         assert!(!dir.path().join("x").exists());
-        refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), name);
-        refused(
+        assert_refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), name);
+        assert_refused(
             &zip(&[
                 ("agent.toml", 0o644, MANIFEST.as_bytes()),
                 (name, 0o644, b"x"),
@@ -136,8 +140,8 @@ fn paths_outside_the_bundle_are_refused() {
             reason,
         );
     }
-    refused(&zip(&[("a\\..\\b", 0o644, b"")]), "backslash");
-    refused(
+    assert_refused(&zip(&[("a\\..\\b", 0o644, b"")]), "backslash");
+    assert_refused(
         &Tar::with_manifest()
             .file(&format!("{}/x", "n".repeat(90)), 0o644, b"")
             .file("", 0o644, b"")
@@ -148,12 +152,12 @@ fn paths_outside_the_bundle_are_refused() {
 
 #[test]
 fn links_outside_the_bundle_are_refused() {
-    let good = Tar::with_manifest()
+    let links_inside = Tar::with_manifest()
         .file("lib/real.so.1", 0o644, b"library")
         .symlink("lib/real.so", "real.so.1")
         .symlink("main.so", "lib/real.so")
         .entry(EntryType::Link, "copy", 0o644, "lib/real.so.1", b"");
-    let (_dir, bundle) = accepted(&good.gz());
+    let (_dir, bundle) = unpack_valid(&links_inside.gz());
     assert_eq!(fs::read(bundle.dir.join("main.so")).unwrap(), b"library");
     let copy = bundle.dir.join("copy").metadata().unwrap();
     assert_eq!(
@@ -163,34 +167,34 @@ fn links_outside_the_bundle_are_refused() {
 
     let leaves = "is a link that leaves the bundle";
     for target in ["/etc/passwd", "..", "../x", "lib/../.."] {
-        refused(&Tar::with_manifest().symlink("l", target).gz(), leaves);
+        assert_refused(&Tar::with_manifest().symlink("l", target).gz(), leaves);
         let mut as_zip = ZipWithLink::new(target);
-        refused(&as_zip.bytes(), leaves);
+        assert_refused(&as_zip.bytes(), leaves);
     }
     // If the bundle is in a top-level folder, the archive's root is outside of it.
     let top = Tar::new()
         .file("top/agent.toml", 0o644, MANIFEST.as_bytes())
         .symlink("top/l", "..");
-    refused(&top.gz(), leaves);
+    assert_refused(&top.gz(), leaves);
     // A chain of links that leaves the bundle only when it is followed.
     let chain = Tar::with_manifest()
         .symlink("deep/up", "..")
         .symlink("escape", "deep/up/../x");
-    refused(&chain.gz(), "escape");
-    refused(
+    assert_refused(&chain.gz(), "escape");
+    assert_refused(
         &Tar::with_manifest()
             .symlink("a", "b")
             .symlink("b", "a")
             .gz(),
         "circle",
     );
-    refused(
+    assert_refused(
         &Tar::with_manifest()
             .entry(EntryType::Link, "passwd", 0o644, "/etc/passwd", b"")
             .gz(),
         "absolute path",
     );
-    refused(
+    assert_refused(
         &Tar::with_manifest()
             .entry(EntryType::Link, "l", 0o644, "missing", b"")
             .gz(),
@@ -229,11 +233,11 @@ fn files_are_never_written_through_links() {
     let tar = Tar::with_manifest()
         .symlink("l", target)
         .file("l/x", 0o644, b"owned");
-    refused(&tar.gz(), "goes through the link");
+    assert_refused(&tar.gz(), "goes through the link");
     let tar = Tar::with_manifest()
         .symlink("l", target)
         .file("l", 0o644, b"owned");
-    refused(&tar.gz(), "twice");
+    assert_refused(&tar.gz(), "twice");
     assert_eq!(fs::read_dir(outside.path()).unwrap().count(), 0);
 }
 
@@ -245,14 +249,14 @@ fn duplicate_names_are_refused() {
             .file(name, 0o644, b"2")
             .gz()
     };
-    refused(&twice("a"), "\"a\" is in the archive twice");
-    refused(&twice("./a"), "\"./a\" is in the archive twice");
-    refused(
+    assert_refused(&twice("a"), "\"a\" is in the archive twice");
+    assert_refused(&twice("./a"), "\"./a\" is in the archive twice");
+    assert_refused(
         &twice("a/b"),
         "needs \"a\" to be a folder, but it is a file",
     );
-    refused(&Tar::with_manifest().folder("d/").folder("d").gz(), "twice");
-    refused(
+    assert_refused(&Tar::with_manifest().folder("d/").folder("d").gz(), "twice");
+    assert_refused(
         &Tar::with_manifest().folder("d/").file("d", 0o644, b"").gz(),
         "twice",
     );
@@ -262,12 +266,12 @@ fn duplicate_names_are_refused() {
         ("a1", 0o644, b"x"),
         ("a2", 0o644, b"y"),
     ]);
-    for at in 0..bytes.len() - 2 {
-        if &bytes[at..at + 2] == b"a2" {
-            bytes[at + 1] = b'1';
+    for start in 0..bytes.len() - 2 {
+        if &bytes[start..start + 2] == b"a2" {
+            bytes[start + 1] = b'1';
         }
     }
-    refused(&bytes, "\"a1\" is in the archive twice");
+    assert_refused(&bytes, "\"a1\" is in the archive twice");
 }
 
 #[test]
@@ -279,16 +283,16 @@ fn devices_pipes_and_set_id_bits_are_refused() {
         (EntryType::GNUSparse, "a sparse file"),
         (EntryType::new(b'Z'), "of an unknown kind"),
     ] {
-        refused(
+        assert_refused(
             &Tar::with_manifest().entry(kind, "dev", 0o644, "", b"").gz(),
             what,
         );
     }
-    refused(
+    assert_refused(
         &Tar::with_manifest().file("su", 0o4755, b"").gz(),
         "set-user-id",
     );
-    refused(
+    assert_refused(
         &Tar::with_manifest()
             .entry(EntryType::Directory, "d", 0o2755, "", b"")
             .gz(),
@@ -298,8 +302,12 @@ fn devices_pipes_and_set_id_bits_are_refused() {
         (0o104_755_u16, "set-user-id"),
         (0o020_644, "a device, pipe or socket"),
     ] {
-        let bytes = change_last_entry(zip(&[("x", 0o644, b"")]), 40, &mode.to_le_bytes());
-        refused(&bytes, what);
+        let bytes = change_last_entry(
+            zip(&[("x", 0o644, b"")]),
+            zip_field::UNIX_MODE,
+            &mode.to_le_bytes(),
+        );
+        assert_refused(&bytes, what);
     }
 }
 
@@ -315,7 +323,7 @@ fn long_names_of_gnu_and_pax_are_read() {
             format!("{name}\0").as_bytes(),
         )
         .file("short", 0o644, b"gnu");
-    let (_dir, bundle) = accepted(&gnu.gz());
+    let (_dir, bundle) = unpack_valid(&gnu.gz());
     assert_eq!(fs::read(bundle.dir.join(&name)).unwrap(), b"gnu");
 
     let record = format!(" path={name}\n");
@@ -336,7 +344,7 @@ fn long_names_of_gnu_and_pax_are_read() {
             record.as_bytes(),
         )
         .file("short", 0o644, b"pax");
-    let (_dir, bundle) = accepted(&pax.gz());
+    let (_dir, bundle) = unpack_valid(&pax.gz());
     assert_eq!(fs::read(bundle.dir.join(&name)).unwrap(), b"pax");
 
     let escape = Tar::with_manifest()
@@ -348,7 +356,7 @@ fn long_names_of_gnu_and_pax_are_read() {
             b"../../evil\0",
         )
         .file("fine", 0o644, b"");
-    refused(&escape.gz(), "'..'");
+    assert_refused(&escape.gz(), "'..'");
     let size = Tar::with_manifest()
         .entry(
             EntryType::XHeader,
@@ -358,23 +366,36 @@ fn long_names_of_gnu_and_pax_are_read() {
             b"10 size=1\n",
         )
         .file("x", 0o644, b"12345");
-    refused(&size.gz(), "states a size outside of its header");
+    assert_refused(&size.gz(), "states a size outside of its header");
 }
 
-/// Changes a field of the last entry in the central directory of a zip, to values that the library does not write.
-fn change_last_entry(mut zip: Vec<u8>, at: usize, value: &[u8]) -> Vec<u8> {
+/// Offsets in an entry of a zip's central directory.
+mod zip_field {
+    pub const FLAGS: usize = 8;
+    pub const COMPRESSION_METHOD: usize = 10;
+    pub const UNPACKED_BYTES: usize = 24;
+    /// The upper half of the external attributes.
+    pub const UNIX_MODE: usize = 40;
+    pub const NAME: usize = 46;
+}
+
+/// Changes the field at this [`zip_field`] of the last entry in the central directory of a zip, to values that the library
+/// does not write.
+fn change_last_entry(mut zip: Vec<u8>, field: usize, value: &[u8]) -> Vec<u8> {
     let entry = zip
         .windows(4)
         .rposition(|magic| magic == b"PK\x01\x02")
         .unwrap();
-    zip[entry + at..][..value.len()].copy_from_slice(value);
+    zip[entry + field..][..value.len()].copy_from_slice(value);
     zip
 }
 
 /// A zip with one file whose headers both state a size of ten bytes.
 fn understated_zip(name: &str, content: &[u8]) -> Vec<u8> {
     let size = 10_u32.to_le_bytes();
-    let mut bytes = change_last_entry(zip(&[(name, 0o644, content)]), 24, &size);
+    let packed = zip(&[(name, 0o644, content)]);
+    let mut bytes = change_last_entry(packed, zip_field::UNPACKED_BYTES, &size);
+    // The same field of the first local header.
     bytes[22..26].copy_from_slice(&size);
     bytes
 }
@@ -404,15 +425,15 @@ fn bombs_are_stopped_while_streaming() {
             bytes.len() < 1 << 20,
             "the bomb is small before it is unpacked"
         );
-        let dir = refused_with(&bytes, limits, needle);
+        let dir = assert_refused_with_limits(&bytes, limits, needle);
         let written = dir.path().join("out/bomb").metadata().unwrap().len();
         assert!(written <= 1 << 20, "{written} bytes were written");
     }
-    refused_unwritten(&zip(&[("bomb", 0o644, &bomb)]), limits, too_much);
+    assert_refused_unwritten(&zip(&[("bomb", 0o644, &bomb)]), limits, too_much);
     // A header that describes the next entry cannot bypass the limit.
     let header = Tar::with_manifest().entry(EntryType::GNULongName, "l", 0o644, "", &bomb);
-    refused_with(&header.gz(), limits, "has a header of 41943040 bytes");
-    refused_with(
+    assert_refused_with_limits(&header.gz(), limits, "has a header of 41943040 bytes");
+    assert_refused_with_limits(
         &vec![b'x'; 2 << 20],
         limits,
         "has 2097152 bytes; at most 1048576",
@@ -433,15 +454,15 @@ fn files_and_folders_are_counted() {
             .gz()
     };
     assert!(try_unpack(&files(4), limits).1.is_ok());
-    refused_with(&files(5), limits, "more than 5 files");
+    assert_refused_with_limits(&files(5), limits, "more than 5 files");
     let folders = Tar::with_manifest().folder("1/2/3/4/5/6");
-    refused_with(&folders.gz(), limits, "more than 5 folders");
+    assert_refused_with_limits(&folders.gz(), limits, "more than 5 folders");
     let names: Vec<String> = (0..6).map(|i| format!("f{i}")).collect();
     let entries: Vec<(&str, u32, &[u8])> = names
         .iter()
         .map(|name| (name.as_str(), 0o644, &b""[..]))
         .collect();
-    refused_with(&zip(&entries), limits, "more than 5 files");
+    assert_refused_with_limits(&zip(&entries), limits, "more than 5 files");
 }
 
 #[test]
@@ -450,7 +471,7 @@ fn default_limit_is_fifty_thousand_files() {
     let tar = names
         .iter()
         .fold(Tar::with_manifest(), |tar, name| tar.file(name, 0o644, b""));
-    refused(&tar.gz(), "more than 50000 files");
+    assert_refused(&tar.gz(), "more than 50000 files");
 }
 
 #[test]
@@ -462,7 +483,7 @@ fn folders_beyond_the_limit_are_not_created() {
         .map(|name| (name.as_str(), 0o755, &b""[..]))
         .collect();
     for bytes in [tar().gz(), tar().zst(), zip(&entries)] {
-        refused_unwritten(
+        assert_refused_unwritten(
             &bytes,
             BundleLimits::default(),
             "the archive has more than 50000 folders",
@@ -480,27 +501,35 @@ fn zip_with_an_unusable_last_entry_writes_nothing() {
             (name, 0o644, b"2"),
         ])
     };
-    let field = |at: usize, value: &[u8]| change_last_entry(ending("b"), at, value);
+    let changed = |field: usize, value: &[u8]| change_last_entry(ending("b"), field, value);
     for (bytes, needle) in [
-        (field(8, &[1, 0]), "\"b\" is encrypted"),
-        (field(10, &[12, 0]), "by another method than deflate"),
+        (changed(zip_field::FLAGS, &[1, 0]), "\"b\" is encrypted"),
         (
-            field(24, &0x9000_0000_u32.to_le_bytes()),
+            changed(zip_field::COMPRESSION_METHOD, &[12, 0]),
+            "by another method than deflate",
+        ),
+        (
+            changed(zip_field::UNPACKED_BYTES, &0x9000_0000_u32.to_le_bytes()),
             "unpacks to more than 2147483648 bytes (stopped at entry \"b\")",
         ),
         (
-            field(40, &0o020_644_u16.to_le_bytes()),
+            changed(zip_field::UNIX_MODE, &0o020_644_u16.to_le_bytes()),
             "\"b\" is a device, pipe or socket",
         ),
         (
-            field(40, &0o104_755_u16.to_le_bytes()),
+            changed(zip_field::UNIX_MODE, &0o104_755_u16.to_le_bytes()),
             "\"b\" has a set-user-id or set-group-id bit",
         ),
-        // The entry's name.
-        (field(46, b"a"), "\"a\" is in the archive twice"),
-        (field(46, b"\xff"), "has a name that is not UTF-8"),
-        (field(46, b"\\"), "named with a backslash"),
-        (field(46, b"/"), "\"/\" has an absolute path"),
+        (
+            changed(zip_field::NAME, b"a"),
+            "\"a\" is in the archive twice",
+        ),
+        (
+            changed(zip_field::NAME, b"\xff"),
+            "has a name that is not UTF-8",
+        ),
+        (changed(zip_field::NAME, b"\\"), "named with a backslash"),
+        (changed(zip_field::NAME, b"/"), "\"/\" has an absolute path"),
         (ending("../b"), "\"../b\" has '..' in its path"),
         (
             ending("a/b"),
@@ -508,15 +537,15 @@ fn zip_with_an_unusable_last_entry_writes_nothing() {
         ),
         (ending(&"n".repeat(256)), "has too long a path"),
     ] {
-        refused_unwritten(&bytes, BundleLimits::default(), needle);
+        assert_refused_unwritten(&bytes, BundleLimits::default(), needle);
     }
     let few = BundleLimits {
         files: 2,
         ..BundleLimits::default()
     };
-    refused_unwritten(&ending("b"), few, "more than 2 files");
-    refused_unwritten(&ending("1/2/b"), few, "more than 2 folders");
-    accepted(&ending("b"));
+    assert_refused_unwritten(&ending("b"), few, "more than 2 files");
+    assert_refused_unwritten(&ending("1/2/b"), few, "more than 2 folders");
+    unpack_valid(&ending("b"));
 }
 
 #[test]
@@ -540,7 +569,7 @@ fn empty_folders_are_created_with_their_modes() {
         ("late/", 0o755, b""),
     ]);
     for bytes in [tar().gz(), tar().zst(), zipped] {
-        let (_dir, bundle) = accepted(&bytes);
+        let (_dir, bundle) = unpack_valid(&bytes);
         for folder in ["empty", "closed", "a", "a/b", "a/b/c", "late"] {
             let path = bundle.dir.join(folder);
             assert!(path.symlink_metadata().unwrap().is_dir(), "{folder}");
@@ -558,7 +587,7 @@ fn folder_with_only_a_link_is_created() {
         .symlink("only/a/link", "../../agent.toml")
         .symlink("to", "only/a")
         .entry(EntryType::Link, "other/name", 0o644, "agent.toml", b"");
-    let (_dir, bundle) = accepted(&tar.gz());
+    let (_dir, bundle) = unpack_valid(&tar.gz());
     for path in ["only/a/link", "to/link", "other/name"] {
         let text = fs::read_to_string(bundle.dir.join(path)).unwrap();
         assert_eq!(text, MANIFEST, "{path}");
@@ -570,19 +599,19 @@ fn folder_with_only_a_link_is_created() {
 fn damaged_archives_are_refused_as_invalid() {
     let tar = || Tar::with_manifest().file("agent.py", 0o644, &[1; 50_000]);
     let gz = tar().gz();
-    refused(&gz[..gz.len() / 2], "the archive is damaged");
+    assert_refused(&gz[..gz.len() / 2], "the archive is damaged");
     let zst = tar().zst();
-    refused(&zst[..zst.len() / 2], "the archive is damaged");
+    assert_refused(&zst[..zst.len() / 2], "the archive is damaged");
     let zipped = zip(&[
         ("agent.toml", 0o644, MANIFEST.as_bytes()),
         ("x", 0o644, &[1; 5000]),
     ]);
-    refused(&zipped[..zipped.len() / 2], "the archive is damaged");
+    assert_refused(&zipped[..zipped.len() / 2], "the archive is damaged");
     let mut flipped = zip(&[("agent.toml", 0o644, MANIFEST.as_bytes())]);
     flipped[50] ^= 0xff;
     let (_dir, result) = try_unpack(&flipped, BundleLimits::default());
     assert!(matches!(result, Err(BundleError::Invalid(_))), "{result:?}");
-    refused(b"PK\x03\x04 and nothing more", "the archive is damaged");
+    assert_refused(b"PK\x03\x04 and nothing more", "the archive is damaged");
 }
 
 #[test]
@@ -643,12 +672,12 @@ fn manifest_that_is_no_file_is_refused() {
     let folder = Tar::new()
         .folder("agent.toml/")
         .file("agent.py", 0o644, b"");
-    refused(&folder.gz(), "agent.toml is a folder: expected a file");
+    assert_refused(&folder.gz(), "agent.toml is a folder: expected a file");
     let full = Tar::new().file("agent.toml/agent.toml", 0o644, manifest);
-    refused(&full.zst(), "agent.toml is a folder");
+    assert_refused(&full.zst(), "agent.toml is a folder");
     let below = Tar::new().folder("top/agent.toml/");
-    refused(&below.gz(), "agent.toml is a folder");
-    refused(
+    assert_refused(&below.gz(), "agent.toml is a folder");
+    assert_refused(
         &zip(&[("agent.toml/", 0o755, b"")]),
         "agent.toml is a folder",
     );
@@ -656,13 +685,13 @@ fn manifest_that_is_no_file_is_refused() {
         let link = Tar::new()
             .file("real.toml", 0o644, manifest)
             .symlink("agent.toml", target);
-        refused(&link.gz(), "agent.toml is a link: expected a file");
+        assert_refused(&link.gz(), "agent.toml is a link: expected a file");
     }
     let circle = Tar::new().symlink("agent.toml", "agent.toml");
-    refused(&circle.gz(), "leads in a circle");
+    assert_refused(&circle.gz(), "leads in a circle");
     for kind in [EntryType::Fifo, EntryType::Char, EntryType::Block] {
         let device = Tar::new().entry(kind, "agent.toml", 0o644, "", b"");
-        refused(&device.gz(), "a bundle holds files, folders and links");
+        assert_refused(&device.gz(), "a bundle holds files, folders and links");
     }
 
     // A developer's folder, opened in place.

@@ -1,8 +1,8 @@
-//! Datasets of real agents.
+//! Datasets of real agents: independent of the number of workers, and verifiable by a new simulation.
 
 use crate::{
     agents::{Agent, sandboxed},
-    recording::{moving_agent, read},
+    recording::{moving_agent, read_table},
     shard::{run, spec},
 };
 use faceoff_dataset::{
@@ -19,8 +19,8 @@ use std::{
 use zip::ZipArchive;
 
 /// All columns of a table except measured times and the columns derived from them.
-fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayRef)> {
-    let batch = read(&dir.join(table));
+fn columns_without_times(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayRef)> {
+    let batch = read_table(&dir.join(table));
     let schema = batch.schema();
     schema
         .fields()
@@ -41,25 +41,27 @@ fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayR
 fn recordings_of_one_and_three_workers_are_equal() {
     let dir = tempfile::tempdir().unwrap();
     let agent = moving_agent();
+    // Plays the shards (ranges of episodes) with this number of workers.
     let play = |name: &str, shards: &[(u32, u32)], workers: usize| {
         let dirs: Vec<PathBuf> = shards
             .iter()
             .map(|(start, _)| dir.path().join(format!("{name}-{start}")))
             .collect();
+        // Index of the next shard.
         let next = std::sync::atomic::AtomicUsize::new(0);
         std::thread::scope(|scope| {
             for _ in 0..workers {
                 scope.spawn(|| {
                     loop {
-                        let at = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                        let Some((start, end)) = shards.get(at) else {
+                        let index = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                        let Some((start, end)) = shards.get(index) else {
                             break;
                         };
                         run(
                             &spec(Task::Defend, *start..*end),
                             &agent,
                             &sandboxed(),
-                            &dirs[at],
+                            &dirs[index],
                         )
                         .unwrap();
                     }
@@ -84,8 +86,8 @@ fn recordings_of_one_and_three_workers_are_equal() {
     assert_eq!(result_one.steps, result_three.steps);
     for table in ["steps.parquet", "episodes.parquet"] {
         let (one, three) = (
-            timeless_columns(&one, table),
-            timeless_columns(&three, table),
+            columns_without_times(&one, table),
+            columns_without_times(&three, table),
         );
         assert!(one.len() > 30);
         assert_eq!(one, three, "{table}");
@@ -104,8 +106,8 @@ fn meta() -> EvaluationMeta {
     }
 }
 
-/// Runs one shard and simulates its recording again.
-fn verified(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset {
+/// Runs one shard, and verifies its dataset by simulating it again.
+fn play_and_verify(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset {
     let dir = tempfile::tempdir().unwrap();
     let shard = dir.path().join("shard");
     run(&spec(task, 0..episodes), agent, &sandboxed(), &shard).unwrap();
@@ -117,7 +119,7 @@ fn verified(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset {
 
 #[test]
 fn recordings_with_faults_verify() {
-    assert_eq!(verified(&moving_agent(), Task::Hit, 2).episodes, 2);
+    assert_eq!(play_and_verify(&moving_agent(), Task::Hit, 2).episodes, 2);
     let agent = Agent::with(
         "now = 0\n\
          def on_reset(episode):\n    global now; now = episode\n    \
@@ -125,9 +127,9 @@ fn recordings_with_faults_verify() {
          def on_step(step, answer):\n    \
          return 'oops' if (now, step) == (1, 4) else json.dumps(answer)",
     );
-    assert_eq!(verified(&agent, Task::Prepare, 4).episodes, 4);
+    assert_eq!(play_and_verify(&agent, Task::Prepare, 4).episodes, 4);
     let failing = Agent::script("import sys\nsys.exit('no model')");
-    assert_eq!(verified(&failing, Task::Hit, 2).steps, 0);
+    assert_eq!(play_and_verify(&failing, Task::Hit, 2).steps, 0);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::{
     agents::{Agent, sandboxed},
     game,
-    recording::{read, seconds},
+    recording::{read_table, seconds},
     shard::{run, spec},
 };
 use faceoff_runner::{AgentEnvironment, GameObserver, run_game};
@@ -33,12 +33,12 @@ fn cpu_time_between_answer_and_question_counts() {
         out.path(),
     );
     assert_eq!(report.unwrap().outcomes[0].fault, None);
-    let steps = read(&out.path().join("steps.parquet"));
+    let steps = read_table(&out.path().join("steps.parquet"));
     let sum = |name| seconds(&steps, name).iter().sum::<f64>();
     let (counted, host) = (sum("computation_time_ns"), sum("host_time_ns"));
     let used = sum("cpu_time_ns");
-    // Most gaps here are about as short as the shortest measured gap (100 µs), so a part is left out. Unit tests of `CpuUsage` check
-    // the exact values.
+    // Most gaps here are about as short as the shortest measured gap (100 µs), so a part is left out. Unit tests of
+    // `CpuUsage` check the exact values.
     assert!(
         counted + host >= 0.5 * used,
         "{used} s were used, {counted} s counted, and {host} s attributed to the host"
@@ -57,7 +57,7 @@ impl GameObserver for NullObserver {
 /// late, so the minimum over many steps is checked.
 #[test]
 fn answered_side_is_frozen_on_shared_cpus() {
-    let hog = Agent::with(&format!(
+    let computing = Agent::with(&format!(
         "import atexit\n{SPINS}\n\
          answered, computed = None, []\n\
          def on_step(step, answer):\n    \
@@ -68,13 +68,13 @@ fn answered_side_is_frozen_on_shared_cpus() {
          return json.dumps(answer)\n\
          atexit.register(lambda: print('least', min(computed), file=sys.stderr))"
     ));
-    let sleeper =
+    let sleeping =
         Agent::with("def on_step(step, answer): time.sleep(0.1); return json.dumps(answer)");
     let out = tempfile::tempdir().unwrap();
     let env = on_last_cpu();
     let played = run_game(
         &game::spec(40),
-        [&hog.bundle, &sleeper.bundle],
+        [&computing.bundle, &sleeping.bundle],
         [&env; 2],
         out.path(),
         &mut NullObserver,
@@ -84,6 +84,6 @@ fn answered_side_is_frozen_on_shared_cpus() {
     let least_s: f64 = least.unwrap_or_else(|| panic!("{logs:?}")).parse().unwrap();
     assert!(
         least_s < 0.05,
-        "it computed for {least_s} s and more while the other slept for 0.1 s"
+        "the computing agent computed for {least_s} s and more while the other slept for 0.1 s"
     );
 }

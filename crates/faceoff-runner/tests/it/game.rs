@@ -11,7 +11,7 @@ use faceoff_types::{
 };
 use std::{cell::Cell, fs, path::Path};
 
-/// Answers are late after a minute, so that other load of the host does not affect a test.
+/// A game in which answers are late after a minute, so that other load of the host does not affect a test.
 pub fn spec(steps: u32) -> GameSpec {
     let seed = Seed::from_number(7);
     GameSpec {
@@ -57,6 +57,7 @@ fn play(spec: &GameSpec, agents: [&Agent; 2]) -> GameReport {
     report
 }
 
+/// Asserts that the recording's results equal those of a new simulation.
 fn assert_verifies(out: &Path, report: &GameReport) {
     let recording = GameRecording::open(&out.join(GAME_FILE)).unwrap();
     let steps = Cell::new(0);
@@ -65,12 +66,12 @@ fn assert_verifies(out: &Path, report: &GameReport) {
     assert_eq!(recording.results().unwrap(), report.archives.score);
     assert_eq!(recording.outcome().unwrap(), report.archives.outcome);
     assert_eq!(steps.get(), u64::from(report.archives.outcome.steps));
-    let found = recording.archive().unwrap().unwrap();
-    assert_eq!(found, report.archives.game);
+    let archive = recording.archive().unwrap().unwrap();
+    assert_eq!(archive, report.archives.game);
 }
 
 /// The outcome without measured times.
-fn timeless(outcome: &GameOutcome) -> GameOutcome {
+fn without_times(outcome: &GameOutcome) -> GameOutcome {
     let mut outcome = outcome.clone();
     for side in &mut outcome.sides {
         side.time_used_s = 0.0;
@@ -81,23 +82,25 @@ fn timeless(outcome: &GameOutcome) -> GameOutcome {
     outcome
 }
 
-/// The sides of a game: the tested agent, and an agent that behaves.
-fn against_holding(spec: &GameSpec, hooks: &str) -> [SideOutcome; 2] {
-    let (agent, hold) = (Agent::with(hooks), Agent::behaving());
-    let report = play(spec, [&agent, &hold]);
-    let [bad, good] = timeless(&report.archives.outcome).sides;
-    assert_eq!(good.faults, []);
-    assert_eq!(good.late_answers, 0);
-    assert_eq!(good.answers, report.archives.outcome.steps);
-    // Its answers hold the pose, so they violate nothing either.
+/// The sides of a game between the tested agent and an agent that behaves.
+fn play_against_behaving(spec: &GameSpec, hooks: &str) -> [SideOutcome; 2] {
+    let (tested, opponent) = (Agent::with(hooks), Agent::behaving());
+    let report = play(spec, [&tested, &opponent]);
+    let [tested, opponent] = without_times(&report.archives.outcome).sides;
+    assert_eq!(opponent.faults, []);
+    assert_eq!(opponent.late_answers, 0);
+    assert_eq!(opponent.answers, report.archives.outcome.steps);
+    // The opponent keeps its pose, so its answers violate nothing either.
     assert!(
-        good.windows
+        opponent
+            .windows
             .iter()
             .all(|window| { window.violations == Default::default() && window.faults == 0 })
     );
-    [bad, good]
+    [tested, opponent]
 }
 
+/// Kind, episode and step of each fault.
 fn kinds(side: &SideOutcome) -> Vec<(&AgentFaultKind, Option<u32>, Option<u32>)> {
     let faults = side.faults.iter().map(|fault| &fault.fault);
     faults
@@ -124,7 +127,7 @@ fn game_verifies_and_is_reproducible() {
     });
     let outcomes = reports
         .each_ref()
-        .map(|report| timeless(&report.archives.outcome));
+        .map(|report| without_times(&report.archives.outcome));
     assert_eq!(outcomes[0], outcomes[1]);
     let outcome = &outcomes[0];
     assert_eq!((outcome.steps, &outcome.end), (1700, &GameEnd::Played));
@@ -223,27 +226,27 @@ fn always_late_agent_never_moves_its_arm() {
 #[test]
 fn silent_side_holds_its_arm_and_is_restarted_next_rally() {
     let agent = Agent::with("def on_step(step, answer): return None");
-    let mut impatient = sandboxed();
-    impatient.time.step_s = 0.2;
+    let mut short_limit = sandboxed();
+    short_limit.time.step_s = 0.2;
     let out = tempfile::tempdir().unwrap();
     let behaving = Agent::behaving();
     let env = sandboxed();
     let report = play_in(
         &spec(800),
         [&behaving, &agent],
-        [&env, &impatient],
+        [&env, &short_limit],
         out.path(),
     );
     assert_verifies(out.path(), &report);
-    let [good, bad] = &report.archives.outcome.sides;
-    assert_eq!((good.answers, good.faults.len()), (800, 0));
-    assert_eq!(bad.answers, 0);
+    let [behaving, silent] = &report.archives.outcome.sides;
+    assert_eq!((behaving.answers, behaving.faults.len()), (800, 0));
+    assert_eq!(silent.answers, 0);
     let timed_out = AgentFaultKind::TimedOut {
         phase: Phase::Step,
         limit_s: 0.2,
     };
     assert_eq!(
-        kinds(bad),
+        kinds(silent),
         [
             (&timed_out, Some(0), Some(0)),
             (&timed_out, Some(1), Some(0))
@@ -283,17 +286,17 @@ fn invalid_output_and_crashes_are_faults_of_their_side() {
             "numbers between -10000 and 10000",
         ),
     ] {
-        let [bad, _] = against_holding(&spec(30), hooks);
-        assert_eq!(bad.faults.len(), 1, "{hooks}");
-        let fault = bad.faults[0].to_string();
+        let [faulty, _] = play_against_behaving(&spec(30), hooks);
+        assert_eq!(faulty.faults.len(), 1, "{hooks}");
+        let fault = faulty.faults[0].to_string();
         assert!(fault.contains(message), "{fault}");
-        assert_eq!(bad.windows[0].faults, 1);
+        assert_eq!(faulty.windows[0].faults, 1);
     }
 }
 
 #[test]
 fn extreme_actions_are_valid_until_the_world_diverges() {
-    let [at_the_bound, _] = against_holding(
+    let [at_the_bound, _] = play_against_behaving(
         &spec(40),
         "def on_step(step, answer):\n    \
          answer['action'] = [[1e4 if step % 2 else -1e4] * 7] * 2; return json.dumps(answer)",
@@ -303,7 +306,7 @@ fn extreme_actions_are_valid_until_the_world_diverges() {
         assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
     }
     // Accelerates each joint in the direction in which it moves already.
-    let [diverging, _] = against_holding(
+    let [diverging, _] = play_against_behaving(
         &spec(1500),
         "INTERPOLATION = None\n\
          def on_step(step, answer):\n    \
@@ -321,9 +324,9 @@ fn extreme_actions_are_valid_until_the_world_diverges() {
 fn repeated_faults_forfeit_the_game() {
     let mut spec = spec(45_000);
     spec.limits.max_faults = 1;
-    let crashes = Agent::with("def on_reset(episode): os._exit(5)");
-    let hold = Agent::behaving();
-    let report = play(&spec, [&hold, &crashes]);
+    let crashing = Agent::with("def on_reset(episode): os._exit(5)");
+    let behaving = Agent::behaving();
+    let report = play(&spec, [&behaving, &crashing]);
     let (outcome, score) = (&report.archives.outcome, &report.archives.score);
     let cause = ForfeitCause::Faults {
         count: 2,
@@ -342,7 +345,7 @@ fn repeated_faults_forfeit_the_game() {
     assert!(report.logs[0].ends_with("goodbye\n"), "{}", report.logs[0]);
 
     spec.limits.max_faults = 0;
-    let report = play(&spec, [&crashes, &crashes]);
+    let report = play(&spec, [&crashing, &crashing]);
     let (outcome, score) = (&report.archives.outcome, &report.archives.score);
     let causes = [ForfeitCause::Faults {
         count: 1,
@@ -357,7 +360,6 @@ fn repeated_faults_forfeit_the_game() {
 #[test]
 fn used_up_game_time_forfeits_the_game() {
     let mut spec = spec(45_000);
-    spec.limits.total_s = 3600.0;
     let agents = [
         Agent::behaving(),
         Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)"),
@@ -387,24 +389,24 @@ fn used_up_game_time_forfeits_the_game() {
 /// other side's time.
 #[test]
 fn diagnosis_of_one_side_is_not_on_the_others_clock() {
-    let closes = Agent::with(
+    let closing = Agent::with(
         "def on_step(step, answer):\n    \
          if step == 2: os.close(1); time.sleep(3600)\n    \
          return json.dumps(answer)",
     );
-    let hold = Agent::behaving();
+    let behaving = Agent::behaving();
     let mut env = sandboxed();
     env.time.bye_s = 3.0;
     let mut spec = spec(10);
     // At most the wait for the other agent's exit, and far more than answer times on a busy host.
     spec.limits.in_time_s = 3.0;
-    for agents in [[&closes, &hold], [&hold, &closes]] {
+    for agents in [[&closing, &behaving], [&behaving, &closing]] {
         let out = tempfile::tempdir().unwrap();
         let report = play_in(&spec, agents, [&env; 2], out.path());
         assert_verifies(out.path(), &report);
         let sides = &report.archives.outcome.sides;
         for (agent, side) in agents.into_iter().zip(sides) {
-            if std::ptr::eq(agent, &closes) {
+            if std::ptr::eq(agent, &closing) {
                 assert_eq!(side.faults.len(), 1);
                 assert_eq!(side.faults[0].fault.fault, AgentFaultKind::ClosedOutput);
             } else {
@@ -417,13 +419,14 @@ fn diagnosis_of_one_side_is_not_on_the_others_clock() {
 
 #[test]
 fn cancelled_game_leaves_logs_and_no_recording() {
-    struct Stops {
-        asked: Cell<u32>,
+    /// Cancels the game at its fourth step.
+    struct CancellingObserver {
+        checks: Cell<u32>,
         logs: Vec<(Side, String)>,
         rallies: u32,
         steps: u32,
     }
-    impl GameObserver for Stops {
+    impl GameObserver for CancellingObserver {
         fn on_rally_start(&mut self, _: &faceoff_episode::RallyStart<'_>) {
             self.rallies += 1;
         }
@@ -434,13 +437,13 @@ fn cancelled_game_leaves_logs_and_no_recording() {
             self.logs.push((side, log.to_owned()));
         }
         fn cancelled(&self) -> bool {
-            self.asked.set(self.asked.get() + 1);
-            self.asked.get() == 4
+            self.checks.set(self.checks.get() + 1);
+            self.checks.get() == 4
         }
     }
     let agent = Agent::with("def on_reset(episode): print('reset', file=sys.stderr, flush=True)");
-    let mut observer = Stops {
-        asked: Cell::new(0),
+    let mut observer = CancellingObserver {
+        checks: Cell::new(0),
         logs: Vec::new(),
         rallies: 0,
         steps: 0,

@@ -1,9 +1,10 @@
-//! Late answers and host interference: real agents, with real interference or with a fixed monitor.
+//! Late answers and *host interference* (time in which the host let others run instead of the agent): real agents, with real
+//! interference or with a fixed monitor.
 
 use crate::{
     agents::{Agent, sandboxed, unconfined},
-    recording::{floats, ints, read, seconds},
-    shard::{RecordingObserver, run, spec, timeless},
+    recording::{floats, ints, read_table, seconds},
+    shard::{RecordingObserver, run, spec, without_times},
 };
 use arrow_array::Array;
 use faceoff_runner::{
@@ -27,13 +28,13 @@ const HANGS: &str = "def on_hello(hello): print('a new process', file=sys.stderr
     def on_step(step, answer):\n    \
     return None if step == 3 else json.dumps(answer)";
 
-/// Attributes a fixed share of every wait to the host.
+/// Attributes a fixed share (0 to 1) of every wait to the host.
 #[derive(Debug)]
 struct FixedShare(f64);
 
 impl InterferenceMonitor for FixedShare {
-    fn interference(&self, asked: Instant, now: Instant, _: Option<Duration>) -> Duration {
-        (now - asked).mul_f64(self.0)
+    fn interference(&self, asked_at: Instant, now: Instant, _: Option<Duration>) -> Duration {
+        (now - asked_at).mul_f64(self.0)
     }
 }
 
@@ -44,8 +45,8 @@ fn with_reruns(mut env: AgentEnvironment, per_episode: u32, per_100: u32) -> Age
     env
 }
 
-/// With a short step limit, for agents that never answer.
-fn impatient(step_s: f64) -> AgentEnvironment {
+/// The sandbox with this step limit, for agents that do not answer in time.
+fn with_step_limit(step_s: f64) -> AgentEnvironment {
     let mut env = sandboxed();
     env.time.step_s = step_s;
     env
@@ -87,7 +88,7 @@ fn sleeping_agent_is_not_excused() {
         let time = &outcome.computation_time;
         assert!(faceoff_scoring::computation_time_penalty(time) >= 1.0);
     }
-    let episodes = read(&out.path().join("episodes.parquet"));
+    let episodes = read_table(&out.path().join("episodes.parquet"));
     assert_eq!(ints(&episodes, "host_noise_reruns").values(), &[0, 0]);
 }
 
@@ -104,7 +105,7 @@ fn late_answer_counts_without_host_interference() {
         out.path(),
     );
     assert_eq!(report.timing.host_noise_reruns, 0);
-    let steps = read(&out.path().join("steps.parquet"));
+    let steps = read_table(&out.path().join("steps.parquet"));
     let (counted, host) = (
         seconds(&steps, "computation_time_ns"),
         seconds(&steps, "host_time_ns"),
@@ -126,7 +127,7 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
     let out = tempfile::tempdir().unwrap();
     let spec = spec(Task::Defend, 0..2);
     // Without a sandbox the second process can detect that it is not the first.
-    let mark = out.path().join("mark");
+    let mark = out.path().join("mark of the first process");
     let agent = Agent::with(&format!(
         "def on_hello(hello): print('a new process', file=sys.stderr)\n\
          def on_reset(episode): print('reset', episode, file=sys.stderr)\n\
@@ -137,7 +138,7 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
     ));
     let mut env = with_reruns(unconfined(), 2, 100);
     env.time.step_s = 0.5;
-    let dir = out.path().join("ended");
+    let dir = out.path().join("rerun");
     let report = run_monitored(&spec, &agent, &env, &FixedShare(1.0), &dir);
     assert_eq!(report.timing.host_noise_reruns, 1);
     let agent_lines: Vec<&str> = report
@@ -154,28 +155,32 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
         "goodbye",
     ];
     assert_eq!(agent_lines, expected);
-    let episodes = read(&dir.join("episodes.parquet"));
+    let episodes = read_table(&dir.join("episodes.parquet"));
     assert_eq!(ints(&episodes, "host_noise_reruns").values(), &[1, 0]);
     assert_eq!(ints(&episodes, "episode").values(), &[0, 1]);
 
     // Same seed, same bits, as without the interruption.
     let plain = out.path().join("plain");
     let undisturbed = run(&spec, &Agent::behaving(), &sandboxed(), &plain).unwrap();
-    assert_eq!(timeless(&report.outcomes), timeless(&undisturbed.outcomes));
-    let [ended, plain] = [dir, plain].map(|dir| read(&dir.join("steps.parquet")));
+    assert_eq!(
+        without_times(&report.outcomes),
+        without_times(&undisturbed.outcomes)
+    );
+    let [rerun, plain] = [dir, plain].map(|dir| read_table(&dir.join("steps.parquet")));
     for name in ["obs_puck_x", "puck_x", "ee_z", "constraint_ee"] {
-        assert_eq!(floats(&ended, name), floats(&plain, name), "{name}");
+        assert_eq!(floats(&rerun, name), floats(&plain, name), "{name}");
     }
-    assert_eq!(ints(&ended, "step"), ints(&plain, "step"));
+    assert_eq!(ints(&rerun, "step"), ints(&plain, "step"));
 }
 
 #[test]
 fn reruns_are_bounded_and_the_last_try_counts() {
     let out = tempfile::tempdir().unwrap();
+    // Maximum reruns per episode and per 100 episodes, and the reruns of each of three episodes.
     for (per_episode, per_100, expected) in
         [(0, 100, [0, 0, 0]), (2, 100, [2, 1, 0]), (2, 5, [1, 0, 0])]
     {
-        let env = with_reruns(impatient(0.1), per_episode, per_100);
+        let env = with_reruns(with_step_limit(0.1), per_episode, per_100);
         let mut spec = spec(Task::Hit, 0..3);
         spec.max_faults = 10;
         let report = run_monitored(
@@ -193,7 +198,7 @@ fn reruns_are_bounded_and_the_last_try_counts() {
                 "{fault:?}"
             );
         }
-        let episodes = read(&out.path().join("episodes.parquet"));
+        let episodes = read_table(&out.path().join("episodes.parquet"));
         assert_eq!(ints(&episodes, "host_noise_reruns").values(), &expected);
         let total: u32 = expected.iter().sum();
         assert_eq!(report.timing.host_noise_reruns, total);
@@ -212,7 +217,7 @@ fn hard_limit_is_extended_only_by_host_interference() {
     let late = "def on_step(step, answer):\n    \
         if step == 1: time.sleep(1.5)\n    \
         return json.dumps(answer)";
-    let env = with_reruns(impatient(1.0), 2, 100);
+    let env = with_reruns(with_step_limit(1.0), 2, 100);
     let agent = Agent::with(late);
     let play = |share| {
         run_monitored(
@@ -233,8 +238,9 @@ fn hard_limit_is_extended_only_by_host_interference() {
     assert_eq!(play(1.0).fault, None);
 }
 
-/// Storms of simultaneous events on the agent's own CPU. They once distorted the measurement of host interference;
-/// their time must count as the agent's.
+/// Storms of simultaneous events on the agent's own CPU: a name, and Python code. `at` is the instant of the events, as
+/// seconds and nanoseconds. Such storms once distorted the measurement of host interference; their time must count as
+/// the agent's.
 const STORMS: [(&str, &str); 6] = [
     (
         "timers that send signals",
@@ -292,11 +298,12 @@ const STORMS: [(&str, &str); 6] = [
 
 /// Run time of all processes on a CPU plus its steal time, in seconds, if cgroup version 1 reports it.
 fn busy_s(cpu: usize) -> Option<f64> {
-    let each = fs::read_to_string("/sys/fs/cgroup/cpuacct/cpuacct.usage_percpu").ok()?;
-    let ran_ns: f64 = each.split_whitespace().nth(cpu)?.parse().ok()?;
+    let usage_per_cpu = fs::read_to_string("/sys/fs/cgroup/cpuacct/cpuacct.usage_percpu").ok()?;
+    let ran_ns: f64 = usage_per_cpu.split_whitespace().nth(cpu)?.parse().ok()?;
     let stat = fs::read_to_string("/proc/stat").ok()?;
     let name = format!("cpu{cpu} ");
     let line = stat.lines().find_map(|line| line.strip_prefix(&name))?;
+    // The eighth number of the line is the steal time, in ticks of 10 ms.
     let stolen_ticks: f64 = line.split_whitespace().nth(7)?.parse().ok()?;
     Some(ran_ns * 1e-9 + stolen_ticks * 0.01)
 }
@@ -310,11 +317,11 @@ fn event_storms_of_the_agent_are_not_host_interference() {
             "import ctypes, signal, threading\n\
              libc = ctypes.CDLL(None)\n\
              signal.signal(signal.SIGCONT, lambda *_: None)\n\
-             def unleash(at):\n    {storm}\n\
+             def start_storm(at):\n    {storm}\n\
              def on_step(step, answer):\n    \
              if step in range(5, 50, 5):\n        \
              nanoseconds = time.monotonic_ns() + 50_000_000\n        \
-             unleash(divmod(nanoseconds, 10**9))\n        \
+             start_storm(divmod(nanoseconds, 10**9))\n        \
              while time.monotonic_ns() < nanoseconds + 100_000_000: time.sleep(0.001)\n    \
              return json.dumps(answer)"
         ));
@@ -333,7 +340,7 @@ fn event_storms_of_the_agent_are_not_host_interference() {
         let after_s = busy_s(cpu);
         assert_eq!(report.outcomes[0].fault, None, "{name}");
         assert_eq!(report.timing.host_noise_reruns, 0, "{name}");
-        let steps = read(&out.path().join("steps.parquet"));
+        let steps = read_table(&out.path().join("steps.parquet"));
         let [host, counted, cpu] = ["host_time_ns", "computation_time_ns", "cpu_time_ns"]
             .map(|name| seconds(&steps, name));
         for storm in (5..50).step_by(5).take_while(|step| *step < host.len()) {
@@ -364,7 +371,7 @@ fn missing_cgroup_yields_no_host_interference() {
     )
     .unwrap();
     assert_eq!(report.timing.longest_stall_s, 0.0);
-    let steps = read(&out.path().join("steps.parquet"));
+    let steps = read_table(&out.path().join("steps.parquet"));
     assert!(
         seconds(&steps, "host_time_ns")
             .iter()
@@ -373,7 +380,7 @@ fn missing_cgroup_yields_no_host_interference() {
     assert!(seconds(&steps, "computation_time_ns")[1] >= 0.15);
 }
 
-/// Host programs outside of the agent's cgroup that never sleep.
+/// Programs of the host, outside of the agent's cgroup, that never sleep.
 struct BusyLoops(Vec<std::process::Child>);
 
 impl BusyLoops {
@@ -396,7 +403,7 @@ impl BusyLoops {
 impl Drop for BusyLoops {
     fn drop(&mut self) {
         for child in &mut self.0 {
-            // It may have ended already.
+            // The child may have ended already.
             let _ = child.kill();
             let _ = child.wait();
         }
@@ -420,7 +427,7 @@ fn other_load_on_the_agents_cpu_is_measured() {
     let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path());
     drop(busy_loops);
     report.unwrap();
-    let steps = read(&out.path().join("steps.parquet"));
+    let steps = read_table(&out.path().join("steps.parquet"));
     let [host, counted, cpu] =
         ["host_time_ns", "computation_time_ns", "cpu_time_ns"].map(|name| seconds(&steps, name));
     if cpu[1] == 0.0 || host.iter().all(|time| *time == 0.0) {
@@ -435,8 +442,8 @@ fn other_load_on_the_agents_cpu_is_measured() {
     }
 }
 
-/// Helper processes that wait for the CPU while the main thread sleeps: with the policies `SCHED_IDLE` and
-/// `SCHED_BATCH`, or with ordinary priority; all the time, or briefly each time.
+/// Helper processes of an agent that wait for the CPU while its main thread sleeps (a name, and Python code): with the
+/// policies `SCHED_IDLE` and `SCHED_BATCH`, or with ordinary priority; all the time, or briefly each time.
 const HELPERS: [(&str, &str); 4] = [
     (
         "idle",
@@ -458,10 +465,10 @@ fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
     let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
     for (name, body) in HELPERS {
         let agent = Agent::with(&format!(
-            "def help():\n        {body}\n\
+            "def run_helper():\n        {body}\n\
              def on_hello(hello):\n    \
              for _ in range(8):\n        \
-             if os.fork() == 0: help()\n\
+             if os.fork() == 0: run_helper()\n\
              def on_step(step, answer):\n    \
              if step in range(1, 4): time.sleep(0.5)\n    \
              return json.dumps(answer)",
@@ -475,7 +482,7 @@ fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
         let report = report.unwrap();
         assert_eq!(report.outcomes[0].fault, None, "{name}: {}", report.log);
         assert_eq!(report.timing.host_noise_reruns, 0, "{name}");
-        let steps = read(&out.path().join("steps.parquet"));
+        let steps = read_table(&out.path().join("steps.parquet"));
         let [host, counted] =
             ["host_time_ns", "computation_time_ns"].map(|name| seconds(&steps, name));
         for step in 1..4 {
@@ -522,7 +529,7 @@ fn cpu_time_without_a_sandbox_includes_children() {
          return json.dumps(answer)",
     );
     run(&spec(Task::Hit, 0..1), &agent, &unconfined(), out.path()).unwrap();
-    let steps = read(&out.path().join("steps.parquet"));
+    let steps = read_table(&out.path().join("steps.parquet"));
     let column = steps.column_by_name("cpu_time_ns").unwrap();
     assert_eq!(column.null_count(), 0);
     let cpu_time_s = seconds(&steps, "cpu_time_ns");

@@ -13,6 +13,7 @@ use faceoff_runner::{
 use faceoff_sandbox::{Isolation, Layer};
 use faceoff_types::{AgentFaultKind, Seed};
 
+/// The report of the validation of [`HOLDS_A_POSE`].
 fn report_in(env: &AgentEnvironment) -> ValidationReport {
     let dir = tempfile::tempdir().unwrap();
     let image = shell_agent(HOLDS_A_POSE_TOML, HOLDS_A_POSE);
@@ -27,6 +28,7 @@ fn report_in(env: &AgentEnvironment) -> ValidationReport {
     validate(&spec, &bundle, env, &|| false).expect("the platform works")
 }
 
+/// The reason why the agent cannot start.
 fn refusal(env: &AgentEnvironment) -> String {
     match report_in(env).failure {
         Some(ValidationFailure::Fault { fault, .. }) => match fault.fault {
@@ -41,6 +43,7 @@ fn refusal(env: &AgentEnvironment) -> String {
 fn image_agent_gets_image_and_manifest_variables() {
     let report = report_in(&sandboxed());
     assert_eq!(report.failure, None, "{}", report.log);
+    // The agent prints $MODE, $PATH and $OWN at the end of each of three tasks.
     assert_eq!(report.log, "toml /opt/bin own\n".repeat(3));
 }
 

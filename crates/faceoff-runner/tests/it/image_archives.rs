@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 use std::io::{Cursor, Write};
 
+/// A valid `agent.toml` of a container image.
 pub const IMAGE_MANIFEST: &str = "name = \"boxed\"\ncommand = [\"./agent\"]\nruntime = \"image\"\n";
 
 /// `sha256:` and the digits of the hash.
@@ -13,7 +14,8 @@ pub fn digest(bytes: &[u8]) -> String {
     format!("sha256:{}", hex::encode(Sha256::digest(bytes)))
 }
 
-fn blob(digest: &str) -> String {
+/// The path of a blob (a document or a layer) in an OCI layout.
+fn blob_path(digest: &str) -> String {
     format!("blobs/{}", digest.replace(':', "/"))
 }
 
@@ -67,11 +69,13 @@ impl TestImage {
         Self::new([agent_layer()].into_iter().chain(layers))
     }
 
+    /// Sets the compression of the layers.
     pub fn packed(mut self, packing: Packing) -> Self {
         self.packing = packing;
         self
     }
 
+    /// Changes the image's configuration.
     pub fn config(mut self, change: impl FnOnce(&mut Value)) -> Self {
         change(&mut self.config);
         self
@@ -95,7 +99,7 @@ impl TestImage {
         self.layers.iter().map(pack).collect()
     }
 
-    /// The format of older versions of Docker: layers in folders, the list last.
+    /// The image in the format of older versions of Docker: layers in folders, the list of images last.
     pub fn docker(&self) -> Tar {
         let names: Vec<String> = (0..self.layers.len())
             .map(|index| format!("layer{index}/layer.tar"))
@@ -109,13 +113,13 @@ impl TestImage {
         tar.file(
             "manifest.json",
             0o644,
-            &list(&json!([{
+            &json_bytes(&json!([{
                 "Config": "config.json", "RepoTags": ["ours:latest", "ours:1"], "Layers": names,
             }])),
         )
     }
 
-    /// Its blobs, and the descriptor of its manifest.
+    /// Adds the image's blobs to `tar`. Also returns the descriptor of the image's manifest, for an index.
     pub fn blobs(&self, tar: Tar) -> (Tar, Value) {
         let layers = self.packed_layers();
         let config = self.config_bytes();
@@ -124,9 +128,9 @@ impl TestImage {
             "config": {"mediaType": "application/vnd.oci.image.config.v1+json", "digest": digest(&config), "size": 1},
             "layers": layers.iter().map(|layer| json!({"digest": digest(layer), "size": 1})).collect::<Vec<_>>(),
         });
-        let manifest = list(&manifest);
-        let mut tar = tar.file(&blob(&digest(&config)), 0o644, &config).file(
-            &blob(&digest(&manifest)),
+        let manifest = json_bytes(&manifest);
+        let mut tar = tar.file(&blob_path(&digest(&config)), 0o644, &config).file(
+            &blob_path(&digest(&manifest)),
             0o644,
             &manifest,
         );
@@ -134,7 +138,7 @@ impl TestImage {
         for layer in &layers {
             if !seen.contains(&digest(layer)) {
                 seen.push(digest(layer));
-                tar = tar.file(&blob(&digest(layer)), 0o644, layer);
+                tar = tar.file(&blob_path(&digest(layer)), 0o644, layer);
             }
         }
         let descriptor = json!({
@@ -143,27 +147,29 @@ impl TestImage {
         (tar, descriptor)
     }
 
-    /// The OCI layout.
+    /// The image in the OCI layout (the format of the Open Container Initiative).
     pub fn layout(&self) -> Tar {
-        let (tar, descriptor) = self.blobs(layout());
-        index(tar, &[descriptor])
+        let (tar, descriptor) = self.blobs(empty_layout());
+        with_index(tar, &[descriptor])
     }
 }
 
-/// The marker file of an OCI layout.
-pub fn layout() -> Tar {
+/// An OCI layout without images: only its marker file.
+pub fn empty_layout() -> Tar {
     Tar::new().file("oci-layout", 0o644, b"{\"imageLayoutVersion\":\"1.0.0\"}")
 }
 
-pub fn index(tar: Tar, images: &[Value]) -> Tar {
+/// Adds the index of an OCI layout, which lists these images.
+pub fn with_index(tar: Tar, images: &[Value]) -> Tar {
     tar.file(
         "index.json",
         0o644,
-        &list(&json!({"schemaVersion": 2, "manifests": images})),
+        &json_bytes(&json!({"schemaVersion": 2, "manifests": images})),
     )
 }
 
-pub fn list(value: &Value) -> Vec<u8> {
+/// A JSON document as bytes.
+pub fn json_bytes(value: &Value) -> Vec<u8> {
     value.to_string().into_bytes()
 }
 

@@ -1,5 +1,6 @@
-//! Host interference counts towards no limit: not in a validation's verdict, not in the reset budget, not in the
-//! start-up limit. A fixed monitor replaces the kernel's counters.
+//! Host interference (time in which the host let others run instead of the agent) counts towards no limit: not in a
+//! validation's verdict, not in the reset budget, not in the start-up limit. A fixed monitor replaces the kernel's
+//! counters.
 
 use crate::{
     agents::{Agent, sandboxed},
@@ -12,20 +13,20 @@ use faceoff_runner::{
 use faceoff_types::{AgentFaultKind, Phase, Seed, Task};
 use std::time::{Duration, Instant};
 
-/// Attributes a fixed share of every wait to the host.
+/// Attributes a fixed share (0 to 1) of every wait to the host.
 #[derive(Debug)]
 struct FixedShare(f64);
 
-const NONE: FixedShare = FixedShare(0.0);
-const NEARLY_ALL: FixedShare = FixedShare(0.9999);
+const NO_INTERFERENCE: FixedShare = FixedShare(0.0);
+const NEARLY_ALL_INTERFERENCE: FixedShare = FixedShare(0.9999);
 
 impl InterferenceMonitor for FixedShare {
-    fn interference(&self, asked: Instant, now: Instant, _: Option<Duration>) -> Duration {
-        (now - asked).mul_f64(self.0)
+    fn interference(&self, asked_at: Instant, now: Instant, _: Option<Duration>) -> Duration {
+        (now - asked_at).mul_f64(self.0)
     }
 }
 
-fn validated(
+fn run_validation(
     agent: &Agent,
     env: &AgentEnvironment,
     monitor: &FixedShare,
@@ -44,9 +45,9 @@ fn validation_mean_excludes_host_interference() {
         Agent::with("def on_step(step, answer): time.sleep(0.012); return json.dumps(answer)");
     let mut env = sandboxed();
     env.time.mean_s = 0.006;
-    let report = validated(&agent, &env, &NEARLY_ALL).unwrap();
+    let report = run_validation(&agent, &env, &NEARLY_ALL_INTERFERENCE).unwrap();
     assert_eq!(report.failure, None);
-    let report = validated(&agent, &env, &NONE).unwrap();
+    let report = run_validation(&agent, &env, &NO_INTERFERENCE).unwrap();
     let Some(failure @ ValidationFailure::TooSlow { .. }) = &report.failure else {
         panic!("{:?}", report.failure)
     };
@@ -68,13 +69,13 @@ fn validation_timeout_by_the_host_is_a_platform_fault() {
     env.time.step_s = 0.1;
     for reruns in [0, 2] {
         env.time.host_noise_reruns = reruns;
-        let result = validated(&agent, &env, &NEARLY_ALL);
+        let result = run_validation(&agent, &env, &NEARLY_ALL_INTERFERENCE);
         assert!(
             matches!(result, Err(PlatformFault::HostBusy(_))),
             "{result:?}"
         );
     }
-    let report = validated(&agent, &env, &NONE).unwrap();
+    let report = run_validation(&agent, &env, &NO_INTERFERENCE).unwrap();
     let Some(
         failure @ ValidationFailure::Fault {
             fault,
@@ -109,13 +110,13 @@ fn start_up_limit_excludes_host_interference() {
     let agent = Agent::with("def on_hello(hello): time.sleep(1.0)");
     let mut env = sandboxed();
     env.time.startup_s = 0.5;
-    let late = validated(&agent, &env, &NONE).unwrap();
+    let report = run_validation(&agent, &env, &NO_INTERFERENCE).unwrap();
     let Some(ValidationFailure::Fault {
         fault,
         wait: Some(_),
-    }) = late.failure
+    }) = report.failure
     else {
-        panic!("{:?}", late.failure)
+        panic!("{:?}", report.failure)
     };
     assert!(
         matches!(
@@ -128,10 +129,10 @@ fn start_up_limit_excludes_host_interference() {
         "{fault:?}"
     );
     // The agent never starts; as long as the monitor blames the host, it is a platform fault.
-    let result = validated(
+    let result = run_validation(
         &Agent::with("def on_hello(hello): time.sleep(10_000)"),
         &env,
-        &NEARLY_ALL,
+        &NEARLY_ALL_INTERFERENCE,
     );
     assert!(
         matches!(result, Err(PlatformFault::HostBusy(_))),
@@ -162,8 +163,8 @@ fn reset_budget_excludes_host_interference() {
             .filter_map(|outcome| outcome.fault);
         faults.map(|fault| fault.fault).collect::<Vec<_>>()
     };
-    assert_eq!(play(&NEARLY_ALL), []);
-    let faults = play(&NONE);
+    assert_eq!(play(&NEARLY_ALL_INTERFERENCE), []);
+    let faults = play(&NO_INTERFERENCE);
     assert!(
         matches!(
             faults[0],

@@ -1,4 +1,4 @@
-//! The live feed of a game.
+//! Tests of the live feed of a game: its events, and positions at intervals.
 
 use crate::{
     agents::{Agent, sandboxed},
@@ -25,18 +25,19 @@ impl LiveFeedSink for RecordingSink {
     }
 }
 
+/// Runs a game in which the second agent crashes at its fourth step of each rally.
 fn run_with_feed(steps: u32, position_interval: Duration) -> (RecordingSink, GameReport) {
-    let crashes = Agent::with(
+    let crashing = Agent::with(
         "def on_step(step, answer):\n    \
          if step == 3: os._exit(3)\n    \
          return json.dumps(answer)",
     );
-    let hold = Agent::behaving();
+    let behaving = Agent::behaving();
     let out = tempfile::tempdir().unwrap();
     let env = sandboxed();
     let mut sink = RecordingSink::default();
     let mut feed = LiveFeed::new(&mut sink, position_interval);
-    let bundles = [&hold.bundle, &crashes.bundle];
+    let bundles = [&behaving.bundle, &crashing.bundle];
     let report = run_game(&spec(steps), bundles, [&env; 2], out.path(), &mut feed).unwrap();
     feed.end(&report);
     (sink, report)
@@ -48,8 +49,9 @@ fn live_feed_has_all_events_in_order_and_all_positions() {
     let outcome = &report.archives.outcome;
     let fouls = outcome.sides.each_ref().map(|side| side.fouls);
     assert_eq!((fouls[0] + fouls[1], outcome.rallies), (1, 2));
-    let by = Side::BOTH[usize::from(fouls[1] == 1)];
-    let serves = |at: usize| match sink.events[at].event {
+    // The first side to serve commits the foul.
+    let fouling_side = Side::BOTH[usize::from(fouls[1] == 1)];
+    let serving_side = |index: usize| match sink.events[index].event {
         GameEvent::RallyBegun { serves, .. } => serves,
         ref other => panic!("{other:?}"),
     };
@@ -57,14 +59,17 @@ fn live_feed_has_all_events_in_order_and_all_positions() {
     let expected = [
         GameEvent::RallyBegun {
             rally: 0,
-            serves: by,
+            serves: fouling_side,
         },
         GameEvent::Fault { side, count: 1 },
-        GameEvent::Foul { by, score: [0, 0] },
+        GameEvent::Foul {
+            by: fouling_side,
+            score: [0, 0],
+        },
         GameEvent::Restarted { side },
         GameEvent::RallyBegun {
             rally: 1,
-            serves: by.other(),
+            serves: fouling_side.other(),
         },
         GameEvent::Fault { side, count: 2 },
         GameEvent::Ended {
@@ -77,7 +82,10 @@ fn live_feed_has_all_events_in_order_and_all_positions() {
             forfeits: [None; 2],
         },
     ];
-    assert_eq!((serves(0), serves(4)), (by, by.other()));
+    assert_eq!(
+        (serving_side(0), serving_side(4)),
+        (fouling_side, fouling_side.other())
+    );
     let kinds: Vec<_> = sink.events.iter().map(|event| &event.event).collect();
     assert_eq!(kinds, expected.iter().collect::<Vec<_>>());
     let restart_step = sink.events[2].step;
@@ -95,15 +103,20 @@ fn live_feed_has_all_events_in_order_and_all_positions() {
         ]
     );
 
-    let mut seen: Vec<u32> = sink.positions.iter().map(|at| at.step).collect();
-    assert!(seen.is_sorted());
-    seen.dedup();
-    assert!(seen.into_iter().eq(0..=800), "each step has a position");
+    let mut steps: Vec<u32> = sink
+        .positions
+        .iter()
+        .map(|position| position.step)
+        .collect();
+    assert!(steps.is_sorted());
+    steps.dedup();
+    assert!(steps.into_iter().eq(0..=800), "each step has a position");
     for LivePosition { puck, mallets, .. } in &sink.positions {
         assert!(puck[0].abs() < 0.75 && puck[1].abs() < 0.45, "{puck:?}");
-        // Both arms hold their initial pose: 0.65 m from their bases, which are 1.51 m from the centre.
-        for ([x, y], begun) in mallets.iter().zip([-0.86, 0.86]) {
-            assert!((x - begun).abs() < 0.02 && y.abs() < 0.02, "{mallets:?}");
+        // The puck is on the table. Both arms keep their initial pose: 0.65 m from their bases, which are 1.51 m from the
+        // centre.
+        for ([x, y], start_x) in mallets.iter().zip([-0.86, 0.86]) {
+            assert!((x - start_x).abs() < 0.02 && y.abs() < 0.02, "{mallets:?}");
         }
     }
 }
@@ -113,7 +126,11 @@ fn rare_positions_do_not_delay_events() {
     let (sink, report) = run_with_feed(40, Duration::MAX);
     assert_eq!(report.archives.outcome.steps, 40);
     // The start of the first rally, its fault, and the end: each with the current position.
-    let steps: Vec<u32> = sink.positions.iter().map(|at| at.step).collect();
+    let steps: Vec<u32> = sink
+        .positions
+        .iter()
+        .map(|position| position.step)
+        .collect();
     assert_eq!(steps, [0, 40, 40]);
     let last = sink.events.last().map(|event| &event.event);
     assert!(matches!(last, Some(GameEvent::Ended { .. })));

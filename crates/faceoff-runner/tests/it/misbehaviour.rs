@@ -1,12 +1,13 @@
-//! Agent faults and their verdicts.
+//! Misbehaving agents in a validation: each misbehaviour is an agent fault with its own verdict.
 
-use crate::agents::{Agent, impatient, sandboxed};
+use crate::agents::{Agent, sandboxed, with_short_step_limit};
 use faceoff_runner::{
     AgentEnvironment, PlatformFault, VALIDATION_STEPS, ValidationFailure, ValidationReport,
     ValidationSpec, validate,
 };
 use faceoff_types::{AgentFault, AgentFaultKind, Phase, Seed, Task};
 
+/// A validation with the seed of this number.
 fn spec(number: u64) -> ValidationSpec {
     let seed = Seed::from_number(number);
     ValidationSpec {
@@ -15,10 +16,12 @@ fn spec(number: u64) -> ValidationSpec {
     }
 }
 
+/// The report of the agent's validation.
 fn report_in(agent: &Agent, env: &AgentEnvironment) -> ValidationReport {
     validate(&spec(0), &agent.bundle, env, &|| false).expect("the platform works")
 }
 
+/// The fault that ended the agent's validation, and the report.
 fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, ValidationReport) {
     let report = report_in(agent, env);
     (fault(&report).fault, report)
@@ -119,10 +122,10 @@ fn exceeded_time_budget_is_a_fault() {
 
 #[test]
 fn validation_stops_when_cancelled() {
-    let asked = std::cell::Cell::new(0);
+    let checks = std::cell::Cell::new(0);
     let stop_at_the_third_step = || {
-        asked.set(asked.get() + 1);
-        asked.get() == 3
+        checks.set(checks.get() + 1);
+        checks.get() == 3
     };
     let stopped = validate(
         &spec(0),
@@ -131,7 +134,7 @@ fn validation_stops_when_cancelled() {
         &stop_at_the_third_step,
     );
     assert!(matches!(stopped, Err(PlatformFault::Cancelled)));
-    assert_eq!(asked.get(), 3);
+    assert_eq!(checks.get(), 3);
 }
 
 #[test]
@@ -231,7 +234,7 @@ fn too_large_number_is_named() {
 #[test]
 fn silence_times_out() {
     let agent = Agent::with("def on_step(step, answer): return None");
-    let (kind, report) = verdict_in(&agent, &impatient());
+    let (kind, report) = verdict_in(&agent, &with_short_step_limit());
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
@@ -247,7 +250,7 @@ fn line_without_newline_times_out() {
     let agent = Agent::with(
         "def on_step(step, answer):\n    sys.stdout.write(json.dumps(answer)); sys.stdout.flush()",
     );
-    let (kind, _) = verdict_in(&agent, &impatient());
+    let (kind, _) = verdict_in(&agent, &with_short_step_limit());
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
@@ -275,7 +278,7 @@ fn endless_line_is_too_long() {
 fn closed_output_is_a_fault() {
     let agent = Agent::with("def on_step(step, answer):\n    os.close(1); time.sleep(3600)");
     let mut env = sandboxed();
-    // It never exits, so a short wait is enough.
+    // The agent never exits, so a short wait for its exit is enough.
     env.time.bye_s = 0.5;
     let (kind, _) = verdict_in(&agent, &env);
     assert_eq!(kind, AgentFaultKind::ClosedOutput);
@@ -320,7 +323,7 @@ fn wrong_ready_is_named() {
 
 #[test]
 fn memory_use_exceeds_the_limit() {
-    // It exceeds the limit before it answers, so the step cannot end in another way.
+    // The agent exceeds the limit before it answers, so the step cannot end in another way.
     let (kind, _) =
         verdict("def on_step(step, answer):\n    hoard = [b'x' * (1 << 20) for _ in range(600)]");
     let AgentFaultKind::LimitExceeded { limit, .. } = &kind else {

@@ -1,3 +1,5 @@
+//! Recordings of shards: every recorded number equals that of a new simulation from the seed and the recorded actions.
+
 use crate::{
     agents::{Agent, sandboxed},
     shard::{run, spec},
@@ -11,8 +13,8 @@ use faceoff_types::Task;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::{fs::File, path::Path, time::Duration};
 
-/// The whole table, in one batch.
-pub fn read(path: &Path) -> RecordBatch {
+/// Reads a whole Parquet table, in one batch.
+pub fn read_table(path: &Path) -> RecordBatch {
     let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
     let rows = builder.metadata().file_metadata().num_rows() as usize;
     let mut batches = builder.with_batch_size(rows).build().unwrap();
@@ -21,6 +23,7 @@ pub fn read(path: &Path) -> RecordBatch {
     batch
 }
 
+/// A column of floating-point numbers.
 pub fn floats<'a>(batch: &'a RecordBatch, name: &str) -> &'a Float64Array {
     batch
         .column_by_name(name)
@@ -41,6 +44,7 @@ pub fn seconds(batch: &RecordBatch, name: &str) -> Vec<f64> {
         .collect()
 }
 
+/// A column of unsigned integers.
 pub fn ints<'a>(batch: &'a RecordBatch, name: &str) -> &'a UInt32Array {
     batch
         .column_by_name(name)
@@ -48,6 +52,7 @@ pub fn ints<'a>(batch: &'a RecordBatch, name: &str) -> &'a UInt32Array {
         .as_primitive()
 }
 
+/// A column of texts.
 pub fn texts<'a>(batch: &'a RecordBatch, name: &str) -> &'a StringArray {
     batch
         .column_by_name(name)
@@ -72,8 +77,8 @@ fn recording_matches_the_simulation() {
         let spec = spec(task, 4..6);
         let dir = out.path().join(task.as_str());
         let report = run(&spec, &moving_agent(), &sandboxed(), &dir).unwrap();
-        let steps = read(&dir.join("steps.parquet"));
-        let episodes = read(&dir.join("episodes.parquet"));
+        let steps = read_table(&dir.join("steps.parquet"));
+        let episodes = read_table(&dir.join("episodes.parquet"));
         let played: u32 = report.outcomes.iter().map(|outcome| outcome.steps).sum();
         assert_eq!(steps.num_rows(), played as usize);
         assert_eq!(episodes.num_rows(), 2);
@@ -103,6 +108,7 @@ fn recording_matches_the_simulation() {
                 compare_observation(&steps, row, &world);
                 let action = actions.value(row);
                 let action: &Float64Array = action.as_primitive();
+                // Positions and velocities of 7 joints.
                 assert_eq!(action.len(), 14);
                 let values = world.step(action.values()).constraints;
                 compare_state(&steps, "", row, &world);
@@ -223,7 +229,7 @@ fn times_and_faults_are_recorded() {
     let agent =
         Agent::with("def on_step(step, answer): return 'no' if step == 3 else json.dumps(answer)");
     let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
-    let steps = read(&out.path().join("steps.parquet"));
+    let steps = read_table(&out.path().join("steps.parquet"));
     assert_eq!(
         steps.num_rows(),
         3,
@@ -241,7 +247,7 @@ fn times_and_faults_are_recorded() {
             .all(|time| *time >= 0.0)
     );
 
-    let episodes = read(&out.path().join("episodes.parquet"));
+    let episodes = read_table(&out.path().join("episodes.parquet"));
     assert_eq!(texts(&episodes, "end").value(0), "agent_fault");
     let fault: faceoff_types::AgentFault =
         serde_json::from_str(texts(&episodes, "fault").value(0)).unwrap();

@@ -1,3 +1,5 @@
+//! Shards: ranges of episodes of one task, played by one agent, with their outcomes, faults and logs.
+
 use crate::agents::{Agent, sandboxed};
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
@@ -8,14 +10,16 @@ use std::{ops::Range, path::Path};
 /// Records the events of a shard, and stops it after a number of episodes.
 #[derive(Default)]
 pub struct RecordingObserver {
-    pub seen: Vec<u32>,
+    /// The episodes that are over.
+    pub episodes: Vec<u32>,
     pub logs: Vec<String>,
+    /// Number of episodes after which the shard is cancelled.
     pub stop_after: Option<usize>,
 }
 
 impl Observer for RecordingObserver {
     fn on_episode_end(&mut self, outcome: &EpisodeOutcome) {
-        self.seen.push(outcome.episode);
+        self.episodes.push(outcome.episode);
     }
 
     fn log(&mut self, log: &str) {
@@ -24,10 +28,11 @@ impl Observer for RecordingObserver {
 
     fn cancelled(&self) -> bool {
         self.stop_after
-            .is_some_and(|count| self.seen.len() >= count)
+            .is_some_and(|count| self.episodes.len() >= count)
     }
 }
 
+/// A shard of these episodes.
 pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
     let seed = Seed::from_number(7);
     ShardSpec {
@@ -59,7 +64,7 @@ pub fn run(
 }
 
 /// The outcomes without times, which depend on the host.
-pub fn timeless(outcomes: &[EpisodeOutcome]) -> Vec<EpisodeOutcome> {
+pub fn without_times(outcomes: &[EpisodeOutcome]) -> Vec<EpisodeOutcome> {
     outcomes
         .iter()
         .map(|outcome| EpisodeOutcome {
@@ -121,7 +126,7 @@ fn results_do_not_depend_on_the_division_into_shards() {
         );
     }
     parts.sort_by_key(|outcome| outcome.episode);
-    assert_eq!(timeless(&parts), timeless(&whole.outcomes));
+    assert_eq!(without_times(&parts), without_times(&whole.outcomes));
 }
 
 #[test]
@@ -169,11 +174,11 @@ fn fault_ends_its_episode_and_restarts_the_agent() {
         &spec(Task::Prepare, 2..3),
         &Agent::behaving(),
         &sandboxed(),
-        &out.path().join("x"),
+        &out.path().join("undisturbed"),
     );
     assert_eq!(
-        timeless(&undisturbed.unwrap().outcomes),
-        timeless(std::slice::from_ref(third))
+        without_times(&undisturbed.unwrap().outcomes),
+        without_times(std::slice::from_ref(third))
     );
 }
 
@@ -226,7 +231,7 @@ fn cancelled_shard_leaves_no_recording() {
         matches!(result, Err(PlatformFault::Cancelled)),
         "{result:?}"
     );
-    assert_eq!(observer.seen, [0]);
+    assert_eq!(observer.episodes, [0]);
     assert_eq!(observer.logs, ["started\n"]);
     assert!(!dir.join("shard.json").exists());
     // The same folder can be used again.

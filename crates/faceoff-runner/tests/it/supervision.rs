@@ -1,4 +1,5 @@
-//! A call that blocks the evaluator ends with the agent's death.
+//! Supervision of the *evaluator* (the thread that waits for an agent's answers): a call that blocks it ends with the agent's
+//! death.
 
 use crate::{
     agents::{Agent, sandboxed},
@@ -19,8 +20,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Does not answer its second step; sets its process name, so that the test can find it.
-fn silent(name: &str) -> Agent {
+/// An agent that does not answer its second step. It sets its process name, so that the test can find it.
+fn silent_agent(name: &str) -> Agent {
     const PR_SET_NAME: u32 = 15;
     Agent::with(&format!(
         "import ctypes\n\
@@ -33,7 +34,7 @@ fn silent(name: &str) -> Agent {
 }
 
 /// Is there a living process with this name?
-fn is_silent(name: &str) -> bool {
+fn is_alive(name: &str) -> bool {
     let named = format!("({name}) ");
     let processes = fs::read_dir("/proc").unwrap().flatten();
     processes
@@ -50,14 +51,14 @@ struct BlockedByAgent(&'static str);
 
 impl InterferenceMonitor for BlockedByAgent {
     fn interference(&self, _: Instant, _: Instant, _: Option<Duration>) -> Duration {
-        while is_silent(self.0) {
+        while is_alive(self.0) {
             thread::sleep(Duration::from_millis(5));
         }
         Duration::ZERO
     }
 }
 
-fn impatient(supervision: Supervision) -> AgentEnvironment {
+fn with_short_limits(supervision: Supervision) -> AgentEnvironment {
     let mut env = sandboxed();
     env.time.step_s = 0.2;
     env.time.bye_s = 0.1;
@@ -67,15 +68,15 @@ fn impatient(supervision: Supervision) -> AgentEnvironment {
 
 #[test]
 fn agent_that_blocks_its_evaluator_is_killed_and_blamed() {
-    const NAME: &str = "holds-evaluator";
-    let agent = silent(NAME);
+    const NAME: &str = "blocks-thread";
+    let agent = silent_agent(NAME);
     let out = tempfile::tempdir().unwrap();
     let mut spec = spec(Task::Hit, 0..2);
     spec.max_faults = 10;
     let report = run_shard_monitored(
         &spec,
         &agent.bundle,
-        &impatient(Supervision::default()),
+        &with_short_limits(Supervision::default()),
         out.path(),
         &mut RecordingObserver::default(),
         &BlockedByAgent(NAME),
@@ -100,11 +101,12 @@ fn agent_that_blocks_its_evaluator_is_killed_and_blamed() {
 
 #[test]
 fn cancelled_job_does_not_wait_for_its_agent() {
-    let agent = silent("waits-cancelled");
+    const NAME: &str = "waits-cancelled";
+    let agent = silent_agent(NAME);
     let out = tempfile::tempdir().unwrap();
     let cancelled = Arc::new(AtomicBool::new(false));
     let mut env = sandboxed();
-    // The limit is never reached.
+    // This limit is never reached.
     env.time.step_s = 3600.0;
     env.supervision = Supervision::new({
         let cancelled = Arc::clone(&cancelled);
@@ -120,7 +122,7 @@ fn cancelled_job_does_not_wait_for_its_agent() {
                 &mut RecordingObserver::default(),
             )
         });
-        while !is_silent("waits-cancelled") {
+        while !is_alive(NAME) {
             thread::yield_now();
         }
         cancelled.store(true, Ordering::Relaxed);
@@ -130,5 +132,5 @@ fn cancelled_job_does_not_wait_for_its_agent() {
         matches!(played, Err(PlatformFault::Cancelled)),
         "{played:?}"
     );
-    assert!(!is_silent("waits-cancelled"));
+    assert!(!is_alive(NAME));
 }

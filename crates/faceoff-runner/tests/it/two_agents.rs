@@ -1,6 +1,6 @@
 //! Two agents with one evaluator, like the two sides of a game.
 
-use crate::agents::{Agent, impatient, sandboxed, unconfined};
+use crate::agents::{Agent, sandboxed, unconfined, with_short_step_limit};
 use faceoff_episode::AnswerTiming;
 use faceoff_runner::{AgentEnvironment, Session, SessionError};
 use faceoff_types::{AgentFaultKind, AgentTask, Phase, Side};
@@ -15,13 +15,13 @@ fn start(agent: &Agent, env: &AgentEnvironment, side: Side) -> Session<'static> 
         .unwrap()
 }
 
-/// Waits for both answers; takes them in the order of their arrival.
-fn both(sessions: &mut [Session<'_>; 2]) -> [Result<AnswerTiming, SessionError>; 2] {
+/// Waits for both answers, and takes them in the order of their arrival.
+fn wait_for_both(sessions: &mut [Session<'_>; 2]) -> [Result<AnswerTiming, SessionError>; 2] {
     let mut results = [None, None];
     while results.iter().any(Option::is_none) {
         let [first, second] = &*sessions;
-        let until = Instant::now() + Duration::from_secs(3600);
-        Session::wait_for_any(&[first, second], until).unwrap();
+        let deadline = Instant::now() + Duration::from_secs(3600);
+        Session::wait_for_any(&[first, second], deadline).unwrap();
         for (session, result) in sessions.iter_mut().zip(&mut results) {
             if result.is_none() {
                 *result = session.poll(Instant::now()).transpose();
@@ -39,6 +39,7 @@ fn both_sides_are_asked_before_waiting() {
     for pipe in &pipes {
         mknodat(CWD, pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
     }
+    // Each agent writes to its own pipe and reads from that of the other.
     let agents = [[0, 1], [1, 0]].map(|[own, other]| {
         Agent::with(&format!(
             "own, other = os.open({:?}, os.O_RDWR), os.open({:?}, os.O_RDWR)\n\
@@ -53,34 +54,36 @@ fn both_sides_are_asked_before_waiting() {
     for session in &mut sessions {
         session.send_reset(0).unwrap();
     }
-    for results in both(&mut sessions) {
+    for results in wait_for_both(&mut sessions) {
         results.unwrap();
     }
     for step in 0..20 {
         for (number, session) in (1..).zip(&mut sessions) {
             session.send_step(step, &[f64::from(number); 23]).unwrap();
         }
-        for results in both(&mut sessions) {
+        for results in wait_for_both(&mut sessions) {
             assert!(results.unwrap().computation_time_s > 0.0);
         }
         for (number, session) in (1..).zip(&mut sessions) {
             assert_eq!(session.action()[..7], [f64::from(number); 7]);
-            let nothing = session.poll(Instant::now()).unwrap();
-            assert_eq!(nothing, None);
+            let second_answer = session.poll(Instant::now()).unwrap();
+            assert_eq!(second_answer, None);
         }
     }
     let logs = sessions.map(|session| session.finish().unwrap());
     assert_eq!(logs, ["tournament 1\ngoodbye\n", "tournament 2\ngoodbye\n"]);
 }
 
-/// One agent does not answer. The other has closed its output inside of a sandbox that still has it open, and does not
-/// exit.
+/// One agent does not answer. The other closes its output and does not exit; its sandbox still has the output open.
 #[test]
 fn sides_get_separate_verdicts() {
     let mut short_exit_grace = sandboxed();
     short_exit_grace.time.bye_s = 0.5;
     let agents = [
-        ("def on_step(step, answer): return None", impatient()),
+        (
+            "def on_step(step, answer): return None",
+            with_short_step_limit(),
+        ),
         (
             "def on_step(step, answer):\n    os.close(1); time.sleep(3600)",
             short_exit_grace,
@@ -92,7 +95,7 @@ fn sides_get_separate_verdicts() {
         session.reset(0).unwrap();
         session.send_step(0, &[0.0; 23]).unwrap();
     }
-    let faults = both(&mut sessions).map(|results| match results {
+    let faults = wait_for_both(&mut sessions).map(|results| match results {
         // On a busy host the timeout may be attributed to the host; the fault is the same.
         Err(
             SessionError::Agent { fault, .. }

@@ -3,17 +3,19 @@
 
 use crate::{
     agents::{Agent, sandboxed, unconfined},
-    recording::{read, seconds},
+    recording::{read_table, seconds},
     shard::{run, spec},
 };
 use faceoff_types::{AgentFaultKind, Task};
 use std::path::Path;
 
-/// Answers without reading the questions, until the next one does not fit. Then it acts according to MODE, writes a
-/// line to its log, and reads all questions. With MODE `drains` a thread reads every question slowly, byte by byte.
+/// An agent that answers without reading the questions, until the next question does not fit into its input. Then it uses
+/// time: with MODE `sleeps` by sleeping, with `computes` by computing. It writes `used time` to its log, and reads all
+/// questions. With MODE `answers` it answers instead of reading. With MODE `reads slowly` it reads the first questions in a
+/// thread, a byte each millisecond.
 const LEAVES_UNREAD: &str = r#"
 import array, fcntl, json, os, sys, termios, threading, time
-THOUGHTS = 6
+SLOW_READS = 6
 
 def unread():
     count = array.array("i", [0])
@@ -25,25 +27,25 @@ def say(answer):
     sys.stdout.flush()
 
 def act(step):
-    say({"type": "act", "step": step, "action": [held, [0.0] * 7]})
+    say({"type": "act", "step": step, "action": [start_position, [0.0] * 7]})
 
-def line():
+def read_line():
     text = b""
     while not text.endswith(b"\n"):
         text += os.read(0, 1)
     return json.loads(text)
 
-def think():
+def use_time():
     if MODE == "sleeps":
         time.sleep(0.3)
     else:
         until = time.monotonic() + 0.3
         while time.monotonic() < until: pass
-    print("thought", file=sys.stderr, flush=True)
+    print("used time", file=sys.stderr, flush=True)
 
-def without_taking(step):
+def answer_unread(step):
     """Answers without reading, until the next question does not arrive."""
-    taken = step
+    last_read = step
     while True:
         before, waited = unread(), time.monotonic()
         act(step)
@@ -53,44 +55,44 @@ def without_taking(step):
                 if MODE == "answers":
                     act(step)
                     time.sleep(3600)
-                think()
+                use_time()
                 # All unread questions, and the following ones.
-                while taken < step:
-                    message = line()
-                    taken = message["step"]
+                while last_read < step:
+                    message = read_line()
+                    last_read = message["step"]
                 return message
             time.sleep(0.0002)
 
-def drained():
+def read_slowly():
     """The next question, read by a thread byte by byte."""
     text = []
-    def drain():
+    def read_bytes():
         while text[-1:] != [b"\n"]:
             text.append(os.read(0, 1))
             time.sleep(0.001)
-    reader = threading.Thread(target=drain)
+    reader = threading.Thread(target=read_bytes)
     reader.start()
     reader.join()
-    print("thought", file=sys.stderr, flush=True)
+    print("used time", file=sys.stderr, flush=True)
     return json.loads(b"".join(text))
 
-held, message, takes = None, None, MODE == "drains"
+start_position, message, reads_all = None, None, MODE == "reads slowly"
 while True:
-    if MODE == "drains" and held and THOUGHTS > 0:
-        THOUGHTS -= 1
-        message = drained()
+    if MODE == "reads slowly" and start_position and SLOW_READS > 0:
+        SLOW_READS -= 1
+        message = read_slowly()
     else:
-        message = message or line()
+        message = message or read_line()
     kind = message["type"]
     if kind == "hello":
         say({"type": "ready", "protocol": 1, "interpolation": 3})
     elif kind == "reset":
-        held = None
+        start_position = None
         say({"type": "ready", "episode": message["episode"]})
     elif kind == "step":
-        held = held or message["obs"][6:13]
-        if not takes:
-            takes, message = True, without_taking(message["step"])
+        start_position = start_position or message["obs"][6:13]
+        if not reads_all:
+            reads_all, message = True, answer_unread(message["step"])
             continue
         act(message["step"])
     elif kind == "bye":
@@ -98,13 +100,14 @@ while True:
     message = None
 "#;
 
+/// An agent with [`LEAVES_UNREAD`] and this MODE.
 fn leaves_unread(mode: &str) -> Agent {
     Agent::script(&format!("MODE = {mode:?}\n{LEAVES_UNREAD}"))
 }
 
 /// Number of recorded answers that took 0.3 s or more, including host interference.
 fn slow_answers(recording: &Path) -> usize {
-    let steps = read(&recording.join("steps.parquet"));
+    let steps = read_table(&recording.join("steps.parquet"));
     let counted = seconds(&steps, "computation_time_ns");
     let host = seconds(&steps, "host_time_ns");
     let took = counted
@@ -126,9 +129,9 @@ fn question_that_does_not_fit_costs_the_agents_time() {
         let agent = leaves_unread(mode);
         let report = run(&spec(Task::Prepare, 0..1), &agent, &env, out.path()).unwrap();
         assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
-        let thoughts = report.log.matches("thought").count();
+        let uses_of_time = report.log.matches("used time").count();
         let slow = slow_answers(out.path());
-        assert_eq!(thoughts, 1, "{}", report.log);
+        assert_eq!(uses_of_time, 1, "{}", report.log);
         assert!(slow >= 1, "the computing time was not charged");
     }
 }
@@ -140,7 +143,8 @@ fn agent_cannot_shrink_its_channel() {
         "import fcntl\n\
          def on_hello(hello):\n    \
          for fd in range(3):\n        \
-         try: fcntl.fcntl(fd, 1031, 4096)\n        \
+         F_SETPIPE_SZ = 1031\n        \
+         try: fcntl.fcntl(fd, F_SETPIPE_SZ, 4096)\n        \
          except OSError as error: print('refused', error.errno, file=sys.stderr)",
     );
     for env in [sandboxed(), unconfined()] {
@@ -153,11 +157,11 @@ fn agent_cannot_shrink_its_channel() {
 #[test]
 fn slow_read_of_a_question_costs_the_agents_time() {
     let out = tempfile::tempdir().unwrap();
-    let agent = leaves_unread("drains");
+    let agent = leaves_unread("reads slowly");
     let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
     assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
-    assert_eq!(report.log.matches("thought").count(), 6);
-    // It takes a millisecond for each of the few hundred bytes of a question.
+    assert_eq!(report.log.matches("used time").count(), 6);
+    // The agent takes a millisecond for each of the few hundred bytes of a question.
     assert_eq!(slow_answers(out.path()), 6);
 }
 

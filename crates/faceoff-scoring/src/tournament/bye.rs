@@ -1,3 +1,5 @@
+//! Byes: rounds in which a team has no opponent.
+
 use faceoff_types::{RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 

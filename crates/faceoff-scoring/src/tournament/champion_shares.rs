@@ -1,11 +1,12 @@
-//! Certainty of the champion, from replays of the whole schedule with the same submissions and new seeds.
+//! Certainty of the champion: how often each team wins if all games of the tournament are played again with the same
+//! submissions and new seeds.
 
 use crate::interval::wilson95;
 use faceoff_types::TeamName;
 use serde::{Deserialize, Serialize};
 use std::{cmp::Reverse, collections::BTreeMap};
 
-/// How often a team was the champion in replays of the schedule.
+/// How often a team was the champion in repetitions of the tournament (replays).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ChampionShare {
@@ -19,8 +20,8 @@ pub struct ChampionShare {
     pub share_ci95: [f64; 2],
 }
 
-/// The shares of all teams with at least one first place, largest first, then by name. `first_places` has the champion
-/// of each complete replay. The interval of a missing team is [`wilson95`](crate::wilson95) of 0 successes.
+/// The shares of all teams with at least one first place, largest first, then by name. `first_places` has one entry for each
+/// complete replay: its champion. The interval of a missing team is [`wilson95`](crate::wilson95) of 0 successes.
 #[must_use]
 pub fn compute_champion_shares(first_places: &[TeamName]) -> Vec<ChampionShare> {
     let mut counts = BTreeMap::<&TeamName, u32>::new();
@@ -51,8 +52,8 @@ mod tests {
         let names = [
             "beta", "alpha", "beta", "gamma", "beta", "alpha", "gamma", "beta",
         ];
-        let all = names.map(|name| name.parse().unwrap());
-        let shares = compute_champion_shares(&all);
+        let champions = names.map(|name| name.parse().unwrap());
+        let shares = compute_champion_shares(&champions);
         let rows: Vec<_> = shares
             .iter()
             .map(|share| (share.team.as_str(), share.first_places, share.share))
@@ -69,8 +70,8 @@ mod tests {
 
     #[test]
     fn sole_champion_still_has_interval() {
-        let ten: Vec<TeamName> = vec!["alpha".parse().unwrap(); 10];
-        let [share] = compute_champion_shares(&ten).try_into().unwrap();
+        let champions: Vec<TeamName> = vec!["alpha".parse().unwrap(); 10];
+        let [share] = compute_champion_shares(&champions).try_into().unwrap();
         assert_eq!((share.first_places, share.share), (10, 1.0));
         let [low, high] = share.share_ci95;
         assert!((0.7..0.73).contains(&low) && high <= 1.0, "{low} {high}");

@@ -37,19 +37,19 @@ impl Departures {
     /// # Errors
     /// If a team is listed twice.
     pub fn new(list: impl IntoIterator<Item = Departure>) -> Result<Self, DuplicateDeparture> {
-        let mut all = BTreeMap::new();
+        let mut by_team = BTreeMap::new();
         for departure in list {
             let Departure {
                 team,
                 kind,
                 from_round,
             } = departure;
-            if all.contains_key(&team) {
+            if by_team.contains_key(&team) {
                 return Err(DuplicateDeparture(team));
             }
-            all.insert(team, (kind, from_round));
+            by_team.insert(team, (kind, from_round));
         }
-        Ok(Self(all))
+        Ok(Self(by_team))
     }
 
     /// The team whose departure excludes the game; the home team if both left. `None` if the game counts.
@@ -69,7 +69,10 @@ impl Departures {
     }
 
     /// The games that still count.
-    pub fn counting<'a>(&'a self, games: &'a [PlayedGame]) -> impl Iterator<Item = &'a PlayedGame> {
+    pub fn counting_games<'a>(
+        &'a self,
+        games: &'a [PlayedGame],
+    ) -> impl Iterator<Item = &'a PlayedGame> {
         games.iter().filter(|game| self.excluded_by(game).is_none())
     }
 

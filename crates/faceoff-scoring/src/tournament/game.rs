@@ -1,3 +1,5 @@
+//! A played game as in the file `games.json`: validation of the entry, and the game with its result.
+
 use super::{
     result::{Forfeit, GameResult, ResultReason},
     rules::{GameTally, final_score, forfeit_score, judge},
@@ -16,7 +18,7 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "GameEntry")]
 pub struct PlayedGame {
     raw: GameEntry,
-    /// Final score `[home, away]` that counts.
+    /// Final score `[home, away]` that counts: 10 : 0 after a forfeit.
     score: [u32; 2],
     result: GameResult,
 }
@@ -41,7 +43,7 @@ pub struct GameEntry {
     pub score: Option<[u32; 2]>,
     /// Penalty points of each team over the game.
     pub penalty_points: [f64; 2],
-    /// Length of the game in windows of 500 steps; absent for the default.
+    /// Length of the game in windows of 500 control steps; absent for the default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windows: Option<u32>,
     /// The limit that each side exceeded, if it forfeited.
@@ -257,33 +259,34 @@ impl GameEntry {
             ));
         }
         // At most one goal and one foul per control step.
-        let max = windows * WINDOW_STEPS;
+        let max_count = windows * WINDOW_STEPS;
         let counts = [
             ("goals", Some(self.goals)),
             ("fouls", self.fouls),
             ("score", self.score),
         ];
         for (field, pair) in counts {
-            if let Some(count) = pair.into_iter().flatten().find(|count| *count > max) {
+            if let Some(count) = pair.into_iter().flatten().find(|count| *count > max_count) {
                 return Err(format!(
-                    "{field}: expected at most {max}, one per control step of the game, got {count}"
+                    "{field}: expected at most {max_count}, one per control step of the game, got {count}"
                 ));
             }
         }
-        let max = MAX_EPISODE_PENALTY * f64::from(windows);
+        let max_points = MAX_EPISODE_PENALTY * f64::from(windows);
         if let Some(points) = self
             .penalty_points
             .into_iter()
-            .find(|points| !(0.0..=max).contains(points))
+            .find(|points| !(0.0..=max_points).contains(points))
         {
             return Err(format!(
-                "penalty_points: expected 0 to {max} ({MAX_EPISODE_PENALTY} for each of {windows} \
+                "penalty_points: expected 0 to {max_points} ({MAX_EPISODE_PENALTY} for each of {windows} \
                  windows), got {points}"
             ));
         }
         self.final_score()
     }
 
+    /// The final score before forfeits, from goals and fouls or from `score`.
     fn final_score(&self) -> Result<[u32; 2], String> {
         if let Some(forfeit_score) = forfeit_score(self.forfeit) {
             let fouls = self.fouls.ok_or(

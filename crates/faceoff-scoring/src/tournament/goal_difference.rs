@@ -1,4 +1,5 @@
-//! Mean goal differences with bootstrap intervals over games or mirrored pairs.
+//! Mean goal differences with bootstrap intervals over games or mirrored pairs (two games with the same seed and swapped
+//! sides).
 
 use crate::draws::Draws;
 use serde::Serialize;
@@ -6,7 +7,7 @@ use serde::Serialize;
 /// Minimum number of games or pairs for an interval: with fewer, a bootstrap interval is too narrow.
 pub const MIN_FOR_INTERVAL: u32 = 10;
 
-/// Samples for an interval.
+/// Bootstrap samples for an interval.
 const RESAMPLES: usize = 2000;
 
 /// Identifies the stream of random draws; a change of the method needs a new name.
@@ -18,11 +19,11 @@ pub struct GoalDifference {
     /// Number of games or pairs.
     #[serde(rename = "of")]
     pub count: u32,
-    /// Their mean, in goals; 0 without games.
+    /// Mean of the differences, in goals; 0 without games.
     pub mean: f64,
     /// 95 % bootstrap interval of the mean, in goals; `None` below [`MIN_FOR_INTERVAL`] observations.
     pub mean_ci95: Option<[f64; 2]>,
-    /// Their variance with the divisor n − 1, in goals²; `None` below two observations.
+    /// Variance of the differences with the divisor n − 1, in goals²; `None` below two observations.
     pub variance: Option<f64>,
 }
 
@@ -30,15 +31,15 @@ impl GoalDifference {
     /// Computes the statistics from the difference of each game or pair.
     #[must_use]
     pub fn from_differences(differences: impl IntoIterator<Item = i64>) -> Self {
-        let mut all: Vec<_> = differences.into_iter().map(|value| [value]).collect();
+        let mut observations: Vec<_> = differences.into_iter().map(|value| [value]).collect();
         // Sorted, so that the interval does not depend on the order of the differences.
-        all.sort_unstable();
-        let values = || all.iter().map(|[value]| *value);
-        let count = all.len();
+        observations.sort_unstable();
+        let values = || observations.iter().map(|[value]| *value);
+        let count = observations.len();
         Self {
             count: u32::try_from(count).unwrap_or(u32::MAX),
             mean: mean(values()),
-            mean_ci95: bootstrap_ci95(std::slice::from_ref(&all), |drawn| {
+            mean_ci95: bootstrap_ci95(std::slice::from_ref(&observations), |drawn| {
                 Some(mean(drawn[0].iter().map(|[value]| *value)))
             }),
             variance: (count > 1).then(|| squared_deviations(values()) / (count - 1) as f64),
@@ -66,7 +67,7 @@ pub(super) fn squared_deviations(values: impl Iterator<Item = i64>) -> f64 {
 /// `None` below [`MIN_FOR_INTERVAL`] observations in all groups, or if `statistic` is `None` for more than half of the
 /// samples.
 ///
-/// The draws come from BLAKE3 keyed with the groups, which the caller has sorted.
+/// An observation consists of `N` numbers. The draws come from BLAKE3 keyed with the groups, which the caller has sorted.
 pub(super) fn bootstrap_ci95<const N: usize>(
     groups: &[Vec<[i64; N]>],
     statistic: impl Fn(&[Vec<[i64; N]>]) -> Option<f64>,
@@ -94,6 +95,7 @@ pub(super) fn bootstrap_ci95<const N: usize>(
     Some([quantile(25), quantile(975)])
 }
 
+/// The key of the random draws: a hash of the groups.
 fn key<const N: usize>(groups: &[Vec<[i64; N]>]) -> blake3::Hasher {
     let mut key = blake3::Hasher::new_derive_key(STREAM);
     for group in groups {
@@ -111,8 +113,8 @@ mod tests {
 
     #[test]
     fn mean_variance_and_interval_follow_formulas() {
-        let all: Vec<i64> = (0..100).map(|n| n % 5 - 1).collect();
-        let result = GoalDifference::from_differences(all.iter().copied());
+        let differences: Vec<i64> = (0..100).map(|n| n % 5 - 1).collect();
+        let result = GoalDifference::from_differences(differences.iter().copied());
         assert_eq!((result.count, result.mean), (100, 1.0));
         // −1, 0, 1, 2, 3, twenty times each: Σ (x − 1)² = 20 · 10
         assert_eq!(result.variance, Some(200.0 / 99.0));
@@ -121,7 +123,7 @@ mod tests {
         assert!((low - (1.0 - 0.277)).abs() < 0.05, "{low}");
         assert!((high - (1.0 + 0.277)).abs() < 0.05, "{high}");
         assert_eq!(
-            GoalDifference::from_differences(all.into_iter().rev()),
+            GoalDifference::from_differences(differences.into_iter().rev()),
             result
         );
     }

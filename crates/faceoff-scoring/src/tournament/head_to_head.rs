@@ -1,3 +1,5 @@
+//! Head-to-head records: the games of each two teams against each other.
+
 use super::{game::PlayedGame, side::Side};
 use faceoff_types::TeamName;
 use serde::{Deserialize, Serialize};

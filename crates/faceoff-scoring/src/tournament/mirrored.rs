@@ -41,10 +41,10 @@ pub struct VarianceComparison {
     pub of_pairs: f64,
     /// Var(D₁) + Var(D₂), the variance of the sum of two games with different seeds.
     pub of_independent_games: f64,
-    /// `of_pairs` / `of_independent_games`: below 1, mirroring reduces the variance, and N pairs are equivalent to N / ratio
-    /// pairs of independent games. `None` if all goal differences are equal.
+    /// `of_pairs` / `of_independent_games`. If it is below 1, mirroring reduces the variance: N mirrored pairs are as exact
+    /// as N / `ratio` pairs of independent games. `None` if all goal differences are equal.
     pub ratio: Option<f64>,
-    /// Its 95 % bootstrap interval over pairs, drawn within each pairing; `None` below
+    /// 95 % interval of `ratio` by a bootstrap over pairs, drawn within each pairing; `None` below
     /// [`MIN_FOR_INTERVAL`](super::MIN_FOR_INTERVAL) pairs.
     pub ratio_ci95: Option<[f64; 2]>,
 }
@@ -95,6 +95,7 @@ pub fn find_mirrored_pairs<'a>(
     })
 }
 
+/// Goals of the home team minus those of the away team.
 fn goal_difference(game: &PlayedGame) -> i64 {
     let [home, away] = game.counted_goals();
     i64::from(home) - i64::from(away)

@@ -1,6 +1,6 @@
 //! The tournament: schedule, results of games, standings, and ratings of submissions.
 //!
-//! A game has 90 windows of 500 control steps. The penalty points of a team are counted for each window, like those of
+//! A game has 90 *windows* of 500 control steps. The penalty points of a team are counted for each window, like those of
 //! an episode of the qualifying stage.
 
 mod bye;

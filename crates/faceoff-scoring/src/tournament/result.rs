@@ -1,3 +1,5 @@
+//! The result of a game: the winner and the reason, or why it is a draw.
+
 use super::side::Side;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -16,7 +18,7 @@ pub enum GameResult {
     Drawn(DrawReason),
 }
 
-/// Why a side won. `led` is true if it also had the higher final score before forfeits.
+/// Why a side won. `led` is true if the winner also had the higher final score before forfeits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WinReason {
     /// Neither side was non-deployable, and the winner had the higher final score.

@@ -1,3 +1,5 @@
+//! The rules that decide a game: points, forfeits, final score and winner.
+
 use super::{
     result::{DrawReason, Forfeit, GameResult, WinReason},
     side::Side,
@@ -56,17 +58,17 @@ pub fn forfeit_score(forfeits: [Option<Forfeit>; 2]) -> Option<[u32; 2]> {
 pub fn judge(game: &GameTally) -> GameResult {
     let led = |side: Side| game.score[side as usize] > game.score[side.other() as usize];
     let won = |winner, reason| GameResult::Won { winner, reason };
-    let by_forfeit = |winner, cause| {
+    let won_by_forfeit = |winner, cause| {
         let led = led(winner);
         won(winner, WinReason::Forfeit { cause, led })
     };
     match game.forfeits {
         [Some(_), Some(_)] => return GameResult::Drawn(DrawReason::BothForfeit),
-        [None, Some(cause)] => return by_forfeit(Side::Home, cause),
-        [Some(cause), None] => return by_forfeit(Side::Away, cause),
+        [None, Some(cause)] => return won_by_forfeit(Side::Home, cause),
+        [Some(cause), None] => return won_by_forfeit(Side::Away, cause),
         [None, None] => {}
     }
-    let by_tier = |winner| won(winner, WinReason::Tier { led: led(winner) });
+    let won_by_tier = |winner| won(winner, WinReason::Tier { led: led(winner) });
     match game
         .penalty_points
         .map(|points| tier_of(points, game.windows) != Tier::NonDeployable)
@@ -76,8 +78,8 @@ pub fn judge(game: &GameTally) -> GameResult {
             Ordering::Less => won(Side::Away, WinReason::Score),
             Ordering::Equal => GameResult::Drawn(DrawReason::EqualScore),
         },
-        [true, false] => by_tier(Side::Home),
-        [false, true] => by_tier(Side::Away),
+        [true, false] => won_by_tier(Side::Home),
+        [false, true] => won_by_tier(Side::Away),
         [false, false] => GameResult::Drawn(DrawReason::BothNonDeployable),
     }
 }
@@ -120,6 +122,7 @@ mod tests {
         })
     }
 
+    /// Up to 135 penalty points over the 90 windows of a game a side is not non-deployable.
     #[test]
     fn tier_takes_precedence_over_score() {
         let won = |winner, reason| GameResult::Won { winner, reason };
@@ -153,8 +156,9 @@ mod tests {
 
     #[test]
     fn forfeit_takes_precedence_over_tier() {
+        // 11 points in each of the 90 windows: without the forfeit the home team would lose.
         let unsafe_home = [990.0, 0.0];
-        for (forfeits, expected, counts) in [
+        for (forfeits, expected, expected_score) in [
             (
                 [None, Some(Forfeit::Faults)],
                 GameResult::Won {
@@ -184,13 +188,14 @@ mod tests {
             ),
         ] {
             assert_eq!(judged([1, 2], unsafe_home, forfeits), expected);
-            assert_eq!(forfeit_score(forfeits), Some(counts));
+            assert_eq!(forfeit_score(forfeits), Some(expected_score));
         }
         assert_eq!(forfeit_score([None, None]), None);
     }
 
     #[test]
     fn tier_bound_scales_with_length_of_game() {
+        // 10 windows: the bound is 15 points.
         assert_eq!(winner([1, 0], [15.0, 0.0], 10), Some(Home));
         assert_eq!(winner([1, 0], [15.5, 0.0], 10), Some(Away));
     }

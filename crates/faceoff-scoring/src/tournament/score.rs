@@ -1,3 +1,6 @@
+//! The score of one game from its recorded outcome, in the layout of `results.json`. A game is divided into *windows* of 500
+//! control steps, in each of which penalty points are counted as in an episode.
+
 use super::{
     game::GameEntry,
     result::{Forfeit, GameResult, ResultReason},
@@ -253,14 +256,16 @@ mod side_index {
 
     #[expect(
         clippy::ref_option,
-        reason = "serde passes what is serialised by reference"
+        reason = "serde passes the serialised value by reference"
     )]
-    pub fn serialize<S: Serializer>(side: &Option<Side>, to: S) -> Result<S::Ok, S::Error> {
-        side.map(|side| side as u32).serialize(to)
+    pub fn serialize<S: Serializer>(side: &Option<Side>, serializer: S) -> Result<S::Ok, S::Error> {
+        side.map(|side| side as u32).serialize(serializer)
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Side>, D::Error> {
-        match Option::<u32>::deserialize(from)? {
+    pub fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Side>, D::Error> {
+        match Option::<u32>::deserialize(deserializer)? {
             None => Ok(None),
             Some(0) => Ok(Some(Side::Home)),
             Some(1) => Ok(Some(Side::Away)),
@@ -300,6 +305,7 @@ mod tests {
         }
     }
 
+    /// The score of a game of three windows, the last of which has one step.
     fn scored(end: GameEnd, sides: [SideOutcome; 2]) -> GameScore {
         let seed = Seed::from_number(1);
         let settings = GameSettings {

@@ -1,3 +1,5 @@
+//! The two sides of a game.
+
 /// One side of a game, the index of pairs `[home, away]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Side {

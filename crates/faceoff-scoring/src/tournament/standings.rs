@@ -1,3 +1,5 @@
+//! The standings of a tournament: the table of teams by their points, goals and penalty points.
+
 use super::{
     bye::{Bye, POINTS_BYE},
     departures::Departures,
@@ -105,10 +107,10 @@ pub fn score_tournament_with(
             .or_insert_with(|| StandingsRow::new(team.clone(), rounds as usize))
     }
     for game in games {
-        let counts = departures.excluded_by(game).is_none();
+        let is_counted = departures.excluded_by(game).is_none();
         for (side, team) in Side::BOTH.into_iter().zip(game.teams()) {
             let row = row(&mut teams, team, rounds);
-            if counts {
+            if is_counted {
                 row.add(game, side);
             }
         }
@@ -122,7 +124,7 @@ pub fn score_tournament_with(
     for row in teams.values_mut() {
         row.departure = departures.kind(&row.team);
     }
-    // Sorted by name; the stable sort keeps that for ties.
+    // The rows are sorted by name; the sort is stable, so ties stay sorted by name.
     let mut standings: Vec<_> = teams.into_values().collect();
     standings.sort_by(|a, b| {
         let is_disqualified =

@@ -1,3 +1,5 @@
+//! The label of a submission: a text that identifies one of a team's submissions in games and ratings.
+
 use faceoff_types::is_printable;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};

@@ -1,3 +1,5 @@
+//! Tests of boards, which rank evaluations, and of their groups of statistically tied rows.
+
 use crate::support::task_result;
 use faceoff_scoring::{
     BoardEntry, RankedEntry, overall_board, rank_groups, score_evaluation, task_board,
@@ -6,7 +8,7 @@ use faceoff_types::{Profile, Ruleset, Seed, Task, Tier};
 use proptest::prelude::*;
 use std::{collections::BTreeMap, convert::Infallible};
 
-/// An entry with `hit` (50 episodes) only.
+/// An entry with 50 episodes of the task hit only. Up to 25 penalty points it is deployable, up to 75 improvable.
 fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -> BoardEntry<K> {
     let tasks = BTreeMap::from([(Task::Hit, task_result(50, successes, penalty_points))]);
     let result = score_evaluation(
@@ -126,7 +128,9 @@ proptest! {
     ) {
         let entries: Vec<_> = (0..)
             .zip(&numbers)
-            .map(|(at, &(successes, points))| entry(at, successes, f64::from(points) * 20.0, at))
+            .map(|(time_ms, &(successes, points))| {
+                entry(time_ms, successes, f64::from(points) * 20.0, time_ms)
+            })
             .collect();
         let board = overall_board(entries.clone());
         let mut shuffled = entries;

@@ -1,3 +1,5 @@
+//! Tests of comparisons of two evaluations, and of the summaries that they need.
+
 use crate::support::episode;
 use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
@@ -43,13 +45,13 @@ static NO_VARIATION: LazyLock<Variation> = LazyLock::new(Variation::default);
 
 #[test]
 fn comparison_uses_variation_and_refuses_different_ones() {
-    let a = summary(&outcomes(100, |task, e| match task {
-        Task::Hit => e < 80,
-        _ => e < 50,
+    let a = summary(&outcomes(100, |task, episode| match task {
+        Task::Hit => episode < 80,
+        _ => episode < 50,
     }));
-    let b = summary(&outcomes(100, |task, e| match task {
-        Task::Prepare => e < 99,
-        _ => e < 50,
+    let b = summary(&outcomes(100, |task, episode| match task {
+        Task::Prepare => episode < 99,
+        _ => episode < 50,
     }));
     let with_weights = |weights: &str| Variation {
         weights: weights.parse().unwrap(),
@@ -79,16 +81,16 @@ fn comparison_uses_variation_and_refuses_different_ones() {
     assert!(evaluation_of(&a).differs_significantly(&evaluation_of(&b), Some(Task::Hit)));
     assert!(!evaluation_of(&a).differs_significantly(&evaluation_of(&b), None));
 
-    let mut calm = Variation::default();
-    calm.perturbations.tracking_loss.probability = 0.0;
-    let bounds = Variation {
+    let mut without_losses = Variation::default();
+    without_losses.perturbations.tracking_loss.probability = 0.0;
+    let other_bounds = Variation {
         tier_bounds: "0.1,0.2".parse().unwrap(),
         ..Variation::default()
     };
     for (other, field) in [
         (with_weights("1,0,0"), "weights"),
-        (bounds, "tier_bounds"),
-        (calm, "perturbations"),
+        (other_bounds, "tier_bounds"),
+        (without_losses, "perturbations"),
     ] {
         let other = ComparedEvaluation {
             variation: &other,
@@ -115,26 +117,29 @@ fn tier_change_depends_on_bounds() {
         })
         .collect();
     let clear = EpisodeSummary::from_outcomes(&costly, &TierBounds::default()).unwrap();
-    assert_eq!(clear.tier_change, 0.0, "10 points of 50");
+    assert_eq!(
+        clear.tier_change, 0.0,
+        "10 points in each task, deployable up to 50"
+    );
     let tight = EpisodeSummary::from_outcomes(&costly, &"0.1,0.5".parse().unwrap()).unwrap();
     assert!(
         tight.tier_change > 0.5,
-        "10 points of 10, three times: {}",
+        "10 points in each of three tasks, deployable up to 10: {}",
         tight.tier_change
     );
 }
 
 #[test]
 fn comparison_has_counts_intervals_and_p_values() {
-    let a = summary(&outcomes(100, |task, e| match task {
-        Task::Hit => e < 60,
-        Task::Defend => e % 2 == 0,
+    let a = summary(&outcomes(100, |task, episode| match task {
+        Task::Hit => episode < 60,
+        Task::Defend => episode % 2 == 0,
         Task::Prepare => true,
     }));
-    let b = summary(&outcomes(100, |task, e| match task {
-        Task::Hit => (20..50).contains(&e),
-        Task::Defend => e % 2 == 0,
-        Task::Prepare => e > 0,
+    let b = summary(&outcomes(100, |task, episode| match task {
+        Task::Hit => (20..50).contains(&episode),
+        Task::Defend => episode % 2 == 0,
+        Task::Prepare => episode > 0,
     }));
     let comparison = evaluation(&a).compare(&evaluation(&b)).unwrap();
     let hit = &comparison.tasks[&Task::Hit];
@@ -218,9 +223,15 @@ fn comparison_error_names_differing_field() {
 #[test]
 fn unpaired_evaluations_are_compared_by_rates() {
     // Paired, 20 episodes that only one solved are significant; unpaired, 48 % and 50 % of 1000 are not.
-    let a = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 500));
-    let b = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 480));
-    let c = summary(&outcomes(1000, |task, e| task == Task::Hit && e < 400));
+    let a = summary(&outcomes(1000, |task, episode| {
+        task == Task::Hit && episode < 500
+    }));
+    let b = summary(&outcomes(1000, |task, episode| {
+        task == Task::Hit && episode < 480
+    }));
+    let c = summary(&outcomes(1000, |task, episode| {
+        task == Task::Hit && episode < 400
+    }));
     let (first, second) = (evaluation(&a), evaluation(&b));
     assert!(
         first.differs_significantly(&second, None)
@@ -264,7 +275,7 @@ fn summary_needs_each_episode_once() {
 
 #[test]
 fn summary_round_trips_as_json() {
-    let mut outcomes = outcomes(50, |_, e| e % 3 == 0);
+    let mut outcomes = outcomes(50, |_, episode| episode % 3 == 0);
     for outcome in &mut outcomes[..8] {
         outcome.violations = Violations {
             ee: true,
@@ -288,9 +299,10 @@ proptest! {
         a in prop::collection::vec(any::<bool>(), 1..200),
         seed in any::<u64>(),
     ) {
-        let n = a.len() as u32;
-        let outcomes_a = outcomes(n, |_, e| a[e as usize]);
-        let outcomes_b = outcomes(n, |task, e| (seed >> (e % 61)) & 1 == u64::from(task == Task::Hit));
+        let episodes = a.len() as u32;
+        let outcomes_a = outcomes(episodes, |_, episode| a[episode as usize]);
+        // The bits of the seed decide which episodes B solves.
+        let outcomes_b = outcomes(episodes, |task, episode| (seed >> (episode % 61)) & 1 == u64::from(task == Task::Hit));
         let comparison = evaluation(&summary(&outcomes_a)).compare(&evaluation(&summary(&outcomes_b))).unwrap();
         let tallies: BTreeMap<Task, PairedTally> = Task::ALL
             .into_iter()
@@ -318,7 +330,7 @@ proptest! {
         }
         prop_assert_eq!(comparison.overall.p_value, overall_p_value(&Default::default(), &tallies));
         let score = |all: &[EpisodeOutcome]| overall_score(&Default::default(), Task::ALL.map(|task| {
-            let task_outcomes: Vec<_> = all.iter().filter(|o| o.task == task).cloned().collect();
+            let task_outcomes: Vec<_> = all.iter().filter(|outcome| outcome.task == task).cloned().collect();
             (task, score_task(&task_outcomes, &StepTimes::default(), &Default::default()).success_rate)
         }));
         prop_assert_eq!(comparison.overall.score_a, score(&outcomes_a));

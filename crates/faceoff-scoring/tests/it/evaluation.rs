@@ -1,3 +1,5 @@
+//! Tests of the scores of episodes, tasks and evaluations (an evaluation is one agent's run of all tasks).
+
 use crate::support::{episode, task_result};
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
@@ -8,8 +10,8 @@ use std::collections::BTreeMap;
 
 #[test]
 fn violations_have_own_points_and_count_once() {
-    let blameless = episode(Task::Hit, 0);
-    assert_eq!(episode_penalty(&blameless), 0.0);
+    let clean = episode(Task::Hit, 0);
+    assert_eq!(episode_penalty(&clean), 0.0);
     let penalty = |ee, link, joint_pos, joint_vel| {
         let violations = Violations {
             ee,
@@ -19,7 +21,7 @@ fn violations_have_own_points_and_count_once() {
         };
         episode_penalty(&faceoff_types::EpisodeOutcome {
             violations,
-            ..blameless.clone()
+            ..clean.clone()
         })
     };
     assert_eq!(penalty(true, false, false, false), 3.0);
@@ -83,7 +85,11 @@ fn task_result_does_not_depend_on_episode_order() {
         (50, 20, 0.4)
     );
     assert_eq!(result.penalty_points, 10.0 * 4.0 + 0.5);
-    assert_eq!(result.tier, Tier::Improvable, "25 < 40.5 ≤ 75");
+    assert_eq!(
+        result.tier,
+        Tier::Improvable,
+        "over 50 episodes: deployable up to 25 points, improvable up to 75"
+    );
     assert_eq!(
         (result.violations.ee, result.violations.joint_vel),
         (10, 10)

@@ -1,3 +1,5 @@
+//! Tests of the input files `tasks.json` and `games.json`: valid input, and errors that name the wrong value.
+
 use crate::support::{read, team};
 use faceoff_scoring::{
     QualifyingScores,
@@ -5,12 +7,14 @@ use faceoff_scoring::{
 };
 use serde_json::{Value, json};
 
+/// The results of a team in `tasks.json`.
 const TASKS: &str = r#"{
     "hit": {"success_rate": 0.5, "penalty_points": 10},
     "defend": {"success_rate": 0.5, "penalty_points": 10},
     "prepare": {"success_rate": 0.5, "penalty_points": 10}
 }"#;
 
+/// Asserts that the file is refused with an error that contains all `words`.
 #[track_caller]
 fn assert_refused(file: &str, words: &[&str]) {
     let error = read::<QualifyingScores>(file).unwrap_err();
@@ -112,11 +116,11 @@ fn empty_file_gives_empty_board() {
 fn tied_teams_keep_order_of_the_file() {
     let file = format!(r#"{{"Zulu": {TASKS}, "Alpha": {TASKS}}}"#);
     let board = read::<QualifyingScores>(&file).unwrap().board();
-    let places: Vec<_> = board
+    let ranking: Vec<_> = board
         .iter()
         .map(|row| (row.rank, row.team.as_str()))
         .collect();
-    assert_eq!(places, [(1, "Zulu"), (2, "Alpha")]);
+    assert_eq!(ranking, [(1, "Zulu"), (2, "Alpha")]);
 }
 
 #[test]
@@ -138,6 +142,7 @@ fn tasks_of_results_json_are_valid_input() {
     assert_eq!(row["tasks"]["hit"]["episodes"], 50);
 }
 
+/// A `games.json` with one game, in which `changes` replace fields; null removes a field.
 fn game(changes: Value) -> String {
     let mut game = json!({
         "round": 1, "home": "Alpha", "away": "Beta", "goals": [3, 2], "fouls": [4, 7],
@@ -228,12 +233,13 @@ fn impossible_games_are_refused() {
     }
 }
 
+/// The teams in the order of the standings.
 fn standings(games: Value) -> Vec<String> {
     let games: Vec<PlayedGame> = read(&games.to_string()).unwrap();
     score_tournament(&games)
         .standings
         .iter()
-        .map(|s| s.team.to_string())
+        .map(|row| row.team.to_string())
         .collect()
 }
 
@@ -243,7 +249,7 @@ fn standings_sort_by_points_goals_penalty_and_name() {
         json!({"round": 1, "home": home, "away": away, "goals": goals, "fouls": [0, 0],
                "penalty_points": penalty_points})
     };
-    // Each of the first four teams beats a different opponent.
+    // Each of the first four teams beats a different opponent, a loser L1 to L4.
     assert_eq!(
         standings(json!([
             game("difference 1", "L1", [9, 8], [0.0, 0.0]),

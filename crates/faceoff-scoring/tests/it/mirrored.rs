@@ -1,9 +1,10 @@
-//! Variances of mirrored pairs, on synthetic pairs with known variances.
+//! Tests of mirrored pairs (two games with the same seed and swapped sides), on synthetic pairs with known variances.
 
 use crate::support::read;
 use faceoff_scoring::tournament::{PlayedGame, find_mirrored_pairs};
 use serde_json::{Value, json};
 
+/// One of the two games of a mirrored pair.
 fn half(home: &str, away: &str, goals: [u32; 2], pair: u32) -> Value {
     json!({"round": 1, "home": home, "away": away, "goals": goals, "fouls": [0, 0],
            "penalty_points": [0, 0], "pair": pair})
@@ -23,26 +24,27 @@ fn pair(number: u32, [home, away]: [i32; 2]) -> [Value; 2] {
     ]
 }
 
-fn pairs(all: &[[i32; 2]]) -> Vec<Value> {
+/// Pairs with the given leads, numbered from 1.
+fn pairs(leads: &[[i32; 2]]) -> Vec<Value> {
     (1..)
-        .zip(all)
-        .flat_map(|(n, halves)| pair(n, *halves))
+        .zip(leads)
+        .flat_map(|(number, leads)| pair(number, *leads))
         .collect()
 }
 
 #[test]
 fn opposite_luck_in_both_halves_cancels() {
     // Luck of ±3 for the home team, in addition to one goal of skill.
-    let all: Vec<_> = (0..20)
+    let leads: Vec<_> = (0..20)
         .map(|n| if n % 2 == 0 { [4, -2] } else { [-2, 4] })
         .collect();
-    let result = find_mirrored_pairs(&games(&pairs(&all))).unwrap();
+    let result = find_mirrored_pairs(&games(&pairs(&leads))).unwrap();
     let variances = result.variances.unwrap();
     assert_eq!(
         (result.pairs, variances.of_pairs, variances.ratio),
         (20, 0.0, Some(0.0))
     );
-    // Each half: ±3 around 1, by n − 1.
+    // In each half the leads are ±3 around 1; the variance has the divisor n − 1 = 19.
     assert_eq!(variances.of_independent_games, 2.0 * 9.0 * 20.0 / 19.0);
     assert_eq!(variances.ratio_ci95, Some([0.0, 0.0]));
     let [pairing] = result.pairings.try_into().unwrap();
@@ -52,8 +54,8 @@ fn opposite_luck_in_both_halves_cancels() {
 
 #[test]
 fn equal_luck_in_both_halves_doubles_variance() {
-    let all: Vec<_> = (0..20).map(|n| [n % 3, n % 3]).collect();
-    let variances = find_mirrored_pairs(&games(&pairs(&all)))
+    let leads: Vec<_> = (0..20).map(|n| [n % 3, n % 3]).collect();
+    let variances = find_mirrored_pairs(&games(&pairs(&leads)))
         .unwrap()
         .variances
         .unwrap();
@@ -63,9 +65,9 @@ fn equal_luck_in_both_halves_doubles_variance() {
 #[test]
 fn independent_halves_have_ratio_one() {
     // Each combination of both halves' results is equally frequent, so the covariance is 0.
-    let all: Vec<_> = (0..50).map(|n| [n % 5 - 2, n / 5 % 5 - 2]).collect();
-    let mut listed = pairs(&all);
-    let result = find_mirrored_pairs(&games(&listed)).unwrap();
+    let leads: Vec<_> = (0..50).map(|n| [n % 5 - 2, n / 5 % 5 - 2]).collect();
+    let mut games_of_pairs = pairs(&leads);
+    let result = find_mirrored_pairs(&games(&games_of_pairs)).unwrap();
     let variances = result.variances.clone().unwrap();
     assert!((variances.ratio.unwrap() - 1.0).abs() < 1e-12);
     let [low, high] = variances.ratio_ci95.unwrap();
@@ -74,8 +76,11 @@ fn independent_halves_have_ratio_one() {
         "{low} {high}"
     );
     // The same pairs in another order, and the second half first.
-    listed.reverse();
-    assert_eq!(find_mirrored_pairs(&games(&listed)).unwrap(), result);
+    games_of_pairs.reverse();
+    assert_eq!(
+        find_mirrored_pairs(&games(&games_of_pairs)).unwrap(),
+        result
+    );
 }
 
 #[test]
@@ -86,13 +91,14 @@ fn variances_are_pooled_and_single_games_ignored() {
         all.push(half("A", "C", [goals, 0], pair));
         all.push(half("C", "A", [0, goals], pair));
     }
-    let before = find_mirrored_pairs(&games(&all)).unwrap();
-    let variances = before.variances.clone().unwrap();
-    // Five degrees of freedom; of the four pairs' sums ±2 around 20, of each half ±1 around 10.
+    let expected = find_mirrored_pairs(&games(&all)).unwrap();
+    let variances = expected.variances.clone().unwrap();
+    // Three equal pairs of A and B, four of A and C: 2 + 3 = 5 degrees of freedom. The sums of the four pairs are ±2 around 20,
+    // their halves ±1 around 10.
     assert_eq!(variances.of_pairs, 16.0 / 5.0);
     assert_eq!(variances.of_independent_games, 8.0 / 5.0);
     assert_eq!(variances.ratio_ci95, None, "seven pairs");
-    let means: Vec<_> = before
+    let means: Vec<_> = expected
         .pairings
         .iter()
         .map(|pairing| {
@@ -108,7 +114,7 @@ fn variances_are_pooled_and_single_games_ignored() {
     let mut single = half("A", "B", [90, 0], 0);
     single.as_object_mut().unwrap().remove("pair");
     all.push(single);
-    assert_eq!(find_mirrored_pairs(&games(&all)).unwrap(), before);
+    assert_eq!(find_mirrored_pairs(&games(&all)).unwrap(), expected);
     assert_eq!(find_mirrored_pairs(&[]).unwrap().variances, None);
 }
 

@@ -1,3 +1,5 @@
+//! A reference implementation of maximum matching for small numbers of teams.
+
 use faceoff_types::TeamName;
 
 /// Maximum number of disjoint pairs of `members` with `may_meet`, by enumeration.
@@ -11,9 +13,9 @@ pub fn most_pairs(
     let mut best = most_pairs(rest, may_meet);
     for (index, other) in rest.iter().enumerate() {
         if may_meet(first, other) {
-            let mut left = rest.to_vec();
-            left.remove(index);
-            best = best.max(1 + most_pairs(&left, may_meet));
+            let mut remaining = rest.to_vec();
+            remaining.remove(index);
+            best = best.max(1 + most_pairs(&remaining, may_meet));
         }
     }
     best

@@ -1,3 +1,5 @@
+//! Tests of paired tests: two teams on the same episodes.
+
 use crate::support::episode;
 use faceoff_scoring::{EpisodeSummary, PairedTally, PairingError, Successes, overall_p_value};
 use faceoff_types::{EpisodeEnd, EpisodeOutcome, Task};

@@ -1,8 +1,11 @@
+//! Compares boards with the qualifying tables of the paper on the competition of 2023, whose rules these are.
+
 use crate::support::{read, rows, task_result};
 use faceoff_scoring::{BoardEntry, QualifyingScores, overall_board, score_evaluation, task_board};
 use faceoff_types::{Profile, Ruleset, Seed, Task};
 use serde_json::{Map, Value, json};
 
+/// The tables of the paper.
 const GOLDEN: &str = include_str!(concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../tests/golden/qualifying.json"
@@ -55,7 +58,7 @@ fn appendix_tables_give_qualifying_table() {
         assert_eq!(board.len(), expected.len());
         for (index, (row, expected)) in board.iter().zip(expected).enumerate() {
             let team = &expected["team"];
-            assert_eq!(row["team"], *team, "place {}", index + 1);
+            assert_eq!(row["team"], *team, "rank {}", index + 1);
             assert_eq!(row["rank"], index + 1, "{team}");
             assert_eq!(row["tier"], expected["tier"], "{team}");
             assert_eq!(row["penalty_points"], expected["penalty_points"], "{team}");

@@ -1,6 +1,6 @@
-//! Ratings from the 36 games of the paper. The expected estimates are from an independent program that minimises the
-//! negative logarithm of the posterior with SciPy's BFGS, the expected intervals from its bootstrap with NumPy's random
-//! numbers.
+//! Compares ratings from the 36 games of the paper on the competition of 2023 with expected ones. The expected estimates are
+//! from an independent program that minimises the negative logarithm of the posterior with SciPy's BFGS, the expected
+//! intervals from its bootstrap with NumPy's random numbers.
 
 use crate::support::read;
 use faceoff_scoring::tournament::{
@@ -33,13 +33,13 @@ fn assert_ratings(pool: &Pool, expected: &[Expected]) {
     for (row, (team, rating, low, high)) in pool.ratings.iter().zip(expected) {
         assert_eq!(row.rated.team.as_str(), *team);
         assert!((row.rating - rating).abs() < 1e-3, "{team}: {}", row.rating);
-        for (got, other) in row.ci95.into_iter().zip([low, high]) {
-            assert_eq!(got.is_some(), other.is_some(), "{team}: {:?}", row.ci95);
-            if let (Some(got), Some(other)) = (got, other) {
+        for (got, reference) in row.ci95.into_iter().zip([low, high]) {
+            assert_eq!(got.is_some(), reference.is_some(), "{team}: {:?}", row.ci95);
+            if let (Some(got), Some(reference)) = (got, reference) {
                 // Two bootstraps with a thousand samples may differ by this much.
                 assert!(
-                    (got - other).abs() < 30.0,
-                    "{team}: {got}, expected {other}"
+                    (got - reference).abs() < 30.0,
+                    "{team}: {got}, expected {reference}"
                 );
             }
         }
@@ -80,8 +80,8 @@ fn ratings_of_the_papers_teams_are_as_expected() {
             ("AJoy", 974.3801, Some(800.4), Some(1102.9)),
         ],
     );
-    let played: Vec<_> = results.ratings.iter().map(|row| row.games).collect();
-    assert_eq!(played, [11, 11, 11, 11, 11, 11, 6]);
+    let game_counts: Vec<_> = results.ratings.iter().map(|row| row.games).collect();
+    assert_eq!(game_counts, [11, 11, 11, 11, 11, 11, 6]);
 }
 
 /// Teams changed their agents between the rounds, so submissions of the first round never met those of the second.

@@ -1,9 +1,12 @@
+//! Compares results and standings with the tournament tables of the paper on the competition of 2023, whose rules these are.
+
 use crate::support::{read, rows};
 use faceoff_scoring::tournament::{
     DrawReason, GameResult, PlayedGame, WinReason, score_tournament,
 };
 use serde_json::{Value, json};
 
+/// The tables of the paper.
 const GOLDEN: &str = include_str!(concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../tests/golden/tournament.json"
@@ -13,6 +16,7 @@ fn golden() -> Value {
     serde_json::from_str(GOLDEN).unwrap()
 }
 
+/// The games of the paper without their winners.
 fn games(golden: &Value) -> Vec<PlayedGame> {
     let mut games = golden["games"].clone();
     for game in games.as_array_mut().unwrap() {
@@ -65,6 +69,7 @@ const BY_TIER: [(u32, &str, &str, bool); 19] = [
 fn tier_decided_19_games_and_9_winners_did_not_lead() {
     let games = games(&golden());
     let mut by_tier = Vec::new();
+    // Numbers of games that were won by score and that were drawn.
     let mut others = [0; 2];
     for game in &games {
         let [home, away] = game.teams().map(|team| team.as_str());
@@ -152,11 +157,11 @@ fn standings_are_those_of_the_paper() {
 #[test]
 fn single_round_gives_its_points() {
     let golden = golden();
-    let second: Vec<_> = games(&golden)
+    let second_round: Vec<_> = games(&golden)
         .into_iter()
         .filter(|game| game.round() == 2)
         .collect();
-    for row in score_tournament(&second).standings {
+    for row in score_tournament(&second_round).standings {
         let expected = rows(&golden, "points")
             .iter()
             .find(|expected| expected["team"] == row.team.as_str())

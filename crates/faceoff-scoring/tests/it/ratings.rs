@@ -16,11 +16,13 @@ fn game(home: &str, away: &str, goals: [u32; 2]) -> Value {
            "penalty_points": [0, 0]})
 }
 
-fn with(mut game: Value, field: &str, value: Value) -> Value {
+/// The game with another value of a field.
+fn with_field(mut game: Value, field: &str, value: Value) -> Value {
     game[field] = value;
     game
 }
 
+/// The pools of ratings from results and from goals.
 fn rated(games: &[PlayedGame]) -> [Vec<Pool>; 2] {
     let ratings = rate(games).unwrap();
     [ratings.results, ratings.goals]
@@ -41,12 +43,12 @@ fn round_robin() -> Vec<Value> {
 
 #[test]
 fn ratings_do_not_depend_on_order_of_games() {
-    let mut all = round_robin();
-    let expected = rated(&games(&all));
-    all.reverse();
-    assert_eq!(rated(&games(&all)), expected);
-    all.rotate_left(3);
-    assert_eq!(rated(&games(&all)), expected);
+    let mut entries = round_robin();
+    let expected = rated(&games(&entries));
+    entries.reverse();
+    assert_eq!(rated(&games(&entries)), expected);
+    entries.rotate_left(3);
+    assert_eq!(rated(&games(&entries)), expected);
     // Pinned: published numbers must not change with the machine or the compiler.
     let pool = &expected[0][0];
     let best = &pool.ratings[0];
@@ -174,7 +176,7 @@ fn disconnected_samples_are_not_used_for_intervals() {
 #[test]
 fn unconnected_submissions_are_in_different_pools() {
     let labelled = |home, away, labels: [&str; 2], goals| {
-        with(game(home, away, goals), "submissions", json!(labels))
+        with_field(game(home, away, goals), "submissions", json!(labels))
     };
     let [results, goals] = rated(&games(&[
         labelled("A", "B", ["v1", "v1"], [1, 0]),
@@ -203,7 +205,7 @@ fn unconnected_submissions_are_in_different_pools() {
 
 #[test]
 fn forfeit_counts_as_result_without_goals() {
-    let forfeited = with(game("A", "B", [0, 3]), "forfeit", json!([null, "time"]));
+    let forfeited = with_field(game("A", "B", [0, 3]), "forfeit", json!([null, "time"]));
     let [results, goals] = rated(&games(&[forfeited]));
     assert_eq!(results[0].ratings[0].rated.team.as_str(), "A");
     assert_eq!(goals, []);
@@ -218,7 +220,7 @@ fn mirrored_pair_is_drawn_as_a_whole() {
         let (a, b) = if number < 8 { (1, 0) } else { (0, 1) };
         for half in [game("A", "B", [a, b]), game("B", "A", [b, a])] {
             single.push(half.clone());
-            paired.push(with(half, "pair", json!(number)));
+            paired.push(with_field(half, "pair", json!(number)));
         }
     }
     let width = |pool: &Pool| {
@@ -230,8 +232,8 @@ fn mirrored_pair_is_drawn_as_a_whole() {
     assert_eq!((rated_games[0].units, rated_pairs[0].units), (24, 12));
     assert!((rated_games[0].ratings[0].rating - rated_pairs[0].ratings[0].rating).abs() < 1e-6);
     // Half as many units: wider by √2, apart from the effect of the prior.
-    let wider = width(&rated_pairs[0]) / width(&rated_games[0]);
-    assert!((1.25..1.6).contains(&wider), "{wider}");
+    let width_ratio = width(&rated_pairs[0]) / width(&rated_games[0]);
+    assert!((1.25..1.6).contains(&width_ratio), "{width_ratio}");
     // One half may be missing after a platform fault.
     paired.pop();
     assert_eq!(rated(&games(&paired))[0][0].units, 12);
@@ -239,12 +241,15 @@ fn mirrored_pair_is_drawn_as_a_whole() {
 
 #[test]
 fn invalid_mirrored_pair_is_refused() {
-    let half = |home, away| with(game(home, away, [1, 0]), "pair", json!(3));
-    for (all, words) in [
+    let half = |home, away| with_field(game(home, away, [1, 0]), "pair", json!(3));
+    for (entries, words) in [
         (vec![half("A", "B"), half("A", "B")], "with sides swapped"),
         (vec![half("A", "B"), half("C", "A")], "with sides swapped"),
         (
-            vec![half("A", "B"), with(half("B", "A"), "round", json!(2))],
+            vec![
+                half("A", "B"),
+                with_field(half("B", "A"), "round", json!(2)),
+            ],
             "of two rounds",
         ),
         (
@@ -252,7 +257,7 @@ fn invalid_mirrored_pair_is_refused() {
             "more than two games",
         ),
     ] {
-        let error = rate(&games(&all)).unwrap_err().to_string();
+        let error = rate(&games(&entries)).unwrap_err().to_string();
         assert!(error.starts_with("pair 3 of A against B: "), "{error}");
         assert!(error.contains(words), "{words:?} is not in: {error}");
     }

@@ -1,4 +1,4 @@
-//! Properties of schedules for any number of teams, any seed and any results.
+//! Tests of schedules: properties for any number of teams, any seed and any results, and errors.
 
 use crate::{
     most_pairs::most_pairs,
@@ -18,8 +18,14 @@ fn names(count: usize) -> Vec<TeamName> {
     (0..count).map(|n| team(&format!("T{n:02}"))).collect()
 }
 
-fn number(number: u32) -> RoundNumber {
+fn round_number(number: u32) -> RoundNumber {
     number.try_into().unwrap()
+}
+
+fn round_robin(rounds: u32) -> Format {
+    Format::RoundRobin {
+        rounds: round_number(rounds),
+    }
 }
 
 /// A simulated tournament.
@@ -53,6 +59,7 @@ impl SimulatedTournament {
         }
     }
 
+    /// Draws and adds the next round; `None` after the last.
     fn draw(&mut self) -> Result<Option<&Round>, ScheduleError> {
         let next = self.format.next_round(&self.seed, &self.progress())?;
         Ok(next.map(|round| {
@@ -78,15 +85,16 @@ impl SimulatedTournament {
 fn game_counts<'a>(
     rounds: impl IntoIterator<Item = &'a Round>,
 ) -> BTreeMap<[&'a TeamName; 2], usize> {
-    let mut all = BTreeMap::new();
+    let mut counts = BTreeMap::new();
     for pairing in rounds.into_iter().flat_map(Round::pairings) {
         let mut teams = pairing.teams();
         teams.sort();
-        *all.entry(teams).or_default() += 1;
+        *counts.entry(teams).or_default() += 1;
     }
-    all
+    counts
 }
 
+/// Home games minus away games of a team.
 fn home_balance(rounds: &[Round], team: &TeamName) -> i64 {
     rounds
         .iter()
@@ -99,9 +107,9 @@ fn home_balance(rounds: &[Round], team: &TeamName) -> i64 {
 fn assert_one_game_per_team_and_day(round: &Round) {
     for day in &round.matchdays {
         let playing = day.pairings.iter().flat_map(|pairing| pairing.teams());
-        let all: Vec<_> = playing.chain(&day.byes).collect();
-        let different: BTreeSet<_> = all.iter().collect();
-        assert_eq!(different.len(), all.len(), "{day:?}");
+        let teams: Vec<_> = playing.chain(&day.byes).collect();
+        let different: BTreeSet<_> = teams.iter().collect();
+        assert_eq!(different.len(), teams.len(), "{day:?}");
     }
 }
 
@@ -114,7 +122,7 @@ proptest! {
         rounds in 1u32..5,
         seed in any::<u64>(),
     ) {
-        let format = Format::RoundRobin { rounds: number(rounds) };
+        let format = round_robin(rounds);
         let mut tournament = SimulatedTournament::new(format, names(count), seed);
         while let Some(round) = tournament.draw().unwrap() {
             assert_one_game_per_team_and_day(round);
@@ -142,9 +150,9 @@ proptest! {
         seed in any::<u64>(),
     ) {
         for format in [
-            Format::RoundRobin { rounds: number(2) },
+            round_robin(2),
             Format::Groups { groups: 2, advance: 2 },
-            Format::Swiss { rounds: number(4) },
+            Format::Swiss { rounds: round_number(4) },
         ] {
             let [entered, sorted, other] = [
                 (teams.clone(), seed),
@@ -169,7 +177,7 @@ proptest! {
         seed in any::<u64>(),
         goals in proptest::collection::vec([0u32..4, 0u32..4], 100),
     ) {
-        let format = Format::Swiss { rounds: number(rounds) };
+        let format = Format::Swiss { rounds: round_number(rounds) };
         let mut tournament = SimulatedTournament::new(format, names(count), seed);
         let mut goals = goals.into_iter().cycle();
         while tournament.draw().unwrap().is_some() {
@@ -184,13 +192,13 @@ proptest! {
                 !counts.contains_key(&[a.min(b), a.max(b)])
             };
             let playing: Vec<_> = round.pairings().flat_map(|pairing| pairing.teams()).collect();
-            let new = round
+            let new_pairs = round
                 .pairings()
                 .filter(|pairing| have_not_met(&pairing.home, &pairing.away))
                 .count();
-            prop_assert_eq!(new, most_pairs(&playing, &have_not_met));
+            prop_assert_eq!(new_pairs, most_pairs(&playing, &have_not_met));
             if earlier.len() < count / 2 {
-                prop_assert_eq!(new, count / 2, "in early rounds there is always a pairing without repeats");
+                prop_assert_eq!(new_pairs, count / 2, "in early rounds there is always a pairing without repeats");
             }
 
             // The home team has at most as many home games.
@@ -235,10 +243,10 @@ proptest! {
         let expected: usize = sizes.iter().map(|size| size * (size - 1) / 2).sum();
         prop_assert_eq!(game_counts([&first]).len(), expected);
         for pairing in first.pairings() {
-            let together = |group: &&Vec<TeamName>| {
+            let contains_both = |group: &&Vec<TeamName>| {
                 pairing.teams().into_iter().all(|team| group.contains(team))
             };
-            prop_assert_eq!(first.groups.iter().filter(together).count(), 1);
+            prop_assert_eq!(first.groups.iter().filter(contains_both).count(), 1);
         }
         // The team with the earlier name wins, so that the first of each group is known.
         tournament.play(|home, away| if home < away { [1, 0] } else { [0, 1] });
@@ -286,7 +294,7 @@ fn final_of_two_groups_with_one_finalist_is_one_game() {
 /// As in the paper's tournament: six teams, and a seventh from the second round.
 #[test]
 fn team_may_enter_between_two_rounds() {
-    let format = Format::RoundRobin { rounds: number(2) };
+    let format = round_robin(2);
     let mut tournament = SimulatedTournament::new(format, names(6), 3);
     tournament.draw().unwrap();
     tournament.play(|_, _| [1, 0]);
@@ -304,7 +312,7 @@ fn team_may_enter_between_two_rounds() {
         let home = |round: &Round| {
             round
                 .pairings()
-                .find(|p| p.is_between([a, b]))
+                .find(|pairing| pairing.is_between([a, b]))
                 .unwrap()
                 .home
                 .clone()
@@ -319,14 +327,14 @@ fn team_may_enter_between_two_rounds() {
 
 #[test]
 fn departure_excludes_team_and_its_open_games() {
-    let format = Format::RoundRobin { rounds: number(3) };
+    let format = round_robin(3);
     let mut tournament = SimulatedTournament::new(format, names(4), 5);
     tournament.draw().unwrap();
-    assert_eq!(tournament.progress().current_round(), Some(number(1)));
+    assert_eq!(tournament.progress().current_round(), Some(round_number(1)));
     tournament.play(|_, _| [1, 0]);
     assert_eq!(
         tournament.progress().current_round(),
-        Some(number(2)),
+        Some(round_number(2)),
         "between two rounds"
     );
     tournament.draw().unwrap();
@@ -334,15 +342,15 @@ fn departure_excludes_team_and_its_open_games() {
     // In the second round, the games of T00 and one other game are still open.
     let involves = |game: &PlayedGame, name: &str| game.teams().contains(&&team(name));
     let between = |game: &PlayedGame| involves(game, "T01") && involves(game, "T02");
-    let (open, done) = std::mem::take(&mut tournament.games)
+    let (open, finished) = std::mem::take(&mut tournament.games)
         .into_iter()
         .partition::<Vec<_>, _>(|game| {
             game.round() == 2 && (involves(game, "T00") || between(game))
         });
-    tournament.games = done;
+    tournament.games = finished;
     assert_eq!(open.len(), 4);
     let from_round = tournament.progress().current_round().unwrap();
-    assert_eq!(from_round, number(2));
+    assert_eq!(from_round, round_number(2));
     tournament.departures = Departures::new([Departure {
         team: team("T00"),
         kind: DepartureKind::Withdrawn,
@@ -358,7 +366,7 @@ fn departure_excludes_team_and_its_open_games() {
     );
     tournament.games.extend(open.into_iter().filter(between));
     let third = tournament.draw().unwrap().unwrap();
-    assert_eq!(third.number, number(3));
+    assert_eq!(third.number, round_number(3));
     assert_eq!(game_counts([third]).len(), 3);
     assert!(
         third
@@ -369,7 +377,8 @@ fn departure_excludes_team_and_its_open_games() {
 
 #[test]
 fn swiss_bye_gives_points_of_a_win() {
-    let mut tournament = SimulatedTournament::new(Format::Swiss { rounds: number(2) }, names(3), 8);
+    let rounds = round_number(2);
+    let mut tournament = SimulatedTournament::new(Format::Swiss { rounds }, names(3), 8);
     tournament.draw().unwrap();
     tournament.play(|_, _| [0, 0]);
     let bye = tournament.rounds[0].byes().next().unwrap().clone();
@@ -380,8 +389,7 @@ fn swiss_bye_gives_points_of_a_win() {
         (&first.team, first.points, first.byes),
         (&bye, POINTS_BYE, 1)
     );
-    let round_robin = Format::RoundRobin { rounds: number(1) };
-    assert_eq!(round_robin.byes(&tournament.rounds), []);
+    assert_eq!(round_robin(1).byes(&tournament.rounds), []);
 }
 
 #[test]
@@ -398,12 +406,12 @@ fn impossible_schedule_is_refused_with_reason() {
     );
     assert_eq!(
         message(Entrants::new(names(257))),
-        "a tournament has at most 256 teams, there are 257; divide them"
+        "a tournament has at most 256 teams, there are 257; split them into several tournaments"
     );
 
-    let round_robin = Format::RoundRobin { rounds: number(2) };
+    let format = round_robin(2);
     let refused = |change: &dyn Fn(&mut SimulatedTournament)| {
-        let mut tournament = SimulatedTournament::new(round_robin, names(3), 1);
+        let mut tournament = SimulatedTournament::new(format, names(3), 1);
         tournament.draw().unwrap();
         tournament.play(|_, _| [1, 0]);
         change(&mut tournament);
@@ -418,7 +426,7 @@ fn impossible_schedule_is_refused_with_reason() {
         Departures::new(names.iter().map(|name| Departure {
             team: team(name),
             kind: DepartureKind::Withdrawn,
-            from_round: number(1),
+            from_round: round_number(1),
         }))
         .unwrap()
     };
@@ -439,7 +447,7 @@ fn impossible_schedule_is_refused_with_reason() {
         "a tournament needs at least two teams, there are 1; enter more"
     );
     assert_eq!(
-        refused(&|tournament| tournament.rounds[0].number = number(2)),
+        refused(&|tournament| tournament.rounds[0].number = round_number(2)),
         "expected round 1, got 2; give all earlier rounds in order"
     );
     assert_eq!(

@@ -1,3 +1,5 @@
+//! Helpers of the tests.
+
 use faceoff_types::{
     ComputationTime, ComputationTimeSummary, EpisodeEnd, EpisodeOutcome, Task, TaskResult,
     TeamName, ViolationCounts, Violations,
@@ -14,6 +16,7 @@ pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, String> {
     serde_path_to_error::deserialize(&mut json).map_err(|error| error.to_string())
 }
 
+/// The rows of a table in a golden file.
 pub fn rows<'a>(golden: &'a Value, table: &str) -> &'a [Value] {
     golden[table].as_array().unwrap()
 }
@@ -35,6 +38,7 @@ pub fn episode(task: Task, episode: u32) -> EpisodeOutcome {
     }
 }
 
+/// The result of a task without violations, steps and times.
 pub fn task_result(episodes: u32, successes: u32, penalty_points: f64) -> TaskResult {
     TaskResult {
         episodes,

@@ -1,4 +1,4 @@
-//! Forfeits, departures, byes and head-to-head records, on synthetic games.
+//! Tests of forfeits, departures, byes and head-to-head records, on synthetic games.
 
 use crate::support::{read, team};
 use faceoff_scoring::tournament::{
@@ -16,7 +16,8 @@ fn game(round: u32, home: &str, away: &str, goals: [u32; 2]) -> Value {
            "penalty_points": [10, 20]})
 }
 
-fn with(mut game: Value, field: &str, value: Value) -> Value {
+/// The game with another value of a field.
+fn with_field(mut game: Value, field: &str, value: Value) -> Value {
     game[field] = value;
     game
 }
@@ -34,20 +35,20 @@ fn round(number: u32) -> RoundNumber {
     number.try_into().unwrap()
 }
 
-fn departure(name: &str, kind: DepartureKind, from: u32) -> Departure {
+fn departure(name: &str, kind: DepartureKind, from_round: u32) -> Departure {
     Departure {
         team: team(name),
         kind,
-        from_round: round(from),
+        from_round: round(from_round),
     }
 }
 
 #[test]
 fn forfeited_game_counts_10_to_0() {
-    let unsafe_home = with(game(1, "A", "B", [1, 7]), "penalty_points", json!([900, 0]));
+    let unsafe_home = with_field(game(1, "A", "B", [1, 7]), "penalty_points", json!([900, 0]));
     let played = games(json!([
-        with(unsafe_home, "forfeit", json!([null, "faults"])),
-        with(
+        with_field(unsafe_home, "forfeit", json!([null, "faults"])),
+        with_field(
             game(1, "C", "D", [3, 0]),
             "forfeit",
             json!(["time", "faults"])
@@ -81,19 +82,19 @@ fn forfeited_game_counts_10_to_0() {
 
 #[test]
 fn forfeit_that_contradicts_score_is_refused() {
-    let forfeited = with(game(1, "A", "B", [1, 7]), "forfeit", json!([null, "time"]));
+    let forfeited = with_field(game(1, "A", "B", [1, 7]), "forfeit", json!([null, "time"]));
     for (changed, words) in [
         (
-            with(forfeited.clone(), "score", json!([1, 7])),
+            with_field(forfeited.clone(), "score", json!([1, 7])),
             "counts [10, 0], got [1, 7]",
         ),
         (
-            with(forfeited.clone(), "forfeit", json!([null, "sleep"])),
+            with_field(forfeited.clone(), "forfeit", json!([null, "sleep"])),
             "unknown variant `sleep`, expected `faults` or `time`",
         ),
         (
-            with(
-                with(forfeited.clone(), "fouls", Value::Null),
+            with_field(
+                with_field(forfeited.clone(), "fouls", Value::Null),
                 "score",
                 json!([10, 0]),
             ),
@@ -103,7 +104,7 @@ fn forfeit_that_contradicts_score_is_refused() {
         let error = read::<Vec<PlayedGame>>(&json!([changed]).to_string()).unwrap_err();
         assert!(error.contains(words), "{words:?} is not in: {error}");
     }
-    games(json!([with(forfeited, "score", json!([10, 0]))]));
+    games(json!([with_field(forfeited, "score", json!([10, 0]))]));
 }
 
 #[test]
@@ -132,7 +133,7 @@ fn departure_excludes_games_of_unfinished_round() {
     let row = serde_json::to_value(&tournament.standings[1]).unwrap();
     assert_eq!(row["left"], "withdrawn");
     assert_eq!(row["points_per_round"], json!([6, 0]));
-    assert_eq!(departures.counting(&played).count(), 4);
+    assert_eq!(departures.counting_games(&played).count(), 4);
 }
 
 #[test]
@@ -202,7 +203,7 @@ fn bye_gives_points_without_game() {
 
 #[test]
 fn head_to_head_record_combines_home_and_away_games() {
-    let forfeited = with(game(2, "A", "B", [0, 4]), "forfeit", json!([null, "time"]));
+    let forfeited = with_field(game(2, "A", "B", [0, 4]), "forfeit", json!([null, "time"]));
     let played = games(json!([
         game(1, "B", "A", [5, 2]),
         forfeited,
@@ -221,10 +222,13 @@ fn head_to_head_record_combines_home_and_away_games() {
 
 #[test]
 fn mirrored_pair_is_no_repeated_pairing() {
-    let half = |home, away| with(game(1, home, away, [1, 0]), "pair", json!(7));
-    let mut all = vec![half("A", "B"), half("B", "A")];
-    assert_eq!(score_tournament(&games(json!(all))).repeated_pairings, []);
-    all.push(game(1, "A", "B", [1, 0]));
-    let repeated = score_tournament(&games(json!(all))).repeated_pairings;
+    let half = |home, away| with_field(game(1, home, away, [1, 0]), "pair", json!(7));
+    let mut entries = vec![half("A", "B"), half("B", "A")];
+    assert_eq!(
+        score_tournament(&games(json!(entries))).repeated_pairings,
+        []
+    );
+    entries.push(game(1, "A", "B", [1, 0]));
+    let repeated = score_tournament(&games(json!(entries))).repeated_pairings;
     assert_eq!((repeated.len(), repeated[0].games), (1, 2));
 }

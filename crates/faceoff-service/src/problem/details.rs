@@ -1,3 +1,6 @@
+//! Problem: an error response as RFC 9457 defines it. Its body has a kind, a sentence with details, and further members for API
+//! clients.
+
 use super::kind::ProblemKind;
 use axum::{
     Json,
@@ -11,12 +14,14 @@ use serde_json::{Map, Value};
 use std::fmt::Display;
 use utoipa::ToSchema;
 
-/// A problem, ready to be sent.
+/// An error response.
 #[derive(Debug, Clone)]
 pub struct Problem {
     kind: ProblemKind,
     detail: String,
+    /// Extension members of the body, by name.
     members: Map<String, Value>,
+    /// Additional headers of the response.
     headers: Vec<(HeaderName, HeaderValue)>,
 }
 
@@ -27,6 +32,7 @@ impl Problem {
     /// A problem; `detail` says what was expected, what came and what to do.
     #[must_use]
     pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        // Values of `Retry-After` are in seconds: roughly how long the cause lasts.
         let headers = match kind {
             ProblemKind::Unauthenticated => vec![(
                 header::WWW_AUTHENTICATE,
@@ -102,7 +108,8 @@ impl Problem {
         Self::new(ProblemKind::InvalidContent, format!("{field}: {detail}")).with("field", field)
     }
 
-    /// Refuses a request that is not confirmed with the `name` of the affected resource, and describes its `effect`.
+    /// Refuses a request unless it is confirmed with the `name` of the affected resource. The message describes the `effect` of the
+    /// request.
     pub fn check_confirmed(confirmed: Option<&str>, name: &str, effect: &str) -> Result<(), Self> {
         if confirmed == Some(name) {
             return Ok(());
@@ -112,32 +119,32 @@ impl Problem {
         Err(Self::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
     }
 
-    /// A file that was removed.
-    pub fn removed(what: &str, removed: &Ruling) -> Self {
-        let at = removed.at.strftime("%Y-%m-%d at %H:%M:%S UTC");
-        let detail = format!("{what} was removed on {at} {}", removed.reason);
-        Self::new(ProblemKind::Removed, detail).with("removed_at", removed.at.to_string())
+    /// A file that was removed. `file` is its name in the message; `removal` says when it was removed, and by whom or why.
+    pub fn removed(file: &str, removal: &Ruling) -> Self {
+        let removed_at = removal.at.strftime("%Y-%m-%d at %H:%M:%S UTC");
+        let detail = format!("{file} was removed on {removed_at} {}", removal.reason);
+        Self::new(ProblemKind::Removed, detail).with("removed_at", removal.at.to_string())
     }
 
-    /// A request that would change an archived season.
+    /// Refuses a request that would change an archived season. The archive was made at `made_at`.
     pub fn archived(made_at: Timestamp, imported_at: Option<Timestamp>) -> Self {
-        let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+        let format_time = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
         let imported = imported_at.map_or_else(String::new, |at| {
-            format!(", which was imported at {}", shown(at))
+            format!(", which was imported at {}", format_time(at))
         });
         Self::new(
             ProblemKind::ReadOnly,
             format!(
                 "this server shows the archive of a season as of {}{imported}: everything can be read, but nothing can be \
                  changed",
-                shown(made_at)
+                format_time(made_at)
             ),
         )
         .with("made_at", made_at.to_string())
         .with("imported_at", imported_at.map(|at| at.to_string()))
     }
 
-    /// A platform fault; `cause` is only logged.
+    /// A fault of the server; `cause` is logged, but not sent.
     pub fn internal(cause: impl Display) -> Self {
         Self::logged(&cause)
     }
@@ -151,11 +158,12 @@ impl Problem {
         )
     }
 
-    /// The resource does not exist, or is not the caller's: the two must be indistinguishable. `what` names its kind.
-    pub fn not_found(what: &str) -> Self {
+    /// The resource does not exist, or the caller may not see it: the two must be indistinguishable. `resource_kind` names its
+    /// kind, such as "team".
+    pub fn not_found(resource_kind: &str) -> Self {
         Self::new(
             ProblemKind::NotFound,
-            format!("you have no such {what}; check the id and the token's team"),
+            format!("you have no such {resource_kind}; check the id and the token's team"),
         )
     }
 

@@ -1,3 +1,5 @@
+//! Problems for the errors of the store, which is the database with its files.
+
 use super::{details::Problem, kind::ProblemKind};
 use faceoff_store::StoreError;
 use jiff::Timestamp;
@@ -5,9 +7,9 @@ use jiff::Timestamp;
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         match error {
-            StoreError::NotFound(what) => Self::new(
+            StoreError::NotFound(resource_kind) => Self::new(
                 ProblemKind::NotFound,
-                format!("there is no such {what}; check the id"),
+                format!("there is no such {resource_kind}; check the id"),
             ),
             StoreError::TeamNameTaken(name) => Self::new(
                 ProblemKind::TeamNameTaken,
@@ -38,12 +40,12 @@ impl From<StoreError> for Problem {
                 opens_at,
                 closed_at,
             } => {
-                let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
-                let when = match closed_at {
-                    Some(at) => format!("closed at {}; no further day of it starts", shown(at)),
-                    None => format!("opens at {}; no day of it starts before", shown(opens_at)),
+                let format_time = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
+                let period = match closed_at {
+                    Some(at) => format!("closed at {}; no further day of it starts", format_time(at)),
+                    None => format!("opens at {}; no day of it starts before", format_time(opens_at)),
                 };
-                Self::new(ProblemKind::StageNotOpen, format!("the stage {name:?} {when}"))
+                Self::new(ProblemKind::StageNotOpen, format!("the stage {name:?} {period}"))
                     .with("opens_at", opens_at.to_string())
                     .with("closed_at", closed_at.map(|at| at.to_string()))
             }

@@ -1,9 +1,12 @@
+//! The kinds of problems (error responses), with HTTP status, title and explanation of each.
+
 use axum::http::StatusCode;
 
-/// One line per kind: variant, name in `type`, HTTP status, title, and what it means with what to do.
+/// One entry per kind: variant, slug (its name in URLs), HTTP status, title, and its meaning with advice for the client.
 macro_rules! kinds {
     ($($kind:ident $slug:literal $status:ident $title:literal $meaning:literal)*) => {
-        /// Kind of a problem. `type` in the response is `/problems#` and the kind's slug; that page explains all kinds.
+        /// Kind of a problem. The member `type` of the response is `/problems#` and the kind's slug; the page `/problems` explains all
+        /// kinds.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum ProblemKind {
             $(#[doc = $meaning] $kind,)*
@@ -13,7 +16,8 @@ macro_rules! kinds {
             /// All kinds, as the page `/problems` lists them.
             pub const ALL: &[Self] = &[$(Self::$kind,)*];
 
-            const fn row(self) -> (&'static str, StatusCode, &'static str, &'static str) {
+            /// Slug, status, title and meaning.
+            const fn properties(self) -> (&'static str, StatusCode, &'static str, &'static str) {
                 match self {
                     $(Self::$kind => ($slug, StatusCode::$status, $title, $meaning),)*
                 }
@@ -155,13 +159,13 @@ kinds! {
 }
 
 impl ProblemKind {
-    /// The name in `type`.
+    /// The name in the member `type`.
     #[must_use]
     pub const fn slug(self) -> &'static str {
-        self.row().0
+        self.properties().0
     }
 
-    /// The name in `type` of earlier versions. Links to it keep working until the next minor version.
+    /// The slug in earlier versions. Links with it keep working until the next minor version.
     #[must_use]
     pub const fn old_slug(self) -> Option<&'static str> {
         match self {
@@ -173,19 +177,19 @@ impl ProblemKind {
 
     #[must_use]
     pub const fn status(self) -> StatusCode {
-        self.row().1
+        self.properties().1
     }
 
     /// Short title, the same for every problem of the kind.
     #[must_use]
     pub const fn title(self) -> &'static str {
-        self.row().2
+        self.properties().2
     }
 
     /// What the kind means and what to do, for the page `/problems`.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
-        self.row().3
+        self.properties().3
     }
 }
 

@@ -1,3 +1,5 @@
+//! Problems of quotas per day, with the time until the quota is available again.
+
 use super::details::Problem;
 use faceoff_store::StoreError;
 use jiff::{Timestamp, tz::TimeZone};
@@ -5,7 +7,7 @@ use jiff::{Timestamp, tz::TimeZone};
 impl Problem {
     /// The problem of a store error. If a day's quota is used up, `Retry-After` is the time to midnight UTC.
     pub fn with_quota_reset(error: StoreError, now: Timestamp) -> Self {
-        let is_spent = matches!(
+        let is_daily_quota = matches!(
             error,
             StoreError::DailyQuotaExceeded { .. } | StoreError::GameQuotaExceeded { .. }
         );
@@ -15,7 +17,7 @@ impl Problem {
             .tomorrow()
             .and_then(|tomorrow| tomorrow.start_of_day());
         match tomorrow {
-            Ok(tomorrow) if is_spent => {
+            Ok(tomorrow) if is_daily_quota => {
                 let seconds = tomorrow.timestamp().duration_since(now).as_secs();
                 problem.retry_after(seconds.unsigned_abs().max(1))
             }

@@ -1,4 +1,5 @@
-//! Accounts of users who accept an invitation.
+//! Creation of a user's account: the user accepts an invitation by its code, and founds or joins a team, or becomes an
+//! organiser.
 
 use crate::{app::AppState, boxed, problem::Problem, text};
 use faceoff_api::{
@@ -11,7 +12,8 @@ use jiff::{SignedDuration, Timestamp};
 
 /// Default validity of an invitation.
 const DEFAULT_VALIDITY: SignedDuration = SignedDuration::from_hours(7 * 24);
-const AFFILIATION_CHARS: usize = 120;
+/// Longest affiliation of a team.
+const MAX_AFFILIATION_CHARS: usize = 120;
 
 /// When an invitation that is created now expires by default.
 pub(crate) fn default_expiry(now: Timestamp) -> Timestamp {
@@ -34,7 +36,7 @@ pub fn checked_profile(team: FoundedTeam) -> Result<(TeamName, TeamProfile), Pro
         division,
     } = team;
     let affiliation =
-        affiliation.map(|line| text::single_line("affiliation", &line, AFFILIATION_CHARS));
+        affiliation.map(|text| text::single_line("affiliation", &text, MAX_AFFILIATION_CHARS));
     let profile = TeamProfile {
         affiliation: affiliation.transpose()?,
         link: link.map(|link| text::link("link", &link)).transpose()?,
@@ -43,36 +45,36 @@ pub fn checked_profile(team: FoundedTeam) -> Result<(TeamName, TeamProfile), Pro
     Ok((name, profile))
 }
 
-/// Accepts an invitation, and creates a token or a session for the user.
+/// Accepts an invitation, and creates a token or a session for the user, as `token_kind` says.
 #[boxed]
 pub async fn join(
     app: &AppState,
-    join: requests::JoinRequest,
-    kind: TokenKind,
+    request: requests::JoinRequest,
+    token_kind: TokenKind,
     expires_at: Option<Timestamp>,
 ) -> Result<(JoinOutcome, Secret), Problem> {
     let now = app.config.clock.now();
-    let code_hash = hash_token(join.code.trim());
+    let code_hash = hash_token(request.code.trim());
     // Checked before the password is hashed, which is expensive.
     app.store.code_status(code_hash, now).await?;
-    let team = join.team.map(checked_profile).transpose()?;
-    let password = match join.password {
+    let team = request.team.map(checked_profile).transpose()?;
+    let password = match request.password {
         Some(password) => Some(app.passwords.hash(password).await?),
         None => None,
     };
-    let (secret_kind, token_name) = match kind {
+    let (secret_kind, token_name) = match token_kind {
         TokenKind::ApiToken => (SecretKind::User, "first"),
         TokenKind::Session => (SecretKind::Session, "browser"),
     };
     let secret = Secret::generate(secret_kind).map_err(Problem::internal)?;
     let join_request = JoinRequest {
         code_hash,
-        name: join.name,
+        name: request.name,
         password,
         team,
-        accepted_terms: join.accepted_terms,
+        accepted_terms: request.accepted_terms,
         token_hash: secret.hash(),
-        token_kind: kind,
+        token_kind,
         token_name: token_name.to_owned(),
         token_expires_at: expires_at,
     };

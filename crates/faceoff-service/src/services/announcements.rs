@@ -1,4 +1,4 @@
-//! Announcements, questions with their answers, and the terms.
+//! Announcements of the organisers, questions of teams with their answers, and the season's terms of participation.
 
 use crate::{
     app::AppState,
@@ -15,10 +15,12 @@ use faceoff_api::{
 use faceoff_store::Actor;
 use faceoff_types::QuestionId;
 
-const TITLE_CHARS: usize = 120;
-const TEXT_CHARS: usize = 5_000;
-const QUESTION_CHARS: usize = 2_000;
-const TERMS_CHARS: usize = 20_000;
+/// Longest title of an announcement.
+const MAX_TITLE_CHARS: usize = 120;
+/// Longest text of an announcement or an answer.
+const MAX_TEXT_CHARS: usize = 5_000;
+const MAX_QUESTION_CHARS: usize = 2_000;
+const MAX_TERMS_CHARS: usize = 20_000;
 
 /// Publishes an announcement. It cannot be changed.
 #[boxed]
@@ -27,8 +29,8 @@ pub async fn announce(
     actor: Actor,
     new: &NewAnnouncement,
 ) -> Result<AnnouncementView, Problem> {
-    let title = text::single_line("title", &new.title, TITLE_CHARS)?;
-    let body = text::multi_line("text", &new.text, TEXT_CHARS)?;
+    let title = text::single_line("title", &new.title, MAX_TITLE_CHARS)?;
+    let body = text::multi_line("text", &new.text, MAX_TEXT_CHARS)?;
     let now = app.config.clock.now();
     let announcement = app.store.announce(actor, &title, &body, now).await?;
     tracing::info!(announcement = %announcement.id, "announcement published");
@@ -42,7 +44,7 @@ pub async fn questions(
     caller: Option<&Caller>,
 ) -> Result<Vec<QuestionView>, Problem> {
     let questions = app.store.questions().await?.into_iter();
-    let shown = questions.filter_map(|question| {
+    let views = questions.filter_map(|question| {
         let may_see_team = caller
             .zip(question.team)
             .is_some_and(|(caller, team)| caller.may_see(team));
@@ -52,16 +54,17 @@ pub async fn questions(
             .is_some_and(|answer| answer.is_public);
         (may_see_team || is_public).then(|| announcement::question(question, may_see_team))
     });
-    Ok(shown.collect())
+    Ok(views.collect())
 }
 
+/// Stores a team's question to the organisers.
 #[boxed]
 pub async fn ask(
     app: &AppState,
     caller: &TeamCaller,
     new: &NewQuestion,
 ) -> Result<QuestionView, Problem> {
-    let text = text::multi_line("text", &new.text, QUESTION_CHARS)?;
+    let text = text::multi_line("text", &new.text, MAX_QUESTION_CHARS)?;
     let now = app.config.clock.now();
     let team = &caller.team;
     let question = app.store.ask(caller.actor(), team.id, &text, now).await?;
@@ -77,7 +80,7 @@ pub async fn answer(
     id: QuestionId,
     new: &NewAnswer,
 ) -> Result<QuestionView, Problem> {
-    let text = text::multi_line("text", &new.text, TEXT_CHARS)?;
+    let text = text::multi_line("text", &new.text, MAX_TEXT_CHARS)?;
     let now = app.config.clock.now();
     let question = app.store.answer(actor, id, &text, new.public, now).await?;
     tracing::info!(question = %id, public = new.public, "answered");
@@ -91,7 +94,7 @@ pub async fn publish_terms(
     actor: Actor,
     new: &NewTerms,
 ) -> Result<TermsView, Problem> {
-    let text = text::multi_line("text", &new.text, TERMS_CHARS)?;
+    let text = text::multi_line("text", &new.text, MAX_TERMS_CHARS)?;
     let now = app.config.clock.now();
     let terms = app.store.publish_terms(actor, &text, now).await?;
     tracing::info!(version = terms.version, "terms published");

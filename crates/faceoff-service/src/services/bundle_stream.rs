@@ -1,5 +1,6 @@
-//! Receives a bundle: streams it to a file, counts and hashes its bytes, and detects its format. A bundle is never held
-//! in memory and never unpacked here.
+//! Receives the body of an upload, mostly a *bundle*: the archive file or container image with a team's agent. The body is
+//! streamed to a file, so that it is never completely in memory; meanwhile its bytes are counted and hashed, and its format
+//! is detected. This module does not unpack it.
 
 use crate::{
     boxed, free_space,
@@ -13,40 +14,41 @@ use std::path::Path;
 use tempfile::NamedTempFile;
 use tokio::{io::AsyncWriteExt, time::Instant};
 
-/// After a refusal the server reads and discards up to so many bytes. A client that is still sending then gets the
+/// After a refusal the server reads and discards up to this number of bytes. A client that is still sending then gets the
 /// response instead of a broken connection.
 const DRAIN_BYTES: u64 = 64 * 1024 * 1024;
 
-/// Bytes that a refusal of an unknown format quotes. Enough for every magic number except plain tar's.
-const SHOWN_BYTES: usize = 4;
+/// Number of first bytes that the message about an unknown format quotes. A format is recognised by its first bytes, and all but
+/// a plain tar by the first four.
+const QUOTED_BYTES: usize = 4;
 
 /// A bundle on disk; the file is removed when this is dropped.
 #[derive(Debug)]
 pub struct ReceivedBundle {
     pub file: NamedTempFile,
-    /// Its size in bytes.
+    /// Size of the bundle in bytes.
     pub bytes: u64,
-    /// BLAKE3 of all of its bytes.
+    /// BLAKE3 hash of the whole bundle.
     pub blake3: blake3::Hash,
-    /// Detected from its first bytes.
+    /// Detected from the first bytes.
     pub format: ArchiveFormat,
 }
 
 /// Size limit of a bundle.
 pub(crate) struct SizeLimit {
     pub(crate) max_bytes: u64,
-    /// The problem for a larger bundle, given its announced number of bytes.
-    pub exceeded: Box<dyn Fn(Option<u64>) -> Problem + Send + Sync>,
+    /// Makes the problem for a larger bundle, given its announced number of bytes (header `Content-Length`), if any.
+    pub make_problem: Box<dyn Fn(Option<u64>) -> Problem + Send + Sync>,
 }
 
-/// A body with a minimum transfer rate.
+/// A body that must arrive at a minimum transfer rate.
 struct RateGuardedBody {
     stream: BodyDataStream,
     rate: MinTransferRate,
     guard: TransferRateGuard,
 }
 
-/// Streams `body` into a file under `dir`.
+/// Streams a bundle into a file under `dir`. `announced_bytes` is the size that the client has announced (`Content-Length`).
 ///
 /// # Errors
 /// The problem of `limit` if the body is larger; `UnsupportedMediaType` for an unknown format; `RequestTimeout` if it is
@@ -54,42 +56,42 @@ struct RateGuardedBody {
 /// writing fails.
 pub(crate) async fn receive(
     body: Body,
-    announced: Option<u64>,
+    announced_bytes: Option<u64>,
     dir: &Path,
     limit: &SizeLimit,
     rate: MinTransferRate,
 ) -> Result<ReceivedBundle, Problem> {
     let max_bytes = limit.max_bytes;
     let mut body = RateGuardedBody::new(body, rate);
-    if let Some(bytes) = announced.filter(|bytes| *bytes > max_bytes) {
+    if let Some(bytes) = announced_bytes.filter(|bytes| *bytes > max_bytes) {
         body.drain(bytes).await;
-        return Err((limit.exceeded)(Some(bytes)));
+        return Err((limit.make_problem)(Some(bytes)));
     }
 
-    let file = new_file(dir)?;
+    let file = create_temp_file(dir)?;
     let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
     let mut hasher = blake3::Hasher::new();
-    let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
+    let mut first_bytes = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
     let mut format = None;
     let mut bytes = 0;
     while let Some(chunk) = body.next_chunk().await? {
         bytes += chunk.len() as u64;
         if bytes > max_bytes {
             body.drain(DRAIN_BYTES).await;
-            return Err((limit.exceeded)(None));
+            return Err((limit.make_problem)(None));
         }
         if format.is_none() {
-            let missing = ArchiveFormat::LONGEST_MAGIC - head.len();
-            head.extend_from_slice(&chunk[..missing.min(chunk.len())]);
-            format = ArchiveFormat::detect(&head);
-            if format.is_none() && head.len() == ArchiveFormat::LONGEST_MAGIC {
-                body.drain(announced.unwrap_or(DRAIN_BYTES)).await;
-                return Err(not_an_archive(&head));
+            let missing_bytes = ArchiveFormat::LONGEST_MAGIC - first_bytes.len();
+            first_bytes.extend_from_slice(&chunk[..missing_bytes.min(chunk.len())]);
+            format = ArchiveFormat::detect(&first_bytes);
+            if format.is_none() && first_bytes.len() == ArchiveFormat::LONGEST_MAGIC {
+                body.drain(announced_bytes.unwrap_or(DRAIN_BYTES)).await;
+                return Err(not_an_archive(&first_bytes));
             }
         }
         hasher.update(&chunk);
         if let Err(error) = writer.write_all(&chunk).await {
-            body.drain(announced.unwrap_or(DRAIN_BYTES)).await;
+            body.drain(announced_bytes.unwrap_or(DRAIN_BYTES)).await;
             return Err(free_space::write_problem(error));
         }
     }
@@ -100,7 +102,7 @@ pub(crate) async fn receive(
              image)",
         ));
     }
-    let format = format.ok_or_else(|| not_an_archive(&head))?;
+    let format = format.ok_or_else(|| not_an_archive(&first_bytes))?;
     // The artifact is copied from this file by name, so the writer's buffer must be flushed.
     writer.flush().await.map_err(free_space::write_problem)?;
     Ok(ReceivedBundle {
@@ -123,7 +125,7 @@ pub async fn receive_file(
     rate: MinTransferRate,
 ) -> Result<NamedTempFile, Problem> {
     let mut body = RateGuardedBody::new(body, rate);
-    let file = new_file(dir)?;
+    let file = create_temp_file(dir)?;
     let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
     let mut bytes = 0;
     while let Some(chunk) = body.next_chunk().await? {
@@ -141,14 +143,14 @@ pub async fn receive_file(
     Ok(file)
 }
 
-fn new_file(dir: &Path) -> Result<NamedTempFile, Problem> {
+fn create_temp_file(dir: &Path) -> Result<NamedTempFile, Problem> {
     tempfile::Builder::new()
         .prefix("upload-")
         .tempfile_in(dir)
         .map_err(free_space::write_problem)
 }
 
-/// Reads and discards a body that is refused unread.
+/// Reads and discards the body of a refused request.
 #[boxed]
 pub async fn discard(body: Body, rate: MinTransferRate) {
     RateGuardedBody::new(body, rate).drain(DRAIN_BYTES).await;
@@ -170,7 +172,7 @@ impl RateGuardedBody {
         match received {
             Ok(None) => Ok(None),
             Ok(Some(Ok(chunk))) => {
-                self.guard.transferred(chunk.len());
+                self.guard.record_bytes(chunk.len());
                 Ok(Some(chunk))
             }
             Ok(Some(Err(error))) => Err(Problem::new(
@@ -181,9 +183,9 @@ impl RateGuardedBody {
         }
     }
 
-    /// Reads and discards what the client still sends, up to [`DRAIN_BYTES`].
-    async fn drain(&mut self, at_most: u64) {
-        let mut left = at_most.min(DRAIN_BYTES);
+    /// Reads and discards up to `max_bytes` bytes that the client still sends, but at most [`DRAIN_BYTES`].
+    async fn drain(&mut self, max_bytes: u64) {
+        let mut left = max_bytes.min(DRAIN_BYTES);
         while left > 0 {
             match self.next_chunk().await {
                 Ok(Some(chunk)) => left = left.saturating_sub(chunk.len() as u64),
@@ -206,8 +208,10 @@ fn too_slow(rate: MinTransferRate) -> Problem {
     .with("least_bytes_per_s", bytes_per_s)
 }
 
-pub(crate) fn too_large(max_bytes: u64, announced: Option<u64>) -> Problem {
-    let size = announced.map_or_else(|| "got more".to_owned(), |n| format!("got {n}"));
+/// The problem of a bundle that exceeds the limit for all teams.
+pub(crate) fn too_large(max_bytes: u64, announced_bytes: Option<u64>) -> Problem {
+    let size =
+        announced_bytes.map_or_else(|| "got more".to_owned(), |bytes| format!("got {bytes}"));
     Problem::new(
         ProblemKind::TooLarge,
         format!(
@@ -218,13 +222,13 @@ pub(crate) fn too_large(max_bytes: u64, announced: Option<u64>) -> Problem {
     .with("limit_bytes", max_bytes)
 }
 
-fn not_an_archive(head: &[u8]) -> Problem {
+fn not_an_archive(first_bytes: &[u8]) -> Problem {
     Problem::new(
         ProblemKind::UnsupportedMediaType,
         format!(
             "expected a .tar.gz, .tar.zst or .zip bundle, or the .tar of a container image, got a body that begins with the \
              bytes {}. Send the bundle file itself as the body, not a form",
-            hex::encode(&head[..head.len().min(SHOWN_BYTES)])
+            hex::encode(&first_bytes[..first_bytes.len().min(QUOTED_BYTES)])
         ),
     )
 }

@@ -1,4 +1,5 @@
-//! Decisions of organisers: each has a reason; one that cannot be undone is previewed and confirmed by a name.
+//! Decisions of organisers. Each has a public reason. For a decision that cannot be undone, the organiser first gets a preview
+//! of its effects, and then confirms it with the name of the affected resource.
 
 use crate::problem::Problem;
 
@@ -19,14 +20,14 @@ pub fn checked_reason(reason: &str) -> Result<&str, Problem> {
 /// The effects of a decision, before it is made.
 #[derive(Debug, Clone)]
 pub struct Preview {
-    /// The name that confirms the decision: that of the affected resource.
+    /// The name of the affected resource, which confirms the decision.
     pub name: String,
     /// What the decision does, as a clause without a full stop.
     pub effect: String,
 }
 
 impl Preview {
-    /// Refuses a decision that is not confirmed, with its effects.
+    /// Refuses a decision that is not confirmed with the name; the message describes the effects.
     ///
     /// # Errors
     /// `NotConfirmed`.
@@ -35,7 +36,7 @@ impl Preview {
     }
 }
 
-/// The clause that the reason is public; quotes the reason, once there is one.
+/// A clause for the description of effects, which says that the reason is public; it quotes the reason if that is already known.
 pub fn reason_clause(reason: Option<&str>) -> String {
     match reason {
         Some(reason) => format!("with the public reason {reason:?}"),

@@ -1,4 +1,4 @@
-//! Entrants of a tournament.
+//! Entrants: the teams that take part in a tournament.
 
 use crate::{
     app::AppState,
@@ -15,33 +15,34 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The teams with these names, ignoring case.
 ///
 /// # Errors
-/// `InvalidContent`: a name is unknown, or given twice.
+/// `InvalidContent`, for the request's `field`: a name is unknown, or occurs twice.
 #[boxed]
 pub async fn find_by_names(
     app: &AppState,
     field: &str,
     names: &[TeamName],
 ) -> Result<Vec<TeamId>, Problem> {
-    let folded = |name: &TeamName| name.as_str().to_lowercase();
+    let lowercase = |name: &TeamName| name.as_str().to_lowercase();
     let teams = app.store.teams().await?.into_iter();
-    let teams: BTreeMap<String, TeamId> = teams.map(|team| (folded(&team.name), team.id)).collect();
-    let mut found = Vec::new();
-    let mut seen = BTreeSet::new();
+    let teams: BTreeMap<String, TeamId> =
+        teams.map(|team| (lowercase(&team.name), team.id)).collect();
+    let mut ids = Vec::new();
+    let mut seen_ids = BTreeSet::new();
     for name in names {
-        let Some(id) = teams.get(&folded(name)) else {
+        let Some(id) = teams.get(&lowercase(name)) else {
             let detail = format!("there is no team {:?}; check the name", name.as_str());
             return Err(Problem::invalid(field, detail));
         };
-        if !seen.insert(*id) {
+        if !seen_ids.insert(*id) {
             let detail = format!("expected each team once, got {name} twice; remove one of them");
             return Err(Problem::invalid(field, detail));
         }
-        found.push(*id);
+        ids.push(*id);
     }
-    Ok(found)
+    Ok(ids)
 }
 
-/// Refuses more entrants than a schedule supports; teams that left count.
+/// Refuses more entrants than a schedule supports. Teams that have left the tournament count.
 pub fn check_count(teams: usize) -> Result<(), Problem> {
     if teams > MAX_ENTRANTS {
         let detail = format!(
@@ -52,7 +53,9 @@ pub fn check_count(teams: usize) -> Result<(), Problem> {
     Ok(())
 }
 
-/// The teams that are deployable or improvable on a stage's live board under its newest rules, without retired ones.
+/// The teams that qualify for a tournament by their results in a stage. These are the teams in the two better *tiers* (grades of
+/// safety: deployable, improvable) on the stage's live board under its newest rules, without retired teams. The live board
+/// also has results after a freeze of the boards.
 #[boxed]
 pub async fn qualified_teams(app: &AppState, stage: &Stage) -> Result<Vec<TeamId>, Problem> {
     let query = BoardQuery {
@@ -67,8 +70,8 @@ pub async fn qualified_teams(app: &AppState, stage: &Stage) -> Result<Vec<TeamId
         .filter(|team| team.retired_at.is_some())
         .map(|team| team.id)
         .collect();
-    let entering = board.rows.into_iter().filter(|row| {
+    let qualified = board.rows.into_iter().filter(|row| {
         matches!(row.tier, Tier::Deployable | Tier::Improvable) && !retired.contains(&row.team_id)
     });
-    Ok(entering.map(|row| row.team_id).collect())
+    Ok(qualified.map(|row| row.team_id).collect())
 }

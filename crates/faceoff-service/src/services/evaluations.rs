@@ -1,4 +1,5 @@
-//! Evaluation days and evaluations that an organiser starts, cancels or reruns.
+//! Evaluation days and evaluations that an organiser starts, cancels or reruns. At the cutoff of an *evaluation day* the
+//! server starts one *evaluation* for each team: it runs all tasks of the day with the team's active submission.
 
 use super::decisions::{Preview, checked_reason, reason_clause};
 use crate::{
@@ -15,7 +16,7 @@ use faceoff_store::{Actor, EvaluationState, Stage, StagePhase, StoreError};
 use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
 use jiff::{Timestamp, civil::Date};
 
-/// Starts a stage's evaluation day. Default: the open stage.
+/// Starts the evaluation day of a stage; `None`: of the open stage.
 #[boxed]
 pub async fn start_day(
     app: &AppState,
@@ -32,19 +33,19 @@ pub async fn start_day(
             stage = %stage.name, evaluations = created.len(), "the day was started"
         ),
         Err(StoreError::CutoffPassed { day, cutoff_at }) => {
-            return Err(cutoff_passed(app, &stage, day, cutoff_at).await?);
+            return Err(cutoff_passed_problem(app, &stage, day, cutoff_at).await?);
         }
         Err(error) => return Err(error.into()),
     }
     day::build(app, stage.day(now)).await
 }
 
-/// The open stage. If none is open, the nearest one: its refusal says when it is open.
+/// The open stage. If none is open, the nearest one in time: the store then refuses to start its day and says when it is open.
 async fn open_stage(app: &AppState, now: Timestamp) -> Result<Stage, Problem> {
-    let mut open = app.store.stages().await?;
-    open.retain(|stage| stage.phase(now) == StagePhase::Open);
-    if open.len() > 1 {
-        let names: Vec<String> = open
+    let mut open_stages = app.store.stages().await?;
+    open_stages.retain(|stage| stage.phase(now) == StagePhase::Open);
+    if open_stages.len() > 1 {
+        let names: Vec<String> = open_stages
             .iter()
             .map(|stage| format!("{} ({})", stage.name, stage.id))
             .collect();
@@ -57,31 +58,32 @@ async fn open_stage(app: &AppState, now: Timestamp) -> Result<Stage, Problem> {
     stage::current(app).await
 }
 
-async fn cutoff_passed(
+/// The problem of a day that has already had its cutoff, with the time of the next one.
+async fn cutoff_passed_problem(
     app: &AppState,
     stage: &Stage,
     day: Date,
     cutoff_at: Timestamp,
 ) -> Result<Problem, Problem> {
-    let next = day::next_cutoff(app, stage).await?;
-    let when = match &next {
+    let next_cutoff = day::next_cutoff(app, stage).await?;
+    let outlook = match &next_cutoff {
         Some(next) => {
             format!("The next cutoff evaluates the submissions that are active then: {next}")
         }
         None => "The stage has no further day".to_owned(),
     };
     let detail = format!(
-        "{day} had its cutoff at {}, and a day has only one; nothing was started. {when}",
+        "{day} had its cutoff at {}, and a day has only one; nothing was started. {outlook}",
         cutoff_at.strftime("%Y-%m-%d %H:%M:%S UTC")
     );
-    let next = serde_json::to_value(next).map_err(Problem::internal)?;
+    let next_cutoff = serde_json::to_value(next_cutoff).map_err(Problem::internal)?;
     Ok(Problem::new(ProblemKind::CutoffPassed, detail)
         .with("day", day.to_string())
         .with_renamed("cutoff_at", "cut_at", cutoff_at.to_string())
-        .with_renamed("next_cutoff", "next_cut", next))
+        .with_renamed("next_cutoff", "next_cut", next_cutoff))
 }
 
-/// Starts a missed day of a stage.
+/// Starts a past day of a stage that had no cutoff, with the submissions that are active now.
 #[boxed]
 pub async fn start_missed_day(
     app: &AppState,
@@ -102,14 +104,14 @@ pub async fn start_missed_day(
             stage = %stage.name, %day, evaluations = created.len(), reason, "a missed day was started"
         ),
         Err(StoreError::CutoffPassed { day, cutoff_at }) => {
-            return Err(cutoff_passed(app, &stage, day, cutoff_at).await?);
+            return Err(cutoff_passed_problem(app, &stage, day, cutoff_at).await?);
         }
         Err(error) => return Err(error.into()),
     }
     day::build(app, stage_day).await
 }
 
-/// Preview of an extra evaluation; `None` if it replaces no result that counts.
+/// Preview of an extra evaluation, which the organisers grant to one team for a day; `None` if it replaces no result that counts.
 #[boxed]
 pub async fn preview_extra_evaluation(
     app: &AppState,
@@ -118,16 +120,18 @@ pub async fn preview_extra_evaluation(
     reason: Option<&str>,
 ) -> Result<Option<Preview>, Problem> {
     let team = app.store.team(team).await?;
-    let own = app.store.evaluations_of(team.id).await?;
-    let ended = |state: &EvaluationState| {
+    let team_evaluations = app.store.evaluations_of(team.id).await?;
+    let has_ended = |state: &EvaluationState| {
         matches!(
             state,
             EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. }
         )
     };
-    let replaced = own
-        .iter()
-        .find(|one| one.stage_day == stage_day && one.voided.is_none() && ended(&one.state));
+    let replaced = team_evaluations.iter().find(|evaluation| {
+        evaluation.stage_day == stage_day
+            && evaluation.voided.is_none()
+            && has_ended(&evaluation.state)
+    });
     Ok(replaced.map(|replaced| Preview {
         effect: format!(
             "{} has an evaluation of {} that counts ({}). It would be voided at once, {}, and the team's active submission \
@@ -147,13 +151,13 @@ pub async fn grant_extra_evaluation(
     app: &AppState,
     actor: Actor,
     stage_day: StageDay,
-    wanted: &NewExtraEvaluation,
+    new: &NewExtraEvaluation,
 ) -> Result<EvaluationView, Problem> {
-    let reason = checked_reason(&wanted.reason)?;
-    let team = wanted.team;
+    let reason = checked_reason(&new.reason)?;
+    let team = new.team;
     let preview = preview_extra_evaluation(app, stage_day, team, Some(reason)).await?;
     if let Some(preview) = &preview {
-        preview.check_confirmed(wanted.confirm.as_deref())?;
+        preview.check_confirmed(new.confirm.as_deref())?;
     }
     let now = app.config.clock.now();
     let extra = app

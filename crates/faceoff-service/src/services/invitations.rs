@@ -1,4 +1,5 @@
-//! Invitations: creating, listing and revoking them.
+//! Invitations: creating, listing and revoking them. An *invitation* is a link with a secret code, by which a person gets an
+//! account as organiser, as member or founder of a team, or a new password.
 
 use super::accounts::{default_expiry, join_link};
 use crate::{
@@ -20,19 +21,27 @@ use jiff::SignedDuration;
 
 /// Longest validity of an invitation.
 const MAX_VALIDITY: SignedDuration = SignedDuration::from_hours(90 * 24);
-const NOTE_CHARS: usize = 80;
+/// Longest note on an invitation.
+const MAX_NOTE_CHARS: usize = 80;
 
+/// Whether the caller may see and revoke an invitation: organisers all, a member those to the own team.
 fn may_manage(caller: &Caller, invitation: &Invitation) -> bool {
     match (&caller.principal, invitation.role) {
         (Principal::Host | Principal::Organiser(_), _) => true,
-        (Principal::Member(_, own), InvitationRole::Member(team)) => own.id == team,
+        (Principal::Member(_, own_team), InvitationRole::Member(team)) => own_team.id == team,
         (Principal::Member(..) | Principal::Team(_), _) => false,
     }
 }
 
-/// The role that the caller invites to, if they may.
-fn invited_as(caller: &Caller, new: &requests::NewInvitation) -> Result<InvitationRole, Problem> {
-    let check_absent = |field: &str, is_given: bool| match is_given {
+/// The role that a new invitation gives.
+///
+/// # Errors
+/// `Forbidden` if the caller may not invite to this role; `InvalidContent` for fields that do not fit the role.
+fn invitation_role(
+    caller: &Caller,
+    new: &requests::NewInvitation,
+) -> Result<InvitationRole, Problem> {
+    let check_absent = |field: &str, is_present: bool| match is_present {
         true => Err(Problem::invalid(
             field,
             "expected no value for this role, got one; leave it out",
@@ -50,9 +59,9 @@ fn invited_as(caller: &Caller, new: &requests::NewInvitation) -> Result<Invitati
         (Principal::Team(_), _) => {
             forbidden("a team's token cannot invite; use a member's token, or an organiser's")
         }
-        (Principal::Member(_, own), InvitedRole::Member) => match new.team {
-            Some(team) if team != own.id => Err(Problem::not_found("team")),
-            _ => Ok(InvitationRole::Member(own.id)),
+        (Principal::Member(_, own_team), InvitedRole::Member) => match new.team {
+            Some(team) if team != own_team.id => Err(Problem::not_found("team")),
+            _ => Ok(InvitationRole::Member(own_team.id)),
         },
         (Principal::Member(..), _) => forbidden("a member can invite only members of their team"),
         (_, InvitedRole::Organiser) => Ok(InvitationRole::Organiser),
@@ -82,8 +91,8 @@ pub async fn create_invitation(
     caller: &Caller,
     new: requests::NewInvitation,
 ) -> Result<NewInvitationView, Problem> {
-    let invited_as = invited_as(caller, &new)?;
-    let note = text::single_line("note", &new.note, NOTE_CHARS)?;
+    let role = invitation_role(caller, &new)?;
+    let note = text::single_line("note", &new.note, MAX_NOTE_CHARS)?;
     let now = app.config.clock.now();
     let expires_at = new.expires_at.unwrap_or_else(|| default_expiry(now));
     if now.duration_until(expires_at) > MAX_VALIDITY {
@@ -96,7 +105,7 @@ pub async fn create_invitation(
     let secret = Secret::generate(SecretKind::Invitation).map_err(Problem::internal)?;
     let new = NewInvitation {
         code_hash: secret.hash(),
-        role: invited_as,
+        role,
         note,
         expires_at,
     };
@@ -117,10 +126,10 @@ pub async fn revoke_invitation(
     id: InvitationId,
 ) -> Result<InvitationView, Problem> {
     let invitations = app.store.invitations().await?;
-    let is_known = invitations
+    let is_manageable = invitations
         .iter()
         .any(|invitation| invitation.id == id && may_manage(caller, invitation));
-    if !is_known {
+    if !is_manageable {
         return Err(Problem::not_found("invitation"));
     }
     let now = app.config.clock.now();

@@ -1,4 +1,5 @@
-//! Operations that the API and the pages share.
+//! Operations that the API and the pages share, one file per resource: each checks its input, changes the store, and logs the
+//! change.
 
 pub mod accounts;
 pub mod announcements;

@@ -1,4 +1,4 @@
-//! Registrations of teams.
+//! Registrations: a visitor registers a new team, and the organisers approve or refuse it.
 
 use super::{
     accounts::{checked_profile, default_expiry, join_link},
@@ -13,23 +13,24 @@ use faceoff_api::{
 use faceoff_store::{Actor, NewRegistration};
 use faceoff_types::RegistrationId;
 
-const CONTACT_CHARS: usize = 120;
+/// Longest contact of a team.
+const MAX_CONTACT_CHARS: usize = 120;
 
 /// Registers a team. The returned link lets the first member join once the organisers have approved the registration.
 #[boxed]
 pub async fn register(
     app: &AppState,
-    register: RegistrationRequest,
+    request: RegistrationRequest,
 ) -> Result<NewRegistrationView, Problem> {
-    let contact = text::single_line("contact", &register.contact, CONTACT_CHARS)?;
-    let (team_name, profile) = checked_profile(register.team)?;
+    let contact = text::single_line("contact", &request.contact, MAX_CONTACT_CHARS)?;
+    let (team_name, profile) = checked_profile(request.team)?;
     let secret = Secret::generate(SecretKind::Invitation).map_err(Problem::internal)?;
     let new = NewRegistration {
         code_hash: secret.hash(),
         team_name,
         profile,
         contact,
-        accepted_terms: register.accepted_terms,
+        accepted_terms: request.accepted_terms,
     };
     let now = app.config.clock.now();
     let registration = app.store.register(new, now).await?;

@@ -1,4 +1,5 @@
-//! Organisers' decisions about results, teams and the queue.
+//! Decisions of organisers about results, teams and the queue: voiding an evaluation or a day, pausing the queue, and
+//! disqualifying a team. A *voided* evaluation no longer counts on any board.
 
 use super::decisions::{Preview, checked_reason, reason_clause};
 use crate::{
@@ -33,7 +34,7 @@ pub async fn preview_void_evaluation(
     Ok(Preview { name, effect })
 }
 
-/// Voids an evaluation, once that is confirmed.
+/// Voids an evaluation, if that is confirmed with the team's name.
 #[boxed]
 pub async fn void_evaluation(
     app: &AppState,
@@ -58,17 +59,17 @@ pub async fn preview_void_day(
     stage_day: StageDay,
     reason: Option<&str>,
 ) -> Result<Preview, Problem> {
-    let (mut ended, mut open) = (0, 0);
+    let (mut ended_count, mut open_count) = (0, 0);
     for evaluation in app.store.evaluations_of_day(stage_day).await? {
         match evaluation.state {
             EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => {
-                ended += u32::from(evaluation.voided.is_none());
+                ended_count += u32::from(evaluation.voided.is_none());
             }
-            state => open += u32::from(!state.is_over()),
+            state => open_count += u32::from(!state.is_over()),
         }
     }
     let effect = format!(
-        "{ended} evaluations of {} would disappear from the boards for good and {open} unfinished ones be cancelled, {}",
+        "{ended_count} evaluations of {} would disappear from the boards for good and {open_count} unfinished ones be cancelled, {}",
         stage_day.date,
         reason_clause(reason)
     );
@@ -76,7 +77,7 @@ pub async fn preview_void_day(
     Ok(Preview { name, effect })
 }
 
-/// Voids all evaluations of a day, once that is confirmed.
+/// Voids all evaluations of a day, if that is confirmed with the date.
 #[boxed]
 pub async fn void_day(
     app: &AppState,
@@ -120,8 +121,10 @@ pub async fn preview_disqualification(
     reason: Option<&str>,
 ) -> Result<Preview, Problem> {
     let team = app.store.team(id).await?;
-    let own = app.store.evaluations_of(id).await?;
-    let open = own.iter().filter(|evaluation| !evaluation.state.is_over());
+    let team_evaluations = app.store.evaluations_of(id).await?;
+    let open = team_evaluations
+        .iter()
+        .filter(|evaluation| !evaluation.state.is_over());
     let effect = format!(
         "{} would disappear from all boards, {} of its unfinished evaluations be cancelled, and it could neither upload nor \
          be evaluated until it is reinstated, {}",
@@ -133,7 +136,7 @@ pub async fn preview_disqualification(
     Ok(Preview { name, effect })
 }
 
-/// Disqualifies a team, once that is confirmed.
+/// Disqualifies a team, if that is confirmed with the team's name.
 #[boxed]
 pub async fn disqualify_team(
     app: &AppState,

@@ -1,4 +1,4 @@
-//! Sessions: signing in with a password.
+//! Sessions of browsers: a user signs in with a password and gets a session, which is a token in a cookie.
 
 use crate::{
     app::AppState,
@@ -10,8 +10,8 @@ use faceoff_store::{Actor, NewToken, SESSION_LIFETIME, TokenKind, TokenOwner};
 use faceoff_types::UserId;
 use jiff::Timestamp;
 
-/// Name of a browser's session.
-const NAME: &str = "browser";
+/// Name of each session in the list of the user's tokens.
+const SESSION_NAME: &str = "browser";
 
 /// When a session that begins now expires.
 pub fn session_expiry(now: Timestamp) -> Timestamp {
@@ -19,7 +19,7 @@ pub fn session_expiry(now: Timestamp) -> Timestamp {
         .unwrap_or(Timestamp::MAX)
 }
 
-/// Signs a user in; returns the user and the session's secret.
+/// Signs in the user with this name; returns the user's id and the secret of the new session.
 #[boxed]
 pub async fn sign_in(
     app: &AppState,
@@ -27,8 +27,8 @@ pub async fn sign_in(
     password: String,
 ) -> Result<(UserId, Secret), Problem> {
     let now = app.config.clock.now();
-    let known = app.store.password_hash_of(name.trim()).await?;
-    let Some(id) = app.passwords.verify(known, password, now).await? else {
+    let account = app.store.password_hash_of(name.trim()).await?;
+    let Some(id) = app.passwords.verify(account, password, now).await? else {
         return Err(Problem::new(
             ProblemKind::Unauthenticated,
             "wrong name or password; if you have lost it, ask an organiser for a new link",
@@ -39,7 +39,7 @@ pub async fn sign_in(
         hash: secret.hash(),
         kind: TokenKind::Session,
         owner: TokenOwner::User(id),
-        name: NAME.to_owned(),
+        name: SESSION_NAME.to_owned(),
         expires_at: Some(session_expiry(now)),
     };
     app.store.create_token(Actor::User(id), new, now).await?;

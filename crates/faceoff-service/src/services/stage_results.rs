@@ -1,4 +1,5 @@
-//! Freezing boards, starting a stage's final day, and signing its result off.
+//! The end of a stage: freezing its boards, starting its final evaluation day, and signing its result off. A *frozen* board
+//! shows no later results; after the *sign-off* the result cannot change any more.
 
 use super::decisions::{Preview, checked_reason};
 use crate::{
@@ -48,8 +49,8 @@ pub async fn start_final_day(
 ) -> Result<DayView, Problem> {
     let now = app.config.clock.now();
     let stage = app.store.stage(id).await?;
-    let started = app.store.start_final_day(actor, id, now).await;
-    let created = started.map_err(|error| match error {
+    let result = app.store.start_final_day(actor, id, now).await;
+    let created = result.map_err(|error| match error {
         StoreError::CutoffPassed { day, cutoff_at } => Problem::new(
             ProblemKind::CutoffPassed,
             format!(
@@ -80,7 +81,7 @@ pub async fn preview_sign_off(app: &AppState, id: StageId) -> Result<Preview, Pr
     Ok(Preview { name, effect })
 }
 
-/// Signs a stage's result off, once that is confirmed.
+/// Signs a stage's result off, if that is confirmed with the stage's name.
 #[boxed]
 pub async fn finalise_stage(
     app: &AppState,
@@ -90,7 +91,7 @@ pub async fn finalise_stage(
 ) -> Result<StageView, Problem> {
     preview_sign_off(app, id).await?.check_confirmed(confirm)?;
     let now = app.config.clock.now();
-    let done = app.store.sign_off_stage(actor, id, now).await?;
-    tracing::info!(stage = %done.name, %id, "stage signed off");
-    stage::build(app, done).await
+    let signed_off = app.store.sign_off_stage(actor, id, now).await?;
+    tracing::info!(stage = %signed_off.name, %id, "stage signed off");
+    stage::build(app, signed_off).await
 }

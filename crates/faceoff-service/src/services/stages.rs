@@ -1,4 +1,5 @@
-//! Creating and changing stages.
+//! Creating and changing stages. A *stage* is a part of the season with its own rules, board and daily evaluations. A change of the
+//! rules of an open stage begins a new *revision*, with an empty board.
 
 use crate::{app::AppState, boxed, problem::Problem, viewer::Viewer, views::stage};
 use faceoff_api::{
@@ -11,7 +12,7 @@ use faceoff_types::{
     StageName, StageRules, StageSettings, Variation,
 };
 
-fn name(text: &str) -> Result<StageName, Problem> {
+fn parse_name(text: &str) -> Result<StageName, Problem> {
     text.parse()
         .map_err(|error| Problem::invalid("name", error))
 }
@@ -21,18 +22,18 @@ fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
     checked.map_err(|error| Problem::invalid(error.field(), error))
 }
 
-/// Refuses runtimes that the server does not offer.
-pub fn check_offered(app: &AppState, wanted: Option<&Runtimes>) -> Result<(), Problem> {
-    let Some(wanted) = wanted else {
+/// Refuses runtimes (environments such as Python) that the server does not offer. `None` stands for all.
+pub fn check_offered(app: &AppState, requested: Option<&Runtimes>) -> Result<(), Problem> {
+    let Some(requested) = requested else {
         return Ok(());
     };
-    wanted
+    requested
         .check()
         .map_err(|error| Problem::invalid("runtimes", error))?;
     let runtimes = &app.config.capacity.runtimes;
-    match wanted
+    match requested
         .names()
-        .find(|name| !runtimes.iter().any(|known| known == name))
+        .find(|name| !runtimes.iter().any(|offered| offered == name))
     {
         Some(name) => {
             let detail = format!(
@@ -45,14 +46,15 @@ pub fn check_offered(app: &AppState, wanted: Option<&Runtimes>) -> Result<(), Pr
     }
 }
 
-/// Refuses magnitudes for which no robot of the season exists.
+/// Refuses magnitudes of perturbations from which no simulated robot can be drawn. The robot of a season is drawn at random: its
+/// mass and gains differ from the model that the teams have, so far that its static error is in a configured range.
 #[boxed]
 pub async fn check_robot(app: &AppState, settings: &PerturbationSettings) -> Result<(), Problem> {
     if settings.model_mismatch == MismatchSettings::default() {
         return Ok(());
     }
     let seed = app.store.season().await?.secret.model_mismatch();
-    let [least, most] = settings.model_mismatch.static_error_m;
+    let [min_error_m, max_error_m] = settings.model_mismatch.static_error_m;
     let settings = settings.clone();
     let has_robot = move || faceoff_dataset::can_draw_plant(&settings, seed);
     if tokio::task::spawn_blocking(has_robot)
@@ -63,7 +65,7 @@ pub async fn check_robot(app: &AppState, settings: &PerturbationSettings) -> Res
     }
     let detail = format!(
         "model_mismatch: none of 300 robots drawn from these ranges of mass and gains has a largest static error of \
-         {least} to {most} m (static_error_m); widen one of the ranges"
+         {min_error_m} to {max_error_m} m (static_error_m); widen one of the ranges"
     );
     Err(Problem::invalid("perturbations", detail))
 }
@@ -78,27 +80,22 @@ pub async fn create_stage(
     let template = stage::current(app).await?;
     let now = app.config.clock.now();
     check_offered(app, new.runtimes.as_ref().and_then(Option::as_ref))?;
+    let inherited = template.rules.rules;
     let rules = StageRules {
         ruleset: Ruleset::CURRENT,
-        profile: new.profile.unwrap_or(template.rules.rules.profile),
-        tasks: new.tasks.unwrap_or(template.rules.rules.tasks),
-        episodes_per_task: new
-            .episodes_per_task
-            .unwrap_or(template.rules.rules.episodes_per_task),
-        max_faults: new.max_faults.unwrap_or(template.rules.rules.max_faults),
+        profile: new.profile.unwrap_or(inherited.profile),
+        tasks: new.tasks.unwrap_or(inherited.tasks),
+        episodes_per_task: new.episodes_per_task.unwrap_or(inherited.episodes_per_task),
+        max_faults: new.max_faults.unwrap_or(inherited.max_faults),
         variation: Variation {
-            weights: new
-                .weights
-                .unwrap_or(template.rules.rules.variation.weights),
-            tier_bounds: new
-                .tier_bounds
-                .unwrap_or(template.rules.rules.variation.tier_bounds),
+            weights: new.weights.unwrap_or(inherited.variation.weights),
+            tier_bounds: new.tier_bounds.unwrap_or(inherited.variation.tier_bounds),
             perturbations: new
                 .perturbations
-                .unwrap_or(template.rules.rules.variation.perturbations),
+                .unwrap_or(inherited.variation.perturbations),
         },
-        limits: new.limits.unwrap_or(template.rules.rules.limits),
-        runtimes: new.runtimes.unwrap_or(template.rules.rules.runtimes),
+        limits: new.limits.unwrap_or(inherited.limits),
+        runtimes: new.runtimes.unwrap_or(inherited.runtimes),
     };
     let default = StageSettings::default();
     let settings = StageSettings {
@@ -117,7 +114,7 @@ pub async fn create_stage(
     let retention = checked_retention(new.retention)?.unwrap_or_default();
     check_robot(app, &rules.variation.perturbations).await?;
     let new_stage = faceoff_store::NewStage {
-        name: name(&new.name)?,
+        name: parse_name(&new.name)?,
         opens_at: new.opens_at.unwrap_or(now),
         closes_at: new.closes_at,
         zone: new.zone.unwrap_or(template.zone),
@@ -144,7 +141,7 @@ pub async fn change_stage(
 ) -> Result<StageView, Problem> {
     let stage = app.store.stage(id).await?;
     let now = app.config.clock.now();
-    let current = &stage.rules.rules;
+    let current_rules = &stage.rules.rules;
     let has_new_rules = change.profile.is_some()
         || change.tasks.is_some()
         || change.episodes_per_task.is_some()
@@ -156,27 +153,33 @@ pub async fn change_stage(
         || change.runtimes.is_some();
     check_offered(app, change.runtimes.as_ref().and_then(Option::as_ref))?;
     let rules = StageRules {
-        // An upgrade of the server alone does not change a stage.
+        // A stage keeps its ruleset when a newer server version brings another one, until its rules are changed.
         ruleset: if has_new_rules {
             Ruleset::CURRENT
         } else {
-            current.ruleset
+            current_rules.ruleset
         },
-        profile: change.profile.unwrap_or(current.profile),
-        tasks: change.tasks.unwrap_or_else(|| current.tasks.clone()),
+        profile: change.profile.unwrap_or(current_rules.profile),
+        tasks: change.tasks.unwrap_or_else(|| current_rules.tasks.clone()),
         episodes_per_task: change
             .episodes_per_task
-            .unwrap_or(current.episodes_per_task),
-        max_faults: change.max_faults.unwrap_or(current.max_faults),
+            .unwrap_or(current_rules.episodes_per_task),
+        max_faults: change.max_faults.unwrap_or(current_rules.max_faults),
         variation: Variation {
-            weights: change.weights.unwrap_or(current.variation.weights),
-            tier_bounds: change.tier_bounds.unwrap_or(current.variation.tier_bounds),
+            weights: change.weights.unwrap_or(current_rules.variation.weights),
+            tier_bounds: change
+                .tier_bounds
+                .unwrap_or(current_rules.variation.tier_bounds),
             perturbations: change
                 .perturbations
-                .unwrap_or_else(|| current.variation.perturbations.clone()),
+                .unwrap_or_else(|| current_rules.variation.perturbations.clone()),
         },
-        limits: change.limits.unwrap_or_else(|| current.limits.clone()),
-        runtimes: change.runtimes.unwrap_or_else(|| current.runtimes.clone()),
+        limits: change
+            .limits
+            .unwrap_or_else(|| current_rules.limits.clone()),
+        runtimes: change
+            .runtimes
+            .unwrap_or_else(|| current_rules.runtimes.clone()),
     };
     let settings = StageSettings {
         schedule: change
@@ -196,12 +199,12 @@ pub async fn change_stage(
     };
     check(&rules, &settings)?;
     let retention = checked_retention(change.retention)?;
-    if rules.variation.perturbations != current.variation.perturbations {
+    if rules.variation.perturbations != current_rules.variation.perturbations {
         check_robot(app, &rules.variation.perturbations).await?;
     }
     let mut effects = Vec::new();
     if stage.phase(now) == StagePhase::Open {
-        let new_revision = (rules != *current).then(|| new_revision_effect(&stage));
+        let new_revision = (rules != *current_rules).then(|| new_revision_effect(&stage));
         let reordering = (settings.standings != stage.settings.standings)
             .then(|| reordering_effect(&stage, settings.standings));
         effects.extend(new_revision.into_iter().chain(reordering));
@@ -211,7 +214,7 @@ pub async fn change_stage(
     }
     check_confirmed(&stage, &effects, change.confirm.as_deref())?;
     let stage_change = faceoff_store::StageChange {
-        name: change.name.as_deref().map(name).transpose()?,
+        name: change.name.as_deref().map(parse_name).transpose()?,
         opens_at: change.opens_at,
         closes_at: change.closes_at,
         zone: change.zone,
@@ -233,7 +236,7 @@ fn checked_retention(retention: Option<Retention>) -> Result<Option<Retention>, 
     Ok(retention)
 }
 
-/// The files that a new retention would remove, in words.
+/// Describes which files a new retention (how long a stage keeps datasets and bundles) would remove; `None` if none.
 async fn retention_effect(
     app: &AppState,
     stage: &Stage,
@@ -243,15 +246,15 @@ async fn retention_effect(
         return Ok(None);
     }
     let now = app.config.clock.now();
-    let removed = app.store.preview_removal(stage.id, retention, now).await?;
-    if removed.is_empty() {
+    let removal = app.store.preview_removal(stage.id, retention, now).await?;
+    if removal.is_empty() {
         return Ok(None);
     }
-    let unmeasured = match removed.unmeasured {
+    let unmeasured_clause = match removal.unmeasured {
         0 => String::new(),
         unmeasured => format!(", without {unmeasured} datasets that are not measured yet"),
     };
-    let time = match removed.next_removal_at {
+    let time_clause = match removal.next_removal_at {
         None => "at once".to_owned(),
         Some(at) => format!(
             "some of it not before {}",
@@ -260,13 +263,13 @@ async fn retention_effect(
     };
     Ok(Some(format!(
         "the stage {:?} would keep {retention}; {} datasets of {} teams and {} bundles of submissions that are no longer \
-         used ({} bytes{unmeasured}) would be removed for good, {time}, but only once nothing of the stage is running, \
+         used ({} bytes{unmeasured_clause}) would be removed for good, {time_clause}, but only once nothing of the stage is running, \
          undecided or blind; results stay",
         stage.name.as_str(),
-        removed.datasets,
-        removed.teams,
-        removed.bundles,
-        removed.bytes
+        removal.datasets,
+        removal.teams,
+        removal.bundles,
+        removal.bytes
     )))
 }
 

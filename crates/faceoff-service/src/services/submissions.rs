@@ -1,4 +1,5 @@
-//! Activating, withdrawing and describing submissions.
+//! Activating, withdrawing and describing submissions. The *active* submission of a team is the one that the next cutoff
+//! evaluates.
 
 use crate::{
     app::AppState,
@@ -17,9 +18,10 @@ const MAX_LABEL_CHARS: usize = 80;
 /// Longest note on a submission.
 const MAX_NOTE_CHARS: usize = 2000;
 
+/// Refuses a submission of another team.
 async fn check_own(app: &AppState, caller: &TeamCaller, id: SubmissionId) -> Result<(), Problem> {
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
+    let submission = app.store.submission(id).await;
+    caller.visible("submission", submission, |submission| submission.team)?;
     Ok(())
 }
 
@@ -78,7 +80,7 @@ pub async fn describe_submission(
     submission::build(app, submission).await
 }
 
-/// The trimmed text, if it is not too long.
+/// The trimmed text of a field, if it is not too long. `None`: the field is left out; `Some(None)`: it is null.
 #[expect(
     clippy::option_option,
     reason = "null differs from a field that is left out"

@@ -1,4 +1,5 @@
-//! Changes of teams and of the season, by teams and organisers.
+//! Changes of a team's name and profile, and of the season's settings for registrations and divisions. A *division* is a group of
+//! teams that are ranked among themselves; a *baseline* is a team of the organisers, for comparison, without a rank.
 
 use super::accounts::checked_profile;
 use crate::{
@@ -51,14 +52,14 @@ pub async fn change_team(
             "baseline: only an organiser can change whether a team is a baseline",
         ));
     }
-    let described = requests::FoundedTeam {
+    let changed_team = requests::FoundedTeam {
         name: change.name.clone().unwrap_or_else(|| team.name.clone()),
         affiliation: change.affiliation.unwrap_or(team.profile.affiliation),
         link: change.link.unwrap_or(team.profile.link),
         division: change.division.unwrap_or(team.profile.division),
     };
     let declines = change.declines_friendly_games;
-    let (_, profile): (_, TeamProfile) = checked_profile(described)?;
+    let (_, profile): (_, TeamProfile) = checked_profile(changed_team)?;
     let change = TeamChange {
         name: change.name,
         profile: Some(profile),

@@ -1,4 +1,5 @@
-//! API tokens: listing, creating, rotating and revoking them.
+//! API tokens: listing, creating, rotating and revoking them. A *token* belongs to a user, a team or the host (the server's
+//! operator). Rotating replaces its secret.
 
 use crate::{
     app::AppState,
@@ -17,7 +18,7 @@ use faceoff_store::{NewToken, Principal, StoreError, Token, TokenKind, TokenOwne
 use faceoff_types::{TeamId, TokenId};
 
 /// Longest name of a token.
-const NAME_CHARS: usize = 80;
+const MAX_NAME_CHARS: usize = 80;
 
 /// Whether the caller may see and revoke a token: organisers all, a member their own and the team's, a team's API client
 /// the team's.
@@ -47,15 +48,18 @@ pub async fn tokens(app: &AppState, caller: &Caller) -> Result<Vec<Token>, Probl
     Ok(tokens)
 }
 
-/// The owner of a new token.
-fn owner(caller: &Caller, team: Option<TeamId>) -> Result<TokenOwner, Problem> {
+/// The owner of a new token: the given team, or otherwise the caller.
+///
+/// # Errors
+/// `Forbidden` or `NotFound` if the caller may not create such a token.
+fn new_token_owner(caller: &Caller, team: Option<TeamId>) -> Result<TokenOwner, Problem> {
     match (&caller.principal, team) {
         (Principal::Host, None) => Ok(TokenOwner::Host),
         (Principal::Organiser(user) | Principal::Member(user, _), None) => {
             Ok(TokenOwner::User(user.id))
         }
         (Principal::Host | Principal::Organiser(_), Some(id)) => Ok(TokenOwner::Team(id)),
-        (Principal::Member(_, own), Some(id)) if own.id == id => Ok(TokenOwner::Team(id)),
+        (Principal::Member(_, own_team), Some(id)) if own_team.id == id => Ok(TokenOwner::Team(id)),
         (Principal::Member(..), Some(_)) => Err(Problem::not_found("team")),
         // A leaked team token must not create tokens that outlive it.
         (Principal::Team(_), _) => Err(Problem::new(
@@ -72,8 +76,8 @@ pub async fn create_token(
     caller: &Caller,
     new: requests::NewToken,
 ) -> Result<NewTokenView, Problem> {
-    let owner = owner(caller, new.team)?;
-    let name = text::single_line("name", &new.name, NAME_CHARS)?;
+    let owner = new_token_owner(caller, new.team)?;
+    let name = text::single_line("name", &new.name, MAX_NAME_CHARS)?;
     let kind = match owner {
         TokenOwner::Host => SecretKind::Admin,
         TokenOwner::Team(id) => {

@@ -1,4 +1,5 @@
-//! Starting the next round of a tournament, drawn from the results so far.
+//! Starting the next round of a tournament. A round has *matchdays*, in each of which a team plays one game or has a bye; who
+//! plays whom is drawn from the results so far.
 
 use crate::{
     app::AppState,
@@ -24,13 +25,14 @@ pub async fn start_round(
             "the tournament is closed; no further round starts".to_owned(),
         ));
     }
-    // One half of a mirrored pair is enough for the scoring, so both have to be complete.
-    let open = state.games.iter().filter(|game| state.needs_result(game));
-    let open = open.count();
-    if open > 0 {
+    // In a mirrored tournament each pairing is played twice with exchanged sides. The scoring would also accept one of the two
+    // games, so the draw waits until both have a result.
+    let open_games = state.games.iter().filter(|game| state.needs_result(game));
+    let open_count = open_games.count();
+    if open_count > 0 {
         let round = state.rounds.len();
         return Err(conflict(format!(
-            "round {round} is running: {open} of its games have no result, and the next round is drawn from all results. \
+            "round {round} is running: {open_count} of its games have no result, and the next round is drawn from all results. \
              Wait, rerun void and failed games (POST /api/v1/games/ID/rerun), or withdraw a team"
         )));
     }

@@ -1,4 +1,4 @@
-//! Uploads of submissions.
+//! Uploads of submissions: a team sends a *bundle* (archive file or container image with its agent), and a validation run checks it.
 
 use super::bundle_stream::{self, ReceivedBundle, SizeLimit};
 use crate::{
@@ -18,11 +18,11 @@ use uuid::Uuid;
 
 /// A bundle that is being uploaded.
 pub struct IncomingBundle {
-    /// Announced number of bytes (`Content-Length`).
+    /// Number of bytes that the client has announced (`Content-Length`).
     pub bytes: Option<u64>,
     /// File name from the client; not yet sanitised.
     pub claimed_name: String,
-    /// The bundle.
+    /// The bundle's bytes.
     pub body: Body,
 }
 
@@ -34,9 +34,9 @@ pub async fn upload(
     incoming: IncomingBundle,
 ) -> Result<Submission, Problem> {
     let (team, actor) = (caller.team.clone(), caller.actor());
-    if let Err(refused) = free_space::check(app) {
+    if let Err(problem) = free_space::check(app) {
         bundle_stream::discard(incoming.body, app.config.limits.min_upload_rate).await;
-        return Err(refused);
+        return Err(problem);
     }
     let slot = app.upload_slots.acquire(team.id).ok_or_else(|| {
         let limit = app.config.limits.team_uploads;
@@ -46,7 +46,7 @@ pub async fn upload(
         )
         .with("limit", limit)
     })?;
-    // Checked before the bundle is transferred in vain; the store checks it again.
+    // The store checks this, too, but only after the transfer.
     if let Some(closed_at) = app.store.season().await?.closed_at {
         return Err(StoreError::SeasonClosed { closed_at }.into());
     }
@@ -69,12 +69,12 @@ pub async fn upload(
     }
 
     let now = app.config.clock.now();
-    let used = app.store.upload_usage(team.id, now).await?;
+    let usage = app.store.upload_usage(team.id, now).await?;
     let received = bundle_stream::receive(
         incoming.body,
         incoming.bytes,
         &app.config.upload_dir,
-        &size_limit(app, limits.quota, used, now),
+        &size_limit(app, limits.quota, usage, now),
         app.config.limits.min_upload_rate,
     )
     .await?;
@@ -92,7 +92,7 @@ pub async fn upload(
 /// Upload limits of a team, from the current stage or the server's configuration.
 #[derive(Clone, Copy)]
 struct UploadLimits {
-    /// Submissions that may wait for their validation run.
+    /// Largest number of submissions that wait for their validation run.
     max_pending: usize,
     quota: UploadQuota,
 }
@@ -100,31 +100,33 @@ struct UploadLimits {
 impl UploadLimits {
     async fn current(app: &App) -> Result<Self, Problem> {
         let limits = &app.config.limits;
-        let own = stage::current(app).await?.settings.uploads;
+        let stage_limits = stage::current(app).await?.settings.uploads;
         let quota = limits.upload_quota;
         Ok(Self {
-            max_pending: own
+            max_pending: stage_limits
                 .waiting
                 .map_or(limits.pending_submissions, |waiting| waiting as usize),
             quota: UploadQuota {
-                day_bytes: own.day_bytes.unwrap_or(quota.day_bytes),
-                stored_bytes: own.stored_bytes.unwrap_or(quota.stored_bytes),
+                day_bytes: stage_limits.day_bytes.unwrap_or(quota.day_bytes),
+                stored_bytes: stage_limits.stored_bytes.unwrap_or(quota.stored_bytes),
             },
         })
     }
 }
 
-/// The limit for any bundle, or the rest of the team's quota if that is less.
-fn size_limit(app: &App, quota: UploadQuota, used: UploadUsage, now: Timestamp) -> SizeLimit {
-    let largest = app.config.max_bundle_bytes;
-    let left = quota.remaining(used);
+/// The size limit of a bundle: the limit for all teams, or the rest of the team's quota if that is less.
+fn size_limit(app: &App, quota: UploadQuota, usage: UploadUsage, now: Timestamp) -> SizeLimit {
+    let max_bundle_bytes = app.config.max_bundle_bytes;
+    let left_bytes = quota.remaining(usage);
     SizeLimit {
-        max_bytes: left.min(largest),
-        exceeded: Box::new(move |announced| {
-            let bytes = announced.unwrap_or(left.saturating_add(1));
-            match quota.check(used, bytes) {
-                Err(spent) if left < largest => Problem::with_quota_reset(spent, now),
-                _ => bundle_stream::too_large(largest, announced),
+        max_bytes: left_bytes.min(max_bundle_bytes),
+        make_problem: Box::new(move |announced_bytes| {
+            let bytes = announced_bytes.unwrap_or(left_bytes.saturating_add(1));
+            match quota.check(usage, bytes) {
+                Err(error) if left_bytes < max_bundle_bytes => {
+                    Problem::with_quota_reset(error, now)
+                }
+                _ => bundle_stream::too_large(max_bundle_bytes, announced_bytes),
             }
         }),
     }
@@ -181,11 +183,13 @@ async fn store(
 
 /// A safe file name with an extension of the bundle's format, from the claimed one.
 fn file_name(claimed: &str, format: ArchiveFormat) -> String {
-    let last = claimed.rsplit(['/', '\\']).next().unwrap_or_default();
-    let safe: String = last
+    /// Longest name that is kept.
+    const MAX_CHARS: usize = 80;
+    let last_component = claimed.rsplit(['/', '\\']).next().unwrap_or_default();
+    let safe: String = last_component
         .chars()
         .filter(|c| c.is_alphanumeric() || "._-".contains(*c))
-        .take(80)
+        .take(MAX_CHARS)
         .collect();
     let stem = safe.trim_start_matches('.');
     if stem.is_empty() {
@@ -193,7 +197,7 @@ fn file_name(claimed: &str, format: ArchiveFormat) -> String {
     } else if format
         .names()
         .iter()
-        .any(|end| stem.to_lowercase().ends_with(end))
+        .any(|extension| stem.to_lowercase().ends_with(extension))
     {
         stem.to_owned()
     } else {
@@ -207,15 +211,15 @@ mod tests {
 
     #[test]
     fn file_name_is_safe_and_matches_format() {
-        let gz = |claimed| file_name(claimed, ArchiveFormat::TarGz);
-        assert_eq!(gz("striker.tar.gz"), "striker.tar.gz");
-        assert_eq!(gz("striker.tgz"), "striker.tgz");
-        assert_eq!(gz("../../etc/passwd"), "passwd.tar.gz");
-        assert_eq!(gz("C:\\agents\\a b.zip"), "ab.zip.tar.gz");
-        assert_eq!(gz(""), "agent.tar.gz");
-        assert_eq!(gz(".."), "agent.tar.gz");
+        let tar_gz_name = |claimed| file_name(claimed, ArchiveFormat::TarGz);
+        assert_eq!(tar_gz_name("striker.tar.gz"), "striker.tar.gz");
+        assert_eq!(tar_gz_name("striker.tgz"), "striker.tgz");
+        assert_eq!(tar_gz_name("../../etc/passwd"), "passwd.tar.gz");
+        assert_eq!(tar_gz_name("C:\\agents\\a b.zip"), "ab.zip.tar.gz");
+        assert_eq!(tar_gz_name(""), "agent.tar.gz");
+        assert_eq!(tar_gz_name(".."), "agent.tar.gz");
         assert_eq!(file_name("x", ArchiveFormat::Zip), "x.zip");
         assert_eq!(file_name("ours.tar", ArchiveFormat::Tar), "ours.tar");
-        assert!(gz(&"a".repeat(500)).len() < 100);
+        assert!(tar_gz_name(&"a".repeat(500)).len() < 100);
     }
 }

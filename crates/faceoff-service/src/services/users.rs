@@ -1,4 +1,4 @@
-//! Users: listing them, closing accounts, and accepting terms.
+//! Users, who are organisers and members of teams: listing them, closing accounts, and accepting the season's terms.
 
 use crate::{
     app::AppState,
@@ -27,12 +27,14 @@ pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, P
         Err(StoreError::NotFound(_)) => return Err(Problem::not_found("user")),
         Err(error) => return Err(error.into()),
     };
-    let is_self = caller.user().is_some_and(|own| own.id == id);
+    let is_self = caller.user().is_some_and(|user| user.id == id);
     if caller.is_organiser() || is_self {
         return Ok(user);
     }
     match (&caller.principal, user.team) {
-        (Principal::Member(_, own) | Principal::Team(own), Some(team)) if own.id == team => {
+        (Principal::Member(_, own_team) | Principal::Team(own_team), Some(team))
+            if own_team.id == team =>
+        {
             Err(Problem::new(
                 ProblemKind::Forbidden,
                 "only this user or an organiser may do this",
@@ -42,7 +44,7 @@ pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, P
     }
 }
 
-/// Closes a user's account, once that is confirmed with the user's name.
+/// Closes a user's account, if that is confirmed with the user's name.
 #[boxed]
 pub async fn remove_user(
     app: &AppState,

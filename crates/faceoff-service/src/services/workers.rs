@@ -1,10 +1,11 @@
-//! Decisions about remote workers.
+//! Decisions about remote workers, which are processes on other machines that run jobs of this server.
 
 use super::decisions::checked_reason;
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_store::{Actor, WorkerName};
 
-/// Bans a worker, whose results are rejected from now on. Returns the number of shards that are run again.
+/// Bans a worker: its results are rejected from now on. Returns the number of its shards (parts of
+/// unfinished evaluations) that are queued again.
 #[boxed]
 pub async fn ban_worker(
     app: &AppState,

@@ -1,4 +1,5 @@
-//! Ablations: what each perturbation costs an agent.
+//! Ablations. An *ablation* runs one submission in the ideal simulator, under each kind of perturbation alone, and under all of them
+//! (the *profiles*), on the same episodes. It shows what each perturbation costs the agent.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::{
@@ -22,7 +23,7 @@ pub async fn newest(
     }
 }
 
-/// An ablation with its progress, or its effects.
+/// An ablation: its progress while it is running, then the effect of each profile.
 #[boxed]
 pub async fn build(app: &AppState, ablation: Ablation) -> Result<AblationView, Problem> {
     let status = match ablation.state {
@@ -61,16 +62,16 @@ pub async fn exists(app: &AppState, submission: SubmissionId) -> Result<bool, Pr
     Ok(app.store.newest_ablation(submission).await?.is_some())
 }
 
-/// The effects of the profiles, from the summaries of their runs.
+/// The effects of the profiles by task, from the summaries of their runs (all episodes under one profile).
 async fn effects(
     app: &AppState,
     runs: BTreeMap<Profile, RunId>,
 ) -> Result<BTreeMap<Task, Vec<ProfileEffect>>, Problem> {
-    let ids: Vec<_> = runs.values().copied().collect();
-    let summaries = app.summaries.load(&ids).await?;
-    let profiles: BTreeMap<_, _> = runs
+    let run_ids: Vec<_> = runs.values().copied().collect();
+    let summaries = app.summaries.load(&run_ids).await?;
+    let summaries_by_profile: BTreeMap<_, _> = runs
         .into_iter()
         .filter_map(|(profile, run)| Some((profile, summaries.get(&run)?.as_ref())))
         .collect();
-    faceoff_scoring::ablation(&profiles).map_err(Problem::internal)
+    faceoff_scoring::ablation(&summaries_by_profile).map_err(Problem::internal)
 }

@@ -1,4 +1,6 @@
-//! Clips of an ablation: of the episodes whose outcome differs from the ideal simulator's.
+//! Clips of an ablation. An *ablation* runs a submission under several profiles (sets of perturbations) on the same episodes. A
+//! *clip* is the compressed recording of an episode. Clips are stored of the episodes whose outcome under a profile differs from
+//! that in the ideal simulator.
 
 use crate::{
     app::AppState,
@@ -21,11 +23,12 @@ pub struct AblationClips {
     pub can_see_observations: bool,
 }
 
-/// An episode whose outcome under a perturbation differs from the ideal one.
+/// An episode whose outcome under a perturbation differs from that in the ideal simulator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DifferingEpisode {
     /// The outcome in the ideal simulator.
     pub ideal: EpisodeLine,
+    /// The outcome under the perturbation.
     pub perturbed: EpisodeLine,
 }
 
@@ -53,7 +56,7 @@ impl AblationClips {
             ablation: newest.map(|ablation| ablation.id),
             can_see_observations: match viewer {
                 Viewer::Organiser => true,
-                Viewer::Team(own) => own == team,
+                Viewer::Team(viewer_team) => viewer_team == team,
                 Viewer::Visitor => false,
             },
         })
@@ -72,7 +75,11 @@ impl AblationClips {
     /// # Errors
     /// `NotFound` if there is none.
     #[boxed]
-    pub async fn profile(&self, app: &AppState, profile: Profile) -> Result<ClipFile, Problem> {
+    pub async fn profile_file(
+        &self,
+        app: &AppState,
+        profile: Profile,
+    ) -> Result<ClipFile, Problem> {
         let file = self.find(app, profile).await?;
         file.ok_or_else(|| Problem::not_found("episode"))
     }
@@ -91,8 +98,8 @@ impl AblationClips {
         };
         let ideal = ideal.read(Pack::clip_index).await?;
         let mut differing = BTreeMap::new();
-        let all = Profile::ABLATION.into_iter();
-        for profile in all.filter(|profile| *profile != Profile::Ideal) {
+        let profiles = Profile::ABLATION.into_iter();
+        for profile in profiles.filter(|profile| *profile != Profile::Ideal) {
             let Some(file) = self.find(app, profile).await? else {
                 continue;
             };
@@ -123,7 +130,7 @@ impl AblationClips {
         task: Task,
         episode: u32,
     ) -> Result<Episode, Problem> {
-        let file = self.profile(app, profile).await?;
+        let file = self.profile_file(app, profile).await?;
         file.episode(task, episode, self.can_see_observations).await
     }
 }

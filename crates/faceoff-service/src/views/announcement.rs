@@ -1,4 +1,4 @@
-//! Announcements, questions and the terms.
+//! Announcements of the organisers, questions of teams, and the season's terms of participation.
 
 use faceoff_api::views::announcement::{AnnouncementView, QuestionView, TermsView};
 use faceoff_store::{Announcement, Question, Terms};

@@ -1,4 +1,5 @@
-//! The season archive that a server shows.
+//! The season archive that a server shows. An *archive* is an export of a whole season; a server that has imported one shows it
+//! read-only.
 
 use faceoff_api::views::archive::ArchiveView;
 use faceoff_store::ArchivedSeason;

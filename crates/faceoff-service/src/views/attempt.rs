@@ -1,4 +1,4 @@
-//! Attempts at a game.
+//! Attempts at a game: a slot of a worker starts to play it. A game has several attempts if one ends without a result.
 
 use faceoff_api::views::{
     attempt::{AttemptOutcomeView, GameAttemptView},

@@ -1,4 +1,6 @@
-//! Boards: ranks of the teams, and their statistical uncertainty.
+//! Boards: the ranks of the teams in a stage, and their statistical uncertainty. A board belongs to one revision of the stage's
+//! rules. It ranks by *tier* (grade of safety) first, then by score. Teams in the same *rank group* are statistically tied with
+//! the first team of the group. A *baseline* is a team of the organisers, which is shown for comparison, without a rank.
 
 use crate::{
     aggregated_rows::AggregatedRow,
@@ -33,8 +35,8 @@ pub struct BoardSelection {
     pub task: Option<Task>,
     /// `None`: the teams of all divisions.
     pub division: Option<DivisionName>,
-    /// Overrides the stage's `standings`.
-    pub by: Option<CountingResult>,
+    /// Which results count; overrides the stage's setting `standings`.
+    pub counting_result: Option<CountingResult>,
 }
 
 impl BoardSelection {
@@ -44,7 +46,7 @@ impl BoardSelection {
     }
 }
 
-/// The stage of a requested board.
+/// The stage of a requested board; by default the current one. `is_live` requests results after a freeze of the boards.
 ///
 /// # Errors
 /// `Unauthenticated` or `Forbidden` if the viewer may not see the live board of a frozen stage.
@@ -52,9 +54,9 @@ impl BoardSelection {
 pub async fn requested_stage(
     app: &AppState,
     visibility: &Visibility,
-    (stage, live): (Option<StageId>, bool),
+    (stage, is_live): (Option<StageId>, bool),
 ) -> Result<Stage, Problem> {
-    if live {
+    if is_live {
         visibility.check_organiser("the board beyond the freeze")?;
     }
     match stage {
@@ -98,7 +100,7 @@ pub async fn query(
     let selection = BoardSelection {
         task,
         division,
-        by: query.by.map(BoardBy::counting_result),
+        counting_result: query.by.map(BoardBy::counting_result),
     };
     let board = build(
         app,
@@ -122,36 +124,44 @@ pub async fn build(
     app: &AppState,
     visibility: &Visibility,
     stage: &Stage,
-    number: u32,
+    revision_number: u32,
     selection: BoardSelection,
     (scope, extra): (&BoardScope, Vec<BoardRecord>),
 ) -> Result<BoardView, Problem> {
     let mut revisions = app.store.stage_revisions(stage.id).await?.into_iter();
-    let Some(revision) = revisions.find(|revision| revision.number == number) else {
+    let Some(revision) = revisions.find(|revision| revision.number == revision_number) else {
         return Err(Problem::not_found("revision of the stage's rules"));
     };
     let mut disqualified = team::all(app).await?;
     match &stage.sign_off {
         None => disqualified.retain(|team| team.disqualified.is_some()),
-        Some(finalised) => {
-            disqualified.retain(|team| finalised.disqualified_teams.contains(&team.id))
+        Some(sign_off) => {
+            disqualified.retain(|team| sign_off.disqualified_teams.contains(&team.id))
         }
     }
     disqualified.retain(|team| selection.is_ranked(team.division.as_ref()));
     let variation = revision.rules.variation;
-    let rows_by = match selection.by {
-        Some(by) => by,
+    let rows_by = match selection.counting_result {
+        Some(counting_result) => counting_result,
         None => board_rows::counting_result(app, stage, scope).await?,
     };
     let (rows, baselines) = if visibility.is_hidden(stage.id) {
         Default::default()
     } else {
-        ranked_rows(app, stage, number, (scope, extra), rows_by, &selection).await?
+        ranked_rows(
+            app,
+            stage,
+            revision_number,
+            (scope, extra),
+            rows_by,
+            &selection,
+        )
+        .await?
     };
     Ok(BoardView {
         stage: stage.id,
         stage_name: stage.name.clone(),
-        revision: number,
+        revision: revision_number,
         since: revision.since,
         ruleset: revision.rules.ruleset.to_string(),
         weights: variation.weights,
@@ -177,7 +187,7 @@ pub async fn build(
 
 /// Refuses a day without results. `days` are the days with results up to this one.
 fn check_has_results(day: Date, days: &[Date]) -> Result<(), Problem> {
-    let why = match days.last() {
+    let hint = match days.last() {
         Some(last) if *last == day => return Ok(()),
         Some(last) => format!("the last earlier day with results is {last}"),
         None => "no earlier day has results".to_owned(),
@@ -185,7 +195,7 @@ fn check_has_results(day: Date, days: &[Date]) -> Result<(), Problem> {
     Err(Problem::new(
         ProblemKind::NotFound,
         format!(
-            "{day} has no results on this board; {why}; GET /api/v1/board/history lists all days with results"
+            "{day} has no results on this board; {hint}; GET /api/v1/board/history lists all days with results"
         ),
     ))
 }
@@ -212,18 +222,21 @@ async fn ranked_rows(
         .into_iter()
         .map(|aggregated| Row::new(aggregated, &summaries))
         .collect::<Result<_, _>>()?;
-    let all = board_rows::rank(rows, task, |row| &row.aggregated.record);
-    let (ranked, baselines) =
-        board_rows::split_baselines(all, |row: &Row| row.aggregated.record.team.is_baseline);
+    let all_ranked = board_rows::rank(rows, task, |row| &row.aggregated.record);
+    let (ranked, baselines) = board_rows::split_baselines(all_ranked, |row: &Row| {
+        row.aggregated.record.team.is_baseline
+    });
     let groups = rank_groups(&ranked, |leader, row| {
         let [leader, row] = [leader, row].map(|row| row.to_compared(mismatch_seed));
         Ok::<_, Problem>(leader.differs_significantly(&row, task))
     })?;
     let rows = ranked.into_iter().zip(groups);
-    let rows = rows.map(|(ranked, rank_group)| row(ranked, rank_group, task));
+    let rows = rows.map(|(ranked, rank_group)| row_view(ranked, rank_group, task));
     // Baselines have no rank group.
-    let baselines = baselines.into_iter().map(|ranked| row(ranked, 0, task));
-    Ok((rows.collect(), baselines.map(baseline).collect()))
+    let baselines = baselines
+        .into_iter()
+        .map(|ranked| row_view(ranked, 0, task));
+    Ok((rows.collect(), baselines.map(baseline_row).collect()))
 }
 
 /// A row with the summary of its episodes.
@@ -234,16 +247,17 @@ struct Row {
 
 impl Row {
     fn new(aggregated: AggregatedRow, summaries: &RunSummaries) -> Result<Self, Problem> {
-        let days = aggregated.runs.iter().map(|run| {
+        let day_summaries = aggregated.runs.iter().map(|run| {
             let summary = summaries.get(run);
             summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
         });
-        let days: Vec<&Arc<EpisodeSummary>> = days.collect::<Result<_, _>>()?;
-        let summary = match days[..] {
-            [day] => Arc::clone(day),
+        let day_summaries: Vec<&Arc<EpisodeSummary>> = day_summaries.collect::<Result<_, _>>()?;
+        let summary = match day_summaries[..] {
+            [summary] => Arc::clone(summary),
             _ => {
-                let days: Vec<&EpisodeSummary> = days.iter().map(|day| &***day).collect();
-                Arc::new(joined_summary(&days))
+                let day_summaries: Vec<&EpisodeSummary> =
+                    day_summaries.iter().map(|summary| &***summary).collect();
+                Arc::new(joined_summary(&day_summaries))
             }
         };
         Ok(Self {
@@ -252,7 +266,7 @@ impl Row {
         })
     }
 
-    /// The row as comparisons need it.
+    /// The row in the form that statistical comparisons take.
     fn to_compared(&self, mismatch_seed: Seed) -> ComparedEvaluation<'_> {
         let result = &self.aggregated.record.result;
         ComparedEvaluation {
@@ -266,7 +280,8 @@ impl Row {
     }
 }
 
-fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRow {
+/// A row of the response. Seed and episode data of a day without release are left out.
+fn row_view(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRow {
     let RankedEntry { rank, tier, entry } = ranked;
     let (row, result) = (entry.key, entry.result);
     let AggregatedRow {
@@ -304,8 +319,8 @@ fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRo
     }
 }
 
-/// The row of a baseline; `row.rank` is the rank that it would have.
-fn baseline(row: BoardRow) -> BaselineRow {
+/// The row of a baseline; `row.rank` is the rank that it would have if it were ranked.
+fn baseline_row(row: BoardRow) -> BaselineRow {
     BaselineRow {
         would_rank: row.rank,
         baseline: true,

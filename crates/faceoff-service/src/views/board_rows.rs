@@ -1,4 +1,5 @@
-//! Aggregation of results into board rows: for each team one evaluation, or the mean of several.
+//! Aggregation of results into board rows: for each team one evaluation, or the mean of several. The stage's setting
+//! ([`CountingResult`]) says which of a team's evaluations count. Results are board records: an evaluation with a score.
 
 use crate::{
     aggregated_rows::{AggregatedRow, RowsKey},
@@ -10,7 +11,8 @@ use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
 use faceoff_types::{CountingResult, Task};
 use jiff::civil::Date;
 
-/// The evaluations that rows show within a scope. A stage with a final day shows the newest ones until its cutoff.
+/// Which evaluations the rows show within a scope (which selects results by time and day). A stage whose final day counts shows
+/// the newest evaluations until the cutoff of that day.
 pub(super) async fn counting_result(
     app: &AppState,
     stage: &Stage,
@@ -22,11 +24,13 @@ pub(super) async fn counting_result(
     }
     let final_cutoff = app.store.final_cutoff(stage.id).await?;
     // A board that was frozen before the final day keeps showing the newest results.
-    let is_over = final_cutoff.is_some_and(|at| {
-        scope.finished_until.is_none_or(|until| at <= until)
-            && scope.last_day.is_none_or(|day| stage.day(at).date <= day)
+    let has_final_day = final_cutoff.is_some_and(|cutoff_at| {
+        scope.finished_until.is_none_or(|until| cutoff_at <= until)
+            && scope
+                .last_day
+                .is_none_or(|day| stage.day(cutoff_at).date <= day)
     });
-    Ok(if is_over {
+    Ok(if has_final_day {
         CountingResult::Final
     } else {
         CountingResult::Latest
@@ -43,19 +47,19 @@ pub(super) async fn rows(
     counting_result: CountingResult,
     task: Option<Task>,
 ) -> Result<Vec<AggregatedRow>, Problem> {
-    let is_plain = scope.excluded.is_empty() && extra.is_empty();
+    let is_hypothetical = !scope.excluded.is_empty() || !extra.is_empty();
     let compute = async || load(app, stage, revision, (scope, extra), counting_result, task).await;
-    // Reading the newest results is as fast as checking the cache.
-    if counting_result == CountingResult::Latest || !is_plain {
+    // Newest results are not cached: reading them is as fast as checking the cache.
+    if counting_result == CountingResult::Latest || is_hypothetical {
         return compute().await;
     }
     let key = RowsKey {
         stage: stage.id,
         revision,
-        by: counting_result,
+        counting_result,
         task,
-        until: scope.finished_until,
-        until_day: scope.last_day,
+        finished_until: scope.finished_until,
+        last_day: scope.last_day,
     };
     app.row_cache.get(key, compute).await
 }
@@ -83,7 +87,7 @@ async fn load(
     };
     if !extra.is_empty() {
         let final_cutoff = app.store.final_cutoff(stage.id).await?;
-        let final_day = final_cutoff.map(|at| stage.day(at).date);
+        let final_day = final_cutoff.map(|cutoff_at| stage.day(cutoff_at).date);
         let is_eligible = |record: &BoardRecord| {
             counting_result != CountingResult::Final || Some(record.day) == final_day
         };
@@ -105,7 +109,7 @@ async fn load(
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CountingRule {
     pub(super) counting_result: CountingResult,
-    /// Needed if there are also records of other days.
+    /// The final day, if there are also records of other days.
     pub(super) final_day: Option<Date>,
     pub(super) task: Option<Task>,
 }
@@ -115,16 +119,16 @@ pub(super) fn aggregate(
     records: Vec<BoardRecord>,
     rule: CountingRule,
 ) -> Result<Vec<AggregatedRow>, Problem> {
-    let teams = by_team(records);
+    let teams = group_by_team(records);
     match rule.counting_result {
         CountingResult::Latest => {
-            let newest = teams.filter_map(|mut days| days.pop());
+            let newest = teams.filter_map(|mut records| records.pop());
             Ok(newest.map(AggregatedRow::single).collect())
         }
         CountingResult::Final => {
             let final_day = rule.final_day;
-            let final_results = teams.filter_map(|mut days| {
-                let newest = days.pop()?;
+            let final_results = teams.filter_map(|mut records| {
+                let newest = records.pop()?;
                 final_day
                     .is_none_or(|day| newest.day == day)
                     .then_some(newest)
@@ -132,14 +136,14 @@ pub(super) fn aggregate(
             Ok(final_results.map(AggregatedRow::single).collect())
         }
         CountingResult::Best => {
-            let best = teams.filter_map(|days| best(days, rule.task));
+            let best = teams.filter_map(|records| best(records, rule.task));
             Ok(best.map(AggregatedRow::single).collect())
         }
-        CountingResult::MeanOfLast(last) => teams
-            .filter_map(|mut days| {
-                let older = days.len().saturating_sub(last as usize);
-                days.drain(..older);
-                AggregatedRow::mean(days).transpose()
+        CountingResult::MeanOfLast(count) => teams
+            .filter_map(|mut records| {
+                let older_count = records.len().saturating_sub(count as usize);
+                records.drain(..older_count);
+                AggregatedRow::mean(records).transpose()
             })
             .collect(),
     }
@@ -147,21 +151,21 @@ pub(super) fn aggregate(
 
 /// Drops a team's records that cannot count any more, whatever results follow.
 pub(super) fn drop_superseded(records: &mut Vec<BoardRecord>, rule: CountingRule) {
-    let count = match rule.counting_result {
+    let kept_count = match rule.counting_result {
         CountingResult::Latest | CountingResult::Final => 1,
-        CountingResult::MeanOfLast(days) => days as usize,
+        CountingResult::MeanOfLast(count) => count as usize,
         CountingResult::Best => {
             let all = std::mem::take(records);
             records.extend(best(all, rule.task));
             1
         }
     };
-    let older = records.len().saturating_sub(count);
-    records.drain(..older);
+    let older_count = records.len().saturating_sub(kept_count);
+    records.drain(..older_count);
 }
 
 /// Splits records, which are grouped by team, into one list per team.
-fn by_team(records: Vec<BoardRecord>) -> impl Iterator<Item = Vec<BoardRecord>> {
+fn group_by_team(records: Vec<BoardRecord>) -> impl Iterator<Item = Vec<BoardRecord>> {
     let mut records = records.into_iter().peekable();
     std::iter::from_fn(move || {
         let first = records.next()?;
@@ -199,12 +203,12 @@ pub(super) fn rank<K>(
 
 /// Teams with their ranks, and baselines with the rank that each would have.
 pub(super) fn split_baselines<K>(
-    all: Vec<RankedEntry<K>>,
+    all_ranked: Vec<RankedEntry<K>>,
     is_baseline: impl Fn(&K) -> bool,
 ) -> (Vec<RankedEntry<K>>, Vec<RankedEntry<K>>) {
     let (mut ranked, mut baselines) = (Vec::new(), Vec::new());
     let mut rank = 1;
-    for entry in all {
+    for entry in all_ranked {
         let entry = RankedEntry { rank, ..entry };
         if is_baseline(&entry.entry.key) {
             baselines.push(entry);

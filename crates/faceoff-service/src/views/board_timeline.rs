@@ -1,4 +1,4 @@
-//! The days of a board, and the ranks of the day before.
+//! Timeline of a board: the days for which it can be requested, and the ranks on the previous day with results.
 
 use crate::{
     app::AppState,
@@ -17,9 +17,9 @@ use std::collections::BTreeMap;
 pub struct BoardTimeline {
     /// Days with results, earliest first.
     pub days: Vec<Date>,
-    /// The board of the day before its newest one; `None` on the first day, and if the rows showed other evaluations
-    /// then.
-    pub before: Option<EarlierBoard>,
+    /// The board of the day before the board's own day; `None` on the first day. Also `None` if the board shows the results of
+    /// the final day, because earlier boards showed other evaluations.
+    pub previous_board: Option<EarlierBoard>,
 }
 
 /// A board of an earlier day.
@@ -46,42 +46,43 @@ impl EarlierBoard {
 }
 
 impl BoardTimeline {
-    /// The timeline of a board as it is shown; `live` includes results after a freeze.
+    /// The timeline of a board as it is shown; `is_live` includes results after a freeze of the boards.
     #[boxed]
     pub async fn load(
         app: &AppState,
         visibility: &Visibility,
         board: &BoardView,
-        live: bool,
+        is_live: bool,
     ) -> Result<Self, Problem> {
         let mut timeline = Self {
             days: Vec::new(),
-            before: None,
+            previous_board: None,
         };
         if visibility.is_hidden(board.stage) {
             return Ok(timeline);
         }
-        let frozen = board.frozen.as_ref().filter(|_| !live);
+        let frozen = board.frozen.as_ref().filter(|_| !is_live);
         let scope = BoardScope {
             finished_until: frozen.map(|frozen| frozen.at),
             ..BoardScope::default()
         };
         let days = app.store.board_days(board.stage, board.revision, &scope);
         timeline.days = days.await?;
-        let earlier = timeline.days.iter().rev();
-        let mut earlier = earlier.skip_while(|day| board.day.is_some_and(|shown| **day > shown));
-        // The first one is the board's own day.
-        if let Some(day) = earlier.nth(1).copied() {
+        let newest_first = timeline.days.iter().rev();
+        let mut days_until_board =
+            newest_first.skip_while(|day| board.day.is_some_and(|board_day| **day > board_day));
+        // The first of them is the board's own day.
+        if let Some(day) = days_until_board.nth(1).copied() {
             let scope = BoardScope {
                 last_day: Some(day),
                 ..scope
             };
-            timeline.before = Self::before(app, board, scope, day).await?;
+            timeline.previous_board = Self::load_earlier(app, board, scope, day).await?;
         }
         Ok(timeline)
     }
 
-    async fn before(
+    async fn load_earlier(
         app: &AppState,
         board: &BoardView,
         scope: BoardScope,
@@ -92,22 +93,24 @@ impl BoardTimeline {
         if board.rows_by == CountingResult::Final && earlier_result != CountingResult::Final {
             return Ok(None);
         }
-        let (by, task) = (board.rows_by, board.task);
+        let (rows_by, task) = (board.rows_by, board.task);
         let results = (&scope, Vec::new());
-        let mut rows = board_rows::rows(app, &stage, board.revision, results, by, task).await?;
+        let mut rows =
+            board_rows::rows(app, &stage, board.revision, results, rows_by, task).await?;
         rows.retain(|row| {
             let division = &row.record.team.profile.division;
             board.division.is_none() || board.division == *division || row.record.team.is_baseline
         });
-        let all = board_rows::rank(rows, task, |row| &row.record);
-        let (ranked, _) = board_rows::split_baselines(all, |row| row.record.team.is_baseline);
+        let all_ranked = board_rows::rank(rows, task, |row| &row.record);
+        let (ranked, _) =
+            board_rows::split_baselines(all_ranked, |row| row.record.team.is_baseline);
         let teams = ranked.into_iter().map(|ranked| {
             let record = ranked.entry.key.record;
-            let earlier = EarlierRank {
+            let earlier_rank = EarlierRank {
                 rank: ranked.rank,
-                score: score(&record.result, task),
+                score: score_percent(&record.result, task),
             };
-            (record.team.id, earlier)
+            (record.team.id, earlier_rank)
         });
         Ok(Some(EarlierBoard {
             day,
@@ -116,9 +119,10 @@ impl BoardTimeline {
     }
 }
 
-fn score(result: &EvaluationResult, task: Option<Task>) -> f64 {
+/// The overall score, or the success rate of the task.
+fn score_percent(result: &EvaluationResult, task: Option<Task>) -> f64 {
     match task.and_then(|task| result.tasks.get(&task)) {
-        Some(of_task) => 100.0 * of_task.success_rate,
+        Some(task_result) => 100.0 * task_result.success_rate,
         None => result.score,
     }
 }

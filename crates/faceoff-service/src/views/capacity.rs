@@ -1,4 +1,5 @@
-//! Capacity forecast: whether the evaluations of a day fit into the slots and the time available.
+//! Capacity forecast: whether the evaluations of a day can finish before its deadline. A *slot* runs one job at a time; a job of an
+//! evaluation is a *shard*, a part of its episodes.
 
 use crate::{app::AppState, boxed, config::Capacity, problem::Problem};
 use faceoff_api::views::capacity::{CapacityView, DayLoad, Fit};
@@ -9,25 +10,31 @@ use jiff::{Timestamp, civil::Date};
 /// Remaining work of a day, independent of the number of slots.
 struct Load {
     day: Date,
+    /// Whether the day's cutoff has passed.
     is_under_way: bool,
+    /// Number of teams with remaining episodes.
     teams: u32,
+    /// Number of remaining episodes of all teams.
     episodes: u32,
+    /// Expected duration on one slot, from measured durations.
     expected_ms: Option<f64>,
+    /// Duration on one slot if every agent uses up its time limits.
     longest_s: f64,
     /// The deadline, and the hours until then.
     deadline: Option<(Timestamp, f64)>,
 }
 
-fn hours(from: Timestamp, to: Timestamp) -> f64 {
-    to.duration_since(from).as_secs_f64() / 3600.0
+fn hours_between(start: Timestamp, end: Timestamp) -> f64 {
+    end.duration_since(start).as_secs_f64() / 3600.0
 }
 
+/// The forecast of a day: whether its load fits into these slots.
 fn day_load(load: &Load, slots: u32) -> DayLoad {
     let slots = f64::from(slots.max(1));
     let worst_case_hours = load.longest_s / slots / 3600.0;
     let expected_hours = load.expected_ms.map(|ms| ms / 1000.0 / slots / 3600.0);
-    let available = load.deadline.map(|(_, hours)| hours);
-    let fit = match (available, expected_hours) {
+    let available_hours = load.deadline.map(|(_, hours)| hours);
+    let fit = match (available_hours, expected_hours) {
         (None, _) => Fit::Surely,
         (Some(available), _) if worst_case_hours <= available => Fit::Surely,
         (Some(available), Some(expected)) if expected <= available => Fit::Probably,
@@ -42,7 +49,7 @@ fn day_load(load: &Load, slots: u32) -> DayLoad {
         expected_hours,
         worst_case_hours,
         deadline_at: load.deadline.map(|(at, _)| at),
-        hours_until_deadline: available,
+        hours_until_deadline: available_hours,
         fit,
         summary: String::new(),
     };
@@ -50,6 +57,7 @@ fn day_load(load: &Load, slots: u32) -> DayLoad {
     view
 }
 
+/// The forecast of a day in words.
 fn summary(day: &DayLoad) -> String {
     let teams = match (day.is_under_way, day.teams) {
         (true, 0) => {
@@ -72,31 +80,32 @@ fn summary(day: &DayLoad) -> String {
         "{}: {teams} {} episodes to run: {expected}; at most {:.1} hours, if every agent uses up its time",
         day.day, day.episodes, day.worst_case_hours
     );
-    let Some(available) = day.hours_until_deadline else {
+    let Some(available_hours) = day.hours_until_deadline else {
         return format!("{load}. No deadline.");
     };
     let advice = "more slots, fewer episodes or a later deadline (day_deadline) would help";
     match day.fit {
-        Fit::Surely => format!("{load}. The day has {available:.1} hours: it fits."),
+        Fit::Surely => format!("{load}. The day has {available_hours:.1} hours: it fits."),
         Fit::Probably => format!(
-            "{load}. The day has {available:.1} hours: it probably fits, unless agents use up their time."
+            "{load}. The day has {available_hours:.1} hours: it probably fits, unless agents use up their time."
         ),
         Fit::Unknown => format!(
-            "{load}. The day has {available:.1} hours: evaluations of slow agents may not finish; {advice}."
+            "{load}. The day has {available_hours:.1} hours: evaluations of slow agents may not finish; {advice}."
         ),
         Fit::Not => format!(
-            "{load}. The day has {available:.1} hours: it does not fit, and evaluations that are not finished at the \
+            "{load}. The day has {available_hours:.1} hours: it does not fit, and evaluations that are not finished at the \
              deadline do not count; {advice}."
         ),
     }
 }
 
+/// Load of the day of the next cutoff, if the submissions that are active now stay active.
 fn next_load(
     stage: &Stage,
     day: Date,
-    cut_at: Timestamp,
+    cutoff_at: Timestamp,
     teams: &[TeamId],
-    measured: &JobDurations,
+    durations: &JobDurations,
     capacity: &Capacity,
 ) -> Load {
     let plan = stage.plan();
@@ -106,49 +115,53 @@ fn next_load(
         plan.episodes_per_task
             .div_ceil(plan.episodes_per_shard.max(1)),
     );
-    let count = u32::try_from(teams.len()).unwrap_or(u32::MAX);
+    let team_count = u32::try_from(teams.len()).unwrap_or(u32::MAX);
     let expected = teams
         .iter()
-        .map(|team| Some(measured.episode_ms_of(*team)? * f64::from(episodes)));
-    let each_s = capacity
+        .map(|team| Some(durations.episode_ms_of(*team)? * f64::from(episodes)));
+    let longest_per_team_s = capacity
         .time
         .max_slot_time_s(episodes, shards, plan.max_faults);
     Load {
         day,
         is_under_way: false,
-        teams: count,
-        episodes: count.saturating_mul(episodes),
+        teams: team_count,
+        episodes: team_count.saturating_mul(episodes),
         expected_ms: expected.sum(),
-        longest_s: f64::from(count) * each_s,
+        longest_s: f64::from(team_count) * longest_per_team_s,
         deadline: stage
-            .deadline(day, cut_at)
-            .map(|at| (at, hours(cut_at, at))),
+            .deadline(day, cutoff_at)
+            .map(|at| (at, hours_between(cutoff_at, at))),
     }
 }
 
+/// Remaining load of a day that is under way.
 fn open_load(
     day: &faceoff_store::Day,
-    work: &[EvaluationBacklog],
+    backlog: &[EvaluationBacklog],
     capacity: &Capacity,
     now: Timestamp,
 ) -> Load {
     let day_backlog = || {
-        work.iter()
-            .filter(|work| work.stage_day == day.stage_day && work.episodes > 0)
+        backlog
+            .iter()
+            .filter(|entry| entry.stage_day == day.stage_day && entry.episodes > 0)
     };
-    let longest_s = |work: &EvaluationBacklog| {
+    let longest_s = |entry: &EvaluationBacklog| {
         capacity
             .time
-            .max_slot_time_s(work.episodes, work.shards, work.max_faults)
+            .max_slot_time_s(entry.episodes, entry.shards, entry.max_faults)
     };
     Load {
         day: day.stage_day.date,
         is_under_way: true,
         teams: u32::try_from(day_backlog().count()).unwrap_or(u32::MAX),
-        episodes: day_backlog().map(|work| work.episodes).sum(),
-        expected_ms: day_backlog().map(|work| work.expected_ms).sum(),
+        episodes: day_backlog().map(|entry| entry.episodes).sum(),
+        expected_ms: day_backlog().map(|entry| entry.expected_ms).sum(),
         longest_s: day_backlog().map(longest_s).sum(),
-        deadline: day.deadline_at.map(|at| (at, hours(now, at).max(0.0))),
+        deadline: day
+            .deadline_at
+            .map(|at| (at, hours_between(now, at).max(0.0))),
     }
 }
 
@@ -169,11 +182,11 @@ pub async fn forecast(
     now: Timestamp,
 ) -> Result<CapacityView, StoreError> {
     let stage = store.stage(id).await?;
-    let (work, measured) = store.evaluation_backlog(now).await?;
+    let (backlog, durations) = store.evaluation_backlog(now).await?;
     let under_way = store.unreleased_days(id).await?;
     let mut loads: Vec<Load> = under_way
         .iter()
-        .map(|day| open_load(day, &work, capacity, now))
+        .map(|day| open_load(day, &backlog, capacity, now))
         .collect();
     let newest = store.newest_day(id).await?;
     let season_is_open = store.season().await?.closed_at.is_none();
@@ -184,7 +197,7 @@ pub async fn forecast(
         let teams: Vec<TeamId> = active.iter().map(|submission| submission.team).collect();
         let cutoff_at = at.unwrap_or(now).max(now);
         loads.push(next_load(
-            &stage, day, cutoff_at, &teams, &measured, capacity,
+            &stage, day, cutoff_at, &teams, &durations, capacity,
         ));
     }
     let slots = capacity.slots + store.workers().available_slots(now);
@@ -202,22 +215,28 @@ mod tests {
     use super::*;
     use jiff::civil::date;
 
-    fn load(expected_hours: Option<f64>, worst_hours: f64, available: Option<f64>) -> DayLoad {
+    /// The forecast of a day of 40 teams on two slots, with these durations.
+    fn forecast_day(
+        expected_hours: Option<f64>,
+        worst_hours: f64,
+        available_hours: Option<f64>,
+    ) -> DayLoad {
+        const SLOTS: u32 = 2;
         let load = Load {
             day: date(2026, 3, 1),
             is_under_way: false,
             teams: 40,
             episodes: 120_000,
-            expected_ms: expected_hours.map(|hours| hours * 2.0 * 3.6e6),
-            longest_s: worst_hours * 2.0 * 3600.0,
-            deadline: available.map(|hours| (Timestamp::UNIX_EPOCH, hours)),
+            expected_ms: expected_hours.map(|hours| hours * f64::from(SLOTS) * 3.6e6),
+            longest_s: worst_hours * f64::from(SLOTS) * 3600.0,
+            deadline: available_hours.map(|hours| (Timestamp::UNIX_EPOCH, hours)),
         };
-        day_load(&load, 2)
+        day_load(&load, SLOTS)
     }
 
     #[test]
     fn fit_and_summary_follow_from_hours() {
-        for (expected, worst, available, fit, words) in [
+        for (expected_hours, worst_hours, available_hours, fit, phrase) in [
             (Some(10.0), 20.0, Some(24.0), Fit::Surely, "it fits"),
             (None, 20.0, Some(24.0), Fit::Surely, "it fits"),
             (
@@ -231,16 +250,16 @@ mod tests {
             (None, 400.0, Some(24.0), Fit::Unknown, "duration unknown"),
             (Some(30.0), 400.0, None, Fit::Surely, "No deadline"),
         ] {
-            let load = load(expected, worst, available);
+            let load = forecast_day(expected_hours, worst_hours, available_hours);
             assert_eq!(load.fit, fit, "{}", load.summary);
-            assert!(load.summary.contains(words), "{}", load.summary);
+            assert!(load.summary.contains(phrase), "{}", load.summary);
             assert!(
                 load.summary.contains("40 teams would have 120000 episodes"),
                 "{}",
                 load.summary
             );
-            assert_eq!(load.expected_hours, expected);
-            assert!((load.worst_case_hours - worst).abs() < 1e-9);
+            assert_eq!(load.expected_hours, expected_hours);
+            assert!((load.worst_case_hours - worst_hours).abs() < 1e-9);
         }
     }
 }

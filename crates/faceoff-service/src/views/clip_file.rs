@@ -1,27 +1,28 @@
-//! Clip files: recorded motion and observations, stored as artifacts.
+//! Clip files. A *clip* is a compressed recording: either the motion of robot and puck, which the public may see, or the agent's
+//! observations and actions. A clip file holds the clips of many episodes, or of a game, and is stored as an artifact.
 
 use crate::{app::AppState, boxed, problem::Problem};
-use faceoff_replay::{Clip, EpisodeLine, Key, Pack, ReplayError};
+use faceoff_replay::{Clip, ClipKey, EpisodeLine, Pack, ReplayError};
 use faceoff_types::Task;
 use std::path::PathBuf;
 
 /// An episode, as far as the viewer may see it.
 pub struct Episode {
-    /// Its outcome.
+    /// The outcome of the episode, as a line of the clip index.
     pub line: EpisodeLine,
-    /// Whether the task has an episode before it.
-    pub has_before: bool,
-    /// Whether the task has an episode after it.
-    pub has_after: bool,
+    /// Whether the file also has the task's previous episode.
+    pub has_previous: bool,
+    /// Whether the file also has the task's next episode.
+    pub has_next: bool,
     pub motion: Clip,
     /// Observations and actions; `None` without access to the dataset.
-    pub observed: Option<Clip>,
+    pub observations: Option<Clip>,
 }
 
 /// A clip file.
 #[derive(Debug)]
 pub struct ClipFile {
-    /// Its artifact key; never reused for another file.
+    /// The artifact key of the file; never reused for another file.
     pub key: String,
     path: PathBuf,
 }
@@ -41,7 +42,7 @@ impl ClipFile {
         Ok(Some(Self { key, path }))
     }
 
-    /// Reads the file on a blocking thread.
+    /// Opens the file and calls `read` with it, on a blocking thread.
     ///
     /// # Errors
     /// `Internal` if it cannot be read.
@@ -61,7 +62,7 @@ impl ClipFile {
     /// # Errors
     /// `NotFound` if there is no such episode.
     #[boxed]
-    pub async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
+    pub async fn clip(&self, key: ClipKey) -> Result<Vec<u8>, Problem> {
         let clip = self.read(move |pack| pack.clip(key)).await?;
         clip.ok_or_else(|| Problem::not_found("episode"))
     }
@@ -84,27 +85,28 @@ impl ClipFile {
                 bytes.map(|bytes| Clip::read(&bytes)).transpose()
             };
             let line = index.line(task, episode);
-            let Some((line, motion)) = line.zip(clip(Key::motion(task, episode))?) else {
+            let Some((line, motion)) = line.zip(clip(ClipKey::motion(task, episode))?) else {
                 return Ok(None);
             };
-            let exists =
-                |other: Option<u32>| other.is_some_and(|other| index.line(task, other).is_some());
+            let exists = |episode: Option<u32>| {
+                episode.is_some_and(|episode| index.line(task, episode).is_some())
+            };
             let mut line = line.clone();
             if !can_see_observations {
                 line.make_public();
             }
             Ok(Some(Episode {
                 line,
-                has_before: exists(episode.checked_sub(1)),
-                has_after: exists(episode.checked_add(1)),
+                has_previous: exists(episode.checked_sub(1)),
+                has_next: exists(episode.checked_add(1)),
                 motion,
-                observed: match can_see_observations {
-                    true => clip(Key::observed(task, episode))?,
+                observations: match can_see_observations {
+                    true => clip(ClipKey::observed(task, episode))?,
                     false => None,
                 },
             }))
         };
-        let found = self.read(read).await?;
-        found.ok_or_else(|| Problem::not_found("episode"))
+        let episode = self.read(read).await?;
+        episode.ok_or_else(|| Problem::not_found("episode"))
     }
 }

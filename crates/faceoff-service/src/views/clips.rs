@@ -1,5 +1,5 @@
-//! Clips of an evaluation. Motion and outcomes are public once the day is released. Observations, actions, computation
-//! times and faults need access to the dataset.
+//! Clips of an evaluation: compressed recordings of its episodes. Motion and outcomes are public once the evaluation day is
+//! released. Observations, actions, computation times and faults are visible to viewers with access to the dataset.
 
 use crate::{
     app::AppState,
@@ -12,7 +12,7 @@ use crate::{
     },
 };
 use faceoff_api::views::clips::{EpisodesView, TimeBinView};
-use faceoff_replay::{ClipIndex, EpisodeLine, Key, Pack};
+use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, Pack};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, Task};
 use std::collections::BTreeMap;
@@ -30,8 +30,8 @@ impl Clips {
     /// The clips of an evaluation, if the viewer may see them now.
     ///
     /// # Errors
-    /// `NotFound`, `NotYet`, `Blind`; `Removed` once the dataset was removed; `Conflict` without a result, and for
-    /// evaluations by an older version of the server.
+    /// `NotFound`; `NotYet` before the release; `Blind` for a blind stage; `Removed` if the dataset was removed; `Conflict`
+    /// without a result, and for evaluations by an older version of the server, which recorded no clips.
     #[boxed]
     pub async fn find(
         app: &AppState,
@@ -50,8 +50,8 @@ impl Clips {
         if !visibility.is_own(&evaluation) {
             visibility.check_not_frozen(&evaluation, "shown")?;
         }
-        if let Some(removed) = &evaluation.dataset_removed {
-            return Err(Problem::removed("the recording and its replays", removed));
+        if let Some(removal) = &evaluation.dataset_removed {
+            return Err(Problem::removed("the recording and its replays", removal));
         }
         archive_contents::check_included(app, dataset, "recording").await?;
         let key = Artifacts::clips_key(dataset);
@@ -75,7 +75,7 @@ impl Clips {
     /// # Errors
     /// `NotFound` if there is no such episode.
     #[boxed]
-    pub async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
+    pub async fn clip(&self, key: ClipKey) -> Result<Vec<u8>, Problem> {
         self.file.clip(key).await
     }
 

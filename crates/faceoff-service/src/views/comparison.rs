@@ -1,4 +1,4 @@
-//! Paired comparison of two evaluations on the same episodes.
+//! Paired comparison of two evaluations: a statistical test of the difference between their results on the same episodes.
 
 use crate::{
     app::AppState,
@@ -16,7 +16,7 @@ use faceoff_store::{Evaluation, EvaluationState, StoreError};
 use faceoff_types::{EvaluationId, EvaluationResult, Seed};
 use std::sync::Arc;
 
-/// A finished evaluation with the data for a comparison.
+/// One of the two evaluations, which are both finished, with the data for the comparison.
 struct Side {
     evaluation: Evaluation,
     result: Box<EvaluationResult>,
@@ -55,6 +55,7 @@ impl Side {
         })
     }
 
+    /// The evaluation in the form that statistical comparisons take.
     fn to_compared(&self, mismatch_seed: Seed) -> ComparedEvaluation<'_> {
         ComparedEvaluation {
             ruleset: &self.result.ruleset,
@@ -78,7 +79,7 @@ impl Side {
 ///
 /// # Errors
 /// `NotFound`; `Conflict` while one has no result; `Blind` until their stage is revealed; `NotYet` until their day is
-/// released; `NotComparable` if their episodes differ.
+/// released; `NotPaired` if their episodes differ.
 #[boxed]
 pub async fn compare(
     app: &AppState,
@@ -115,13 +116,17 @@ pub async fn compare(
     for side in [&a, &b] {
         visibility.check_not_frozen(&side.evaluation, "compared")?;
     }
-    // The season's, which both share.
+    // The seed of model mismatch is the same for the whole season.
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
     let (compared_a, compared_b) = (a.to_compared(mismatch_seed), b.to_compared(mismatch_seed));
-    let differs = |error: NotComparable| not_paired(error.field(), error.to_string());
-    let Comparison { tasks, overall } = compared_a.compare(&compared_b).map_err(differs)?;
+    let not_comparable = |error: NotComparable| not_paired(error.field(), error.to_string());
+    let Comparison { tasks, overall } = compared_a.compare(&compared_b).map_err(not_comparable)?;
     let episodes = match query.episodes {
-        true => Some(compared_a.solved_episodes(&compared_b).map_err(differs)?),
+        true => Some(
+            compared_a
+                .solved_episodes(&compared_b)
+                .map_err(not_comparable)?,
+        ),
         false => None,
     };
     Ok(ComparisonView {

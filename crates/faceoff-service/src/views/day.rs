@@ -1,4 +1,4 @@
-//! An evaluation day after its cutoff, and the next cutoff.
+//! Evaluation days and cutoffs. At the *cutoff* of a day the server starts one evaluation of each team's active submission.
 
 use crate::{
     app::AppState,
@@ -16,9 +16,12 @@ use std::collections::BTreeSet;
 #[boxed]
 pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Problem> {
     let visibility = Visibility::for_organiser(app).await?;
-    let mut created = evaluation::day_evaluations(app, &visibility, stage_day).await?;
-    evaluation::add_queue_positions(app, &mut created).await?;
-    let evaluated: BTreeSet<TeamId> = created.iter().map(|created| created.team).collect();
+    let mut evaluations = evaluation::day_evaluations(app, &visibility, stage_day).await?;
+    evaluation::add_queue_positions(app, &mut evaluations).await?;
+    let evaluated: BTreeSet<TeamId> = evaluations
+        .iter()
+        .map(|evaluation| evaluation.team)
+        .collect();
     let mut without_submission = team::all(app).await?;
     let mut excluded_teams =
         exclusions::excluded_teams(app, &app.store.stage(stage_day.stage).await?).await?;
@@ -28,7 +31,7 @@ pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Probl
     Ok(DayView {
         stage: stage_day.stage,
         day: stage_day.date,
-        created,
+        created: evaluations,
         without_submission,
         excluded: excluded_teams,
     })
@@ -51,18 +54,22 @@ pub async fn next_cutoff(app: &AppState, stage: &Stage) -> Result<Option<NextCut
     }))
 }
 
-/// The next cutoff of all stages; `None` if no stage has a further day, or the season is closed.
+/// The earliest of the next cutoffs of all stages; `None` if no stage has a further day, or the season is closed.
 pub(crate) async fn first_cutoff(app: &AppState) -> Result<Option<NextCutoff>, Problem> {
     let mut first: Option<(Timestamp, NextCutoff)> = None;
     for stage in app.store.stages().await? {
         let Some(next) = next_cutoff(app, &stage).await? else {
             continue;
         };
-        let begins = next.day.to_zoned(stage.zone.time_zone());
-        let begins = begins.map_err(Problem::internal)?.timestamp();
-        let at = next.at.unwrap_or(begins);
-        if first.as_ref().is_none_or(|(earliest, _)| at < *earliest) {
-            first = Some((at, next));
+        // Without a schedule, an organiser starts the day at any time from its beginning on.
+        let day_start = next.day.to_zoned(stage.zone.time_zone());
+        let day_start = day_start.map_err(Problem::internal)?.timestamp();
+        let cutoff_at = next.at.unwrap_or(day_start);
+        if first
+            .as_ref()
+            .is_none_or(|(earliest, _)| cutoff_at < *earliest)
+        {
+            first = Some((cutoff_at, next));
         }
     }
     Ok(first.map(|(_, next)| next))

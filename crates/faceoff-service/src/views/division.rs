@@ -1,4 +1,5 @@
-//! Look-up of the season's divisions.
+//! Look-up of the season's divisions by name. A *division* is a group of teams, such as students, that are ranked among
+//! themselves.
 
 use crate::{
     app::AppState,
@@ -13,16 +14,18 @@ use faceoff_types::DivisionName;
 /// `NotFound`, with the names of all divisions.
 #[boxed]
 pub async fn find(app: &AppState, name: &DivisionName) -> Result<DivisionName, Problem> {
-    let all = app.store.divisions().await?;
+    let divisions = app.store.divisions().await?;
     let lowercase = name.as_str().to_lowercase();
-    let found = all
+    let division = divisions
         .iter()
         .find(|division| division.as_str().to_lowercase() == lowercase);
-    found.cloned().ok_or_else(|| unknown(name, &all))
+    division
+        .cloned()
+        .ok_or_else(|| unknown_division(name, &divisions))
 }
 
-fn unknown(name: &DivisionName, all: &[DivisionName]) -> Problem {
-    let names: Vec<String> = all.iter().map(ToString::to_string).collect();
+fn unknown_division(name: &DivisionName, divisions: &[DivisionName]) -> Problem {
+    let names: Vec<String> = divisions.iter().map(ToString::to_string).collect();
     let quoted: Vec<String> = names.iter().map(|name| format!("“{name}”")).collect();
     let detail = if names.is_empty() {
         format!(

@@ -1,4 +1,4 @@
-//! Evaluations and their progress.
+//! Evaluations, with progress and position in the queue. An *evaluation* is the run of all tasks of a day with one team's submission.
 
 use crate::{
     app::AppState,
@@ -18,7 +18,7 @@ use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, StageDay, TeamId, TeamName};
 use std::{collections::BTreeMap, sync::Arc};
 
-/// What happens next to a finished evaluation whose dataset was removed.
+/// Text of the field `next`, which says what happens next, for a finished evaluation whose dataset was removed.
 const DATASET_REMOVED: &str = "Done. The result stays; the dataset was removed.";
 
 /// An evaluation, with its faults if the viewer may see them.
@@ -31,8 +31,8 @@ pub async fn find(
     build(app, visibility, app.store.evaluation(id).await?).await
 }
 
-/// An evaluation with its position in the queue. If it failed by agent faults and its day is released, a viewer who may
-/// see them also gets faults and log.
+/// An evaluation with its position in the queue. If it failed by agent faults and its day is released, its team and the organisers
+/// also see the faults and the log.
 #[boxed]
 pub async fn build(
     app: &AppState,
@@ -43,7 +43,7 @@ pub async fn build(
     let run = evaluation.run;
     let shows_faults =
         visibility.is_own(&evaluation) && !visibility.is_hidden(evaluation.stage_day.stage);
-    let mut view = view(visibility, evaluation, team.name);
+    let mut view = evaluation_view(visibility, evaluation, team.name);
     if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
         && view.released_at.is_some()
         && shows_faults
@@ -56,7 +56,7 @@ pub async fn build(
     Ok(view)
 }
 
-/// Adds positions in the queue to unfinished evaluations. Without any, the database is not read.
+/// Adds positions in the queue to unfinished evaluations. If all have ended, the database is not read.
 #[boxed]
 pub async fn add_queue_positions(
     app: &AppState,
@@ -119,7 +119,7 @@ pub async fn all(
     evaluations
         .into_iter()
         .map(|evaluation| match names.get(&evaluation.team) {
-            Some(name) => Ok(view(visibility, evaluation, name.clone())),
+            Some(name) => Ok(evaluation_view(visibility, evaluation, name.clone())),
             None => Err(Problem::internal(format_args!(
                 "evaluation {} has no team",
                 evaluation.id
@@ -128,10 +128,15 @@ pub async fn all(
         .collect()
 }
 
-fn view(visibility: &Visibility, evaluation: Evaluation, team_name: TeamName) -> EvaluationView {
-    let released = evaluation.released_at.is_some();
+/// An evaluation without its position in the queue, and without faults and log.
+fn evaluation_view(
+    visibility: &Visibility,
+    evaluation: Evaluation,
+    team_name: TeamName,
+) -> EvaluationView {
+    let is_released = evaluation.released_at.is_some();
     let has_dataset = evaluation.dataset_removed.is_none();
-    let (hidden, public) = (
+    let (is_hidden, is_public) = (
         visibility.is_hidden(evaluation.stage_day.stage),
         visibility.is_public(&evaluation),
     );
@@ -156,10 +161,10 @@ fn view(visibility: &Visibility, evaluation: Evaluation, team_name: TeamName) ->
             ..
         } => EvaluationStatus::Finished {
             finished_at,
-            result: (!hidden).then(|| Box::new(ResultView::new(*result, released))),
-            dataset: (!hidden && has_dataset)
+            result: (!is_hidden).then(|| Box::new(ResultView::new(*result, is_released))),
+            dataset: (!is_hidden && has_dataset)
                 .then(|| format!("{}/dataset", paths::evaluation(evaluation.id))),
-            dataset_blake3: dataset_blake3.filter(|_| !hidden),
+            dataset_blake3: dataset_blake3.filter(|_| !is_hidden),
         },
         EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {
             finished_at,
@@ -188,7 +193,7 @@ fn view(visibility: &Visibility, evaluation: Evaluation, team_name: TeamName) ->
             reason,
         },
     };
-    let voided = evaluation.voided.is_some();
+    let is_voided = evaluation.voided.is_some();
     EvaluationView {
         id: evaluation.id,
         submission: evaluation.submission,
@@ -202,8 +207,8 @@ fn view(visibility: &Visibility, evaluation: Evaluation, team_name: TeamName) ->
         rerun_of: evaluation.rerun_of,
         extra_evaluation: evaluation.extra_for,
         voided: evaluation.voided.map(ruling::view),
-        blind: hidden,
-        public,
+        blind: is_hidden,
+        public: is_public,
         dataset_removed: evaluation.dataset_removed.map(ruling::view),
         profile: evaluation.plan.profile,
         tasks: evaluation.plan.tasks,
@@ -214,7 +219,7 @@ fn view(visibility: &Visibility, evaluation: Evaluation, team_name: TeamName) ->
             episodes_total,
         },
         queue: None,
-        next: match status.next(released, voided) {
+        next: match status.next(is_released, is_voided) {
             EvaluationStatus::DONE if !has_dataset => DATASET_REMOVED,
             next => next,
         }

@@ -1,4 +1,5 @@
-//! The event log, as organisers read it.
+//! The event log, which organisers read: every change of the season, with its time, its actor (who made it) and its subject (what was
+//! changed).
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::{
@@ -12,6 +13,7 @@ use std::collections::BTreeMap;
 /// Default number of events per page.
 const DEFAULT_LIMIT: u32 = 100;
 
+/// Largest number of events per page.
 const MAX_LIMIT: u32 = 1000;
 
 /// The page of events that a query selects.
@@ -22,7 +24,7 @@ pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Prob
         let detail = format!("expected 1 to {MAX_LIMIT}, got {limit}");
         return Err(Problem::invalid("limit", detail));
     }
-    let subject = query.subject.map(|text| subject(&text)).transpose()?;
+    let subject = query.subject.map(|text| parse_subject(&text)).transpose()?;
     query.actor.as_deref().map(check_actor).transpose()?;
     if let Some(kind) = &query.kind {
         Event::check_kind(kind).map_err(|error| Problem::invalid("kind", error))?;
@@ -33,24 +35,24 @@ pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Prob
         subject,
         kind: query.kind,
     };
-    // One event more shows whether there is another page.
-    let mut found = app.store.newest_events(&filter, limit + 1).await?;
-    let is_last = found.len() <= limit as usize;
-    found.truncate(limit as usize);
-    let next_before = found.last().filter(|_| !is_last).map(|event| event.id);
+    // Reading one event more shows whether there is another page.
+    let mut events = app.store.newest_events(&filter, limit + 1).await?;
+    let is_last = events.len() <= limit as usize;
+    events.truncate(limit as usize);
+    let next_before = events.last().filter(|_| !is_last).map(|event| event.id);
     let names = actor_names(app).await?;
-    let named = |record: EventRecord| {
+    let view_with_name = |record: EventRecord| {
         let mut view = view(record);
         view.actor_name = names.get(&view.actor).cloned();
         view
     };
     Ok(EventsView {
-        events: found.into_iter().map(named).collect(),
+        events: events.into_iter().map(view_with_name).collect(),
         next_before,
     })
 }
 
-/// Names of all users and teams, by their notation in the log.
+/// Names of all users and teams, by actor as the log writes it, such as `team:ID`.
 #[boxed]
 pub async fn actor_names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
     let users = app.store.users().await?.into_iter();
@@ -60,7 +62,7 @@ pub async fn actor_names(app: &AppState) -> Result<BTreeMap<String, String>, Pro
     Ok(users.chain(teams).collect())
 }
 
-fn subject(text: &str) -> Result<Subject, Problem> {
+fn parse_subject(text: &str) -> Result<Subject, Problem> {
     text.parse().map_err(|_| {
         let expected = "season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, ablation:ID, \
                         person:ID, registration:ID, announcement:ID, question:ID, proposal:ID, tournament:ID or game:ID";

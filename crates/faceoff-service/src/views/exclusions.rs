@@ -1,4 +1,4 @@
-//! Exclusions: submissions whose runtime a stage does not accept.
+//! Exclusions: a stage excludes a submission if it does not accept its *runtime* (environment such as Python).
 
 use crate::{app::AppState, problem::Problem};
 use faceoff_api::views::exclusion::{ExcludedTeam, StageExclusion};
@@ -34,12 +34,12 @@ pub(super) async fn excluded_teams(
 ) -> Result<Vec<ExcludedTeam>, Problem> {
     let mut excluded = Vec::new();
     for submission in app.store.active_submissions().await? {
-        if let Err(why) = stage.check_accepts(&submission) {
+        if let Err(refusal) = stage.check_accepts(&submission) {
             excluded.push(ExcludedTeam {
                 team: submission.team,
                 team_name: app.store.team(submission.team).await?.name,
                 submission: submission.id,
-                reason: why.to_string(),
+                reason: refusal.to_string(),
             });
         }
     }

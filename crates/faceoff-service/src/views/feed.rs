@@ -1,4 +1,4 @@
-//! News feed of the season: announcements, openings, releases and closings.
+//! News feed of the season: announcements, openings and closings of stages and tournaments, and releases of evaluation days.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::paths;
@@ -6,21 +6,22 @@ use faceoff_store::Stage;
 use jiff::Timestamp;
 use uuid::Uuid;
 
-/// Longest feed.
+/// Largest number of items in the feed.
 const MAX_ITEMS: usize = 100;
 
-/// Newest announcements that are read.
+/// Number of newest announcements that may appear in the feed.
 const MAX_ANNOUNCEMENTS: u32 = 100;
 
-/// Newest tournaments whose rounds are read.
+/// Number of newest tournaments whose rounds may appear in the feed.
 const MAX_TOURNAMENTS: usize = 10;
 
 /// An item of the feed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewsItem {
-    /// The same in every version of the feed.
+    /// The same whenever the feed is made, so that a reader recognises the item.
     pub id: Uuid,
-    pub at: Timestamp,
+    /// When the event of the item happened.
+    pub occurred_at: Timestamp,
     pub title: String,
     /// The full text; plain text.
     pub text: Option<String>,
@@ -46,17 +47,18 @@ fn xml_safe(text: &str) -> String {
     text.chars().filter(is_allowed).collect()
 }
 
-fn item(key: &str, at: Timestamp, title: String, path: String) -> NewsItem {
+/// An item without text; its id derives from `key`.
+fn item(key: &str, occurred_at: Timestamp, title: String, path: String) -> NewsItem {
     NewsItem {
         id: item_id(key),
-        at,
+        occurred_at,
         title: xml_safe(&title),
         text: None,
         path,
     }
 }
 
-/// The id of the feed, derived from the season's commitment.
+/// The id of the feed, derived from the season's commitment, which is the hash of its secret.
 pub fn feed_id(commitment: &str) -> Uuid {
     item_id(&format!("season {commitment}"))
 }
@@ -71,19 +73,19 @@ pub async fn newest(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
         items.extend(stage_items(stage));
     }
     for (day, _) in app.store.days().await? {
-        let Some(at) = day.released_at else {
+        let Some(released_at) = day.released_at else {
             continue;
         };
         let stage = stages.iter().find(|stage| stage.id == day.stage_day.stage);
         let stage = stage.map_or("a stage", |stage| stage.name.as_str());
         let title = format!("{stage}: the day {} is released", day.stage_day.date);
         let key = format!("day {} released", day.stage_day);
-        items.push(item(&key, at, title, "/season".to_owned()));
+        items.push(item(&key, released_at, title, "/season".to_owned()));
     }
     items.extend(tournament_items(app).await?);
     // Items of the future are not shown yet.
-    items.retain(|item| item.at <= now);
-    items.sort_by_key(|item| (std::cmp::Reverse(item.at), item.id));
+    items.retain(|item| item.occurred_at <= now);
+    items.sort_by_key(|item| (std::cmp::Reverse(item.occurred_at), item.id));
     items.truncate(MAX_ITEMS);
     Ok(items)
 }
@@ -96,7 +98,7 @@ async fn announcements(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
         .into_iter();
     let items = announcements.map(|announcement| NewsItem {
         id: announcement.id.as_uuid(),
-        at: announcement.at,
+        occurred_at: announcement.at,
         title: xml_safe(&announcement.title),
         text: Some(xml_safe(&announcement.text)),
         path: "/announcements".to_owned(),
@@ -104,7 +106,7 @@ async fn announcements(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
     Ok(items.collect())
 }
 
-/// A stage opens and closes by the clock, without an event in the log.
+/// Items of a stage. It opens and closes at a set time, without an event in the log.
 fn stage_items(stage: &Stage) -> Vec<NewsItem> {
     let (id, name) = (stage.id, &stage.name);
     let path = format!("/?stage={id}");
@@ -114,10 +116,10 @@ fn stage_items(stage: &Stage) -> Vec<NewsItem> {
         format!("{name} is open"),
         path.clone(),
     )];
-    if let Some(at) = stage.closes_at {
+    if let Some(closes_at) = stage.closes_at {
         let title = format!("{name} is closed");
         let key = format!("stage {id} closes");
-        items.push(item(&key, at, title, path.clone()));
+        items.push(item(&key, closes_at, title, path.clone()));
     }
     if let Some(sign_off) = &stage.sign_off {
         let title = format!("{name}: the result is signed off");
@@ -133,26 +135,30 @@ async fn tournament_items(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
     for tournament in tournaments.into_iter().rev().take(MAX_TOURNAMENTS) {
         let (id, name) = (tournament.id, &tournament.name);
         let path = paths::tournament(id);
-        let mut add = |event: &str, at: Timestamp, title: String| {
+        let mut add = |event: &str, occurred_at: Timestamp, title: String| {
             items.push(item(
                 &format!("tournament {id} {event}"),
-                at,
+                occurred_at,
                 title,
                 path.clone(),
             ));
         };
         let opened = format!("The tournament {name} is open");
         add("opened", tournament.created_at, opened);
-        if let Some(at) = tournament.closed_at {
-            add("closed", at, format!("The tournament {name} is closed"));
+        if let Some(closed_at) = tournament.closed_at {
+            add(
+                "closed",
+                closed_at,
+                format!("The tournament {name} is closed"),
+            );
         }
         for round in app.store.tournament_record(id).await?.rounds {
             let number = round.number;
             let begun = format!("{name}: round {number} has begun");
             add(&format!("round {number} begun"), round.started_at, begun);
-            if let Some(at) = round.over_at {
+            if let Some(over_at) = round.over_at {
                 let over = format!("{name}: round {number} is over");
-                add(&format!("round {number} over"), at, over);
+                add(&format!("round {number} over"), over_at, over);
             }
         }
     }

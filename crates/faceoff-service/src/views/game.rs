@@ -1,4 +1,4 @@
-//! Games between two submissions: purpose, state and result.
+//! Games between two submissions: purpose (a round of a tournament, a test, a friendly game), state and result.
 
 use crate::{
     app::AppState,
@@ -17,7 +17,7 @@ use faceoff_store::{
 };
 use faceoff_types::{GameId, RoundNumber, Side, TournamentId};
 
-/// A game that the viewer may see, with the state of its tournament, which is not scored.
+/// A game that the viewer may see, with the state of its tournament, without draws and results.
 ///
 /// # Errors
 /// `NotFound`, also for a game that the viewer may not see.
@@ -27,20 +27,21 @@ pub async fn find_visible(
     viewer: Viewer,
     id: GameId,
 ) -> Result<(TournamentState, Game), Problem> {
-    let none = || Problem::new(ProblemKind::NotFound, NO_GAME);
+    let not_found = || Problem::new(ProblemKind::NotFound, GAME_NOT_FOUND);
     let game = match app.store.game(id).await {
-        Err(StoreError::NotFound(_)) => return Err(none()),
-        found => found?,
+        Err(StoreError::NotFound(_)) => return Err(not_found()),
+        result => result?,
     };
     let state = TournamentState::unscored(app, game.tournament).await?;
     if state.visibility(viewer).is_visible(&game) {
         Ok((state, game))
     } else {
-        Err(none())
+        Err(not_found())
     }
 }
 
-const NO_GAME: &str = "there is no such game, or you may not see it; check the id. Test and friendly games are visible only \
+/// Message for a game that does not exist or that the viewer may not see.
+const GAME_NOT_FOUND: &str = "there is no such game, or you may not see it; check the id. Test and friendly games are visible only \
                        to their two teams: check the token";
 
 /// A game that the viewer may see.
@@ -57,7 +58,7 @@ pub fn round_games(
     round: Option<RoundNumber>,
 ) -> Result<Vec<GameView>, Problem> {
     let is_selected = |game: &&Game| {
-        round.is_none() || game.purpose.schedule_entry().map(|meeting| meeting.round) == round
+        round.is_none() || game.purpose.schedule_entry().map(|entry| entry.round) == round
     };
     let games = state.games.iter().filter(is_selected);
     games.map(|game| view(state, viewer, game)).collect()
@@ -105,7 +106,7 @@ pub fn view(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<Game
         sides: [side(Side::First)?, side(Side::Second)?],
         seed_label: game.seed.to_string(),
         created_at: game.created_at,
-        next: next(state, game).to_owned(),
+        next: next_text(state, game).to_owned(),
         excluded_by,
         status: status(state, viewer, game)?,
     })
@@ -147,16 +148,16 @@ fn status(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<GameSt
             attempt: *attempt,
             since: *since,
         },
-        GameState::Played(row) => {
+        GameState::Played(played_row) => {
             let (score, played) = state.result(game)?.ok_or_else(|| {
                 Problem::internal(format_args!("game {} is played without a result", game.id))
             })?;
-            let recording = row.recording.as_ref();
+            let recording = played_row.recording.as_ref();
             let recording = recording
-                .map(|files| recording_view(state.visibility(viewer), game, &score, files));
+                .map(|recording| recording_view(state.visibility(viewer), game, &score, recording));
             GameStatus::Played {
-                attempt: row.attempt,
-                finished_at: row.at,
+                attempt: played_row.attempt,
+                finished_at: played_row.at,
                 result: Box::new(result_view(&score, &played, recording)),
             }
         }
@@ -179,13 +180,13 @@ fn recording_view(
     visibility: GameVisibility<'_>,
     game: &Game,
     score: &GameScore,
-    files: &GameRecording,
+    recording: &GameRecording,
 ) -> RecordingView {
     RecordingView {
         public: visibility.is_public(game),
         seed: visibility.can_see_both_sides(game).then_some(score.seed),
-        game_blake3: files.game_blake3.clone(),
-        side_blake3: files.side_blake3.clone(),
+        game_blake3: recording.game_blake3.clone(),
+        side_blake3: recording.side_blake3.clone(),
     }
 }
 
@@ -218,8 +219,8 @@ fn result_view(
 }
 
 /// What happens next to a game, in words.
-fn next(state: &TournamentState, game: &Game) -> &'static str {
-    let counts = matches!(game.purpose, GamePurpose::Round(_));
+fn next_text(state: &TournamentState, game: &Game) -> &'static str {
+    let counts_in_tournament = matches!(game.purpose, GamePurpose::Round(_));
     match &game.state {
         GameState::Queued if state.tournament.paused.is_some() => {
             "It waits until the paused tournament is resumed."
@@ -229,7 +230,7 @@ fn next(state: &TournamentState, game: &Game) -> &'static str {
         }
         GameState::Running { .. } => "It is running; its result is published at once when it ends.",
         GameState::Played(_) => "Done. Its result stays.",
-        GameState::PlatformFailed { .. } if counts => {
+        GameState::PlatformFailed { .. } if counts_in_tournament => {
             "It does not count. An organiser has to rerun it, with the same seed, before the tournament continues."
         }
         GameState::PlatformFailed { .. } => "Failed. An organiser can rerun it.",

@@ -1,5 +1,5 @@
-//! Clips of a game: the motion for everyone who may see the game, a side's observations and actions with access to its
-//! recording.
+//! Clips of a game: compressed recordings. Everyone who may see the game may see the motion. The observations and actions of a side
+//! (one of the two teams) are visible to viewers with access to the side's recording.
 
 use crate::{
     app::App,
@@ -8,7 +8,7 @@ use crate::{
     viewer::Viewer,
     views::{clip_file::ClipFile, game, visibility::GameVisibility},
 };
-use faceoff_replay::{CHUNK_STEPS, Clip, GameAnalysis, Key, Pack, ReplayError};
+use faceoff_replay::{CHUNK_STEPS, Clip, ClipKey, GameAnalysis, Pack, ReplayError};
 use faceoff_store::{Game, GameState};
 use faceoff_types::{GameId, Side};
 use std::sync::Arc;
@@ -38,10 +38,10 @@ impl GameClips {
         game: &Game,
     ) -> Result<Self, Problem> {
         let recording = match &game.state {
-            GameState::Played(row) => row.recording.as_ref(),
+            GameState::Played(played_row) => played_row.recording.as_ref(),
             _ => None,
         };
-        let conflict = |why: &str| Problem::new(ProblemKind::Conflict, why);
+        let conflict = |detail: &str| Problem::new(ProblemKind::Conflict, detail);
         let Some(recording) = recording else {
             return Err(conflict(
                 "the game has no replay, because it has no result with a recording",
@@ -64,9 +64,9 @@ impl GameClips {
     /// A clip's compressed bytes.
     ///
     /// # Errors
-    /// `NotFound` if the game ended before.
+    /// `NotFound` if the game ended before this clip. A clip has a fixed number of steps of the game.
     #[boxed]
-    pub async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
+    pub async fn clip(&self, key: ClipKey) -> Result<Vec<u8>, Problem> {
         let clip = self.file.read(move |pack| pack.clip(key)).await?;
         clip.ok_or_else(|| {
             let detail = format!(
@@ -76,7 +76,7 @@ impl GameClips {
         })
     }
 
-    /// Analysis of the whole game's motion, cached.
+    /// Analysis of the motion of the whole game, which has this number of control steps. It is cached.
     ///
     /// # Errors
     /// `Internal` if the clips cannot be read.
@@ -90,7 +90,7 @@ impl GameClips {
         let read = move |pack: &Pack| {
             let chunks = 0..steps.div_ceil(CHUNK_STEPS);
             let clip = |chunk| -> Result<Option<Clip>, ReplayError> {
-                let bytes = pack.clip(Key::game_motion(chunk))?;
+                let bytes = pack.clip(ClipKey::game_motion(chunk))?;
                 bytes.map(|bytes| Clip::read(&bytes)).transpose()
             };
             GameAnalysis::from_clips(chunks.filter_map(|chunk| clip(chunk).transpose()))

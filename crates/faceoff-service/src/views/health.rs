@@ -1,4 +1,4 @@
-//! Readiness of the server.
+//! Health check: whether the server is ready, that is, whether database, queue and disks work.
 
 use crate::{
     app::AppState,
@@ -23,7 +23,7 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
         QueueHealth::Running { out_of_space, .. } => out_of_space,
         _ => 0,
     };
-    let (running, waiting, queue) = match health.queue {
+    let (running, waiting, queue_state) = match health.queue {
         QueueHealth::Running {
             running, waiting, ..
         } => (running, waiting, "moving"),
@@ -90,7 +90,7 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
                 "not writable"
             },
         )
-        .with("queue", queue)
+        .with("queue", queue_state)
         .with_renamed(
             "free_space",
             "room",

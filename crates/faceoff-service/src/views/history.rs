@@ -1,4 +1,4 @@
-//! Board history: results and ranks of all teams, day by day.
+//! Board history: the results of each evaluation day, with the ranks that the teams had on the board of that day.
 
 use crate::{
     aggregated_rows::AggregatedRow,
@@ -46,30 +46,30 @@ pub async fn query(
         None => app.store.board_revision_within(&stage, &scope).await?,
     };
     let revisions = app.store.stage_revisions(stage.id).await?;
-    if !revisions.iter().any(|known| known.number == revision) {
+    if !revisions.iter().any(|existing| existing.number == revision) {
         return Err(Problem::not_found("revision of the stage's rules"));
     }
     let division = match query.division {
         Some(name) => Some(division::find(app, &name).await?),
         None => None,
     };
-    let by = query.by.map(BoardBy::counting_result);
+    let requested_result = query.by.map(BoardBy::counting_result);
     let mut records = if visibility.is_hidden(stage.id) {
         Vec::new()
     } else {
-        let all = BoardDays::All;
-        let board = app.store.board_of_days(stage.id, revision, all, &scope);
-        board.await?
+        let days = BoardDays::All;
+        let records = app.store.board_of_days(stage.id, revision, days, &scope);
+        records.await?
     };
     records.retain(|record| {
         let team_division = &record.team.profile.division;
         record.team.is_baseline || division.is_none() || *team_division == division
     });
     let final_cutoff = app.store.final_cutoff(stage.id).await?;
-    let final_day = final_cutoff.map(|at| stage.day(at).date);
-    let rows_by = |day: Date| match (by, stage.settings.standings) {
-        (Some(by), _) => by,
-        (None, CountingResult::Final) if final_day.is_none_or(|last| day < last) => {
+    let final_day = final_cutoff.map(|cutoff_at| stage.day(cutoff_at).date);
+    let rows_by = |day: Date| match (requested_result, stage.settings.standings) {
+        (Some(counting_result), _) => counting_result,
+        (None, CountingResult::Final) if final_day.is_none_or(|final_day| day < final_day) => {
             CountingResult::Latest
         }
         (None, standings) => standings,
@@ -79,7 +79,7 @@ pub async fn query(
     days.dedup();
     Ok(HistoryView {
         revision,
-        by,
+        by: requested_result,
         task: query.task,
         division,
         frozen: frozen.map(ruling::view),
@@ -89,6 +89,7 @@ pub async fn query(
     })
 }
 
+/// The history of a stage without its rows.
 fn without_rows(stage: Stage) -> HistoryView {
     HistoryView {
         stage: stage.id,
@@ -117,12 +118,12 @@ fn rows(
     let mut team_index = BTreeMap::new();
     let mut by_day: BTreeMap<Date, Vec<BoardRecord>> = BTreeMap::new();
     for record in records {
-        let next = team_index.len();
-        team_index.entry(record.team.id).or_insert(next);
+        let next_index = team_index.len();
+        team_index.entry(record.team.id).or_insert(next_index);
         by_day.entry(record.day).or_default().push(record);
     }
-    // By team, the results that can still count.
-    let mut counting = vec![Vec::new(); team_index.len()];
+    // For each team, the results that can still count.
+    let mut counting_records = vec![Vec::new(); team_index.len()];
     let mut rows = Vec::new();
     for (day, day_records) in by_day {
         let rule = CountingRule {
@@ -131,19 +132,25 @@ fn rows(
             task,
         };
         for record in &day_records {
-            let team_records: &mut Vec<BoardRecord> = &mut counting[team_index[&record.team.id]];
+            let team_records: &mut Vec<BoardRecord> =
+                &mut counting_records[team_index[&record.team.id]];
             team_records.push(record.clone());
             board_rows::drop_superseded(team_records, rule);
         }
-        let aggregated = board_rows::aggregate(counting.concat(), rule)?;
-        let all = board_rows::rank(aggregated, task, |row| &row.record);
+        let aggregated = board_rows::aggregate(counting_records.concat(), rule)?;
+        let all_ranked = board_rows::rank(aggregated, task, |row| &row.record);
         let (ranked, baselines) =
-            board_rows::split_baselines(all, |row| row.record.team.is_baseline);
+            board_rows::split_baselines(all_ranked, |row| row.record.team.is_baseline);
         let mut day_rows: Vec<HistoryRow> = day_records
             .iter()
             .filter_map(|record| {
                 let team = record.team.id;
-                row(record, task, rank(&ranked, team), rank(&baselines, team))
+                row(
+                    record,
+                    task,
+                    rank_of(&ranked, team),
+                    rank_of(&baselines, team),
+                )
             })
             .collect();
         day_rows.sort_by_key(|row| (row.baseline, row.rank.or(row.would_rank)));
@@ -152,12 +159,12 @@ fn rows(
     Ok(rows)
 }
 
-fn rank(rows: &[RankedEntry<AggregatedRow>], team: TeamId) -> Option<u32> {
-    let found = rows.iter().find(|row| row.entry.key.record.team.id == team);
-    found.map(|row| row.rank)
+fn rank_of(rows: &[RankedEntry<AggregatedRow>], team: TeamId) -> Option<u32> {
+    let team_row = rows.iter().find(|row| row.entry.key.record.team.id == team);
+    team_row.map(|row| row.rank)
 }
 
-/// A day's result; `None` if the task was not evaluated.
+/// A result with the team's rank on its day, or the rank that a baseline would have; `None` if the task was not evaluated.
 fn row(
     record: &BoardRecord,
     task: Option<Task>,

@@ -1,4 +1,4 @@
-//! Invitations and registrations.
+//! Invitations (links by which a person gets an account) and registrations of new teams.
 
 use faceoff_api::{
     requests::InvitedRole,

@@ -1,4 +1,4 @@
-//! The current state of a live game, for pages that do not use the stream.
+//! The current state of a running game, for pages that do not read the stream of live events.
 
 use crate::app::AppState;
 use faceoff_store::LiveUpdate;
@@ -13,7 +13,7 @@ pub struct LiveGameView {
 }
 
 impl LiveGameView {
-    /// `None` if no slot reports it to this process, or it has not started yet.
+    /// The current state of a game; `None` if the game is not running, or the slot that plays it does not report to this process.
     pub fn find(app: &AppState, game: GameId) -> Option<Self> {
         let mut subscription = app.store.live_games().subscribe(game)?;
         let LiveUpdate { state, events, .. } = subscription.read_since(None);

@@ -1,4 +1,4 @@
-//! A team's own status: today's evaluation and the submission for the next cutoff.
+//! A team's own status: today's evaluation, and the submission that the next cutoff evaluates.
 
 use crate::{
     app::AppState,
@@ -19,13 +19,13 @@ pub async fn build(app: &AppState, team: Team) -> Result<MeView, Problem> {
     let visibility = Visibility::load(app, Viewer::Team(team.id)).await?;
     let today = stage::current(app).await?.day(app.config.clock.now());
     let counts_for_day = |evaluation: &Evaluation| {
-        let stopped = matches!(
+        let has_no_result = matches!(
             evaluation.state,
             EvaluationState::PlatformFailed { .. }
                 | EvaluationState::NotPlayed { .. }
                 | EvaluationState::Cancelled { .. }
         );
-        !stopped && evaluation.voided.is_none()
+        !has_no_result && evaluation.voided.is_none()
     };
     let evaluations = app.store.evaluations_of(team.id).await?;
     let evaluation = evaluations

@@ -1,8 +1,8 @@
 //! Builds response bodies from the store and the scoring, one file per resource. Their types are in
 //! [`faceoff_api::views`].
 //!
-//! Data about a day's episodes becomes visible with the day's release, for everyone at once. What depends on the viewer
-//! (scores of blind stages, evaluations that are not public) is decided only in [`visibility`].
+//! Data about the episodes of an evaluation day becomes visible with the day's release, for everyone at once. Restrictions that
+//! depend on the viewer (scores of blind stages, evaluations that are not public) are decided only in [`visibility`].
 
 pub mod ablation;
 pub mod ablation_clips;

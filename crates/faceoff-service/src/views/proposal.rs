@@ -1,4 +1,6 @@
-//! Trials and proposed re-evaluations, and the changes that they would make.
+//! Proposals: sets of evaluations that do not count yet. A *trial* runs the active submissions on
+//! separate episodes and never counts. A proposed re-evaluation repeats an evaluation, a day, or a day under changed rules. The
+//! organisers see how it would change the board, and then apply or drop it.
 
 use crate::{
     app::AppState,
@@ -34,13 +36,19 @@ async fn evaluation_view(
     evaluation: ProposedEvaluation,
     is_dropped: bool,
 ) -> Result<ProposedEvaluationView, Problem> {
-    let (mut done, mut total) = (0, 0);
+    let mut progress = Progress {
+        episodes_done: 0,
+        episodes_total: 0,
+    };
     if let EvaluationState::Running {
         episodes_done,
         episodes_total,
     } = &evaluation.state
     {
-        (done, total) = (*episodes_done, *episodes_total);
+        progress = Progress {
+            episodes_done: *episodes_done,
+            episodes_total: *episodes_total,
+        };
     }
     let status = match evaluation.state {
         EvaluationState::Queued => ProposedEvaluationStatus::Queued,
@@ -82,16 +90,13 @@ async fn evaluation_view(
         team_name: app.store.team(evaluation.team).await?.name,
         submission: evaluation.submission,
         replaces: evaluation.replaces,
-        progress: Progress {
-            episodes_done: done,
-            episodes_total: total,
-        },
+        progress,
         status,
     })
 }
 
-/// The board record of a proposed evaluation with a score.
-async fn record(
+/// The board record of a proposed evaluation; `None` if it has no score, or its team is disqualified.
+async fn board_record(
     app: &AppState,
     stage: &Stage,
     proposal: &Proposal,
@@ -133,6 +138,7 @@ async fn record(
     }))
 }
 
+/// The boards without and with the proposed results, and the differences.
 async fn outcome(
     app: &AppState,
     proposal: &Proposal,
@@ -140,19 +146,19 @@ async fn outcome(
 ) -> Result<OutcomeView, Problem> {
     let stage = app.store.stage(proposal.stage).await?;
     let visibility = Visibility::for_organiser(app).await?;
-    let mut played = Vec::new();
+    let mut proposed_records = Vec::new();
     for evaluation in proposed {
-        played.extend(record(app, &stage, proposal, evaluation).await?);
+        proposed_records.extend(board_record(app, &stage, proposal, evaluation).await?);
     }
     let revision = proposal.revision;
     let old_revision = match proposal.kind {
         ProposalKind::Trial => {
-            // Without the results that count.
-            let nothing = BoardScope {
+            // The board of a trial shows only the results of the trial.
+            let empty_scope = BoardScope {
                 finished_until: Some(Timestamp::MIN),
                 ..BoardScope::default()
             };
-            let trial_results = (&nothing, played);
+            let trial_results = (&empty_scope, proposed_records);
             let new_board = board::build(
                 app,
                 &visibility,
@@ -171,35 +177,35 @@ async fn outcome(
         ProposalKind::Rules(_) => app.store.board_revision(&stage).await?,
         ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
     };
-    let current_scope = (&BoardScope::default(), Vec::new());
+    let current_results = (&BoardScope::default(), Vec::new());
     let old_board = board::build(
         app,
         &visibility,
         &stage,
         old_revision,
         BoardSelection::default(),
-        current_scope,
+        current_results,
     )
     .await?;
-    // A platform fault replaces no result.
-    let replaces = |evaluation: &ProposedEvaluation| match evaluation.state {
+    // An evaluation that failed by a platform fault replaces no result.
+    let replaced_evaluation = |evaluation: &ProposedEvaluation| match evaluation.state {
         EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => {
             evaluation.replaces
         }
         _ => None,
     };
     let scope = BoardScope {
-        excluded: proposed.iter().filter_map(replaces).collect(),
+        excluded: proposed.iter().filter_map(replaced_evaluation).collect(),
         ..BoardScope::default()
     };
-    let new_scope = (&scope, played);
+    let new_results = (&scope, proposed_records);
     let new_board = board::build(
         app,
         &visibility,
         &stage,
         revision,
         BoardSelection::default(),
-        new_scope,
+        new_results,
     )
     .await?;
     Ok(OutcomeView {
@@ -230,7 +236,7 @@ fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
             })
         })
     };
-    let mut seen = BTreeSet::new();
+    let mut seen_teams = BTreeSet::new();
     let boards = [new, old].into_iter();
     let teams = boards.flat_map(|board| {
         let ranked = board.rows.iter().map(|row| (row.team_id, &row.team));
@@ -238,7 +244,7 @@ fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
         ranked.chain(baselines)
     });
     teams
-        .filter(|(id, _)| seen.insert(*id))
+        .filter(|(id, _)| seen_teams.insert(*id))
         .map(|(id, team)| ChangeView {
             team: team.clone(),
             old: rank(old, id),
@@ -248,13 +254,13 @@ fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
         .collect()
 }
 
-/// The proposals, in order, without their evaluations.
+/// The proposals, in order, without their evaluations and outcomes.
 #[boxed]
-pub async fn heads(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<ProposalView>, Problem> {
+pub async fn list(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<ProposalView>, Problem> {
     let mut views = Vec::new();
     for proposal in proposals {
         let (proposal, proposed) = app.store.proposal(proposal.id).await?;
-        views.push(head(app, &proposal, &proposed).await?);
+        views.push(summary(app, &proposal, &proposed).await?);
     }
     Ok(views)
 }
@@ -263,8 +269,8 @@ pub async fn heads(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<Propo
 #[boxed]
 pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Problem> {
     let (proposal, proposed) = app.store.proposal(id).await?;
-    let head = head(app, &proposal, &proposed).await?;
-    let outcome = match head.state {
+    let summary = summary(app, &proposal, &proposed).await?;
+    let outcome = match summary.state {
         ProposalStateView::Played => Some(outcome(app, &proposal, &proposed).await?),
         _ => None,
     };
@@ -276,11 +282,12 @@ pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Proble
     Ok(ProposalView {
         evaluations,
         outcome,
-        ..head
+        ..summary
     })
 }
 
-async fn head(
+/// A proposal without its evaluations and its outcome.
+async fn summary(
     app: &AppState,
     proposal: &Proposal,
     proposed: &[ProposedEvaluation],

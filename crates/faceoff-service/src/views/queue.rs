@@ -1,4 +1,4 @@
-//! Positions in the queue.
+//! Positions in the queue of jobs, with the time at which each evaluation or validation run is expected to end.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::queue::QueueView;
@@ -12,7 +12,7 @@ pub fn view(position: QueuePosition) -> QueueView {
     }
 }
 
-/// Slots that run jobs now: the server's own and those of remote workers.
+/// Number of slots that run jobs now: the server's own and those of remote workers.
 pub fn slots(app: &AppState) -> u32 {
     let remote = app.store.workers().available_slots(app.config.clock.now());
     app.config.capacity.slots + remote

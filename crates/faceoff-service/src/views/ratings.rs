@@ -1,4 +1,4 @@
-//! Ratings of a tournament's submissions, from their games.
+//! Ratings of a tournament's submissions: estimates of playing strength from the results of their games.
 
 use crate::{
     app::App,
@@ -19,28 +19,30 @@ use std::sync::Arc;
 pub async fn ratings(app: &App, id: TournamentId) -> Result<Arc<Ratings>, Problem> {
     let app = Arc::clone(app);
     let task = tokio::spawn(async move {
-        let compute_ratings = async || compute(&app, id).await;
-        app.rating_cache.get(&app.store, id, compute_ratings).await
+        let compute = async || compute_ratings(&app, id).await;
+        app.rating_cache.get(&app.store, id, compute).await
     });
     task.await.map_err(Problem::internal)?
 }
 
-async fn compute(app: &App, id: TournamentId) -> Result<Ratings, Problem> {
+async fn compute_ratings(app: &App, id: TournamentId) -> Result<Ratings, Problem> {
     let state = TournamentState::find(app, id).await?;
-    // The intervals need a thousand fits.
-    let rated =
-        tokio::task::spawn_blocking(move || rate(state.departures.counting(state.played())));
-    match rated.await.map_err(Problem::internal)? {
+    // The uncertainty intervals need a thousand fits of the rating model, so they are computed on a blocking thread.
+    let result =
+        tokio::task::spawn_blocking(move || rate(state.departures.counting_games(state.played())));
+    match result.await.map_err(Problem::internal)? {
         Err(error @ RatingError::TooMany(_)) => {
             Err(Problem::new(ProblemKind::Conflict, error.to_string()))
         }
-        rated => rated.map_err(Problem::internal),
+        ratings => ratings.map_err(Problem::internal),
     }
 }
 
 /// The head-to-head record of each pair of teams that met, by name.
 #[boxed]
-pub async fn records(app: &App, id: TournamentId) -> Result<Vec<HeadToHead>, Problem> {
+pub async fn head_to_head_records(app: &App, id: TournamentId) -> Result<Vec<HeadToHead>, Problem> {
     let state = TournamentState::find(app, id).await?;
-    Ok(head_to_head(state.departures.counting(state.played())))
+    Ok(head_to_head(
+        state.departures.counting_games(state.played()),
+    ))
 }

@@ -1,4 +1,5 @@
-//! Replays of a tournament's schedule with other seeds, to estimate how certain its champion is.
+//! Replays of a tournament: its whole schedule is played again, several times, with other seeds. The share of replays that each team
+//! wins estimates how certain the champion is.
 
 use crate::{
     app::App,
@@ -45,8 +46,9 @@ fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSh
         }
     }
     let mut first_places = Vec::<TeamName>::new();
-    let mut given_up = 0;
+    let mut incomplete_count = 0;
     for games in replays.values() {
+        // A replay is incomplete if one of its games has ended without a result.
         let (mut is_running, mut is_incomplete) = (false, false);
         for game in games {
             let is_played = matches!(game.state, GameState::Played(_));
@@ -56,7 +58,7 @@ fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSh
             }
         }
         if is_incomplete {
-            given_up += 1;
+            incomplete_count += 1;
         } else if !is_running {
             let tables = state.tables(&state.results(games.iter().copied())?);
             first_places.extend(tables.first().and_then(first_place));
@@ -69,15 +71,15 @@ fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSh
         .iter()
         .filter(|game| !matches!(game.state, GameState::Cancelled { .. }));
     Ok(ChampionSharesView {
-        replays: count(replays.len()),
-        complete: count(first_places.len()),
-        given_up,
-        games: count(to_be_played.count()),
-        games_played: count(played.count()),
+        replays: to_u32(replays.len()),
+        complete: to_u32(first_places.len()),
+        given_up: incomplete_count,
+        games: to_u32(to_be_played.count()),
+        games_played: to_u32(played.count()),
         champions: compute_champion_shares(&first_places),
     })
 }
 
-fn count(number: usize) -> u32 {
-    u32::try_from(number).unwrap_or(u32::MAX)
+fn to_u32(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
 }

@@ -1,4 +1,4 @@
-//! What the organiser has decided, and why.
+//! Rulings: decisions of the organisers, with time and reason.
 
 use faceoff_api::views::ruling::RulingView;
 use faceoff_store::Ruling;

@@ -1,4 +1,5 @@
-//! Runtimes and resource limits of agents, for the server and for each stage and tournament.
+//! Runtimes and resource limits of agents, for the server and for each stage and tournament. A *runtime* is an environment in which an
+//! agent runs, for example Python with its packages.
 
 use crate::{app::AppState, boxed, problem::Problem, views::stage};
 use faceoff_api::views::{
@@ -13,11 +14,12 @@ pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
     let resources = &app.config.agent_resources;
     let aborted = || Problem::internal("the inspection of the runtimes was aborted");
     let inventories = resources.inventories().await.ok_or_else(aborted)?;
-    let runtimes: Vec<_> = inventories.iter().map(public).collect();
-    let accepted = |by: Option<&Runtimes>| -> Vec<String> {
+    let runtimes: Vec<_> = inventories.iter().map(public_inventory).collect();
+    // Names of the runtimes that a stage or tournament accepts; `None`: all.
+    let accepted_names = |selection: Option<&Runtimes>| -> Vec<String> {
         let names = runtimes.iter().map(|runtime| &runtime.name);
         names
-            .filter(|name| by.is_none_or(|by| by.contains(name)))
+            .filter(|name| selection.is_none_or(|selection| selection.contains(name)))
             .cloned()
             .collect()
     };
@@ -30,7 +32,7 @@ pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
         }
         let rules = &stage.rules.rules;
         stages.push(StageResources {
-            runtimes: accepted(rules.runtimes.as_ref()),
+            runtimes: accepted_names(rules.runtimes.as_ref()),
             limits: rules.limits.apply_to(&resources.limits),
             id: stage.id,
             name: stage.name,
@@ -50,7 +52,7 @@ pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
             .map(|tournament| TournamentResources {
                 id: tournament.id,
                 name: tournament.name,
-                runtimes: accepted(tournament.rules.runtimes.as_ref()),
+                runtimes: accepted_names(tournament.rules.runtimes.as_ref()),
                 limits: tournament.rules.limits.apply_to(&resources.limits),
                 game_limits: tournament.rules.game_limits,
             })
@@ -60,7 +62,7 @@ pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
 }
 
 /// Hides why a runtime does not work: the reason may contain the host's folders.
-fn public(runtime: &RuntimeInventory) -> RuntimeInventory {
+fn public_inventory(runtime: &RuntimeInventory) -> RuntimeInventory {
     match &runtime.content {
         RuntimeContent::Failed { .. } => RuntimeInventory {
             name: runtime.name.clone(),

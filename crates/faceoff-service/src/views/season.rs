@@ -1,4 +1,5 @@
-//! The season: its commitment, stages and days, and the seeds that are revealed.
+//! The season: its stages, evaluation days and seeds. All seeds derive from the season's secret, which is published at the end; its
+//! hash, the *commitment*, is public from the start, so that everyone can check the seeds.
 
 use crate::{
     app::AppState,
@@ -21,13 +22,14 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
     update_has_tournaments(app).await?;
     let visibility = Visibility::load(app, viewer).await?;
     let days = app.store.days().await?;
-    let missed: HashMap<StageDay, String> = app.store.missed_days().await?.into_iter().collect();
+    let missed_reasons: HashMap<StageDay, String> =
+        app.store.missed_days().await?.into_iter().collect();
     let stages = app.store.stages().await?;
     let seeds = app
         .store
         .day_seeds(&season, &stages, days.iter().map(|(day, _)| day.stage_day))
         .await?;
-    let revealed = |seed: Seed| season.closed_at.map(|_| seed);
+    let reveal_if_closed = |seed: Seed| season.closed_at.map(|_| seed);
     Ok(SeasonView {
         ruleset: RULESET.to_owned(),
         created_at: season.created_at,
@@ -37,8 +39,8 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
         takes_registrations: season.registration_open,
         divisions: app.store.divisions().await?,
         terms_version: app.store.terms().await?.first().map(|terms| terms.version),
-        secret: revealed(season.secret),
-        mismatch_seed: revealed(season.secret.model_mismatch()),
+        secret: reveal_if_closed(season.secret),
+        mismatch_seed: reveal_if_closed(season.secret.model_mismatch()),
         today: stage::current(app).await?.day(app.config.clock.now()).date,
         stages: stage::all_for_viewer(app, viewer).await?,
         next_cutoff: day::first_cutoff(app).await?,
@@ -50,7 +52,7 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
                 cutoff_at: day.cutoff_at,
                 deadline_at: day.deadline_at,
                 released_at: day.released_at,
-                missed: missed.get(&day.stage_day).cloned(),
+                missed: missed_reasons.get(&day.stage_day).cloned(),
                 finished,
                 seed: day
                     .released_at
@@ -63,7 +65,7 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
     })
 }
 
-/// The season's data in page headers; one database read, however long the season is.
+/// The season's data in page headers. Loading it is one database read, however many days the season has.
 pub struct SeasonHead {
     pub name: String,
     /// Hash of the season secret, in hexadecimal digits.
@@ -86,7 +88,7 @@ impl SeasonHead {
     }
 }
 
-/// Pages link to the tournaments once there is one.
+/// Updates the flag that the season has a tournament: pages link to tournaments once there is one.
 async fn update_has_tournaments(app: &AppState) -> Result<(), Problem> {
     if !app.has_tournaments.load(Ordering::Relaxed) && !app.store.tournaments().await?.is_empty() {
         app.has_tournaments.store(true, Ordering::Relaxed);

@@ -1,4 +1,5 @@
-//! Stages: opening times, rules and the next cutoff.
+//! Stages: opening times, rules and the next cutoff. A *stage* is a part of the season with its own rules, board and daily
+//! evaluations; a *revision* is a version of its rules.
 
 use crate::{
     app::AppState,
@@ -94,7 +95,7 @@ pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
     })
 }
 
-/// The default stage of requests: the open one, or the nearest in time.
+/// The stage of requests that name none: the open one, or the nearest in time.
 #[boxed]
 pub async fn current(app: &AppState) -> Result<Stage, Problem> {
     let current = app.store.current_stage(app.config.clock.now()).await?;

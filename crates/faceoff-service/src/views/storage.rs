@@ -1,11 +1,11 @@
-//! Disk usage and quota of teams.
+//! Disk usage of teams, and their quota of stored bundles.
 
 use crate::{app::AppState, boxed, problem::Problem, views::stage};
 use faceoff_api::views::storage::StorageView;
 use faceoff_store::{StorageScope, TeamStorage};
 use faceoff_types::TeamId;
 
-fn view(storage: TeamStorage, quota_bytes: u64, counted: StorageScope) -> StorageView {
+fn view(storage: TeamStorage, quota_bytes: u64, scope: StorageScope) -> StorageView {
     StorageView {
         team: storage.team,
         team_name: storage.name,
@@ -15,7 +15,7 @@ fn view(storage: TeamStorage, quota_bytes: u64, counted: StorageScope) -> Storag
         datasets: storage.datasets,
         dataset_bytes: storage.dataset_bytes,
         unmeasured_datasets: storage.unmeasured,
-        proposal_bytes: (counted == StorageScope::All).then_some(storage.proposal_bytes),
+        proposal_bytes: (scope == StorageScope::All).then_some(storage.proposal_bytes),
     }
 }
 
@@ -25,28 +25,29 @@ pub async fn all(app: &AppState) -> Result<Vec<StorageView>, Problem> {
     usage(app, None, StorageScope::All).await
 }
 
-/// Disk usage of a team, for itself or for organisers.
+/// Disk usage of a team, for the team itself or for organisers. `scope` says whether proposed re-evaluations count.
 #[boxed]
 pub async fn find(
     app: &AppState,
     team: TeamId,
-    counted: StorageScope,
+    scope: StorageScope,
 ) -> Result<StorageView, Problem> {
-    let found = usage(app, Some(team), counted).await?;
-    let found = found.into_iter().next();
-    found.ok_or_else(|| Problem::not_found("team"))
+    let usage = usage(app, Some(team), scope).await?;
+    let team_usage = usage.into_iter().next();
+    team_usage.ok_or_else(|| Problem::not_found("team"))
 }
 
+/// Disk usage of one team, or of all (`None`), by name.
 async fn usage(
     app: &AppState,
     team: Option<TeamId>,
-    counted: StorageScope,
+    scope: StorageScope,
 ) -> Result<Vec<StorageView>, Problem> {
-    let own = stage::current(app).await?.settings.uploads;
-    let configured = app.config.limits.upload_quota.stored_bytes;
-    let quota = own.stored_bytes.unwrap_or(configured);
-    let storage = app.store.storage(team, counted).await?.into_iter();
+    let stage_limits = stage::current(app).await?.settings.uploads;
+    let configured_bytes = app.config.limits.upload_quota.stored_bytes;
+    let quota_bytes = stage_limits.stored_bytes.unwrap_or(configured_bytes);
+    let storage = app.store.storage(team, scope).await?.into_iter();
     Ok(storage
-        .map(|storage| view(storage, quota, counted))
+        .map(|storage| view(storage, quota_bytes, scope))
         .collect())
 }

@@ -1,4 +1,5 @@
-//! Submissions and the verdicts of their validation runs.
+//! Submissions, with the verdicts of their validation runs. A *validation run* checks that the agent of a
+//! submission starts, responds, and meets its time limits.
 
 use crate::{
     app::AppState,
@@ -14,8 +15,8 @@ use faceoff_store::{Stage, Submission, SubmissionState};
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
 
-/// What happens next to a valid submission whose bundle was removed.
-const REMOVED: &str = "It cannot be evaluated any more: its bundle was deleted. Its results stay; to evaluate it again, upload it again.";
+/// Text of the field `next`, which says what happens next, for a valid submission whose bundle was removed.
+const BUNDLE_REMOVED: &str = "It cannot be evaluated any more: its bundle was deleted. Its results stay; to evaluate it again, upload it again.";
 
 /// A submission with its log and its position in the queue.
 #[boxed]
@@ -23,6 +24,7 @@ pub async fn find(app: &AppState, id: SubmissionId) -> Result<SubmissionView, Pr
     build(app, app.store.submission(id).await?).await
 }
 
+/// A submission with its log and its position in the queue.
 #[boxed]
 pub async fn build(app: &AppState, submission: Submission) -> Result<SubmissionView, Problem> {
     let log = app.store.submission_log(submission.id).await?;
@@ -54,7 +56,7 @@ pub async fn all(
     Ok(views)
 }
 
-/// Adds positions in the queue to submissions that wait for their validation run. Without any, the database is not read.
+/// Adds positions in the queue to submissions that wait for their validation run. If none waits, the database is not read.
 async fn add_queue_positions(app: &AppState, views: &mut [SubmissionView]) -> Result<(), Problem> {
     if views
         .iter()
@@ -95,7 +97,7 @@ pub fn view(
     let is_removed =
         matches!(status, SubmissionStatus::Valid { .. }) && submission.bundle_removed.is_some();
     let next = if is_removed {
-        REMOVED.to_owned()
+        BUNDLE_REMOVED.to_owned()
     } else {
         let mut next = status.next(submission.active, is_withdrawn).to_owned();
         for exclusion in &exclusions {
@@ -120,9 +122,9 @@ pub fn view(
         note: submission.note.map(printable),
         same_as: submission.duplicate_of,
         bundle_removed: submission.bundle_removed.map(ruling::view),
-        deleted: submission.deleted.map(|deleted| DeletionView {
-            at: deleted.deleted_at,
-            by: deleted.actor.to_string(),
+        deleted: submission.deleted.map(|deletion| DeletionView {
+            at: deletion.deleted_at,
+            by: deletion.actor.to_string(),
         }),
         queue: None,
         next,

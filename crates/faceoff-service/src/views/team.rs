@@ -1,11 +1,11 @@
-//! Teams.
+//! Teams: name, profile and state.
 
 use crate::{app::AppState, boxed, problem::Problem, views::ruling};
 use faceoff_api::views::team::TeamView;
 use faceoff_store::Team;
 use faceoff_types::TeamId;
 
-/// A team, without whether it declines friendly games.
+/// A team, without the setting whether it declines friendly games (games against another team that do not count).
 pub fn view(team: Team) -> TeamView {
     TeamView {
         id: team.id,
@@ -21,7 +21,7 @@ pub fn view(team: Team) -> TeamView {
     }
 }
 
-/// A team, including whether it declines friendly games.
+/// A team, including that setting.
 #[boxed]
 pub async fn find(app: &AppState, id: TeamId) -> Result<TeamView, Problem> {
     Ok(TeamView {

@@ -1,4 +1,4 @@
-//! Tokens and sessions, without their secrets.
+//! Tokens of API clients and sessions of browsers, without their secrets.
 
 use faceoff_api::views::token::TokenView;
 use faceoff_store::{Token, TokenKind, TokenOwner};

@@ -1,4 +1,5 @@
-//! Tournaments: rules, entrants, rounds and standings.
+//! Tournaments: rules, entrants (teams), rounds of games, and tables with the standings. A round has *matchdays*, in each of which a
+//! team plays one game or has a *bye* (no game).
 
 use crate::{
     app::AppState,
@@ -17,7 +18,7 @@ use faceoff_scoring::tournament::schedule::Table;
 use faceoff_store::{Departure, Entrant, Game, GamePurpose, GameState, TournamentRound};
 use faceoff_types::{RoundNumber, StageName, TeamId, TeamName, TournamentId};
 
-/// All tournaments, in order of creation.
+/// The heads of all tournaments, in order of creation. A head has no rounds and tables.
 #[boxed]
 pub async fn heads(app: &AppState) -> Result<Vec<TournamentHead>, Problem> {
     let mut heads = Vec::new();
@@ -46,7 +47,7 @@ fn build_head(state: &TournamentState, tables: &[Table]) -> TournamentHead {
         paused: tournament.paused.clone().map(ruling::view),
         closed_at: tournament.closed_at,
         champion: champion(state, tables),
-        next: next(state, phase),
+        next: next_text(state, phase),
     }
 }
 
@@ -99,12 +100,12 @@ pub fn entrant(entrant: Entrant) -> EntrantView {
     }
 }
 
-pub fn departure(leave: Departure) -> DepartureView {
+pub fn departure(departure: Departure) -> DepartureView {
     DepartureView {
-        r#as: leave.kind,
-        from_round: leave.from_round,
-        at: leave.at,
-        reason: printable(leave.reason),
+        r#as: departure.kind,
+        from_round: departure.from_round,
+        at: departure.at,
+        reason: printable(departure.reason),
     }
 }
 
@@ -132,7 +133,7 @@ pub fn round_view(state: &TournamentState, round: &TournamentRound) -> Result<Ro
     let mut matchdays = 0;
     for (game, matchday) in games {
         matchdays = matchday.max(matchdays);
-        count(&mut progress, &game.state);
+        count_game(&mut progress, &game.state);
     }
     Ok(RoundView {
         number: round.number,
@@ -146,7 +147,8 @@ pub fn round_view(state: &TournamentState, round: &TournamentRound) -> Result<Ro
     })
 }
 
-const fn count(progress: &mut RoundProgress, state: &GameState) {
+/// Counts a game by its state.
+const fn count_game(progress: &mut RoundProgress, state: &GameState) {
     progress.games += 1;
     *match state {
         GameState::Queued => &mut progress.queued,
@@ -166,15 +168,13 @@ fn games_in_round(
         .games
         .iter()
         .filter_map(move |game| match game.purpose {
-            GamePurpose::Round(meeting) if meeting.round == number => {
-                Some((game, meeting.matchday))
-            }
+            GamePurpose::Round(entry) if entry.round == number => Some((game, entry.matchday)),
             _ => None,
         })
 }
 
 fn phase(state: &TournamentState) -> TournamentPhase {
-    let last = state.tournament.rules.format.last_round();
+    let last_round = state.tournament.rules.format.last_round();
     if state.tournament.closed_at.is_some() {
         TournamentPhase::Closed
     } else if state.rounds.is_empty() {
@@ -183,7 +183,7 @@ fn phase(state: &TournamentState) -> TournamentPhase {
         || state.rounds.iter().any(|round| round.over_at.is_none())
     {
         TournamentPhase::Round
-    } else if state.rounds.len() < last.get() as usize {
+    } else if state.rounds.len() < last_round.get() as usize {
         TournamentPhase::Between
     } else {
         TournamentPhase::Played
@@ -197,19 +197,20 @@ pub(super) fn first_place(table: &Table) -> Option<TeamName> {
     Some(first.team.clone())
 }
 
+/// The champion, once all rounds are over.
 fn champion(state: &TournamentState, tables: &[Table]) -> Option<TeamName> {
-    let last = state.tournament.rules.format.last_round();
+    let last_round = state.tournament.rules.format.last_round();
     // An archive may contain only a part of a round that was running.
-    let are_over = state.rounds.iter().all(|round| round.over_at.is_some());
-    let is_over = state.rounds.len() >= last.get() as usize
-        && are_over
+    let all_rounds_over = state.rounds.iter().all(|round| round.over_at.is_some());
+    let is_over = state.rounds.len() >= last_round.get() as usize
+        && all_rounds_over
         && !state.games.iter().any(|game| state.needs_result(game));
     first_place(tables.first().filter(|_| is_over)?)
 }
 
 /// What happens next, in words.
-fn next(state: &TournamentState, phase: TournamentPhase) -> String {
-    let last = state.tournament.rules.format.last_round();
+fn next_text(state: &TournamentState, phase: TournamentPhase) -> String {
+    let last_round = state.tournament.rules.format.last_round();
     let next_number = state.rounds.len() + 1;
     match phase {
         TournamentPhase::Closed => "The tournament is closed.".to_owned(),
@@ -218,7 +219,7 @@ fn next(state: &TournamentState, phase: TournamentPhase) -> String {
                 .to_owned()
         }
         TournamentPhase::Open | TournamentPhase::Between => format!(
-            "An organiser starts round {next_number} of {last}; the active submissions of that moment play the whole round."
+            "An organiser starts round {next_number} of {last_round}; the active submissions of that moment play the whole round."
         ),
         TournamentPhase::Round => running_round_text(state),
     }
@@ -227,8 +228,8 @@ fn next(state: &TournamentState, phase: TournamentPhase) -> String {
 fn running_round_text(state: &TournamentState) -> String {
     let mut progress = RoundProgress::default();
     let unfinished = state.games.iter().filter(|game| state.needs_result(game));
-    unfinished.for_each(|game| count(&mut progress, &game.state));
-    let all = progress.games;
+    unfinished.for_each(|game| count_game(&mut progress, &game.state));
+    let unfinished_count = progress.games;
     let mut text = match &state.tournament.paused {
         Some(paused) => format!(
             "Paused ({}): no game starts. ",
@@ -237,7 +238,7 @@ fn running_round_text(state: &TournamentState) -> String {
         None => String::new(),
     };
     text += &format!(
-        "Games without a result: {all}; running: {}, waiting for a slot: {}",
+        "Games without a result: {unfinished_count}; running: {}, waiting for a slot: {}",
         progress.running, progress.queued
     );
     if progress.to_be_rerun > 0 {
@@ -246,8 +247,8 @@ fn running_round_text(state: &TournamentState) -> String {
             progress.to_be_rerun
         );
     }
-    let last = state.tournament.rules.format.last_round();
-    if state.rounds.len() < last.get() as usize {
+    let last_round = state.tournament.rules.format.last_round();
+    if state.rounds.len() < last_round.get() as usize {
         text + ". Then the next round can start."
     } else {
         text + ". Then the tournament can be closed."

@@ -1,4 +1,5 @@
-//! A tournament in the scoring's types, built from database rows; `faceoff score tournament` reads the same from a file.
+//! The state of a tournament, built from database rows: entrants, rounds with their draw (who plays whom), games and results. Draws
+//! and results are in the types of `faceoff-scoring`; the command `faceoff score tournament` reads the same types from a file.
 
 use crate::{
     app::AppState, boxed, problem::Problem, viewer::Viewer, views::visibility::GameVisibility,
@@ -13,8 +14,8 @@ use faceoff_store::{
 use faceoff_types::{RoundNumber, Seed, TeamId, TeamName, TournamentId};
 use std::collections::BTreeMap;
 
-/// More than a round can have meetings, so that pairs of different rounds get different numbers.
-const MEETINGS_PER_ROUND: u32 = 100_000;
+/// More than a round can have pairings, so that the pairs of different rounds get different numbers.
+const MAX_PAIRINGS_PER_ROUND: u32 = 100_000;
 
 /// The complete state of a tournament, with draws and results in the scoring's types.
 #[derive(Debug)]
@@ -30,7 +31,9 @@ pub struct TournamentState {
     /// Teams that left, and from which round on.
     pub departures: Departures,
     names: BTreeMap<TeamId, TeamName>,
+    /// The started rounds with their draw; empty in an unscored state.
     drawn: Vec<Round>,
+    /// The results of all rounds; empty in an unscored state.
     played: Vec<PlayedGame>,
 }
 
@@ -74,7 +77,7 @@ impl TournamentState {
         })
     }
 
-    /// What a viewer may see of its games.
+    /// What a viewer may see of the games of the tournament.
     pub fn visibility(&self, viewer: Viewer) -> GameVisibility<'_> {
         GameVisibility::new(viewer, &self.tournament, &self.rounds)
     }
@@ -85,10 +88,10 @@ impl TournamentState {
         name.ok_or_else(|| Problem::internal(format_args!("no team has the id {team}")))
     }
 
-    /// The entrant with this name.
+    /// The id of the entrant with this name.
     pub fn team(&self, name: &TeamName) -> Result<TeamId, Problem> {
-        let found = self.entrants.iter().find(|entrant| entrant.name == *name);
-        found
+        let entrant = self.entrants.iter().find(|entrant| entrant.name == *name);
+        entrant
             .map(|entrant| entrant.team)
             .ok_or_else(|| Problem::internal(format_args!("{name} is not in the tournament")))
     }
@@ -100,28 +103,32 @@ impl TournamentState {
 
     /// The scored result of a game; `None` without a result.
     pub fn result(&self, game: &Game) -> Result<Option<(GameScore, PlayedGame)>, Problem> {
-        let GameState::Played(row) = &game.state else {
+        let GameState::Played(played_row) = &game.state else {
             return Ok(None);
         };
         let damaged = |error: &dyn std::fmt::Display| {
             Problem::internal(format_args!("the score of game {}: {error}", game.id))
         };
         let score: GameScore =
-            serde_json::from_value(row.score.clone()).map_err(|error| damaged(&error))?;
+            serde_json::from_value(played_row.score.clone()).map_err(|error| damaged(&error))?;
         let [home, away] = game.teams;
-        // A game without a round is scored as if it were of the first.
-        let meeting = game.purpose.schedule_entry();
-        let round = meeting.map_or(RoundNumber::FIRST, |meeting| meeting.round);
+        // A test or friendly game belongs to no round; it is scored like a game of the first round.
+        let schedule_entry = game.purpose.schedule_entry();
+        let round =
+            schedule_entry.map_or(RoundNumber::FIRST, |schedule_entry| schedule_entry.round);
         let mut entry = score.entry(round, [self.name(home)?, self.name(away)?]);
         let labels = game.submissions.map(|id| id.to_string().parse());
-        let [home, away] = labels;
+        let [home_label, away_label] = labels;
         entry.submissions = Some([
-            home.map_err(|error| damaged(&error))?,
-            away.map_err(|error| damaged(&error))?,
+            home_label.map_err(|error| damaged(&error))?,
+            away_label.map_err(|error| damaged(&error))?,
         ]);
-        entry.pair = meeting
+        // The two games of a mirrored pairing, with exchanged sides, have the same number.
+        entry.pair = schedule_entry
             .filter(|_| self.tournament.rules.mirrored)
-            .map(|meeting| meeting.round.get() * MEETINGS_PER_ROUND + meeting.pairing);
+            .map(|schedule_entry| {
+                schedule_entry.round.get() * MAX_PAIRINGS_PER_ROUND + schedule_entry.pairing
+            });
         let played = PlayedGame::try_from(entry).map_err(|error| damaged(&error))?;
         Ok(Some((score, played)))
     }
@@ -132,18 +139,19 @@ impl TournamentState {
         games: impl IntoIterator<Item = &'a Game>,
     ) -> Result<Vec<PlayedGame>, Problem> {
         let results = games.into_iter().map(|game| self.result(game));
-        let played = results.filter_map(|result| Some(result.transpose()?.map(|(_, game)| game)));
-        played.collect()
+        let played_games =
+            results.filter_map(|result| Some(result.transpose()?.map(|(_, game)| game)));
+        played_games.collect()
     }
 
     /// The team whose departure excludes a game of a round or a replay from the standings, if there is one.
     pub fn excluded_by(&self, game: &Game) -> Result<Option<TeamName>, Problem> {
-        let Some(meeting) = game.purpose.schedule_entry() else {
+        let Some(schedule_entry) = game.purpose.schedule_entry() else {
             return Ok(None);
         };
         for team in game.teams {
             let name = self.name(team)?;
-            if self.departures.excludes(&name, meeting.round.get()) {
+            if self.departures.excludes(&name, schedule_entry.round.get()) {
                 return Ok(Some(name));
             }
         }
@@ -162,7 +170,7 @@ impl TournamentState {
         ) && !game.teams.iter().any(has_left)
     }
 
-    /// The tables after these results, the deciding one first.
+    /// The tables after these results. The first one decides who is the champion.
     pub fn tables(&self, played: &[PlayedGame]) -> Vec<Table> {
         let Ok(entrants) = self.all_entrants() else {
             // With fewer than two teams there is no table.
@@ -200,14 +208,14 @@ impl TournamentState {
         let rounds = self.rounds.iter().map(|round| {
             let mut matchdays = BTreeMap::<u32, Matchday>::new();
             for game in &self.games {
-                let GamePurpose::Round(meeting) = game.purpose else {
+                let GamePurpose::Round(schedule_entry) = game.purpose else {
                     continue;
                 };
-                if meeting.round != round.number || meeting.second_half {
+                if schedule_entry.round != round.number || schedule_entry.second_half {
                     continue;
                 }
                 let [home, away] = game.teams;
-                let day = matchdays.entry(meeting.matchday).or_default();
+                let day = matchdays.entry(schedule_entry.matchday).or_default();
                 day.pairings.push(Pairing {
                     home: self.name(home)?,
                     away: self.name(away)?,

@@ -1,4 +1,4 @@
-//! Users, and the calling user or API client.
+//! Users (organisers and members of teams), and the caller of a request.
 
 use crate::views::team;
 use faceoff_api::views::{

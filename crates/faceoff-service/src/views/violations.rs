@@ -1,4 +1,5 @@
-//! Violations of an evaluation, episode by episode, from the dataset's `violations.json`.
+//! Violations of an evaluation: for each task and constraint, the episodes in which the robot violated it. A *constraint* is a limit
+//! of the robot's motion, such as the largest joint velocity. The data is the file `violations.json` of the dataset.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::violations::ViolationsView;
@@ -17,9 +18,11 @@ pub async fn read(app: &AppState, dataset: &str) -> Result<ViolationsView, Probl
         .local_path(dataset)
         .map_err(Problem::internal)?;
     let read = move || Dataset::open_lazily(&path)?.violations();
-    let file = tokio::task::spawn_blocking(read)
+    let violations = tokio::task::spawn_blocking(read)
         .await
         .map_err(Problem::internal)?
         .map_err(|error| Problem::internal(format_args!("{dataset}: {error}")))?;
-    Ok(ViolationsView { tasks: file.tasks })
+    Ok(ViolationsView {
+        tasks: violations.tasks,
+    })
 }

@@ -1,10 +1,10 @@
 //! What a viewer may see.
 //!
-//! Evaluations: only organisers see the scores of blind stages. Scores after a freeze of the boards are visible to
+//! Evaluations: only organisers see the scores of *blind* stages. After a *freeze* of a stage's boards, later scores are visible to
 //! organisers and the team only. Without a token only published evaluations are visible.
 //!
-//! Games: results of rounds are public. Test and friendly games are visible to their two teams. Of a recording each team
-//! sees its own side until the recording is published.
+//! Games: results of tournament rounds are public. Test and friendly games are visible to their two teams. Until the recording of a
+//! game is published, each team sees only its own side of it.
 
 use crate::{
     app::AppState,
@@ -32,14 +32,15 @@ pub struct Visibility {
 struct StageRestrictions {
     name: String,
     is_blind: bool,
+    /// When evaluations become public automatically.
     publishes: Publication,
     has_closed: bool,
-    /// The freeze of its boards.
+    /// The freeze of the boards, if they are frozen.
     frozen: Option<Ruling>,
 }
 
 impl StageRestrictions {
-    /// The freeze that hides a score of this time, if there is one.
+    /// The freeze that hides a score which was computed at this time, if there is one.
     fn hiding_freeze(&self, scored_at: Timestamp) -> Option<&Ruling> {
         self.frozen.as_ref().filter(|frozen| scored_at > frozen.at)
     }
@@ -83,12 +84,12 @@ impl Visibility {
         Self::load(app, Viewer::Organiser).await
     }
 
-    /// Refuses all viewers but organisers; `what` names the resource.
+    /// Refuses all viewers but organisers; `resource` is its name in the message.
     ///
     /// # Errors
     /// `Unauthenticated` or `Forbidden`.
-    pub(crate) fn check_organiser(&self, what: &str) -> Result<(), Problem> {
-        self.viewer.check_organiser(what)
+    pub(crate) fn check_organiser(&self, resource: &str) -> Result<(), Problem> {
+        self.viewer.check_organiser(resource)
     }
 
     /// Whether a stage's scores are hidden from the viewer.
@@ -123,8 +124,8 @@ impl Visibility {
         self.stages.get(&stage)?.frozen.as_ref()
     }
 
-    /// The freeze that hides a score of this time from the viewer, on boards, pages and in comparisons; `None` if it is
-    /// visible, and for organisers.
+    /// The freeze that hides a score which was computed at this time from the viewer, on boards, pages and in comparisons. `None` if
+    /// the score is visible; it always is for organisers.
     pub fn hiding_freeze(&self, stage: StageId, scored_at: Timestamp) -> Option<&Ruling> {
         if self.viewer == Viewer::Organiser {
             return None;
@@ -132,8 +133,8 @@ impl Visibility {
         self.stages.get(&stage)?.hiding_freeze(scored_at)
     }
 
-    /// Refuses an evaluation whose score a freeze hides from the viewer. `action` is the participle of what becomes
-    /// possible once the boards are unfrozen, e.g. "compared".
+    /// Refuses an evaluation whose score a freeze hides from the viewer. `action` completes the
+    /// message “it can be … once they are unfrozen”, for example “compared”.
     ///
     /// # Errors
     /// `NotYet`.
@@ -159,20 +160,20 @@ impl Visibility {
         let Some(stage) = self.stages.get(&evaluation.stage_day.stage) else {
             return false;
         };
-        let by_stage = match stage.publishes {
+        let is_published_by_stage = match stage.publishes {
             Publication::Never => false,
             Publication::AtClose => stage.has_closed,
             Publication::AtRelease => true,
         };
-        let is_frozen_out =
+        let is_hidden_by_freeze =
             scored_at(&evaluation.state).is_some_and(|at| stage.hiding_freeze(at).is_some());
         !stage.is_blind
-            && !is_frozen_out
+            && !is_hidden_by_freeze
             && evaluation.released_at.is_some()
-            && (by_stage || evaluation.published_at.is_some())
+            && (is_published_by_stage || evaluation.published_at.is_some())
     }
 
-    /// Whether the viewer may see what only the evaluation's team sees: faults and logs.
+    /// Whether the viewer may see data that only the evaluation's team and organisers see: faults and logs.
     pub fn is_own(&self, evaluation: &Evaluation) -> bool {
         match self.viewer {
             Viewer::Organiser => true,
@@ -181,13 +182,18 @@ impl Visibility {
         }
     }
 
-    /// `found`, if the viewer may read it; otherwise the same error as if it did not exist.
+    /// The evaluation, if the viewer may read it; otherwise the same error as if it did not exist.
     ///
     /// # Errors
     /// `NotFound`; without a token `Unauthenticated`, whether it exists or not.
-    pub fn readable(&self, found: Result<Evaluation, StoreError>) -> Result<Evaluation, Problem> {
-        match found {
-            Ok(found) if self.is_own(&found) || self.is_public(&found) => Ok(found),
+    pub fn readable(
+        &self,
+        evaluation: Result<Evaluation, StoreError>,
+    ) -> Result<Evaluation, Problem> {
+        match evaluation {
+            Ok(evaluation) if self.is_own(&evaluation) || self.is_public(&evaluation) => {
+                Ok(evaluation)
+            }
             Ok(_) | Err(StoreError::NotFound(_)) if self.viewer == Viewer::Visitor => {
                 Err(Problem::new(
                     ProblemKind::Unauthenticated,
@@ -233,7 +239,8 @@ impl<'a> GameVisibility<'a> {
         }
     }
 
-    /// Whether the side is the viewer's, who may then see its recording and log at once.
+    /// Whether the side of the game is the viewer's own, so that the viewer may see its recording and log at once. All sides count
+    /// as the organisers' own.
     pub fn is_own(self, game: &Game, side: Side) -> bool {
         match self.viewer {
             Viewer::Organiser => true,
@@ -244,7 +251,7 @@ impl<'a> GameVisibility<'a> {
 
     /// Whether the recording of both sides, with the game's seed, is public.
     pub fn is_public(self, game: &Game) -> bool {
-        let GamePurpose::Round(meeting) = game.purpose else {
+        let GamePurpose::Round(schedule_entry) = game.purpose else {
             return false;
         };
         let has_closed = self.tournament.closed_at.is_some();
@@ -255,7 +262,7 @@ impl<'a> GameVisibility<'a> {
                 let round = self
                     .rounds
                     .iter()
-                    .find(|round| round.number == meeting.round);
+                    .find(|round| round.number == schedule_entry.round);
                 has_closed || round.is_some_and(|round| round.over_at.is_some())
             }
         }
@@ -266,11 +273,11 @@ impl<'a> GameVisibility<'a> {
         self.viewer == Viewer::Organiser || self.is_public(game)
     }
 
-    /// The problem for data of a visible game that the viewer may not see; `what` names the data.
+    /// The problem for data of a visible game that the viewer may not see; `data` is its name in the message.
     ///
     /// # Errors
     /// `Unauthenticated` or `Forbidden`, with the time of its publication.
-    pub fn denial(self, game: &Game, what: &str) -> Problem {
+    pub fn denial(self, game: &Game, data: &str) -> Problem {
         let publication = match (&game.purpose, self.tournament.settings.publishes) {
             (GamePurpose::Round(_), Publication::AtRelease) => {
                 "it becomes public when its round is over"
@@ -282,7 +289,7 @@ impl<'a> GameVisibility<'a> {
         };
         Problem::new(
             self.viewer.denial_kind(),
-            format!("you may not see {what}: {publication}; a team can see its own side's at once"),
+            format!("you may not see {data}: {publication}; a team can see its own side's at once"),
         )
     }
 }

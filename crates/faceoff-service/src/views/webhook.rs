@@ -1,4 +1,5 @@
-//! Webhooks, without their secrets, and their deliveries.
+//! Webhooks, without their secrets, and their deliveries. A *webhook* is a URL, chosen by a team or an
+//! organiser, to which the server sends events. A *delivery* is the sending of one event.
 
 use faceoff_api::views::webhook::{
     DeliveryAttemptView, DeliveryStateView, DeliveryView, WebhookState, WebhookView,
@@ -9,9 +10,9 @@ use jiff::Timestamp;
 /// The webhook's state at `now`.
 pub fn view(webhook: Webhook, now: Timestamp) -> WebhookView {
     let state = match (webhook.disabled, webhook.failing_since) {
-        (Some(dead), _) => WebhookState::Dead {
-            since: dead.at,
-            reason: dead.reason,
+        (Some(disabling), _) => WebhookState::Dead {
+            since: disabling.at,
+            reason: disabling.reason,
         },
         (None, Some(since)) => WebhookState::Failing { since },
         (None, None) => WebhookState::Alive,

@@ -1,4 +1,4 @@
-//! Remote workers and their slots.
+//! Remote workers: processes on other machines that run jobs of this server. A worker runs one job in each of its *slots*.
 
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::workers::{
@@ -7,10 +7,10 @@ use faceoff_api::views::workers::{
 use faceoff_store::{SlotStatus, WorkerStatus};
 use jiff::{SignedDuration, Timestamp};
 
-/// A job that runs longer than this raises an alarm.
+/// A job that runs longer than this is reported as an alarm.
 const ALARM_AFTER: SignedDuration = SignedDuration::from_hours(1);
 
-/// Evaluations and games that are listed for a banned worker.
+/// Largest number of evaluations and games that are listed for a banned worker.
 const MAX_LISTED: u32 = 100;
 
 /// All workers, with the bans.
@@ -38,10 +38,11 @@ pub async fn with_bans(app: &AppState) -> Result<WorkersView, Problem> {
 pub fn current(app: &AppState) -> WorkersView {
     let (workers, now) = (app.store.workers(), app.config.clock.now());
     let problems = workers.problems().into_iter();
-    let problems = problems.map(|(activity, why)| format!("The server cannot {activity}: {why}"));
+    let problems =
+        problems.map(|(activity, error)| format!("The server cannot {activity}: {error}"));
     let all = workers.all();
-    let stuck = all.iter().flat_map(stuck_jobs);
-    let problems = problems.chain(stuck).collect();
+    let stuck_jobs = all.iter().flat_map(stuck_jobs);
+    let problems = problems.chain(stuck_jobs).collect();
     let alarms = all
         .iter()
         .flat_map(|worker| long_jobs(worker, now))
@@ -52,12 +53,15 @@ pub fn current(app: &AppState) -> WorkersView {
         leases_jobs: workers.are_enabled(),
         problems,
         alarms,
-        workers: all.into_iter().map(|heard| worker(heard, now)).collect(),
+        workers: all
+            .into_iter()
+            .map(|worker| worker_view(worker, now))
+            .collect(),
         bans: Vec::new(),
     }
 }
 
-/// Jobs whose result a worker cannot send.
+/// Descriptions of jobs whose result a worker cannot send.
 fn stuck_jobs(worker: &WorkerStatus) -> impl Iterator<Item = String> {
     worker.busy_slots.iter().filter_map(|(slot, busy)| {
         let problem = busy.problem.as_ref()?;
@@ -68,7 +72,7 @@ fn stuck_jobs(worker: &WorkerStatus) -> impl Iterator<Item = String> {
     })
 }
 
-/// Jobs that a worker has been running for very long.
+/// Descriptions of jobs that a worker has been running for very long.
 fn long_jobs(worker: &WorkerStatus, now: Timestamp) -> impl Iterator<Item = String> {
     worker.busy_slots.iter().filter_map(move |(slot, busy)| {
         let job = describe(worker, slot, busy);
@@ -76,6 +80,7 @@ fn long_jobs(worker: &WorkerStatus, now: Timestamp) -> impl Iterator<Item = Stri
     })
 }
 
+/// The slot and its job in words.
 fn describe(worker: &WorkerStatus, slot: &str, busy: &SlotStatus) -> String {
     let job = busy
         .description
@@ -88,7 +93,7 @@ fn is_long(busy: &SlotStatus, now: Timestamp) -> bool {
     now.duration_since(busy.since) > ALARM_AFTER
 }
 
-fn worker(worker: WorkerStatus, now: Timestamp) -> WorkerView {
+fn worker_view(worker: WorkerStatus, now: Timestamp) -> WorkerView {
     let state = match &worker.refusal {
         _ if !worker.is_online(now) => WorkerState::Silent,
         Some(_) => WorkerState::Refused,

@@ -1,6 +1,6 @@
-//! Compares episodes stepped at once with the same episodes stepped one by one: held arms, and recorded actions of
-//! striker. Prints control steps and physics steps per second of one core, and the speed-up; then a batch on all
-//! cores.
+//! Benchmark: compares episodes stepped at once, with SIMD instructions, with the same episodes stepped one by one. The arms hold still,
+//! or follow recorded actions of `striker`, an agent of this repository. Prints control steps and physics steps per second of one core,
+//! and the speed-up; then the speed of a batch of episodes on all cores.
 //!
 //! The variants alternate, and the least CPU time of each counts, so that other load has little effect. An argument
 //! filters the rows: `cargo bench --bench episode_step -- held`.
@@ -14,17 +14,17 @@ use faceoff_sim::{
     model::INITIAL_Q,
 };
 use faceoff_types::{Factors, Seed, Task};
-use recorded::{Recorded, Worlds, hold, record};
+use recorded::{RecordedEpisode, ReplayingWorlds, hold_still, record_striker};
 use rustix::time::{ClockId, clock_gettime};
 use std::time::{Duration, Instant};
 
-/// Worlds per row of the table, control steps of each in a round, and rounds.
+/// Episodes per row of the table, control steps of each in a round, and rounds (repetitions).
 const WORLDS: usize = 16;
 const STEPS: usize = 100;
 const ROUNDS: usize = 20;
 
-/// Worlds of the batch, and control steps of each in a round.
-const BATCH: u32 = 256;
+/// Episodes of the batch, and control steps of each in a round.
+const BATCH_WORLDS: u32 = 256;
 const BATCH_STEPS: usize = 20;
 
 fn main() {
@@ -35,11 +35,14 @@ fn main() {
         for task in Task::ALL {
             let name = format!("held/{task}/{profile}");
             if is_wanted(&name) {
-                compare(&name, &hold(task, factors, STEPS as u32, WORLDS as u32));
+                compare(
+                    &name,
+                    &hold_still(task, factors, STEPS as u32, WORLDS as u32),
+                );
             }
             let name = format!("striker/{task}/{profile}");
             if is_wanted(&name) {
-                compare(&name, &record(task, factors, 2 * WORLDS as u32));
+                compare(&name, &record_striker(task, factors, 2 * WORLDS as u32));
             }
         }
     }
@@ -48,49 +51,49 @@ fn main() {
     }
 }
 
-/// One row: each variant steps the same worlds.
-fn compare(name: &str, recorded: &[Recorded]) {
+/// Measures and prints one row: each variant steps the same episodes.
+fn compare(name: &str, recorded: &[RecordedEpisode]) {
     let variants = [
         ("one by one", None),
         ("plain", Some(SimdLevel::PLAIN)),
         ("avx", SimdLevel::avx()),
     ];
-    let mut least = [Duration::MAX; 3];
+    let mut least_times = [Duration::MAX; 3];
     for _ in 0..ROUNDS {
-        for (least, (variant, simd_level)) in least.iter_mut().zip(variants) {
+        for (least_time, (variant, simd_level)) in least_times.iter_mut().zip(variants) {
             if simd_level.is_none() && variant == "avx" {
                 continue;
             }
-            let mut worlds = Worlds::new(recorded, WORLDS);
+            let mut worlds = ReplayingWorlds::new(recorded, WORLDS);
             let start = cpu_time();
             for _ in 0..STEPS {
                 worlds.step(simd_level);
             }
-            *least = (cpu_time() - start).min(*least);
+            *least_time = (cpu_time() - start).min(*least_time);
         }
     }
     print!("{name:28}");
-    for ((variant, _), time) in variants.into_iter().zip(least) {
+    for ((variant, _), time) in variants.into_iter().zip(least_times) {
         if time < Duration::MAX {
             print!(
                 "  {variant} {} x{:.2}",
                 rate(WORLDS * STEPS, time),
-                least[0].as_secs_f64() / time.as_secs_f64()
+                least_times[0].as_secs_f64() / time.as_secs_f64()
             );
         }
     }
     println!();
 }
 
-/// A batch on one thread and on all threads, by wall time.
+/// Measures and prints the speed of a batch on one thread and on all threads, by wall time.
 fn batch() {
     let held = Interpolation::Cubic.hold_position(&INITIAL_Q);
-    let actions = held[..2 * JOINTS].repeat(BATCH as usize);
+    let actions = held[..2 * JOINTS].repeat(BATCH_WORLDS as usize);
     let all = std::thread::available_parallelism().map_or(1, usize::from);
-    let counts = [1, all];
-    let mut least = [Duration::MAX; 2];
+    let thread_counts = [1, all];
+    let mut least_times = [Duration::MAX; 2];
     for _ in 0..ROUNDS {
-        for (least, threads) in least.iter_mut().zip(counts) {
+        for (least_time, threads) in least_times.iter_mut().zip(thread_counts) {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let pool = pool.build().expect("a machine that has threads");
             let mut batch = Batch::new(BatchSetup {
@@ -100,7 +103,7 @@ fn batch() {
                 settings: PerturbationSettings::default(),
                 plant: Plant::nominal(),
                 seed: Seed::from_number(0),
-                worlds: BATCH,
+                worlds: BATCH_WORLDS,
             });
             let start = Instant::now();
             pool.install(|| {
@@ -108,20 +111,20 @@ fn batch() {
                     batch.step(&actions);
                 }
             });
-            *least = start.elapsed().min(*least);
+            *least_time = start.elapsed().min(*least_time);
         }
     }
-    for (threads, time) in counts.into_iter().zip(least) {
+    for (threads, time) in thread_counts.into_iter().zip(least_times) {
         println!(
-            "batch of {BATCH}, prepare/ideal: {threads} threads {}",
-            rate(BATCH as usize * BATCH_STEPS, time)
+            "batch of {BATCH_WORLDS}, prepare/ideal: {threads} threads {}",
+            rate(BATCH_WORLDS as usize * BATCH_STEPS, time)
         );
     }
-    let per_core = least[0].as_secs_f64() / least[1].as_secs_f64() / all as f64;
-    println!("throughput per thread with {all} threads: {per_core:.2} of a single thread");
+    let efficiency = least_times[0].as_secs_f64() / least_times[1].as_secs_f64() / all as f64;
+    println!("throughput per thread with {all} threads: {efficiency:.2} of a single thread");
 }
 
-/// Control steps per second, and physics steps.
+/// Text: control steps per second, and in parentheses physics steps per second.
 fn rate(control_steps: usize, time: Duration) -> String {
     let per_s = control_steps as f64 / time.as_secs_f64();
     format!("{per_s:.0} ({:.0})", per_s * SUBSTEPS as f64)

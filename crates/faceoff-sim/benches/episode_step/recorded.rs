@@ -1,4 +1,4 @@
-//! Recorded actions of striker in whole episodes, and worlds that replay them.
+//! Recorded actions of the agent `striker`, or of one that holds still, in whole episodes, and worlds that replay them.
 
 use faceoff_sim::{
     Episode, Interpolation, PerturbationSettings, Plant, SimdLevel, StepOutcome, env_info,
@@ -9,37 +9,37 @@ use striker::{Agent, Policy};
 
 /// An episode at its start, and the action of each of its control steps.
 #[derive(Clone)]
-pub struct Recorded {
+pub struct RecordedEpisode {
     start: Episode,
     actions: Vec<Vec<f64>>,
 }
 
-/// Records episodes of an evaluation that striker plays to their ends.
-pub fn record(task: Task, factors: Factors, episodes: u32) -> Vec<Recorded> {
+/// Records episodes that `striker` plays to their ends.
+pub fn record_striker(task: Task, factors: Factors, episodes: u32) -> Vec<RecordedEpisode> {
     (0..episodes)
         .map(|number| {
-            let start = start(task, factors, number);
-            let mut agent = agent(task);
+            let start = start_episode(task, factors, number);
+            let mut agent = striker_for(task);
             let mut episode = start.clone();
             let mut actions = vec![];
             loop {
                 let rows = agent.act(episode.observation()).expect("an observation");
                 actions.push(rows.concat());
                 if episode.step(&rows.concat()).end.is_some() {
-                    return Recorded { start, actions };
+                    return RecordedEpisode { start, actions };
                 }
             }
         })
         .collect()
 }
 
-/// Records episodes in which the arm holds still, for at most `steps` steps.
-pub fn hold(task: Task, factors: Factors, steps: u32, episodes: u32) -> Vec<Recorded> {
+/// Records episodes in which the arm holds still, for at most `steps` control steps.
+pub fn hold_still(task: Task, factors: Factors, steps: u32, episodes: u32) -> Vec<RecordedEpisode> {
     let held = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let action = held[..Interpolation::Cubic.len()].to_vec();
     (0..episodes)
         .map(|number| {
-            let start = start(task, factors, number);
+            let start = start_episode(task, factors, number);
             let mut episode = start.clone();
             let mut actions = vec![];
             while episode.steps() < steps {
@@ -48,12 +48,13 @@ pub fn hold(task: Task, factors: Factors, steps: u32, episodes: u32) -> Vec<Reco
                     break;
                 }
             }
-            Recorded { start, actions }
+            RecordedEpisode { start, actions }
         })
         .collect()
 }
 
-fn start(task: Task, factors: Factors, number: u32) -> Episode {
+/// The episode with this index, at its start.
+fn start_episode(task: Task, factors: Factors, number: u32) -> Episode {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(0);
     let plant = Plant::for_factors(factors, &settings, seed.model_mismatch());
@@ -61,7 +62,8 @@ fn start(task: Task, factors: Factors, number: u32) -> Episode {
     Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed)
 }
 
-fn agent(task: Task) -> Agent {
+/// The agent `striker` at the start of an episode of a task.
+fn striker_for(task: Task) -> Agent {
     let env = env_info(task);
     let radius = |radius: f64| striker::RadiusInfo { radius };
     let task = match task {
@@ -94,34 +96,34 @@ fn agent(task: Task) -> Agent {
     agent
 }
 
-/// Worlds that replay recorded episodes in order, each from a different one on.
+/// Worlds that replay recorded episodes in order. World `w` begins with episode `w`.
 #[derive(Clone)]
-pub struct Worlds<'r> {
-    recorded: &'r [Recorded],
-    /// The index of each world's episode.
-    playing: Vec<usize>,
+pub struct ReplayingWorlds<'r> {
+    recorded: &'r [RecordedEpisode],
+    /// The index in `recorded` of each world's current episode.
+    current: Vec<usize>,
     episodes: Vec<Episode>,
     outcomes: Vec<StepOutcome>,
 }
 
-impl<'r> Worlds<'r> {
-    /// Worlds at the start of an episode.
-    pub fn new(recorded: &'r [Recorded], count: usize) -> Self {
-        let playing: Vec<usize> = (0..count).map(|w| w % recorded.len()).collect();
+impl<'r> ReplayingWorlds<'r> {
+    /// Worlds at the start of their first episode.
+    pub fn new(recorded: &'r [RecordedEpisode], count: usize) -> Self {
+        let current: Vec<usize> = (0..count).map(|w| w % recorded.len()).collect();
         let mut first = recorded[0].start.clone();
         let outcome = first.step(&recorded[0].actions[0]);
         Self {
-            episodes: playing.iter().map(|&e| recorded[e].start.clone()).collect(),
+            episodes: current.iter().map(|&e| recorded[e].start.clone()).collect(),
             outcomes: vec![outcome; count],
-            playing,
+            current,
             recorded,
         }
     }
 
-    /// A control step of all worlds: at once with an instruction set, or one by one.
+    /// A control step of all worlds: at once with the instruction set `simd_level`, or one by one (`None`).
     pub fn step(&mut self, simd_level: Option<SimdLevel>) {
         let actions = self
-            .playing
+            .current
             .iter()
             .zip(&self.episodes)
             .map(|(&e, episode)| {
@@ -143,8 +145,8 @@ impl<'r> Worlds<'r> {
         }
         for (w, outcome) in self.outcomes.iter().enumerate() {
             if outcome.end.is_some() {
-                self.playing[w] = (self.playing[w] + 1) % self.recorded.len();
-                self.episodes[w] = self.recorded[self.playing[w]].start.clone();
+                self.current[w] = (self.current[w] + 1) % self.recorded.len();
+                self.episodes[w] = self.recorded[self.current[w]].start.clone();
             }
         }
     }

@@ -1,12 +1,14 @@
+//! The command that a robot receives for a control step: its agent's answer, or the lack of one.
+
 /// An agent's answer for a control step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command<'a> {
-    /// An action: row-major, of length [`Interpolation::len`], finite.
+    /// An action: one number per joint in each row, row-major, of length [`Interpolation::len`], finite.
     ///
     /// [`Interpolation::len`]: faceoff_types::Interpolation::len
     Act(&'a [f64]),
-    /// No answer arrived in time. The previous position is commanded again, with zero velocity. Under
-    /// [`Factor::Delay`] the last trajectory continues at constant velocity for 80 ms, then stops.
+    /// No answer arrived in time. The previous position is commanded again, with zero velocity. With
+    /// [`Factor::Delay`] (a kind of perturbation) the arm instead continues its last trajectory at constant velocity for 80 ms, then stops.
     ///
     /// [`Factor::Delay`]: faceoff_types::Factor::Delay
     Late,

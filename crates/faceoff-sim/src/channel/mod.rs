@@ -1,17 +1,17 @@
-//! The channel between an agent and its robot: observations in one direction, commands in the other, both
-//! subject to the perturbations.
+//! The *channel* between an agent and its robot: observations in one direction, commands in the other, both
+//! subject to the perturbations (noise, delays, a lost puck).
 
 mod command;
 mod latency;
 pub mod observation;
 
-use crate::{perturbation::noise::ObservationNoise, stream::Stream, world::World};
+use crate::{perturbation::noise::ObservationNoise, stream::RandomStream, world::World};
 pub use command::Command;
 use faceoff_types::{Factor, Factors, Interpolation, PerturbationSettings, Seed};
 use latency::Latency;
 use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
 
-/// The channel of one agent and its robot, for one episode or rally.
+/// The channel of one agent and its robot, for one episode, or one rally of a game.
 #[derive(Debug, Clone)]
 pub struct AgentChannel {
     robot: usize,
@@ -22,7 +22,7 @@ pub struct AgentChannel {
 }
 
 impl AgentChannel {
-    /// The channel of a robot (0 or 1) in a world at its start. Each factor and each robot has its own random
+    /// The channel of a robot (0 or 1) in a world at its start. Each factor (kind of perturbation) and each robot has its own random
     /// stream, derived from `seed` by the factor's name.
     #[must_use]
     pub fn new(
@@ -35,8 +35,8 @@ impl AgentChannel {
     ) -> Self {
         let stream = |factor: Factor| {
             factors.contains(factor).then(|| match robot {
-                0 => Stream::new(seed, factor.as_str()),
-                _ => Stream::new(seed, &format!("{factor}, robot {}", robot + 1)),
+                0 => RandomStream::new(seed, factor.as_str()),
+                _ => RandomStream::new(seed, &format!("{factor}, robot {}", robot + 1)),
             })
         };
         let mut channel = Self {
@@ -52,7 +52,7 @@ impl AgentChannel {
         channel
     }
 
-    /// The latest observation. Its last three numbers are the opponent's end effector, or zero.
+    /// The latest observation. Its last three numbers are the position of the opponent's end effector, or zero without an opponent.
     #[must_use]
     pub fn observation(&self) -> &[f64; OBSERVATION_WITH_OPPONENT_LEN] {
         &self.observation
@@ -66,7 +66,7 @@ impl AgentChannel {
         }
     }
 
-    /// Passes the coming control step's command to the robot.
+    /// Passes the command for the coming control step to the robot.
     pub fn command(&mut self, world: &mut World, command: Command<'_>) {
         let (robot, interpolation) = (self.robot, self.interpolation);
         if let Command::Act(action) = command {
@@ -79,8 +79,8 @@ impl AgentChannel {
         }
     }
 
-    /// Observes the world; `lost` repeats the puck's last reported pose.
-    pub fn update_observation(&mut self, world: &World, lost: bool) {
+    /// Observes the world. If tracking has lost the puck, the observation repeats its last reported pose, at rest.
+    pub fn update_observation(&mut self, world: &World, is_puck_lost: bool) {
         let [x, y, yaw, ..] = self.observation;
         self.observation = observe(world, self.robot);
         if let Some(latency) = &mut self.latency {
@@ -91,7 +91,7 @@ impl AgentChannel {
             noise.add(&mut self.observation);
             self.observation[2] = wrap(self.observation[2]);
         }
-        if lost {
+        if is_puck_lost {
             self.observation[..6].copy_from_slice(&[x, y, yaw, 0.0, 0.0, 0.0]);
         }
     }

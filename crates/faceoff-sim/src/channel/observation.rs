@@ -1,4 +1,5 @@
-//! An agent's observation (PROTOCOL and MODEL, "Observation").
+//! An agent's observation: puck pose and velocity (x, y, yaw and their rates), seven joint positions, seven joint velocities and, with an
+//! opponent, the position of its end effector; in the robot's base frame (`docs/protocol.md`, "Observations").
 
 use crate::{
     table::{geometry::TABLE, puck::Puck},
@@ -23,7 +24,7 @@ pub const fn len(task: Task) -> usize {
 
 /// The observation of a robot (0 or 1), in its own base frame, without noise: puck pose and
 /// velocity, joint positions, filtered joint velocities, and the opponent's end effector. The last
-/// three are zero without an opponent.
+/// three are zero without an opponent. SI units, radians.
 #[must_use]
 pub fn observe(world: &World, robot: usize) -> [f64; OBSERVATION_WITH_OPPONENT_LEN] {
     let mut observation = [0.0; OBSERVATION_WITH_OPPONENT_LEN];
@@ -38,16 +39,17 @@ pub fn observe(world: &World, robot: usize) -> [f64; OBSERVATION_WITH_OPPONENT_L
     observation
 }
 
+/// The puck's pose (m, rad) and velocity (m/s, rad/s) in a robot's base frame.
 fn puck_in_robot_frame(puck: &Puck, robot: usize) -> [f64; 6] {
-    let ([x, y, yaw], [vx, vy, rate]) = (puck.pose, puck.velocity);
+    let ([x, y, yaw], [vx, vy, yaw_rate]) = (puck.pose, puck.velocity);
     if robot == 0 {
-        [x + TABLE.base_x_m, y, wrap(yaw), vx, vy, rate]
+        [x + TABLE.base_x_m, y, wrap(yaw), vx, vy, yaw_rate]
     } else {
-        [TABLE.base_x_m - x, -y, wrap(yaw - PI), -vx, -vy, rate]
+        [TABLE.base_x_m - x, -y, wrap(yaw - PI), -vx, -vy, yaw_rate]
     }
 }
 
-/// An angle in [−π, π).
+/// The same angle, rad, in [−π, π).
 #[must_use]
 pub fn wrap(angle: f64) -> f64 {
     let shifted = (angle + PI) - TAU * ((angle + PI) / TAU).floor();

@@ -1,7 +1,7 @@
-//! `libm`'s arc tangent, sine and cosine in lanes, with the same bits as the scalar functions.
+//! Arc tangent, sine and cosine in SIMD lanes (several numbers at once), with the same bits as the scalar functions of `libm`.
 //!
-//! If all four lanes are in the usual range, they are computed at once, in fdlibm's order of operations,
-//! which `libm` follows. Otherwise, and for fewer lanes, each lane calls `libm`.
+//! If all four lanes are in the usual range, they are computed at once, in the order of operations of fdlibm (Sun's C library),
+//! which `libm` follows; the letters of intermediate values are fdlibm's, too. Otherwise, and for fewer lanes, each lane calls `libm`.
 
 use super::lanes::{Lanes, MAX_LANES, PIO2_HEAD, PIO2_TAIL, rotate_quarters};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
@@ -14,7 +14,7 @@ pub fn atan2<T: Lanes>(y: T, x: T) -> T {
     }
     let ratio = (y / x).abs();
     // Excludes NaN, infinities, and x and y both zero.
-    if T::bits(ratio.less_or_equal(T::splat(STEEPEST))) != T::ALL {
+    if T::bits(ratio.less_or_equal(T::splat(STEEPEST_RATIO))) != T::ALL {
         return atan2_lane_by_lane(&y, &x);
     }
     let z = arc_tangent(ratio);
@@ -32,18 +32,18 @@ pub fn sin_cos<T: Lanes>(angle: T) -> (T, T) {
     let size = angle.abs();
     // Near a quarter turn more digits of π are needed; beyond half a turn, more reduction.
     let near_quarter = T::mask_xor(
-        T::splat(QUARTER.0).less_or_equal(size),
-        T::splat(QUARTER.1).less_or_equal(size),
+        T::splat(NEAR_QUARTER_TURN_RAD.0).less_or_equal(size),
+        T::splat(NEAR_QUARTER_TURN_RAD.1).less_or_equal(size),
     );
-    let far = T::splat(HALF).less_or_equal(size);
+    let far = T::splat(NEAR_HALF_TURN_RAD).less_or_equal(size);
     if T::bits(T::mask_or(near_quarter, far)) != 0 || T::bits(size.less_or_equal(size)) != T::ALL {
         return sin_cos_lane_by_lane(&angle);
     }
     let quarters = T::select(
-        T::splat(TWO_QUARTERS).less_or_equal(size),
+        T::splat(TWO_QUARTERS_FROM_RAD).less_or_equal(size),
         T::splat(2.0),
         T::select(
-            T::splat(ONE_QUARTER).less_or_equal(size),
+            T::splat(ONE_QUARTER_FROM_RAD).less_or_equal(size),
             T::splat(1.0),
             T::splat(0.0),
         ),
@@ -59,13 +59,13 @@ pub fn sin_cos<T: Lanes>(angle: T) -> (T, T) {
     let r = s2 + z * (s3 + z * s4) + z * w * (s5 + z * s6);
     let v = z * x;
     let half = T::splat(0.5);
-    let whole = T::select(
+    let sin_of_reduced = T::select(
         half.less_than(quarters),
         x - ((z * (half * tail - v * r) - tail) - v * s1),
         x + v * (s1 + z * r),
     );
-    // Keeps the sign of a zero.
-    let sin = T::select(size.less_than(T::splat(TINY)), angle, whole);
+    // Tiny angles are their own sine, which also keeps the sign of a zero.
+    let sin = T::select(size.less_than(T::splat(TINY_RAD)), angle, sin_of_reduced);
     let r = z * (c1 + z * (c2 + z * c3)) + w * w * (c4 + z * (c5 + z * c6));
     let half_square = half * z;
     let one = T::splat(1.0);
@@ -78,22 +78,26 @@ pub fn sin_cos<T: Lanes>(angle: T) -> (T, T) {
 #[inline(always)]
 fn arc_tangent<T: Lanes>(ratio: T) -> T {
     let one = T::splat(1.0);
-    // Reduces by a reference angle: 0, atan ½, π/4, atan 1½, π/2.
-    let [half, quarter, steep, upright] =
+    // Subtracts the nearest reference angle.
+    let [is_past_first, is_past_second, is_past_third, is_past_fourth] =
         ARC_BOUNDS.map(|bound| T::splat(bound).less_or_equal(ratio));
-    let pick = |values: [T; 5]| {
-        let low = T::select(half, values[1], values[0]);
-        let middle = T::select(quarter, values[2], low);
-        T::select(upright, values[4], T::select(steep, values[3], middle))
+    let by_reference_angle = |values: [T; 5]| {
+        let low = T::select(is_past_first, values[1], values[0]);
+        let middle = T::select(is_past_second, values[2], low);
+        T::select(
+            is_past_fourth,
+            values[4],
+            T::select(is_past_third, values[3], middle),
+        )
     };
-    let numerator = pick([
+    let numerator = by_reference_angle([
         ratio,
         T::splat(2.0) * ratio - one,
         ratio - one,
         ratio - T::splat(1.5),
         -one,
     ]);
-    let denominator = pick([
+    let denominator = by_reference_angle([
         one,
         T::splat(2.0) + ratio,
         ratio + one,
@@ -106,7 +110,8 @@ fn arc_tangent<T: Lanes>(ratio: T) -> T {
     let a = ARC_TANGENT.map(T::splat);
     let odd = z * (a[0] + w * (a[2] + w * (a[4] + w * (a[6] + w * (a[8] + w * a[10])))));
     let even = w * (a[1] + w * (a[3] + w * (a[5] + w * (a[7] + w * a[9]))));
-    pick(ARC_HEAD.map(T::splat)) - (x * (odd + even) - pick(ARC_TAIL.map(T::splat)) - x)
+    by_reference_angle(ARC_HEAD.map(T::splat))
+        - (x * (odd + even) - by_reference_angle(ARC_TAIL.map(T::splat)) - x)
 }
 
 #[cold]
@@ -124,26 +129,26 @@ fn sin_cos_lane_by_lane<T: Lanes>(angle: &T) -> (T, T) {
     (T::from_fn(|i| sines[i]), T::from_fn(|i| cosines[i]))
 }
 
-/// Ratios above this have the arc tangent π/2.
-const STEEPEST: f64 = 1_152_921_504_606_846_976.0;
-/// π minus the nearest `f64`.
+/// Ratios y / x above this (2⁶⁰) have the arc tangent π/2.
+const STEEPEST_RATIO: f64 = 1_152_921_504_606_846_976.0;
+/// π minus the `f64` nearest to it.
 const PI_TAIL: f64 = 1.224_646_799_147_353_2e-16;
 /// Angles from which `libm` subtracts one and two quarter turns, rad.
-const ONE_QUARTER: f64 = f64::from_bits(0x3fe9_21fc_0000_0000);
-const TWO_QUARTERS: f64 = f64::from_bits(0x4002_d97d_0000_0000);
+const ONE_QUARTER_FROM_RAD: f64 = f64::from_bits(0x3fe9_21fc_0000_0000);
+const TWO_QUARTERS_FROM_RAD: f64 = f64::from_bits(0x4002_d97d_0000_0000);
 /// Range of angles near a quarter turn, rad.
-const QUARTER: (f64, f64) = (
+const NEAR_QUARTER_TURN_RAD: (f64, f64) = (
     f64::from_bits(0x3ff9_21fb_0000_0000),
     f64::from_bits(0x3ff9_21fc_0000_0000),
 );
 /// Angles from here on are near half a turn or beyond, rad.
-const HALF: f64 = f64::from_bits(0x4009_21fb_0000_0000);
+const NEAR_HALF_TURN_RAD: f64 = f64::from_bits(0x4009_21fb_0000_0000);
 /// Below this angle, rad, the sine equals the angle.
-const TINY: f64 = f64::from_bits(0x3e46_a09e_0000_0000);
-/// Ratios at which the next reference angle becomes nearer.
+const TINY_RAD: f64 = f64::from_bits(0x3e46_a09e_0000_0000);
+/// Ratios from which the second, third, … of the reference angles (below) is the nearest.
 const ARC_BOUNDS: [f64; 4] = [0.4375, 0.6875, 1.1875, 2.4375];
 
-/// The published constants (fdlibm).
+/// Coefficients of the polynomials for sine, cosine and arc tangent, as published with fdlibm.
 const SINE: [f64; 6] = [
     -0.166_666_666_666_666_32,
     0.008_333_333_333_322_49,
@@ -173,7 +178,7 @@ const ARC_TANGENT: [f64; 11] = [
     -0.036_531_572_744_216_916,
     0.016_285_820_115_365_782,
 ];
-/// The reference angles, rad, as a head and a correction.
+/// The reference angles 0, atan ½, π/4, atan 1½, π/2, rad: each is the sum of a head (the nearest `f64`) and a tail.
 const ARC_HEAD: [f64; 5] = [
     0.0,
     0.463_647_609_000_806_1,
@@ -194,22 +199,22 @@ mod tests {
     use super::*;
     use wide::f64x4;
 
-    fn assert_same(actual: f64, expected: f64, label: &str) {
+    fn assert_same_bits(actual: f64, expected: f64, label: &str) {
         let same = actual.to_bits() == expected.to_bits() || (actual.is_nan() && expected.is_nan());
         assert!(same, "{label}: {actual:e} and {expected:e}");
     }
 
-    /// Numbers of all magnitudes and signs, and the limits of each formula.
+    /// Numbers of all magnitudes and signs, and the neighbours of each limit between two formulas.
     fn numbers() -> Vec<f64> {
         let mut all = vec![0.0, f64::INFINITY, f64::NAN, f64::MIN_POSITIVE, 5e-324];
         let edges = [
-            ONE_QUARTER,
-            TWO_QUARTERS,
-            QUARTER.0,
-            QUARTER.1,
-            HALF,
-            TINY,
-            STEEPEST,
+            ONE_QUARTER_FROM_RAD,
+            TWO_QUARTERS_FROM_RAD,
+            NEAR_QUARTER_TURN_RAD.0,
+            NEAR_QUARTER_TURN_RAD.1,
+            NEAR_HALF_TURN_RAD,
+            TINY_RAD,
+            STEEPEST_RATIO,
         ];
         for edge in edges
             .into_iter()
@@ -236,8 +241,8 @@ mod tests {
             let (sines, cosines) = sin_cos(f64x4::new([x, 0.3, -1.2, 2.9]));
             for (lane, angle) in [x, 0.3, -1.2, 2.9].into_iter().enumerate() {
                 let (sin, cos) = libm::sincos(angle);
-                assert_same(sines.lane(lane), sin, &format!("sine of {angle:e}"));
-                assert_same(cosines.lane(lane), cos, &format!("cosine of {angle:e}"));
+                assert_same_bits(sines.lane(lane), sin, &format!("sine of {angle:e}"));
+                assert_same_bits(cosines.lane(lane), cos, &format!("cosine of {angle:e}"));
             }
         }
     }
@@ -251,7 +256,7 @@ mod tests {
                 let angles = atan2(f64x4::new(ys), f64x4::new(xs));
                 for lane in 0..4 {
                     let label = format!("angle of ({:e}, {:e})", xs[lane], ys[lane]);
-                    assert_same(angles.lane(lane), libm::atan2(ys[lane], xs[lane]), &label);
+                    assert_same_bits(angles.lane(lane), libm::atan2(ys[lane], xs[lane]), &label);
                 }
             }
         }

@@ -1,4 +1,9 @@
-//! The arm's equations of motion: kinematics, recursive Newton–Euler, composite rigid body.
+//! The arm's equations of motion: forward kinematics, torques by the recursive Newton–Euler algorithm, and the joint-space inertia by the
+//! composite-rigid-body algorithm.
+//!
+//! The *plant* is the simulated arm: seven driven joints and the two hinges of the *universal joint*, on which the mallet hangs. The
+//! *controller's model* has the seven driven joints only. `q`, `dq` and `ddq` are joint positions (rad), velocities (rad/s) and
+//! accelerations (rad/s²). All vectors are in the robot's base frame. `T` is one number per arm ([`Lanes`]).
 
 use super::{
     lanes::Lanes,
@@ -6,16 +11,16 @@ use super::{
 };
 use crate::model::{DOFS, GRAVITY_M_S2, JOINTS, LINKS, Mount, Offset, SUBSTEP_S, TOOL};
 
-/// Frames of the links and joint axes, in the base frame.
+/// Frames of the links, and axes of the joints, in the base frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Kinematics<T> {
     /// Frames of links 1…7, at their joints.
     pub links: [Frame<T>; JOINTS],
     /// Frame of the end effector.
     pub end_effector: Frame<T>,
-    /// The mallet's z axis.
+    /// The mallet's z axis, a unit vector from the universal joint to the mallet.
     pub mallet_axis: Vec3<T>,
-    /// Motion of unit rate of each joint: 7 driven ones, then the universal joint's y and x hinge.
+    /// Motion of the following bodies at unit rate of each joint: 7 driven ones, then the universal joint's y and x hinge.
     pub axes: [Motion<T>; DOFS],
 }
 
@@ -27,7 +32,7 @@ impl<T: Lanes> Kinematics<T> {
         let mut links = [frame; JOINTS];
         let mut axes = [Motion::zero(); DOFS];
         for i in 0..JOINTS {
-            frame = step(&frame, LINKS[i].offset, LINKS[i].mount, q[i]);
+            frame = link_frame(&frame, LINKS[i].offset, LINKS[i].mount, q[i]);
             links[i] = frame;
             axes[i] = Motion::hinge(frame.z, frame.origin);
         }
@@ -58,15 +63,16 @@ impl<T: Lanes> Kinematics<T> {
         self.end_effector.origin + self.mallet_axis.scale(T::splat(TOOL.cylinder_centre_z_m))
     }
 
-    /// The linear velocity that unit rate of each joint gives to a point fixed to the mallet.
+    /// The linear velocity, m/s, that a rate of 1 rad/s of each joint gives to a point fixed to the mallet.
     #[inline(always)]
     pub fn jacobian_at(&self, point: Vec3<T>) -> [Vec3<T>; DOFS] {
-        self.axes.map(|axis| axis.at(point))
+        self.axes.map(|axis| axis.velocity_at(point))
     }
 }
 
+/// The frame of a link whose joint is at angle `q`, rad.
 #[inline(always)]
-fn step<T: Lanes>(parent: &Frame<T>, offset: Offset, mount: Mount, q: T) -> Frame<T> {
+fn link_frame<T: Lanes>(parent: &Frame<T>, offset: Offset, mount: Mount, q: T) -> Frame<T> {
     let origin = parent.origin
         + match offset {
             Offset::Y(d) => parent.y.scale(T::splat(d)),
@@ -87,7 +93,7 @@ fn step<T: Lanes>(parent: &Frame<T>, offset: Offset, mount: Mount, q: T) -> Fram
     }
 }
 
-/// Spatial inertias of the bodies at one configuration.
+/// Spatial inertias of the bodies at one set of joint positions, with nominal masses.
 #[derive(Debug, Clone, Copy)]
 pub struct Bodies<T> {
     /// Links 1…7.
@@ -163,11 +169,11 @@ pub struct PlantBodies<T> {
     pub mallet: Inertia<T>,
 }
 
-/// Index of the degree of freedom that carries the mallet.
-const MALLET: usize = DOFS - 1;
+/// Index of the degree of freedom that carries the mallet: the second hinge.
+const MALLET_DOF: usize = DOFS - 1;
 
 /// Inverse dynamics of the controller's seven-joint model by recursive Newton–Euler: the torques
-/// `M(q) ddq + bias(q, dq)`, N m.
+/// `M(q) ddq + bias(q, dq)`, N m, with the joint-space inertia M. The bias consists of gravity, centrifugal and Coriolis torques.
 #[inline(always)]
 pub fn controller_torques<T: Lanes>(
     kinematics: &Kinematics<T>,
@@ -184,7 +190,7 @@ pub fn controller_torques<T: Lanes>(
     let mut forces = [Force::zero(); JOINTS];
     for i in 0..JOINTS {
         let joint_velocity = kinematics.axes[i].scale(dq[i]);
-        // v × S q̇ needs only the parent's velocity, for S × S = 0.
+        // `velocity` is still the parent's: the link's own part would add nothing, since the cross product of an axis with itself is 0.
         acceleration =
             acceleration + kinematics.axes[i].scale(ddq[i]) + velocity.cross_motion(joint_velocity);
         velocity = velocity + joint_velocity;
@@ -205,7 +211,7 @@ fn force_of<T: Lanes>(body: &Inertia<T>, velocity: Motion<T>, acceleration: Moti
     body.mul(acceleration) + velocity.cross_force(body.mul(velocity))
 }
 
-/// Gravity, centrifugal and Coriolis torques of the nine-joint plant by recursive Newton–Euler, N m.
+/// The bias of the nine-joint plant by recursive Newton–Euler: gravity, centrifugal and Coriolis torques, N m.
 #[inline(always)]
 pub fn plant_bias<T: Lanes>(
     kinematics: &Kinematics<T>,
@@ -225,7 +231,7 @@ pub fn plant_bias<T: Lanes>(
         velocity = velocity + joint_velocity;
         if i < JOINTS {
             forces[i] = force_of(&bodies.links[i], velocity, acceleration);
-        } else if i == MALLET {
+        } else if i == MALLET_DOF {
             total = force_of(&bodies.mallet, velocity, acceleration);
         }
     }
@@ -263,9 +269,13 @@ pub fn mass_matrix<T: Lanes>(
     mass
 }
 
-/// `M + h D`: the matrix of the semi-implicit Euler step with implicit joint damping.
+/// The matrix `M + h D` of the semi-implicit Euler step with implicit joint damping: joint-space inertia M (kg m²), length h of a substep
+/// (s), joint damping D (N m s/rad).
 #[inline(always)]
-pub fn damped<T: Lanes>(mass: &[[T; DOFS]; DOFS], damping: &[T; JOINTS]) -> [[T; DOFS]; DOFS] {
+pub fn damped_mass_matrix<T: Lanes>(
+    mass: &[[T; DOFS]; DOFS],
+    damping: &[T; JOINTS],
+) -> [[T; DOFS]; DOFS] {
     let mut m = *mass;
     for i in 0..JOINTS {
         m[i][i] += T::splat(SUBSTEP_S) * damping[i];

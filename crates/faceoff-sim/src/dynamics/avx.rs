@@ -1,4 +1,4 @@
-//! Four lanes in the 256-bit registers of AVX, on machines that have them.
+//! Four lanes (numbers that are computed at once) in the 256-bit registers of AVX, on machines that have them.
 //!
 //! The crate is built for every x86-64 CPU, which guarantees registers of two numbers only. `wide` selects
 //! its instructions at compile time. Selecting them at run time needs the compiler's intrinsics, which are
@@ -35,9 +35,9 @@ impl Avx {
     }
 
     /// Runs a kernel in four lanes.
-    pub fn run<I: LaneKernel>(self, kernel: I) -> I::Output {
+    pub fn run<K: LaneKernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "avx")]
-        fn with_avx<I: LaneKernel>(kernel: I) -> I::Output {
+        fn with_avx<K: LaneKernel>(kernel: K) -> K::Output {
             kernel.run::<F64x4>()
         }
         // SAFETY: `self` exists only on machines with AVX.
@@ -49,7 +49,7 @@ impl Avx {
 #[derive(Debug, Clone, Copy)]
 pub struct F64x4(__m256d);
 
-/// A call of an intrinsic.
+/// Calls an intrinsic.
 macro_rules! intrinsic {
     ($result:expr) => {
         // SAFETY: pure arithmetic on values, which exist only on machines with AVX (`F64x4`).
@@ -57,6 +57,7 @@ macro_rules! intrinsic {
     };
 }
 
+/// Implements an arithmetic operator by an intrinsic.
 macro_rules! operator {
     ($operator:ident, $function:ident, $intrinsic:ident) => {
         impl $operator for F64x4 {
@@ -172,7 +173,7 @@ impl Lanes for F64x4 {
         intrinsic!(_mm256_movemask_pd(mask.0)).cast_unsigned()
     }
 
-    // The instructions return their second operand if the operands are equal or one of them is NaN.
+    // The instructions return their second operand, here `self`, if the operands are equal or one of them is NaN.
     #[inline(always)]
     fn at_least(self, low: Self) -> Self {
         Self(intrinsic!(_mm256_max_pd(low.0, self.0)))

@@ -1,9 +1,9 @@
-//! Computations that are written once for lanes of any width.
+//! *Kernels*: computations that are written once, for any number of lanes (arms that are computed at once).
 
 use super::lanes::Lanes;
 
-/// A computation in lanes. Every function that it calls with lanes must be inlined: functions that are not
-/// are compiled for the baseline registers.
+/// A computation in lanes. Every function that it calls with lanes must be inlined: a function that is not inlined
+/// is compiled for the registers that every CPU of the target has, instead of those of the chosen instruction set.
 pub(crate) trait LaneKernel {
     type Output;
 

@@ -1,4 +1,4 @@
-//! Arithmetic on one arm, or on several at once.
+//! Arithmetic on one number per arm: on one arm, or on several at once in the *lanes* (number slots) of a SIMD register.
 
 use std::f64::consts::FRAC_2_PI;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -68,10 +68,10 @@ pub trait Lanes:
     /// `yes` where the mask is true, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// A mask as bits; the first arm is the lowest bit.
+    /// A mask as bits, 1 for true; the first arm has the lowest bit.
     fn bits(mask: Self::Mask) -> u32;
 
-    /// The mask of [`Lanes::bits`].
+    /// The mask with these [`Lanes::bits`].
     #[inline]
     fn mask(bits: u32) -> Self::Mask {
         let yes = Self::from_fn(|i| f64::from(bits >> i & 1));
@@ -90,22 +90,23 @@ pub trait Lanes:
         Self::select(high.less_than(self), high, self)
     }
 
-    /// Sine and cosine of an angle in rad, the same bits for every number of lanes, within an ulp of
-    /// `libm` up to a hundred turns.
+    /// Sine and cosine of an angle in rad, with the same bits for every number of lanes. Up to a hundred turns they differ from
+    /// `libm`'s by at most one unit in the last place.
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let quarters = self * Self::splat(FRAC_2_PI);
         let quarters = quarters.nearest();
-        // Cody and Waite: subtract whole quarter turns in two steps, the first one exact.
+        // Cody and Waite's reduction: subtract whole quarter turns in two steps, the first one exact. Letters are fdlibm's: r is the
+        // reduced angle, z its square.
         let r = self - quarters * Self::splat(PIO2_HEAD) - quarters * Self::splat(PIO2_TAIL);
         let z = r * r;
         let sin = kernel_sin(r, z);
         let cos = kernel_cos(z);
         if Self::COUNT <= 2 {
-            return lane_by_lane(&quarters, &sin, &cos);
+            return rotate_lane_by_lane(&quarters, &sin, &cos);
         }
         if Self::bits(quarters.abs().less_than(Self::splat(MAX_EXACT_QUARTERS))) != Self::ALL {
-            return large_angles(&quarters, &sin, &cos);
+            return rotate_large_angles(&quarters, &sin, &cos);
         }
         // Quarter turns without whole turns, −2…2; all exact.
         let turns = (quarters * Self::splat(0.25)).nearest();
@@ -115,11 +116,11 @@ pub trait Lanes:
 
 /// Sine and cosine after some quarter turns, from those of the reduced angle.
 #[inline(always)]
-fn lane_by_lane<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
+fn rotate_lane_by_lane<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
     let (mut sines, mut cosines) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
     for lane in 0..T::COUNT {
         let (s, c) = (sin.lane(lane), cos.lane(lane));
-        // Exact: a small integer. Larger angles have no accurate sine.
+        // The conversion is exact for small integers; larger angles have no accurate sine anyway.
         (sines[lane], cosines[lane]) = match quarters.lane(lane) as i64 & 3 {
             0 => (s, c),
             1 => (c, -s),
@@ -130,14 +131,14 @@ fn lane_by_lane<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
     (T::from_fn(|i| sines[i]), T::from_fn(|i| cosines[i]))
 }
 
-/// [`lane_by_lane`] out of line: many lanes rarely need it.
+/// [`rotate_lane_by_lane`] as a function that is not inlined: four lanes rarely need it.
 #[cold]
 #[inline(never)]
-fn large_angles<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
-    lane_by_lane(quarters, sin, cos)
+fn rotate_large_angles<T: Lanes>(quarters: &T, sin: &T, cos: &T) -> (T, T) {
+    rotate_lane_by_lane(quarters, sin, cos)
 }
 
-/// Numbers of quarter turns below this are exact.
+/// Numbers of quarter turns below this (2⁵⁰) are exact.
 const MAX_EXACT_QUARTERS: f64 = 1_125_899_906_842_624.0;
 
 /// Sine and cosine after −2…2 quarter turns, from those of the reduced angle.
@@ -156,9 +157,9 @@ pub(super) fn rotate_quarters<T: Lanes>(quarters: T, sin: T, cos: T) -> (T, T) {
     (sin, cos)
 }
 
-/// 1.5 · 2⁵²: adding and subtracting it rounds to an integer, see `nearest`.
+/// 1.5 · 2⁵²: adding and subtracting it rounds a number to an integer.
 pub(super) const ROUNDING: f64 = 6_755_399_441_055_744.0;
-/// The first 33 bits of π/2, and the rest of it (as in fdlibm).
+/// The first 33 bits of π/2, and the rest of it, as in fdlibm (Sun's C library).
 #[expect(
     clippy::excessive_precision,
     reason = "the digits of the published constants"
@@ -214,7 +215,7 @@ fn kernel_cos<T: Lanes>(z: T) -> T {
     w + (((T::splat(1.0) - w) - half) + z * z * p)
 }
 
-/// A polynomial, highest coefficient first.
+/// A polynomial in `z` by Horner's scheme, highest coefficient first.
 #[inline(always)]
 fn horner<T: Lanes>(z: T, coefficients: [f64; 6]) -> T {
     let mut sum = T::splat(coefficients[0]);
@@ -224,14 +225,14 @@ fn horner<T: Lanes>(z: T, coefficients: [f64; 6]) -> T {
     sum
 }
 
-/// Transposes one row per arm into lanes.
+/// Collects one row of numbers per arm into lanes: number `i` of the result has number `i` of every arm's row.
 #[inline(always)]
 pub fn gather<'a, T: Lanes, const N: usize>(row: impl Fn(usize) -> &'a [f64; N]) -> [T; N] {
     let rows: [&[f64; N]; MAX_LANES] = std::array::from_fn(|lane| row(lane.min(T::COUNT - 1)));
     std::array::from_fn(|i| T::from_fn(|lane| rows[lane][i]))
 }
 
-/// The row of one arm.
+/// The row of one arm, the inverse of [`gather`].
 #[inline]
 pub fn row<T: Lanes, const N: usize>(lanes: &[T; N], lane: usize) -> [f64; N] {
     std::array::from_fn(|i| lanes[i].lane(lane))

@@ -1,9 +1,9 @@
-//! Factorisation of the joint-space inertia.
+//! LDLᵀ factorisation of the joint-space inertia, to solve for joint accelerations.
 
 use super::lanes::Lanes;
 use crate::model::DOFS;
 
-/// `L D Lᵀ` of a symmetric positive definite matrix.
+/// The factors `L D Lᵀ` of a symmetric positive definite matrix: L is lower triangular with ones on its diagonal, D diagonal.
 #[derive(Debug, Clone, Copy)]
 pub struct Ldlt<T> {
     /// Strictly lower triangle: L (unit diagonal). The diagonal holds 1 / D.
@@ -17,7 +17,7 @@ impl<T: Lanes> Ldlt<T> {
         let mut l = *matrix;
         let one = T::splat(1.0);
         for j in 0..DOFS {
-            // Column j times D, of the rows above the diagonal.
+            // Row j of L·D, left of the diagonal.
             let mut scaled = [one; DOFS];
             let mut pivot = l[j][j];
             for k in 0..j {
@@ -39,7 +39,7 @@ impl<T: Lanes> Ldlt<T> {
         Self { l }
     }
 
-    /// Solves for a right-hand side.
+    /// Solves `matrix · x = rhs` for x.
     #[inline(always)]
     pub fn solve(&self, rhs: &[T; DOFS]) -> [T; DOFS] {
         let l = &self.l;

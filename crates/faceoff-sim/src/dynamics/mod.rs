@@ -1,4 +1,4 @@
-//! The dynamics of an arm, for one arm or several at once.
+//! The dynamics of an arm, for one arm or for several at once in the lanes (number slots) of SIMD registers.
 
 pub mod angles;
 pub mod arm;

@@ -1,4 +1,4 @@
-//! Selects the instruction set of four lanes.
+//! Selects the instruction set with which several arms are computed at once, one in each lane (number slot) of a register.
 
 #[cfg(target_arch = "x86_64")]
 use super::avx::Avx;
@@ -11,6 +11,7 @@ pub struct SimdLevel(Registers);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Registers {
+    /// Those that every CPU of the target has.
     Plain,
     #[cfg(target_arch = "x86_64")]
     Avx(Avx),
@@ -29,7 +30,7 @@ impl SimdLevel {
         None
     }
 
-    /// The fastest one of this machine.
+    /// The fastest level of this machine.
     #[must_use]
     pub fn fastest() -> Self {
         Self::avx().unwrap_or(Self::PLAIN)
@@ -45,7 +46,7 @@ impl SimdLevel {
     }
 
     /// Runs a kernel on `arms` arms in lanes, at most [`MAX_LANES`].
-    pub(crate) fn run<I: LaneKernel>(self, arms: usize, kernel: I) -> I::Output {
+    pub(crate) fn run<K: LaneKernel>(self, arms: usize, kernel: K) -> K::Output {
         match self.0 {
             Registers::Plain if arms <= 2 => kernel.run::<f64x2>(),
             Registers::Plain => kernel.run::<f64x4>(),

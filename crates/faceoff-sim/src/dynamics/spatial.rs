@@ -1,4 +1,5 @@
-//! Spatial (six-dimensional) vectors and inertias, all taken about the origin of the arm's base frame.
+//! Spatial (six-dimensional) vectors and inertias, as in Featherstone's rigid-body dynamics: linear and angular parts in one, all taken
+//! about the origin of the arm's base frame. `T` is one number per arm.
 //!
 //! With one common origin, velocities, forces and inertias of different links add without a transform. This
 //! keeps the recursions short.
@@ -18,13 +19,12 @@ pub struct Vec3<T> {
 }
 
 impl<T: Lanes> Vec3<T> {
-    /// From components.
     #[inline(always)]
     pub fn new(x: T, y: T, z: T) -> Self {
         Self { x, y, z }
     }
 
-    /// From constants, the same for every arm.
+    /// A vector of constants, the same for every arm.
     #[inline(always)]
     pub fn splat(v: [f64; 3]) -> Self {
         Self::new(T::splat(v[0]), T::splat(v[1]), T::splat(v[2]))
@@ -36,16 +36,16 @@ impl<T: Lanes> Vec3<T> {
     }
 
     #[inline(always)]
-    pub fn dot(self, o: Self) -> T {
-        self.x * o.x + self.y * o.y + self.z * o.z
+    pub fn dot(self, other: Self) -> T {
+        self.x * other.x + self.y * other.y + self.z * other.z
     }
 
     #[inline(always)]
-    pub fn cross(self, o: Self) -> Self {
+    pub fn cross(self, other: Self) -> Self {
         Self::new(
-            self.y * o.z - self.z * o.y,
-            self.z * o.x - self.x * o.z,
-            self.x * o.y - self.y * o.x,
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
         )
     }
 
@@ -64,16 +64,16 @@ impl<T: Lanes> Vec3<T> {
 impl<T: Lanes> Add for Vec3<T> {
     type Output = Self;
     #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        Self::new(self.x + o.x, self.y + o.y, self.z + o.z)
+    fn add(self, other: Self) -> Self {
+        Self::new(self.x + other.x, self.y + other.y, self.z + other.z)
     }
 }
 
 impl<T: Lanes> Sub for Vec3<T> {
     type Output = Self;
     #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        Self::new(self.x - o.x, self.y - o.y, self.z - o.z)
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.x - other.x, self.y - other.y, self.z - other.z)
     }
 }
 
@@ -148,9 +148,9 @@ impl<T: Lanes> Motion<T> {
         }
     }
 
-    /// The velocity that this motion gives to a point.
+    /// The linear velocity, m/s, that this motion gives to a point (m).
     #[inline(always)]
-    pub fn at(self, point: Vec3<T>) -> Vec3<T> {
+    pub fn velocity_at(self, point: Vec3<T>) -> Vec3<T> {
         self.linear + self.angular.cross(point)
     }
 
@@ -162,12 +162,12 @@ impl<T: Lanes> Motion<T> {
         }
     }
 
-    /// The rate of change of a motion vector `o` that is carried along by this velocity.
+    /// The rate of change of a motion vector `other` that is carried along by this velocity.
     #[inline(always)]
-    pub fn cross_motion(self, o: Self) -> Self {
+    pub fn cross_motion(self, other: Self) -> Self {
         Self {
-            angular: self.angular.cross(o.angular),
-            linear: self.angular.cross(o.linear) + self.linear.cross(o.angular),
+            angular: self.angular.cross(other.angular),
+            linear: self.angular.cross(other.linear) + self.linear.cross(other.angular),
         }
     }
 
@@ -180,7 +180,7 @@ impl<T: Lanes> Motion<T> {
         }
     }
 
-    /// Power of a force on this motion, or the generalised force about this axis.
+    /// The power of a force on this velocity; if `self` is a joint axis, the force's torque about it.
     #[inline(always)]
     pub fn dot(self, f: Force<T>) -> T {
         self.angular.dot(f.moment) + self.linear.dot(f.force)
@@ -190,10 +190,10 @@ impl<T: Lanes> Motion<T> {
 impl<T: Lanes> Add for Motion<T> {
     type Output = Self;
     #[inline(always)]
-    fn add(self, o: Self) -> Self {
+    fn add(self, other: Self) -> Self {
         Self {
-            angular: self.angular + o.angular,
-            linear: self.linear + o.linear,
+            angular: self.angular + other.angular,
+            linear: self.linear + other.linear,
         }
     }
 }
@@ -220,10 +220,10 @@ impl<T: Lanes> Force<T> {
 impl<T: Lanes> Add for Force<T> {
     type Output = Self;
     #[inline(always)]
-    fn add(self, o: Self) -> Self {
+    fn add(self, other: Self) -> Self {
         Self {
-            moment: self.moment + o.moment,
-            force: self.force + o.force,
+            moment: self.moment + other.moment,
+            force: self.force + other.force,
         }
     }
 }
@@ -263,10 +263,10 @@ impl<T: Lanes> Symmetric<T> {
         )
     }
 
-    /// `R m Rᵀ`: a matrix given in `frame`, in the base frame.
+    /// `R m Rᵀ`: the matrix m = `self`, given in the frame `f` with rotation R, in the base frame.
     #[inline(always)]
     fn rotated(self, f: &Frame<T>) -> Self {
-        // Columns of R m.
+        // The columns of R m.
         let a = f.x.scale(self.xx) + f.y.scale(self.xy) + f.z.scale(self.xz);
         let b = f.x.scale(self.xy) + f.y.scale(self.yy) + f.z.scale(self.yz);
         let c = f.x.scale(self.xz) + f.y.scale(self.yz) + f.z.scale(self.zz);
@@ -284,14 +284,14 @@ impl<T: Lanes> Symmetric<T> {
 impl<T: Lanes> Add for Symmetric<T> {
     type Output = Self;
     #[inline(always)]
-    fn add(self, o: Self) -> Self {
+    fn add(self, other: Self) -> Self {
         Self {
-            xx: self.xx + o.xx,
-            yy: self.yy + o.yy,
-            zz: self.zz + o.zz,
-            xy: self.xy + o.xy,
-            xz: self.xz + o.xz,
-            yz: self.yz + o.yz,
+            xx: self.xx + other.xx,
+            yy: self.yy + other.yy,
+            zz: self.zz + other.zz,
+            xy: self.xy + other.xy,
+            xz: self.xz + other.xz,
+            yz: self.yz + other.yz,
         }
     }
 }
@@ -301,26 +301,26 @@ impl<T: Lanes> Add for Symmetric<T> {
 pub struct Inertia<T> {
     /// kg.
     pub mass: T,
-    /// Mass times centre of mass, kg m.
+    /// Mass times position of the centre of mass, kg m.
     pub first_moment: Vec3<T>,
     /// Rotational inertia about the base's origin, kg m².
     pub rotational: Symmetric<T>,
 }
 
 impl<T: Lanes> Inertia<T> {
-    /// From the rotational inertia about the centre of mass, in the body's own frame.
+    /// From mass (kg), centre of mass (m) and rotational inertia about it (kg m²; xx, yy, zz, xy, xz, yz), in the body's own `frame`.
     #[inline(always)]
     pub fn of_body(frame: &Frame<T>, mass: f64, centre: [f64; 3], rotational: [f64; 6]) -> Self {
         let about_centre = Symmetric::splat(rotational).rotated(frame);
-        Self::about(frame.point(centre), mass, about_centre)
+        Self::with_centre(frame.point(centre), mass, about_centre)
     }
 
-    /// From a rotational inertia about the centre of mass that is the same about every axis.
+    /// From a rotational inertia about the centre of mass, kg m², that is the same about every axis.
     #[inline(always)]
     pub fn isotropic(centre: Vec3<T>, mass: f64, rotational: f64) -> Self {
         let zero = T::splat(0.0);
         let diagonal = T::splat(rotational);
-        Self::about(
+        Self::with_centre(
             centre,
             mass,
             Symmetric {
@@ -334,11 +334,13 @@ impl<T: Lanes> Inertia<T> {
         )
     }
 
+    /// From the centre of mass (m), and the rotational inertia about it, both in the base frame.
     #[inline(always)]
-    fn about(c: Vec3<T>, mass: f64, about_centre: Symmetric<T>) -> Self {
+    fn with_centre(centre: Vec3<T>, mass: f64, about_centre: Symmetric<T>) -> Self {
         let mass = T::splat(mass);
-        let h = c.scale(mass);
+        let (c, h) = (centre, centre.scale(mass));
         let (xx, yy, zz) = (h.x * c.x, h.y * c.y, h.z * c.z);
+        // Steiner's theorem (parallel axes).
         let steiner = Symmetric {
             xx: yy + zz,
             yy: xx + zz,
@@ -354,7 +356,7 @@ impl<T: Lanes> Inertia<T> {
         }
     }
 
-    /// Momentum of a velocity, or force of an acceleration.
+    /// The momentum of the body at a velocity, or the force for an acceleration.
     #[inline(always)]
     pub fn mul(&self, v: Motion<T>) -> Force<T> {
         Force {
@@ -363,20 +365,20 @@ impl<T: Lanes> Inertia<T> {
         }
     }
 
-    /// A body of the same shape with `s` times the mass.
+    /// A body of the same shape with `factor` times the mass.
     #[inline(always)]
-    pub fn scaled(&self, s: T) -> Self {
+    pub fn scaled(&self, factor: T) -> Self {
         let r = self.rotational;
         Self {
-            mass: self.mass * s,
-            first_moment: self.first_moment.scale(s),
+            mass: self.mass * factor,
+            first_moment: self.first_moment.scale(factor),
             rotational: Symmetric {
-                xx: r.xx * s,
-                yy: r.yy * s,
-                zz: r.zz * s,
-                xy: r.xy * s,
-                xz: r.xz * s,
-                yz: r.yz * s,
+                xx: r.xx * factor,
+                yy: r.yy * factor,
+                zz: r.zz * factor,
+                xy: r.xy * factor,
+                xz: r.xz * factor,
+                yz: r.yz * factor,
             },
         }
     }
@@ -385,11 +387,11 @@ impl<T: Lanes> Inertia<T> {
 impl<T: Lanes> Add for Inertia<T> {
     type Output = Self;
     #[inline(always)]
-    fn add(self, o: Self) -> Self {
+    fn add(self, other: Self) -> Self {
         Self {
-            mass: self.mass + o.mass,
-            first_moment: self.first_moment + o.first_moment,
-            rotational: self.rotational + o.rotational,
+            mass: self.mass + other.mass,
+            first_moment: self.first_moment + other.first_moment,
+            rotational: self.rotational + other.rotational,
         }
     }
 }

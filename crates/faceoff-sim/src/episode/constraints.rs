@@ -1,4 +1,5 @@
-//! The constraints on the robot's motion (RULES, "Constraints and penalty points").
+//! The constraints on a robot's motion, whose violation costs penalty points (`docs/rules.md`, "Penalty points"). They form four groups:
+//! joint positions, joint velocities, end effector (the tip of the arm, which carries the mallet) and links.
 
 use crate::{
     dynamics::arm::Kinematics,
@@ -11,20 +12,20 @@ use faceoff_types::Violations;
 /// Tolerance ± of the end effector's height, m.
 pub const HEIGHT_TOLERANCE_M: f64 = 0.02;
 
-/// Least height of elbow and wrist above the robot's base frame, m.
+/// Least height of elbow and wrist in the robot's base frame, m.
 pub const LINK_HEIGHT_M: f64 = 0.25;
 
-/// Constraint values as the maximum over the group's values; violated when above 0. The value of a
-/// joint position is in rad, of a joint velocity in rad/s, the others in m.
+/// For each group of constraints, the largest excess over a bound. A group is violated if its value is above 0. Joint positions are in rad,
+/// joint velocities in rad/s, the others in m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ConstraintValues {
     /// Joint positions against 95 % of their range.
     pub joint_pos: f64,
     /// Filtered joint velocities against 95 % of their limits.
     pub joint_vel: f64,
-    /// End effector within its area of the table and at its height.
+    /// End effector against its area of the table and its height.
     pub ee: f64,
-    /// Height of elbow (link 4) and wrist (link 7).
+    /// Elbow (link 4) and wrist (link 7) against their least height.
     pub link: f64,
 }
 
@@ -46,6 +47,7 @@ impl ConstraintValues {
         )
     }
 
+    /// Constraint values at joint positions `q` (rad), filtered joint velocities (rad/s), and the kinematics of these positions.
     #[must_use]
     pub fn new(
         q: &[f64; JOINTS],
@@ -65,8 +67,9 @@ impl ConstraintValues {
         }
         let [x, y, z] = kinematics.end_effector.origin.lane(0);
         let radius = TOOL.cylinder_radius_m;
-        let near_edge = TABLE.base_x_m - (TABLE.half_length_m() - radius);
-        values.ee = (near_edge - x)
+        // Least x of the end effector, so that the mallet stays on the table.
+        let near_edge_x = TABLE.base_x_m - (TABLE.half_length_m() - radius);
+        values.ee = (near_edge_x - x)
             .max(y.abs() - (TABLE.half_width_m() - radius))
             .max((z - EE_DESIRED_HEIGHT_M).abs() - HEIGHT_TOLERANCE_M);
         let lowest = kinematics.links[3]
@@ -77,7 +80,7 @@ impl ConstraintValues {
         values
     }
 
-    /// Sets the flags of the violated groups.
+    /// Sets the flags of the violated groups in `violations`; other flags are kept.
     pub fn mark(&self, violations: &mut Violations) {
         violations.ee |= self.ee > 0.0;
         violations.link |= self.link > 0.0;

@@ -1,4 +1,4 @@
-//! The description of its environment that an agent receives (PROTOCOL, "env").
+//! The description of table and robot that an agent receives in the protocol's first message, `hello` (`docs/protocol.md`, "`env`").
 
 use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
@@ -9,10 +9,10 @@ use crate::{
 };
 use faceoff_types::Task;
 
-/// `env` of the protocol's hello, as plain data. SI units, radians; always of the nominal robot.
+/// The content of `env` in `hello`, as plain data. SI units, radians. The robot is always the nominal one, without model mismatch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnvInfo {
-    /// Robots on the table.
+    /// Number of robots on the table.
     pub n_agents: u32,
     /// Goal line to goal line.
     pub table_length: f64,
@@ -24,9 +24,9 @@ pub struct EnvInfo {
     pub puck_radius: f64,
     /// Radius of the mallet.
     pub mallet_radius: f64,
-    /// Height of the mallet plane above the robot's base frame.
+    /// Height at which the rules want the end effector, in the robot's base frame.
     pub ee_desired_height: f64,
-    /// Height of the universal joint above the table's surface at that height.
+    /// The same height above the table's surface. The end effector is where the universal joint carries the mallet.
     pub universal_height: f64,
     /// Control steps per second.
     pub control_frequency: f64,
@@ -51,10 +51,10 @@ pub fn env_info(task: Task) -> EnvInfo {
     env_info_for(if task == Task::Hit { 2 } else { 1 }, 0)
 }
 
-/// The environment of `robots` robots, as seen by robot `own` (0 or 1).
+/// The environment of `robots` robots (1 or 2), as seen by the robot `own_robot` (0 or 1).
 #[must_use]
-pub fn env_info_for(robots: u32, own: usize) -> EnvInfo {
-    let both = |limit: fn(usize) -> f64| {
+pub fn env_info_for(robots: u32, own_robot: usize) -> EnvInfo {
+    let lower_and_upper = |limit: fn(usize) -> f64| {
         [false, true].map(|upper| std::array::from_fn(|i| if upper { limit(i) } else { -limit(i) }))
     };
     let base_frame = |robot: usize| {
@@ -64,7 +64,7 @@ pub fn env_info_for(robots: u32, own: usize) -> EnvInfo {
             side, 0.0, 0.0, x, 0.0, side, 0.0, 0.0, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0,
         ]
     };
-    let order = [own, 1 - own];
+    let robots_own_first = [own_robot, 1 - own_robot];
     EnvInfo {
         n_agents: robots,
         table_length: TABLE.length_m,
@@ -75,10 +75,12 @@ pub fn env_info_for(robots: u32, own: usize) -> EnvInfo {
         ee_desired_height: EE_DESIRED_HEIGHT_M,
         universal_height: EE_DESIRED_HEIGHT_M + TABLE.base_z_m,
         control_frequency: 50.0,
-        joint_pos_limit: both(|i| LINKS[i].range_rad),
-        joint_vel_limit: both(|i| LINKS[i].velocity_limit_rad_s),
-        joint_acc_limit: both(|i| ACCELERATION_PER_VELOCITY * LINKS[i].velocity_limit_rad_s),
-        base_frame: order
+        joint_pos_limit: lower_and_upper(|i| LINKS[i].range_rad),
+        joint_vel_limit: lower_and_upper(|i| LINKS[i].velocity_limit_rad_s),
+        joint_acc_limit: lower_and_upper(|i| {
+            ACCELERATION_PER_VELOCITY * LINKS[i].velocity_limit_rad_s
+        }),
+        base_frame: robots_own_first
             .into_iter()
             .take(robots as usize)
             .map(base_frame)

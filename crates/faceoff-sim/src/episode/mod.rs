@@ -1,4 +1,4 @@
-//! Episodes of the qualifying tasks.
+//! *Episodes*: attempts of one agent at one of the qualifying tasks (`hit`, `defend`, `prepare`), in control steps of 20 ms.
 
 pub mod constraints;
 pub mod env_info;
@@ -12,7 +12,7 @@ use crate::{
     model::JOINTS,
     perturbation::table_factors::TableFactors,
     robot::plant::Plant,
-    stream::Stream,
+    stream::RandomStream,
     table::puck::Puck,
     world::{Bounds, Divergence, World},
 };
@@ -22,7 +22,7 @@ use faceoff_types::{
 };
 use opponent::Opponent;
 
-/// One qualifying episode. Deterministic: no clock, no I/O. Clone saves and restores it exactly.
+/// A running episode. It is deterministic: it reads no clock and does no I/O. A clone continues with the same bits.
 #[derive(Debug, Clone)]
 pub struct Episode {
     task: Task,
@@ -30,15 +30,17 @@ pub struct Episode {
     opponent: Option<Opponent>,
     channel: AgentChannel,
     table: TableFactors,
+    /// Control steps so far.
     steps: u32,
     puck_lost: bool,
+    /// Constraints violated so far.
     violations: Violations,
 }
 
 impl Episode {
-    /// An episode at its start. `plant` is nominal unless the factors contain
-    /// [`Factor::ModelMismatch`]; the caller passes [`Plant::mismatched`] then. The initial state and each
-    /// factor have their own random stream, derived from `seed` by name.
+    /// An episode at its start. `factors` are the active kinds of perturbations, `settings` their magnitudes. `plant` (the arms' physical
+    /// properties) is nominal unless the factors contain [`ModelMismatch`](faceoff_types::Factor::ModelMismatch); then the caller passes
+    /// [`Plant::mismatched`]. The initial state and each factor have their own random stream, derived from `seed` by name.
     #[must_use]
     pub fn new(
         task: Task,
@@ -48,11 +50,11 @@ impl Episode {
         plant: &Plant,
         seed: Seed,
     ) -> Self {
-        let puck = task::initial_puck(task, &mut Stream::new(&seed, "initial_state"));
+        let puck = task::initial_puck(task, &mut RandomStream::new(&seed, "initial_state"));
         Self::with_initial_puck(task, interpolation, factors, settings, plant, seed, puck)
     }
 
-    /// As [`Episode::new`], with a given initial puck [x, y, yaw, vx, vy, yaw rate].
+    /// As [`Episode::new`], with a given initial state of the puck: [x, y, yaw, vx, vy, yaw rate], table frame.
     #[must_use]
     pub fn with_initial_puck(
         task: Task,
@@ -78,26 +80,26 @@ impl Episode {
         }
     }
 
-    /// The same episode with other bounds than those of the current ruleset.
+    /// The same episode with other bounds of the simulation than those of the current ruleset.
     #[must_use]
     pub fn with_bounds(mut self, bounds: Bounds) -> Self {
         self.world.set_bounds(bounds);
         self
     }
 
-    /// The observation that the agent gets: 23 numbers for `hit`, 20 otherwise (PROTOCOL).
+    /// The observation for the agent: 23 numbers for `hit`, 20 otherwise (`docs/protocol.md`, "Observations").
     #[must_use]
     pub fn observation(&self) -> &[f64] {
         &self.channel.observation()[..observation::len(self.task)]
     }
 
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
-    /// be called after an end. A world that diverges ends as [`EpisodeEnd::AgentFault`]: only the agent's
-    /// commands can cause it.
+    /// be called after an end. If the world diverges (its state would leave the bounds of the simulation), the episode ends with
+    /// [`EpisodeEnd::AgentFault`], since only the agent's commands can cause it.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
         self.command(action);
-        let (world, air) = self.world_and_air_force();
-        world.control_step(air);
+        let (world, air_force) = self.world_and_air_force();
+        world.control_step(air_force);
         self.observe()
     }
 
@@ -110,7 +112,7 @@ impl Episode {
         }
     }
 
-    /// The world to be stepped, and the force of the air on the puck, N.
+    /// The world to be stepped, and the function that returns the force of the air flow on the puck, N.
     pub(crate) fn world_and_air_force(&mut self) -> (&mut World, impl FnMut(&Puck) -> [f64; 2]) {
         let table = &mut self.table;
         (&mut self.world, |puck: &Puck| table.force(puck))
@@ -118,7 +120,7 @@ impl Episode {
 
     /// Ends a control step: updates the observation and returns the result.
     pub(crate) fn observe(&mut self) -> StepOutcome {
-        self.puck_lost = self.table.is_lost();
+        self.puck_lost = self.table.draw_puck_lost();
         self.channel.update_observation(&self.world, self.puck_lost);
         self.steps += 1;
 
@@ -131,24 +133,25 @@ impl Episode {
         StepOutcome { end, constraints }
     }
 
-    /// Set once the world has diverged; its numbers are still finite then.
+    /// `Some` once the world has diverged; its numbers are still finite then.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.world.divergence()
     }
 
-    /// Has tracking lost the puck, so that the observation repeats an earlier position?
+    /// Has the (simulated) tracking lost the puck, so that the observation repeats an earlier pose?
     #[must_use]
     pub fn is_puck_lost(&self) -> bool {
         self.puck_lost
     }
 
+    /// Control steps so far.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps
     }
 
-    /// Success, tested on the last true state.
+    /// Is the last true state a success of the task?
     #[must_use]
     pub fn success(&self) -> bool {
         task::success(self.task, self.world.puck())
@@ -195,31 +198,35 @@ impl Episode {
 pub struct StepOutcome {
     /// The end of the episode, if this step ended it.
     pub end: Option<EpisodeEnd>,
-    /// Constraint values at this step.
+    /// Constraint values after this step.
     pub constraints: ConstraintValues,
 }
 
 impl StepOutcome {
+    /// The value before the first step.
     pub(crate) const NONE: Self = Self {
         end: None,
         constraints: ConstraintValues::ZERO,
     };
 }
 
-/// True state, recorded per step. SI units, radians; the puck in the table frame.
+/// The true state of an episode, as recordings contain it. SI units, radians. Joints are those of the agent's robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpisodeState {
-    /// x, y, yaw, vx, vy, yaw rate.
+    /// The puck's x, y, yaw, vx, vy, yaw rate, in the table frame.
     pub puck: [f64; 6],
+    /// Positions of the driven joints.
     pub q: [f64; JOINTS],
+    /// Velocities of the driven joints.
     pub dq: [f64; JOINTS],
-    /// Low-pass filtered joint velocities.
+    /// Low-pass filtered velocities of the driven joints.
     pub dq_filtered: [f64; JOINTS],
+    /// Angles of the universal joint, the two hinges of the mallet.
     pub universal: [f64; 2],
-    /// End effector in the robot's own base frame.
+    /// Position of the end effector, in the robot's own base frame.
     pub ee: [f64; 3],
     /// Joint positions of the opponent, `hit` only.
     pub opponent_q: Option<[f64; JOINTS]>,
-    /// The opponent's end effector in its own base frame, `hit` only.
+    /// Position of the opponent's end effector in its own base frame, `hit` only.
     pub opponent_ee: Option<[f64; 3]>,
 }

@@ -1,4 +1,4 @@
-//! The opponent of `hit`: robot 2 on a fixed figure of eight (MODEL, "The opponent of hit").
+//! The opponent in the task `hit`: robot 2, whose end effector follows a fixed figure of eight, as in the challenge's own simulator.
 
 use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS},
@@ -6,17 +6,21 @@ use crate::{
 };
 use std::f64::consts::FRAC_PI_2;
 
-/// Angle by which the figure advances per control step, rad.
-const ADVANCE: f64 = 3.0 * CONTROL_STEP_S;
-/// Centre of the figure along x, its half lengths along x (times one half) and y, m, base frame.
+/// Increase of the figure's phase per control step, rad: 3 rad/s.
+const PHASE_PER_STEP_RAD: f64 = 3.0 * CONTROL_STEP_S;
+/// Centre of the figure along x, m, in robot 2's base frame; along y it is 0.
 const CENTRE_X_M: f64 = 0.65;
-const HALF_X_M: f64 = 0.1;
-const HALF_Y_M: f64 = 0.16;
+/// Amplitude of the figure along x, times sine · cosine of the phase, m.
+const AMPLITUDE_X_M: f64 = 0.1;
+/// Amplitude of the figure along y, times cosine of the phase, m.
+const AMPLITUDE_Y_M: f64 = 0.16;
 
-/// Position of the opponent on its figure.
+/// The opponent, with its position on the figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opponent {
+    /// Control steps so far.
     steps: u32,
+    /// Joint positions of the last action, rad.
     q: [f64; JOINTS],
 }
 
@@ -27,7 +31,7 @@ impl Default for Opponent {
 }
 
 impl Opponent {
-    /// At rest in the initial pose.
+    /// The opponent at the start of an episode, at rest in the initial pose.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -36,14 +40,14 @@ impl Opponent {
         }
     }
 
-    /// The action of the next control step: positions and velocities, each to be interpolated
+    /// The action of the next control step: joint positions (rad) and velocities (rad/s), each to be interpolated
     /// linearly.
     pub fn action(&mut self) -> [f64; 2 * JOINTS] {
         self.steps += 1;
-        let (sin, cos) = libm::sincos(FRAC_PI_2 + ADVANCE * f64::from(self.steps));
+        let (sin, cos) = libm::sincos(FRAC_PI_2 + PHASE_PER_STEP_RAD * f64::from(self.steps));
         let target = [
-            CENTRE_X_M + HALF_X_M * sin * cos,
-            HALF_Y_M * cos,
+            CENTRE_X_M + AMPLITUDE_X_M * sin * cos,
+            AMPLITUDE_Y_M * cos,
             EE_DESIRED_HEIGHT_M,
         ];
         let next = inverse_kinematics(target, &self.q);

@@ -1,9 +1,9 @@
-//! The three tasks: start of the puck, end of an episode, success
-//! (RULES, "Tasks").
+//! The three qualifying tasks: the puck's initial state, the end of an episode, and success (`docs/rules.md`, "What is played"). In `hit`
+//! the agent scores a goal, in `defend` it stops an incoming puck, in `prepare` it moves a resting puck into a good position.
 
 use crate::{
     model::TOOL,
-    stream::Stream,
+    stream::RandomStream,
     table::{
         geometry::{PUCK, TABLE},
         puck::Puck,
@@ -14,45 +14,46 @@ use std::f64::consts::FRAC_PI_2;
 
 pub use faceoff_types::EPISODE_STEPS;
 
-/// Numbers of the tasks, table frame.
+/// The numbers of the tasks, in the table frame: origin at the table's centre, x towards the opponent's goal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TaskRules {
-    /// Range of x at the start of `hit`, m.
+    /// Range of the puck's x at the start of `hit`, m.
     pub hit_x_m: [f64; 2],
-    /// Range of the speed at the start of `hit`, m/s.
+    /// Range of the puck's speed at the start of `hit`, m/s.
     pub hit_speed_m_s: [f64; 2],
-    /// Largest angle of the first velocity of `hit`, rad.
+    /// Largest angle ± between the puck's initial velocity in `hit` and −x, rad.
     pub hit_angle_rad: f64,
-    /// Largest yaw rate at the start of `hit`, rad/s.
+    /// Largest yaw rate ± of the puck at the start of `hit`, rad/s.
     pub hit_yaw_rate_rad_s: f64,
-    /// Least speed at which a goal counts, m/s: the paper requires one, ref does not.
+    /// Least speed at which a goal counts, m/s. The challenge's paper requires one, its simulator does not.
     pub hit_min_goal_speed_m_s: f64,
-    /// Range of x at the start of `defend`, m.
+    /// Range of the puck's x at the start of `defend`, m.
     pub defend_x_m: [f64; 2],
-    /// Largest |y| at the start of `defend`, m.
+    /// Largest |y| of the puck at the start of `defend`, m.
     pub defend_y_m: f64,
-    /// Range of the speed at the start of `defend`, m/s.
+    /// Range of the puck's speed at the start of `defend`, m/s.
     pub defend_speed_m_s: [f64; 2],
-    /// Largest angle of the first velocity of `defend`, rad.
+    /// Largest angle ± between the puck's initial velocity in `defend` and −x, rad.
     pub defend_angle_rad: f64,
-    /// Largest yaw rate at the start of `defend`, rad/s.
+    /// Largest yaw rate ± of the puck at the start of `defend`, rad/s.
     pub defend_yaw_rate_rad_s: f64,
-    /// `defend` ends below this speed, m/s.
+    /// `defend` ends when the puck is slower than this, m/s.
     pub defend_stopped_m_s: f64,
-    /// Side strip of `prepare`, range of x, m.
+    /// `prepare` starts with the puck in a strip near the edge of the table. Range of x of the strip along a long side, m.
     pub prepare_side_x_m: [f64; 2],
-    /// Corner strip of `prepare`, range of x, m.
+    /// Range of x of the strip in a corner, m.
     pub prepare_corner_x_m: [f64; 2],
-    /// `prepare` ends within this |y|, m.
+    /// `prepare` ends when the puck's |y| is below this, m.
     pub prepare_axis_m: f64,
-    /// Range of x that counts as a good position of the puck, m.
+    /// Range of x in which `defend` and `prepare` succeed, m.
     pub success_x_m: [f64; 2],
-    /// vx below which the puck counts as held, m/s.
+    /// Bound on vx below which `defend` and `prepare` succeed, m/s.
     pub success_vx_m_s: f64,
     /// A faster puck counts as lost, m/s.
     pub lost_speed_m_s: f64,
 }
 
+/// The numbers of the current ruleset.
 pub const TASK_RULES: TaskRules = TaskRules {
     hit_x_m: [-0.7, -0.2],
     hit_speed_m_s: [0.0, 0.5],
@@ -73,18 +74,21 @@ pub const TASK_RULES: TaskRules = TaskRules {
     lost_speed_m_s: 100.0,
 };
 
-/// |y| up to which a mallet reaches the puck without touching the long rims: the puck's radius and a
-/// mallet's diameter from the rim, 0.39105 m.
+/// Largest |y| of a puck with enough space for the mallet between it and a long side: the puck's radius and the
+/// mallet's diameter from the side, 0.39105 m.
 pub const PLAYABLE_Y_M: f64 = TABLE.half_width_m() - PUCK.radius_m - 2.0 * TOOL.cylinder_radius_m;
 
 /// |y| at the outer edge of the strips of `prepare`, 0.48535 m.
 const STRIP_Y_M: f64 = TABLE.half_width_m() - PUCK.radius_m - 0.002;
 
-/// Draws the puck's initial state [x, y, yaw, vx, vy, yaw rate]. Always six draws.
-pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
+/// Draws the puck's initial state [x, y, yaw, vx, vy, yaw rate]. It always makes six draws, so that the draws of one quantity do not
+/// depend on the task.
+pub fn initial_puck(task: Task, stream: &mut RandomStream) -> [f64; 6] {
+    // Uniform in [0, 1).
     let u: [f64; 6] = std::array::from_fn(|_| stream.unit());
     let between = |[low, high]: [f64; 2], u: f64| low + (high - low) * u;
     let around = |limit: f64, u: f64| between([-limit, limit], u);
+    // `angle` is measured from −x, towards the agent's goal.
     let moving = |x: f64, y: f64, speed: f64, angle: f64, yaw_rate: f64| {
         let (sin, cos) = libm::sincos(angle);
         [x, y, 0.0, -cos * speed, sin * speed, yaw_rate]
@@ -105,6 +109,7 @@ pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
             around(TASK_RULES.defend_yaw_rate_rad_s, u[4]),
         ),
         Task::Prepare => {
+            // Ranges of x and |y|; a strip is drawn with a probability in proportion to its area.
             let side = (TASK_RULES.prepare_side_x_m, [PLAYABLE_Y_M, STRIP_Y_M]);
             let corner = (
                 TASK_RULES.prepare_corner_x_m,
@@ -132,18 +137,19 @@ pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
 /// The reason if an episode ends in this true state, `steps` control steps after its start.
 #[must_use]
 pub fn end(task: Task, puck: &Puck, steps: u32) -> Option<EpisodeEnd> {
-    end_on_table(task, puck).or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon))
+    end_by_puck(task, puck).or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon))
 }
 
-fn end_on_table(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
+/// The reason if the puck's state ends the episode, regardless of time.
+fn end_by_puck(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
     let [x, y, _] = puck.pose;
     let vx = puck.velocity[0];
     let speed = puck.speed();
     // Negated, so that NaN ends the episode too.
-    let on_table = x.abs() <= TABLE.half_length_m()
+    let is_on_table = x.abs() <= TABLE.half_length_m()
         && y.abs() <= TABLE.half_width_m()
         && speed <= TASK_RULES.lost_speed_m_s;
-    if !on_table {
+    if !is_on_table {
         return Some(EpisodeEnd::LeftTable);
     }
     match task {
@@ -156,11 +162,11 @@ fn end_on_table(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
     }
 }
 
-/// Whether this true state, the last of an episode, is a success.
+/// Is this true state of the puck, the last of an episode, a success?
 #[must_use]
 pub fn success(task: Task, puck: &Puck) -> bool {
     let [x, y, _] = puck.pose;
-    let in_place = TASK_RULES.success_x_m[0] < x
+    let is_in_place = TASK_RULES.success_x_m[0] < x
         && x <= TASK_RULES.success_x_m[1]
         && puck.velocity[0] < TASK_RULES.success_vx_m_s;
     match task {
@@ -169,7 +175,7 @@ pub fn success(task: Task, puck: &Puck) -> bool {
                 && y.abs() < TABLE.goal_width_m / 2.0
                 && puck.speed() >= TASK_RULES.hit_min_goal_speed_m_s
         }
-        Task::Defend => in_place,
-        Task::Prepare => in_place && y.abs() < PLAYABLE_Y_M,
+        Task::Defend => is_in_place,
+        Task::Prepare => is_in_place && y.abs() < PLAYABLE_Y_M,
     }
 }

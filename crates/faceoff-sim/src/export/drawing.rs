@@ -1,4 +1,4 @@
-//! The robot from the side and the table from above, to scale, as SVG.
+//! Export of a drawing as SVG: the robot from the side and the table from above, to scale, with lengths in mm.
 
 use super::numbers::tidy;
 use crate::{
@@ -13,8 +13,7 @@ use crate::{
 };
 use std::fmt::{Display, Write as _};
 
-/// Both views have the base frame's x to the right. In the side view z points up, in the top view y. Lengths
-/// are labelled in mm.
+/// The text of the SVG file. In both views the base frame's x points to the right. In the side view z points up, in the top view y.
 #[must_use]
 pub fn drawing() -> String {
     let mut picture = Picture {
@@ -40,19 +39,21 @@ const SCALE: f64 = 340.0;
 const SIDE_ORIGIN: [f64; 2] = [90.0, 370.0];
 const TOP_ORIGIN: [f64; 2] = [90.0, 655.0];
 
+/// SVG attributes of the arm's lines.
 const ARM: &str = "stroke=\"#4a6fa5\" stroke-linecap=\"round\"";
+/// SVG attributes of auxiliary lines.
 const FAINT: &str = "stroke=\"#999999\" stroke-dasharray=\"4 3\"";
 
 fn side_view(picture: &mut Picture) {
-    let at = |x: f64, z: f64| pixels(SIDE_ORIGIN, [x, z]);
+    let to_pixels = |x: f64, z: f64| pixels(SIDE_ORIGIN, [x, z]);
     let surface = -TABLE.base_z_m;
     let [near, far] = [-1.0, 1.0].map(|side| on_table([side * TABLE.half_length_m(), 0.0])[0]);
     picture.line(
-        at(near, surface),
-        at(far, surface),
+        to_pixels(near, surface),
+        to_pixels(far, surface),
         "stroke=\"black\" stroke-width=\"3\"",
     );
-    let end = at(far, surface);
+    let end = to_pixels(far, surface);
     picture.label(
         [end[0] - 250.0, end[1] + 18.0],
         format_args!("surface of the table, {} mm above the base", mm(surface)),
@@ -61,14 +62,14 @@ fn side_view(picture: &mut Picture) {
         (EE_DESIRED_HEIGHT_M, "end effector's height"),
         (LINK_HEIGHT_M, "least height of links 4 and 7"),
     ] {
-        picture.line(at(-0.2, height), at(far, height), FAINT);
-        let end = at(far, height);
+        picture.line(to_pixels(-0.2, height), to_pixels(far, height), FAINT);
+        let end = to_pixels(far, height);
         picture.label(
             [end[0] - 250.0, end[1] - 4.0],
             format_args!("{text}: {} mm", mm(height)),
         );
     }
-    let end = at(far, EE_DESIRED_HEIGHT_M);
+    let end = to_pixels(far, EE_DESIRED_HEIGHT_M);
     picture.label(
         [end[0] - 250.0, end[1] + 12.0],
         format_args!("± {} mm", mm(HEIGHT_TOLERANCE_M)),
@@ -81,8 +82,9 @@ fn side_view(picture: &mut Picture) {
     );
 }
 
+/// Draws the arm in its start pose, with the numbers of its joints and the lengths of its links.
 fn arm(picture: &mut Picture) {
-    let at = |[x, _, z]: [f64; 3]| pixels(SIDE_ORIGIN, [x, z]);
+    let to_pixels = |[x, _, z]: [f64; 3]| pixels(SIDE_ORIGIN, [x, z]);
     let kinematics = Kinematics::new(&with_zero_universal(&INITIAL_Q));
     let ee = kinematics.end_effector.origin.lane(0);
     let mut points = vec![[0.0; 3]];
@@ -90,7 +92,7 @@ fn arm(picture: &mut Picture) {
     points.push(ee);
     for (i, ends) in points.windows(2).enumerate() {
         let width = if i == JOINTS { 4 } else { 14 };
-        let (from, to) = (at(ends[0]), at(ends[1]));
+        let (from, to) = (to_pixels(ends[0]), to_pixels(ends[1]));
         picture.line(from, to, format_args!("{ARM} stroke-width=\"{width}\""));
         let length = match LINKS.get(i).map(|link| link.offset) {
             Some(Offset::Y(length) | Offset::Z(length)) => length,
@@ -104,7 +106,7 @@ fn arm(picture: &mut Picture) {
         }
     }
     for (i, ends) in points.windows(2).take(JOINTS).enumerate() {
-        let (from, [x, y]) = (at(ends[0]), at(ends[1]));
+        let (from, [x, y]) = (to_pixels(ends[0]), to_pixels(ends[1]));
         picture.disc(
             [x, y],
             6.0,
@@ -119,18 +121,22 @@ fn arm(picture: &mut Picture) {
     }
     // The universal joint holds the mallet's axis vertical, with z downwards.
     let centre = [ee[0], 0.0, ee[2] - TOOL.cylinder_centre_z_m];
-    let [x, y] = at(centre);
+    let [x, y] = to_pixels(centre);
     let (radius, half) = (
         TOOL.cylinder_radius_m * SCALE,
         TOOL.cylinder_half_height_m * SCALE,
     );
-    picture.line(at(ee), [x, y], "stroke=\"#b23a48\" stroke-width=\"3\"");
+    picture.line(
+        to_pixels(ee),
+        [x, y],
+        "stroke=\"#b23a48\" stroke-width=\"3\"",
+    );
     picture.rect(
         [x - radius, y - half],
         [2.0 * radius, 2.0 * half],
         "fill=\"#b23a48\"",
     );
-    let [x, y] = at(ee);
+    let [x, y] = to_pixels(ee);
     picture.disc([x, y], 4.0, "fill=\"#1d3557\"");
     picture.label(
         [x + 22.0, y - 16.0],
@@ -139,20 +145,24 @@ fn arm(picture: &mut Picture) {
 }
 
 fn top_view(picture: &mut Picture) {
-    let at = |point: [f64; 2]| pixels(TOP_ORIGIN, on_table(point));
+    let to_pixels = |point: [f64; 2]| pixels(TOP_ORIGIN, on_table(point));
     let (x, y) = (TABLE.half_length_m(), TABLE.half_width_m());
     let mouth = TABLE.goal_width_m / 2.0;
     let rim = "stroke=\"black\" stroke-width=\"3\"";
     for side in [-1.0, 1.0] {
-        picture.line(at([-x, side * y]), at([x, side * y]), rim);
+        picture.line(to_pixels([-x, side * y]), to_pixels([x, side * y]), rim);
         for end in [-1.0, 1.0] {
-            picture.line(at([end * x, side * y]), at([end * x, side * mouth]), rim);
+            picture.line(
+                to_pixels([end * x, side * y]),
+                to_pixels([end * x, side * mouth]),
+                rim,
+            );
         }
     }
-    picture.line(at([0.0, -y]), at([0.0, y]), FAINT);
+    picture.line(to_pixels([0.0, -y]), to_pixels([0.0, y]), FAINT);
     let radius = TOOL.cylinder_radius_m;
-    let [left, top] = at([-x + radius, y - radius]);
-    let [right, bottom] = at([x, -(y - radius)]);
+    let [left, top] = to_pixels([-x + radius, y - radius]);
+    let [right, bottom] = to_pixels([x, -(y - radius)]);
     picture.rect(
         [left, top],
         [right - left, bottom - top],
@@ -162,8 +172,18 @@ fn top_view(picture: &mut Picture) {
         [left + 8.0, bottom - 8.0],
         "allowed area of the end effector",
     );
-    picture.disc(at([0.0, 0.0]), PUCK.radius_m * SCALE, "fill=\"#333333\"");
-    picture.label([at([0.0, 0.0])[0] + 16.0, at([0.0, 0.0])[1] - 10.0], "puck");
+    picture.disc(
+        to_pixels([0.0, 0.0]),
+        PUCK.radius_m * SCALE,
+        "fill=\"#333333\"",
+    );
+    picture.label(
+        [
+            to_pixels([0.0, 0.0])[0] + 16.0,
+            to_pixels([0.0, 0.0])[1] - 10.0,
+        ],
+        "puck",
+    );
     let start = Kinematics::new(&with_zero_universal(&INITIAL_Q))
         .end_effector
         .origin
@@ -178,10 +198,10 @@ fn top_view(picture: &mut Picture) {
         ),
         ([x - 0.3, 0.0], "the other goal".to_owned()),
     ] {
-        let [x, y] = at(point);
+        let [x, y] = to_pixels(point);
         picture.label([x + 8.0, y + 40.0], text);
     }
-    let [left, bottom] = at([-x, -y]);
+    let [left, bottom] = to_pixels([-x, -y]);
     picture.label(
         [left + 300.0, bottom + 20.0],
         format_args!("{} × {} mm", mm(TABLE.length_m), mm(TABLE.width_m)),
@@ -205,12 +225,14 @@ fn on_table([x, y]: [f64; 2]) -> [f64; 2] {
     [x, y]
 }
 
+/// The position in the picture of a point with these coordinates (m) in a view with this origin (pixels).
 fn pixels(origin: [f64; 2], [right, up]: [f64; 2]) -> [f64; 2] {
     [origin[0] + SCALE * right, origin[1] - SCALE * up]
 }
 
+/// Draws the two axes of a view; `up` is the name of the vertical one.
 fn axes(picture: &mut Picture, origin: [f64; 2], up: &str) {
-    const LENGTH: f64 = 34.0;
+    const LENGTH: f64 = 34.0; // pixels
     let [x, y] = origin;
     let style = "stroke=\"#2a7f3f\" stroke-width=\"2\"";
     picture.line([x, y], [x + LENGTH, y], style);
@@ -224,16 +246,18 @@ fn is_level(from: [f64; 2], to: [f64; 2]) -> bool {
     (to[0] - from[0]).abs() > (to[1] - from[1]).abs()
 }
 
+/// A length in mm, without rounding noise.
 fn mm(length_m: f64) -> f64 {
     tidy(1000.0 * length_m)
 }
 
-/// Shapes, one per line, later ones on top.
+/// The shapes drawn so far as SVG, one per line, later ones on top. Coordinates are in pixels.
 struct Picture {
     text: String,
 }
 
 impl Picture {
+    /// Appends a shape.
     fn put(&mut self, shape: std::fmt::Arguments<'_>) {
         writeln!(self.text, "{shape}").expect("writing to a string cannot fail");
     }
@@ -259,10 +283,10 @@ impl Picture {
         ));
     }
 
-    fn label(&mut self, at: [f64; 2], text: impl Display) {
+    fn label(&mut self, position: [f64; 2], text: impl Display) {
         self.put(format_args!(
             "<text x=\"{:.1}\" y=\"{:.1}\">{text}</text>",
-            at[0], at[1]
+            position[0], position[1]
         ));
     }
 }

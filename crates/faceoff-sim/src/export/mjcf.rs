@@ -1,12 +1,12 @@
-//! MJCF: the arm, the table and the puck, with the contacts' constants.
+//! Export of arm, table and puck as MJCF, MuJoCo's XML format, with the constants of the contacts.
 
 use super::{
     numbers::{spaced, tidy},
-    parts::{Model, end_of_link, level, quaternion, vector, visual_radius_m},
+    parts::{Model, end_of_link, level_mallet_angles, quaternion, vector, visual_radius_m},
 };
 use crate::{
     model::{GRAVITY_M_S2, INITIAL_Q, JOINTS, LINKS, SUBSTEP_S, TOOL},
-    robot::universal_joint::TORQUE_LIMIT,
+    robot::universal_joint::TORQUE_LIMIT_N_M,
     table::{
         contact_law::{JOINT, MALLET, Material, RIM, WIDTH_M},
         frames::table_from_robot,
@@ -37,16 +37,16 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
          <option timestep=\"{SUBSTEP_S}\" gravity=\"0 0 {}\" integrator=\"Euler\" cone=\"elliptic\"/>",
         -GRAVITY_M_S2
     )?;
-    // No contacts but those of the pairs below.
+    // Contacts are off by default (`contype`, `conaffinity`); only the pairs at the end of the file have contacts.
     writeln!(
         out,
         "  <default>\n    <geom contype=\"0\" conaffinity=\"0\" rgba=\"0.6 0.6 0.65 1\"/>\n    \
          <default class=\"driven\"><joint type=\"hinge\" axis=\"0 0 1\" limited=\"true\" \
-         solreffriction=\"{soft}\" solimpfriction=\"{impedance}\" solreflimit=\"{soft}\" \
-         solimplimit=\"{impedance}\"/></default>\n    \
+         solreffriction=\"{solref}\" solimpfriction=\"{solimp}\" solreflimit=\"{solref}\" \
+         solimplimit=\"{solimp}\"/></default>\n    \
          <default class=\"rim\"><geom rgba=\"0.35 0.25 0.2 1\"/></default>\n  </default>",
-        soft = solref(&JOINT),
-        impedance = solimp(&JOINT),
+        solref = solref(&JOINT),
+        solimp = solimp(&JOINT),
     )?;
     writeln!(out, "  <worldbody>")?;
     writeln!(
@@ -60,7 +60,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
     motors(model, out)?;
     let mut pose = INITIAL_Q.to_vec();
     if model == Model::Plant {
-        pose.extend(level(&INITIAL_Q));
+        pose.extend(level_mallet_angles(&INITIAL_Q));
     }
     pose.extend([0.0; 3]);
     writeln!(
@@ -70,7 +70,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
     )
 }
 
-/// Writes the surface and the rims; returns the names of the rims' parts.
+/// Writes the surface and the rims (walls around the table); returns the names of the rims' parts.
 fn table(out: &mut String) -> Result<Vec<String>, std::fmt::Error> {
     const SURFACE_HALF_THICKNESS_M: f64 = 0.01;
     let (half_length, half_width) = (TABLE.half_length_m(), TABLE.half_width_m());
@@ -88,10 +88,10 @@ fn table(out: &mut String) -> Result<Vec<String>, std::fmt::Error> {
         ]),
     )?;
     let mut names = Vec::new();
-    let mut rim = |out: &mut String, name: String, kind: &str, at: [f64; 2], size: &[f64]| {
+    let mut rim = |out: &mut String, name: String, kind: &str, centre: [f64; 2], size: &[f64]| {
         let mut size = size.to_vec();
         size.push(half_height);
-        let [x, y] = at;
+        let [x, y] = centre;
         let written = writeln!(
             out,
             "    <geom name=\"{name}\" class=\"rim\" type=\"{kind}\" pos=\"{}\" size=\"{}\"/>",
@@ -125,13 +125,13 @@ fn table(out: &mut String) -> Result<Vec<String>, std::fmt::Error> {
                 [x, side * box_y],
                 &[thickness / 2.0, box_half],
             )?;
-            let lip = [thickness / 2.0 - post, post / 2.0];
+            let lip_size = [thickness / 2.0 - post, post / 2.0];
             rim(
                 out,
                 name("_lip"),
                 "box",
                 [x, side * (mouth + post / 2.0)],
-                &lip,
+                &lip_size,
             )?;
             for (part, x) in [
                 ("_post", end * (half_length + post)),
@@ -150,11 +150,12 @@ fn table(out: &mut String) -> Result<Vec<String>, std::fmt::Error> {
     Ok(names)
 }
 
+/// Middle and half length of an interval.
 fn middle_and_half(from: f64, to: f64) -> (f64, f64) {
     ((from + to) / 2.0, (to - from) / 2.0)
 }
 
-/// The arm before the puck, so that the arm's joints come first.
+/// Writes the arm and then the puck, so that the arm's joints come first.
 fn arm_and_puck(model: Model, out: &mut String) -> std::fmt::Result {
     let base = table_from_robot(0, [0.0; 3]).map(tidy);
     writeln!(out, "    <body name=\"base\" pos=\"{}\">", spaced(&base))?;
@@ -207,6 +208,7 @@ fn arm_and_puck(model: Model, out: &mut String) -> std::fmt::Result {
     puck(out)
 }
 
+/// Writes the mallet on its two hinges.
 fn mallet(out: &mut String) -> std::fmt::Result {
     writeln!(out, "    <body name=\"mallet\">")?;
     for (name, axis) in [("universal_y", "0 1 0"), ("universal_x", "1 0 0")] {
@@ -233,7 +235,7 @@ fn mallet(out: &mut String) -> std::fmt::Result {
     writeln!(out, "    </body>")
 }
 
-/// The puck neither rises nor tips: only its yaw inertia matters.
+/// Writes the puck. It neither rises nor tips, so only its yaw inertia matters.
 fn puck(out: &mut String) -> std::fmt::Result {
     writeln!(out, "    <body name=\"puck\">")?;
     for (name, kind, axis, damping) in [
@@ -257,6 +259,7 @@ fn puck(out: &mut String) -> std::fmt::Result {
     writeln!(out, "    </body>")
 }
 
+/// Writes a body's inertia: centre of mass at height `z` (m), mass (kg), inertia about every axis (kg m²).
 fn isotropic(out: &mut String, z: f64, mass: f64, inertia: f64) -> std::fmt::Result {
     writeln!(
         out,
@@ -264,6 +267,7 @@ fn isotropic(out: &mut String, z: f64, mass: f64, inertia: f64) -> std::fmt::Res
     )
 }
 
+/// Writes a capsule for display, from the body's origin to `end`, m.
 fn visual_capsule(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
     writeln!(
         out,
@@ -272,6 +276,7 @@ fn visual_capsule(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Res
     )
 }
 
+/// Writes the pairs of bodies that can be in contact with the puck.
 fn pairs(model: Model, rims: &[String], out: &mut String) -> std::fmt::Result {
     writeln!(out, "  <contact>")?;
     let mut pair = |other: &str, material: &Material| {
@@ -293,6 +298,7 @@ fn pairs(model: Model, rims: &[String], out: &mut String) -> std::fmt::Result {
     writeln!(out, "  </contact>")
 }
 
+/// Writes a motor for each joint of the arm.
 fn motors(model: Model, out: &mut String) -> std::fmt::Result {
     writeln!(out, "  <actuator>")?;
     let mut motor = |joint: &str, limit: f64| {
@@ -306,21 +312,22 @@ fn motors(model: Model, out: &mut String) -> std::fmt::Result {
         motor(&format!("joint_{}", i + 1), link.torque_limit_n_m)?;
     }
     if model == Model::Plant {
-        motor("universal_y", TORQUE_LIMIT)?;
-        motor("universal_x", TORQUE_LIMIT)?;
+        motor("universal_y", TORQUE_LIMIT_N_M)?;
+        motor("universal_x", TORQUE_LIMIT_N_M)?;
     }
     writeln!(out, "  </actuator>")
 }
 
-/// A material's time constant, s, and damping ratio. MuJoCo derives damping and stiffness from them.
+/// The attribute `solref`: a material's time constant, s, and damping ratio. MuJoCo derives damping and stiffness from them.
 fn solref(material: &Material) -> String {
-    let full = material.impedance_1;
-    let time_constant_s = 2.0 / (full * material.damping_per_s);
-    let damping_ratio = 1.0 / (full * time_constant_s * material.stiffness_per_s2.sqrt());
+    let final_impedance = material.impedance_1;
+    let time_constant_s = 2.0 / (final_impedance * material.damping_per_s);
+    let damping_ratio =
+        1.0 / (final_impedance * time_constant_s * material.stiffness_per_s2.sqrt());
     spaced(&[time_constant_s, damping_ratio].map(tidy))
 }
 
-/// Impedance at zero and at full penetration, the depth of full penetration, and the shape in between: a
+/// The attribute `solimp`: impedance at depth 0, final impedance, the depth (m) at which it is reached, and the shape in between: a
 /// quadratic spline around the middle.
 fn solimp(material: &Material) -> String {
     spaced(&[

@@ -1,8 +1,8 @@
-//! Exports of the ideal model: URDF and MJCF for other simulators and robotics libraries, a Python module of
-//! constants, and a drawing.
+//! Exports of the nominal model: URDF (a robot description in XML) and MJCF (MuJoCo's XML) for other simulators and robotics libraries, a
+//! Python module of constants, and a drawing.
 //!
 //! All of it is generated from the constants that the simulator uses. Geometry consists of primitives. The
-//! shape of the arm is visual only.
+//! shape of the arm serves display only.
 
 mod drawing;
 mod mjcf;

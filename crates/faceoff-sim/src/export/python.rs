@@ -1,6 +1,6 @@
-//! A Python module of the model's constants.
+//! Export of the nominal model's constants as a Python module, each with a comment.
 
-use super::parts::{level, rotation, vector};
+use super::parts::{level_mallet_angles, rotation, vector};
 use crate::{
     episode::{
         constraints::{HEIGHT_TOLERANCE_M, LINK_HEIGHT_M},
@@ -19,15 +19,15 @@ use std::fmt::{Display, Write as _};
 /// to tip, and plain numbers. Names carry the unit; SI units, radians.
 #[must_use]
 pub fn python() -> String {
-    let mut out = Module::new();
+    let mut out = PythonModule::new();
     out.section("The arm: joints and links, base to tip.");
-    out.whole("JOINTS", JOINTS, "driven joints");
-    out.numbers(
+    out.integer("JOINTS", JOINTS, "driven joints");
+    out.multiline_tuple(
         "LINK_OFFSET_M",
         LINKS.map(|link| tuple(&vector(link.offset))),
         "each joint in its parent's frame",
     );
-    out.numbers(
+    out.multiline_tuple(
         "LINK_MOUNT",
         LINKS.map(|link| {
             let rows = rotation(link.mount).map(|row| tuple(&row));
@@ -36,12 +36,12 @@ pub fn python() -> String {
         "rotation matrix, rows, of each link in its parent at angle 0; each joint turns about its link's z",
     );
     out.per_joint("MASS_KG", |link| link.mass_kg, "");
-    out.numbers(
+    out.multiline_tuple(
         "CENTRE_OF_MASS_M",
         LINKS.map(|link| tuple(&link.centre_m)),
         "link's frame",
     );
-    out.numbers(
+    out.multiline_tuple(
         "INERTIA_KG_M2",
         LINKS.map(|link| tuple(&link.inertia_kg_m2)),
         "about the centre of mass, link's axes: xx, yy, zz, xy, xz, yz",
@@ -89,7 +89,7 @@ pub fn python() -> String {
     );
     out.line(
         "START_UNIVERSAL_RAD",
-        tuple(&level(&INITIAL_Q)),
+        tuple(&level_mallet_angles(&INITIAL_Q)),
         "angles of the universal joint in that pose, mallet vertical",
     );
     out.section("The tool: on link 7 the end effector, on it by the universal joint the mallet.");
@@ -128,12 +128,12 @@ pub fn python() -> String {
         ),
         (
             "UNIVERSAL_TORQUE_LIMIT_N_M",
-            universal_joint::TORQUE_LIMIT,
+            universal_joint::TORQUE_LIMIT_N_M,
             "±",
         ),
         (
             "UNIVERSAL_RANGE_RAD",
-            universal_joint::RANGE,
+            universal_joint::RANGE_RAD,
             "±, of its desired angles",
         ),
         (
@@ -187,17 +187,17 @@ pub fn python() -> String {
     out.section("Time and gravity.");
     out.line("CONTROL_STEP_S", CONTROL_STEP_S, "one action");
     out.line("SUBSTEP_S", SUBSTEP_S, "one step of controller and physics");
-    out.whole("SUBSTEPS", SUBSTEPS, "in a control step");
+    out.integer("SUBSTEPS", SUBSTEPS, "in a control step");
     out.line("GRAVITY_M_S2", GRAVITY_M_S2, "along −z");
     out.text
 }
 
-/// The text of the module.
-struct Module {
+/// The text of a Python module that is being written.
+struct PythonModule {
     text: String,
 }
 
-impl Module {
+impl PythonModule {
     fn new() -> Self {
         Self {
             text: "\"\"\"The numbers of robot, table and puck, as the simulator has them. SI units, radians.\n\n\
@@ -207,12 +207,14 @@ impl Module {
         }
     }
 
+    /// Appends text.
     fn put(&mut self, line: std::fmt::Arguments<'_>) {
         self.text
             .write_fmt(line)
             .expect("writing to a string cannot fail");
     }
 
+    /// A comment that begins a group of constants.
     fn section(&mut self, title: &str) {
         self.put(format_args!("\n# {title}\n"));
     }
@@ -224,23 +226,31 @@ impl Module {
         }
     }
 
+    /// A constant with a comment.
     fn line(&mut self, name: &str, value: impl Literal, note: &str) {
         self.note(note);
         self.put(format_args!("{name}: Final = {}\n", value.literal()));
     }
 
-    fn whole(&mut self, name: &str, value: usize, note: &str) {
+    /// An integer constant with a comment.
+    fn integer(&mut self, name: &str, value: usize, note: &str) {
         self.note(note);
         self.put(format_args!("{name}: Final = {value}\n"));
     }
 
+    /// A tuple with a number of each link or its joint.
     fn per_joint(&mut self, name: &str, value: impl Fn(&Link) -> f64, note: &str) {
         let values: Vec<f64> = LINKS.iter().map(value).collect();
         self.line(name, tuple(&values), note);
     }
 
-    /// A tuple with a line for each item.
-    fn numbers(&mut self, name: &str, items: impl IntoIterator<Item = impl Display>, note: &str) {
+    /// A tuple of tuples, with a line for each item.
+    fn multiline_tuple(
+        &mut self,
+        name: &str,
+        items: impl IntoIterator<Item = impl Display>,
+        note: &str,
+    ) {
         self.note(note);
         self.put(format_args!("{name}: Final = (\n"));
         for item in items {
@@ -268,6 +278,7 @@ impl Literal for String {
     }
 }
 
+/// A Python tuple of floats.
 fn tuple(numbers: &[f64]) -> String {
     let literals: Vec<String> = numbers.iter().map(|number| number.literal()).collect();
     format!("({})", literals.join(", "))

@@ -1,4 +1,4 @@
-//! URDF: the arm alone, on its base frame.
+//! Export of the arm as URDF, the XML robot description of ROS: the arm alone, on its base frame.
 
 use super::{
     numbers::{spaced, tidy},
@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     model::{JOINTS, LINKS, TOOL},
-    robot::universal_joint::TORQUE_LIMIT,
+    robot::universal_joint::TORQUE_LIMIT_N_M,
 };
 use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
 
@@ -64,6 +64,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
     writeln!(out, "</robot>")
 }
 
+/// Writes joint `i` (0…6).
 fn driven_joint(out: &mut String, i: usize) -> std::fmt::Result {
     let link = &LINKS[i];
     let parent = match i {
@@ -88,6 +89,7 @@ fn driven_joint(out: &mut String, i: usize) -> std::fmt::Result {
     writeln!(out, "  </joint>")
 }
 
+/// Writes link `i` (0…6).
 fn link(out: &mut String, i: usize) -> std::fmt::Result {
     let link = &LINKS[i];
     writeln!(out, "  <link name=\"link_{}\">", i + 1)?;
@@ -96,7 +98,8 @@ fn link(out: &mut String, i: usize) -> std::fmt::Result {
     writeln!(out, "  </link>")
 }
 
-/// A hinge about the end effector's y carries a hinge about the rotated x, which carries the mallet.
+/// Writes the universal joint and the mallet: a hinge about the end effector's y carries a hinge about the rotated x, which carries the
+/// mallet.
 fn universal_joint(out: &mut String) -> std::fmt::Result {
     for (axis, parent, child) in [
         ("y", "end_effector", "universal"),
@@ -108,7 +111,7 @@ fn universal_joint(out: &mut String) -> std::fmt::Result {
         let direction = if axis == "y" { "0 1 0" } else { "1 0 0" };
         writeln!(out, "    <axis xyz=\"{direction}\"/>")?;
         // Its speed has no limit, but URDF requires a number.
-        limit(out, FRAC_PI_2, TORQUE_LIMIT, 1000.0)?;
+        limit(out, FRAC_PI_2, TORQUE_LIMIT_N_M, 1000.0)?;
         writeln!(out, "  </joint>")?;
         if child == "universal" {
             writeln!(out, "  <link name=\"universal\"/>")?;
@@ -134,6 +137,7 @@ fn universal_joint(out: &mut String) -> std::fmt::Result {
     writeln!(out, "  </link>")
 }
 
+/// Writes a frame's position (m) and roll, pitch and yaw (rad).
 fn origin(out: &mut String, xyz: [f64; 3], rpy: [f64; 3]) -> std::fmt::Result {
     writeln!(
         out,
@@ -143,11 +147,13 @@ fn origin(out: &mut String, xyz: [f64; 3], rpy: [f64; 3]) -> std::fmt::Result {
     )
 }
 
+/// Writes the two links that a joint connects.
 fn ends(out: &mut String, parent: &str, child: &str) -> std::fmt::Result {
     writeln!(out, "    <parent link=\"{parent}\"/>")?;
     writeln!(out, "    <child link=\"{child}\"/>")
 }
 
+/// Writes a joint's limits: range ±, rad, effort ±, N m, velocity ±, rad/s.
 fn limit(out: &mut String, range: f64, effort: f64, velocity: f64) -> std::fmt::Result {
     writeln!(
         out,
@@ -156,7 +162,7 @@ fn limit(out: &mut String, range: f64, effort: f64, velocity: f64) -> std::fmt::
     )
 }
 
-/// `inertia` in the order of the model: xx, yy, zz, xy, xz, yz.
+/// Writes mass (kg), centre of mass (m) and inertia about it (kg m²; xx, yy, zz, xy, xz, yz).
 fn inertial(out: &mut String, mass: f64, centre: [f64; 3], inertia: [f64; 6]) -> std::fmt::Result {
     let [xx, yy, zz, xy, xz, yz] = inertia;
     writeln!(out, "    <inertial>")?;
@@ -173,7 +179,7 @@ fn inertial(out: &mut String, mass: f64, centre: [f64; 3], inertia: [f64; 6]) ->
     writeln!(out, "    </inertial>")
 }
 
-/// A visual cylinder from the origin to a point on y or z.
+/// Writes a cylinder for display, from the link's origin to the point `end` on its y or z axis, m.
 fn visual_cylinder(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
     let along_y = end[1] != 0.0;
     let rpy = [if along_y { FRAC_PI_2 } else { 0.0 }, 0.0, 0.0];
@@ -181,6 +187,7 @@ fn visual_cylinder(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Re
     cylinder(out, "visual", middle, rpy, (radius, end[1] + end[2]))
 }
 
+/// Writes a cylinder; `kind` is `visual` or `collision`, lengths are in m, `rpy` is in rad.
 fn cylinder(
     out: &mut String,
     kind: &str,

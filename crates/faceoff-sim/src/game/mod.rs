@@ -1,4 +1,5 @@
-//! Games between two agents.
+//! A *game* between two agents, robot 1 and robot 2 (0 and 1 in the code). It is a sequence of *rallies*; a rally lasts from a serve to a
+//! goal, a foul or another end. Violated constraints are counted per *window*, a part of the game with a fixed number of control steps.
 
 pub mod referee;
 mod state;
@@ -10,7 +11,7 @@ use crate::{
     episode::{constraints::ConstraintValues, task::PLAYABLE_Y_M},
     perturbation::table_factors::TableFactors,
     robot::plant::Plant,
-    stream::Stream,
+    stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
 };
 use faceoff_types::{
@@ -23,25 +24,27 @@ use referee::{GAME_RULES, RallyEnd, Referee};
 pub struct GameSetup {
     /// How the two agents' actions become trajectories.
     pub interpolation: [Interpolation; 2],
-    /// Perturbations. Both robots share the table, the puck's tracking and the plant; noise and delays are
+    /// The active kinds of perturbations. Both robots share the table, the puck's tracking and the plant; noise and delays are
     /// separate.
     pub factors: Factors,
+    /// Magnitudes of the perturbations.
     pub settings: PerturbationSettings,
-    /// Both arms; nominal unless the factors contain the model mismatch.
+    /// The physical properties of both arms; nominal unless the factors contain the model mismatch.
     pub plant: Plant,
-    /// The random streams of a rally derive from it and the rally's number.
+    /// The game's seed. The random streams of a rally are derived from it and the rally's number.
     pub seed: Seed,
 }
 
-/// A game of rallies. Deterministic: no clock, no I/O. Clone saves and restores it exactly.
+/// A running game. It is deterministic: it reads no clock and does no I/O. A clone continues with the same bits.
 #[derive(Debug, Clone)]
 pub struct Game {
     setup: GameSetup,
     bounds: Bounds,
     referee: Referee,
     rally: Rally,
+    /// Control steps so far.
     steps: u32,
-    /// Constraints violated in the current window.
+    /// Constraints that each robot violated in the current window.
     violations: [Violations; 2],
 }
 
@@ -60,38 +63,38 @@ pub struct GameStep {
     /// The end of the rally, if this step ended it. The next step belongs to a new rally; the caller resets
     /// both agents.
     pub rally_end: Option<RallyEnd>,
-    /// Constraint values at this step, before a new rally.
+    /// Constraint values after this step; if it ended the rally, still those of the ended rally.
     pub constraints: [ConstraintValues; 2],
-    /// At the end of a window: the constraints violated in it.
+    /// The constraints that each robot violated in the window that ends with this step; `None` if no window ends.
     pub window: Option<[Violations; 2]>,
-    /// The true state after this step, before a new rally.
+    /// The true state after this step; if it ended the rally, still that of the ended rally.
     pub state: GameState,
-    /// How the world diverged, if that ended the rally.
+    /// Set if this step ended the rally by divergence (the world's state would have left the bounds of the simulation).
     pub divergence: Option<Divergence>,
-    /// Had tracking lost the puck after this step?
+    /// Had the (simulated) tracking lost the puck after this step?
     pub puck_lost: bool,
     /// The contacts of the puck that began in this step.
     pub impacts: Impacts,
 }
 
 impl Game {
-    /// A game at the start of its first rally, on a side drawn at random.
+    /// A game at the start of its first rally; a random draw decides on which side the puck starts.
     #[must_use]
     pub fn new(setup: GameSetup) -> Self {
-        let serves = usize::from(Stream::new(&setup.seed, "first_side").unit() < 0.5);
+        let serving_robot = usize::from(RandomStream::new(&setup.seed, "first_side").unit() < 0.5);
         let bounds = Bounds::of(Ruleset::CURRENT);
-        let rally = Rally::new(&setup, bounds, 0, serves);
+        let rally = Rally::new(&setup, bounds, 0, serving_robot);
         Self {
             setup,
             bounds,
-            referee: Referee::new(serves),
+            referee: Referee::new(serving_robot),
             rally,
             steps: 0,
             violations: [Violations::default(); 2],
         }
     }
 
-    /// The same game with other bounds than those of the current ruleset.
+    /// The same game with other bounds of the simulation than those of the current ruleset.
     #[must_use]
     pub fn with_bounds(mut self, bounds: Bounds) -> Self {
         self.bounds = bounds;
@@ -106,7 +109,7 @@ impl Game {
     }
 
     /// One control step of both robots. The caller decides when the game is over. A world that diverges ends
-    /// the rally: a fault of the robots that the end names.
+    /// the rally; the robots at fault are those that `rally_end` names.
     pub fn step(&mut self, commands: [Command<'_>; 2]) -> GameStep {
         let Rally {
             world,
@@ -117,9 +120,9 @@ impl Game {
         for (channel, command) in channels.iter_mut().zip(commands) {
             channel.command(world, command);
         }
-        let lost = table.control_step(world);
+        let puck_lost = table.control_step(world);
         for channel in channels {
-            channel.update_observation(world, lost);
+            channel.update_observation(world, puck_lost);
         }
         self.steps += 1;
 
@@ -130,8 +133,12 @@ impl Game {
         let divergence = world.divergence();
         let impacts = *world.impacts();
         let rally_end = match divergence {
-            Some(Divergence { by, .. }) => {
-                let end = RallyEnd::Diverged { by };
+            Some(Divergence {
+                robots_at_fault, ..
+            }) => {
+                let end = RallyEnd::Diverged {
+                    by: robots_at_fault,
+                };
                 self.referee.record_end(end);
                 Some(end)
             }
@@ -139,7 +146,7 @@ impl Game {
         };
         if rally_end.is_some() {
             let next = *number + 1;
-            self.rally = Rally::new(&self.setup, self.bounds, next, self.referee.serves);
+            self.rally = Rally::new(&self.setup, self.bounds, next, self.referee.serving_robot);
         }
         let window = self
             .steps
@@ -151,7 +158,7 @@ impl Game {
             window,
             state,
             divergence,
-            puck_lost: lost,
+            puck_lost,
             impacts,
         }
     }
@@ -194,14 +201,14 @@ impl Game {
 }
 
 impl Rally {
-    /// Both robots in their initial state, the puck at rest on the side of `serves`.
-    fn new(setup: &GameSetup, bounds: Bounds, number: u32, serves: usize) -> Self {
+    /// A rally with both robots in their initial state and the puck at rest on the side of the robot `serving_robot`.
+    fn new(setup: &GameSetup, bounds: Bounds, number: u32, serving_robot: usize) -> Self {
         let seed = setup.seed.rally(number);
-        let mut stream = Stream::new(&seed, "initial_state");
+        let mut stream = RandomStream::new(&seed, "initial_state");
         let [near, far] = GAME_RULES.start_x_m;
         let x = stream.uniform(near, far);
         let y = stream.uniform(-PLAYABLE_Y_M, PLAYABLE_Y_M);
-        let x = if serves == 0 { -x } else { x };
+        let x = if serving_robot == 0 { -x } else { x };
         let mut world = World::with_robots(&setup.plant, 2, [x, y, 0.0, 0.0, 0.0, 0.0]);
         world.set_bounds(bounds);
         let table = TableFactors::new(setup.factors, &setup.settings, &seed, &mut world);

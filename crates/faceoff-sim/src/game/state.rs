@@ -1,20 +1,25 @@
+//! The true state of a game, as recordings contain it.
+
 use crate::{episode::constraints::ConstraintValues, model::JOINTS, world::World};
 
-/// True state of a game, recorded per step. SI units, radians; the puck in the table frame. Pairs are robot
-/// 1's first.
+/// The true state of a game after a control step. SI units, radians. In pairs, robot 1 comes first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GameState {
-    /// x, y, yaw, vx, vy, yaw rate.
+    /// The puck's x, y, yaw, vx, vy, yaw rate, in the table frame.
     pub puck: [f64; 6],
+    /// Positions of the driven joints.
     pub q: [[f64; JOINTS]; 2],
+    /// Velocities of the driven joints.
     pub dq: [[f64; JOINTS]; 2],
+    /// Angles of the universal joints, the two hinges of each mallet.
     pub universal: [[f64; 2]; 2],
-    /// End effectors, each in its robot's own base frame.
+    /// Positions of the end effectors, each in its robot's own base frame.
     pub ee: [[f64; 3]; 2],
 }
 
 impl GameState {
-    /// The current state and constraint values of a world of two robots: both need the same kinematics.
+    /// The current state of a world with two robots, and their constraint values. They are computed together, since both need the
+    /// robots' kinematics.
     pub(super) fn with_constraints(world: &World) -> (Self, [ConstraintValues; 2]) {
         let kinematics = [0, 1].map(|robot| world.kinematics(robot));
         let constraints = [0, 1].map(|robot| {

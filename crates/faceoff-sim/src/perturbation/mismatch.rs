@@ -1,4 +1,5 @@
-//! The plant of a season, with its model mismatch.
+//! The perturbation `model_mismatch`: the *plant* (the physical properties of the arm) deviates from the nominal model that agents know. It
+//! is drawn once per season.
 
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
@@ -6,28 +7,29 @@ use crate::{
     robot::{
         inverse_kinematics::{inverse_kinematics, with_zero_universal},
         plant::Plant,
-        universal_joint::vertical,
+        universal_joint::mallet_vertical_angles,
     },
-    stream::Stream,
+    stream::RandomStream,
 };
 use faceoff_types::{Factor, Factors, MismatchSettings, PerturbationSettings, Seed};
 
-/// End-effector positions over the table at which the static error is evaluated, m, base frame.
+/// The *workspace*: end-effector positions over the table at which the static error is evaluated, m, base frame. The *static error* is the
+/// distance between commanded and reached position at rest.
 const WORKSPACE_X_M: [f64; 4] = [0.65, 0.85, 1.05, 1.2];
 const WORKSPACE_Y_M: [f64; 5] = [-0.4, -0.2, 0.0, 0.2, 0.4];
 
-/// Limit of draws, after which the last one is used. The ruleset's settings accept about one draw in three, so
-/// only settings that cannot be met reach it.
-const DRAWS: usize = 10_000;
+/// Largest number of draws; the last one is used in any case. The ruleset's settings accept about one draw in three, so
+/// only settings that cannot be met reach this number.
+const MAX_DRAWS: usize = 10_000;
 
-/// Number of draws that suffices for all settings that can be met in practice.
-const EXPECTED_DRAWS: usize = 300;
+/// Number of draws within which a plant must be found, so that settings are accepted.
+const MAX_ACCEPTED_DRAWS: usize = 300;
 
-/// Iterations of the fixed-point iteration for the sag; each adds two to three digits.
+/// Iterations of the fixed-point iteration for the sag (the joint deviations due to gravity); each adds two to three digits.
 const SAG_ROUNDS: usize = 12;
 
 impl Plant {
-    /// The plant for these factors: nominal, or that of the season with this mismatch seed.
+    /// The plant for these active perturbations: nominal, or that of the season with this mismatch seed.
     #[must_use]
     pub fn for_factors(
         factors: Factors,
@@ -46,34 +48,34 @@ impl Plant {
     /// is the season's mismatch seed.
     #[must_use]
     pub fn mismatched(settings: &PerturbationSettings, seed: Seed) -> Self {
-        draw_in_range(&settings.model_mismatch, seed, DRAWS).0
+        draw_in_range(&settings.model_mismatch, seed, MAX_DRAWS).0
     }
 
-    /// Is a plant within these settings' range found in a reasonable number of draws? Otherwise episodes would use a
-    /// plant out of range, after seconds of draws.
+    /// Is a plant within the settings' range of static errors found in a reasonable number of draws? Settings for which it is not must
+    /// be refused: episodes would use a plant out of range, after seconds of draws.
     #[must_use]
     pub fn can_be_drawn(settings: &PerturbationSettings, seed: Seed) -> bool {
-        draw_in_range(&settings.model_mismatch, seed, EXPECTED_DRAWS).1
+        draw_in_range(&settings.model_mismatch, seed, MAX_ACCEPTED_DRAWS).1
     }
 
     /// The largest distance, m, between commanded and reached end-effector position over the workspace, at
-    /// rest, when friction carries no load.
+    /// rest, if dry friction carries no load.
     #[must_use]
     pub fn largest_static_error(&self) -> f64 {
         largest_static_error(self, &workspace())
     }
 }
 
-/// The first plant of at most `draws` whose static error is in range, otherwise the last one; and whether it is
+/// Draws plants until the static error of one is in range, at most `max_draws`. Returns the last plant, and whether it is
 /// in range.
-fn draw_in_range(settings: &MismatchSettings, seed: Seed, draws: usize) -> (Plant, bool) {
+fn draw_in_range(settings: &MismatchSettings, seed: Seed, max_draws: usize) -> (Plant, bool) {
     let [least, most] = settings.static_error_m;
     let workspace = workspace();
     let is_in_range =
         |plant: &Plant| (least..=most).contains(&largest_static_error(plant, &workspace));
-    let mut stream = Stream::new(&seed, "plant");
+    let mut stream = RandomStream::new(&seed, "plant");
     let mut plant = draw(settings, &mut stream);
-    for _ in 1..draws {
+    for _ in 1..max_draws {
         if is_in_range(&plant) {
             return (plant, true);
         }
@@ -83,15 +85,16 @@ fn draw_in_range(settings: &MismatchSettings, seed: Seed, draws: usize) -> (Plan
     (plant, in_range)
 }
 
-fn draw(settings: &MismatchSettings, stream: &mut Stream) -> Plant {
-    let mut factors = |[low, high]: [f64; 2]| -> [f64; JOINTS] {
+/// Draws one plant.
+fn draw(settings: &MismatchSettings, stream: &mut RandomStream) -> Plant {
+    let mut draw_factors = |[low, high]: [f64; 2]| -> [f64; JOINTS] {
         std::array::from_fn(|_| stream.uniform(low, high))
     };
-    let links = factors(settings.mass);
-    let kp = factors(settings.gains);
-    let kd = factors(settings.gains);
-    let damping = factors(settings.friction);
-    let friction = factors(settings.friction);
+    let links = draw_factors(settings.mass);
+    let kp = draw_factors(settings.gains);
+    let kd = draw_factors(settings.gains);
+    let damping = draw_factors(settings.friction);
+    let friction = draw_factors(settings.friction);
     let [end_effector, mallet] = {
         let [low, high] = settings.mass;
         [stream.uniform(low, high), stream.uniform(low, high)]
@@ -109,6 +112,7 @@ fn draw(settings: &MismatchSettings, stream: &mut Stream) -> Plant {
     )
 }
 
+/// The commanded joint positions (rad) for each position of the workspace.
 fn workspace() -> Vec<[f64; JOINTS]> {
     let mut poses = Vec::new();
     for x in WORKSPACE_X_M {
@@ -126,7 +130,7 @@ fn largest_static_error(plant: &Plant, workspace: &[[f64; JOINTS]]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Distance between the commanded end-effector position and where gravity and gains balance.
+/// Distance, m, between the commanded end-effector position and the one where gravity and the controller's gains balance.
 fn static_error(plant: &Plant, desired: &[f64; JOINTS]) -> f64 {
     let target = Kinematics::new(&with_zero_universal(desired))
         .end_effector
@@ -135,7 +139,7 @@ fn static_error(plant: &Plant, desired: &[f64; JOINTS]) -> f64 {
     for _ in 0..SAG_ROUNDS {
         let kinematics = Kinematics::new(&q);
         let ee = &kinematics.end_effector;
-        let universal = vertical(ee.x, ee.y, [q[7], q[8]]);
+        let universal = mallet_vertical_angles(ee.x, ee.y, [q[7], q[8]]);
         let bodies = Bodies::new(&kinematics);
         let feed_forward = controller_torques(
             &kinematics,

@@ -1,4 +1,5 @@
-//! Differences between the evaluator's world and the ideal one. Each factor has its own random stream.
+//! *Perturbations*: differences between the world of an evaluation and the ideal one that agents are developed in (`docs/rules.md`,
+//! "Perturbations"). Each kind is called a *factor* and has its own random stream.
 
 pub mod disturbance;
 mod mismatch;

@@ -1,28 +1,28 @@
-//! Gaussian noise on the agent's observations.
+//! The perturbation `observation_noise`: Gaussian noise on the agent's observations.
 
-use crate::{model::JOINTS, stream::Stream};
+use crate::{model::JOINTS, stream::RandomStream};
 use faceoff_types::NoiseSettings;
 
 /// Draws the noise of successive observations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObservationNoise {
-    stream: Stream,
+    stream: RandomStream,
     settings: NoiseSettings,
 }
 
 impl ObservationNoise {
     #[must_use]
-    pub fn new(settings: &NoiseSettings, stream: Stream) -> Self {
+    pub fn new(settings: &NoiseSettings, stream: RandomStream) -> Self {
         Self {
             stream,
             settings: settings.clone(),
         }
     }
 
-    /// Adds noise to puck pose and velocity, joint positions and velocities: the first 20 numbers
-    /// of an observation, always 20 normal draws. The yaw is left unwrapped.
+    /// Adds noise to puck pose and velocity, joint positions and velocities, the first 20 numbers
+    /// of an observation. It always makes 20 normal draws. The yaw may leave [−π, π).
     pub fn add(&mut self, observation: &mut [f64]) {
-        let s = &self.settings;
+        let s = &self.settings; // standard deviations
         let deviations = [
             s.puck_position_m,
             s.puck_position_m,

@@ -1,10 +1,10 @@
-//! A table as in the laboratory: not quite level, its air cushion not quite as designed (RULES, factor
-//! `delay`).
+//! The table of the perturbation `delay`, which is for rehearsals on a real robot: as in a laboratory, the table is not quite level, and
+//! its air cushion damps the puck more or less than designed.
 
-use crate::stream::Stream;
+use crate::stream::RandomStream;
 use faceoff_types::DelaySettings;
 
-/// Drawn once per episode.
+/// The properties of the table, drawn once per episode or rally.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RehearsalTable {
     /// Acceleration of the puck by the table's tilt, m/s², table frame.
@@ -14,8 +14,9 @@ pub struct RehearsalTable {
 }
 
 impl RehearsalTable {
+    /// Draws a table.
     #[must_use]
-    pub fn draw(settings: &DelaySettings, mut stream: Stream) -> Self {
+    pub fn draw(settings: &DelaySettings, mut stream: RandomStream) -> Self {
         let [low, high] = settings.puck_damping_per_s;
         Self {
             tilt_m_s2: stream.normal_pair().map(|n| settings.tilt_m_s2 * n),

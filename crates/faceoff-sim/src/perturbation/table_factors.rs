@@ -1,16 +1,16 @@
-//! The factors that act on the table and on the tracking of the puck: shared by all robots.
+//! The factors (kinds of perturbations) that act on the table and on the tracking of the puck, and so on all robots alike.
 
 use super::{
     disturbance::Disturbance, rehearsal_table::RehearsalTable, tracking_loss::TrackingLoss,
 };
 use crate::{
-    stream::Stream,
+    stream::RandomStream,
     table::{geometry::PUCK, puck::Puck},
     world::World,
 };
 use faceoff_types::{Factor, Factors, PerturbationSettings, Seed};
 
-/// The draws of one episode or rally.
+/// The factors of one episode or rally, with their draws.
 #[derive(Debug, Clone)]
 pub struct TableFactors {
     disturbance: Option<Disturbance>,
@@ -20,7 +20,7 @@ pub struct TableFactors {
 }
 
 impl TableFactors {
-    /// Draws from the seed of the episode or rally, and sets the puck's damping in the world.
+    /// Draws from the seed of the episode or rally, and sets the puck's damping in the world. `settings` are the magnitudes.
     #[must_use]
     pub fn new(
         factors: Factors,
@@ -29,7 +29,9 @@ impl TableFactors {
         world: &mut World,
     ) -> Self {
         let stream = |factor: Factor, label: &str| {
-            factors.contains(factor).then(|| Stream::new(seed, label))
+            factors
+                .contains(factor)
+                .then(|| RandomStream::new(seed, label))
         };
         let table = stream(Factor::Delay, "delay, table")
             .map(|stream| RehearsalTable::draw(&settings.delay, stream));
@@ -54,14 +56,14 @@ impl TableFactors {
         [x + self.tilt_n[0], y + self.tilt_n[1]]
     }
 
-    /// Advances the world by a control step; returns whether the puck is lost at its end.
+    /// Advances the world by a control step; returns whether tracking has lost the puck at its end.
     pub fn control_step(&mut self, world: &mut World) -> bool {
         world.control_step(|puck| self.force(puck));
-        self.is_lost()
+        self.draw_puck_lost()
     }
 
-    /// Whether the puck is lost at the end of a control step. Call it once per control step.
-    pub fn is_lost(&mut self) -> bool {
+    /// Is the puck lost at the end of a control step? It draws random numbers, so call it once per control step.
+    pub fn draw_puck_lost(&mut self) -> bool {
         self.tracking_loss
             .as_mut()
             .is_some_and(TrackingLoss::advance)

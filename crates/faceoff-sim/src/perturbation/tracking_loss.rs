@@ -1,38 +1,39 @@
-//! Loss of the puck's tracking.
+//! The perturbation `tracking_loss`: the simulated camera loses the puck for some control steps.
 
-use crate::stream::Stream;
+use crate::stream::RandomStream;
 use faceoff_types::TrackingLossSettings;
 
-/// Draws the control steps at which the puck is lost.
+/// Draws the control steps in which the puck is lost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackingLoss {
-    stream: Stream,
+    stream: RandomStream,
     settings: TrackingLossSettings,
-    remaining: u32,
+    /// Control steps for which the puck stays lost.
+    remaining_steps: u32,
 }
 
 impl TrackingLoss {
     /// Starts with the puck tracked.
     #[must_use]
-    pub fn new(settings: &TrackingLossSettings, stream: Stream) -> Self {
+    pub fn new(settings: &TrackingLossSettings, stream: RandomStream) -> Self {
         Self {
             stream,
             settings: settings.clone(),
-            remaining: 0,
+            remaining_steps: 0,
         }
     }
 
-    /// Whether the puck is lost at the next control step. Do not call it for an episode's first observation.
+    /// Advances by a control step, and returns whether the puck is lost in it. Do not call it for an episode's first observation.
     pub fn advance(&mut self) -> bool {
         // Always two draws, so that the draws of a step do not depend on earlier ones.
-        let chance = self.stream.unit();
+        let draw = self.stream.unit();
         let [shortest, longest] = self.settings.steps;
         let steps = self.stream.integer(shortest, longest.max(shortest));
-        if self.remaining == 0 && chance < self.settings.probability {
-            self.remaining = steps;
+        if self.remaining_steps == 0 && draw < self.settings.probability {
+            self.remaining_steps = steps;
         }
-        let lost = self.remaining > 0;
-        self.remaining = self.remaining.saturating_sub(1);
+        let lost = self.remaining_steps > 0;
+        self.remaining_steps = self.remaining_steps.saturating_sub(1);
         lost
     }
 }

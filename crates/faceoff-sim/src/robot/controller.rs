@@ -1,4 +1,7 @@
-//! The 1 kHz torque controller with its safety limiter (MODEL, "Controller").
+//! The torque controller of the arm, at 1 kHz: feedback on position and velocity, plus the *feed-forward*, the torques that the nominal
+//! model needs for the desired acceleration. Before it, a *limiter* keeps the commands within the limits of position and velocity. It
+//! computes several arms at once in SIMD lanes ([`Lanes`]: one number per arm). `q` are joint positions (rad), `dq` velocities (rad/s).
+//! Constants marked "reference" are those of the challenge's own simulator.
 
 use super::{plant::PlantLanes, trajectory::Setpoint};
 use crate::{
@@ -6,14 +9,14 @@ use crate::{
     model::{JOINTS, LINKS, SUBSTEP_S},
 };
 
-/// Largest approach velocity of a joint per distance to its stop, 1/s (ref).
+/// Largest commanded velocity of a joint towards its stop (the end of its range) per distance to the stop, 1/s (reference).
 pub(crate) const LIMITER_GAIN: f64 = 20.0;
 
-/// Weights of the new and of the previous value in the low-pass filter of the joint velocity (ref).
+/// Weights of the new and of the previous value in the low-pass filter of the joint velocity, per substep of 1 ms (reference).
 pub(crate) const FILTER_NEW: f64 = 0.274;
 const FILTER_OLD: f64 = 0.726;
 
-/// Limits commands to the position and velocity limits.
+/// Keeps the commands of an arm within its position and velocity limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limiter<T = f64> {
     /// The previously commanded position, rad.
@@ -58,17 +61,17 @@ impl<T: Lanes> Limiter<T> {
         };
         let (gain, step) = (T::splat(-LIMITER_GAIN), T::splat(SUBSTEP_S));
         for i in 0..JOINTS {
-            let q_max = T::splat(LINKS[i].range_rad);
-            let v_max = LINKS[i].velocity_limit_rad_s;
-            let p = self.commanded[i];
-            let within = |v: T| clamp(v, T::splat(-v_max), T::splat(v_max));
-            let slowest = within(gain * (p + q_max));
-            let fastest = within(gain * (p - q_max));
-            command.velocity[i] = clamp(or_else(desired.velocity[i], zero), slowest, fastest);
+            let q_max = T::splat(LINKS[i].range_rad); // rad
+            let v_max = LINKS[i].velocity_limit_rad_s; // rad/s
+            let previous = self.commanded[i];
+            let clamp_velocity = |v: T| clamp(v, T::splat(-v_max), T::splat(v_max));
+            let slowest = clamp_velocity(gain * (previous + q_max));
+            let fastest = clamp_velocity(gain * (previous - q_max));
+            command.velocity[i] = clamp(replace_nan(desired.velocity[i], zero), slowest, fastest);
             command.position[i] = clamp(
-                or_else(desired.position[i], p),
-                p + step * slowest,
-                p + step * fastest,
+                replace_nan(desired.position[i], previous),
+                previous + step * slowest,
+                previous + step * fastest,
             );
         }
         self.commanded = command.position;
@@ -77,7 +80,7 @@ impl<T: Lanes> Limiter<T> {
 }
 
 /// Torques of the driven joints, N m: feedback on position and filtered velocity plus the
-/// feed-forward of the nominal model, within the drives' limits.
+/// `feed_forward` (N m), within the drives' limits.
 #[inline(always)]
 pub fn torque<T: Lanes>(
     plant: &PlantLanes<T>,
@@ -91,7 +94,7 @@ pub fn torque<T: Lanes>(
             + plant.kd[i] * (command.velocity[i] - dq_filtered[i]);
         let limit = LINKS[i].torque_limit_n_m;
         clamp(
-            or_else(feedback + feed_forward[i], T::splat(0.0)),
+            replace_nan(feedback + feed_forward[i], T::splat(0.0)),
             T::splat(-limit),
             T::splat(limit),
         )
@@ -106,10 +109,10 @@ pub fn filter_velocity<T: Lanes>(dq_filtered: &mut [T; JOINTS], dq: &[T]) {
     }
 }
 
-/// `otherwise` if a desired value is NaN: the joint then stays where it is.
+/// `x`, or `replacement` if `x` is NaN. A joint with a NaN command then stays where it is.
 #[inline(always)]
-fn or_else<T: Lanes>(x: T, otherwise: T) -> T {
-    T::select(x.less_or_equal(x), x, otherwise)
+fn replace_nan<T: Lanes>(x: T, replacement: T) -> T {
+    T::select(x.less_or_equal(x), x, replacement)
 }
 
 /// `f64::clamp` without its panic: the bounds are ordered by construction.

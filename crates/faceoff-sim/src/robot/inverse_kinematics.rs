@@ -1,4 +1,5 @@
-//! Damped least-squares inverse kinematics of the end effector's position (MODEL, "The opponent").
+//! Damped least-squares inverse kinematics: joint positions for a position of the end effector, the tip of the arm's rod. The method and
+//! its constants are those of the *reference*, the challenge's own simulator.
 
 use crate::{
     dynamics::{arm::Kinematics, spatial::Vec3},
@@ -6,13 +7,13 @@ use crate::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-/// Added to the diagonal of the normal equations (ref).
+/// Added to the diagonal of the normal equations (λ below), m².
 const DAMPING: f64 = 1e-3;
-/// Longest step in joint space, rad (ref).
+/// Longest step of an iteration in joint space, rad.
 const STEP_LIMIT_RAD: f64 = 0.1;
-/// Accepted distance, m (ref).
+/// Distance from the target at which the iteration ends, m.
 const TOLERANCE_M: f64 = 1e-4;
-/// Iterations before giving up (ref).
+/// Largest number of iterations.
 const ITERATIONS: usize = 1000;
 
 /// Joint positions that bring the end effector within 0.1 mm of `target` (m, robot's base frame),
@@ -28,8 +29,10 @@ pub fn inverse_kinematics(target: [f64; 3], start: &[f64; JOINTS]) -> [f64; JOIN
         if error.norm() < TOLERANCE_M {
             break;
         }
-        let columns: [Vec3<f64>; JOINTS] = std::array::from_fn(|i| kinematics.axes[i].at(ee));
-        // (Jᵀ J + λ I)⁻¹ Jᵀ e = Jᵀ (J Jᵀ + λ I)⁻¹ e, which is 3×3.
+        // The columns of the Jacobian J: velocity of the end effector per rate of each joint, m/rad.
+        let columns: [Vec3<f64>; JOINTS] =
+            std::array::from_fn(|i| kinematics.axes[i].velocity_at(ee));
+        // The step is (Jᵀ J + λ I)⁻¹ Jᵀ e = Jᵀ (J Jᵀ + λ I)⁻¹ e with the error e; the inverse on the right is only 3×3.
         let mut normal = Matrix3::identity() * DAMPING;
         for c in columns {
             let c = Vector3::new(c.x, c.y, c.z);
@@ -52,7 +55,7 @@ pub fn inverse_kinematics(target: [f64; 3], start: &[f64; JOINTS]) -> [f64; JOIN
     q
 }
 
-/// Appends the universal joint's angles, both zero, to the driven joints' positions.
+/// Appends the angles of the universal joint (the two hinges of the mallet), both zero, to the driven joints' positions, rad.
 pub fn with_zero_universal(q: &[f64; JOINTS]) -> [f64; DOFS] {
     let mut all = [0.0; DOFS];
     all[..JOINTS].copy_from_slice(q);

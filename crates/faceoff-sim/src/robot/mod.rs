@@ -1,4 +1,4 @@
-//! The robot: its plant, its trajectories, its controllers and its inverse kinematics.
+//! The robot: its *plant* (physical properties), the trajectories of its joints, its controllers and its inverse kinematics.
 
 pub mod controller;
 pub mod inverse_kinematics;

@@ -1,4 +1,5 @@
-//! The physical properties of the arm: nominal, or changed by the season's model mismatch.
+//! The *plant*: the physical properties of the simulated arm. They are nominal (the model that agents know) or changed by the season's
+//! *model mismatch*, a perturbation that is drawn once per season.
 
 use crate::{
     dynamics::{
@@ -13,7 +14,7 @@ use crate::{
 /// episodes and by both arms. The controller's feed-forward and the agent's model are always nominal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plant {
-    /// Factor on the masses and inertias of links 1…7, end effector and mallet.
+    /// Factors on mass and inertia of links 1…7, end effector and mallet.
     pub(crate) mass_scale: [f64; 9],
     /// Proportional gains, N m/rad.
     pub(crate) kp: [f64; JOINTS],
@@ -21,15 +22,15 @@ pub struct Plant {
     pub(crate) kd: [f64; JOINTS],
     /// Viscous joint damping, N m s/rad.
     pub(crate) damping: [f64; JOINTS],
-    /// Dry friction, N m.
+    /// Largest torque ± of the joints' dry friction, N m.
     pub(crate) friction: [f64; JOINTS],
-    /// Diagonal of the inverse joint-space inertia at q = 0, 1/(kg m²): scales the regularisation of
-    /// the soft joint constraints.
+    /// Diagonal of the inverse joint-space inertia at joint positions 0, 1/(kg m²). It scales the regularisation of
+    /// the soft joint constraints (dry friction and stops).
     pub(crate) inverse_inertia: [f64; DOFS],
 }
 
 impl Plant {
-    /// The plant of MODEL's tables.
+    /// The plant with the numbers of [`LINKS`].
     #[must_use]
     pub fn nominal() -> Self {
         Self::new(
@@ -67,7 +68,7 @@ impl Plant {
     }
 }
 
-/// The plants of several arms, which may differ.
+/// The plants of several arms, which may differ, one per SIMD lane; fields as in [`Plant`].
 #[derive(Debug, Clone, Copy)]
 pub struct PlantLanes<T> {
     pub(crate) mass_scale: [T; 9],

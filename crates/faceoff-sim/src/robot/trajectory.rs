@@ -1,4 +1,8 @@
-//! From actions at 50 Hz to a trajectory at 1 kHz (MODEL, "Interpolation").
+//! Interpolation of an agent's action, which comes at 50 Hz, to the desired motion at 1 kHz. `docs/protocol.md` ("Actions") says what the
+//! rows of an action are in each interpolation; the polynomials are those of the *reference*, the challenge's own simulator.
+//!
+//! Symbols: `T` is the duration of a control step (s), `j` a joint; p, v and a are the position (rad), velocity (rad/s) and acceleration
+//! (rad/s²) at the start of the step, which is the end of the previous trajectory.
 
 use crate::{
     dynamics::lanes::{Lanes, gather},
@@ -6,7 +10,7 @@ use crate::{
 };
 use faceoff_types::Interpolation;
 
-/// Desired motion at one instant.
+/// Desired motion of the joints at one instant; `L` is `f64` for one arm, or SIMD lanes for several.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setpoint<L = f64> {
     /// rad.
@@ -43,12 +47,12 @@ impl Setpoint {
 /// The desired motion at t = 1…20 ms of a control step; the next step starts from the last setpoint.
 pub type Trajectory = [Setpoint; SUBSTEPS];
 
-/// Below this distance, rad, a quadratic starts at rest (ref).
+/// A quadratic starts at rest if all joints together are closer than this to the action, rad (reference).
 const QUADRATIC_REST_RAD: f64 = 1e-3;
 
-/// Interpolates one action. `action` is row-major, of length [`Interpolation::len`].
+/// Interpolates one action, starting at `from`. `action` is row-major, of length [`Interpolation::len`].
 pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]) -> Trajectory {
-    let row = |r: usize, j: usize| action[r * JOINTS + j];
+    let row = |row: usize, j: usize| action[row * JOINTS + j];
     match interpolation {
         Interpolation::Linear => polynomial(|j| {
             let p = from.position[j];
@@ -67,6 +71,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
         }
         Interpolation::Cubic => polynomial(|j| {
             let (p, v) = (from.position[j], from.velocity[j]);
+            // What the action adds to a continued uniform motion, in position and velocity.
             let dp = row(0, j) - p - v * T;
             let dv = row(1, j) - v;
             [
@@ -80,6 +85,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
         }),
         Interpolation::Quartic => polynomial(|j| {
             let (p, v, a) = (from.position[j], from.velocity[j], from.acceleration[j]);
+            // What the action adds to a continued uniform acceleration, in position and velocity.
             let dp = row(0, j) - p - v * T - 0.5 * a * T * T;
             let dv = row(1, j) - v - a * T;
             let (c3, c4) = (4.0 * dp - dv * T, dv * T - 3.0 * dp);
@@ -87,6 +93,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
         }),
         Interpolation::Quintic => polynomial(|j| {
             let (p, v, a) = (from.position[j], from.velocity[j], from.acceleration[j]);
+            // What the action adds to a continued uniform acceleration, in position, velocity · T and acceleration · T².
             let dp = row(0, j) - p - v * T - 0.5 * a * T * T;
             let dv = (row(1, j) - v - a * T) * T;
             let da = (row(2, j) - a) * T * T;
@@ -100,8 +107,8 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
             ]
         }),
         Interpolation::LinearBoth => std::array::from_fn(|k| {
-            let s = (k + 1) as f64 / SUBSTEPS as f64;
-            let between = |from: f64, to: f64| from + (to - from) * s;
+            let share = (k + 1) as f64 / SUBSTEPS as f64;
+            let between = |from: f64, to: f64| from + (to - from) * share;
             Setpoint {
                 position: std::array::from_fn(|j| between(from.position[j], row(0, j))),
                 velocity: std::array::from_fn(|j| between(from.velocity[j], row(1, j))),
@@ -116,7 +123,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
     }
 }
 
-/// Evaluates a polynomial per joint, coefficients in rising order.
+/// Evaluates one polynomial in time (s) per joint at each millisecond; `coefficients` in rising order.
 fn polynomial(coefficients: impl Fn(usize) -> [f64; 6]) -> Trajectory {
     let coefficients: [[f64; 6]; JOINTS] = std::array::from_fn(coefficients);
     std::array::from_fn(|k| {

@@ -1,32 +1,37 @@
-//! Soft contacts (MODEL, "Contact law").
+//! The law of soft contacts, as in MuJoCo, with the constants of the challenge's own simulator.
+//!
+//! A *constraint* wants the acceleration `stiffness · impedance · depth − damping · velocity`, where the *depth* of the overlap is the
+//! constraint's error. The *impedance*, between 0 and 1, rises with the depth; the nearer it is to 1, the less the *regularisation* lets
+//! the constraint miss that acceleration.
 
 /// The constants of a pair of materials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Impedance at zero penetration.
+    /// Impedance at zero depth.
     pub impedance_0: f64,
-    /// Impedance at full penetration.
+    /// Impedance from a depth of 1 mm on.
     pub impedance_1: f64,
-    /// Damping of the constraint's error, 1/s.
+    /// Damping of the error, 1/s.
     pub damping_per_s: f64,
-    /// Stiffness of the constraint's error, 1/s².
+    /// Stiffness of the error, 1/s².
     pub stiffness_per_s2: f64,
     /// Inverse inertia that scales the regularisation, 1/kg.
     pub inverse_inertia: f64,
+    /// Friction coefficient: largest tangential force over normal force.
     pub friction: f64,
 }
 
-/// Penetration at which the impedance is full, m.
+/// Depth from which the impedance is constant, m.
 pub(crate) const WIDTH_M: f64 = 0.001;
 
-/// Inverse inertia of the puck in the regularisation, 1/kg: 1/m averaged over three axes, along one
-/// of which the puck cannot move (the reference engine's estimate).
+/// Inverse inertia of the puck in the regularisation, 1/kg: one over its mass, averaged over three axes, along one
+/// of which the puck cannot move (MuJoCo's estimate).
 const PUCK_INVERSE_INERTIA: f64 = 200.0 / 3.0;
 
 /// Inverse inertia of a mallet at the end of its arm, 1/kg.
 pub const MALLET_INVERSE_INERTIA: f64 = 1.07;
 
-/// Puck and rims: hard, and so rough that the puck never slips.
+/// Puck and rims (walls of the table): hard, and so rough that the puck never slips.
 pub const RIM: Material = Material {
     impedance_0: 0.99,
     impedance_1: 0.999,
@@ -52,7 +57,7 @@ pub const MALLETS: Material = Material {
     ..MALLET
 };
 
-/// Joint stops and dry friction of the joints (the reference engine's defaults).
+/// Stops (ends of the range) and dry friction of the joints: MuJoCo's defaults.
 pub const JOINT: Material = Material {
     impedance_0: 0.9,
     impedance_1: 0.95,
@@ -63,21 +68,22 @@ pub const JOINT: Material = Material {
 };
 
 impl Material {
-    /// Impedance d at a penetration in m: how much of the constraint's force is rigid.
+    /// The impedance at a depth (m).
     #[must_use]
     pub fn impedance(&self, depth_m: f64) -> f64 {
+        // Share of the rise: two parabolas, which meet in the middle.
         let x = depth_m / WIDTH_M;
-        let s = if x >= 1.0 {
+        let share = if x >= 1.0 {
             1.0
         } else if x <= 0.5 {
             2.0 * x * x
         } else {
             1.0 - 2.0 * (1.0 - x) * (1.0 - x)
         };
-        self.impedance_0 + (self.impedance_1 - self.impedance_0) * s
+        self.impedance_0 + (self.impedance_1 - self.impedance_0) * share
     }
 
-    /// Regularisation R per unit of inverse inertia, at an impedance.
+    /// Regularisation per inverse inertia, at an impedance.
     #[must_use]
     pub fn softness(impedance: f64) -> f64 {
         (1.0 - impedance) / impedance

@@ -1,6 +1,7 @@
-//! The numbers of table, goals and puck (MODEL, "Table, puck and contacts"), table frame.
+//! The numbers of table, goals and puck, in the table frame: origin at the centre of the surface, x towards robot 2, z up. The *rims* are
+//! the walls around the table, two long ones along x and short ones beside the goals.
 
-/// The table: x towards robot 2, origin at the centre of the surface.
+/// Dimensions of the table, and positions of the robots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Table {
     /// Goal line to goal line, m.
@@ -11,11 +12,11 @@ pub struct Table {
     pub goal_width_m: f64,
     /// Thickness of the rims, from the inner face outwards, m.
     pub rim_thickness_m: f64,
-    /// Radius of the goal posts' rounding, m.
+    /// Radius of the rounded edge of the goal posts, the ends of the short rims, m.
     pub post_radius_m: f64,
     /// Distance of a robot's base from the table's centre, along x, m.
     pub base_x_m: f64,
-    /// Height of a robot's base, m (below the surface).
+    /// Height of a robot's base above the surface, m; negative, since it is below.
     pub base_z_m: f64,
 }
 
@@ -33,7 +34,7 @@ impl Table {
     }
 }
 
-/// The challenge's final published table.
+/// The table of the challenge, in its last published version.
 pub const TABLE: Table = Table {
     length_m: 1.948,
     width_m: 1.038,
@@ -44,7 +45,7 @@ pub const TABLE: Table = Table {
     base_z_m: -0.1,
 };
 
-/// The puck: a disc, free in x, y and yaw.
+/// A disc that slides on the surface, free in x, y and yaw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
     pub radius_m: f64,
@@ -60,6 +61,7 @@ pub struct Disc {
     pub height_m: f64,
 }
 
+/// The puck of the challenge.
 pub const PUCK: Disc = Disc {
     radius_m: 0.03165,
     mass_kg: 0.01,

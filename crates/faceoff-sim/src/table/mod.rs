@@ -1,4 +1,4 @@
-//! Table, puck and contacts.
+//! Table, puck and mallets: geometry, coordinate frames, contacts and the puck's motion.
 
 pub mod contact_finder;
 pub mod contact_law;

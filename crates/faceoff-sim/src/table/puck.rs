@@ -1,4 +1,4 @@
-//! The puck's motion.
+//! The puck's motion on the table, in substeps of 1 ms.
 
 use super::geometry::PUCK;
 use crate::model::SUBSTEP_S;
@@ -12,7 +12,7 @@ pub struct Puck {
     pub velocity: [f64; 3],
 }
 
-/// Inverse inertia along x, y and yaw, 1/kg and 1/(kg m²).
+/// Inverse inertia of the puck along x, y and yaw, 1/kg and 1/(kg m²).
 pub const INVERSE_INERTIA: [f64; 3] = [
     1.0 / PUCK.mass_kg,
     1.0 / PUCK.mass_kg,
@@ -24,12 +24,13 @@ pub const INVERSE_INERTIA: [f64; 3] = [
 pub struct Damping([f64; 3]);
 
 impl Damping {
+    /// The puck's own damping.
     pub const NOMINAL: Self = Self([PUCK.damping, PUCK.damping, PUCK.yaw_damping]);
 
-    /// Damping with a given decay rate of the velocity, 1/s.
+    /// Damping with a given decay rate of the linear velocity, 1/s, and the nominal damping of the yaw.
     #[must_use]
-    pub fn per_s(rate: f64) -> Self {
-        let linear = rate * PUCK.mass_kg;
+    pub fn with_decay_rate(rate_per_s: f64) -> Self {
+        let linear = rate_per_s * PUCK.mass_kg;
         Self([linear, linear, PUCK.yaw_damping])
     }
 }
@@ -37,39 +38,40 @@ impl Damping {
 impl Puck {
     /// From [x, y, yaw, vx, vy, yaw rate].
     #[must_use]
-    pub fn from_state(s: [f64; 6]) -> Self {
+    pub fn from_state([x, y, yaw, vx, vy, yaw_rate]: [f64; 6]) -> Self {
         Self {
-            pose: [s[0], s[1], s[2]],
-            velocity: [s[3], s[4], s[5]],
+            pose: [x, y, yaw],
+            velocity: [vx, vy, yaw_rate],
         }
     }
 
     /// As [x, y, yaw, vx, vy, yaw rate].
     #[must_use]
     pub fn state(&self) -> [f64; 6] {
-        let ([x, y, yaw], [vx, vy, w]) = (self.pose, self.velocity);
-        [x, y, yaw, vx, vy, w]
+        let ([x, y, yaw], [vx, vy, yaw_rate]) = (self.pose, self.velocity);
+        [x, y, yaw, vx, vy, yaw_rate]
     }
 
-    /// m/s.
+    /// Linear speed, m/s.
     #[must_use]
     pub fn speed(&self) -> f64 {
         (self.velocity[0] * self.velocity[0] + self.velocity[1] * self.velocity[1]).sqrt()
     }
 
-    /// Acceleration without contacts, under an air flow's force in N.
+    /// Acceleration without contacts (m/s², m/s², rad/s²), under damping and the force of an air flow (N).
     #[inline(always)]
     pub fn free_acceleration(&self, damping: &Damping, air_n: [f64; 2]) -> [f64; 3] {
         let force = [air_n[0], air_n[1], 0.0];
         std::array::from_fn(|i| (force[i] - damping.0[i] * self.velocity[i]) * INVERSE_INERTIA[i])
     }
 
-    /// One substep under a force (N, N, N m): semi-implicit Euler, damping implicit.
+    /// One substep under a force (N, N, N m): a semi-implicit Euler step with implicit damping.
     #[inline(always)]
     pub fn advance(&mut self, damping: &Damping, force: [f64; 3]) {
         for i in 0..3 {
-            let h = SUBSTEP_S * INVERSE_INERTIA[i];
-            self.velocity[i] = (self.velocity[i] + h * force[i]) / (1.0 + h * damping.0[i]);
+            let step_per_inertia = SUBSTEP_S * INVERSE_INERTIA[i];
+            self.velocity[i] = (self.velocity[i] + step_per_inertia * force[i])
+                / (1.0 + step_per_inertia * damping.0[i]);
             self.pose[i] += SUBSTEP_S * self.velocity[i];
         }
     }

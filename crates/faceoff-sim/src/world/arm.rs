@@ -1,4 +1,4 @@
-//! The state of one arm.
+//! The state of one arm: seven driven joints, the two hinges of the *universal joint* on which the mallet hangs, and the controllers.
 
 use super::joints::JointConstraints;
 use crate::{
@@ -9,36 +9,43 @@ use crate::{
         inverse_kinematics::with_zero_universal,
         plant::Plant,
         trajectory::{Setpoint, Trajectory, interpolate},
-        universal_joint::{UniversalJoint, vertical},
+        universal_joint::{UniversalJoint, mallet_vertical_angles},
     },
 };
 use faceoff_types::Interpolation;
 
-/// One arm with its controller: all state that its future depends on.
+/// One arm with its controllers: all state that its future depends on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
+    /// Joint positions, rad: the driven joints, then the hinges.
     pub(super) q: [f64; DOFS],
+    /// Joint velocities, rad/s.
     pub(super) dq: [f64; DOFS],
+    /// Low-pass filtered velocities of the driven joints, rad/s.
     pub(super) dq_filtered: [f64; JOINTS],
+    /// Torques of the drives in the last substep, N m.
     pub(super) torque: [f64; JOINTS],
+    /// Desired motion in the current control step.
     pub(super) trajectory: Trajectory,
     pub(super) limiter: Limiter,
     pub(super) universal: UniversalJoint,
+    /// Dry friction and stops.
     pub(super) constraints: JointConstraints,
+    /// Position of the end effector before the last substep, m, in the robot's base frame.
     pub(super) ee_before: [f64; 3],
     /// Control steps for which the trajectory has continued since the last action.
-    coasted: u32,
+    coasted_steps: u32,
 }
 
 /// If an action is late, the previous trajectory continues for this many control steps: 80 ms.
 const COAST_STEPS: u32 = 4;
 
 impl Arm {
-    /// At rest, the mallet vertical.
+    /// An arm at rest, with its mallet vertical. `joints` are the positions of the driven joints, rad.
     pub fn new(plant: &Plant, joints: &[f64; JOINTS]) -> Self {
         let mut q = with_zero_universal(joints);
         let ee = Kinematics::new(&q).end_effector;
-        let universal = vertical(ee.x, ee.y, [0.0; 2]);
+        let universal = mallet_vertical_angles(ee.x, ee.y, [0.0; 2]);
         q[JOINTS..].copy_from_slice(&universal);
         Self {
             q,
@@ -50,7 +57,7 @@ impl Arm {
             universal: UniversalJoint::at_rest(),
             constraints: JointConstraints::new(plant),
             ee_before: ee.origin.lane(0),
-            coasted: 0,
+            coasted_steps: 0,
         }
     }
 
@@ -62,19 +69,19 @@ impl Arm {
     /// Starts a control step with an action.
     pub fn command(&mut self, interpolation: Interpolation, action: &[f64]) {
         self.trajectory = interpolate(interpolation, self.end(), action);
-        self.coasted = 0;
+        self.coasted_steps = 0;
     }
 
     /// Are all numbers of the trajectory finite?
-    pub fn is_commanded_finitely(&self) -> bool {
+    pub fn is_trajectory_finite(&self) -> bool {
         self.trajectory.iter().all(|setpoint| {
             let Setpoint {
                 position,
                 velocity,
                 acceleration,
             } = setpoint;
-            let all = |row: &[f64; JOINTS]| row.iter().all(|x| x.is_finite());
-            all(position) && all(velocity) && all(acceleration)
+            let are_finite = |row: &[f64; JOINTS]| row.iter().all(|x| x.is_finite());
+            are_finite(position) && are_finite(velocity) && are_finite(acceleration)
         })
     }
 
@@ -89,7 +96,7 @@ impl Arm {
     pub fn coast(&mut self) {
         let end = *self.end();
         self.trajectory = std::array::from_fn(|k| {
-            if self.coasted >= COAST_STEPS {
+            if self.coasted_steps >= COAST_STEPS {
                 return Setpoint::at_rest(end.position);
             }
             let t = (k + 1) as f64 * SUBSTEP_S;
@@ -99,6 +106,6 @@ impl Arm {
                 acceleration: [0.0; JOINTS],
             }
         });
-        self.coasted = (self.coasted + 1).min(COAST_STEPS);
+        self.coasted_steps = (self.coasted_steps + 1).min(COAST_STEPS);
     }
 }

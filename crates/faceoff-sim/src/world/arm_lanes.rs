@@ -1,4 +1,4 @@
-//! The state of several arms, one in each lane, during their substeps.
+//! The state of several arms during their substeps, one arm in each *lane* (number slot) of a SIMD register.
 
 use super::{arm::Arm, friction::FrictionLanes};
 use crate::{
@@ -18,18 +18,24 @@ use crate::{
 #[derive(Debug)]
 pub struct ArmLanes<T: Lanes> {
     pub motion: MotionLanes<T>,
+    /// Torques of the drives, N m.
     pub torque: [T; JOINTS],
     pub limiter: Limiter<T>,
     pub universal: UniversalJoint<T>,
     pub friction: FrictionLanes<T>,
+    /// Positions of the end effectors before the substep, m, each in its robot's base frame.
     pub ee_before: Vec3<T>,
     pub plant: PlantLanes<T>,
 }
 
+/// Positions and velocities of the joints of several arms.
 #[derive(Debug, Clone, Copy)]
 pub struct MotionLanes<T> {
+    /// Joint positions, rad.
     pub q: [T; DOFS],
+    /// Joint velocities, rad/s.
     pub dq: [T; DOFS],
+    /// Low-pass filtered velocities of the driven joints, rad/s.
     pub dq_filtered: [T; JOINTS],
 }
 
@@ -75,7 +81,7 @@ impl<T: Lanes> MotionLanes<T> {
         arm.dq_filtered = row(&self.dq_filtered, lane);
     }
 
-    /// Replaces one lane by that of another instant.
+    /// Replaces one lane by the same lane of another instant.
     pub fn replace(&mut self, lane: usize, other: &Self) {
         set_row(&mut self.q, lane, &row(&other.q, lane));
         set_row(&mut self.dq, lane, &row(&other.dq, lane));

@@ -1,5 +1,5 @@
-//! Bounds of the simulation: beyond them a step of a millisecond is too long, and numbers grow without limit or
-//! become NaN.
+//! Bounds of the simulation. In a state beyond them a substep of a millisecond is too long, and numbers grow without limit or
+//! become NaN. A world that would leave them *diverges*: it stops.
 
 use super::{arm::Arm, arm_lanes::MotionLanes};
 use crate::{
@@ -14,7 +14,7 @@ use std::{f64::consts::FRAC_PI_2, fmt};
 /// in its last state within them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// How far a joint may be beyond its stop, rad.
+    /// How far a joint may be beyond its stop (the end of its range), rad.
     pub beyond_stop_rad: f64,
     /// How fast a joint may turn, rad/s.
     pub joint_rad_s: f64,
@@ -24,12 +24,12 @@ pub struct Bounds {
     pub puck_rad_s: f64,
 }
 
-/// A joint that turns this many times faster than its velocity limit cannot follow from a feasible command. The
+/// A joint *runs away* if it turns this many times faster than its velocity limit: no feasible command has that effect. The
 /// first robot with such a joint is at fault for a later divergence.
-const RUNAWAY: f64 = 10.0;
+const RUNAWAY_FACTOR: f64 = 10.0;
 
 impl Bounds {
-    /// Half a turn beyond a stop; a radian (joint) and ten metres (puck) in a millisecond.
+    /// Half a turn beyond a stop; in a millisecond a radian (joint), and ten metres or 1000 radians (puck).
     pub const WIDE: Self = Self {
         beyond_stop_rad: std::f64::consts::PI,
         joint_rad_s: 1e3,
@@ -37,7 +37,7 @@ impl Bounds {
         puck_rad_s: 1e6,
     };
 
-    /// Any finite state.
+    /// Bounds that every finite state keeps.
     pub const FINITE: Self = Self {
         beyond_stop_rad: f64::MAX,
         joint_rad_s: f64::MAX,
@@ -75,12 +75,13 @@ impl Bounds {
     }
 }
 
-/// Is an arm in its ordinary range of motion? The only check of the bounds in every substep.
+/// Are the arms in their ordinary range of motion, which is far within all bounds? This is the only check in every substep; the others
+/// follow if it fails. Beyond the driven joints, the limits are those of the mallet's hinges.
 #[inline(always)]
 pub(super) fn is_ordinary<T: Lanes>(motion: &MotionLanes<T>) -> T::Mask {
     let limits = |i: usize| match LINKS.get(i) {
         Some(link) => (
-            RUNAWAY * link.velocity_limit_rad_s,
+            RUNAWAY_FACTOR * link.velocity_limit_rad_s,
             link.range_rad + FRAC_PI_2,
         ),
         None => (Bounds::WIDE.joint_rad_s, 2.0 * FRAC_PI_2),
@@ -99,17 +100,17 @@ pub(super) fn is_ordinary<T: Lanes>(motion: &MotionLanes<T>) -> T::Mask {
     ordinary
 }
 
-/// [`is_ordinary`] for the puck: in tasks and games a faster puck counts as lost.
+/// Is the puck in its ordinary range of motion? In tasks and games a puck faster than 100 m/s counts as lost.
 #[inline(always)]
 pub(super) fn is_ordinary_puck(puck: &Puck) -> bool {
     let [vx, vy, yaw_rate] = puck.velocity;
-    vx.abs() <= 100.0 && vy.abs() <= 100.0 && yaw_rate.abs() <= 1e4
+    vx.abs() <= 100.0 && vy.abs() <= 100.0 && yaw_rate.abs() <= 1e4 // m/s, rad/s
 }
 
 /// Does a driven joint turn faster than any feasible command demands?
 pub(super) fn is_runaway(arm: &Arm) -> bool {
     (0..JOINTS).any(|i| {
-        let ordinary = arm.dq[i].abs() <= RUNAWAY * LINKS[i].velocity_limit_rad_s;
+        let ordinary = arm.dq[i].abs() <= RUNAWAY_FACTOR * LINKS[i].velocity_limit_rad_s;
         !ordinary
     })
 }
@@ -117,21 +118,21 @@ pub(super) fn is_runaway(arm: &Arm) -> bool {
 /// A world that would have left its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Divergence {
-    /// The robots (0 and 1) at fault: their command or state left its bounds first. Both only if in the same
-    /// millisecond.
-    pub by: [bool; 2],
-    /// The joint or puck that would have left the bounds.
+    /// Is robot 0, and robot 1, at fault, since its command or state was the first out of bounds? Both are only if it happened in the
+    /// same millisecond.
+    pub robots_at_fault: [bool; 2],
+    /// What would have left the bounds: a joint or the puck.
     pub cause: Runaway,
 }
 
 /// The part of a world that leaves its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Runaway {
-    /// A joint of a robot: 0 to 6 are driven, 7 and 8 hold the mallet.
+    /// A joint of a robot. Joints 0 to 6 are driven, 7 and 8 are the hinges of the mallet.
     Joint {
         /// 0 or 1.
         robot: usize,
-        /// From 0.
+        /// Index of the joint, 0 to 8.
         joint: usize,
     },
     Puck,

@@ -1,25 +1,27 @@
-//! The convex problem behind the contact forces.
+//! The convex optimisation problem whose solution are the contact forces.
 //!
-//! Each contact has a normal and two tangential forces, within a cone. The forces minimise one quadratic
-//! function over all cones, as in the reference engine.
+//! Each contact has a normal and two tangential forces (N). They are within the *friction cone*: the tangential force is at most the
+//! friction coefficient `mu` times the normal force. A contact *slips* if it is at the bound, and *sticks* otherwise. The forces minimise
+//! one quadratic function over all cones, as in MuJoCo.
 
-/// Normal, horizontal tangent, upright tangent.
+/// Number of directions of a contact: normal, horizontal tangent, upright tangent.
 pub const DIRECTIONS: usize = 3;
 
-/// Largest number of sweeps over several contacts if one of them slips, and the relative change that ends them.
+/// If one of several contacts slips, they are solved one after the other in sweeps: the largest number of sweeps, and the relative change
+/// of the forces that ends them.
 const SWEEPS: usize = 20_000;
 const SWEEP_TOLERANCE: f64 = 1e-13;
-/// Directions of slip on the full circle that are tried before the search around the best one.
+/// Number of directions of slip, spread over the full circle, that are tried before the search around the best one.
 const DIRECTIONS_TRIED: usize = 16;
-/// Bisections in that search: down to rounding.
+/// Number of bisections in that search, which narrows the direction down to rounding.
 const BISECTIONS: usize = 54;
 
 /// One contact's force: normal, horizontal tangent, upright tangent.
 type ContactForce = [f64; DIRECTIONS];
 
-/// Minimises ½ f·matrix·f − target·f where each contact's tangential force stays within friction times
-/// its normal force; rows are normal, horizontal and upright tangent of each contact. This is the reference's
-/// friction model: a convex problem, in which slipping increases the normal force.
+/// Minimises ½ f·matrix·f − target·f over forces f within their friction cones; rows are normal, horizontal and upright tangent of each
+/// contact. `matrix` is relative acceleration per force (1/kg), `target` the desired relative acceleration (m/s²). This is the friction
+/// model of MuJoCo: a convex problem, in which slipping increases the normal force.
 ///
 /// The matrix is symmetric and positive definite in the rows of the contacts, one friction coefficient
 /// each; later rows are ignored.
@@ -31,8 +33,8 @@ pub fn solve_cone<const N: usize>(
     let rows = DIRECTIONS * friction.len();
     let mut force = eliminate(matrix, target, rows);
     let sticks = |(c, mu): (usize, &f64)| {
-        let [f, a, b] = block(&force, c);
-        norm([a, b]) <= mu * f
+        let [normal, horizontal, upright] = block(&force, c);
+        norm([horizontal, upright]) <= mu * normal
     };
     if friction.iter().enumerate().all(sticks) {
         return force;
@@ -80,22 +82,25 @@ fn solve_one_cone(
     if target[0] + mu * norm(pull) <= 0.0 {
         return [0.0; DIRECTIONS];
     }
-    // The force is on the surface of the cone. Along a given edge there is one unknown. The best edge is found
-    // roughly first and then between its neighbours.
+    // The contact slips, so the force is on the surface of the cone. On the edge (straight line from the tip) in the tangential direction
+    // u, a unit vector, there is one unknown: the size. The best edge is found roughly first and then between its neighbours.
     let edge = |u: [f64; 2]| [1.0, mu * u[0], mu * u[1]];
     let response = |edge: &ContactForce| matrix.map(|row| dot(&row, edge));
+    // Twice the decrease of the minimised function by the best force on an edge.
     let gain = |u: [f64; 2]| {
         let edge = edge(u);
         let push = dot(&edge, target).max(0.0);
         push * push / dot(&edge, &response(&edge))
     };
-    let along = |u: [f64; 2]| -> ContactForce {
+    // The best force on an edge.
+    let best_force = |u: [f64; 2]| -> ContactForce {
         let edge = edge(u);
         let size = (dot(&edge, target) / dot(&edge, &response(&edge))).max(0.0);
         edge.map(|e| size * e)
     };
+    // Positive if the best edge is further round the circle, anticlockwise.
     let gain_across = |u: [f64; 2]| {
-        let force = along(u);
+        let force = best_force(u);
         let residual: ContactForce = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
         residual[2] * u[0] - residual[1] * u[1]
     };
@@ -116,7 +121,7 @@ fn solve_one_cone(
             after = middle;
         }
     }
-    along(before)
+    best_force(before)
 }
 
 /// Rotates by one of [`DIRECTIONS_TRIED`] parts of a full turn, forwards (+1) or backwards (−1).
@@ -131,11 +136,12 @@ fn dot(a: &ContactForce, b: &ContactForce) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// The three numbers of one contact in a row of the matrix or in the forces.
 fn block<const N: usize>(row: &[f64; N], contact: usize) -> ContactForce {
     std::array::from_fn(|d| row[DIRECTIONS * contact + d])
 }
 
-/// Not `hypot`, which depends on the platform.
+/// Length of a vector. Not by `hypot`, which depends on the platform.
 fn norm(v: [f64; 2]) -> f64 {
     (v[0] * v[0] + v[1] * v[1]).sqrt()
 }
@@ -150,7 +156,7 @@ fn unit(v: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// Solves the first `n` equations by elimination with pivoting.
+/// Solves the first `n` equations of `matrix · x = target` by Gaussian elimination with pivoting.
 fn eliminate<const N: usize>(matrix: &[[f64; N]; N], target: &[f64; N], n: usize) -> [f64; N] {
     let mut a = *matrix;
     let mut x = *target;
@@ -183,11 +189,12 @@ fn eliminate<const N: usize>(matrix: &[[f64; N]; N], target: &[f64; N], n: usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stream::Stream;
+    use crate::stream::RandomStream;
     use faceoff_types::Seed;
 
-    /// A random symmetric, positive definite matrix, and a target that pushes and pulls equally often.
-    fn problem<const N: usize>(stream: &mut Stream) -> ([[f64; N]; N], [f64; N]) {
+    /// A random symmetric, positive definite matrix, and a target that pushes and pulls equally often. The constants are chosen so that
+    /// contacts open, stick and slip.
+    fn random_problem<const N: usize>(stream: &mut RandomStream) -> ([[f64; N]; N], [f64; N]) {
         let root: [[f64; N]; N] =
             std::array::from_fn(|_| std::array::from_fn(|_| stream.uniform(-1.0, 1.0)));
         let scale: [f64; N] = std::array::from_fn(|r| if r % DIRECTIONS == 2 { 0.2 } else { 3.0 });
@@ -201,8 +208,8 @@ mod tests {
     }
 
     /// Checks the conditions of the optimum: forces in their cones, residuals in the polar cones, and no gain along
-    /// the forces. Returns how many contacts are open, stick and slip.
-    fn check<const N: usize>(
+    /// the forces. Returns how many contacts are open (without force), stick and slip.
+    fn check_optimum<const N: usize>(
         matrix: &[[f64; N]; N],
         target: &[f64; N],
         friction: &[f64],
@@ -210,7 +217,8 @@ mod tests {
         let force = solve_cone(matrix, target, friction);
         let mut kinds = [0; 3];
         for (c, &mu) in friction.iter().enumerate() {
-            let [f, a, b] = block(&force, c);
+            let contact_force = block(&force, c);
+            let [normal, horizontal, upright] = contact_force;
             let residual: ContactForce = std::array::from_fn(|d| {
                 let row = matrix[DIRECTIONS * c + d];
                 let response: f64 = row.iter().zip(&force).map(|(m, f)| m * f).sum();
@@ -218,7 +226,7 @@ mod tests {
             });
             let tolerance = 1e-9;
             assert!(
-                norm([a, b]) <= mu * f + tolerance,
+                norm([horizontal, upright]) <= mu * normal + tolerance,
                 "outside its cone: {force:?}"
             );
             let outward = residual[0] + mu * norm([residual[1], residual[2]]);
@@ -227,15 +235,15 @@ mod tests {
                 "not optimal: {residual:?} {force:?}"
             );
             assert!(
-                dot(&residual, &[f, a, b]).abs() <= tolerance * 1e3,
+                dot(&residual, &contact_force).abs() <= tolerance * 1e3,
                 "{residual:?} {force:?}"
             );
-            let kind = if f == 0.0 {
-                0
-            } else if norm([a, b]) < mu * f * (1.0 - 1e-9) {
-                1
+            let kind = if normal == 0.0 {
+                0 // open
+            } else if norm([horizontal, upright]) < mu * normal * (1.0 - 1e-9) {
+                1 // sticks
             } else {
-                2
+                2 // slips
             };
             kinds[kind] += 1;
         }
@@ -244,11 +252,11 @@ mod tests {
 
     #[test]
     fn single_contact_satisfies_the_optimality_conditions() {
-        let mut stream = Stream::new(&Seed::from_number(1), "one contact");
+        let mut stream = RandomStream::new(&Seed::from_number(1), "one contact");
         let mut kinds = [0; 3];
         for _ in 0..2000 {
-            let (matrix, target) = problem::<3>(&mut stream);
-            let found = check(&matrix, &target, &[stream.uniform(0.2, 2.0)]);
+            let (matrix, target) = random_problem::<3>(&mut stream);
+            let found = check_optimum(&matrix, &target, &[stream.uniform(0.2, 2.0)]);
             kinds = std::array::from_fn(|k| kinds[k] + found[k]);
         }
         assert!(kinds.iter().all(|count| *count > 20), "{kinds:?}");
@@ -256,11 +264,11 @@ mod tests {
 
     #[test]
     fn several_contacts_satisfy_the_optimality_conditions() {
-        let mut stream = Stream::new(&Seed::from_number(2), "several contacts");
+        let mut stream = RandomStream::new(&Seed::from_number(2), "several contacts");
         let mut kinds = [0; 3];
         for _ in 0..300 {
-            let (matrix, target) = problem::<9>(&mut stream);
-            let found = check(&matrix, &target, &[1.0, 1e4, stream.uniform(0.2, 2.0)]);
+            let (matrix, target) = random_problem::<9>(&mut stream);
+            let found = check_optimum(&matrix, &target, &[1.0, 1e4, stream.uniform(0.2, 2.0)]);
             kinds = std::array::from_fn(|k| kinds[k] + found[k]);
         }
         assert!(kinds.iter().all(|count| *count > 50), "{kinds:?}");

@@ -1,4 +1,5 @@
-//! Contact detection of a substep.
+//! Finds the contacts of a substep between mallets, puck and *rims* (the walls around the table). A cheap test, the *broad phase*, excludes
+//! most substeps.
 
 use super::contacts::{Contacts, MalletMotion, Pair};
 use crate::{
@@ -18,7 +19,7 @@ use crate::{
 pub struct MalletPose {
     /// Centre of the striking cylinder, m.
     pub centre: [f64; 3],
-    /// Unit vector along the mallet.
+    /// Unit vector along the mallet's axis.
     pub axis: [f64; 3],
 }
 
@@ -28,17 +29,17 @@ pub struct MalletPose {
 pub fn may_touch(centres: &[[f64; 3]], puck: &Puck) -> bool {
     let puck_xy = [puck.pose[0], puck.pose[1]];
     let centre = |robot: usize| table_from_robot(robot, centres[robot]);
-    let mallets = match centres.len() {
+    let both_mallets = match centres.len() {
         2 => contact_finder::mallets_near(centre(0), centre(1)),
         _ => false,
     };
-    let by_mallet =
+    let mallet_and_puck =
         (0..centres.len()).any(|robot| contact_finder::mallet_near_puck(centre(robot), puck_xy));
-    mallets || by_mallet || contact_finder::near_rims(puck_xy)
+    both_mallets || mallet_and_puck || contact_finder::near_rims(puck_xy)
 }
 
-/// Contacts of this substep, `None` if there are none. `motion` returns a robot's joint axes, in its base frame,
-/// and velocities (rad/s).
+/// The contacts of a substep; `None` if there are none. `motion` returns a robot's joint axes, in its base frame,
+/// and its joint velocities (rad/s).
 #[cold]
 pub fn find_contacts(
     mallets: &[MalletPose],
@@ -68,11 +69,12 @@ pub fn find_contacts(
     if !mallets_touch {
         return (!contacts.is_empty()).then_some(contacts);
     }
-    let mallet = |robot: usize, touch: &Touch| {
+    let mallet_motion = |robot: usize, touch: &Touch| {
         let side = side(robot);
         let [x, y, z] = robot_from_table(robot, touch.point);
         let (axes, dq) = motion(robot);
-        let jacobian = axes.map(|axis| axis.at(Vec3::new(x, y, z)));
+        let jacobian = axes.map(|axis| axis.velocity_at(Vec3::new(x, y, z)));
+        // In the table frame.
         let rows: [[f64; DOFS]; 3] = [
             jacobian.map(|column| side * column.x),
             jacobian.map(|column| side * column.y),
@@ -88,24 +90,24 @@ pub fn find_contacts(
         if let Some(touch) = touch {
             let pair = Pair::Mallet {
                 robot,
-                mallet: &mallet(robot, &touch),
-                puck: &puck.velocity,
+                mallet: &mallet_motion(robot, &touch),
+                puck_velocity: &puck.velocity,
             };
             contacts.add(touch, &MALLET, pair);
         }
     }
     if let Some(touch) = between_mallets {
-        let mallets = [&mallet(0, &touch), &mallet(1, &touch)];
+        let mallets = [&mallet_motion(0, &touch), &mallet_motion(1, &touch)];
         contacts.add(touch, &MALLETS, Pair::Mallets { mallets });
     }
     Some(contacts)
 }
 
-/// Contacts of the puck with the rims.
+/// Adds the contacts of the puck with the rims.
 pub fn add_rims(contacts: &mut Contacts, puck: &Puck) {
     contact_finder::rims([puck.pose[0], puck.pose[1]], |touch| {
         let pair = Pair::Rim {
-            puck: &puck.velocity,
+            puck_velocity: &puck.velocity,
         };
         contacts.add(touch, &RIM, pair);
     });

@@ -1,4 +1,8 @@
-//! The contact forces of one substep, solved jointly for all bodies.
+//! The contact forces of one substep, solved jointly for all bodies: puck, mallets and *rims* (the walls around the table).
+//!
+//! Contacts are soft, as in MuJoCo: each wants a relative acceleration that pushes the overlapping bodies apart (*target*), and its
+//! *regularisation* (1/kg) lets it miss that acceleration in proportion to the force. Each contact has three scalar constraints (*rows*):
+//! along its normal and along two tangents. Vectors are in the table frame.
 
 use super::{
     cone::{DIRECTIONS, solve_cone},
@@ -13,12 +17,12 @@ use crate::{
     },
 };
 
-/// Two rims, two mallets on the puck, mallet on mallet.
+/// Largest number of contacts: two rims and two mallets with the puck, and mallet with mallet.
 pub const MAX_CONTACTS: usize = 5;
+/// Largest number of rows: three for each contact.
 const MAX_ROWS: usize = DIRECTIONS * MAX_CONTACTS;
 
-/// How the motion of a mallet's cylinder depends on its arm's joints, table frame: rows for x, y and
-/// z.
+/// Velocity of a point of the mallet's cylinder per velocity of each joint of its arm, m/rad: rows for x, y and z.
 pub type MalletJacobian = [[f64; DOFS]; 3];
 
 /// Motion of a mallet at a contact point.
@@ -26,12 +30,12 @@ pub type MalletJacobian = [[f64; DOFS]; 3];
 pub struct MalletMotion {
     /// The arm's Jacobian; `None` if the mallet's motion is imposed.
     pub jacobian: Option<MalletJacobian>,
-    /// m/s, table frame.
+    /// Velocity of the contact point, m/s.
     pub velocity: [f64; 3],
 }
 
 impl MalletMotion {
-    /// Inverse inertia of an imposed mallet in the contact's equations, 1/kg: the reference solves them with the arm,
+    /// Inverse inertia of an imposed mallet in the contact's equations, 1/kg. The challenge's own simulator solves them with the arm,
     /// although it overwrites the arm's motion.
     fn inverse_inertia(&self) -> f64 {
         if self.jacobian.is_some() {
@@ -42,13 +46,16 @@ impl MalletMotion {
     }
 }
 
-/// One scalar constraint: along a contact's normal or tangent.
+/// One scalar constraint of a contact: along its normal or a tangent.
 #[derive(Debug, Clone, Copy)]
 struct Row {
-    puck: [f64; 3],
-    arms: [Option<[f64; DOFS]>; 2],
+    /// Relative velocity per velocity of the puck along x, y and yaw; without unit, and for yaw m/rad.
+    puck_jacobian: [f64; 3],
+    /// Relative velocity per joint velocity of each arm that takes part, m/rad.
+    arm_jacobians: [Option<[f64; DOFS]>; 2],
     /// Desired relative acceleration, m/s².
     target: f64,
+    /// 1/kg.
     regularisation: f64,
 }
 
@@ -57,22 +64,23 @@ struct Row {
 pub struct Contacts {
     count: usize,
     rows: [Row; MAX_ROWS],
+    /// Friction coefficient of each contact.
     friction: [f64; MAX_CONTACTS],
     /// The bodies that touch the puck, as bits of [`ContactBody`].
     touching: u8,
 }
 
-/// The two bodies of a contact.
+/// The two bodies of a contact. The puck's velocity is in m/s, m/s, rad/s.
 #[derive(Debug, Clone, Copy)]
 pub enum Pair<'a> {
     /// A rim and the puck.
-    Rim { puck: &'a [f64; 3] },
+    Rim { puck_velocity: &'a [f64; 3] },
     /// A mallet and the puck.
     Mallet {
         /// The mallet's robot, 0 or 1.
         robot: usize,
         mallet: &'a MalletMotion,
-        puck: &'a [f64; 3],
+        puck_velocity: &'a [f64; 3],
     },
     /// Robot 1's mallet and robot 2's.
     Mallets {
@@ -84,8 +92,8 @@ pub enum Pair<'a> {
 impl Contacts {
     pub fn none() -> Self {
         let row = Row {
-            puck: [0.0; 3],
-            arms: [None; 2],
+            puck_jacobian: [0.0; 3],
+            arm_jacobians: [None; 2],
             target: 0.0,
             regularisation: 0.0,
         };
@@ -106,71 +114,73 @@ impl Contacts {
         self.touching
     }
 
-    /// The arms in contact.
-    pub fn pushed(&self) -> [bool; 2] {
+    /// For each robot: does its arm take part in a contact?
+    pub fn arms_in_contact(&self) -> [bool; 2] {
         let rows = &self.rows[..DIRECTIONS * self.count];
-        [0, 1].map(|arm| rows.iter().any(|row| row.arms[arm].is_some()))
+        [0, 1].map(|arm| rows.iter().any(|row| row.arm_jacobians[arm].is_some()))
     }
 
-    /// Force on the puck (N, N, N m) of contacts that push no arm, at a given acceleration without
-    /// contact.
+    /// Force on the puck (N, N, N m) of contacts in which no arm takes part, given the puck's acceleration without
+    /// contact (m/s², m/s², rad/s²).
     pub fn solve_puck(&self, puck_acceleration: &[f64; 3]) -> [f64; 3] {
         self.solve(puck_acceleration, &[[0.0; DOFS]; 2], |_, torque| *torque)
             .puck
     }
 
-    /// Adds a contact, the touch's normal pointing into the pair's second body.
+    /// Adds a contact. The normal of `touch` points into the second body of `pair`.
     pub fn add(&mut self, touch: Touch, material: &Material, pair: Pair<'_>) {
         let n = touch.normal;
         let impedance = material.impedance(touch.depth_m);
         let regularisation = Material::softness(impedance) * material.inverse_inertia;
+        // Part of the target that comes from the depth, m/s².
         let push = material.stiffness_per_s2 * impedance * touch.depth_m;
-        // MODEL leaves two choices open; these match the recordings. The force acts inside the overlap, which is
+        // Two choices match the recordings of the challenge's own simulator. The force acts inside the overlap, which is
         // millimetres deep. And there is an upright tangent: the puck does not move along z, but its friction
-        // brakes a mallet that does, and shares the cone with the horizontal tangent.
-        let across = 1.0 / (n[0] * n[0] + n[1] * n[1]).sqrt();
-        let horizontal = [-n[1] * across, n[0] * across, 0.0];
+        // brakes a mallet that does, and shares the friction cone with the horizontal tangent.
+        let scale = 1.0 / (n[0] * n[0] + n[1] * n[1]).sqrt();
+        let horizontal = [-n[1] * scale, n[0] * scale, 0.0];
         let upward = [
             -n[2] * horizontal[1],
             n[2] * horizontal[0],
             n[0] * horizontal[1] - n[1] * horizontal[0],
         ];
-        let spin_arm = -touch.lever_m;
-        for (k, (direction, spin_arm, push)) in [
+        // Tangential velocity per yaw rate of the second body, m/rad.
+        let spin_lever = -touch.lever_m;
+        for (k, (direction, spin_lever, push)) in [
             (n, 0.0, push),
-            (horizontal, spin_arm, 0.0),
+            (horizontal, spin_lever, 0.0),
             (upward, 0.0, 0.0),
         ]
         .into_iter()
         .enumerate()
         {
-            let along_joints = |sign: f64, mallet: &MalletMotion| {
+            let arm_jacobian = |sign: f64, mallet: &MalletMotion| {
                 mallet.jacobian.map(|j| {
                     std::array::from_fn(|i| sign * dot(&direction, &[j[0][i], j[1][i], j[2][i]]))
                 })
             };
             let mut row = Row {
-                puck: [0.0; 3],
-                arms: [None; 2],
+                puck_jacobian: [0.0; 3],
+                arm_jacobians: [None; 2],
                 target: 0.0,
                 regularisation,
             };
             let mut velocity = 0.0;
-            if let Pair::Rim { puck } | Pair::Mallet { puck, .. } = pair {
-                row.puck = [direction[0], direction[1], spin_arm];
-                velocity += dot(&row.puck, puck);
+            if let Pair::Rim { puck_velocity } | Pair::Mallet { puck_velocity, .. } = pair {
+                row.puck_jacobian = [direction[0], direction[1], spin_lever];
+                velocity += dot(&row.puck_jacobian, puck_velocity);
             }
             match pair {
                 Pair::Rim { .. } => {}
                 Pair::Mallet { robot, mallet, .. } => {
-                    row.arms[robot] = along_joints(-1.0, mallet);
+                    row.arm_jacobians[robot] = arm_jacobian(-1.0, mallet);
                     row.regularisation += mallet.inverse_inertia();
                     velocity -= dot(&direction, &mallet.velocity);
                 }
                 Pair::Mallets { mallets } => {
                     for (robot, (mallet, sign)) in mallets.into_iter().zip([-1.0, 1.0]).enumerate()
                     {
-                        row.arms[robot] = along_joints(sign, mallet);
+                        row.arm_jacobians[robot] = arm_jacobian(sign, mallet);
                         velocity += sign * dot(&direction, &mallet.velocity);
                     }
                 }
@@ -189,8 +199,8 @@ impl Contacts {
         self.count += 1;
     }
 
-    /// Contact forces at given accelerations without contact. `respond` solves an arm's equations of
-    /// motion for a joint torque. Returns the torques on the arms and the force on the puck.
+    /// The contact forces, given the accelerations without contact. `respond` returns the joint accelerations that joint torques give to
+    /// an arm (0 or 1).
     pub fn solve(
         &self,
         puck_acceleration: &[f64; 3],
@@ -199,43 +209,46 @@ impl Contacts {
     ) -> ContactForces {
         let n = DIRECTIONS * self.count;
         let rows = &self.rows[..n];
+        // Relative acceleration along each row per force along each row, 1/kg.
         let mut matrix = [[0.0; MAX_ROWS]; MAX_ROWS];
         let mut target = [0.0; MAX_ROWS];
         for (r, row) in rows.iter().enumerate() {
             let responses: [Option<[f64; DOFS]>; 2] =
-                std::array::from_fn(|arm| row.arms[arm].map(|j| respond(arm, &j)));
-            target[r] = row.target - dot(&row.puck, puck_acceleration);
+                std::array::from_fn(|arm| row.arm_jacobians[arm].map(|j| respond(arm, &j)));
+            target[r] = row.target - dot(&row.puck_jacobian, puck_acceleration);
             for arm in 0..2 {
-                if let Some(jacobian) = &row.arms[arm] {
+                if let Some(jacobian) = &row.arm_jacobians[arm] {
                     target[r] -= dot(jacobian, &arm_acceleration[arm]);
                 }
             }
             for (s, other) in rows.iter().enumerate() {
-                let mut a: f64 = (0..3)
-                    .map(|i| row.puck[i] * INVERSE_INERTIA[i] * other.puck[i])
+                let mut response_to_force: f64 = (0..3)
+                    .map(|i| row.puck_jacobian[i] * INVERSE_INERTIA[i] * other.puck_jacobian[i])
                     .sum();
                 for arm in 0..2 {
-                    if let (Some(response), Some(jacobian)) = (&responses[arm], &other.arms[arm]) {
-                        a += dot(response, jacobian);
+                    if let (Some(response), Some(jacobian)) =
+                        (&responses[arm], &other.arm_jacobians[arm])
+                    {
+                        response_to_force += dot(response, jacobian);
                     }
                 }
-                matrix[s][r] = a;
+                matrix[s][r] = response_to_force;
             }
             matrix[r][r] += row.regularisation;
         }
         let force = solve_cone(&matrix, &target, &self.friction[..self.count]);
         let mut forces = ContactForces {
             puck: [0.0; 3],
-            arms: [[0.0; DOFS]; 2],
+            arm_torques: [[0.0; DOFS]; 2],
         };
         for (r, row) in rows.iter().enumerate() {
             for i in 0..3 {
-                forces.puck[i] += row.puck[i] * force[r];
+                forces.puck[i] += row.puck_jacobian[i] * force[r];
             }
             for arm in 0..2 {
-                if let Some(jacobian) = &row.arms[arm] {
+                if let Some(jacobian) = &row.arm_jacobians[arm] {
                     for i in 0..DOFS {
-                        forces.arms[arm][i] += jacobian[i] * force[r];
+                        forces.arm_torques[arm][i] += jacobian[i] * force[r];
                     }
                 }
             }
@@ -247,10 +260,10 @@ impl Contacts {
 /// Forces of the contacts on puck and arms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactForces {
-    /// N, N, N m, table frame.
+    /// Force and torque on the puck: N, N, N m.
     pub puck: [f64; 3],
-    /// Joint torques, N m.
-    pub arms: [[f64; DOFS]; 2],
+    /// Joint torques on each arm, N m.
+    pub arm_torques: [[f64; DOFS]; 2],
 }
 
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {

@@ -1,17 +1,18 @@
-//! Divergence: a world that would leave its bounds stops.
+//! *Divergence*: a world whose state would leave the bounds of the simulation stops.
 
 use super::{Divergence, Runaway, World, bounds::is_runaway};
 
 impl World {
-    /// Checks a state outside the ordinary range: records the robots at fault, and returns what is out of bounds.
+    /// Checks a state outside the ordinary range: records the robots whose joints turn too fast, and returns the part of the world that is
+    /// out of bounds, if any.
     #[cold]
     pub(super) fn find_runaway(&mut self) -> Option<Runaway> {
         self.record_runaway(|_, arm| is_runaway(arm));
-        let beyond = |(robot, arm)| {
+        let joint_out_of_bounds = |(robot, arm)| {
             let joint = self.bounds.joint_out_of_bounds(arm)?;
             Some(Runaway::Joint { robot, joint })
         };
-        let joint = self.arms.iter().enumerate().find_map(beyond);
+        let joint = self.arms.iter().enumerate().find_map(joint_out_of_bounds);
         joint.or_else(|| {
             self.bounds
                 .is_puck_out_of_bounds(&self.puck)
@@ -19,12 +20,16 @@ impl World {
         })
     }
 
-    /// Stops the world for good.
+    /// Stops the world for good. At fault are the robots that first ran away; without any, the robot whose joint is out of bounds, or the
+    /// robots that last had contact.
     pub(super) fn diverge(&mut self, cause: Runaway) {
-        let by = self.runaway.unwrap_or_else(|| match cause {
-            Runaway::Joint { robot, .. } => [0, 1].map(|a| a == robot),
-            Runaway::Puck => self.pushed,
+        let robots_at_fault = self.runaway_robots.unwrap_or_else(|| match cause {
+            Runaway::Joint { robot, .. } => [0, 1].map(|index| index == robot),
+            Runaway::Puck => self.last_contact_robots,
         });
-        self.divergence = Some(Divergence { by, cause });
+        self.divergence = Some(Divergence {
+            robots_at_fault,
+            cause,
+        });
     }
 }

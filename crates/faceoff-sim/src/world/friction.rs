@@ -1,7 +1,10 @@
-//! Dry friction of the joints of several arms without a joint at its stop: the ordinary case of `joints.rs`, with
-//! the same operations in lanes.
+//! Dry friction of the joints of several arms, without a joint at its *stop* (the end of its range): the ordinary case of `joints.rs`,
+//! with the same operations in SIMD lanes, one arm in each.
+//!
+//! The torque of a dry friction (N m) is `stiffness · (target − acceleration)`, limited to ±bound. The *target* is the acceleration that
+//! would stop the joint softly (rad/s²), the *stiffness* is in kg m². A *bound set* says which frictions are at a bound.
 
-use super::joints::{Friction, JointConstraints};
+use super::joints::{FrictionState, JointConstraints};
 use crate::{
     dynamics::lanes::{Lanes, gather, row},
     model::{DOFS, JOINTS},
@@ -11,19 +14,22 @@ use crate::{
 /// Dry friction of several arms.
 #[derive(Debug, Clone, Copy)]
 pub struct FrictionLanes<T: Lanes> {
+    /// kg m².
     stiffness: [T; JOINTS],
+    /// Largest torque ±, N m.
     bound: [T; JOINTS],
+    /// Desired acceleration, rad/s².
     target: [T; JOINTS],
-    /// Masks of the arms whose friction is at its upper and at its lower bound.
+    /// For each joint, masks of the arms whose friction is at its upper and at its lower bound.
     at_upper: [T::Mask; JOINTS],
     at_lower: [T::Mask; JOINTS],
 }
 
-/// The sets of frictions at their bounds.
+/// The bound set of each arm: for each joint, masks of the arms whose friction is at its upper and at its lower bound.
 pub struct BoundSets<T: Lanes> {
     at_upper: [T::Mask; JOINTS],
     at_lower: [T::Mask; JOINTS],
-    /// The arms whose set has changed, as [`Lanes::bits`].
+    /// The lanes of the arms whose set differs from the stored one, as [`Lanes::bits`].
     pub changed: u32,
 }
 
@@ -31,7 +37,7 @@ impl<T: Lanes> FrictionLanes<T> {
     /// Collects the frictions of several arms.
     #[inline(always)]
     pub fn gather<'a>(constraints: impl Fn(usize) -> &'a JointConstraints) -> Self {
-        let mask_of = |state: Friction| {
+        let mask_of = |state: FrictionState| {
             std::array::from_fn(|i| {
                 let bit = |lane: usize| u32::from(constraints(lane).friction[i] == state) << lane;
                 T::mask((0..T::COUNT).map(bit).sum())
@@ -41,27 +47,27 @@ impl<T: Lanes> FrictionLanes<T> {
             stiffness: gather(|lane| &constraints(lane).friction_stiffness),
             bound: gather(|lane| &constraints(lane).friction_bound),
             target: gather(|lane| &constraints(lane).friction_target),
-            at_upper: mask_of(Friction::AtUpper),
-            at_lower: mask_of(Friction::AtLower),
+            at_upper: mask_of(FrictionState::AtUpper),
+            at_lower: mask_of(FrictionState::AtLower),
         }
     }
 
-    /// Writes one lane to an arm's constraints.
+    /// Writes targets and bound set of one lane to its arm's constraints.
     pub fn store(&self, lane: usize, constraints: &mut JointConstraints) {
         let contains = |mask: T::Mask| T::bits(mask) >> lane & 1 == 1;
         constraints.friction = std::array::from_fn(|i| {
             if contains(self.at_upper[i]) {
-                Friction::AtUpper
+                FrictionState::AtUpper
             } else if contains(self.at_lower[i]) {
-                Friction::AtLower
+                FrictionState::AtLower
             } else {
-                Friction::Inside
+                FrictionState::Inside
             }
         });
         constraints.friction_target = row(&self.target, lane);
     }
 
-    /// Loads the set of bounds that was found for one arm.
+    /// Reads the bound set of one lane from its arm's constraints.
     #[cold]
     pub fn load(&mut self, lane: usize, constraints: &JointConstraints) {
         let replace = |mask: &mut T::Mask, yes: bool| {
@@ -71,16 +77,16 @@ impl<T: Lanes> FrictionLanes<T> {
         for i in 0..JOINTS {
             replace(
                 &mut self.at_upper[i],
-                constraints.friction[i] == Friction::AtUpper,
+                constraints.friction[i] == FrictionState::AtUpper,
             );
             replace(
                 &mut self.at_lower[i],
-                constraints.friction[i] == Friction::AtLower,
+                constraints.friction[i] == FrictionState::AtLower,
             );
         }
     }
 
-    /// Sets up a substep from velocities (rad/s).
+    /// Sets the targets of a substep from joint velocities (rad/s).
     #[inline(always)]
     pub fn prepare(&mut self, dq: &[T; DOFS]) {
         for i in 0..JOINTS {
@@ -88,8 +94,8 @@ impl<T: Lanes> FrictionLanes<T> {
         }
     }
 
-    /// Contributions of the frictions within their bounds to the inertia's diagonal, and of all frictions to the load:
-    /// `(M + diag) a = load`.
+    /// The contributions of the frictions to the equations `(M + diagonal) · acceleration = load`: those within their bounds to the
+    /// diagonal (kg m²), and all to the load (N m). M is the joint-space inertia.
     #[inline(always)]
     pub fn assemble(&self) -> ([T; JOINTS], [T; JOINTS]) {
         let zero = T::splat(0.0);
@@ -104,7 +110,7 @@ impl<T: Lanes> FrictionLanes<T> {
         (diagonal, load)
     }
 
-    /// The frictions at their bounds at these accelerations.
+    /// The bound sets at these accelerations (rad/s²).
     #[inline(always)]
     pub fn classify(&self, acceleration: &[T; DOFS]) -> BoundSets<T> {
         let (mut at_upper, mut at_lower) = (self.at_upper, self.at_lower);
@@ -123,14 +129,14 @@ impl<T: Lanes> FrictionLanes<T> {
         }
     }
 
-    /// Adopts a set.
+    /// Stores the bound sets.
     #[inline(always)]
-    pub fn accept(&mut self, set: &BoundSets<T>) {
-        self.at_upper = set.at_upper;
-        self.at_lower = set.at_lower;
+    pub fn store_bound_sets(&mut self, sets: &BoundSets<T>) {
+        self.at_upper = sets.at_upper;
+        self.at_lower = sets.at_lower;
     }
 
-    /// The torques at the solution's accelerations, N m.
+    /// The torques of the frictions at accelerations (rad/s²), N m.
     #[inline(always)]
     pub fn torques(&self, acceleration: &[T; DOFS]) -> [T; JOINTS] {
         std::array::from_fn(|i| {

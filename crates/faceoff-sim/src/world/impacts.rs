@@ -1,13 +1,14 @@
-//! Impacts of the puck within a control step, for records only: the physics does not depend on them.
+//! *Impacts*: the starts of the puck's contacts within a control step (20 substeps of 1 ms). They serve recordings only; the physics does
+//! not depend on them.
 
 use crate::{model::SUBSTEP_S, table::puck::Puck};
 
 /// A body that the puck touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ContactBody {
-    /// A rim along the table.
+    /// A rim (wall) along a long side of the table.
     LongRim,
-    /// A rim beside a goal, or a goal post.
+    /// A rim beside a goal, including its rounded end, the goal post.
     ShortRim,
     /// A robot's mallet: 0 or 1.
     Mallet(u8),
@@ -21,7 +22,7 @@ impl ContactBody {
         Self::Mallet(1),
     ];
 
-    /// Its bit in a set of bodies.
+    /// The body's bit in a set of bodies.
     pub(super) const fn bit(self) -> u8 {
         match self {
             Self::LongRim => 1,
@@ -35,10 +36,10 @@ impl ContactBody {
 /// The start of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impact {
-    /// The substep of the control step at whose start the bodies overlap, from 0.
+    /// Index within the control step, from 0, of the first substep at whose start the bodies overlap.
     pub substep: u8,
     pub body: ContactBody,
-    /// The puck's centre at that time, m, table frame.
+    /// The puck's centre at the start of that substep, m, table frame.
     pub puck: [f64; 2],
 }
 
@@ -56,7 +57,7 @@ const CAPACITY: usize = 6;
 /// The contacts of the puck that began in a control step, in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impacts {
-    /// The bodies that touch the puck, as bits.
+    /// The bodies that touch the puck now, as [`ContactBody::bit`]s.
     touching: u8,
     count: usize,
     impacts: [Impact; CAPACITY],
@@ -117,12 +118,14 @@ impl Impacts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Plant, World};
+    use crate::{Plant, World, model::CONTROL_STEP_S};
 
     #[test]
     fn bounce_is_recorded_once_with_time_and_position() {
-        // 1.4 m/s towards the long rim, which it touches in the second control step.
-        let mut world = World::new(&Plant::nominal(), &[], [0.2, 0.44, 0.0, 0.0, 1.4, 0.0]);
+        // The puck moves towards the long rim, which it touches in the second control step.
+        let (start_y_m, speed_m_s) = (0.44, 1.4);
+        let puck = [0.2, start_y_m, 0.0, 0.0, speed_m_s, 0.0];
+        let mut world = World::new(&Plant::nominal(), &[], puck);
         let mut recorded = Vec::new();
         for step in 0..10 {
             let before = world.puck().pose[1];
@@ -137,11 +140,11 @@ mod tests {
         };
         assert_eq!(impact.body, ContactBody::LongRim);
         assert!(world.puck().velocity[1] < 0.0, "the puck moves back");
-        let free_m = crate::table::geometry::TABLE.half_width_m()
+        let free_path_m = crate::table::geometry::TABLE.half_width_m()
             - crate::table::geometry::PUCK.radius_m
-            - 0.44;
-        let time_s = f64::from(step) * 0.02 + impact.after_s();
-        let expected_s = free_m / 1.4;
+            - start_y_m;
+        let time_s = f64::from(step) * CONTROL_STEP_S + impact.after_s();
+        let expected_s = free_path_m / speed_m_s;
         assert!(
             (time_s - expected_s).abs() < 0.003,
             "impact after {time_s} s, expected {expected_s} s"

@@ -1,14 +1,14 @@
-//! Assignment of worlds and their arms to lanes.
+//! Assignment of worlds and their arms to *lanes*, the number slots of a SIMD register: each arm has a lane.
 
 use super::World;
 
-/// A world that is stepped together with others.
+/// A world that is stepped together with others. `A` is the function that returns its air force.
 #[derive(Debug)]
 pub struct LaneWorld<'a, A> {
     pub world: &'a mut World,
-    /// Returns the force of the air on its puck, N, before each substep.
+    /// Returns the force of the air flow on the world's puck, N; called before each substep.
     pub air_force: A,
-    /// The lane of its first arm; the second arm has the next lane.
+    /// The lane of the world's first arm; the second arm has the next lane.
     pub first_lane: usize,
     /// False once the world has diverged.
     pub is_moving: bool,
@@ -17,17 +17,17 @@ pub struct LaneWorld<'a, A> {
 }
 
 impl<'a, A> LaneWorld<'a, A> {
-    pub fn new(world: &'a mut World, air: A, first_lane: usize) -> Self {
+    pub fn new(world: &'a mut World, air_force: A, first_lane: usize) -> Self {
         Self {
             world,
-            air_force: air,
+            air_force,
             first_lane,
             is_moving: true,
             puck_force: None,
         }
     }
 
-    /// The lanes of its arms, as bits.
+    /// The lanes of the world's arms, as bits.
     #[inline(always)]
     pub fn lanes(&self) -> u32 {
         ((1 << self.world.arms.len()) - 1) << self.first_lane

@@ -1,4 +1,7 @@
-//! The physical world: a puck and up to two arms.
+//! The physical world: a puck and up to two arms on a table, stepped one *substep* (1 ms) at a time.
+//!
+//! Robots are 0 and 1 in the code and stand opposite each other; texts call them robot 1 and robot 2. The *table frame* has its origin in
+//! the table's centre, x towards robot 2, z up; each robot also has its own *base frame*.
 
 mod arm;
 mod arm_lanes;
@@ -40,30 +43,31 @@ pub struct MalletState {
     pub velocity: [f64; 2],
 }
 
-/// Puck and arms, advanced by one millisecond at a time. Clone saves a world exactly.
+/// Puck and arms. A clone continues with the same bits.
 #[derive(Debug, Clone)]
 pub struct World {
     plant: Plant,
     arms: Vec<Arm>,
     puck: Puck,
     puck_damping: Damping,
-    /// Robot 1's mallet, if its motion is imposed.
-    imposed: Option<MalletState>,
-    /// Force of the air on the puck, N.
+    /// State of robot 1's mallet, if its motion is given by the caller instead of computed.
+    imposed_mallet: Option<MalletState>,
+    /// Force of the air flow on the puck along x and y, N.
     air_n: [f64; 2],
     /// Index of the next substep within the control step.
     substep: usize,
     bounds: Bounds,
-    /// The robots that first commanded or moved beyond what a robot can do.
-    runaway: Option<[bool; 2]>,
-    /// The robots in the latest contact with an arm.
-    pushed: [bool; 2],
+    /// The robots that first commanded or moved beyond what a robot can do; `None` while there is none.
+    runaway_robots: Option<[bool; 2]>,
+    /// The robots whose arms took part in the latest contact of any arm.
+    last_contact_robots: [bool; 2],
+    /// Set once the world would have left its bounds.
     divergence: Option<Divergence>,
     impacts: Impacts,
 }
 
 impl World {
-    /// A world of one arm per initial joint position (at most two), all at rest, and a puck at
+    /// A world with an arm at rest for each item of `joints` (initial joint positions, rad; at most two items), and a puck in the state
     /// [x, y, yaw, vx, vy, yaw rate] in the table frame.
     #[must_use]
     pub fn new(plant: &Plant, joints: &[[f64; JOINTS]], puck: [f64; 6]) -> Self {
@@ -74,23 +78,23 @@ impl World {
             arms: joints.iter().take(2).map(|q| Arm::new(plant, q)).collect(),
             puck: Puck::from_state(puck),
             puck_damping: Damping::NOMINAL,
-            imposed: None,
+            imposed_mallet: None,
             air_n: [0.0; 2],
             substep: 0,
             bounds: Bounds::of(Ruleset::CURRENT),
-            runaway: None,
-            pushed: [false; 2],
+            runaway_robots: None,
+            last_contact_robots: [false; 2],
             divergence: None,
             impacts: Impacts::default(),
         }
     }
 
-    /// Replaces the bounds of what is simulated.
+    /// Replaces the bounds beyond which the world counts as diverged.
     pub fn set_bounds(&mut self, bounds: Bounds) {
         self.bounds = bounds;
     }
 
-    /// Set once the world would have left its bounds. It then stays in its last state within them: all its numbers
+    /// `Some` once the world would have left its bounds. It then stays in its last state within them, so all its numbers
     /// are finite.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
@@ -107,26 +111,26 @@ impl World {
     /// [`Interpolation::len`].
     pub fn command(&mut self, robot: usize, interpolation: Interpolation, action: &[f64]) {
         self.arms[robot].command(interpolation, action);
-        if !self.arms[robot].is_commanded_finitely() {
-            self.record_runaway(|a, _| a == robot);
+        if !self.arms[robot].is_trajectory_finite() {
+            self.record_runaway(|index, _| index == robot);
         }
     }
 
-    /// Records the robots for which a test is true, unless others were recorded earlier.
+    /// Records the robots for which `is_runaway` is true, unless others were recorded earlier.
     fn record_runaway(&mut self, is_runaway: impl Fn(usize, &Arm) -> bool) {
         let mut found = [false; 2];
-        for (a, arm) in self.arms.iter().enumerate() {
-            found[a] = is_runaway(a, arm);
+        for (robot, arm) in self.arms.iter().enumerate() {
+            found[robot] = is_runaway(robot, arm);
         }
         if found != [false; 2] {
-            self.runaway.get_or_insert(found);
+            self.runaway_robots.get_or_insert(found);
         }
     }
 
-    /// Imposes the motion of robot 1's mallet from now on, or frees it. With an imposed mallet
+    /// Imposes the motion of robot 1's mallet from now on, or lets its arm move it again (`None`). With an imposed mallet
     /// robot 1's arm stays where it is.
     pub fn impose_mallet(&mut self, mallet: Option<MalletState>) {
-        self.imposed = mallet;
+        self.imposed_mallet = mallet;
     }
 
     /// Sets the force of the air on the puck, N.
@@ -140,7 +144,7 @@ impl World {
         self.arms.len()
     }
 
-    /// The puck: [x, y, yaw, vx, vy, yaw rate], table frame.
+    /// The puck's state, in the table frame.
     #[must_use]
     pub fn puck(&self) -> &Puck {
         &self.puck
@@ -170,14 +174,14 @@ impl World {
         &self.arms[robot].dq_filtered
     }
 
-    /// Angles of a robot's universal joint, rad.
+    /// Angles of a robot's universal joint (the two hinges of its mallet), rad.
     #[must_use]
     pub fn universal(&self, robot: usize) -> [f64; 2] {
         let q = &self.arms[robot].q;
         [q[7], q[8]]
     }
 
-    /// Torques applied in the last substep, N m.
+    /// Torques of a robot's drives in the last substep, N m.
     #[must_use]
     pub fn torques(&self, robot: usize) -> &[f64; JOINTS] {
         &self.arms[robot].torque
@@ -189,16 +193,17 @@ impl World {
         Kinematics::new(&self.arms[robot].q)
     }
 
-    /// A robot's end effector before the last substep, m, its own base frame: what the reference's
-    /// observation of the opponent shows.
+    /// Position of a robot's end effector before the last substep, m, in its own base frame. The observation of the opponent shows it,
+    /// as in the challenge's own simulator.
     #[must_use]
     pub fn end_effector_before(&self, robot: usize) -> [f64; 3] {
         self.arms[robot].ee_before
     }
 
+    /// The state of a robot's mallet.
     #[must_use]
     pub fn mallet(&self, robot: usize) -> MalletState {
-        if let (0, Some(mallet)) = (robot, self.imposed) {
+        if let (0, Some(mallet)) = (robot, self.imposed_mallet) {
             return mallet;
         }
         let kinematics = self.kinematics(robot);
@@ -228,12 +233,13 @@ impl World {
         self.arms[robot].coast();
     }
 
-    /// Replaces the decay rate of the puck's velocity, 1/s; its spin is damped as before.
-    pub fn set_puck_damping(&mut self, per_s: f64) {
-        self.puck_damping = Damping::per_s(per_s);
+    /// Replaces the decay rate of the puck's linear velocity, 1/s; its spin is damped as before.
+    pub fn set_puck_damping(&mut self, rate_per_s: f64) {
+        self.puck_damping = Damping::with_decay_rate(rate_per_s);
     }
 }
 
+/// The first seven numbers: those of the driven joints.
 fn head(q: &[f64; DOFS]) -> [f64; JOINTS] {
     std::array::from_fn(|i| q[i])
 }

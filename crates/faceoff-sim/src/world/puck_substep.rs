@@ -1,4 +1,4 @@
-//! Substeps of the puck in a world without arms, or with a mallet whose motion is imposed.
+//! Substeps (1 ms) of the puck in a world without arms, or in one with an *imposed* mallet, whose motion the caller gives.
 
 use super::{
     World,
@@ -20,11 +20,11 @@ impl World {
         self.advance_puck(force);
     }
 
-    /// One substep with an imposed mallet.
-    pub(super) fn substep_imposed(&mut self) {
+    /// One substep of the puck with an imposed mallet.
+    pub(super) fn advance_puck_with_imposed_mallet(&mut self) {
         let mut contacts = Contacts::none();
         add_rims(&mut contacts, &self.puck);
-        if let Some(mallet) = self.imposed {
+        if let Some(mallet) = self.imposed_mallet {
             let cylinder = MalletCylinder::upright(mallet.position);
             let puck = [self.puck.pose[0], self.puck.pose[1]];
             if let Some(touch) = contact_finder::mallet_and_puck(&cylinder, puck) {
@@ -38,7 +38,7 @@ impl World {
                     Pair::Mallet {
                         robot: 0,
                         mallet: &motion,
-                        puck: &self.puck.velocity,
+                        puck_velocity: &self.puck.velocity,
                     },
                 );
             }
@@ -51,13 +51,13 @@ impl World {
         self.advance_puck(force);
     }
 
-    /// Moves the puck under air, damping and contacts (N, N, N m).
+    /// Moves the puck by one substep under the air's force, damping and the force of contacts (N, N, N m).
     #[inline(always)]
-    pub(super) fn advance_puck(&mut self, contact: Option<[f64; 3]>) {
+    pub(super) fn advance_puck(&mut self, contact_force: Option<[f64; 3]>) {
         let mut force = [self.air_n[0], self.air_n[1], 0.0];
-        if let Some(contact) = contact {
+        if let Some(contact_force) = contact_force {
             for i in 0..3 {
-                force[i] += contact[i];
+                force[i] += contact_force[i];
             }
         }
         self.puck.advance(&self.puck_damping, force);

@@ -1,4 +1,5 @@
-//! Arms that are solved one by one, outside of the lanes: arms in contact, and arms with a joint at its stop.
+//! *Scalar arms*: arms that are solved one by one instead of together with others in SIMD lanes. These are arms in contact, and arms with a
+//! joint at its stop (the end of its range).
 
 use super::{
     arm_lanes::ArmLanes,
@@ -20,9 +21,9 @@ use crate::{
 #[derive(Debug)]
 pub struct ArmDynamics<T> {
     pub kinematics: Kinematics<T>,
-    /// The plants' inertias, kg m².
+    /// Joint-space inertias of the arms, kg m².
     pub mass: Mass<T>,
-    /// Torques of the controllers minus bias and damping, N m.
+    /// Torques of the controllers minus bias (gravity, centrifugal and Coriolis torques) and damping, N m.
     pub load: [T; DOFS],
 }
 
@@ -36,13 +37,13 @@ impl<T: Lanes> ArmDynamics<T> {
     }
 }
 
-/// Solutions of the arms that were solved one by one.
+/// Solutions of the scalar arms, by lane.
 #[derive(Debug)]
 pub struct ScalarSolutions {
-    /// The lanes of these arms, as bits.
+    /// The lanes of the scalar arms, as bits.
     pub lanes: u32,
     /// The lanes of the arms in contact, as bits.
-    pushed: u32,
+    lanes_in_contact: u32,
     solutions: [ArmSolution; MAX_LANES],
 }
 
@@ -51,21 +52,21 @@ struct ArmSolution {
     /// rad/s².
     acceleration: [f64; DOFS],
     /// Torques of the contacts, N m.
-    contact: [f64; DOFS],
+    contact_torque: [f64; DOFS],
     /// Torques of dry friction and stops, N m.
-    constraint: [f64; DOFS],
+    constraint_torque: [f64; DOFS],
 }
 
 impl ScalarSolutions {
     pub fn empty() -> Self {
         let zero = ArmSolution {
             acceleration: [0.0; DOFS],
-            contact: [0.0; DOFS],
-            constraint: [0.0; DOFS],
+            contact_torque: [0.0; DOFS],
+            constraint_torque: [0.0; DOFS],
         };
         Self {
             lanes: 0,
-            pushed: 0,
+            lanes_in_contact: 0,
             solutions: [zero; MAX_LANES],
         }
     }
@@ -74,10 +75,11 @@ impl ScalarSolutions {
     #[inline(always)]
     pub fn clear(&mut self) {
         self.lanes = 0;
-        self.pushed = 0;
+        self.lanes_in_contact = 0;
     }
 
-    /// Writes the solutions into their lanes.
+    /// Writes the solutions into their lanes: accelerations, torques of the constraints, and torques of contacts, which are added to the
+    /// load.
     #[cold]
     #[inline(never)]
     pub fn insert<T: Lanes>(
@@ -90,12 +92,12 @@ impl ScalarSolutions {
             let contains = |lanes: u32| lanes >> lane & 1 == 1;
             if contains(self.lanes) {
                 set_row(acceleration, lane, &solved.acceleration);
-                set_row(constraint, lane, &solved.constraint);
+                set_row(constraint, lane, &solved.constraint_torque);
             }
-            if contains(self.pushed) {
+            if contains(self.lanes_in_contact) {
                 let mut torques = row(load, lane);
                 for i in 0..DOFS {
-                    torques[i] += solved.contact[i];
+                    torques[i] += solved.contact_torque[i];
                 }
                 set_row(load, lane, &torques);
             }
@@ -103,7 +105,8 @@ impl ScalarSolutions {
     }
 }
 
-/// Solves one world's contacts, if it has any. `centres` are the centres of its mallets, m, the robots' base frames.
+/// Solves one world's contacts, if it has any, and with them its arms. `centres` are the centres of its mallets, m, each in its robot's
+/// base frame.
 #[cold]
 #[inline(never)]
 pub fn solve_contacts<T: Lanes, A>(
@@ -141,15 +144,15 @@ pub fn solve_contacts<T: Lanes, A>(
     let Some(contacts) = contacts else {
         return;
     };
-    let free = world
+    let free_acceleration = world
         .puck
         .free_acceleration(&world.puck_damping, world.air_n);
-    let pushed = contacts.pushed();
-    if pushed == [false; 2] {
-        lane_world.puck_force = Some(contacts.solve_puck(&free));
+    let robots_in_contact = contacts.arms_in_contact();
+    if robots_in_contact == [false; 2] {
+        lane_world.puck_force = Some(contacts.solve_puck(&free_acceleration));
         return;
     }
-    world.pushed = pushed;
+    world.last_contact_robots = robots_in_contact;
     for (robot, arm) in world.arms.iter_mut().enumerate() {
         let lane = lane_of(robot);
         arms.friction.store(lane, &mut arm.constraints);
@@ -158,29 +161,29 @@ pub fn solve_contacts<T: Lanes, A>(
     }
     let problems = [0, 1].map(|robot| dynamics.problem(lane_of(robot)));
     let (accelerations, forces) =
-        accelerations_in_contact(&mut world.arms, &problems, &contacts, &free);
+        accelerations_in_contact(&mut world.arms, &problems, &contacts, &free_acceleration);
     for (robot, arm) in world.arms.iter().enumerate() {
         let lane = lane_of(robot);
         scalar.lanes |= 1 << lane;
-        scalar.pushed |= 1 << lane;
+        scalar.lanes_in_contact |= 1 << lane;
         scalar.solutions[lane] = ArmSolution {
             acceleration: accelerations[robot],
-            contact: forces.arms[robot],
-            constraint: arm.constraints.torques(&accelerations[robot]),
+            contact_torque: forces.arm_torques[robot],
+            constraint_torque: arm.constraints.torques(&accelerations[robot]),
         };
     }
     lane_world.puck_force = Some(forces.puck);
 }
 
-/// Solves the arms of a world that have, or had in the previous substep, a joint at its stop. `beyond` has the
-/// bits of the lanes with a joint beyond its stop.
+/// Solves the arms of a world that have, or had in the previous substep, a joint beyond its stop. `beyond_stop` has the
+/// bits of the lanes that have one now.
 #[cold]
 #[inline(never)]
 pub fn solve_stops<T: Lanes, A>(
     arms: &ArmLanes<T>,
     lane_world: &mut LaneWorld<'_, A>,
     dynamics: &ArmDynamics<T>,
-    beyond: u32,
+    beyond_stop: u32,
     scalar: &mut ScalarSolutions,
 ) {
     let world = &mut *lane_world.world;
@@ -188,7 +191,7 @@ pub fn solve_stops<T: Lanes, A>(
         let lane = lane_world.first_lane + robot;
         let contains = |lanes: u32| lanes >> lane & 1 == 1;
         let constraints = &mut arm.constraints;
-        if contains(scalar.lanes) || !(contains(beyond) || constraints.any_stop()) {
+        if contains(scalar.lanes) || !(contains(beyond_stop) || constraints.was_at_stop()) {
             continue;
         }
         arms.friction.store(lane, constraints);
@@ -198,8 +201,8 @@ pub fn solve_stops<T: Lanes, A>(
         scalar.lanes |= 1 << lane;
         scalar.solutions[lane] = ArmSolution {
             acceleration,
-            contact: [0.0; DOFS],
-            constraint: constraints.torques(&acceleration),
+            contact_torque: [0.0; DOFS],
+            constraint_torque: constraints.torques(&acceleration),
         };
     }
 }

@@ -1,9 +1,9 @@
-//! Solves for one arm's accelerations, joint constraint torques and contact forces.
+//! Solves for the joint accelerations of one arm, the torques of its joint constraints (dry friction and stops) and the contact forces.
 //!
-//! Without contacts, the joint constraints minimise a convex, piecewise quadratic function (as in the
-//! reference engine). Newton's method with the stored set of bounds is exact if the set is right. It almost always
-//! is, and the check is done in lanes. This module handles the other cases by an exact line search for the right
-//! set.
+//! Each joint constraint stores whether its torque is at a bound; together these are the *bound set*. Without contacts, the accelerations
+//! minimise a convex, piecewise quadratic function, as in MuJoCo. Newton's method with the stored set is exact if the set is right. It
+//! almost always is, and `substep.rs` checks that for several arms at once. This module handles the other cases by an exact line search
+//! for the right set.
 
 use super::{
     arm::Arm,
@@ -15,10 +15,10 @@ use crate::{dynamics::ldlt::Ldlt, model::DOFS};
 /// Largest number of Newton steps. If one is not enough, two or three usually are.
 const NEWTON_ROUNDS: usize = 50;
 
-/// Largest number of iterations between joint constraints and contacts.
+/// Largest number of alternations between the solution of the joint constraints and that of the contacts.
 const CONTACT_ROUNDS: usize = 20;
 
-/// A matrix, lower triangle.
+/// A joint-space inertia matrix; only the lower triangle is used.
 pub type Mass<T> = [[T; DOFS]; DOFS];
 
 /// Equations of one arm, `mass · acceleration = load`.
@@ -30,17 +30,17 @@ pub struct Problem {
     pub load: [f64; DOFS],
 }
 
-/// Accelerations without contacts. The constraints store which of them are at their bounds.
+/// Accelerations without contacts, rad/s². Updates the bound set in `constraints`.
 #[cold]
 pub fn accelerations(constraints: &mut JointConstraints, problem: &Problem) -> [f64; DOFS] {
     let (_, mut acceleration) = newton_step(constraints, problem);
     if constraints.classify(&acceleration) {
-        search(constraints, problem, &mut acceleration);
+        search_bound_set(constraints, problem, &mut acceleration);
     }
     acceleration
 }
 
-/// The accelerations for the current set of bounds.
+/// The accelerations (rad/s²) for the current bound set, and the factorisation of its matrix.
 fn newton_step(constraints: &JointConstraints, problem: &Problem) -> (Ldlt<f64>, [f64; DOFS]) {
     let mut matrix = problem.mass;
     let mut rhs = problem.load;
@@ -53,35 +53,38 @@ fn newton_step(constraints: &JointConstraints, problem: &Problem) -> (Ldlt<f64>,
     (factor, factor.solve(&rhs))
 }
 
-/// Newton's method with line search, from accelerations that match the current set of bounds.
+/// Searches the right bound set and its accelerations by Newton's method with line search. It starts from accelerations that match the
+/// current set.
 #[cold]
-pub fn search(
+pub fn search_bound_set(
     constraints: &mut JointConstraints,
     problem: &Problem,
     acceleration: &mut [f64; DOFS],
 ) {
     for _ in 0..NEWTON_ROUNDS {
-        let (_, full) = newton_step(constraints, problem);
-        if !constraints.classify(&full) {
-            *acceleration = full;
+        let (_, newton) = newton_step(constraints, problem);
+        if !constraints.classify(&newton) {
+            *acceleration = newton;
             break;
         }
-        let from = *acceleration;
-        let direction: [f64; DOFS] = std::array::from_fn(|i| full[i] - from[i]);
-        let mut residual = multiply(&problem.mass, &from);
+        let start = *acceleration;
+        let direction: [f64; DOFS] = std::array::from_fn(|i| newton[i] - start[i]);
+        let mut residual = multiply(&problem.mass, &start);
         for i in 0..DOFS {
             residual[i] -= problem.load[i];
         }
-        let along = multiply(&problem.mass, &direction);
-        let curvature = (0..DOFS).map(|i| along[i] * direction[i]).sum();
-        let t = constraints.line_search(&from, &direction, &residual, curvature);
-        *acceleration = std::array::from_fn(|i| from[i] + t * direction[i]);
+        let mass_times_direction = multiply(&problem.mass, &direction);
+        let curvature = (0..DOFS)
+            .map(|i| mass_times_direction[i] * direction[i])
+            .sum();
+        let t = constraints.line_search(&start, &direction, &residual, curvature);
+        *acceleration = std::array::from_fn(|i| start[i] + t * direction[i]);
         constraints.classify(acceleration);
     }
 }
 
-/// Accelerations of one or two arms together with contact forces. In the contact equations the arms' inertia
-/// includes the joint constraints that are within their bounds.
+/// Accelerations (rad/s²) of one or two arms together with the contact forces. In the contact equations the arms' inertia
+/// includes the joint constraints that are within their bounds. `puck_acceleration` is the puck's without contacts (m/s², m/s², rad/s²).
 #[cold]
 pub fn accelerations_in_contact(
     arms: &mut [Arm],
@@ -92,13 +95,13 @@ pub fn accelerations_in_contact(
     let mut acceleration = [[0.0; DOFS]; 2];
     let mut forces = ContactForces {
         puck: [0.0; 3],
-        arms: [[0.0; DOFS]; 2],
+        arm_torques: [[0.0; DOFS]; 2],
     };
     for _ in 0..CONTACT_ROUNDS {
         let factors: [Ldlt<f64>; 2] = std::array::from_fn(|a| {
             let arm = &arms[a.min(arms.len() - 1)];
-            let (factor, free) = newton_step(&arm.constraints, &problems[a]);
-            acceleration[a] = free;
+            let (factor, without_contacts) = newton_step(&arm.constraints, &problems[a]);
+            acceleration[a] = without_contacts;
             factor
         });
         forces = contacts.solve(puck_acceleration, &acceleration, |arm, torque| {
@@ -106,12 +109,15 @@ pub fn accelerations_in_contact(
         });
         let mut changed = false;
         for (a, arm) in arms.iter_mut().enumerate() {
-            add(&mut acceleration[a], &factors[a].solve(&forces.arms[a]));
+            add(
+                &mut acceleration[a],
+                &factors[a].solve(&forces.arm_torques[a]),
+            );
             if arm.constraints.classify(&acceleration[a]) {
                 changed = true;
-                let mut pushed = problems[a];
-                add(&mut pushed.load, &forces.arms[a]);
-                search(&mut arm.constraints, &pushed, &mut acceleration[a]);
+                let mut with_contacts = problems[a];
+                add(&mut with_contacts.load, &forces.arm_torques[a]);
+                search_bound_set(&mut arm.constraints, &with_contacts, &mut acceleration[a]);
             }
         }
         if !changed {

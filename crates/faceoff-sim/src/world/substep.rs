@@ -1,8 +1,8 @@
-//! One millisecond of the arms of one world, or of several worlds in lanes.
+//! One *substep* (1 ms of physics) of the arms of one world, or of several worlds in the lanes of SIMD registers: each arm has a lane.
 //!
 //! The common computations are done in lanes, with masks for conditions. Rare cases are computed per arm or per
-//! world: contacts, joints at their stops, frictions whose set of bounds has changed, and states outside the
-//! ordinary range.
+//! world ("scalar" below): contacts, joints at their stops, changes in which joints' dry friction is at its bound, and states outside
+//! the ordinary range.
 
 use super::{
     arm::Arm,
@@ -11,11 +11,13 @@ use super::{
     contact_detection::may_touch,
     lane_worlds::{LaneWorld, world_in_lane},
     scalar_arms::{ArmDynamics, ScalarSolutions, solve_contacts, solve_stops},
-    solver::search,
+    solver::search_bound_set,
 };
 use crate::{
     dynamics::{
-        arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
+        arm::{
+            Bodies, Kinematics, controller_torques, damped_mass_matrix, mass_matrix, plant_bias,
+        },
         lanes::{Lanes, row, set_row},
         ldlt::Ldlt,
     },
@@ -28,19 +30,20 @@ use crate::{
 };
 use std::f64::consts::FRAC_PI_2;
 
-/// One substep of all arms in the lanes, and of their pucks.
+/// One substep of all arms in the lanes, and of the pucks of their worlds.
 #[inline(always)]
 pub fn substep<T: Lanes, A>(
     arms: &mut ArmLanes<T>,
     lane_worlds: &mut [LaneWorld<'_, A>],
     scalar: &mut ScalarSolutions,
 ) {
-    let before = arms.motion;
+    let motion_before = arms.motion;
     let dynamics = arm_dynamics(arms, lane_worlds);
     scalar.clear();
     solve_contacts_and_stops(arms, lane_worlds, &dynamics, scalar);
 
     let mut acceleration = ordinary_accelerations(arms, lane_worlds, &dynamics, scalar);
+    // Torques of dry friction, and of stops in scalar lanes, N m.
     let mut constraint = [T::splat(0.0); DOFS];
     constraint[..JOINTS].copy_from_slice(&arms.friction.torques(&acceleration));
     let mut load = dynamics.load;
@@ -51,8 +54,9 @@ pub fn substep<T: Lanes, A>(
         load[i] += constraint[i];
     }
 
-    // Semi-implicit Euler, joint damping implicit.
-    let acceleration = Ldlt::new(&damped(&dynamics.mass, &arms.plant.damping)).solve(&load);
+    // Semi-implicit Euler step, with implicit joint damping.
+    let acceleration =
+        Ldlt::new(&damped_mass_matrix(&dynamics.mass, &arms.plant.damping)).solve(&load);
     let motion = &mut arms.motion;
     let step = T::splat(SUBSTEP_S);
     for i in 0..DOFS {
@@ -65,16 +69,17 @@ pub fn substep<T: Lanes, A>(
         .iter_mut()
         .filter(|lane_world| lane_world.is_moving)
     {
-        let puck = lane_world.world.puck;
+        let puck_before = lane_world.world.puck;
         lane_world.world.advance_puck(lane_world.puck_force.take());
         if ordinary & lane_world.lanes() != lane_world.lanes()
             || !is_ordinary_puck(&lane_world.world.puck)
         {
-            check_world(arms, lane_world, &before, puck);
+            check_world(arms, lane_world, &motion_before, puck_before);
         }
     }
 }
 
+/// Computes the equations of motion of all arms, and the torques of their controllers.
 #[inline(always)]
 fn arm_dynamics<T: Lanes, A>(
     arms: &mut ArmLanes<T>,
@@ -87,7 +92,7 @@ fn arm_dynamics<T: Lanes, A>(
     let MotionLanes { q, dq, dq_filtered } = &arms.motion;
     let plant = &arms.plant;
 
-    // Controller and plant share one forward pass.
+    // The controller's model and the plant (the simulated arm) share the forward kinematics.
     let kinematics = Kinematics::new(q);
     let bodies = Bodies::new(&kinematics);
     let feed_forward = controller_torques(
@@ -131,7 +136,7 @@ fn solve_contacts_and_stops<T: Lanes, A>(
     scalar: &mut ScalarSolutions,
 ) {
     let centre = dynamics.kinematics.cylinder_centre();
-    let beyond = T::bits(is_beyond_stop(&arms.motion.q));
+    let beyond_stop = T::bits(is_beyond_stop(&arms.motion.q));
     for lane_world in lane_worlds
         .iter_mut()
         .filter(|lane_world| lane_world.is_moving)
@@ -147,29 +152,29 @@ fn solve_contacts_and_stops<T: Lanes, A>(
         } else {
             lane_world.world.impacts.clear_touching();
         }
-        let at_stop = |arm: &Arm| arm.constraints.any_stop();
-        if beyond & lane_world.lanes() != 0 || lane_world.world.arms.iter().any(at_stop) {
-            solve_stops(arms, lane_world, dynamics, beyond, scalar);
+        let was_at_stop = |arm: &Arm| arm.constraints.was_at_stop();
+        if beyond_stop & lane_world.lanes() != 0 || lane_world.world.arms.iter().any(was_at_stop) {
+            solve_stops(arms, lane_world, dynamics, beyond_stop, scalar);
         }
     }
 }
 
-/// Mask of the arms with a joint beyond its stop.
+/// Mask of the arms with a joint beyond its stop (the end of its range).
 #[inline(always)]
 fn is_beyond_stop<T: Lanes>(q: &[T; DOFS]) -> T::Mask {
-    let joint = |i: usize| {
+    let is_joint_beyond = |i: usize| {
         let range = LINKS.get(i).map_or(FRAC_PI_2, |link| link.range_rad);
         T::splat(range).less_than(q[i].abs())
     };
-    let mut beyond = joint(0);
+    let mut beyond = is_joint_beyond(0);
     for i in 1..DOFS {
-        beyond = T::mask_or(beyond, joint(i));
+        beyond = T::mask_or(beyond, is_joint_beyond(i));
     }
     beyond
 }
 
-/// Accelerations under load and dry friction: with the stored set of bounds, or a search for the right set if it
-/// has changed. Lanes of arms that were solved one by one are not searched.
+/// Accelerations, rad/s², under load and dry friction. Each arm stores which of its frictions are at a bound (its *bound set*). If the
+/// accelerations contradict the stored set, the right one is searched. Lanes of arms that were solved one by one are not searched.
 #[inline(always)]
 fn ordinary_accelerations<T: Lanes, A>(
     arms: &mut ArmLanes<T>,
@@ -179,18 +184,18 @@ fn ordinary_accelerations<T: Lanes, A>(
 ) -> [T; DOFS] {
     let mut matrix = dynamics.mass;
     let mut rhs = dynamics.load;
-    let (diagonal, torque) = arms.friction.assemble();
+    let (diagonal, friction_torque) = arms.friction.assemble();
     for i in 0..DOFS {
-        rhs[i] += torque.get(i).copied().unwrap_or(T::splat(0.0));
+        rhs[i] += friction_torque.get(i).copied().unwrap_or(T::splat(0.0));
     }
     for i in 0..JOINTS {
         matrix[i][i] += diagonal[i];
     }
     let mut acceleration = Ldlt::new(&matrix).solve(&rhs);
-    let set = arms.friction.classify(&acceleration);
-    if set.changed | scalar.lanes != 0 {
-        arms.friction.accept(&set);
-        let changed = set.changed & !scalar.lanes;
+    let bound_sets = arms.friction.classify(&acceleration);
+    if bound_sets.changed | scalar.lanes != 0 {
+        arms.friction.store_bound_sets(&bound_sets);
+        let changed = bound_sets.changed & !scalar.lanes;
         update_bound_sets(
             arms,
             lane_worlds,
@@ -203,7 +208,8 @@ fn ordinary_accelerations<T: Lanes, A>(
     acceleration
 }
 
-/// Searches for the sets of bounds of the `changed` arms, and loads those of the arms that were solved one by one.
+/// Searches the bound sets of the arms in the lanes `changed`, and loads those of the arms in `scalar_lanes`, which were solved one by
+/// one. Both are bits.
 #[cold]
 #[inline(never)]
 fn update_bound_sets<T: Lanes, A>(
@@ -218,13 +224,13 @@ fn update_bound_sets<T: Lanes, A>(
         .iter_mut()
         .filter(|lane_world| lane_world.is_moving)
     {
-        for (a, arm) in lane_world.world.arms.iter_mut().enumerate() {
-            let lane = lane_world.first_lane + a;
+        for (robot, arm) in lane_world.world.arms.iter_mut().enumerate() {
+            let lane = lane_world.first_lane + robot;
             let constraints = &mut arm.constraints;
             if changed >> lane & 1 == 1 {
                 arms.friction.store(lane, constraints);
                 let mut found = row(acceleration, lane);
-                search(constraints, &dynamics.problem(lane), &mut found);
+                search_bound_set(constraints, &dynamics.problem(lane), &mut found);
                 set_row(acceleration, lane, &found);
                 arms.friction.load(lane, constraints);
             } else if scalar_lanes >> lane & 1 == 1 {
@@ -241,21 +247,21 @@ fn update_bound_sets<T: Lanes, A>(
 fn check_world<T: Lanes, A>(
     arms: &mut ArmLanes<T>,
     lane_world: &mut LaneWorld<'_, A>,
-    before: &MotionLanes<T>,
-    puck: Puck,
+    motion_before: &MotionLanes<T>,
+    puck_before: Puck,
 ) {
     let world = &mut *lane_world.world;
-    for (a, arm) in world.arms.iter_mut().enumerate() {
-        arms.store(lane_world.first_lane + a, arm);
+    for (robot, arm) in world.arms.iter_mut().enumerate() {
+        arms.store(lane_world.first_lane + robot, arm);
     }
     let Some(cause) = world.find_runaway() else {
         return;
     };
-    world.puck = puck;
-    for (a, arm) in world.arms.iter_mut().enumerate() {
-        let lane = lane_world.first_lane + a;
-        arms.motion.replace(lane, before);
-        before.store(lane, arm);
+    world.puck = puck_before;
+    for (robot, arm) in world.arms.iter_mut().enumerate() {
+        let lane = lane_world.first_lane + robot;
+        arms.motion.replace(lane, motion_before);
+        motion_before.store(lane, arm);
     }
     world.diverge(cause);
 }

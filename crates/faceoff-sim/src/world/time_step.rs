@@ -1,4 +1,5 @@
-//! Advances worlds in time: one, or several at once.
+//! Advances worlds in time, one alone or several at once in the lanes of SIMD registers. A *substep* is 1 ms, a *control step* (one
+//! action) 20 substeps.
 
 use super::{
     World,
@@ -19,13 +20,13 @@ use crate::{
 use wide::f64x2;
 
 impl World {
-    /// Advances by a control step, 20 substeps. `air` is called before each of them.
-    pub fn control_step(&mut self, air: impl FnMut(&Puck) -> [f64; 2]) {
-        self.advance(SUBSTEPS, air);
+    /// Advances by a control step. `air_force` returns the force of the air flow on the puck (N) and is called before each substep.
+    pub fn control_step(&mut self, air_force: impl FnMut(&Puck) -> [f64; 2]) {
+        self.advance(SUBSTEPS, air_force);
     }
 
-    /// Advances by one substep, 1 ms. After 20 of them a new action is due; without one the last
-    /// trajectory would be repeated, so call [`World::command`] or [`World::hold`] first. A world that has
+    /// Advances by one substep. After every 20 substeps a new action is due: call [`World::command`] or [`World::hold`] first, since
+    /// otherwise the last trajectory is repeated. A world that has
     /// diverged stays in its state.
     pub fn substep(&mut self) {
         let air_n = self.air_n;
@@ -39,28 +40,28 @@ impl World {
         worlds: impl Iterator<Item = (&'a mut Self, A)>,
     ) {
         let mut lane_worlds: Vec<LaneWorld<'_, A>> = Vec::with_capacity(MAX_LANES);
-        let mut first = 0;
-        for (world, air) in worlds {
+        let mut first_lane = 0;
+        for (world, air_force) in worlds {
             if !world.has_moving_arms() {
-                world.control_step(air);
+                world.control_step(air_force);
                 continue;
             }
             world.begin_step();
             let arms = world.arms.len();
-            lane_worlds.push(LaneWorld::new(world, air, first));
-            first += arms;
+            lane_worlds.push(LaneWorld::new(world, air_force, first_lane));
+            first_lane += arms;
         }
-        debug_assert!(first <= MAX_LANES);
+        debug_assert!(first_lane <= MAX_LANES);
         match lane_worlds.as_mut_slice() {
             [] => {}
             [lane_world] => lane_world.world.control_step(&mut lane_world.air_force),
-            lane_worlds => simd_level.run(first, ControlStep { lane_worlds }),
+            lane_worlds => simd_level.run(first_lane, ControlStep { lane_worlds }),
         }
     }
 
-    /// Can its arms be computed in lanes? Not if there are none, they are imposed, or the world has diverged.
+    /// Does the world have arms to simulate? Not if it has none, if a mallet is imposed, or if the world has diverged.
     fn has_moving_arms(&self) -> bool {
-        self.divergence.is_none() && self.imposed.is_none() && !self.arms.is_empty()
+        self.divergence.is_none() && self.imposed_mallet.is_none() && !self.arms.is_empty()
     }
 
     /// Clears the impacts of the previous control step.
@@ -70,23 +71,23 @@ impl World {
         }
     }
 
-    fn advance(&mut self, substeps: usize, mut air: impl FnMut(&Puck) -> [f64; 2]) {
+    fn advance(&mut self, substeps: usize, mut air_force: impl FnMut(&Puck) -> [f64; 2]) {
         self.begin_step();
         if self.has_moving_arms() {
             let robots = self.arms.len();
-            let mut lane_worlds = [LaneWorld::new(self, air, 0)];
+            let mut lane_worlds = [LaneWorld::new(self, air_force, 0)];
             return match robots {
-                1 => advance::<f64, _>(&mut lane_worlds, substeps),
-                _ => advance::<f64x2, _>(&mut lane_worlds, substeps),
+                1 => advance_in_lanes::<f64, _>(&mut lane_worlds, substeps),
+                _ => advance_in_lanes::<f64x2, _>(&mut lane_worlds, substeps),
             };
         }
         for _ in 0..substeps {
-            self.air_n = air(&self.puck);
+            self.air_n = air_force(&self.puck);
             if self.divergence.is_some() {
                 continue;
             }
-            if self.imposed.is_some() {
-                self.substep_imposed();
+            if self.imposed_mallet.is_some() {
+                self.advance_puck_with_imposed_mallet();
             } else {
                 self.advance_puck_alone();
             }
@@ -105,13 +106,13 @@ impl<A: FnMut(&Puck) -> [f64; 2]> LaneKernel for ControlStep<'_, '_, A> {
 
     #[inline(always)]
     fn run<T: Lanes>(self) {
-        advance::<T, A>(self.lane_worlds, SUBSTEPS);
+        advance_in_lanes::<T, A>(self.lane_worlds, SUBSTEPS);
     }
 }
 
 /// Advances worlds in lanes by some substeps.
 #[inline(always)]
-fn advance<T: Lanes, A: FnMut(&Puck) -> [f64; 2]>(
+fn advance_in_lanes<T: Lanes, A: FnMut(&Puck) -> [f64; 2]>(
     lane_worlds: &mut [LaneWorld<'_, A>],
     substeps: usize,
 ) {
@@ -137,8 +138,8 @@ fn advance<T: Lanes, A: FnMut(&Puck) -> [f64; 2]>(
         .iter_mut()
         .filter(|lane_world| lane_world.is_moving)
     {
-        for (a, arm) in lane_world.world.arms.iter_mut().enumerate() {
-            arms.store(lane_world.first_lane + a, arm);
+        for (robot, arm) in lane_world.world.arms.iter_mut().enumerate() {
+            arms.store(lane_world.first_lane + robot, arm);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Steps do not allocate: memory is allocated when a world is created.
+//! Control steps allocate no memory: it is allocated when an episode, or a rally of a game, is created.
 
 use faceoff_sim::{
     Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, golden::strike,
@@ -21,21 +21,21 @@ fn control_steps_allocate_nothing() {
             seed.episode(task, 0),
         );
         let before = *episode.world().puck();
-        let mut touched = false;
-        let count = |episode: &mut Episode, touched: &mut bool| {
+        let mut is_puck_moved = false;
+        let allocations_of_step = |episode: &mut Episode, is_puck_moved: &mut bool| {
             allocation_counter::measure(|| {
                 let action = strike(episode.observation(), episode.steps());
                 episode.step(&action);
-                *touched |= episode.world().puck().velocity != before.velocity;
+                *is_puck_moved |= episode.world().puck().velocity != before.velocity;
             })
             .count_total
         };
         let mut total = 0;
         while episode.steps() < 150 {
-            total += count(&mut episode, &mut touched);
+            total += allocations_of_step(&mut episode, &mut is_puck_moved);
         }
         assert_eq!(total, 0, "{task}");
-        assert!(touched, "{task}: the puck was never touched");
+        assert!(is_puck_moved, "{task}: the puck was never touched");
     }
 }
 
@@ -49,7 +49,7 @@ fn game_allocates_only_at_the_start_of_a_rally() {
         seed: Seed::from_number(1),
     });
     let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
-    let mut steps = 0;
+    let mut steps_within_rallies = 0;
     for _ in 0..1000 {
         let mut new_rally = false;
         let allocated = allocation_counter::measure(|| {
@@ -60,8 +60,8 @@ fn game_allocates_only_at_the_start_of_a_rally() {
         });
         if !new_rally {
             assert_eq!(allocated.count_total, 0);
-            steps += 1;
+            steps_within_rallies += 1;
         }
     }
-    assert!(steps > 990);
+    assert!(steps_within_rallies > 990);
 }

@@ -1,8 +1,11 @@
-//! Counts the arithmetic operations of a substep: the dynamics run on numbers that count their operations.
+//! Counts the arithmetic operations of a substep (1 ms of physics of one arm): the dynamics are computed with numbers that count their
+//! operations.
 
 use faceoff_sim::{
     dynamics::{
-        arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
+        arm::{
+            Bodies, Kinematics, controller_torques, damped_mass_matrix, mass_matrix, plant_bias,
+        },
         lanes::Lanes,
         ldlt::Ldlt,
     },
@@ -150,8 +153,9 @@ fn substep_takes_the_documented_number_of_operations() {
     let zero = [Counted(0.0); DOFS];
     let q: [Counted; DOFS] =
         std::array::from_fn(|i| Counted(INITIAL_Q.get(i).copied().unwrap_or_default()));
+    // Arbitrary velocities and accelerations.
     let velocities = [Counted(0.1); DOFS];
-    let joints = [Counted(0.1); JOINTS];
+    let joint_values = [Counted(0.1); JOINTS];
     let mut total = 0;
     let kinematics = counted("forward kinematics with sines", &mut total, || {
         Kinematics::new(&q)
@@ -162,7 +166,14 @@ fn substep_takes_the_documented_number_of_operations() {
     counted(
         "controller: recursive Newton-Euler, 7 joints",
         &mut total,
-        || controller_torques(&kinematics, &bodies.controller(), &joints, &joints),
+        || {
+            controller_torques(
+                &kinematics,
+                &bodies.controller(),
+                &joint_values,
+                &joint_values,
+            )
+        },
     );
     let bodies = counted("inertias of the plant", &mut total, || {
         bodies.plant(&[Counted(1.0); 9])
@@ -179,7 +190,7 @@ fn substep_takes_the_documented_number_of_operations() {
         Ldlt::new(&mass).solve(&zero)
     });
     counted("integration: implicit damping", &mut total, || {
-        Ldlt::new(&damped(&mass, &[Counted(0.1); JOINTS])).solve(&zero)
+        Ldlt::new(&damped_mass_matrix(&mass, &[Counted(0.1); JOINTS])).solve(&zero)
     });
     println!("{total:5} in total");
     assert_eq!(total, DOCUMENTED);

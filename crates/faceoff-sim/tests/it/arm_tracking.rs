@@ -1,9 +1,10 @@
-//! Arm motions in all interpolation modes (REFERENCE, `arm_tracking`).
+//! Motions of the arm in all interpolations match the recording `arm_tracking` of the *reference*, the challenge's own simulator. `q` are
+//! joint positions (rad), `dq` velocities (rad/s), `ee` is the end effector (m).
 
 use crate::reference::{array, flat, max_difference, recording};
 use faceoff_sim::{ConstraintValues, Interpolation, Plant, SUBSTEPS, World};
 
-/// Largest differences of one motion.
+/// Largest differences between a recorded and a simulated motion, in SI units.
 #[derive(Debug, Default)]
 struct Differences {
     q: f64,
@@ -13,6 +14,7 @@ struct Differences {
     ee: f64,
     constraints: f64,
     torque: f64,
+    /// Positions and velocities in each millisecond; the others, except for the torque, are compared at control steps.
     q_dq_1ms: f64,
 }
 

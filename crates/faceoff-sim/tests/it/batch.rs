@@ -1,4 +1,4 @@
-//! Many worlds stepped at once.
+//! A batch (many worlds of one task, stepped at once) plays the same episodes as worlds that are stepped alone.
 
 use faceoff_sim::{
     Batch, BatchSetup, Episode, Interpolation, PerturbationSettings, Plant, golden::strike,
@@ -7,9 +7,13 @@ use faceoff_types::{Factors, Seed, Task};
 
 const WORLDS: u32 = 10;
 
+/// Numbers in an action: position and velocity of seven joints.
+const ACTION_LEN: usize = 14;
+
+/// A batch with all perturbations.
 fn setup(task: Task) -> BatchSetup {
     let settings = PerturbationSettings::default();
-    let seed = Seed::from_number(4);
+    let seed = Seed::from_number(4); // arbitrary
     BatchSetup {
         task,
         interpolation: Interpolation::Cubic,
@@ -21,7 +25,7 @@ fn setup(task: Task) -> BatchSetup {
     }
 }
 
-/// All observations and outcomes of some steps, as text.
+/// All observations and outcomes of a batch in some steps, as text.
 fn play(setup: BatchSetup, threads: usize, steps: u32) -> Vec<String> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -71,7 +75,7 @@ fn worlds_run_the_episodes_of_the_evaluation_in_order() {
             let outcomes = batch.step(&actions).to_vec();
             for (w, outcome) in outcomes.iter().enumerate() {
                 let (number, episode) = &mut alone[w];
-                let expected = episode.step(&actions[14 * w..14 * (w + 1)]);
+                let expected = episode.step(&actions[ACTION_LEN * w..ACTION_LEN * (w + 1)]);
                 assert_eq!((outcome.episode, outcome.step), (*number, expected));
                 assert_eq!(outcome.last_observation()[..len], *episode.observation());
                 assert_eq!(outcome.success, episode.success());

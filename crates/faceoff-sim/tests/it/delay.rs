@@ -1,10 +1,14 @@
-//! The rehearsal's delays and table (RULES, factor `delay`).
+//! The perturbation `delay`, which is for rehearsals on a real robot: the agent sees the puck late, its actions are applied late, and the
+//! table is tilted and damps the puck differently (`docs/rules.md`, "Perturbations").
 
 use faceoff_sim::{
     Episode, Interpolation, PerturbationSettings, Plant, World, model::INITIAL_Q,
-    perturbation::rehearsal_table::RehearsalTable, stream::Stream,
+    perturbation::rehearsal_table::RehearsalTable, stream::RandomStream,
 };
 use faceoff_types::{Factor, Factors, Seed, Task};
+
+/// Distance of the robot's base from the table's centre along x, m.
+const BASE_X_M: f64 = 1.51;
 
 fn episode(task: Task, factors: Factors, seed: u64) -> Episode {
     Episode::new(
@@ -17,6 +21,7 @@ fn episode(task: Task, factors: Factors, seed: u64) -> Episode {
     )
 }
 
+/// An action that holds the initial position: seven positions, rad, and seven velocities, rad/s.
 fn hold() -> [f64; 14] {
     Interpolation::Cubic.hold_position(&INITIAL_Q)[..14]
         .try_into()
@@ -25,19 +30,20 @@ fn hold() -> [f64; 14] {
 
 #[test]
 fn puck_is_observed_one_or_two_control_steps_late() {
-    let (mut late, mut total) = ([0; 3], 0);
+    // Number of observations with a delay of 0, 1 and 2 control steps.
+    let (mut lag_counts, mut total) = ([0; 3], 0);
     for seed in 0..40 {
         let mut episode = episode(Task::Hit, Factors::only(Factor::Delay), seed);
         let mut pucks = vec![episode.state().puck];
         for _ in 0..60 {
             let end = episode.step(&hold()).end;
             pucks.push(episode.state().puck);
-            let observed_x = episode.observation()[0] - 1.51;
+            let observed_x = episode.observation()[0] - BASE_X_M;
             let lag = (0..3.min(pucks.len()))
                 .find(|lag| (pucks[pucks.len() - 1 - lag][0] - observed_x).abs() < 1e-15);
-            // Nothing is older than the episode; a puck at rest shows no lag.
+            // At the start there are no earlier pucks to compare with, and a puck at rest shows no lag.
             if pucks.len() > 3 && pucks[pucks.len() - 1][0] != pucks[pucks.len() - 3][0] {
-                late[lag.expect("the puck of one of the last steps")] += 1;
+                lag_counts[lag.expect("the puck of one of the last steps")] += 1;
                 total += 1;
             }
             if end.is_some() {
@@ -45,9 +51,13 @@ fn puck_is_observed_one_or_two_control_steps_late() {
             }
         }
     }
-    let second = f64::from(late[2]) / f64::from(total);
-    assert_eq!(late[0], 0);
-    assert!(total > 1000 && (0.16..0.24).contains(&second), "{late:?}");
+    let two_steps_share = f64::from(lag_counts[2]) / f64::from(total);
+    assert_eq!(lag_counts[0], 0);
+    // The rules' probability is 0.2.
+    assert!(
+        total > 1000 && (0.16..0.24).contains(&two_steps_share),
+        "{lag_counts:?}"
+    );
 }
 
 #[test]
@@ -85,27 +95,29 @@ fn arm_coasts_80_ms_after_a_late_action_and_stops() {
     let mut world = World::with_robots(&Plant::nominal(), 1, [0.5, 0.3, 0.0, 0.0, 0.0, 0.0]);
     let mut action = hold();
     for step in 1..=10 {
-        action[0] = 0.01 * f64::from(step);
-        action[7] = 0.5;
+        action[0] = 0.01 * f64::from(step); // position of the first joint, rad
+        action[7] = 0.5; // its velocity, rad/s
         world.command(0, Interpolation::Cubic, &action);
         world.control_step(|_| [0.0; 2]);
     }
-    let mut travelled = vec![];
+    // Movement of the first joint in each control step, rad.
+    let mut movements = vec![];
     for _ in 0..20 {
         let before = world.joints(0)[0];
         world.coast(0);
         world.control_step(|_| [0.0; 2]);
-        travelled.push(world.joints(0)[0] - before);
+        movements.push(world.joints(0)[0] - before);
     }
     // At 0.5 rad/s, 10 mrad per control step; the arm follows with a small lag.
-    for step in &travelled[1..4] {
-        assert!((step - 0.01).abs() < 0.001, "{travelled:?}");
+    for movement in &movements[1..4] {
+        assert!((movement - 0.01).abs() < 0.001, "{movements:?}");
     }
     assert!(
-        travelled[13..].iter().all(|step| step.abs() < 1e-4),
-        "{travelled:?}"
+        movements[13..].iter().all(|movement| movement.abs() < 1e-4),
+        "{movements:?}"
     );
-    let total: f64 = travelled.iter().sum();
+    // 80 ms at 0.5 rad/s.
+    let total: f64 = movements.iter().sum();
     assert!((total - 0.04).abs() < 0.004, "{total}");
 
     // A new action ends the coasting; after the next late action the arm coasts again.
@@ -125,7 +137,7 @@ fn rehearsal_table_has_the_statistics_of_the_rules() {
     let settings = PerturbationSettings::default().delay;
     let tables: Vec<RehearsalTable> = (0..4000)
         .map(|k| {
-            let stream = Stream::new(&Seed::from_number(k), "delay, table");
+            let stream = RandomStream::new(&Seed::from_number(k), "delay, table");
             RehearsalTable::draw(&settings, stream)
         })
         .collect();
@@ -137,10 +149,12 @@ fn rehearsal_table_has_the_statistics_of_the_rules() {
             .map(|t| t.tilt_m_s2[axis].powi(2))
             .sum::<f64>()
             / n;
+        // The rules: normal with a standard deviation of 0.03 m/s².
         assert!(mean.abs() < 0.002, "{mean}");
         assert!((square.sqrt() - 0.03).abs() < 0.0015, "{}", square.sqrt());
     }
     let mean: f64 = tables.iter().map(|t| t.puck_damping_per_s).sum::<f64>() / n;
+    // The rules: uniform from 0.2 to 0.5 per second.
     assert!((mean - 0.35).abs() < 0.006, "{mean}");
     assert!(
         tables
@@ -151,10 +165,9 @@ fn rehearsal_table_has_the_statistics_of_the_rules() {
 
 #[test]
 fn tilt_and_air_cushion_act_on_the_puck() {
-    // A resting puck rolls off a tilted table as a free body does; a moving one keeps its speed longer.
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(7);
-    let table = RehearsalTable::draw(&settings.delay, Stream::new(&seed, "delay, table"));
+    let table = RehearsalTable::draw(&settings.delay, RandomStream::new(&seed, "delay, table"));
     let start = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
     let mut episode = Episode::with_initial_puck(
         Task::Hit,
@@ -168,8 +181,11 @@ fn tilt_and_air_cushion_act_on_the_puck() {
     for _ in 0..25 {
         episode.step(&hold());
     }
-    let (d, t) = (table.puck_damping_per_s, 0.5);
-    let velocity = table.tilt_m_s2.map(|a| a * (1.0 - (-d * t).exp()) / d);
+    // Velocity of a damped body after a constant acceleration of 25 control steps from rest.
+    let (damping_per_s, time_s) = (table.puck_damping_per_s, 0.5);
+    let velocity = table
+        .tilt_m_s2
+        .map(|a| a * (1.0 - (-damping_per_s * time_s).exp()) / damping_per_s);
     let puck = episode.state().puck;
     for axis in 0..2 {
         let error = (puck[3 + axis] - velocity[axis]).abs();

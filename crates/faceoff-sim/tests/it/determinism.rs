@@ -1,4 +1,5 @@
-//! The same seed gives the same bits on every machine, in every build and after every restore.
+//! The same seed gives the same bits on every thread and in a clone, and a robot moves the same with or without a second one. `golden.rs`
+//! compares builds.
 
 use faceoff_sim::{
     Interpolation, Plant, World,
@@ -35,23 +36,23 @@ fn saved_episode_continues_with_the_same_bits() {
 #[test]
 fn arm_moves_the_same_alone_and_with_a_second_arm() {
     let plant = Plant::nominal();
-    let far = [0.0, 0.4, 0.0, 0.0, 0.0, 0.0];
-    let mut alone = World::with_robots(&plant, 1, far);
-    let mut beside = World::with_robots(&plant, 2, far);
+    let puck_out_of_reach = [0.0, 0.4, 0.0, 0.0, 0.0, 0.0];
+    let mut alone = World::with_robots(&plant, 1, puck_out_of_reach);
+    let mut together = World::with_robots(&plant, 2, puck_out_of_reach);
     for step in 0..50 {
         let mut action = [0.0; 14];
         action[..7].copy_from_slice(&INITIAL_Q);
         action[0] = 0.005 * f64::from(step);
         alone.command(0, Interpolation::Cubic, &action);
         for robot in 0..2 {
-            beside.command(robot, Interpolation::Cubic, &action);
+            together.command(robot, Interpolation::Cubic, &action);
         }
         alone.control_step(|_| [0.0; 2]);
-        beside.control_step(|_| [0.0; 2]);
+        together.control_step(|_| [0.0; 2]);
         for robot in 0..2 {
-            assert_eq!(alone.joints(0), beside.joints(robot));
-            assert_eq!(alone.joint_velocities(0), beside.joint_velocities(robot));
-            assert_eq!(alone.universal(0), beside.universal(robot));
+            assert_eq!(alone.joints(0), together.joints(robot));
+            assert_eq!(alone.joint_velocities(0), together.joint_velocities(robot));
+            assert_eq!(alone.universal(0), together.universal(robot));
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Episodes stepped at once have the same bits as alone, with every instruction set.
+//! Episodes that are stepped at once, with SIMD instructions, have the same bits as those that are stepped alone, with every instruction
+//! set.
 
 use faceoff_sim::{
     Bounds, Episode, Interpolation, JOINTS, PerturbationSettings, Plant, SimdLevel, StepOutcome,
@@ -14,7 +15,8 @@ fn simd_levels() -> Vec<SimdLevel> {
         .collect()
 }
 
-/// Narrow bounds, so that worlds diverge. The ruleset's bounds are ten times as wide.
+/// Narrow bounds of the simulation, so that worlds *diverge* (stop, since their state would leave the bounds). The ruleset's bounds are ten
+/// times as wide.
 const NARROW: Bounds = Bounds {
     joint_rad_s: 100.0,
     ..Bounds::WIDE
@@ -23,23 +25,26 @@ const NARROW: Bounds = Bounds {
 /// Behaviour of an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Habit {
+    /// Moves the mallet through the puck.
     Strikes,
+    /// Holds its initial position.
     Holds,
-    /// Drives its joints against their stops.
-    Leans,
-    /// Makes the world diverge, from a step on.
-    Diverges(u32),
+    /// Drives its joints against their stops, the ends of their range.
+    DrivesToStops,
+    /// Commands extreme numbers from this step on, so that the world diverges.
+    DivergesFrom(u32),
 }
 
 /// An episode with its agent.
 #[derive(Clone)]
-struct Play {
+struct EpisodeWithAgent {
     episode: Episode,
     habit: Habit,
     interpolation: Interpolation,
 }
 
-impl Play {
+impl EpisodeWithAgent {
+    /// `number` is both the seed and the index of the episode.
     fn new(task: Task, number: u32, factors: Factors, habit: Habit) -> Self {
         let settings = PerturbationSettings::default();
         let seed = Seed::from_number(u64::from(number));
@@ -47,8 +52,8 @@ impl Play {
         let interpolation = match habit {
             Habit::Strikes => Interpolation::Cubic,
             Habit::Holds => Interpolation::Quintic,
-            Habit::Leans => Interpolation::Linear,
-            Habit::Diverges(_) => Interpolation::Trajectory,
+            Habit::DrivesToStops => Interpolation::Linear,
+            Habit::DivergesFrom(_) => Interpolation::Trajectory,
         };
         let seed = seed.episode(task, number);
         let episode = Episode::new(task, interpolation, factors, &settings, &plant, seed);
@@ -65,7 +70,7 @@ impl Play {
         let held = held[..self.interpolation.len()].to_vec();
         match self.habit {
             Habit::Strikes => strike(self.episode.observation(), step).to_vec(),
-            Habit::Leans => held
+            Habit::DrivesToStops => held
                 .iter()
                 .enumerate()
                 .map(|(i, q)| {
@@ -76,12 +81,12 @@ impl Play {
                     }
                 })
                 .collect(),
-            Habit::Diverges(from) if step >= from => {
+            Habit::DivergesFrom(first_step) if step >= first_step => {
                 let velocities = &self.episode.observation()[13..20];
                 let pushed = |i: usize| ACTION_LIMIT.copysign(velocities[i % JOINTS]);
                 (0..held.len()).map(pushed).collect()
             }
-            Habit::Holds | Habit::Diverges(_) => held,
+            Habit::Holds | Habit::DivergesFrom(_) => held,
         }
     }
 }
@@ -104,10 +109,12 @@ fn snapshot(episode: &Episode) -> (Vec<u64>, String) {
     (numbers.iter().map(|x| x.to_bits()).collect(), rest)
 }
 
-/// Runs all to their ends, at once and each alone; returns the reasons of their ends.
-fn compare(simd_level: SimdLevel, plays: Vec<Play>) -> Vec<EpisodeEnd> {
+/// Runs all episodes to their ends, at once and each alone, and compares them after each step; returns the reasons of their ends.
+fn compare_with_alone(simd_level: SimdLevel, plays: Vec<EpisodeWithAgent>) -> Vec<EpisodeEnd> {
     let mut ends = vec![];
-    let mut pairs: Vec<(Play, Play)> = plays.into_iter().map(|p| (p.clone(), p)).collect();
+    // Each episode twice: one is stepped at once with the others, one alone.
+    let mut pairs: Vec<(EpisodeWithAgent, EpisodeWithAgent)> =
+        plays.into_iter().map(|p| (p.clone(), p)).collect();
     while !pairs.is_empty() {
         let actions: Vec<Vec<f64>> = pairs.iter().map(|(play, _)| play.action()).collect();
         let actions: Vec<&[f64]> = actions.iter().map(Vec::as_slice).collect();
@@ -116,6 +123,7 @@ fn compare(simd_level: SimdLevel, plays: Vec<Play>) -> Vec<EpisodeEnd> {
             .zip(&actions)
             .map(|((_, play), action)| play.episode.step(action))
             .collect();
+        // Wrong outcomes, which the step must replace.
         let mut at_once = alone.clone();
         at_once.rotate_left(1);
         let mut episodes: Vec<&mut Episode> = pairs
@@ -152,14 +160,16 @@ fn episodes_with_contacts_are_the_same_at_once() {
     let singles = Factor::ALL.map(|factor| Factors::NONE.with(factor));
     for simd_level in simd_levels() {
         for factors in [Factors::NONE, Factors::ALL].into_iter().chain(singles) {
-            // Both full and partly filled groups of lanes.
+            // 13 episodes fill some groups of lanes, and the last ones partly.
             let plays = (0..13).map(|number| {
                 let task = Task::ALL[number as usize % 3];
-                Play::new(task, number, factors, Habit::Strikes)
+                EpisodeWithAgent::new(task, number, factors, Habit::Strikes)
             });
-            let ends = compare(simd_level, plays.collect());
-            let some = |end: EpisodeEnd| ends.contains(&end);
-            assert!(some(EpisodeEnd::CrossedMiddle), "{factors:?}: {ends:?}");
+            let ends = compare_with_alone(simd_level, plays.collect());
+            assert!(
+                ends.contains(&EpisodeEnd::CrossedMiddle),
+                "{factors:?}: {ends:?}"
+            );
         }
     }
 }
@@ -169,17 +179,17 @@ fn diverging_world_does_not_change_the_others() {
     for simd_level in simd_levels() {
         let habits = [
             Habit::Holds,
-            Habit::Diverges(7),
-            Habit::Leans,
-            Habit::Diverges(3),
+            Habit::DivergesFrom(7),
+            Habit::DrivesToStops,
+            Habit::DivergesFrom(3),
             Habit::Strikes,
         ];
         let plays = (0..15).map(|number| {
             let habit = habits[number as usize % habits.len()];
             let task = Task::ALL[number as usize / habits.len()];
-            Play::new(task, number, Factors::ALL, habit)
+            EpisodeWithAgent::new(task, number, Factors::ALL, habit)
         });
-        let ends = compare(simd_level, plays.collect());
+        let ends = compare_with_alone(simd_level, plays.collect());
         assert!(ends.contains(&EpisodeEnd::AgentFault), "{ends:?}");
         assert!(ends.contains(&EpisodeEnd::Horizon), "{ends:?}");
     }
@@ -190,9 +200,11 @@ fn step_accepts_any_number_of_worlds() {
     for count in 0..6 {
         let held = Interpolation::Quintic.hold_position(&INITIAL_Q);
         let action = &held[..Interpolation::Quintic.len()];
-        let play = |number| Play::new(Task::Prepare, number, Factors::NONE, Habit::Holds).episode;
-        let mut episodes: Vec<Episode> = (0..count).map(play).collect();
-        let mut outcomes = vec![play(0).step(action); count as usize];
+        let holding = |number| {
+            EpisodeWithAgent::new(Task::Prepare, number, Factors::NONE, Habit::Holds).episode
+        };
+        let mut episodes: Vec<Episode> = (0..count).map(holding).collect();
+        let mut outcomes = vec![holding(0).step(action); count as usize];
         let mut all: Vec<&mut Episode> = episodes.iter_mut().collect();
         step_episodes(&mut all, &vec![action; count as usize], &mut outcomes);
         assert!(episodes.iter().all(|episode| episode.steps() == 1));
@@ -202,6 +214,6 @@ fn step_accepts_any_number_of_worlds() {
 #[test]
 #[should_panic(expected = "expected an action for each episode")]
 fn missing_action_panics() {
-    let mut episode = Play::new(Task::Defend, 0, Factors::NONE, Habit::Holds).episode;
+    let mut episode = EpisodeWithAgent::new(Task::Defend, 0, Factors::NONE, Habit::Holds).episode;
     step_episodes(&mut [&mut episode], &[], &mut []);
 }

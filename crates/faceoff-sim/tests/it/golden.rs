@@ -1,9 +1,9 @@
-//! The golden episodes and games match their file.
+//! The hashes of the *golden* episodes and games (fixed ones with known results) match those stored in `tests/golden/simulator.txt`.
 
 use faceoff_sim::golden;
 use faceoff_types::Profile;
 
-const FILE: &str = include_str!(concat!(
+const STORED_HASHES: &str = include_str!(concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../tests/golden/simulator.txt"
 ));
@@ -11,7 +11,7 @@ const FILE: &str = include_str!(concat!(
 #[test]
 fn golden_hashes_match_the_file() {
     let computed: String = golden::all().map(|golden| format!("{golden}\n")).collect();
-    assert_eq!(computed, FILE);
+    assert_eq!(computed, STORED_HASHES);
 }
 
 #[test]

@@ -1,57 +1,60 @@
-//! Hostile agents: for all commands within the protocol's bounds, all numbers stay finite, and a divergence is
-//! attributed to the hostile agent.
+//! *Hostile* agents, which try to break the simulation by extreme commands: all numbers stay finite, and if the world *diverges* (its state
+//! would leave the bounds of the simulation), the hostile agent is at fault.
 
 use faceoff_sim::{
     Bounds, Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
-    RallyEnd, model::INITIAL_Q, stream::Stream,
+    RallyEnd, model::INITIAL_Q, stream::RandomStream,
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed, Task};
 
-/// Pattern of an agent's numbers.
+/// Pattern of the numbers in an agent's actions.
 #[derive(Debug, Clone, Copy)]
 enum Habit {
+    /// All numbers are the same.
     Constant,
-    /// The sign changes with each step.
-    Swinging,
-    /// The sign changes with each number.
-    Chequered,
+    /// All numbers of an action are the same; the sign changes with each step.
+    AlternatingSteps,
+    /// The sign changes with each number and each step.
+    AlternatingNumbers,
     /// Only one kind of row (position, velocity, acceleration) is large, its sign changing each step;
     /// the others hold.
     OneRow(usize),
-    /// Any sign and any power of ten, including underflow.
+    /// Random signs and powers of ten, including underflow.
     Drawn,
-    /// Twenty steps of rest and one blow, repeatedly.
+    /// Repeatedly twenty steps of rest, and one step with large numbers of alternating sign.
     Blows,
-    /// Always in the joint's current direction of motion.
-    Pumping,
+    /// Each number has the sign of its joint's current velocity, so that motion is amplified.
+    Amplifying,
 }
 
 const HABITS: [Habit; 9] = [
     Habit::Constant,
-    Habit::Swinging,
-    Habit::Chequered,
+    Habit::AlternatingSteps,
+    Habit::AlternatingNumbers,
     Habit::OneRow(0),
     Habit::OneRow(1),
     Habit::OneRow(2),
     Habit::Drawn,
     Habit::Blows,
-    Habit::Pumping,
+    Habit::Amplifying,
 ];
 
-/// All interpolations that `ready` may contain.
+/// All interpolations of actions that an agent may choose in its protocol message `ready`, by their codes.
 fn interpolations() -> impl Iterator<Item = Interpolation> {
     let codes = [1, 2, 3, 4, 5, -1].map(Some).into_iter().chain([None]);
     codes.map(|code| Interpolation::from_code(code).unwrap())
 }
 
+/// An action with numbers up to `size` in magnitude. `observation` is the agent's.
 fn action(
     habit: Habit,
     size: f64,
     interpolation: Interpolation,
     step: u32,
     observation: &[f64],
-    stream: &mut Stream,
+    stream: &mut RandomStream,
 ) -> Vec<f64> {
+    // Joint positions (rad) and velocities (rad/s).
     let (q, dq) = (&observation[6..13], &observation[13..20]);
     let held: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
     let held = interpolation.hold_position(&held);
@@ -60,8 +63,8 @@ fn action(
         .map(|i| {
             let number = match habit {
                 Habit::Constant => size,
-                Habit::Swinging => alternating(step as usize),
-                Habit::Chequered => alternating(i + step as usize),
+                Habit::AlternatingSteps => alternating(step as usize),
+                Habit::AlternatingNumbers => alternating(i + step as usize),
                 Habit::OneRow(row) if i / JOINTS % 3 == row => alternating(step as usize),
                 Habit::OneRow(_) => held[i],
                 Habit::Drawn => {
@@ -71,7 +74,7 @@ fn action(
                 }
                 Habit::Blows if step % 21 == 20 => alternating(i),
                 Habit::Blows => held[i],
-                Habit::Pumping => size.copysign(dq[i % JOINTS]),
+                Habit::Amplifying => size.copysign(dq[i % JOINTS]),
             };
             assert!(number.abs() <= ACTION_LIMIT);
             number
@@ -86,8 +89,8 @@ fn assert_finite(label: &str, numbers: &[f64]) {
     );
 }
 
-/// Runs an episode; returns whether its world diverged.
-fn diverges(
+/// Plays an episode of at most 121 steps, and checks it; returns whether its world diverged.
+fn play_diverges(
     bounds: Bounds,
     plant: &Plant,
     task: Task,
@@ -96,7 +99,7 @@ fn diverges(
     size: f64,
 ) -> bool {
     let settings = PerturbationSettings::default();
-    let seed = Seed::from_number(11);
+    let seed = Seed::from_number(11); // arbitrary, as all seeds in this file
     let mut episode = Episode::new(
         task,
         interpolation,
@@ -107,7 +110,7 @@ fn diverges(
     )
     .with_bounds(bounds);
     let label = format!("{task}, interpolation {interpolation}, {habit:?}, {size}");
-    let mut stream = Stream::new(&seed, &label);
+    let mut stream = RandomStream::new(&seed, &label);
     loop {
         assert_finite(&label, episode.observation());
         let step = episode.steps();
@@ -121,17 +124,21 @@ fn diverges(
         assert_finite(&label, &state.dq);
         let c = outcome.constraints;
         assert_finite(&label, &[c.joint_pos, c.joint_vel, c.ee, c.link]);
-        let diverged = episode.divergence();
+        let divergence = episode.divergence();
         assert_eq!(
-            diverged.is_some(),
+            divergence.is_some(),
             outcome.end == Some(EpisodeEnd::AgentFault),
             "{label}"
         );
-        if let Some(divergence) = diverged {
-            assert_eq!(divergence.by, [true, false], "{label}: {divergence:?}");
+        if let Some(divergence) = divergence {
+            assert_eq!(
+                divergence.robots_at_fault,
+                [true, false],
+                "{label}: {divergence:?}"
+            );
         }
         if outcome.end.is_some() || step >= 120 {
-            return diverged.is_some();
+            return divergence.is_some();
         }
     }
 }
@@ -153,8 +160,9 @@ fn episodes_stay_finite_for_hostile_commands() {
         for task in Task::ALL {
             for interpolation in interpolations() {
                 for habit in HABITS {
+                    // The protocol's limit, and a size near the limits of joint positions and velocities.
                     for size in [ACTION_LIMIT, 30.0] {
-                        if diverges(bounds, &plant, task, interpolation, habit, size) {
+                        if play_diverges(bounds, &plant, task, interpolation, habit, size) {
                             diverged += 1;
                         } else {
                             played += 1;
@@ -167,7 +175,7 @@ fn episodes_stay_finite_for_hostile_commands() {
         (diverged, played)
     };
     let (diverged, played) = count(NARROW);
-    // Both cases must occur, or the test is void.
+    // Both cases must occur, or the test proves nothing.
     assert!(diverged > 0 && played > 0);
     assert!(count(Bounds::WIDE).1 > played);
 }
@@ -177,7 +185,7 @@ fn divergence_in_a_game_names_the_hostile_robot() {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(12);
     let plant = Plant::for_factors(Factors::ALL, &settings, seed.model_mismatch());
-    let mut rallies = 0;
+    let mut diverged_rallies = 0;
     for interpolation in interpolations() {
         for habit in HABITS {
             for hostile in 0..2 {
@@ -190,7 +198,7 @@ fn divergence_in_a_game_names_the_hostile_robot() {
                 })
                 .with_bounds(NARROW);
                 let label = format!("interpolation {interpolation}, {habit:?}, robot {hostile}");
-                let mut stream = Stream::new(&seed, &label);
+                let mut stream = RandomStream::new(&seed, &label);
                 for step in 0..60 {
                     let actions = [0, 1].map(|robot| {
                         let observation = game.observation(robot);
@@ -214,14 +222,14 @@ fn divergence_in_a_game_names_the_hostile_robot() {
                     if let Some(RallyEnd::Diverged { by }) = outcome.rally_end {
                         assert_eq!(by, [0, 1].map(|robot| robot == hostile), "{label}");
                         assert_eq!(game.referee().score(), [0, 0], "{label}");
-                        rallies += 1;
+                        diverged_rallies += 1;
                         break;
                     }
                 }
             }
         }
     }
-    assert!(rallies > 0);
+    assert!(diverged_rallies > 0);
 }
 
 #[test]
@@ -238,11 +246,11 @@ fn diverged_world_stops() {
         seed,
     )
     .with_bounds(NARROW);
-    let mut stream = Stream::new(&seed, "unused");
-    let mut push = |episode: &mut Episode| {
+    let mut stream = RandomStream::new(&seed, "unused");
+    let mut step = |episode: &mut Episode| {
         let observation = episode.observation();
         let action = action(
-            Habit::Pumping,
+            Habit::Amplifying,
             ACTION_LIMIT,
             interpolation,
             0,
@@ -253,11 +261,11 @@ fn diverged_world_stops() {
     };
     while episode.divergence().is_none() {
         assert!(episode.steps() < 500, "it does not diverge");
-        push(&mut episode);
+        step(&mut episode);
     }
     let (state, divergence) = (episode.state(), episode.divergence());
     assert!(state.dq.iter().all(|dq| dq.abs() <= NARROW.joint_rad_s));
-    push(&mut episode);
+    step(&mut episode);
     assert_eq!((episode.state(), episode.divergence()), (state, divergence));
 }
 

@@ -1,4 +1,6 @@
-//! The controller's model (REFERENCE, `kinematics`).
+//! Kinematics and dynamics of the controller's model (seven joints, no mallet) match the recording `kinematics` of the *reference*, the
+//! challenge's own simulator. Matrices are row-major; the Jacobian has rows for the end effector's linear (m/s) and angular (rad/s)
+//! velocity.
 
 use crate::reference::{array, flat, max_difference, recording};
 use faceoff_sim::{
@@ -22,13 +24,13 @@ fn positions_rotations_and_jacobian_match() {
             assert!(max_difference(&position, &frame.origin.lane(0)) < 1e-6);
             assert!(max_difference(&rotation, &frame.rotation(0)) < 1e-6);
         }
-        let mut jacobian = [0.0; 42];
+        let mut jacobian = [0.0; 6 * JOINTS];
         for joint in 0..JOINTS {
-            let linear = kinematics.axes[joint].at(ee.origin).lane(0);
+            let linear = kinematics.axes[joint].velocity_at(ee.origin).lane(0);
             let angular = kinematics.axes[joint].angular.lane(0);
             for row in 0..3 {
-                jacobian[7 * row + joint] = linear[row];
-                jacobian[7 * (row + 3) + joint] = angular[row];
+                jacobian[JOINTS * row + joint] = linear[row];
+                jacobian[JOINTS * (row + 3) + joint] = angular[row];
             }
         }
         assert!(max_difference(&flat(&case["jac_ee"]), &jacobian) < 1e-6);
@@ -47,13 +49,13 @@ fn mass_matrix_bias_and_gravity_match() {
         assert!(max_difference(&flat(&case["bias"]), &bias) < 1e-5);
         assert!(max_difference(&flat(&case["gravity"]), &gravity) < 1e-5);
         // Column by column: the torque of a unit acceleration, less gravity.
-        let mut mass = [0.0; 49];
+        let mut mass = [0.0; JOINTS * JOINTS];
         for joint in 0..JOINTS {
             let mut ddq = zero;
             ddq[joint] = 1.0;
             let torque = controller_torques(&kinematics, &bodies, &zero, &ddq);
             for row in 0..JOINTS {
-                mass[7 * row + joint] = torque[row] - gravity[row];
+                mass[JOINTS * row + joint] = torque[row] - gravity[row];
             }
         }
         assert!(max_difference(&flat(&case["M"]), &mass) < 1e-5);

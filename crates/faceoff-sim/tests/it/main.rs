@@ -1,4 +1,4 @@
-//! Tests of the simulator against the reference's recordings and its own guarantees.
+//! Tests of the simulator: against recordings of the *reference* (the challenge's own simulator), and of its own guarantees.
 
 #![expect(
     clippy::print_stdout,

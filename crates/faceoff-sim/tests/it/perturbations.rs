@@ -1,4 +1,5 @@
-//! Statistics of the factors, and their independence: no factor changes another factor's draws (RULES).
+//! The perturbations have the statistics of the rules (`docs/rules.md`, "Perturbations"), and they are independent: no *factor* (kind of
+//! perturbation) changes the random numbers of another.
 
 use faceoff_sim::{
     Episode, Interpolation, PerturbationSettings, Plant,
@@ -6,13 +7,14 @@ use faceoff_sim::{
     perturbation::{
         disturbance::Disturbance, noise::ObservationNoise, tracking_loss::TrackingLoss,
     },
-    stream::Stream,
+    stream::RandomStream,
     table::puck::Puck,
 };
 use faceoff_types::{Factor, Factors, Seed, Task};
 
-fn stream(label: &str) -> Stream {
-    Stream::new(&Seed::from_number(42), label)
+/// A stream of random numbers with an arbitrary seed.
+fn stream(label: &str) -> RandomStream {
+    RandomStream::new(&Seed::from_number(42), label)
 }
 
 fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
@@ -24,6 +26,7 @@ fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     )
 }
 
+/// An action that holds the initial position: seven positions, rad, and seven velocities, rad/s.
 fn hold() -> [f64; 14] {
     let mut action = [0.0; 14];
     action[..7].copy_from_slice(&INITIAL_Q);
@@ -52,6 +55,7 @@ fn noise_has_the_deviations_of_the_rules() {
             observation
         })
         .collect();
+    // Standard deviations of puck pose and velocity, joint positions and joint velocities.
     let expected: Vec<f64> = [1e-3, 1e-3, 0.02, 0.1, 0.1, 0.1]
         .into_iter()
         .chain([1e-4; 7])
@@ -74,21 +78,23 @@ fn noise_has_the_deviations_of_the_rules() {
 #[test]
 fn air_flow_is_stationary_with_its_correlation_time() {
     let settings = PerturbationSettings::default().disturbance;
+    // At a speed of 1 m/s the force (N) is the process itself (N per m/s), from the first substep on.
     let puck = Puck::from_state([0.0, 0.0, 0.0, 0.6, 0.8, 0.0]);
-    let mut first = vec![];
+    let mut first_forces = vec![];
+    // Of forces that are one correlation time (0.2 s, 200 substeps) apart.
     let (mut products, mut squares) = (0.0, 0.0);
     for index in 0..400 {
         let seed = Seed::from_number(index);
-        let mut air = Disturbance::new(&settings, Stream::new(&seed, "disturbance"));
+        let mut air = Disturbance::new(&settings, RandomStream::new(&seed, "disturbance"));
         let forces: Vec<[f64; 2]> = (0..2_000).map(|_| air.force(&puck)).collect();
-        first.extend(forces[0]);
+        first_forces.extend(forces[0]);
         for k in 0..1_800 {
             products += forces[k][0] * forces[k + 200][0];
             squares += forces[k][0] * forces[k][0];
         }
     }
-    // At 1 m/s the force is the process itself, from the first substep on.
-    let (mean, deviation) = mean_and_deviation(&first);
+    // The rules: standard deviation 4 mN per m/s.
+    let (mean, deviation) = mean_and_deviation(&first_forces);
     assert!(mean.abs() < 0.000_8, "{mean}");
     assert!((deviation / 0.004 - 1.0).abs() < 0.12, "{deviation}");
     let deviation = (squares / (400.0 * 1_800.0)).sqrt();
@@ -108,31 +114,32 @@ fn air_flow_is_stationary_with_its_correlation_time() {
 fn tracking_loss_has_the_rate_and_length_of_the_rules() {
     let settings = PerturbationSettings::default().tracking_loss;
     let mut tracking = TrackingLoss::new(&settings, stream("tracking_loss"));
-    let (mut tracked, mut losses, mut runs) = (0u32, 0u32, vec![]);
-    let mut run = 0u32;
+    let (mut tracked_steps, mut losses, mut lengths) = (0u32, 0u32, vec![]);
+    // Length of the current loss, control steps.
+    let mut length = 0u32;
     for _ in 0..400_000 {
         if tracking.advance() {
-            losses += u32::from(run == 0);
-            run += 1;
+            losses += u32::from(length == 0);
+            length += 1;
         } else {
-            if run > 0 {
-                runs.push(run);
+            if length > 0 {
+                lengths.push(length);
             }
-            run = 0;
-            tracked += 1;
+            length = 0;
+            tracked_steps += 1;
         }
     }
-    // Per tracked step; a step at which a loss begins was tracked until then.
-    let rate = f64::from(losses) / f64::from(tracked + losses);
+    // The rules: a tracked puck is lost with probability 0.03 per control step, for 5 to 20 steps.
+    let rate = f64::from(losses) / f64::from(tracked_steps + losses);
     assert!((rate - 0.03).abs() < 0.002, "{rate}");
-    // Consecutive losses count as one run here, so a few are longer than 20.
-    assert_eq!(runs.iter().min(), Some(&5));
-    let single: Vec<f64> = runs
+    // Consecutive losses count as one here, so a few are longer than 20.
+    assert_eq!(lengths.iter().min(), Some(&5));
+    let single_lengths: Vec<f64> = lengths
         .iter()
-        .filter(|run| **run <= 20)
-        .map(|run| f64::from(*run))
+        .filter(|length| **length <= 20)
+        .map(|length| f64::from(*length))
         .collect();
-    let (mean, _) = mean_and_deviation(&single);
+    let (mean, _) = mean_and_deviation(&single_lengths);
     assert!((mean - 12.5).abs() < 0.3, "{mean}");
 }
 
@@ -180,7 +187,7 @@ fn factor_does_not_change_draws_of_other_factors() {
             assert_eq!(alone.observation(), together.observation());
         }
     }
-    // The air flow's draws do not depend on the noise's: the worlds agree bit for bit.
+    // The air flow's draws do not depend on the other factors: the worlds agree bit for bit.
     let air = Factors::only(Factor::Disturbance);
     let mut alone = episode(Task::Defend, air, 5);
     let mut together = episode(Task::Defend, Factors::ALL, 5);
@@ -207,7 +214,7 @@ fn mismatched_plants_sag_by_five_to_ten_millimetres() {
         assert_ne!(plant, Plant::nominal());
     }
     let nominal = Plant::nominal().largest_static_error();
-    // The mallet's weight alone, with the arm stretched out.
+    // The nominal arm sags by the mallet's weight alone, which the controller's model does not contain.
     assert!((0.002..0.010).contains(&nominal), "{nominal}");
 }
 
@@ -221,7 +228,7 @@ fn initial_states_fill_the_ranges_of_the_rules() {
             values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         )
     };
-    let near = |(low, high): (f64, f64), expected: [f64; 2]| {
+    let assert_fills = |(low, high): (f64, f64), expected: [f64; 2]| {
         let slack = 0.01 * (expected[1] - expected[0]);
         assert!(
             low >= expected[0] && low < expected[0] + slack,
@@ -232,38 +239,39 @@ fn initial_states_fill_the_ranges_of_the_rules() {
             "{high} {expected:?}"
         );
     };
-    near(
+    assert_fills(
         range(states(Task::Hit).map(|p| p[0]).collect()),
         [-0.7, -0.2],
     );
-    near(
+    assert_fills(
         range(states(Task::Hit).map(|p| p[1]).collect()),
         [-0.39105, 0.39105],
     );
-    near(
+    assert_fills(
         range(states(Task::Hit).map(|p| p[3].hypot(p[4])).collect()),
         [0.0, 0.5],
     );
-    near(
+    assert_fills(
         range(states(Task::Hit).map(|p| p[5]).collect()),
         [-2.0, 2.0],
     );
-    near(
+    assert_fills(
         range(states(Task::Defend).map(|p| p[0]).collect()),
         [0.29, 0.65],
     );
-    near(
+    assert_fills(
         range(states(Task::Defend).map(|p| p[3].hypot(p[4])).collect()),
         [1.0, 3.0],
     );
-    near(
+    assert_fills(
         range(states(Task::Defend).map(|p| (p[4]).atan2(-p[3])).collect()),
         [-0.5, 0.5],
     );
     let prepare: Vec<[f64; 6]> = states(Task::Prepare).collect();
-    let side = prepare.iter().filter(|p| p[0] >= -0.8).count() as f64 / 2_000.0;
-    // 0.6 × 0.0943 against 0.14 × 0.36035.
-    assert!((side - 0.5286).abs() < 0.06, "{side}");
+    // Share of the pucks that start in the strip along the side.
+    let side_share = prepare.iter().filter(|p| p[0] >= -0.8).count() as f64 / 2_000.0;
+    // The areas of the strips: 0.6 m × 0.0943 m along the side, 0.14 m × 0.36035 m in the corner.
+    assert!((side_share - 0.5286).abs() < 0.06, "{side_share}");
     for p in &prepare {
         let least = if p[0] >= -0.8 { 0.39105 } else { 0.125 };
         assert!((least..=0.48535).contains(&p[1].abs()) && (-0.94..=-0.2).contains(&p[0]));

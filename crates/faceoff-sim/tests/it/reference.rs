@@ -1,4 +1,4 @@
-//! Reads the recordings of the reference simulator.
+//! Reads the recordings of the *reference*, the challenge's own simulator (`tests/reference/`), and compares lists of numbers.
 
 use serde_json::Value;
 use std::{fs::File, io::Read, path::Path};
@@ -42,7 +42,7 @@ pub fn max_difference(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A quantile of a list, 0 … 1.
+/// A quantile of a list, e.g. the median for `q` = 0.5. Sorts the list.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     values[((values.len() - 1) as f64 * q).round() as usize]

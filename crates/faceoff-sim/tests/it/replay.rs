@@ -1,4 +1,6 @@
-//! Replays of the recordings, for the tests and for the plots in the documentation.
+//! Repeats in the simulator what recordings of the *reference* (the challenge's own simulator) contain: bounces, impacts and whole
+//! episodes. The tests and `examples/fidelity.rs` compare the results. `docs/simulator.md` ("Compared with recordings") lists the
+//! recordings. States of the puck are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
 
 use crate::reference::{array, flat, max_difference, recording, rows};
 use faceoff_sim::{
@@ -6,13 +8,16 @@ use faceoff_sim::{
 };
 use faceoff_types::{Factors, Seed, Task};
 
-const PUCK_RADIUS: f64 = 0.03165;
-const MALLET_RADIUS: f64 = 0.04815;
+const PUCK_RADIUS_M: f64 = 0.03165;
+const MALLET_RADIUS_M: f64 = 0.04815;
 
-/// Change of velocity in a control step, m/s, beyond which the puck has hit something.
-const SHARP_M_S: f64 = 0.02;
+/// Free damping divides the puck's velocity by this number in each substep of 1 ms.
+const DAMPING_DIVISOR: f64 = 1.0005;
 
-/// The puck's states, one per ms, robot 1 holding its initial pose.
+/// Change of velocity in a control step, m/s, from which on the puck has hit something.
+const SHARP_CHANGE_M_S: f64 = 0.02;
+
+/// Simulates a puck from its state `init`, while robot 1 holds its initial pose. Returns `rows` states, one per ms.
 pub fn slide(init: [f64; 6], rows: usize) -> Vec<[f64; 6]> {
     let mut world = World::with_robots(&Plant::nominal(), 1, init);
     let mut states = vec![init];
@@ -23,51 +28,54 @@ pub fn slide(init: [f64; 6], rows: usize) -> Vec<[f64; 6]> {
     states
 }
 
-/// First row whose velocity differs from the free slide's by more than rounding.
+/// Index of the first state whose velocity differs by more than rounding from that of a free slide: the puck has touched something.
 pub fn first_touch(states: &[[f64; 6]]) -> Option<usize> {
     (1..states.len()).find(|&k| {
         let (before, after) = (states[k - 1], states[k]);
-        (0..2).any(|i| (after[3 + i] - before[3 + i] / 1.0005).abs() > 1e-6 + 1e-7)
+        (0..2).any(|i| (after[3 + i] - before[3 + i] / DAMPING_DIVISOR).abs() > 1e-6 + 1e-7)
     })
 }
 
-/// m/s.
+/// Linear speed of a puck, m/s.
 pub fn speed(state: &[f64; 6]) -> f64 {
     state[3].hypot(state[4])
 }
 
-/// A bounce off a rim (`rim_bounce`).
+/// A bounce off a rim, a wall of the table (recording `rim_bounce`), as recorded and as simulated.
 pub struct Bounce {
+    /// Name of the group of bounces, e.g. `corner`.
     pub kind: String,
+    /// States of the puck, one per ms.
     pub recorded: Vec<[f64; 6]>,
     pub simulated: Vec<[f64; 6]>,
 }
 
 impl Bounce {
-    /// The row at which the bounce is judged: after 30 ms at a wall, otherwise 8 ms after the first touch.
-    pub fn judged_row(&self) -> usize {
+    /// Index of the state that is compared: after 30 ms at a wall, otherwise 8 ms after the first touch.
+    pub fn compared_row(&self) -> usize {
         match self.kind.as_str() {
             "wall" | "wall_spin" => 30,
             _ => first_touch(&self.recorded).map_or(0, |k| (k + 8).min(self.recorded.len() - 1)),
         }
     }
 
-    /// Differences of the velocity and of r·spin over the speed before.
+    /// Differences of velocity and of spin times radius, both divided by the speed before the bounce.
     pub fn errors(&self) -> (f64, f64) {
         let mut before = speed(&self.recorded[0]);
         if self.kind.starts_with("wall") {
-            before = before.max(PUCK_RADIUS * self.recorded[0][5].abs());
+            before = before.max(PUCK_RADIUS_M * self.recorded[0][5].abs());
         }
         let (simulated, recorded) = (
-            self.simulated[self.judged_row()],
-            self.recorded[self.judged_row()],
+            self.simulated[self.compared_row()],
+            self.recorded[self.compared_row()],
         );
         let velocity = (simulated[3] - recorded[3]).hypot(simulated[4] - recorded[4]);
-        let spin = PUCK_RADIUS * (simulated[5] - recorded[5]).abs();
+        let spin = PUCK_RADIUS_M * (simulated[5] - recorded[5]).abs();
         (velocity / before, spin / before)
     }
 }
 
+/// Simulates all recorded bounces.
 pub fn bounces() -> Vec<Bounce> {
     let replay = |case: &serde_json::Value| {
         let recorded: Vec<[f64; 6]> = rows(&case["state"]);
@@ -86,23 +94,27 @@ pub fn bounces() -> Vec<Bounce> {
         .collect()
 }
 
-/// A mallet's impact on the puck (`mallet_impact`): differences at the end.
+/// Differences between a recorded impact of a mallet on the puck (recording `mallet_impact`) and the simulated one, at the end.
 pub struct Impact {
+    /// Name of the group of impacts, e.g. `override_…`.
     pub kind: String,
-    /// Velocity over the peak speed.
-    pub velocity: f64,
-    pub position_m: f64,
+    /// Difference of the puck's velocity, divided by its recorded peak speed.
+    pub velocity_error: f64,
+    /// Distance of the pucks, m.
+    pub position_error_m: f64,
 }
 
 impl Impact {
     /// Is the mallet moved by the simulated arm? Otherwise its motion is imposed.
-    pub fn by_arm(&self) -> bool {
+    pub fn is_moved_by_arm(&self) -> bool {
         self.kind.starts_with("realarm")
     }
 }
 
+/// Simulates all recorded impacts.
 pub fn impacts() -> Vec<Impact> {
     let replay = |case: &serde_json::Value| {
+        // One row per ms: position (3) and velocity (2) of the mallet, state of the puck (6).
         let recorded: Vec<[f64; 11]> = rows(&case["rows"]);
         let kind = case["kind"].as_str().unwrap();
         let mut world = World::with_robots(&Plant::nominal(), 1, array(&case["puck_init"]));
@@ -129,8 +141,8 @@ pub fn impacts() -> Vec<Impact> {
         let last = puck(recorded.len() - 1);
         Impact {
             kind: kind.to_owned(),
-            velocity: (simulated[3] - last[3]).hypot(simulated[4] - last[4]) / peak,
-            position_m: (simulated[0] - last[0]).hypot(simulated[1] - last[1]),
+            velocity_error: (simulated[3] - last[3]).hypot(simulated[4] - last[4]) / peak,
+            position_error_m: (simulated[0] - last[0]).hypot(simulated[1] - last[1]),
         }
     };
     let recording = recording("mallet_impact");
@@ -142,14 +154,15 @@ pub fn impacts() -> Vec<Impact> {
         .collect()
 }
 
-/// A whole episode with its recorded actions replayed open loop (`episodes_*`): differences per control
-/// step.
+/// A recorded episode (recordings `episodes_*`) that is simulated with its recorded actions, whatever the simulated puck does, and the
+/// differences between the two.
 pub struct Replay {
+    /// Task and index of the episode, e.g. `hit 7`.
     pub name: String,
     /// First control step in which the recorded puck hit something.
-    pub impact: usize,
-    /// First control step in which robot 1's mallet may have touched the puck.
-    pub contact: usize,
+    pub first_impact_step: usize,
+    /// First control step in which robot 1's mallet may have touched the puck; `usize::MAX` if it never may have.
+    pub first_contact_step: usize,
     pub steps: Vec<StepDifferences>,
     /// The puck after each control step, as recorded.
     pub recorded_puck: Vec<[f64; 6]>,
@@ -157,17 +170,20 @@ pub struct Replay {
     pub puck: Vec<[f64; 6]>,
 }
 
-/// Largest differences after a control step; for the observation, before it.
+/// Differences between a recorded and a simulated control step; of several numbers the largest.
 pub struct StepDifferences {
+    /// Observations before the step; mixed units.
     pub observation: f64,
-    /// rad.
+    /// Positions of the driven joints after the step.
     pub joints_rad: f64,
+    /// Constraint values after the step; mixed units.
     pub constraints: f64,
+    /// Distance of the pucks after the step.
     pub puck_m: f64,
 }
 
 impl Replay {
-    /// The largest value over some control steps.
+    /// The largest `value` over the control steps for which `steps` is true.
     pub fn largest(
         &self,
         steps: impl Fn(usize) -> bool,
@@ -184,18 +200,18 @@ impl Replay {
 
 /// Replays the episodes of all tasks.
 pub fn episodes() -> Vec<Replay> {
-    let of_task = |task: Task| {
+    let replays_of_task = |task: Task| {
         let recording = recording(&format!("episodes_{task}"));
         let cases = recording["episodes"].as_array().unwrap().clone();
         cases
             .into_iter()
             .enumerate()
-            .map(move |(index, case)| episode(task, index, &case))
+            .map(move |(index, case)| replay_episode(task, index, &case))
     };
-    Task::ALL.into_iter().flat_map(of_task).collect()
+    Task::ALL.into_iter().flat_map(replays_of_task).collect()
 }
 
-fn episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
+fn replay_episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
     let init: [f64; 6] = array(&case["puck_init"]);
     let puck: Vec<[f64; 6]> = rows(&case["puck"]);
     let q_dq: Vec<[f64; 14]> = rows(&case["q_dq"]);
@@ -211,15 +227,15 @@ fn episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
     );
     let mut replay = Replay {
         name: format!("{task} {index}"),
-        impact: first_sharp_change(&init, &puck),
-        contact: usize::MAX,
+        first_impact_step: first_sharp_change(&init, &puck),
+        first_contact_step: usize::MAX,
         steps: vec![],
         recorded_puck: puck.clone(),
         puck: vec![],
     };
     for step in 0..puck.len() {
         if may_touch(&episode.world().mallet(0), &episode.state().puck) {
-            replay.contact = replay.contact.min(step);
+            replay.first_contact_step = replay.first_contact_step.min(step);
         }
         let observation = max_difference(&flat(&case["obs"][step]), episode.observation());
         let outcome = episode.step(&flat(&case["action"][step]));
@@ -241,24 +257,25 @@ fn episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
     replay
 }
 
-/// First control step in which the puck hit something, judged on the recording.
+/// The first control step in which the puck hit something: its velocity changed by more than free damping does. The number of steps, if
+/// there is none.
 fn first_sharp_change(init: &[f64; 6], puck: &[[f64; 6]]) -> usize {
-    // Free damping over a control step.
-    let decay = 1.0005f64.powi(-20);
+    // Free damping over a control step of 20 ms.
+    let decay = DAMPING_DIVISOR.powi(-20);
     let mut before = *init;
     puck.iter()
         .position(|after| {
             let change = (after[3] - before[3] * decay).hypot(after[4] - before[4] * decay);
             before = *after;
-            change > SHARP_M_S
+            change > SHARP_CHANGE_M_S
         })
         .unwrap_or(puck.len())
 }
 
-/// Whether robot 1's mallet may touch the puck within a control step: closer than their radii and
-/// what they can travel.
+/// May robot 1's mallet touch the puck within a control step? It may if they are closer than their radii, the distance that they
+/// travel in the step, and 1 mm.
 fn may_touch(mallet: &MalletState, puck: &[f64; 6]) -> bool {
     let distance = (mallet.position[0] - puck[0]).hypot(mallet.position[1] - puck[1]);
     let speed = (mallet.velocity[0] - puck[3]).hypot(mallet.velocity[1] - puck[4]);
-    distance < PUCK_RADIUS + MALLET_RADIUS + 0.02 * speed + 0.001
+    distance < PUCK_RADIUS_M + MALLET_RADIUS_M + 0.02 * speed + 0.001
 }

@@ -20,6 +20,7 @@ fn assert_documented(expected: &str) {
     );
 }
 
+/// A number as the document writes it.
 fn number(x: f64) -> String {
     let text = if x != 0.0 && x.abs() < 1e-4 {
         format!("{x:e}")
@@ -29,6 +30,7 @@ fn number(x: f64) -> String {
     text.replace('-', "−")
 }
 
+/// Numbers as the document writes them, separated by commas.
 fn numbers(xs: &[f64]) -> String {
     xs.iter().map(|&x| number(x)).collect::<Vec<_>>().join(", ")
 }
@@ -36,19 +38,19 @@ fn numbers(xs: &[f64]) -> String {
 #[test]
 fn link_table_matches_the_model() {
     for (i, link) in LINKS.iter().enumerate() {
-        let at = match link.offset {
+        let position = match link.offset {
             Offset::Y(y) => [0.0, y, 0.0],
             Offset::Z(z) => [0.0, 0.0, z],
         };
-        let turn = match link.mount {
+        let rotation = match link.mount {
             Mount::Aligned => "none",
             Mount::HalfTurnYz => "half, about y + z",
             Mount::QuarterTurnX => "quarter, about x",
         };
         assert_documented(&format!(
-            "| {} | {} | {turn} | {} | {} | {} |",
+            "| {} | {} | {rotation} | {} | {} | {} |",
             i + 1,
-            numbers(&at),
+            numbers(&position),
             number(link.mass_kg),
             numbers(&link.centre_m),
             numbers(&link.inertia_kg_m2),
@@ -134,10 +136,10 @@ fn tool_start_pose_and_table_match_the_model() {
 
 #[test]
 fn quoted_measurements_match_the_simulator() {
-    let quiet = [0.8, 0.4, 0.0, 0.0, 0.0, 0.0];
-    let mut world = World::with_robots(&Plant::nominal(), 1, quiet);
+    let puck_out_of_reach = [0.8, 0.4, 0.0, 0.0, 0.0, 0.0];
+    let mut world = World::with_robots(&Plant::nominal(), 1, puck_out_of_reach);
     let [x, _, z] = world.kinematics(0).end_effector.origin.lane(0);
-    run(&mut world, 2000);
+    hold_for(&mut world, 2000);
     let [sagged_x, _, sagged_z] = world.kinematics(0).end_effector.origin.lane(0);
     assert_documented(&format!(
         "{:.1} mm lower and {:.1} mm nearer",
@@ -146,7 +148,8 @@ fn quoted_measurements_match_the_simulator() {
     ));
 
     let mut world = World::with_robots(&Plant::nominal(), 1, [-0.5, 0.4, 0.0, 1.0, 0.0, 10.0]);
-    run(&mut world, 1000);
+    hold_for(&mut world, 1000);
+    // It started with 1 m/s and 10 rad/s.
     let [vx, _, spin] = world.puck().velocity;
     assert_documented(&format!(
         "{:.0} % of its speed and {:.0} % of its spin after a second",
@@ -164,13 +167,14 @@ fn quoted_measurements_match_the_simulator() {
     ));
     assert_documented(&format!("{:.2} of its speed along the rim", mean(&along)));
 
-    let shares: Vec<f64> = [0.5, 1.0, 2.0, 3.0].map(mallet_bounce).to_vec();
+    let speed_ratios: Vec<f64> = [0.5, 1.0, 2.0, 3.0].map(mallet_bounce).to_vec();
     let [least, most] =
-        [f64::min, f64::max].map(|reduce| shares.iter().copied().reduce(reduce).unwrap());
+        [f64::min, f64::max].map(|reduce| speed_ratios.iter().copied().reduce(reduce).unwrap());
     assert_documented(&format!("{least:.2} to {most:.2} of the puck's speed"));
 }
 
-fn run(world: &mut World, duration_ms: usize) {
+/// Simulates some milliseconds, in which the arm holds its position.
+fn hold_for(world: &mut World, duration_ms: usize) {
     for ms in 0..duration_ms {
         if ms % SUBSTEPS == 0 {
             world.hold(0, Interpolation::Cubic);
@@ -196,31 +200,31 @@ fn rim_bounces() -> (Vec<f64>, Vec<f64>) {
                 if is_free(&world) {
                     before = *world.puck();
                 }
-                run(&mut world, 1);
+                hold_for(&mut world, 1);
                 ms += 1;
                 assert!(ms < 1000, "the puck does not come back");
             }
             let after = world.puck();
-            let share = |axis: usize| (after.velocity[axis] / before.velocity[axis]).abs();
-            (share(1), share(0))
+            let ratio = |axis: usize| (after.velocity[axis] / before.velocity[axis]).abs();
+            (ratio(1), ratio(0))
         })
         .unzip()
 }
 
-/// Ratio of the puck's speed after a head-on impact with the mallet of the held arm.
+/// Ratio of the puck's speeds after and before a head-on impact, at `speed` m/s, on the mallet of an arm that holds its position.
 fn mallet_bounce(speed: f64) -> f64 {
     let mut world = World::with_robots(&Plant::nominal(), 1, [-0.6, 0.0, 0.0, -speed, 0.0, 0.0]);
-    let touch = |world: &World| {
+    let is_touching = |world: &World| {
         let mallet = world.mallet(0).position[0];
         world.puck().pose[0] - mallet < PUCK.radius_m + TOOL.cylinder_radius_m + 1e-3
     };
     let mut before = speed;
     let mut ms = 0;
-    while world.puck().velocity[0] < 0.0 || touch(&world) {
-        if !touch(&world) {
+    while world.puck().velocity[0] < 0.0 || is_touching(&world) {
+        if !is_touching(&world) {
             before = -world.puck().velocity[0];
         }
-        run(&mut world, 1);
+        hold_for(&mut world, 1);
         ms += 1;
         assert!(ms < 2000, "the puck does not come back");
     }

@@ -7,6 +7,7 @@ use faceoff_wire::{
     answer::{parse_act, parse_ready, parse_reset_ready},
 };
 
+/// The control step that the lines answer.
 const STEP: u32 = 4;
 const STEP_TEXT: &str = "4";
 
@@ -38,7 +39,7 @@ fn assert_wrong_message(line: &str, expected_got: &str) {
 
 #[track_caller]
 fn assert_wrong_shape(action: &str, expected_got: &str) {
-    match parse(&act("4", action)) {
+    match parse(&act(STEP_TEXT, action)) {
         Err(AgentFaultKind::WrongShape { expected, got }) => {
             assert_eq!((expected.as_str(), got.as_str()), ("[2][7]", expected_got));
         }
@@ -94,10 +95,10 @@ fn all_action_shapes_are_read() {
         (Some(-1), nest(2, &row("1"))),
         (None, nest(20, &nest(3, &row("1")))),
     ] {
-        let code = Interpolation::from_code(code).unwrap();
+        let interpolation = Interpolation::from_code(code).unwrap();
         let mut action = Vec::new();
-        parse_act(act("0", &text).as_bytes(), 0, code, &mut action).unwrap();
-        assert_eq!(action.len(), code.len(), "{code}");
+        parse_act(act("0", &text).as_bytes(), 0, interpolation, &mut action).unwrap();
+        assert_eq!(action.len(), interpolation.len(), "{interpolation}");
     }
 }
 

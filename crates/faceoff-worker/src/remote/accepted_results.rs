@@ -1,4 +1,5 @@
-//! Accepts results of remote workers after checking them.
+//! Accepts results of remote workers after checking them. Results arrive as messages of NATS, a message broker, which
+//! delivers a message again until it is acknowledged.
 
 use super::{
     dispatch::{Dispatcher, POLL_INTERVAL},
@@ -35,22 +36,23 @@ const MAX_LOOKUPS: usize = 16;
 const MAX_REASON_CHARS: usize = 500;
 
 impl Dispatcher {
-    /// Accepts results until the shutdown. Fetches no more than can be checked at once: NATS would deliver a waiting result
-    /// again after a while.
+    /// Accepts results until the shutdown.
     pub(super) async fn accept_results(
         self: &Arc<Self>,
         shutdown: &CancellationToken,
     ) -> anyhow::Result<()> {
         let mut checks = JoinSet::new();
-        let mut ended = self.fetch(&mut checks, shutdown).await;
+        let mut result = self.fetch_results(&mut checks, shutdown).await;
         // Running checks are completed even if no more results can be fetched.
         while let Some(done) = checks.join_next().await {
-            ended = ended.and(join_result(Some(done)));
+            result = result.and(join_result(Some(done)));
         }
-        ended
+        result
     }
 
-    async fn fetch(
+    /// Fetches results and starts their checks. It fetches no more results than can be checked at once: NATS would deliver a
+    /// waiting result again after a while.
+    async fn fetch_results(
         self: &Arc<Self>,
         checks: &mut JoinSet<anyhow::Result<()>>,
         shutdown: &CancellationToken,
@@ -91,8 +93,11 @@ impl Dispatcher {
     }
 
     /// Renews the leases of pending results, since their slots run other jobs. A job whose result NATS has lost is released.
-    pub(super) async fn keep_pending(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
-        let every = Duration::from_secs(self.server.lease_s.into()) / 3;
+    pub(super) async fn renew_pending_results(
+        &self,
+        shutdown: &CancellationToken,
+    ) -> anyhow::Result<()> {
+        let interval = Duration::from_secs(self.server.lease_s.into()) / 3;
         while !shutdown.is_cancelled() {
             let mut overdue = self.pending_results.overdue(Instant::now());
             for PendingResult {
@@ -130,13 +135,13 @@ impl Dispatcher {
             }
             tokio::select! {
                 () = shutdown.cancelled() => {}
-                () = tokio::time::sleep(every) => {}
+                () = tokio::time::sleep(interval) => {}
             }
         }
         Ok(())
     }
 
-    /// Checks and stores a result; how to acknowledge its message.
+    /// Checks and stores a result, and returns how to acknowledge its message.
     async fn accept(&self, message: &jetstream::Message) -> AckKind {
         let Some(worker) = names::worker_of(&message.subject) else {
             tracing::error!(subject = %message.subject, "a result from an unknown worker; ignored");
@@ -154,8 +159,13 @@ impl Dispatcher {
             tracing::error!(job = %id, %worker, "a worker sent a result without a valid grant; ignored");
             return AckKind::Ack;
         };
-        if !result.lease.slot.starts_with(&names::slot(&worker, "")) {
-            result.lease.slot = names::slot(&worker, "?");
+        if !result
+            .lease
+            .slot
+            .starts_with(&names::slot_holder(&worker, ""))
+        {
+            // The subject of the message names the worker; its slot is unknown.
+            result.lease.slot = names::slot_holder(&worker, "?");
         }
         let (workers, now) = (self.server.store.workers(), self.server.clock.now());
         if workers.ban_reason(worker.as_str()).is_some() {
@@ -164,7 +174,7 @@ impl Dispatcher {
         }
         let nonce = result.lease.nonce;
         // Only the worker that started the job may send its result.
-        let is_over = match self.server.store.lease_holder(id, nonce).await {
+        let is_job_over = match self.server.store.lease_holder(id, nonce).await {
             Ok(Some(holder)) if WorkerName::from_holder(&holder).as_ref() != Some(&worker) => {
                 tracing::warn!(job = %id, %worker, holder, "the worker does not have the lease; result ignored");
                 return AckKind::Ack;
@@ -187,17 +197,18 @@ impl Dispatcher {
                 .take(MAX_REASON_CHARS)
                 .collect();
         }
-        let failed = matches!(result.end, JobEnd::PlatformFault { .. });
+        let has_failed = matches!(result.end, JobEnd::PlatformFault { .. });
         let was_played = matches!(result.end, JobEnd::Done { .. });
         let record_failure = || {
             if let Some((jobs, until)) = workers.record_failure(worker.as_str(), id, now) {
                 tracing::warn!(%worker, jobs, %until, "all recent jobs of a worker failed; it gets none for a while");
             }
         };
+        // Dropped at the end of this function.
         let _processing = self.pending_results.start_processing(nonce);
         let acknowledgement = match self.check_and_store(message, grant, result).await {
             // A repeated result has no effect.
-            Ok(Acceptance::Accepted | Acceptance::Unusable) if is_over => {
+            Ok(Acceptance::Accepted | Acceptance::Unusable) if is_job_over => {
                 tracing::info!(job = %id, %worker, "the job is over already; result ignored");
                 AckKind::Ack
             }
@@ -206,7 +217,7 @@ impl Dispatcher {
                 if was_played {
                     workers.record_success(worker.as_str());
                 }
-                if failed {
+                if has_failed {
                     record_failure();
                 }
                 tracing::info!(job = %id, %worker, "result accepted");
@@ -281,12 +292,12 @@ impl Dispatcher {
             if let Err(error) = renewed.map_err(anyhow::Error::from).flatten() {
                 tracing::warn!(job = %lease.job_id, cause = format!("{error:#}"), "the lease of a result under check could not be renewed");
             }
-            // If this fails, NATS delivers the message again, which has no effect.
+            // If this notice fails, NATS delivers the message again, which has no effect.
             let _ = message.ack_with(AckKind::Progress).await;
         }
     }
 
-    /// Bans a worker: its results are ignored, and its jobs are queued again.
+    /// Bans a worker: its results are ignored, and its jobs are queued again. Returns how to acknowledge the message.
     async fn ban(&self, worker: &WorkerName, difference: &str) -> AckKind {
         let reason = format!("its recording differs from the simulation: {difference}");
         let (store, now) = (&self.server.store, self.server.clock.now());
@@ -300,7 +311,7 @@ impl Dispatcher {
                 );
                 AckKind::Ack
             }
-            // Another of its results has caused the ban at the same time.
+            // Another result of this worker has caused the ban at the same time.
             Err(StoreError::Conflict(_)) => AckKind::Ack,
             Err(error) => {
                 tracing::error!(%worker, %error, difference, "a worker could not be banned; trying again");
@@ -310,7 +321,7 @@ impl Dispatcher {
     }
 }
 
-/// The result of a spawned check.
+/// The result of a finished check; without one, there is no error.
 fn join_result(done: Option<Result<anyhow::Result<()>, JoinError>>) -> anyhow::Result<()> {
     done.map_or(Ok(()), |done| done?)
 }

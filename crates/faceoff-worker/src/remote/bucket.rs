@@ -34,8 +34,10 @@ const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 const RECHECK_AFTER: Duration = Duration::from_secs(600);
 /// Bytes in memory per part of an upload.
 const PART_BYTES: usize = 8 << 20;
-/// Largest file of a recording, in bytes; far beyond that of any shard.
-const LARGEST_BYTES: u64 = 4 << 30;
+/// Maximum number of parts that are uploaded at the same time.
+const MAX_CONCURRENT_PARTS: usize = 4;
+/// Largest accepted file of a recording, in bytes; far larger than the files of any shard.
+const MAX_RECORDING_FILE_BYTES: u64 = 4 << 30;
 
 /// Configuration of a bucket.
 #[derive(Debug, Clone)]
@@ -48,9 +50,12 @@ pub struct BucketConfig {
     pub folder: PathBuf,
 }
 
+/// A bucket, opened by the server.
 pub(super) struct Bucket {
     objects: AmazonS3,
+    /// Prefix of all keys, from the configured URL.
     prefix: Key,
+    /// Folder for partial downloads.
     folder: PathBuf,
     /// BLAKE3 of bundles, with the time when their presence was last checked.
     bundles: Mutex<HashMap<String, Instant>>,
@@ -73,8 +78,8 @@ impl HttpConnector for Connector {
 
 impl Bucket {
     pub(super) fn open(config: BucketConfig) -> anyhow::Result<Self> {
-        let named = config.url.strip_prefix("s3://").unwrap_or_default();
-        let (bucket, prefix) = named.split_once('/').unwrap_or((named, ""));
+        let path = config.url.strip_prefix("s3://").unwrap_or_default();
+        let (bucket, prefix) = path.split_once('/').unwrap_or((path, ""));
         let objects = AmazonS3Builder::from_env()
             .with_bucket_name(bucket)
             .with_http_connector(Connector(config.http))
@@ -93,9 +98,9 @@ impl Bucket {
         })
     }
 
-    /// Checks that the bucket is reachable. Jobs that are claimed without it would only be released again.
+    /// Checks that the bucket is reachable. Without the bucket, claimed jobs would only be released again.
     pub(super) async fn probe(&self) -> anyhow::Result<()> {
-        match self.objects.head(&self.bundle("probe")).await {
+        match self.objects.head(&self.bundle_key("probe")).await {
             Ok(_) | Err(object_store::Error::NotFound { .. }) => Ok(()),
             Err(error) => Err(error).context("reaching the bucket"),
         }
@@ -109,7 +114,7 @@ impl Bucket {
     ) -> anyhow::Result<ObjectLinks> {
         let mut bundles = BTreeMap::new();
         for bundle in &grant.bundles {
-            let key = self.bundle(&bundle.blake3);
+            let key = self.bundle_key(&bundle.blake3);
             self.ensure_uploaded(bundle, &key, artifacts)
                 .await
                 .with_context(|| format!("putting a bundle into the bucket, at {key}"))?;
@@ -121,7 +126,7 @@ impl Bucket {
         }
         let mut files = BTreeMap::new();
         for name in writable_files(grant) {
-            let key = self.file(grant.nonce, name);
+            let key = self.file_key(grant.nonce, name);
             let link = self
                 .objects
                 .signed_url(Method::PUT, &key, LINK_VALIDITY)
@@ -156,7 +161,7 @@ impl Bucket {
                     if bytes == 0 {
                         break;
                     }
-                    upload.wait_for_capacity(4).await?;
+                    upload.wait_for_capacity(MAX_CONCURRENT_PARTS).await?;
                     upload.write(&part[..bytes]);
                 }
                 upload.finish().await?;
@@ -174,31 +179,31 @@ impl Bucket {
         artifacts: &Artifacts,
     ) -> anyhow::Result<()> {
         for name in writable_files(grant) {
-            let Some(to) = grant.storage_key(name) else {
+            let Some(artifact_key) = grant.storage_key(name) else {
                 continue;
             };
-            let from = self.file(grant.nonce, name);
-            let found = match self.objects.get(&from).await {
-                Ok(found) => found,
-                // If the file is required, its reader reports the error.
+            let object_key = self.file_key(grant.nonce, name);
+            let object = match self.objects.get(&object_key).await {
+                Ok(object) => object,
+                // If the file is required, a later check of the recording reports that it is missing.
                 Err(object_store::Error::NotFound { .. }) => continue,
                 Err(error) => return Err(error).context("fetching a recording from the bucket"),
             };
-            if found.meta.size > LARGEST_BYTES {
-                let bytes = found.meta.size;
-                tracing::error!(%from, bytes, "the file is too large for a recording; ignored");
+            if object.meta.size > MAX_RECORDING_FILE_BYTES {
+                let bytes = object.meta.size;
+                tracing::error!(%object_key, bytes, "the file is too large for a recording; ignored");
                 continue;
             }
             let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
-            let mut bytes = found.into_stream();
-            while let Some(piece) = bytes.try_next().await? {
+            let mut chunks = object.into_stream();
+            while let Some(chunk) = chunks.try_next().await? {
                 file = tokio::task::spawn_blocking(move || -> io::Result<_> {
-                    file.write_all(&piece)?;
+                    file.write_all(&chunk)?;
                     Ok(file)
                 })
                 .await??;
             }
-            artifacts.put_file(&to, file.path()).await?;
+            artifacts.put_file(&artifact_key, file.path()).await?;
         }
         Ok(())
     }
@@ -207,24 +212,24 @@ impl Bucket {
     pub(super) async fn delete_files(&self, grant: &Grant) {
         let keys = writable_files(grant)
             .iter()
-            .map(|name| Ok(self.file(grant.nonce, name)));
+            .map(|name| Ok(self.file_key(grant.nonce, name)));
         let keys = futures::stream::iter(keys.collect::<Vec<_>>()).boxed();
         let mut deleted = self.objects.delete_stream(keys);
-        while let Some(one) = deleted.next().await {
-            match one {
+        while let Some(result) = deleted.next().await {
+            match result {
                 Ok(_) | Err(object_store::Error::NotFound { .. }) => {}
                 Err(error) => {
-                    tracing::warn!(%error, "a file in the bucket could not be deleted; it remains until its lifetime ends");
+                    tracing::warn!(%error, "a file in the bucket could not be deleted; it remains until the bucket deletes it");
                 }
             }
         }
     }
 
-    fn bundle(&self, blake3: &str) -> Key {
+    fn bundle_key(&self, blake3: &str) -> Key {
         self.prefix.clone().join("bundles").join(blake3)
     }
 
-    fn file(&self, nonce: Uuid, name: &str) -> Key {
+    fn file_key(&self, nonce: Uuid, name: &str) -> Key {
         let folder = self.prefix.clone().join("orders");
         folder.join(nonce.to_string()).join(name)
     }
@@ -234,7 +239,7 @@ impl BucketConfig {
     /// Creates the folder, without files of an earlier process.
     ///
     /// # Errors
-    /// If it cannot be created.
+    /// If the folder cannot be created.
     pub fn create_folder(&self) -> anyhow::Result<()> {
         let create = || {
             match fs::remove_dir_all(&self.folder) {

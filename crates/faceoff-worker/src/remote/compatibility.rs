@@ -6,17 +6,17 @@ use faceoff_wire::remote::WorkerCapabilities;
 
 /// The reason why a worker gets no jobs from this server; `None` if it is compatible.
 pub(super) fn incompatibility(
-    own: &WorkerCapabilities,
+    worker: &WorkerCapabilities,
     required: &WorkerCapabilities,
 ) -> Option<String> {
-    if own.program != required.program {
+    if worker.program != required.program {
         return Some(format!(
             "the worker runs another program (version {}, BLAKE3 {}) than the server (version {}, BLAKE3 {}): only the same program \
              has the same results to the last bit; copy the server's to the worker's machine",
-            own.version, own.program, required.version, required.program
+            worker.version, worker.program, required.version, required.program
         ));
     }
-    let offered = |name: &str| own.runtimes.iter().find(|runtime| runtime.name == name);
+    let offered = |name: &str| worker.runtimes.iter().find(|runtime| runtime.name == name);
     let missing: Vec<&str> = required
         .runtimes
         .iter()
@@ -30,9 +30,9 @@ pub(super) fn incompatibility(
         ));
     }
     required.runtimes.iter().find_map(|runtime| {
-        let other = runtime_difference(&offered(&runtime.name)?.content, &runtime.content)?;
+        let difference = runtime_difference(&offered(&runtime.name)?.content, &runtime.content)?;
         Some(format!(
-            "the worker's runtime {} is not the server's: {other}; it must be the same on all machines",
+            "the worker's runtime {} is not the server's: {difference}; it must be the same on all machines",
             runtime.name
         ))
     })
@@ -40,43 +40,44 @@ pub(super) fn incompatibility(
 
 /// The difference between a worker's and the server's runtime; `None` if there is none. A runtime that is broken on the
 /// server is not compared.
-fn runtime_difference(own: &RuntimeContent, required: &RuntimeContent) -> Option<String> {
+fn runtime_difference(worker: &RuntimeContent, required: &RuntimeContent) -> Option<String> {
     let describe =
         |version: Option<&String>| version.map_or_else(|| "none".to_owned(), Clone::clone);
-    let libc = |own: &Option<String>, required: &Option<String>| {
-        (own != required).then(|| {
+    let libc_difference = |worker: &Option<String>, required: &Option<String>| {
+        (worker != required).then(|| {
             format!(
                 "its C library is {}, the server's {}",
-                describe(own.as_ref()),
+                describe(worker.as_ref()),
                 describe(required.as_ref())
             )
         })
     };
-    match (own, required) {
+    match (worker, required) {
         (_, RuntimeContent::Failed { .. }) | (RuntimeContent::Image, RuntimeContent::Image) => None,
         (RuntimeContent::Failed { reason }, _) => Some(format!("it does not work there: {reason}")),
-        (RuntimeContent::Native { libc: own }, RuntimeContent::Native { libc: required }) => {
-            libc(own, required)
+        (RuntimeContent::Native { libc: worker }, RuntimeContent::Native { libc: required }) => {
+            libc_difference(worker, required)
         }
-        (RuntimeContent::Python(own), RuntimeContent::Python(required)) => {
-            let python = |of: &PythonInventory| format!("{} {}", of.implementation, of.version);
-            if python(own) != python(required) {
+        (RuntimeContent::Python(worker), RuntimeContent::Python(required)) => {
+            let interpreter =
+                |python: &PythonInventory| format!("{} {}", python.implementation, python.version);
+            if interpreter(worker) != interpreter(required) {
                 return Some(format!(
                     "it is {}, the server's {}",
-                    python(own),
-                    python(required)
+                    interpreter(worker),
+                    interpreter(required)
                 ));
             }
-            let names = own.packages.keys().chain(required.packages.keys());
+            let names = worker.packages.keys().chain(required.packages.keys());
             let package = names
-                .map(|name| (name, own.packages.get(name), required.packages.get(name)))
-                .find(|(_, own, required)| own != required);
+                .map(|name| (name, worker.packages.get(name), required.packages.get(name)))
+                .find(|(_, worker, required)| worker != required);
             package.map_or_else(
-                || libc(&own.libc, &required.libc),
-                |(name, own, required)| {
-                    let (own, required) = (describe(own), describe(required));
+                || libc_difference(&worker.libc, &required.libc),
+                |(name, worker, required)| {
+                    let (worker, required) = (describe(worker), describe(required));
                     Some(format!(
-                        "its package {name} is {own}, the server's {required}"
+                        "its package {name} is {worker}, the server's {required}"
                     ))
                 },
             )
@@ -89,6 +90,10 @@ fn runtime_difference(own: &RuntimeContent, required: &RuntimeContent) -> Option
 mod tests {
     use super::*;
     use faceoff_types::RuntimeInventory;
+
+    /// Hashes of the server's program and of another one.
+    const SERVER_PROGRAM: &str = "aa";
+    const OTHER_PROGRAM: &str = "bb";
 
     fn python(version: &str, packages: &[(&str, &str)]) -> RuntimeContent {
         let packages = packages.iter();
@@ -127,7 +132,10 @@ mod tests {
     #[test]
     fn incompatible_worker_gets_the_reason() {
         let numpy = || python("3.11.2", &[("numpy", "2.4.6")]);
-        let required = capabilities("aa", &[("native", native("2.36")), ("python3", numpy())]);
+        let required = capabilities(
+            SERVER_PROGRAM,
+            &[("native", native("2.36")), ("python3", numpy())],
+        );
         let reason = |program: &str, runtimes: &[(&str, RuntimeContent)]| {
             incompatibility(&capabilities(program, runtimes), &required)
         };
@@ -137,25 +145,25 @@ mod tests {
             ("python3", numpy()),
             native_runtime.clone(),
         ];
-        assert_eq!(reason("aa", &superset), None);
+        assert_eq!(reason(SERVER_PROGRAM, &superset), None);
         for (program, runtimes, words) in [
             (
-                "bb",
+                OTHER_PROGRAM,
                 vec![native_runtime.clone(), ("python3", numpy())],
                 "another program",
             ),
             (
-                "aa",
+                SERVER_PROGRAM,
                 vec![native_runtime.clone()],
                 "lacks runtimes that the server offers to agents: python3",
             ),
             (
-                "aa",
+                SERVER_PROGRAM,
                 vec![("native", native("2.41")), ("python3", numpy())],
                 "runtime native is not the server's: its C library is 2.41, the server's 2.36",
             ),
             (
-                "aa",
+                SERVER_PROGRAM,
                 vec![
                     native_runtime.clone(),
                     ("python3", python("3.12.1", &[("numpy", "2.4.6")])),
@@ -163,7 +171,7 @@ mod tests {
                 "it is CPython 3.12.1, the server's CPython 3.11.2",
             ),
             (
-                "aa",
+                SERVER_PROGRAM,
                 vec![
                     native_runtime.clone(),
                     ("python3", python("3.11.2", &[("numpy", "1.26.4")])),
@@ -171,12 +179,12 @@ mod tests {
                 "its package numpy is 1.26.4, the server's 2.4.6",
             ),
             (
-                "aa",
+                SERVER_PROGRAM,
                 vec![native_runtime.clone(), ("python3", python("3.11.2", &[]))],
                 "its package numpy is none, the server's 2.4.6",
             ),
             (
-                "aa",
+                SERVER_PROGRAM,
                 vec![
                     native_runtime.clone(),
                     (
@@ -189,17 +197,17 @@ mod tests {
                 "it does not work there: gone",
             ),
             (
-                "aa",
+                SERVER_PROGRAM,
                 vec![native_runtime.clone(), ("python3", native("2.36"))],
                 "of another kind",
             ),
         ] {
-            let found = reason(program, &runtimes).unwrap_or_default();
-            assert!(found.contains(words), "{found:?} lacks {words:?}");
+            let reason = reason(program, &runtimes).unwrap_or_default();
+            assert!(reason.contains(words), "{reason:?} lacks {words:?}");
         }
         // A runtime that is broken on the server is not required.
         let broken = capabilities(
-            "aa",
+            SERVER_PROGRAM,
             &[(
                 "python3",
                 RuntimeContent::Failed {
@@ -208,7 +216,10 @@ mod tests {
             )],
         );
         assert_eq!(
-            incompatibility(&capabilities("aa", &[("python3", numpy())]), &broken),
+            incompatibility(
+                &capabilities(SERVER_PROGRAM, &[("python3", numpy())]),
+                &broken
+            ),
             None
         );
     }

@@ -1,4 +1,5 @@
-//! A connection to NATS that reconnects automatically and logs changes of its state.
+//! A connection to NATS, the message broker between server and workers, that reconnects automatically and logs changes
+//! of its state.
 
 use super::names::Names;
 use anyhow::Context as _;
@@ -47,13 +48,14 @@ impl NatsConfig {
             .retry_on_initial_connect()
             .max_reconnects(None)
             .reconnect_delay_callback(|tries| {
+                // 100 ms, doubled with each attempt.
                 LONGEST_PAUSE.min(Duration::from_millis(100 << tries.min(6)))
             })
-            // This callback knows why the last attempt failed, which events do not say; it leaves the choice of server to the client.
+            // Only this callback knows why the last attempt failed. It leaves the choice of the NATS server to the client.
             .reconnect_to_server_callback(move |servers, _| {
                 let cause = servers.into_iter().find_map(|server| server.last_error);
                 if let Some(cause) = cause {
-                    reconnect_log.unreachable(&cause);
+                    reconnect_log.record_failure(&cause);
                 }
                 std::future::ready(None)
             })
@@ -111,15 +113,17 @@ impl ConnectionLog {
                     "no connection to NATS; trying again until there is one"
                 );
             }
-            // If the cause is known, it is logged before the next attempt.
-            Event::ClientError(error) if self.is_healthy() => self.unreachable(&error.to_string()),
+            // Further errors are logged with their cause before the next attempt, by the callback above.
+            Event::ClientError(error) if self.is_healthy() => {
+                self.record_failure(&error.to_string());
+            }
             Event::ClientError(error) => tracing::debug!(url, %error, "NATS cannot be reached"),
             Event::ServerError(error) => tracing::error!(url, %error, "NATS refuses"),
-            other => tracing::info!(url, event = %other, "NATS"),
+            event => tracing::info!(url, %event, "NATS"),
         }
     }
 
-    fn unreachable(&self, cause: &str) {
+    fn record_failure(&self, cause: &str) {
         if !self.set_cause(cause) {
             return;
         }
@@ -146,7 +150,7 @@ impl ConnectionLog {
         cause.is_empty()
     }
 
-    /// Records the cause; true if it differs from the previous one.
+    /// Records the cause; returns true if it differs from the previous one.
     fn set_cause(&self, cause: &str) -> bool {
         let mut logged = self.cause.lock().unwrap_or_else(PoisonError::into_inner);
         let is_new = *logged != cause;

@@ -1,4 +1,4 @@
-//! Checks in advance whether a worker on this machine would get jobs.
+//! Checks in advance whether a worker on this machine would get jobs from the server, over the message broker NATS.
 
 use super::{
     connection::{NatsConfig, REQUEST_TIMEOUT},
@@ -14,7 +14,7 @@ use std::time::Duration;
 pub struct ConnectionCheck {
     /// Version of the nats-server, or the reason why it cannot be reached.
     pub nats: Result<String, String>,
-    /// Whether the server would give it jobs, or the reason why not; `None` if NATS cannot be reached.
+    /// `Ok` if the server would give the worker jobs, otherwise the reason; `None` if NATS cannot be reached.
     pub server: Option<Result<(), String>>,
 }
 
@@ -47,13 +47,13 @@ pub async fn check_connection(
             };
         }
     };
-    let asked = async {
+    let response = async {
         let request = serde_json::to_vec(&WorkerRequest::CheckRegistration(capabilities.clone()))?;
         let response = client.request(names.requests(name), request.into());
         let response = tokio::time::timeout(2 * REQUEST_TIMEOUT, response).await??;
         anyhow::Ok(serde_json::from_slice(&response.payload)?)
     };
-    let server = match asked.await {
+    let server = match response.await {
         Ok(WorkerResponse::Accepted) => Ok(()),
         Ok(WorkerResponse::Refused { reason }) => Err(reason),
         Ok(WorkerResponse::Unknown) => Err("the server cannot answer now".to_owned()),

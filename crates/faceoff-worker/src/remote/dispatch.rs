@@ -1,4 +1,5 @@
-//! The server's side of remote work: publishes jobs for free remote slots and accepts their results.
+//! The server's side of remote work: publishes jobs over NATS (a message broker) for free remote slots, and supervises the
+//! tasks that answer workers and accept their results.
 
 use super::{
     bucket::{Bucket, BucketConfig},
@@ -45,7 +46,8 @@ const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 const HEALTHY_AFTER: Duration = Duration::from_secs(10);
 /// Minimum duration of the workers' leases at the start of the server, seconds: they could not be renewed while it was down.
 const MIN_LEASE_AT_START_S: u32 = 60;
-/// The problem of the server while NATS is unreachable; it is the cause of all others.
+/// Key of the problem “NATS is unreachable” in the list of the server's problems, and the cause of all others. A key
+/// completes the phrase “the server cannot …”.
 const REACH_NATS: &str = "reach NATS";
 
 /// Configuration of remote workers in a server.
@@ -67,7 +69,7 @@ pub struct RemoteConfig {
 impl RemoteConfig {
     pub(super) fn checks(&self) -> ResultChecks {
         ResultChecks {
-            episodes: self.checked_episodes,
+            checked_episodes: self.checked_episodes,
             key: self.key.clone(),
         }
     }
@@ -92,14 +94,14 @@ pub async fn dispatch(
         ..config.local_server(store, clock)
     };
     resume_leases(&server).await?;
-    let season = server.store.season().await?.commitment;
+    let season_commitment = server.store.season().await?.commitment;
     let store = server.store.clone();
     let workers = store.workers();
     workers.enable();
-    let status = workers.clone();
+    let problems = workers.clone();
     let client = remote
         .nats
-        .connect(SERVER, move |cause| status.set_problem(REACH_NATS, cause));
+        .connect(SERVER, move |cause| problems.set_problem(REACH_NATS, cause));
     let client = client.await?;
     let bucket = match &remote.bucket {
         Some(bucket) => {
@@ -113,7 +115,7 @@ pub async fn dispatch(
         streams: Arc::new(Streams::new(
             jetstream::new(client.clone()),
             names.clone(),
-            format!("Faceoff, season {season}"),
+            format!("Faceoff, season {season_commitment}"),
         )),
         published_jobs: Arc::default(),
         pending_results: Arc::default(),
@@ -143,9 +145,10 @@ pub async fn dispatch(
         supervisor.run("publish jobs", || dispatcher.publish_jobs(&shutdown)),
         supervisor.run("accept results", || dispatcher.accept_results(&shutdown)),
         supervisor.run("keep the leases of pending results", || dispatcher
-            .keep_pending(&shutdown)),
+            .renew_pending_results(&shutdown)),
         supervisor.run("answer workers", || requests.run(&shutdown)),
-        supervisor.run("relay live games", || requests.relay_games(&shutdown)),
+        supervisor.run("relay live games", || requests
+            .forward_live_games(&shutdown)),
     );
     dispatcher
         .requeue_jobs(dispatcher.published_jobs.take_all(), None)
@@ -171,7 +174,7 @@ async fn resume_leases(server: &LocalServer) -> anyhow::Result<()> {
             );
             Ok(())
         }
-        // They expire anyway.
+        // These leases expire anyway.
         Err(error @ StoreError::DiskFull(_)) => {
             tracing::warn!(%error, "the leases of this server's previous process remain until they expire");
             Ok(())
@@ -188,38 +191,39 @@ struct Supervisor<'a> {
 }
 
 impl Supervisor<'_> {
+    /// Runs a task; `task` completes the phrase “the server cannot …”.
     async fn run<F: Future<Output = anyhow::Result<()>>>(
         &self,
         task: &str,
         mut run: impl FnMut() -> F,
     ) {
-        let mut logged = String::new();
+        let mut logged_cause = String::new();
         while !self.shutdown.is_cancelled() {
-            let began = Instant::now();
+            let started_at = Instant::now();
             let mut running = pin!(run());
-            let ended = match tokio::time::timeout(HEALTHY_AFTER, &mut running).await {
-                Ok(ended) => ended,
+            let result = match tokio::time::timeout(HEALTHY_AFTER, &mut running).await {
+                Ok(result) => result,
                 Err(_) => {
                     self.workers.set_problem(task, None);
-                    logged.clear();
+                    logged_cause.clear();
                     running.await
                 }
             };
-            let Err(error) = ended else {
+            let Err(error) = result else {
                 continue;
             };
             let cause = format!("{error:#}");
-            if cause != logged {
+            if cause != logged_cause {
                 tracing::error!(cause, "cannot {task}; trying again");
                 // While NATS is unreachable, problems that follow from it are not shown.
                 let is_nats_down = self.workers.has_problem(REACH_NATS);
                 self.workers
                     .set_problem(task, (!is_nats_down).then_some(&*cause));
-                logged = cause;
+                logged_cause = cause;
             }
             tokio::select! {
                 () = self.shutdown.cancelled() => {}
-                () = tokio::time::sleep_until((began + RETRY_INTERVAL).into()) => {}
+                () = tokio::time::sleep_until((started_at + RETRY_INTERVAL).into()) => {}
             }
         }
     }
@@ -238,6 +242,7 @@ pub(super) struct Dispatcher {
 }
 
 impl Dispatcher {
+    /// Publishes as many jobs as remote slots are waiting for, until the shutdown.
     async fn publish_jobs(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
         let (mut stream, mut consumer) = self.streams.jobs().await?;
         let mut checked_at = Instant::now();
@@ -245,7 +250,7 @@ impl Dispatcher {
         if let Some(bucket) = &self.bucket {
             bucket.probe().await?;
         }
-        let mut free = self.client.subscribe(self.names.free_slots(ALL)).await?;
+        let mut free_slots = self.client.subscribe(self.names.free_slots(ALL)).await?;
         let mut signal = self.server.store.job_signal();
         while !shutdown.is_cancelled() {
             signal.borrow_and_update();
@@ -264,8 +269,8 @@ impl Dispatcher {
                 anyhow::ensure!(!is_ahead(info, state), MESSAGES_LOST);
                 checked_at = Instant::now();
             }
-            let waiting = u64::try_from(info.num_waiting).unwrap_or_default();
-            for _ in 0..waiting.saturating_sub(info.num_pending) {
+            let waiting_slots = u64::try_from(info.num_waiting).unwrap_or_default();
+            for _ in 0..waiting_slots.saturating_sub(info.num_pending) {
                 if !self.publish_next().await? {
                     break;
                 }
@@ -273,14 +278,14 @@ impl Dispatcher {
             tokio::select! {
                 () = shutdown.cancelled() => {}
                 changed = signal.changed() => changed.context("listening to the queue")?,
-                message = free.next() => anyhow::ensure!(message.is_some(), "the connection to NATS has ended"),
+                message = free_slots.next() => anyhow::ensure!(message.is_some(), "the connection to NATS has ended"),
                 () = tokio::time::sleep(POLL_INTERVAL) => {}
             }
         }
         Ok(())
     }
 
-    /// Claims and publishes one job; false if there is none.
+    /// Claims and publishes one job; returns false if there is none.
     async fn publish_next(&self) -> anyhow::Result<bool> {
         let server = self.server.clone();
         let claimed = tokio::task::spawn_blocking(move || server.claim(UNCLAIMED)).await??;
@@ -296,16 +301,16 @@ impl Dispatcher {
                     .set_published(lease.nonce, sequence, Instant::now());
                 Ok(true)
             }
-            // It may have been published nevertheless: then it can no longer be started, or it already was.
+            // The job may have been published nevertheless. Then no worker can start it any more, or one has already.
             Err(error) => {
                 let _ = self.published_jobs.take(lease.nonce);
-                self.requeue(lease).await;
+                self.requeue_job(lease).await;
                 Err(error)
             }
         }
     }
 
-    /// Publishes a job; its sequence number in the stream.
+    /// Publishes a job and returns its sequence number in the stream.
     async fn publish(&self, job: JobSpec) -> anyhow::Result<u64> {
         let grant = grant_for(&job, &self.remote.required.program);
         let objects = match &self.bucket {
@@ -334,8 +339,8 @@ impl Dispatcher {
     /// Puts jobs that no worker has started back into the queue.
     async fn requeue_jobs(&self, jobs: Vec<PublishedJob>, stream: Option<&Stream>) {
         for job in jobs {
-            self.requeue(job.lease).await;
-            // A worker that still receives it cannot start it.
+            self.requeue_job(job.lease).await;
+            // A worker that receives the message before it is deleted cannot start the job any more.
             if let (Some(stream), Some(sequence)) = (stream, job.sequence)
                 && let Err(error) = stream.delete_message(sequence).await
             {
@@ -344,7 +349,7 @@ impl Dispatcher {
         }
     }
 
-    async fn requeue(&self, lease: Lease) {
+    async fn requeue_job(&self, lease: Lease) {
         let (store, id, now) = (&self.server.store, lease.job_id, self.server.clock.now());
         let claim = claim(&lease, UNCLAIMED);
         match store.release_unstarted(&claim, now).await {

@@ -1,4 +1,5 @@
-//! Grants for remote jobs, and the acceptance of results within their grant.
+//! Grants for remote jobs, and the acceptance of results within their grant. A *grant* is sealed by the server and says which
+//! files the worker of a job may read and write.
 
 use super::result_checks::ResultChecks;
 use crate::{
@@ -12,7 +13,7 @@ use faceoff_wire::{
     remote::{JobEnd, ResultMessage},
 };
 
-/// The grant for a job that this program issues.
+/// The grant for a job. `program` is the hash of the server's program, which the worker must have, too.
 pub(super) fn grant_for(job: &JobSpec, program: &str) -> Grant {
     let (bundles, write_scope, expected_recording) = match &job.payload {
         JobPayload::Shard {
@@ -66,11 +67,11 @@ pub(super) enum Acceptance {
     Accepted,
     /// The worker does not have the lease.
     LeaseLost,
-    /// It does not match its job, which is released as after a platform fault.
+    /// The result does not match its job; the job is released as after a platform fault.
     Unusable,
-    /// It differs from what the simulator computes; the text is for organisers.
+    /// The result differs from what the simulator computes; the text is for organisers.
     Rejected(String),
-    /// Some of its files are still being uploaded.
+    /// Some of the result's files are still being uploaded.
     FilesPending,
 }
 
@@ -123,7 +124,7 @@ fn store_report(
         server.release(lease, reason)?;
         return Ok(Acceptance::Unusable);
     }
-    // A result that is already stored, or whose lease is lost, is not checked; its files may be gone.
+    // If the lease is over, the result is already stored or will be refused. It is not checked, since its files may be gone.
     if server.is_held(lease)? {
         if !server.store.workers().close_files(lease.nonce) {
             return Ok(Acceptance::FilesPending);
@@ -155,8 +156,8 @@ fn matches_grant(report: &JobReport, grant: &Grant) -> bool {
                 recording: Some(key),
                 ..
             },
-            WriteScope::Folder(grants),
-        ) => key == grants,
+            WriteScope::Folder(granted_key),
+        ) => key == granted_key,
         (
             JobReport::Shard {
                 recording: None, ..
@@ -165,11 +166,11 @@ fn matches_grant(report: &JobReport, grant: &Grant) -> bool {
         ) => true,
         (
             JobReport::Game {
-                recording: Some(stored),
+                recording: Some(files),
                 ..
             },
-            WriteScope::Folder(grants),
-        ) => stored.key == *grants,
+            WriteScope::Folder(granted_key),
+        ) => files.key == *granted_key,
         (
             JobReport::Game {
                 recording: None, ..

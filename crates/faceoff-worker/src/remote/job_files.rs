@@ -1,4 +1,5 @@
-//! The files of a job on a worker: over the server's HTTP with the job's grant, or by links to a bucket.
+//! The files of a job on a remote worker: over the server's HTTP with the job's *grant* (a sealed permission), or by links to
+//! an S3 bucket.
 
 use super::transfer::{FileTransfer, check_status};
 use anyhow::Context as _;
@@ -29,35 +30,35 @@ struct FileRequest {
 }
 
 impl JobFiles {
-    /// Fetches a bundle, with retries while the server is unreachable and the job has not `ended`.
+    /// Fetches a bundle, with retries while the server is unreachable, until the job `has_ended`.
     pub(super) async fn fetch_bundle(
         &self,
         transfer: &FileTransfer,
         bundle: &BundleRef,
         archive: &Path,
-        ended: impl Fn() -> bool,
+        has_ended: impl Fn() -> bool,
     ) -> anyhow::Result<()> {
         let blake3 = &bundle.blake3;
         let links = self.objects.as_ref().map(|objects| &objects.bundles);
         let link = links.map(|links| links.get(blake3));
-        let from = self.file_request(Method::GET, &format!("bundles/{blake3}"), link)?;
+        let source = self.file_request(Method::GET, &format!("bundles/{blake3}"), link)?;
         transfer
             .run(
                 async |http, progress| {
-                    let response = check_status(self.request(http, &from).send().await?).await?;
+                    let response = check_status(self.request(http, &source).send().await?).await?;
                     let mut file = tokio::fs::File::create(archive).await?;
-                    let mut bytes = response.bytes_stream();
-                    while let Some(piece) = bytes.try_next().await? {
-                        progress.add(piece.len());
-                        file.write_all(&piece).await?;
+                    let mut chunks = response.bytes_stream();
+                    while let Some(chunk) = chunks.try_next().await? {
+                        progress.add(chunk.len());
+                        file.write_all(&chunk).await?;
                     }
                     file.flush().await?;
                     Ok(())
                 },
-                ended,
+                has_ended,
             )
             .await
-            .with_context(|| format!("fetching the bundle {}", without_query(&from.url)))
+            .with_context(|| format!("fetching the bundle {}", without_query(&source.url)))
     }
 
     /// Stores a file under this name, with retries as in [`Self::fetch_bundle`].
@@ -66,36 +67,36 @@ impl JobFiles {
         transfer: &FileTransfer,
         name: &str,
         file: &Path,
-        ended: impl Fn() -> bool,
+        has_ended: impl Fn() -> bool,
     ) -> anyhow::Result<()> {
         let links = self.objects.as_ref().map(|objects| &objects.files);
         let link = links.map(|links| links.get(name));
-        let to = self.file_request(Method::PUT, &format!("files/{name}"), link)?;
+        let target = self.file_request(Method::PUT, &format!("files/{name}"), link)?;
         transfer
             .run(
                 async |http, progress| {
                     let body = tokio::fs::File::open(file).await?;
                     let bytes = body.metadata().await?.len();
                     progress.set_total(bytes);
-                    let sent = progress.clone();
-                    let pieces =
-                        ReaderStream::new(body).inspect_ok(move |piece| sent.add(piece.len()));
+                    let progress = progress.clone();
+                    let chunks =
+                        ReaderStream::new(body).inspect_ok(move |chunk| progress.add(chunk.len()));
                     let response = self
-                        .request(http, &to)
+                        .request(http, &target)
                         .header(header::CONTENT_LENGTH, bytes)
-                        .body(reqwest::Body::wrap_stream(pieces))
+                        .body(reqwest::Body::wrap_stream(chunks))
                         .send()
                         .await?;
                     let _ = check_status(response).await?;
                     Ok(())
                 },
-                ended,
+                has_ended,
             )
             .await
-            .with_context(|| format!("storing a file at {}", without_query(&to.url)))
+            .with_context(|| format!("storing a file at {}", without_query(&target.url)))
     }
 
-    /// The request for a file: by its link, if files are transferred through a bucket.
+    /// The request for a file. Without a bucket, `link` is `None`; with one, it is the link to the file, if the job has one.
     fn file_request(
         &self,
         method: Method,
@@ -123,7 +124,7 @@ impl JobFiles {
     }
 }
 
-/// A URL for messages: the query may contain credentials.
+/// A URL as it may appear in messages: without the query, which may contain credentials.
 fn without_query(url: &str) -> &str {
     url.split('?').next().unwrap_or_default()
 }

@@ -1,4 +1,6 @@
-//! Names of streams and subjects. Each begins with the server's name, so that several servers can share one NATS.
+//! Names of NATS streams (stored messages) and subjects (addresses of messages). Each begins with the server's name, so that
+//! several servers can share one NATS. The words in them (`orders`, `asks` …) are fixed: workers, NATS permissions and stored
+//! streams use them.
 
 use faceoff_store::WorkerName;
 
@@ -50,7 +52,7 @@ impl Names {
         format!("_INBOX.{}.{client}", self.server)
     }
 
-    /// Is it a subject on which only this worker gets responses? If workers have their own NATS account, NATS replaces the
+    /// Is `subject` one on which only this worker gets responses? If workers have their own NATS account, NATS replaces the
     /// subject by one that no client may name.
     pub(super) fn is_inbox_of(&self, worker: &WorkerName, subject: &str) -> bool {
         if subject.starts_with(BETWEEN_ACCOUNTS) {
@@ -81,14 +83,14 @@ pub(super) const JOBS_CONSUMER: &str = "workers";
 pub(super) const RESULTS_CONSUMER: &str = "server";
 /// All workers, in subjects.
 pub(super) const ALL: &str = "*";
-/// Lease holder of published jobs that no worker has started. No slot has this name.
+/// Lease holder of published jobs that no worker has started. No slot has this name, which the database contains.
 pub(super) const UNCLAIMED: &str = "given out";
 
 /// Prefix of the lease holders of all remote slots.
 pub(super) const REMOTE: &str = "remote";
 
-/// Lease holder name of a remote slot.
-pub(super) fn slot(worker: &WorkerName, slot: &str) -> String {
+/// Name of a remote slot as a lease holder; with an empty `slot`, the prefix of all slots of the worker.
+pub(super) fn slot_holder(worker: &WorkerName, slot: &str) -> String {
     format!("{}/{slot}", worker.holder())
 }
 

@@ -1,4 +1,5 @@
-//! Receiving jobs on a remote slot: it requests a job, receives one, and asks the server to start it.
+//! Receiving jobs on a remote slot: the slot requests a job over NATS (a message broker), receives one, and asks the server
+//! for the permission to start it.
 
 use super::{
     connection::REQUEST_TIMEOUT,
@@ -25,12 +26,12 @@ const REGISTRATION_VALIDITY: Duration = Duration::from_secs(5);
 const START_ATTEMPTS: u32 = 3;
 
 impl ServerClient {
-    /// Registers this worker; whether it gets jobs. Changes are logged. A recent registration need not be repeated: a job
-    /// names its program version, and the server decides at its start whether the worker may run it.
+    /// Registers this worker and returns whether it gets jobs. Changes are logged. A recent registration need not be
+    /// repeated: a job names its program version, and the server decides at its start whether the worker may run it.
     pub(super) async fn register(&self) -> anyhow::Result<bool> {
         let registered_at = || {
-            let at = self.link.registered_at.lock();
-            at.unwrap_or_else(PoisonError::into_inner)
+            let lock = self.link.registered_at.lock();
+            lock.unwrap_or_else(PoisonError::into_inner)
         };
         if registered_at().is_some_and(|at| at.elapsed() < REGISTRATION_VALIDITY) {
             return Ok(true);
@@ -44,17 +45,17 @@ impl ServerClient {
             WorkerResponse::Refused { reason } => Some(reason),
             WorkerResponse::Unknown => return Ok(false),
         };
-        let mut refused = self
+        let mut logged_refusal = self
             .link
-            .refused
+            .refusal
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        if *refused != reason {
+        if *logged_refusal != reason {
             match &reason {
                 Some(reason) => tracing::error!(reason, "the server gives this worker no jobs"),
                 None => tracing::info!("the server gives this worker jobs"),
             }
-            refused.clone_from(&reason);
+            logged_refusal.clone_from(&reason);
         }
         *registered_at() = reason.is_none().then(Instant::now);
         Ok(reason.is_none())
@@ -67,30 +68,30 @@ impl ServerClient {
             return Ok(consumer);
         }
         let stream = self.link.names.jobs_stream();
-        let found = self
+        let lookup = self
             .jetstream
             .get_consumer_from_stream(JOBS_CONSUMER, stream);
-        let found: PullConsumer = with_timeout(found)
+        let found: PullConsumer = with_timeout(lookup)
             .await
             .context("looking up the consumer of jobs")?;
         *cached() = Some(found.clone());
         Ok(found)
     }
 
-    /// Waits for a job and starts it; `None` if there is none, or it cannot be started.
+    /// Waits for a job and starts it. Returns `None` if there is no job, or it cannot be started.
     pub(super) async fn next_job(&self, slot: &str) -> anyhow::Result<Option<RemoteJob>> {
         let link = &self.link;
         let consumer = self.consumer().await?;
-        let jobs = consumer.batch().max_messages(1).expires(REQUEST_OPEN_FOR);
-        let mut jobs = with_timeout(jobs.messages())
+        let request = consumer.batch().max_messages(1).expires(REQUEST_OPEN_FOR);
+        let mut jobs = with_timeout(request.messages())
             .await
             .context("requesting a job")?;
-        let free = link.names.free_slots(link.worker.as_str());
-        with_timeout(link.client.publish(free, Default::default()))
+        let subject = link.names.free_slots(link.worker.as_str());
+        with_timeout(link.client.publish(subject, Default::default()))
             .await
             .context("requesting a job")?;
         let message = tokio::select! {
-            // A job that arrives now is not started, and goes back to the queue.
+            // A job that arrives during the shutdown is not started, and the server puts it back into the queue.
             () = link.shutdown.cancelled() => return Ok(None),
             message = jobs.next() => message,
         };
@@ -103,36 +104,36 @@ impl ServerClient {
         with_timeout(acknowledged)
             .await
             .context("acknowledging a job")?;
-        let Some(mut job) = self.read(&message) else {
+        let Some(mut job) = self.read_job(&message) else {
             return Ok(None);
         };
-        job.job.lease.slot = names::slot(&link.worker, slot);
-        Ok(self.start(&job, slot).await.then_some(job))
+        job.job.lease.slot = names::slot_holder(&link.worker, slot);
+        Ok(self.start_job(&job, slot).await.then_some(job))
     }
 
-    /// Reads a job, if this worker can run it. Another one is not started, so the server requeues it, and this worker
+    /// Reads a job. If this worker cannot run it, the job is not started, so the server requeues it, and this worker
     /// registers again to learn the reason.
-    fn read(&self, message: &Message) -> Option<RemoteJob> {
+    fn read_job(&self, message: &Message) -> Option<RemoteJob> {
         let link = &self.link;
-        let mut logged = link
-            .unreadable
+        let mut logged_cause = link
+            .unreadable_cause
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
         match serde_json::from_slice::<RemoteJob>(&message.payload) {
             Ok(job) => {
-                logged.clear();
+                logged_cause.clear();
                 if job.program == link.capabilities.program {
                     return Some(job);
                 }
             }
             Err(error) => {
                 let cause = error.to_string();
-                if *logged != cause {
+                if *logged_cause != cause {
                     tracing::warn!(
                         cause,
                         "a job cannot be read and is not started; it may be from another version"
                     );
-                    *logged = cause;
+                    *logged_cause = cause;
                 }
             }
         }
@@ -140,9 +141,9 @@ impl ServerClient {
         None
     }
 
-    /// Starts the job; whether this slot now has its lease. Without a response the slot may have it nevertheless; then the
-    /// job is released, so that it need not wait for the expiry.
-    async fn start(&self, job: &RemoteJob, slot: &str) -> bool {
+    /// Starts the job and returns whether this slot now has its lease. Without a response the slot may have it nevertheless;
+    /// then the job is released, so that it need not wait for the expiry.
+    async fn start_job(&self, job: &RemoteJob, slot: &str) -> bool {
         let link = &self.link;
         let (lease, id) = (&job.job.lease, job.job.lease.job_id);
         let request = WorkerRequest::StartJob {

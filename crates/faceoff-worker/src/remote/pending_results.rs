@@ -1,4 +1,5 @@
-//! Results that are stored in NATS and not yet accepted by the server. Their slots run other jobs by now, so the server renews the leases.
+//! Results of remote workers that are stored in NATS and not yet accepted by the server. Their slots run other jobs by
+//! now, so the server renews the leases. A lease is identified by its *nonce*, a random number.
 
 use faceoff_wire::job::Lease;
 use std::{
@@ -22,13 +23,13 @@ pub(super) struct PendingResults {
 /// Marks a result as being processed until it is dropped.
 #[derive(Debug)]
 pub(super) struct ProcessingGuard<'a> {
-    all: &'a PendingResults,
+    results: &'a PendingResults,
     nonce: Uuid,
 }
 
 impl Drop for ProcessingGuard<'_> {
     fn drop(&mut self) {
-        self.all.processing().remove(&self.nonce);
+        self.results.processing().remove(&self.nonce);
     }
 }
 
@@ -50,34 +51,37 @@ impl PendingResults {
             sequence,
             since: now,
         };
-        self.all().insert(result.lease.nonce, result);
+        self.pending().insert(result.lease.nonce, result);
     }
 
     /// Removes a result that was accepted, or whose lease is lost.
     pub(super) fn remove(&self, nonce: Uuid) {
-        self.all().remove(&nonce);
+        self.pending().remove(&nonce);
     }
 
     /// Marks a result as being processed, so that its absence from the stream is no loss.
     pub(super) fn start_processing(&self, nonce: Uuid) -> ProcessingGuard<'_> {
         self.processing().insert(nonce);
-        ProcessingGuard { all: self, nonce }
+        ProcessingGuard {
+            results: self,
+            nonce,
+        }
     }
 
     /// Is the result being processed, or was it processed?
     pub(super) fn is_processed(&self, nonce: Uuid) -> bool {
-        self.processing().contains(&nonce) || !self.all().contains_key(&nonce)
+        self.processing().contains(&nonce) || !self.pending().contains_key(&nonce)
     }
 
-    /// All results that have been pending for a while.
+    /// The results that have been pending for [`RENEW_AFTER`] or longer.
     pub(super) fn overdue(&self, now: Instant) -> Vec<PendingResult> {
-        let all = self.all();
+        let pending = self.pending();
         let is_overdue = |result: &&PendingResult| now.duration_since(result.since) >= RENEW_AFTER;
-        all.values().filter(is_overdue).cloned().collect()
+        pending.values().filter(is_overdue).cloned().collect()
     }
 
     /// A panic while the lock is held leaves every entry intact.
-    fn all(&self) -> MutexGuard<'_, HashMap<Uuid, PendingResult>> {
+    fn pending(&self) -> MutexGuard<'_, HashMap<Uuid, PendingResult>> {
         self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -93,9 +97,11 @@ mod tests {
     use super::*;
     use jiff::Timestamp;
 
+    const EPISODES_DONE: u32 = 50;
+
     #[test]
     fn pending_results_remain_until_they_are_accepted() {
-        let (all, start) = (PendingResults::default(), Instant::now());
+        let (results, start) = (PendingResults::default(), Instant::now());
         let lease = |nonce| Lease {
             job_id: Uuid::from_u128(9),
             nonce: Uuid::from_u128(nonce),
@@ -103,10 +109,10 @@ mod tests {
             expires_at: Timestamp::UNIX_EPOCH,
             duration_s: 30,
         };
-        all.add(lease(1), 50, 7, start);
-        all.add(lease(2), 50, 8, start + Duration::from_secs(1));
-        assert!(all.overdue(start + Duration::from_secs(1)).is_empty());
-        let overdue = all.overdue(start + RENEW_AFTER);
+        results.add(lease(1), EPISODES_DONE, 7, start);
+        results.add(lease(2), EPISODES_DONE, 8, start + Duration::from_secs(1));
+        assert!(results.overdue(start + Duration::from_secs(1)).is_empty());
+        let overdue = results.overdue(start + RENEW_AFTER);
         assert_eq!(overdue.len(), 1);
         assert_eq!(
             (
@@ -114,17 +120,17 @@ mod tests {
                 overdue[0].episodes_done,
                 overdue[0].sequence
             ),
-            (Uuid::from_u128(1), 50, 7)
+            (Uuid::from_u128(1), EPISODES_DONE, 7)
         );
         let nonce = Uuid::from_u128(1);
-        assert!(!all.is_processed(nonce));
-        let guard = all.start_processing(nonce);
-        assert!(all.is_processed(nonce), "it is being processed");
+        assert!(!results.is_processed(nonce));
+        let guard = results.start_processing(nonce);
+        assert!(results.is_processed(nonce), "the result is being processed");
         drop(guard);
-        assert!(!all.is_processed(nonce), "it is pending again");
-        all.remove(nonce);
-        assert!(all.is_processed(nonce), "it was processed");
-        all.remove(Uuid::from_u128(3));
-        assert_eq!(all.overdue(start + Duration::from_secs(60)).len(), 1);
+        assert!(!results.is_processed(nonce), "the result is pending again");
+        results.remove(nonce);
+        assert!(results.is_processed(nonce), "the result was processed");
+        results.remove(Uuid::from_u128(3));
+        assert_eq!(results.overdue(start + Duration::from_secs(60)).len(), 1);
     }
 }

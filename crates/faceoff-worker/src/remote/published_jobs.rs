@@ -1,4 +1,4 @@
-//! Jobs that were published and that no worker has started yet.
+//! Jobs that the server has published to remote workers and that no worker has started yet.
 
 use faceoff_wire::job::Lease;
 use std::{
@@ -18,21 +18,22 @@ pub(super) struct PublishedJob {
     pub(super) description: String,
     /// Sequence number in the stream, once it is known.
     pub(super) sequence: Option<u64>,
-    at: Instant,
+    /// Start of the timeout: when the job was added, then when it was published.
+    waiting_since: Instant,
 }
 
-/// All such jobs, by the nonces of their leases.
+/// All published jobs that have not been started, by the nonces (random identifiers) of their leases.
 #[derive(Debug, Default)]
 pub(super) struct PublishedJobs(Mutex<HashMap<Uuid, PublishedJob>>);
 
 impl PublishedJobs {
-    /// Adds a job. To be called before publishing, since a worker may start the job before NATS acknowledges it.
+    /// Adds a job. Call this before publishing, since a worker may start the job before NATS acknowledges it.
     pub(super) fn add(&self, lease: Lease, description: String, now: Instant) {
         let job = PublishedJob {
             lease,
             description,
             sequence: None,
-            at: now,
+            waiting_since: now,
         };
         self.all().insert(job.lease.nonce, job);
     }
@@ -41,8 +42,8 @@ impl PublishedJobs {
     pub(super) fn set_published(&self, nonce: Uuid, sequence: u64, now: Instant) {
         if let Some(job) = self.all().get_mut(&nonce) {
             job.sequence = Some(sequence);
-            // The timeout starts now: it could not be started before.
-            job.at = now;
+            // No worker could start the job before.
+            job.waiting_since = now;
         }
     }
 
@@ -53,7 +54,7 @@ impl PublishedJobs {
     /// Removes and returns the jobs that were not started in time.
     pub(super) fn take_late(&self, now: Instant) -> Vec<PublishedJob> {
         let mut all = self.all();
-        let is_late = |job: &PublishedJob| now.duration_since(job.at) >= START_TIMEOUT;
+        let is_late = |job: &PublishedJob| now.duration_since(job.waiting_since) >= START_TIMEOUT;
         all.extract_if(|_, job| is_late(job))
             .map(|(_, late)| late)
             .collect()
@@ -77,30 +78,30 @@ mod tests {
 
     #[test]
     fn jobs_not_started_in_time_are_returned_once() {
-        let all = PublishedJobs::default();
+        let jobs = PublishedJobs::default();
         let start = Instant::now();
         let lease = |nonce| Lease {
             job_id: Uuid::from_u128(9),
             nonce: Uuid::from_u128(nonce),
-            slot: "x".into(),
+            slot: "unclaimed".into(),
             expires_at: Timestamp::UNIX_EPOCH,
             duration_s: 30,
         };
-        let add = |nonce, at| all.add(lease(nonce), "hit".into(), at);
+        let add = |nonce, now| jobs.add(lease(nonce), "a shard of the task hit".into(), now);
         add(1, start);
         add(2, start);
         add(3, start + Duration::from_secs(1));
-        all.set_published(Uuid::from_u128(1), 11, start);
-        assert!(all.take(Uuid::from_u128(2)).is_some());
+        jobs.set_published(Uuid::from_u128(1), 11, start);
+        assert!(jobs.take(Uuid::from_u128(2)).is_some());
         // NATS may acknowledge a job after it was started.
-        all.set_published(Uuid::from_u128(2), 12, start);
-        assert!(all.take_late(start + Duration::from_secs(4)).is_empty());
-        let late = all.take_late(start + START_TIMEOUT);
+        jobs.set_published(Uuid::from_u128(2), 12, start);
+        assert!(jobs.take_late(start + Duration::from_secs(4)).is_empty());
+        let late = jobs.take_late(start + START_TIMEOUT);
         assert_eq!(
             late.iter().map(|job| job.sequence).collect::<Vec<_>>(),
             [Some(11)]
         );
-        assert_eq!(all.take_all().len(), 1);
-        assert!(all.take_all().is_empty());
+        assert_eq!(jobs.take_all().len(), 1);
+        assert!(jobs.take_all().is_empty());
     }
 }

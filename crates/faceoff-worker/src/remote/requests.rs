@@ -46,26 +46,29 @@ const MAX_PROBLEM_CHARS: usize = 300;
 /// Minimum interval between writes of progress, since each is a transaction that waits for the disk.
 const PROGRESS_INTERVAL: Duration = Duration::from_secs(2);
 
-/// For each lease, the time and progress of the last renewal in the database. Workers renew more often than the database
-/// needs to know.
+/// The last renewal of each lease (identified by its nonce) in the database: its time and the number of finished episodes.
+/// Workers renew more often than the database needs to know.
 #[derive(Debug, Default)]
 struct Renewals(Mutex<HashMap<Uuid, (Instant, u32)>>);
 
 impl Renewals {
-    /// Must this renewal be written? If it is new, shows progress, or the last write is `every` ago.
-    fn is_due(&self, nonce: Uuid, done: u32, every: Duration, now: Instant) -> bool {
-        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.get(&nonce).is_none_or(|(at, before)| {
-            let ago = now.duration_since(*at);
-            ago >= every || (*before != done && ago >= PROGRESS_INTERVAL)
-        })
+    /// Must this renewal be written? Yes, if the lease is new, if there is progress, or if the last write is `interval` ago.
+    fn is_due(&self, nonce: Uuid, episodes_done: u32, interval: Duration, now: Instant) -> bool {
+        let writes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        writes
+            .get(&nonce)
+            .is_none_or(|(written_at, written_episodes)| {
+                let elapsed = now.duration_since(*written_at);
+                elapsed >= interval
+                    || (*written_episodes != episodes_done && elapsed >= PROGRESS_INTERVAL)
+            })
     }
 
     /// Records a write. Entries of old leases are removed.
-    fn record_write(&self, nonce: Uuid, done: u32, every: Duration, now: Instant) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if all.insert(nonce, (now, done)).is_none() {
-            all.retain(|_, (at, _)| now.duration_since(*at) < 10 * every);
+    fn record_write(&self, nonce: Uuid, episodes_done: u32, interval: Duration, now: Instant) {
+        let mut writes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if writes.insert(nonce, (now, episodes_done)).is_none() {
+            writes.retain(|_, (written_at, _)| now.duration_since(*written_at) < 10 * interval);
         }
     }
 }
@@ -87,11 +90,11 @@ impl RequestHandler {
         let Some(reply) = message.reply.clone() else {
             return;
         };
-        // If the streams belong to another server, so does the worker.
+        // If another server owns the streams, the worker belongs to that server.
         if !self.streams.are_owned() {
             return;
         }
-        // A worker may name any subject for the reply, and this server may publish to most of them.
+        // A worker may name any subject for the reply, and this server has the right to publish to most subjects.
         let worker = names::worker_of(&message.subject);
         if !worker.is_some_and(|worker| self.names.is_inbox_of(&worker, &reply)) {
             tracing::warn!(subject = %message.subject, %reply, "a worker requested a reply on a foreign subject; not answered");
@@ -136,12 +139,12 @@ impl RequestHandler {
         }
         let now = self.clock.now();
         let backoff = || self.store.workers().backoff_reason(worker.as_str(), now);
-        let granted = match request {
+        let result = match request {
             WorkerRequest::Register(capabilities) => {
                 let reason = ban
                     .or_else(|| incompatibility(&capabilities, &self.required))
                     .or_else(backoff);
-                let info = info(&capabilities);
+                let info = worker_info(&capabilities);
                 let workers = self.store.workers();
                 workers.record_poll(worker.as_str(), info, reason.as_deref(), now);
                 return response_for(reason);
@@ -190,7 +193,7 @@ impl RequestHandler {
                 held
             }
         };
-        match granted {
+        match result {
             Ok(true) => WorkerResponse::Accepted,
             Ok(false) => refused("this worker does not have the lease"),
             Err(error) => {
@@ -209,7 +212,7 @@ impl RequestHandler {
     ) -> Result<bool, StoreError> {
         let claim = claim(lease, UNCLAIMED);
         let now = self.clock.now();
-        let holder = names::slot(worker, slot);
+        let holder = names::slot_holder(worker, slot);
         let is_started = self
             .store
             .transfer_lease(&claim, &holder, self.lease_s, now)
@@ -227,14 +230,15 @@ impl RequestHandler {
         Ok(is_started)
     }
 
+    /// Renews a lease, if this worker has it; returns whether it does.
     async fn renew(
         &self,
         worker: &WorkerName,
         lease: &Lease,
-        done: u32,
+        episodes_done: u32,
         renewals: &Renewals,
     ) -> Result<bool, StoreError> {
-        let every = Duration::from_secs(self.lease_s.into()) / 3;
+        let interval = Duration::from_secs(self.lease_s.into()) / 3;
         if !self
             .store
             .is_leased_by(worker, lease.job_id, lease.nonce)
@@ -242,28 +246,31 @@ impl RequestHandler {
         {
             return Ok(false);
         }
-        if !renewals.is_due(lease.nonce, done, every, Instant::now()) {
+        if !renewals.is_due(lease.nonce, episodes_done, interval, Instant::now()) {
             return Ok(true);
         }
-        let is_its_slot = lease.slot.starts_with(&names::slot(worker, ""));
+        // A lease that does not name a slot of this worker is renewed in the name of the worker.
+        let is_own_slot = lease.slot.starts_with(&names::slot_holder(worker, ""));
         let claim = claim(
             lease,
-            if is_its_slot {
+            if is_own_slot {
                 &lease.slot
             } else {
                 worker.as_str()
             },
         );
         let now = self.clock.now();
-        let renewed = self.store.heartbeat(&claim, done, self.lease_s, now);
+        let renewed = self
+            .store
+            .heartbeat(&claim, episodes_done, self.lease_s, now);
         let held = renewed.await?;
         if held {
-            renewals.record_write(lease.nonce, done, every, Instant::now());
+            renewals.record_write(lease.nonce, episodes_done, interval, Instant::now());
         }
         Ok(held)
     }
 
-    /// Updates the state of the slot that organisers see.
+    /// Updates the state of the slot that organisers see. `held` is the result of the renewal, which is returned unchanged.
     fn record_renewal(
         &self,
         worker: &WorkerName,
@@ -272,7 +279,10 @@ impl RequestHandler {
         trouble: Option<&str>,
     ) -> Result<bool, StoreError> {
         let workers = self.store.workers();
-        match (&held, lease.slot.strip_prefix(&names::slot(worker, ""))) {
+        match (
+            &held,
+            lease.slot.strip_prefix(&names::slot_holder(worker, "")),
+        ) {
             (Ok(true), Some(slot)) => {
                 let report = SlotReport {
                     description: None,
@@ -293,7 +303,10 @@ impl RequestHandler {
     }
 
     /// Forwards live updates of games from remote workers to viewers.
-    pub(super) async fn relay_games(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+    pub(super) async fn forward_live_games(
+        &self,
+        shutdown: &CancellationToken,
+    ) -> anyhow::Result<()> {
         let mut updates = self.client.subscribe(self.names.live_games(ALL)).await?;
         loop {
             let message = tokio::select! {
@@ -305,8 +318,8 @@ impl RequestHandler {
             let Ok(update) = serde_json::from_slice::<LiveGameMessage>(&message.payload) else {
                 continue;
             };
-            // Only the holder of a lease may send updates. Whether the game is that of the lease is not checked, since updates
-            // have no influence on results.
+            // Only the holder of a lease may send updates. Whether the game is that of the lease is not checked, since
+            // updates have no influence on results.
             let Some(worker) = names::worker_of(&message.subject) else {
                 continue;
             };
@@ -328,6 +341,7 @@ impl RequestHandler {
     }
 }
 
+/// The store's form of a lease, in the name of `holder`.
 pub(super) fn claim(lease: &Lease, holder: &str) -> JobClaim {
     JobClaim {
         job: lease.job_id,
@@ -345,7 +359,7 @@ fn response_for(reason: Option<String>) -> WorkerResponse {
 }
 
 /// The description of a worker for organisers, with a limited number of labels.
-fn info(capabilities: &WorkerCapabilities) -> WorkerInfo {
+fn worker_info(capabilities: &WorkerCapabilities) -> WorkerInfo {
     let labels = capabilities
         .labels
         .iter()
@@ -371,19 +385,23 @@ mod tests {
     #[test]
     fn renewals_are_written_after_progress_or_time() {
         let renewals = Renewals::default();
-        let (nonce, start, every) = (Uuid::from_u128(1), Instant::now(), Duration::from_secs(10));
-        let is_due = |done, after_s| {
+        let (nonce, start, interval) =
+            (Uuid::from_u128(1), Instant::now(), Duration::from_secs(10));
+        let is_due = |episodes_done, after_s| {
             let now = start + Duration::from_secs(after_s);
-            let is_due = renewals.is_due(nonce, done, every, now);
+            let is_due = renewals.is_due(nonce, episodes_done, interval, now);
             if is_due {
-                renewals.record_write(nonce, done, every, now);
+                renewals.record_write(nonce, episodes_done, interval, now);
             }
             is_due
         };
         assert!(is_due(0, 0));
         assert!(!is_due(0, 1));
-        assert!(!is_due(1, 1), "an episode more, but soon after");
-        assert!(is_due(1, 2), "an episode more");
+        assert!(
+            !is_due(1, 1),
+            "one episode more, but soon after the last write"
+        );
+        assert!(is_due(1, 2), "one episode more");
         assert!(!is_due(1, 11));
         assert!(is_due(1, 12));
     }

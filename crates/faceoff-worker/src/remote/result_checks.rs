@@ -21,7 +21,8 @@ use uuid::Uuid;
 #[derive(Debug, Clone)]
 pub(super) struct ResultChecks {
     /// Number of episodes per shard that are simulated again; 0: no checks.
-    pub(super) episodes: u32,
+    pub(super) checked_episodes: u32,
+    /// The server's secret, from which the sample is drawn.
     pub(super) key: GrantKey,
 }
 
@@ -34,13 +35,13 @@ impl ResultChecks {
         report: &JobReport,
         artifacts: &Artifacts,
     ) -> anyhow::Result<Option<String>> {
-        if self.episodes == 0 {
+        if self.checked_episodes == 0 {
             return Ok(None);
         }
         if let Some(difference) = fault_count_difference(grant, report) {
             return Ok(Some(difference));
         }
-        let found = match (report, &grant.expected_recording) {
+        let checked = match (report, &grant.expected_recording) {
             (
                 JobReport::Shard {
                     outcomes,
@@ -49,19 +50,19 @@ impl ResultChecks {
                 },
                 ExpectedRecording::Shard(spec),
             ) => {
-                let sample = self.sample(grant.nonce, played(&spec.episodes, outcomes));
+                let sample = self.sample(grant.nonce, played_episodes(&spec.episodes, outcomes));
                 verify_shard(&artifacts.local_path(key)?, spec, outcomes, &sample).map(|()| None)
             }
             (
                 JobReport::Game {
                     score,
-                    recording: Some(stored),
+                    recording: Some(files),
                     ..
                 },
                 ExpectedRecording::Game(spec),
             ) => {
-                let folder = artifacts.local_path(&stored.key)?;
-                if let Some(difference) = file_difference(&folder, stored)? {
+                let folder = artifacts.local_path(&files.key)?;
+                if let Some(difference) = file_difference(&folder, files)? {
                     return Ok(Some(difference));
                 }
                 (|| {
@@ -82,7 +83,7 @@ impl ResultChecks {
             }
             _ => return Ok(None),
         };
-        match found {
+        match checked {
             Ok(difference) => Ok(difference),
             Err(error) if is_platform_fault(&error) => {
                 Err(error).context("checking the recording of a remote worker")
@@ -91,19 +92,19 @@ impl ResultChecks {
         }
     }
 
-    /// The episodes to simulate again. They are drawn from the server's secret, so workers cannot predict them, and are the
-    /// same on each call for a lease.
+    /// The episodes to simulate again. They are drawn from the server's secret and the lease's nonce, so workers cannot
+    /// predict them, and they are the same on each call for a lease.
     fn sample(&self, nonce: Uuid, episodes: Range<u32>) -> Vec<u32> {
         let mut remaining: Vec<u32> = episodes.collect();
         let mut drawn = Vec::new();
-        for number in 0..self.episodes {
+        for draw in 0..self.checked_episodes {
             let Ok(count) = u64::try_from(remaining.len()) else {
                 break;
             };
             if count == 0 {
                 break;
             }
-            let index = self.key.draw(nonce, number) % count;
+            let index = self.key.draw(nonce, draw) % count;
             let index = usize::try_from(index).unwrap_or_default();
             drawn.push(remaining.swap_remove(index));
         }
@@ -137,7 +138,7 @@ fn fault_count_difference(grant: &Grant, report: &JobReport) -> Option<String> {
 }
 
 /// The episodes of a shard that were played: only the first ones if faults ended it.
-fn played(episodes: &Range<u32>, outcomes: &[EpisodeOutcome]) -> Range<u32> {
+fn played_episodes(episodes: &Range<u32>, outcomes: &[EpisodeOutcome]) -> Range<u32> {
     let count = u32::try_from(outcomes.len()).unwrap_or(u32::MAX);
     episodes.start..episodes.end.min(episodes.start.saturating_add(count))
 }
@@ -149,10 +150,10 @@ fn same_json(a: &str, b: &str) -> bool {
 }
 
 /// A game file that is missing or does not have the hash of the report.
-fn file_difference(folder: &Path, stored: &GameFiles) -> anyhow::Result<Option<String>> {
-    let [first, second] = &stored.side_blake3;
+fn file_difference(folder: &Path, reported: &GameFiles) -> anyhow::Result<Option<String>> {
+    let [first, second] = &reported.side_blake3;
     let files = [
-        (GAME_FILE, &stored.game_blake3),
+        (GAME_FILE, &reported.game_blake3),
         (side_file(Side::First), first),
         (side_file(Side::Second), second),
     ];
@@ -184,9 +185,13 @@ mod tests {
 
     #[test]
     fn sample_depends_on_secret_and_lease() {
-        let sample_for = |secret: u8, nonce: u128, episodes: u32, range: Range<u32>| {
+        let sample_for = |secret: u8, nonce: u128, checked_episodes: u32, range: Range<u32>| {
             let key = GrantKey::from_secret(&[secret; 32]);
-            ResultChecks { episodes, key }.sample(Uuid::from_u128(nonce), range)
+            let checks = ResultChecks {
+                checked_episodes,
+                key,
+            };
+            checks.sample(Uuid::from_u128(nonce), range)
         };
         let sample = sample_for(1, 1, 3, 50..100);
         assert_eq!(sample, sample_for(1, 1, 3, 50..100));

@@ -15,9 +15,9 @@ const MAX_HEADER_BYTES: usize = 256;
 const PUBLISH_TIMEOUT: Duration = Duration::from_secs(10);
 
 impl ServerClient {
-    /// Sends the result of a job, with retries until NATS has stored it; its sequence number in the stream of results. For a
-    /// completed job it gives up when the lease is lost, and returns `None`. For a message that is too large it gives up
-    /// after the duration of a lease, so that the server learns of it.
+    /// Sends the result of a job, with retries until NATS has stored it, and returns its sequence number in the stream of
+    /// results. The result of a completed job is given up when the lease is lost; then `None` is returned. A message that is
+    /// too large is given up after the duration of a lease, and the job ends with this error.
     pub(super) async fn send_result(
         &self,
         lease: &Lease,
@@ -33,19 +33,19 @@ impl ServerClient {
         let mut headers = HeaderMap::new();
         headers.insert("Nats-Msg-Id", message.id());
         let payload = serde_json::to_vec(&message)?;
-        let began = Instant::now();
+        let started_at = Instant::now();
         let give_up_after = Duration::from_secs(lease.duration_s.into());
         let subject = self.link.names.results(self.link.worker.as_str());
         // Only changes of the cause are logged.
-        let mut logged = String::new();
+        let mut logged_cause = String::new();
         loop {
             let sent = async {
                 // The limit may change when NATS restarts.
-                let largest = self.link.client.max_payload();
-                if payload.len() + MAX_HEADER_BYTES > largest {
+                let max_payload = self.link.client.max_payload();
+                if payload.len() + MAX_HEADER_BYTES > max_payload {
                     return Err(anyhow::Error::from(TooLarge {
                         bytes: payload.len(),
-                        largest,
+                        max_payload,
                     }));
                 }
                 let published = self.jetstream.publish_with_headers(
@@ -64,14 +64,14 @@ impl ServerClient {
             if is_done && self.has_ended() {
                 return Ok(None);
             }
-            if error.is::<TooLarge>() && began.elapsed() >= give_up_after {
+            if error.is::<TooLarge>() && started_at.elapsed() >= give_up_after {
                 return Err(error).context("sending the result");
             }
             let cause = format!("{error:#}");
-            if cause != logged {
+            if cause != logged_cause {
                 tracing::warn!(job = %lease.job_id, cause, "the result is not stored by NATS yet; trying again");
                 self.set_send_problem(&cause);
-                logged = cause;
+                logged_cause = cause;
             }
             if is_done {
                 self.pause().await;
@@ -86,9 +86,9 @@ impl ServerClient {
 /// The result exceeds the maximum message size of NATS.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the result has {bytes} bytes, but NATS accepts messages of at most {largest}: raise its max_payload"
+    "the result has {bytes} bytes, but NATS accepts messages of at most {max_payload}: raise its max_payload"
 )]
 pub(crate) struct TooLarge {
     bytes: usize,
-    largest: usize,
+    max_payload: usize,
 }

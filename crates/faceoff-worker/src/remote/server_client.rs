@@ -32,9 +32,9 @@ pub(super) struct ServerClient {
     pub(super) jetstream: jetstream::Context,
     /// The consumer of jobs, cached until a failure.
     pub(super) consumer: Mutex<Option<PullConsumer>>,
-    current: Mutex<CurrentJob>,
-    /// When the disk was last full.
-    full_at: Mutex<Option<Instant>>,
+    current_job: Mutex<CurrentJob>,
+    /// When this worker's disk was last full.
+    disk_full_at: Mutex<Option<Instant>>,
 }
 
 /// The job that the slot runs.
@@ -42,7 +42,7 @@ pub(super) struct ServerClient {
 struct CurrentJob {
     files: Arc<JobFiles>,
     /// When the lease was last confirmed by the server.
-    held_at: Option<Instant>,
+    confirmed_at: Option<Instant>,
     /// Is the lease lost?
     is_lost: bool,
     /// The problem that prevents sending the result.
@@ -55,41 +55,47 @@ impl ServerClient {
             jetstream: jetstream::new(link.client.clone()),
             link,
             consumer: Mutex::default(),
-            current: Mutex::default(),
-            full_at: Mutex::default(),
+            current_job: Mutex::default(),
+            disk_full_at: Mutex::default(),
         }
     }
 
-    /// Was the disk full recently?
+    /// Was this worker's disk full within [`FULL_DISK_PAUSE`]?
     fn had_full_disk(&self) -> bool {
-        let full_at = self.full_at.lock().unwrap_or_else(PoisonError::into_inner);
-        full_at.is_some_and(|at| at.elapsed() < FULL_DISK_PAUSE)
+        let disk_full_at = self
+            .disk_full_at
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        disk_full_at.is_some_and(|at| at.elapsed() < FULL_DISK_PAUSE)
     }
 
-    fn current(&self) -> MutexGuard<'_, CurrentJob> {
-        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    fn current_job(&self) -> MutexGuard<'_, CurrentJob> {
+        self.current_job
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Must the slot stop its job, because of a lost lease or the shutdown?
     pub(super) fn has_ended(&self) -> bool {
-        self.current().is_lost || self.link.shutdown.is_cancelled()
+        self.current_job().is_lost || self.link.shutdown.is_cancelled()
     }
 
     /// Records why the result cannot be sent; the next renewal reports it to the server.
     pub(super) fn set_send_problem(&self, cause: &str) {
-        self.current().send_problem = Some(cause.to_owned());
+        self.current_job().send_problem = Some(cause.to_owned());
     }
 
     /// The files of the current job.
     fn files(&self) -> Arc<JobFiles> {
-        Arc::clone(&self.current().files)
+        Arc::clone(&self.current_job().files)
     }
 
-    async fn store(&self, name: &str, file: &Path) -> anyhow::Result<()> {
+    async fn store_file(&self, name: &str, file: &Path) -> anyhow::Result<()> {
         let (files, transfer) = (self.files(), &self.link.file_transfer);
         files.store(transfer, name, file, || self.has_ended()).await
     }
 
+    /// Waits for [`RETRY_INTERVAL`], or until the shutdown.
     pub(super) async fn pause(&self) {
         tokio::select! {
             () = self.link.shutdown.cancelled() => {}
@@ -101,17 +107,17 @@ impl ServerClient {
 impl JobServer for ServerClient {
     fn claim(&self, slot: &str) -> anyhow::Result<ClaimResult> {
         // The version is not used: NATS wakes slots that wait for a job.
-        let queue = QueueVersion(0);
+        let queue_version = QueueVersion(0);
         self.link.runtime.block_on(async {
             if self.had_full_disk() {
                 self.pause().await;
-                return Ok(ClaimResult::Empty { queue });
+                return Ok(ClaimResult::Empty { queue_version });
             }
             match self.register().await {
                 Ok(true) => {}
                 Ok(false) => {
                     self.pause().await;
-                    return Ok(ClaimResult::Empty { queue });
+                    return Ok(ClaimResult::Empty { queue_version });
                 }
                 Err(error) => {
                     self.pause().await;
@@ -134,16 +140,16 @@ impl JobServer for ServerClient {
                 ..
             }) = job
             else {
-                return Ok(ClaimResult::Empty { queue });
+                return Ok(ClaimResult::Empty { queue_version });
             };
             self.link.mark_busy();
-            *self.current() = CurrentJob {
+            *self.current_job() = CurrentJob {
                 files: Arc::new(JobFiles {
                     grant,
                     files_url,
                     objects,
                 }),
-                held_at: Some(Instant::now()),
+                confirmed_at: Some(Instant::now()),
                 is_lost: false,
                 send_problem: None,
             };
@@ -156,24 +162,24 @@ impl JobServer for ServerClient {
         let request = WorkerRequest::RenewLease {
             lease: lease.clone(),
             episodes_done,
-            trouble: self.current().send_problem.clone(),
+            trouble: self.current_job().send_problem.clone(),
         };
         let response = self.link.runtime.block_on(self.link.request(&request));
         match response {
             Ok(WorkerResponse::Accepted) => {
-                self.current().held_at = Some(Instant::now());
+                self.current_job().confirmed_at = Some(Instant::now());
                 Ok(LeaseStatus::Held)
             }
             Ok(WorkerResponse::Refused { .. }) => {
-                self.current().is_lost = true;
+                self.current_job().is_lost = true;
                 Ok(LeaseStatus::Lost)
             }
             Ok(WorkerResponse::Unknown) | Err(_) => {
-                let held_at = self.current().held_at;
+                let confirmed_at = self.current_job().confirmed_at;
                 let timeout = Duration::from_secs(lease.duration_s.into());
-                if held_at.is_some_and(|at| at.elapsed() > timeout) {
+                if confirmed_at.is_some_and(|at| at.elapsed() > timeout) {
                     tracing::error!(job = %lease.job_id, "no contact to the server for the duration of the lease: the job is stopped");
-                    self.current().is_lost = true;
+                    self.current_job().is_lost = true;
                     return Ok(LeaseStatus::Lost);
                 }
                 response
@@ -218,7 +224,8 @@ impl JobServer for ServerClient {
                 episodes_done,
                 sequence,
             };
-            // From now on the server renews the lease. If the request fails, it does so only until the lease expires.
+            // From now on the server renews the lease. Without this request it would learn of the result only when it
+            // reads it, perhaps after the lease has expired.
             if let Err(error) = self.link.request(&request).await {
                 tracing::debug!(%error, "the server could not be informed of the pending result");
             }
@@ -232,8 +239,11 @@ impl JobServer for ServerClient {
         let end = match reason {
             ReleaseReason::Shutdown => JobEnd::Shutdown,
             ReleaseReason::FullDisk => {
-                let mut full_at = self.full_at.lock().unwrap_or_else(PoisonError::into_inner);
-                *full_at = Some(Instant::now());
+                let mut disk_full_at = self
+                    .disk_full_at
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner);
+                *disk_full_at = Some(Instant::now());
                 JobEnd::FullDisk
             }
             ReleaseReason::PlatformFault(summary) => JobEnd::PlatformFault {
@@ -252,15 +262,20 @@ impl JobServer for ServerClient {
         full_disk::is_cause_of(error)
     }
 
-    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>) {
-        // A request for a job has already waited.
-        if queue.is_some() {
+    fn wait(
+        &self,
+        stop: &CancellationToken,
+        timeout: Duration,
+        queue_version: Option<QueueVersion>,
+    ) {
+        // The caller has just claimed without success: the request for a job has already waited.
+        if queue_version.is_some() {
             return;
         }
         self.link.runtime.block_on(async {
             tokio::select! {
                 () = stop.cancelled() => {}
-                () = tokio::time::sleep(at_most) => {}
+                () = tokio::time::sleep(timeout) => {}
             }
         });
     }
@@ -281,14 +296,16 @@ impl JobServer for ServerClient {
             while let Some(entry) = entries.next_entry().await? {
                 let name = entry.file_name();
                 let name = name.to_str().context("a recording's file without a name")?;
-                self.store(name, &entry.path()).await?;
+                self.store_file(name, &entry.path()).await?;
             }
             Ok(())
         })
     }
 
     fn store_clips(&self, _: &str, clips: &Path) -> anyhow::Result<()> {
-        self.link.runtime.block_on(self.store(CLIPS_FILE, clips))
+        self.link
+            .runtime
+            .block_on(self.store_file(CLIPS_FILE, clips))
     }
 
     fn store_dataset(&self, key: &str, _: &Path, _: Option<&Path>) -> anyhow::Result<()> {

@@ -1,5 +1,5 @@
-//! The streams and consumers of a server. Old versions of NATS silently ignore unknown settings, so the actual settings are
-//! compared with the requested ones.
+//! The streams of a server in NATS (stored messages: one of jobs, one of results), and the consumers by which they are read.
+//! Old versions of NATS silently ignore unknown settings, so the actual settings are compared with the requested ones.
 
 use super::{
     connection::REQUEST_TIMEOUT,
@@ -32,7 +32,7 @@ const ACK_WAIT: Duration = Duration::from_secs(60);
 /// delivered again, which has no effect.
 pub(super) const MESSAGES_LOST: &str =
     "NATS has lost stored messages: the consumer is created again";
-/// Maximum number of slots that wait for a job.
+/// Maximum number of slots that wait for a job at a time, over all workers.
 const MAX_WAITING: i64 = 8192;
 
 /// The streams of a server.
@@ -41,9 +41,11 @@ pub(super) struct Streams {
     pub(super) names: Names,
     /// Identifies the server; stored as the description of the streams.
     pub(super) owner: String,
-    /// Whether the streams of jobs and of results are known to belong to this server. Otherwise workers are not answered,
-    /// since they belong to another server.
-    are_owned: [AtomicBool; 2],
+    /// Is the stream of jobs known to belong to this server? Unless both streams do, workers are not answered, since they
+    /// belong to another server.
+    owns_jobs_stream: AtomicBool,
+    /// Is the stream of results known to belong to this server?
+    owns_results_stream: AtomicBool,
 }
 
 impl Streams {
@@ -52,46 +54,51 @@ impl Streams {
             jetstream,
             names,
             owner,
-            are_owned: [const { AtomicBool::new(false) }; 2],
+            owns_jobs_stream: AtomicBool::new(false),
+            owns_results_stream: AtomicBool::new(false),
         }
     }
 
     pub(super) fn are_owned(&self) -> bool {
-        let is_owned = |known: &AtomicBool| known.load(Ordering::Relaxed);
-        self.are_owned.iter().all(is_owned)
+        self.owns_jobs_stream.load(Ordering::Relaxed)
+            && self.owns_results_stream.load(Ordering::Relaxed)
     }
 
+    /// Sets up the stream of jobs and its consumer.
     pub(super) async fn jobs(&self) -> anyhow::Result<(Stream, PullConsumer)> {
-        let stream = self.stream(self.jobs_config(), &self.are_owned[0]).await?;
+        let stream = self
+            .stream(self.jobs_config(), &self.owns_jobs_stream)
+            .await?;
         let consumer = consumer(&stream, jobs_consumer()).await?;
         Ok((stream, consumer))
     }
 
+    /// Sets up the stream of results and its consumer.
     pub(super) async fn results(&self) -> anyhow::Result<PullConsumer> {
-        // The owner of the first stream owns the second. Otherwise two new servers could create one each.
-        self.owned_stream(&self.jobs_config(), &self.are_owned[0])
+        // The owner of the stream of jobs owns the stream of results. Otherwise two new servers could create one each.
+        self.owned_stream(&self.jobs_config(), &self.owns_jobs_stream)
             .await?;
-        let stream = self.stream(self.results_config(), &self.are_owned[1]);
+        let stream = self.stream(self.results_config(), &self.owns_results_stream);
         consumer(&stream.await?, results_consumer()).await
     }
 
-    /// Checks that the stream exists and has no results that are never delivered; such failures cause no other error.
-    /// `undelivered` is the first such result of the previous check.
+    /// Checks that the stream of results exists and has no results that are never delivered; such failures cause no other
+    /// error. `undelivered` is the sequence number of the first apparently undelivered result of the previous check.
     ///
     /// # Errors
-    /// If stream and consumer must be set up again.
+    /// If the stream and its consumer must be set up again.
     pub(super) async fn check_results(
         &self,
         consumer: &mut PullConsumer,
         undelivered: &mut Option<u64>,
     ) -> anyhow::Result<()> {
         let name = self.names.results_stream();
-        let doing = || format!("checking the stream {name}");
+        let context = || format!("checking the stream {name}");
         let stream = self.jetstream.get_stream(&name).await;
-        let stream = stream.with_context(doing)?;
+        let stream = stream.with_context(context)?;
         let state = &stream.cached_info().state;
-        let known = consumer.info().await.with_context(doing)?;
-        let is_idle = known.num_pending == 0 && known.num_ack_pending == 0;
+        let info = consumer.info().await.with_context(context)?;
+        let is_idle = info.num_pending == 0 && info.num_ack_pending == 0;
         let first = (is_idle && state.messages > 0).then_some(state.first_sequence);
         // A result that was just acknowledged looks the same, but only once.
         anyhow::ensure!(first.is_none() || first != *undelivered, MESSAGES_LOST);
@@ -118,15 +125,20 @@ impl Streams {
         }
     }
 
-    /// The stream with the wanted configuration, owned by this server.
-    async fn stream(&self, wanted: stream::Config, known: &AtomicBool) -> anyhow::Result<Stream> {
-        let name = &wanted.name;
-        let doing = || format!("setting up the stream {name}");
-        let mut stream = self.owned_stream(&wanted, known).await?;
-        let found = &stream.cached_info().config;
-        if !matches_stream(found, &wanted) {
+    /// Sets up a stream with the requested configuration. `is_known_as_own` is set if this server owns the stream, otherwise
+    /// cleared, with an error.
+    async fn stream(
+        &self,
+        requested: stream::Config,
+        is_known_as_own: &AtomicBool,
+    ) -> anyhow::Result<Stream> {
+        let name = &requested.name;
+        let context = || format!("setting up the stream {name}");
+        let mut stream = self.owned_stream(&requested, is_known_as_own).await?;
+        let actual = &stream.cached_info().config;
+        if !matches_stream(actual, &requested) {
             self.jetstream
-                .update_stream(&wanted)
+                .update_stream(&requested)
                 .await
                 .with_context(|| {
                     format!(
@@ -134,27 +146,27 @@ impl Streams {
                          (`nats stream rm {name}`), and this server creates it again; the jobs of its messages are repeated"
                     )
                 })?;
-            let found = &stream.info().await.with_context(doing)?.config;
+            let actual = &stream.info().await.with_context(context)?.config;
             anyhow::ensure!(
-                matches_stream(found, &wanted),
+                matches_stream(actual, &requested),
                 "NATS does not apply the requested settings of the stream {name}; a newer nats-server may do so"
             );
         }
         Ok(stream)
     }
 
-    /// The stream, created if necessary; an error if another server owns it.
+    /// Opens the stream, or creates it; fails if another server owns it.
     async fn owned_stream(
         &self,
-        wanted: &stream::Config,
-        known: &AtomicBool,
+        requested: &stream::Config,
+        is_known_as_own: &AtomicBool,
     ) -> anyhow::Result<Stream> {
-        let name = &wanted.name;
-        let stream = self.jetstream.get_or_create_stream(wanted.clone()).await;
+        let name = &requested.name;
+        let stream = self.jetstream.get_or_create_stream(requested.clone()).await;
         let stream = stream.with_context(|| format!("setting up the stream {name}"))?;
         let owner = &stream.cached_info().config.description;
-        let is_owned = *owner == wanted.description;
-        known.store(is_owned, Ordering::Relaxed);
+        let is_owned = *owner == requested.description;
+        is_known_as_own.store(is_owned, Ordering::Relaxed);
         anyhow::ensure!(
             is_owned,
             "the stream {name} is another server's ({}): give each server its own nats.name",
@@ -189,51 +201,54 @@ impl Streams {
     }
 }
 
-/// Has the consumer received more messages than its stream has ever had? Then NATS has lost messages, and new messages with
-/// their numbers would not be delivered.
+/// Has the consumer received more messages than its stream has ever had (by their sequence numbers)? Then NATS has lost
+/// messages, and new messages with their numbers would not be delivered.
 pub(super) const fn is_ahead(consumer: &consumer::Info, stream: &stream::State) -> bool {
     consumer.delivered.stream_sequence > stream.last_sequence
 }
 
-async fn consumer(stream: &Stream, wanted: pull::Config) -> anyhow::Result<PullConsumer> {
-    let name = wanted.durable_name.as_deref().unwrap_or_default();
-    let doing = || format!("setting up the consumer {name}");
-    let consumer = stream.create_consumer(wanted.clone()).await;
-    let mut consumer: PullConsumer = consumer.with_context(doing)?;
-    let state = stream.get_info().await.with_context(doing)?.state;
-    let known = consumer.cached_info();
-    let is_idle = known.num_pending == 0 && known.num_ack_pending == 0;
-    if is_ahead(known, &state) || (is_idle && state.messages > 0) {
+/// Sets up a consumer of the stream. If messages were lost, the consumer is created again.
+async fn consumer(stream: &Stream, requested: pull::Config) -> anyhow::Result<PullConsumer> {
+    let name = requested.durable_name.as_deref().unwrap_or_default();
+    let context = || format!("setting up the consumer {name}");
+    let consumer = stream.create_consumer(requested.clone()).await;
+    let mut consumer: PullConsumer = consumer.with_context(context)?;
+    let state = stream.get_info().await.with_context(context)?.state;
+    let info = consumer.cached_info();
+    let is_idle = info.num_pending == 0 && info.num_ack_pending == 0;
+    if is_ahead(info, &state) || (is_idle && state.messages > 0) {
         tracing::warn!(consumer = name, "{MESSAGES_LOST}");
-        stream.delete_consumer(name).await.with_context(doing)?;
-        let recreated = stream.create_consumer(wanted.clone()).await;
-        consumer = recreated.with_context(doing)?;
+        stream.delete_consumer(name).await.with_context(context)?;
+        let recreated = stream.create_consumer(requested.clone()).await;
+        consumer = recreated.with_context(context)?;
     }
-    let found = &consumer.cached_info().config;
+    let actual = &consumer.cached_info().config;
     anyhow::ensure!(
-        matches_consumer(found, &wanted),
+        matches_consumer(actual, &requested),
         "NATS does not apply the requested settings of the consumer {name}; a newer nats-server may do so"
     );
     Ok(consumer)
 }
 
-fn matches_stream(found: &stream::Config, wanted: &stream::Config) -> bool {
-    found.subjects == wanted.subjects
-        && found.retention == wanted.retention
-        && found.discard == wanted.discard
-        && found.storage == wanted.storage
-        && (wanted.max_messages == 0 || found.max_messages == wanted.max_messages)
-        && (wanted.max_bytes == 0 || found.max_bytes == wanted.max_bytes)
-        && (wanted.duplicate_window.is_zero() || found.duplicate_window == wanted.duplicate_window)
+/// Settings that were not requested may have any value.
+fn matches_stream(actual: &stream::Config, requested: &stream::Config) -> bool {
+    actual.subjects == requested.subjects
+        && actual.retention == requested.retention
+        && actual.discard == requested.discard
+        && actual.storage == requested.storage
+        && (requested.max_messages == 0 || actual.max_messages == requested.max_messages)
+        && (requested.max_bytes == 0 || actual.max_bytes == requested.max_bytes)
+        && (requested.duplicate_window.is_zero()
+            || actual.duplicate_window == requested.duplicate_window)
 }
 
 /// Settings that were not requested may have any value.
-fn matches_consumer(found: &jetstream::consumer::Config, wanted: &pull::Config) -> bool {
-    found.max_deliver == wanted.max_deliver
-        && found.ack_policy == wanted.ack_policy
-        && (wanted.ack_wait.is_zero() || found.ack_wait == wanted.ack_wait)
-        && (wanted.max_ack_pending == 0 || found.max_ack_pending == wanted.max_ack_pending)
-        && (wanted.max_waiting == 0 || found.max_waiting == wanted.max_waiting)
+fn matches_consumer(actual: &jetstream::consumer::Config, requested: &pull::Config) -> bool {
+    actual.max_deliver == requested.max_deliver
+        && actual.ack_policy == requested.ack_policy
+        && (requested.ack_wait.is_zero() || actual.ack_wait == requested.ack_wait)
+        && (requested.max_ack_pending == 0 || actual.max_ack_pending == requested.max_ack_pending)
+        && (requested.max_waiting == 0 || actual.max_waiting == requested.max_waiting)
 }
 
 /// Each job is delivered once. The server notices jobs that no worker starts.

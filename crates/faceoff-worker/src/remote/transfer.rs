@@ -1,4 +1,5 @@
-//! Transfer of files to and from a worker. An attempt continues as long as data moves, and failures on the way are retried.
+//! Transfer of files between the server (or its bucket) and a remote worker. An attempt continues as long as data
+//! moves, and failures on the way are retried.
 
 use reqwest::{Client, Response, StatusCode, header};
 use std::{
@@ -19,7 +20,7 @@ pub(super) struct FileTransfer {
 /// Timeouts and retry limits of transfers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TransferTimeouts {
-    /// An attempt is given up after this time without progress.
+    /// An attempt is stopped after this time without progress.
     pub(super) stall: Duration,
     /// Retries end this long after the last progress. The server may be restarting meanwhile.
     pub(super) unavailable: Duration,
@@ -45,9 +46,10 @@ impl Default for TransferTimeouts {
 
 /// How often to check whether the job has ended.
 const END_CHECK_INTERVAL: Duration = Duration::from_millis(500);
-/// Upper bound of the data in this host's buffers after a whole body was written: 4 MiB of the kernel, and those of HTTP.
+/// Upper bound of the data in this host's buffers after a whole body was written: 4 MiB in the kernel, the rest in the HTTP
+/// client.
 const BUFFERED_BYTES: u64 = 5 << 20;
-/// The slowest supported link, which empties the buffers: 128 kbit/s.
+/// Speed of the slowest supported link, at which the buffers are emptied: 128 kbit/s.
 const SLOWEST_BYTES_PER_S: u64 = 16_000;
 
 /// Progress of an attempt.
@@ -56,7 +58,9 @@ pub(super) struct TransferProgress(Arc<Mutex<ProgressState>>);
 
 #[derive(Debug)]
 struct ProgressState {
-    at: Instant,
+    /// When data last moved; initially the start of the attempt.
+    progressed_at: Instant,
+    /// Bytes transferred so far.
     bytes: u64,
     /// Size of a file that is sent; unknown for downloads.
     total_bytes: Option<u64>,
@@ -65,7 +69,7 @@ struct ProgressState {
 impl TransferProgress {
     fn new() -> Self {
         Self(Arc::new(Mutex::new(ProgressState {
-            at: Instant::now(),
+            progressed_at: Instant::now(),
             bytes: 0,
             total_bytes: None,
         })))
@@ -79,18 +83,18 @@ impl TransferProgress {
     /// Adds bytes that were transferred.
     pub(super) fn add(&self, bytes: usize) {
         let mut state = self.state();
-        state.at = Instant::now();
+        state.progressed_at = Instant::now();
         state.bytes += bytes as u64;
     }
 
-    /// Waits until there was no progress for this time.
-    async fn stalled(&self, stall: Duration) {
+    /// Waits until there was no progress for the duration `stall`.
+    async fn wait_for_stall(&self, stall: Duration) {
         loop {
-            let end = self.state().stall_deadline(stall);
-            if end <= Instant::now() {
+            let deadline = self.state().stall_deadline(stall);
+            if deadline <= Instant::now() {
                 return;
             }
-            sleep_until(end).await;
+            sleep_until(deadline).await;
         }
     }
 
@@ -100,12 +104,14 @@ impl TransferProgress {
 }
 
 impl ProgressState {
+    /// When the attempt counts as stalled without further progress. A file that was written completely may still be in this
+    /// host's buffers, which take time to empty.
     fn stall_deadline(&self, stall: Duration) -> Instant {
         let in_buffers = match self.total_bytes {
             Some(total) if self.bytes >= total => total.min(BUFFERED_BYTES),
             _ => 0,
         };
-        self.at + stall + Duration::from_secs(in_buffers / SLOWEST_BYTES_PER_S)
+        self.progressed_at + stall + Duration::from_secs(in_buffers / SLOWEST_BYTES_PER_S)
     }
 }
 
@@ -128,16 +134,17 @@ enum TransientError {
 struct JobEnded;
 
 impl FileTransfer {
-    /// Repeats `attempt` until it succeeds, is refused, or the retry limits are reached. Stops as soon as the job has `ended`.
+    /// Repeats `attempt` until it succeeds, is refused, or the retry limits are reached. Stops as soon as the job
+    /// `has_ended`.
     pub(super) async fn run(
         &self,
         mut attempt: impl AsyncFnMut(&Client, &TransferProgress) -> anyhow::Result<()>,
-        ended: impl Fn() -> bool,
+        has_ended: impl Fn() -> bool,
     ) -> anyhow::Result<()> {
         let timeouts = &self.timeouts;
         let mut attempts = Attempts::default();
-        let mut is_over = pin!(async {
-            while !ended() {
+        let mut job_end = pin!(async {
+            while !has_ended() {
                 sleep(END_CHECK_INTERVAL).await;
             }
         });
@@ -146,8 +153,8 @@ impl FileTransfer {
             let result = tokio::select! {
                 biased;
                 done = attempt(&self.http, &progress) => done,
-                () = &mut is_over => return Err(JobEnded.into()),
-                () = progress.stalled(timeouts.stall) => Err(TransientError::Stalled(timeouts.stall).into()),
+                () = &mut job_end => return Err(JobEnded.into()),
+                () = progress.wait_for_stall(timeouts.stall) => Err(TransientError::Stalled(timeouts.stall).into()),
             };
             let Err(error) = result else {
                 return Ok(());
@@ -156,7 +163,7 @@ impl FileTransfer {
                 return Err(error);
             };
             tokio::select! {
-                () = &mut is_over => return Err(error),
+                () = &mut job_end => return Err(error),
                 () = sleep(delay) => {}
             }
         }
@@ -174,7 +181,8 @@ struct Attempts {
 }
 
 impl Attempts {
-    /// The delay before the next attempt; `None` if there is none. There is at least one retry, except after a refusal.
+    /// The delay before the next attempt; `None` if the transfer is given up. There is at least one retry, except after a
+    /// refusal.
     fn retry_delay(
         &mut self,
         error: &anyhow::Error,
@@ -186,26 +194,26 @@ impl Attempts {
             return None;
         }
         self.failed += 1;
-        let (at, bytes) = {
+        let (progressed_at, bytes) = {
             let state = progress.state();
-            (state.at, state.bytes)
+            (state.progressed_at, state.bytes)
         };
         match transient {
             // Data sent to an overloaded server does not count as progress.
             Some(TransientError::Busy { .. }) => {
-                self.unavailable_since.get_or_insert(at);
+                self.unavailable_since.get_or_insert(progressed_at);
             }
             _ if bytes > 0 => {
                 self.interrupted += 1;
-                self.unavailable_since = Some(at);
+                self.unavailable_since = Some(progressed_at);
             }
             _ => {
-                self.unavailable_since.get_or_insert(at);
+                self.unavailable_since.get_or_insert(progressed_at);
             }
         }
         let is_expired = self
             .unavailable_since
-            .is_some_and(|at| at.elapsed() >= timeouts.unavailable);
+            .is_some_and(|since| since.elapsed() >= timeouts.unavailable);
         if (is_expired && self.failed > 1) || self.interrupted >= timeouts.max_interrupted {
             return None;
         }
@@ -226,7 +234,7 @@ fn is_connection_error(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref::<reqwest::Error>().is_some_and(|error| {
             let is_before = error.is_connect() || error.is_timeout() || error.is_request();
-            // The others occur while the response is read.
+            // The other two occur while the response is read.
             is_before || error.is_body() || error.is_decode()
         })
     })

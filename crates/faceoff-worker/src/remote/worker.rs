@@ -1,4 +1,5 @@
-//! The process of a remote worker.
+//! The process of a remote worker, which runs jobs of a server on another machine. It reaches the server over the message
+//! broker NATS.
 
 use super::{
     connection::{NatsConfig, REQUEST_TIMEOUT},
@@ -23,6 +24,7 @@ use std::{
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
+/// Configuration of a remote worker.
 #[derive(Debug, Clone)]
 pub struct RemoteWorker {
     pub nats: NatsConfig,
@@ -72,8 +74,8 @@ pub async fn run_remote_worker(
             timeouts: TransferTimeouts::default(),
         },
         shutdown: shutdown.clone(),
-        refused: Mutex::default(),
-        unreadable: Mutex::default(),
+        refusal: Mutex::default(),
+        unreadable_cause: Mutex::default(),
         busy_at: Mutex::new(Instant::now()),
         registered_at: Mutex::default(),
     });
@@ -92,7 +94,7 @@ pub async fn run_remote_worker(
         server: Arc::new(ServerClient::new(Arc::clone(&link))),
     });
     let servers = servers.collect();
-    let ended = run_slots(
+    let running = run_slots(
         config.slots,
         &scratch,
         servers,
@@ -100,7 +102,7 @@ pub async fn run_remote_worker(
         Intervals::default(),
         shutdown,
     );
-    ended.await.context("the worker's slots")?;
+    running.await.context("the worker's slots")?;
     // Sends the last messages, if NATS is reachable.
     let _ = tokio::time::timeout(REQUEST_TIMEOUT, link.client.flush()).await;
     Ok(())

@@ -1,4 +1,4 @@
-//! A worker's connection, shared by its slots.
+//! A remote worker's connection to the message broker NATS, shared by its slots (each runs one job at a time).
 
 use super::{connection::REQUEST_TIMEOUT, names::Names, transfer::FileTransfer};
 use anyhow::Context as _;
@@ -25,10 +25,10 @@ pub(super) struct WorkerLink {
     pub(super) file_transfer: FileTransfer,
     pub(super) shutdown: CancellationToken,
     /// The last logged reason of a refusal. Only changes are logged.
-    pub(super) refused: Mutex<Option<String>>,
+    pub(super) refusal: Mutex<Option<String>>,
     /// The last logged cause of an unreadable job. Only changes are logged.
-    pub(super) unreadable: Mutex<String>,
-    /// When a slot last had a job.
+    pub(super) unreadable_cause: Mutex<String>,
+    /// When a slot of this worker last had a job.
     pub(super) busy_at: Mutex<Instant>,
     /// When the server last accepted the registration.
     pub(super) registered_at: Mutex<Option<Instant>>,
@@ -48,13 +48,14 @@ impl WorkerLink {
 
     /// Requires a new registration before the next job.
     pub(super) fn invalidate_registration(&self) {
-        let mut at = self
+        let mut registered_at = self
             .registered_at
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        *at = None;
+        *registered_at = None;
     }
 
+    /// Sends a request to the server and waits for the response.
     pub(super) async fn request(&self, request: &WorkerRequest) -> anyhow::Result<WorkerResponse> {
         let payload = serde_json::to_vec(request)?;
         let subject = self.names.requests(self.worker.as_str());

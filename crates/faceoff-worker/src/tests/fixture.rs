@@ -1,4 +1,4 @@
-//! The scripted evaluator and a server around it.
+//! The fixture of these tests: an evaluator (which plays the jobs of slots) scripted by the test, and a server around it.
 
 use super::scripted_game::game_report;
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     slot_threads::SlotThreads,
 };
 use faceoff_metrics::Metrics;
-use faceoff_replay::{ClipIndex, EpisodeLine, Key, PackWriter};
+use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, PackWriter};
 use faceoff_runner::{
     AgentEnvironment, AssembledDataset, CLIPS_FILE, EvaluationMeta, GameReport, GameSpec,
     LiveFeedSink, Observer, PlatformFault, ShardReport, ShardSpec, TimeLimits, ValidationReport,
@@ -35,62 +35,74 @@ use std::{
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
-pub(super) type Play =
+/// The bundles that the scripted evaluator knows: one that it accepts, one that it refuses, and one whose unpacking ends only
+/// when it is cancelled.
+pub(super) const VALID_ARCHIVE: &[u8] = b"archive";
+pub(super) const INVALID_ARCHIVE: &[u8] = b"no archive";
+pub(super) const ENDLESS_ARCHIVE: &[u8] = b"endless";
+
+/// Plays a shard.
+pub(super) type PlayShard =
     dyn Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault> + Send + Sync;
 
+/// Plays a game.
 pub(super) type PlayGame =
     dyn Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault> + Send + Sync;
 
 /// An evaluator that plays by a test's closures, and records the played shards and assembled parts.
 pub(super) struct Scripted {
-    play: Box<Play>,
-    game: Box<PlayGame>,
+    play_shard: Box<PlayShard>,
+    play_game: Box<PlayGame>,
+    /// Task and first episode of each shard that was played.
     pub(super) played: Mutex<Vec<(Task, u32)>>,
+    /// Content of the recordings from which the last dataset was assembled.
     pub(super) assembled: Mutex<Vec<String>>,
-    /// Notified when an endless archive is being unpacked.
-    pub(super) endless: tokio::sync::Notify,
+    /// Notified when an [`ENDLESS_ARCHIVE`] is being unpacked.
+    pub(super) endless_unpacking: tokio::sync::Notify,
 }
 
 impl Scripted {
+    /// Plays shards by the closure, and everything else without faults.
     pub(super) fn new(
-        play: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
+        play_shard: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
         + Send
         + Sync
         + 'static,
     ) -> Arc<Self> {
-        Arc::new(Self::from_closures(play, |_, _| Ok(())))
+        Arc::new(Self::from_closures(play_shard, |_, _| Ok(())))
     }
 
     /// Plays games by the closure, and everything else without faults.
     pub(super) fn with_game(
-        game: impl Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault>
+        play_game: impl Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault>
         + Send
         + Sync
         + 'static,
     ) -> Arc<Self> {
-        Arc::new(Self::from_closures(|_, _| Ok(()), game))
+        Arc::new(Self::from_closures(|_, _| Ok(()), play_game))
     }
 
     fn from_closures(
-        play: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
+        play_shard: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
         + Send
         + Sync
         + 'static,
-        game: impl Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault>
+        play_game: impl Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault>
         + Send
         + Sync
         + 'static,
     ) -> Self {
         Self {
-            play: Box::new(play),
-            game: Box::new(game),
+            play_shard: Box::new(play_shard),
+            play_game: Box::new(play_game),
             played: Mutex::default(),
             assembled: Mutex::default(),
-            endless: tokio::sync::Notify::new(),
+            endless_unpacking: tokio::sync::Notify::new(),
         }
     }
 }
 
+/// The outcome of an episode of one step that was solved.
 pub(super) fn outcome(task: Task, episode: u32) -> EpisodeOutcome {
     EpisodeOutcome {
         task,
@@ -110,7 +122,7 @@ fn clips(spec: &ShardSpec) -> Vec<u8> {
     let mut index = ClipIndex::default();
     for episode in spec.episodes.clone() {
         let text = format!("{} {episode}", spec.profile);
-        pack.add(Key::motion(spec.task, episode), text.as_bytes())
+        pack.add(ClipKey::motion(spec.task, episode), text.as_bytes())
             .unwrap();
         index.episodes.push(EpisodeLine {
             task: spec.task,
@@ -139,9 +151,9 @@ impl Evaluator for Scripted {
         cancelled: &dyn Fn() -> bool,
     ) -> Result<Bundle, BundleError> {
         match std::fs::read(archive).unwrap().as_slice() {
-            b"archive" => {}
-            b"endless" => {
-                self.endless.notify_one();
+            VALID_ARCHIVE => {}
+            ENDLESS_ARCHIVE => {
+                self.endless_unpacking.notify_one();
                 while !cancelled() {
                     std::thread::yield_now();
                 }
@@ -185,7 +197,7 @@ impl Evaluator for Scripted {
         out: &Path,
         observer: &mut dyn Observer,
     ) -> Result<ShardReport, PlatformFault> {
-        (self.play)(spec, observer)?;
+        (self.play_shard)(spec, observer)?;
         self.played
             .lock()
             .unwrap()
@@ -215,9 +227,9 @@ impl Evaluator for Scripted {
         _bundles: [&Bundle; 2],
         _envs: [&AgentEnvironment; 2],
         out: &Path,
-        audience: &mut dyn LiveFeedSink,
+        live_updates: &mut dyn LiveFeedSink,
     ) -> Result<GameReport, PlatformFault> {
-        (self.game)(spec, audience)?;
+        (self.play_game)(spec, live_updates)?;
         Ok(game_report(spec, out))
     }
 
@@ -247,6 +259,7 @@ impl Evaluator for Scripted {
     }
 }
 
+/// The result of an evaluation with any score.
 pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
     EvaluationResult {
         ruleset: meta.ruleset.to_string(),
@@ -272,11 +285,12 @@ pub(super) struct Server {
     pub(super) folder: tempfile::TempDir,
     /// Start of the clock: about the real time, which file timestamps have.
     started_at: Timestamp,
-    pub(super) ahead_s: Arc<AtomicI64>,
+    /// How far the tests have advanced the clock, seconds.
+    pub(super) clock_ahead_s: Arc<AtomicI64>,
     pub(super) intervals: Intervals,
 }
 
-/// So long that no renewal, after a third of it in real time, falls into a test.
+/// Duration of a lease, seconds. Leases are renewed after a third of it in real time, which no test takes.
 pub(super) const LEASE_S: u32 = 1800;
 
 impl Server {
@@ -287,7 +301,7 @@ impl Server {
             store,
             folder,
             started_at: Timestamp::now(),
-            ahead_s: Arc::default(),
+            clock_ahead_s: Arc::default(),
             intervals: Intervals {
                 idle_poll: Duration::from_millis(20),
                 cleanup: Duration::from_millis(20),
@@ -301,8 +315,10 @@ impl Server {
     }
 
     pub(super) fn clock(&self) -> Clock {
-        let (started_at, ahead_s) = (self.started_at, Arc::clone(&self.ahead_s));
-        Clock::new(move || started_at + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst)))
+        let (started_at, clock_ahead_s) = (self.started_at, Arc::clone(&self.clock_ahead_s));
+        Clock::new(move || {
+            started_at + SignedDuration::from_secs(clock_ahead_s.load(Ordering::SeqCst))
+        })
     }
 
     pub(super) fn now(&self) -> Timestamp {
@@ -317,22 +333,23 @@ impl Server {
 
     /// Advances the clock.
     pub(super) fn advance(&self, seconds: i64) {
-        self.ahead_s.fetch_add(seconds, Ordering::SeqCst);
+        self.clock_ahead_s.fetch_add(seconds, Ordering::SeqCst);
     }
 
-    pub(super) async fn put(&self, key: &str, content: &[u8]) {
+    pub(super) async fn put_artifact(&self, key: &str, content: &[u8]) {
         let file = self.folder.path().join("upload");
         std::fs::write(&file, content).unwrap();
         self.store.artifacts().put_file(key, &file).await.unwrap();
     }
 
     /// Does the artifact exist?
-    pub(super) async fn has(&self, key: &str) -> bool {
+    pub(super) async fn has_artifact(&self, key: &str) -> bool {
         self.store.artifacts().read(key).await.is_ok()
     }
 
+    /// Creates a team and uploads a bundle, which is not validated yet.
     pub(super) async fn upload(&self, team: &str, content: &[u8]) -> Submission {
-        self.put(&format!("bundles/{team}"), content).await;
+        self.put_artifact(&format!("bundles/{team}"), content).await;
         let bundle = BundleRef {
             key: format!("bundles/{team}"),
             bytes: content.len() as u64,
@@ -358,9 +375,9 @@ impl Server {
             .unwrap()
     }
 
-    /// A team with a valid submission.
-    pub(super) async fn valid(&self, team: &str) -> Submission {
-        let submission = self.upload(team, b"archive").await;
+    /// Creates a team with a valid submission.
+    pub(super) async fn upload_valid(&self, team: &str) -> Submission {
+        let submission = self.upload(team, VALID_ARCHIVE).await;
         let claimed = self.store.claim("test", LEASE_S, self.now()).await.unwrap();
         let claim = claimed.expect("a validation run is queued").claim;
         let outcome = ValidationOutcome::Valid {
@@ -376,9 +393,9 @@ impl Server {
         submission
     }
 
-    /// An evaluation of six queued shards.
-    pub(super) async fn evaluation(&self) -> EvaluationId {
-        let submission = self.valid("Alpha").await;
+    /// Starts an evaluation: two shards of two episodes for each of the three tasks are queued.
+    pub(super) async fn start_evaluation(&self) -> EvaluationId {
+        let submission = self.upload_valid("Alpha").await;
         let plan = RunPlan {
             profile: Profile::Evaluation,
             tasks: Task::ALL.to_vec(),
@@ -398,23 +415,23 @@ impl Server {
         started[0].id
     }
 
-    /// The job server of its slots.
+    /// The job server for slots of this process.
     pub(super) fn local(&self) -> LocalServer {
         self.config(1)
             .local_server(self.store.clone(), self.clock())
     }
 
-    pub(super) fn start_slots(&self, slots: usize, evaluator: &Arc<Scripted>) -> Running {
+    pub(super) fn start_slots(&self, slots: usize, evaluator: &Arc<Scripted>) -> RunningSlots {
         self.start_intercepted_slots(slots, evaluator, |server| Arc::new(server))
     }
 
-    /// Starts slots with an intercepted job server.
+    /// Starts slots whose job server is wrapped by `intercept`.
     pub(super) fn start_intercepted_slots(
         &self,
         slots: usize,
         evaluator: &Arc<Scripted>,
         intercept: impl FnOnce(LocalServer) -> Arc<dyn JobServer>,
-    ) -> Running {
+    ) -> RunningSlots {
         let config = self.config(slots);
         let server = config.local_server(self.store.clone(), self.clock());
         let shutdown = CancellationToken::new();
@@ -426,7 +443,7 @@ impl Server {
             self.intervals,
             shutdown.clone(),
         ));
-        Running { shutdown, task }
+        RunningSlots { shutdown, task }
     }
 
     fn config(&self, slots: usize) -> WorkerConfig {
@@ -472,12 +489,13 @@ impl Server {
             if state.is_over() {
                 return state;
             }
-            // After a lag, the state is read again.
+            // Any event may be due to a change; after a lag, too, the state is read again.
             let _ = events.recv().await;
         }
     }
 }
 
+/// Limits of agents; the scripted evaluator does not apply them.
 pub(super) fn limits() -> Limits {
     Limits {
         memory_bytes: 1 << 30,
@@ -490,12 +508,13 @@ pub(super) fn limits() -> Limits {
     }
 }
 
-pub(super) struct Running {
+/// A worker process with slots, running as a task.
+pub(super) struct RunningSlots {
     pub(super) shutdown: CancellationToken,
     pub(super) task: JoinHandle<anyhow::Result<()>>,
 }
 
-impl Running {
+impl RunningSlots {
     pub(super) async fn stop(self) {
         self.shutdown.cancel();
         self.task.await.unwrap().unwrap();

@@ -1,4 +1,4 @@
-//! Full disks at moments that a real disk cannot be made to choose.
+//! Full disks at exact moments, which a real full disk cannot be made to hit.
 
 use super::{
     fixture::*,
@@ -18,12 +18,12 @@ fn full() -> anyhow::Error {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn full_disk_does_not_count_as_an_attempt() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
-    let (calls, ahead_s) = (AtomicU32::new(0), Arc::clone(&server.ahead_s));
+    let id = server.start_evaluation().await;
+    let (calls, clock_ahead_s) = (AtomicU32::new(0), Arc::clone(&server.clock_ahead_s));
     let evaluator = Scripted::new(move |spec, _| {
         assert_eq!(spec.platform_retries, 0, "no attempt was counted");
         // Skips the pause after each failure.
-        ahead_s.fetch_add(10, Ordering::SeqCst);
+        clock_ahead_s.fetch_add(10, Ordering::SeqCst);
         if calls.fetch_add(1, Ordering::SeqCst) < 3 * MAX_ATTEMPTS {
             return Err(PlatformFault::FullDisk("steps.parquet".into()));
         }
@@ -45,11 +45,11 @@ async fn full_disk_does_not_count_as_an_attempt() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn commit_waits_for_disk_space_without_replaying() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     let evaluator = Scripted::new(|_, _| Ok(()));
     let failures = AtomicU32::new(0);
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
-        InterceptedServer::shared(local, move |moment| match moment {
+        InterceptedServer::shared(local, move |interception| match interception {
             // Fails most calls, although the report was stored.
             Interception::Committed(_) if failures.fetch_add(1, Ordering::SeqCst) % 4 < 3 => {
                 Err(full())
@@ -69,10 +69,10 @@ async fn commit_waits_for_disk_space_without_replaying() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn release_waits_for_disk_space() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
-    let (calls, ahead_s) = (AtomicU32::new(0), Arc::clone(&server.ahead_s));
+    let id = server.start_evaluation().await;
+    let (calls, clock_ahead_s) = (AtomicU32::new(0), Arc::clone(&server.clock_ahead_s));
     let evaluator = Scripted::new(move |spec, _| {
-        ahead_s.fetch_add(10, Ordering::SeqCst);
+        clock_ahead_s.fetch_add(10, Ordering::SeqCst);
         assert_eq!(spec.platform_retries, 0, "the lease did not expire");
         match calls.fetch_add(1, Ordering::SeqCst) {
             0 => Err(PlatformFault::FullDisk("steps.parquet".into())),
@@ -81,7 +81,7 @@ async fn release_waits_for_disk_space() {
     });
     let refusals = AtomicU32::new(0);
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
-        InterceptedServer::shared(local, move |moment| match moment {
+        InterceptedServer::shared(local, move |interception| match interception {
             Interception::Releasing if refusals.fetch_add(1, Ordering::SeqCst) < 5 => Err(full()),
             _ => Ok(()),
         })

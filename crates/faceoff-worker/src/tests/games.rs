@@ -17,17 +17,18 @@ use std::{
     },
 };
 
+/// Any positions of puck and mallets.
 const POSITION: LivePosition = LivePosition {
     step: 7,
     puck: [0.1, 0.2, 0.3],
     mallets: [[-0.8, 0.0], [0.8, 0.1]],
 };
 
-/// A tournament of two teams whose first round is one queued game.
-async fn one_game(server: &Server, rules: TournamentRules) -> Game {
+/// Starts a tournament of two teams whose first round is one queued game.
+async fn start_one_game(server: &Server, rules: TournamentRules) -> Game {
     let mut teams = Vec::new();
     for team in ["Alpha", "Beta"] {
-        teams.push(server.valid(team).await.team);
+        teams.push(server.upload_valid(team).await.team);
     }
     let new = NewTournament {
         name: "Finals".parse().unwrap(),
@@ -74,7 +75,8 @@ async fn wait_for_state(
     }
 }
 
-async fn played(server: &Server, id: GameId) -> GameResultRow {
+/// Waits for the result of a game.
+async fn wait_for_result(server: &Server, id: GameId) -> GameResultRow {
     let state = wait_for_state(server, id, |state| !state.is_open()).await;
     let GameState::Played(result) = state else {
         panic!("{state:?}")
@@ -82,10 +84,12 @@ async fn played(server: &Server, id: GameId) -> GameResultRow {
     *result
 }
 
-async fn ends(server: &Server, id: GameId) -> Vec<AttemptOutcome> {
+/// The outcomes of a game's attempts, which must be over.
+async fn attempt_outcomes(server: &Server, id: GameId) -> Vec<AttemptOutcome> {
     let attempts = server.store.game_attempts(id).await.unwrap();
     let ends = attempts.into_iter().map(|attempt| attempt.end);
-    ends.map(|end| end.expect("it is over").outcome).collect()
+    ends.map(|end| end.expect("the attempt is over").outcome)
+        .collect()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -98,7 +102,7 @@ async fn game_job_is_complete_and_contains_no_secret() {
     rules.game_limits.max_faults = 3;
     rules.limits.pids = Some(7);
     rules.perturbations.tracking_loss.probability = 0.25;
-    let game = one_game(&server, rules.clone()).await;
+    let game = start_one_game(&server, rules.clone()).await;
     let local = server.local();
     let claimed = blocking(move || local.claim("test").unwrap()).await;
     let ClaimResult::Job(job) = claimed else {
@@ -135,9 +139,9 @@ async fn game_job_is_complete_and_contains_no_secret() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn platform_fault_ends_game_without_result_until_rerun() {
     let server = Server::new().await;
-    let game = one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, TournamentRules::default()).await.id;
     let seeds = Arc::new(Mutex::new(BTreeSet::new()));
-    let broken = {
+    let failing_evaluator = {
         let seeds = Arc::clone(&seeds);
         Scripted::with_game(move |spec, _| {
             seeds.lock().unwrap().insert(spec.seed.to_string());
@@ -145,12 +149,12 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
         })
     };
     let mut events = server.store.events();
-    let running = server.start_slots(1, &broken);
+    let running = server.start_slots(1, &failing_evaluator);
     for attempt in 1..=MAX_ATTEMPTS {
         while ended_attempts(&server, game).await < attempt {
             let _ = events.recv().await;
         }
-        // It backoff after each failure, by the server's clock.
+        // After each failure the job pauses, by the server's clock.
         server.advance(600);
     }
     let state = wait_for_state(&server, game, |state| !state.is_open()).await;
@@ -162,8 +166,8 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
         "{reason}"
     );
     assert_eq!(
-        ends(&server, game).await,
-        [AttemptOutcome::PlatformFailed; 5]
+        attempt_outcomes(&server, game).await,
+        [AttemptOutcome::PlatformFailed; MAX_ATTEMPTS as usize]
     );
     running.stop().await;
 
@@ -171,16 +175,16 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
         .store
         .rerun_game(Actor::Organiser, game, server.now());
     rerun.await.unwrap();
-    let healthy = {
+    let healthy_evaluator = {
         let seeds = Arc::clone(&seeds);
         Scripted::with_game(move |spec, _| {
             seeds.lock().unwrap().insert(spec.seed.to_string());
             Ok(())
         })
     };
-    let running = server.start_slots(1, &healthy);
-    let result = played(&server, game).await;
-    assert_eq!(result.attempt, 6);
+    let running = server.start_slots(1, &healthy_evaluator);
+    let result = wait_for_result(&server, game).await;
+    assert_eq!(result.attempt, MAX_ATTEMPTS + 1);
     assert_eq!(result.score["sides"][0]["score"], 1);
     for (side, expected) in Side::BOTH.into_iter().zip(["first log\n", "second log\n"]) {
         let log = server.store.game_log(game, side).await.unwrap();
@@ -204,46 +208,49 @@ async fn ended_attempts(server: &Server, game: GameId) -> u32 {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn only_the_counting_recording_of_a_game_is_kept() {
     let server = Server::new().await;
-    let game = one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, TournamentRules::default()).await.id;
     // The recording of an attempt that was killed between upload and commit.
     let killed = format!("games/{game}/killed/game.zip");
-    server.put(&killed, b"PK").await;
+    server.put_artifact(&killed, b"PK").await;
     let evaluator = Scripted::with_game(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
     let files = |result: &GameResultRow| {
         let recording = result.recording.as_ref().expect("a round's game has one");
         ["game.zip", "side-1.zip", "side-2.zip"].map(|name| format!("{}/{name}", recording.key))
     };
-    let first = files(&played(&server, game).await);
+    let first = files(&wait_for_result(&server, game).await);
     for file in &first {
-        assert!(server.has(file).await, "{file}");
+        assert!(server.has_artifact(file).await, "{file}");
     }
     let void = server
         .store
         .void_game(Actor::Organiser, game, "the table leaned", server.now());
     void.await.unwrap();
     for file in &first {
-        assert!(server.has(file).await, "kept until there is another result");
+        assert!(
+            server.has_artifact(file).await,
+            "the files are kept until there is another result"
+        );
     }
     let rerun = server
         .store
         .rerun_game(Actor::Organiser, game, server.now());
     rerun.await.unwrap();
-    let second = files(&played(&server, game).await);
+    let second = files(&wait_for_result(&server, game).await);
     // The slot removes obsolete recordings before it claims another job.
     running.stop().await;
     for file in &second {
-        assert!(server.has(file).await, "{file}");
+        assert!(server.has_artifact(file).await, "{file}");
     }
     for file in first.iter().chain([&killed]) {
-        assert!(!server.has(file).await, "{file}");
+        assert!(!server.has_artifact(file).await, "{file}");
     }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn lost_lease_discards_result_and_recording() {
     let server = Server::new().await;
-    let game = one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, TournamentRules::default()).await.id;
     let local = server.local();
     let claimed = blocking(move || local.claim("lost").unwrap()).await;
     let ClaimResult::Job(job) = claimed else {
@@ -253,7 +260,7 @@ async fn lost_lease_discards_result_and_recording() {
     server.advance(2 * i64::from(LEASE_S));
     let evaluator = Scripted::with_game(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
-    let result = played(&server, game).await;
+    let result = wait_for_result(&server, game).await;
     running.stop().await;
     let JobPayload::Game {
         recording: Some(key),
@@ -263,7 +270,7 @@ async fn lost_lease_discards_result_and_recording() {
         panic!("{}", job.payload)
     };
     let file = format!("{key}/game.zip");
-    server.put(&file, b"PK").await;
+    server.put_artifact(&file, b"PK").await;
     let report = JobReport::Game {
         score: serde_json::json!({"winner": 1}),
         recording: Some(faceoff_wire::job::GameFiles {
@@ -276,10 +283,10 @@ async fn lost_lease_discards_result_and_recording() {
     let (local, lease) = (server.local(), job.lease.clone());
     let status = blocking(move || local.commit(&lease, report).unwrap()).await;
     assert_eq!(status, crate::server::LeaseStatus::Lost);
-    assert!(!server.has(&file).await);
-    assert_eq!(played(&server, game).await, result);
+    assert!(!server.has_artifact(&file).await);
+    assert_eq!(wait_for_result(&server, game).await, result);
     assert_eq!(
-        ends(&server, game).await,
+        attempt_outcomes(&server, game).await,
         [AttemptOutcome::Lost, AttemptOutcome::Played]
     );
 }
@@ -287,11 +294,11 @@ async fn lost_lease_discards_result_and_recording() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn lost_commit_response_keeps_result_and_recording() {
     let server = Server::new().await;
-    let game = one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, TournamentRules::default()).await.id;
     let commits = Arc::new(AtomicU32::new(0));
     let running = server.start_intercepted_slots(1, &Scripted::with_game(|_, _| Ok(())), |local| {
         let commits = Arc::clone(&commits);
-        InterceptedServer::shared(local, move |moment| match moment {
+        InterceptedServer::shared(local, move |interception| match interception {
             Interception::Committed(_) => {
                 commits.fetch_add(1, Ordering::SeqCst);
                 anyhow::bail!("the connection broke")
@@ -299,12 +306,15 @@ async fn lost_commit_response_keeps_result_and_recording() {
             Interception::Releasing => Ok(()),
         })
     });
-    let result = played(&server, game).await;
+    let result = wait_for_result(&server, game).await;
     running.stop().await;
     assert_eq!(commits.load(Ordering::SeqCst), 1);
     let key = result.recording.unwrap().key;
-    assert!(server.has(&format!("{key}/game.zip")).await);
-    assert_eq!(ends(&server, game).await, [AttemptOutcome::Played]);
+    assert!(server.has_artifact(&format!("{key}/game.zip")).await);
+    assert_eq!(
+        attempt_outcomes(&server, game).await,
+        [AttemptOutcome::Played]
+    );
     let state = server.store.game(game).await.unwrap().state;
     assert!(matches!(state, GameState::Played(_)), "{state:?}");
 }
@@ -316,19 +326,23 @@ async fn live_updates_cover_each_attempt() {
         steps: 500,
         ..TournamentRules::default()
     };
-    let game = one_game(&server, rules).await.id;
+    let game = start_one_game(&server, rules).await.id;
     let event = LiveEvent {
         step: 7,
         event: GameEvent::Stuck,
     };
-    let (published, go_on) = (event.clone(), Arc::new(tokio::sync::Semaphore::new(0)));
+    let (published, end_permits) = (event.clone(), Arc::new(tokio::sync::Semaphore::new(0)));
     let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
-    let gate = Arc::clone(&go_on);
-    let evaluator = Scripted::with_game(move |_, audience| {
-        audience.receive(vec![published.clone()], POSITION);
+    let evaluator_permits = Arc::clone(&end_permits);
+    let evaluator = Scripted::with_game(move |_, live_updates| {
+        live_updates.receive(vec![published.clone()], POSITION);
         started.send(()).unwrap();
-        while gate.try_acquire().map(|permit| permit.forget()).is_err() {
-            if audience.cancelled() {
+        while evaluator_permits
+            .try_acquire()
+            .map(|permit| permit.forget())
+            .is_err()
+        {
+            if live_updates.cancelled() {
                 return Err(PlatformFault::Cancelled);
             }
             std::thread::yield_now();
@@ -337,19 +351,19 @@ async fn live_updates_cover_each_attempt() {
     });
     let running = server.start_slots(1, &evaluator);
     starts.recv().await.unwrap();
-    let mut watch = server.store.live_games().subscribe(game).unwrap();
-    let news = watch.read_since(None);
-    assert_eq!(news.events, [event]);
-    assert_eq!((news.state.attempt, news.state.steps), (1, 500));
-    assert_eq!(news.state.position, Some(POSITION));
-    assert!(!news.state.is_over);
+    let mut viewer = server.store.live_games().subscribe(game).unwrap();
+    let updates = viewer.read_since(None);
+    assert_eq!(updates.events, [event]);
+    assert_eq!((updates.state.attempt, updates.state.steps), (1, 500));
+    assert_eq!(updates.state.position, Some(POSITION));
+    assert!(!updates.state.is_over);
 
     // A panic ends the attempt and its live updates.
-    go_on.add_permits(1);
-    let mut aborted = watch.read_since(Some(news.end));
+    end_permits.add_permits(1);
+    let mut aborted = viewer.read_since(Some(updates.end));
     while !aborted.state.is_over {
-        assert!(watch.changed().await);
-        aborted = watch.read_since(Some(news.end));
+        assert!(viewer.changed().await);
+        aborted = viewer.read_since(Some(updates.end));
     }
     assert_eq!(aborted.events[0].event, GameEvent::Aborted);
     while ended_attempts(&server, game).await < 1 {
@@ -357,13 +371,13 @@ async fn live_updates_cover_each_attempt() {
     }
     server.advance(600);
     starts.recv().await.unwrap();
-    let second = watch.read_since(Some(aborted.end));
+    let second = viewer.read_since(Some(aborted.end));
     assert_eq!((second.state.attempt, second.state.is_over), (2, false));
     // A shutdown releases the game without counting the attempt.
     running.stop().await;
     assert_eq!(
-        ends(&server, game).await,
+        attempt_outcomes(&server, game).await,
         [AttemptOutcome::PlatformFailed, AttemptOutcome::Released]
     );
-    assert!(watch.read_since(None).state.is_over);
+    assert!(viewer.read_since(None).state.is_over);
 }

@@ -64,8 +64,13 @@ impl JobServer for InterceptedServer {
         self.server.is_full_disk(error)
     }
 
-    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueVersion>) {
-        self.server.wait(stop, at_most, queue);
+    fn wait(
+        &self,
+        stop: &CancellationToken,
+        timeout: Duration,
+        queue_version: Option<QueueVersion>,
+    ) {
+        self.server.wait(stop, timeout, queue_version);
     }
 
     fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {

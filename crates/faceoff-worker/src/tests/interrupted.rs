@@ -18,7 +18,7 @@ use std::{
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn shutdown_releases_jobs_for_the_next_worker() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let hanging = Scripted::new(move |_, observer| {
         started.send(()).unwrap();
@@ -46,9 +46,9 @@ async fn shutdown_releases_jobs_for_the_next_worker() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn shutdown_releases_job_before_the_slot_ends() {
     let server = Server::new().await;
-    server.evaluation().await;
+    server.start_evaluation().await;
     let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
-    let (stopped, stops) = std::sync::mpsc::channel();
+    let (worker_ended, worker_end) = std::sync::mpsc::channel();
     let hanging = Scripted::new(move |_, observer| {
         started.send(()).unwrap();
         while !observer.cancelled() {
@@ -56,25 +56,26 @@ async fn shutdown_releases_job_before_the_slot_ends() {
         }
         Err(PlatformFault::Cancelled)
     });
-    let (early, stops) = (Arc::new(AtomicBool::new(false)), Mutex::new(stops));
+    // Did the worker end before it had released its job?
+    let (ended_early, worker_end) = (Arc::new(AtomicBool::new(false)), Mutex::new(worker_end));
     let running = server.start_intercepted_slots(1, &hanging, |local| {
-        let early = Arc::clone(&early);
-        InterceptedServer::shared(local, move |moment| {
-            if let Interception::Releasing = moment {
+        let ended_early = Arc::clone(&ended_early);
+        InterceptedServer::shared(local, move |interception| {
+            if let Interception::Releasing = interception {
                 // Enough time for a worker that wrongly does not wait for the release.
-                let ended = stops
+                let ended = worker_end
                     .lock()
                     .unwrap()
                     .recv_timeout(Duration::from_millis(200));
-                early.store(ended.is_ok(), Ordering::SeqCst);
+                ended_early.store(ended.is_ok(), Ordering::SeqCst);
             }
             Ok(())
         })
     });
     starts.recv().await.unwrap();
     running.stop().await;
-    let _ = stopped.send(());
-    assert!(!early.load(Ordering::SeqCst));
+    let _ = worker_ended.send(());
+    assert!(!ended_early.load(Ordering::SeqCst));
     let claimed = server.store.claim("next", LEASE_S, server.now()).await;
     let Some(Job::Shard { shard, .. }) = claimed.unwrap().map(|claimed| claimed.job) else {
         panic!("the slot did not release its shard")
@@ -85,12 +86,12 @@ async fn shutdown_releases_job_before_the_slot_ends() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn shutdown_interrupts_unpacking() {
     let server = Server::new().await;
-    let submission = server.upload("Alpha", b"endless").await;
+    let submission = server.upload("Alpha", ENDLESS_ARCHIVE).await;
     let evaluator = Scripted::new(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
-    evaluator.endless.notified().await;
+    evaluator.endless_unpacking.notified().await;
     running.stop().await;
-    // Released at once, without a fault.
+    // The job was released at once, without a fault.
     let claimed = server.store.claim("next", LEASE_S, server.now()).await;
     let Some(Job::Validation {
         submission: next, ..
@@ -105,7 +106,7 @@ async fn shutdown_interrupts_unpacking() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn cancelled_evaluation_stops_its_slots() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let (stopped, mut stops) = tokio::sync::mpsc::unbounded_channel();
     let hanging = Scripted::new(move |spec, observer| {
@@ -136,30 +137,30 @@ async fn cancelled_evaluation_stops_its_slots() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn result_of_a_lost_lease_is_discarded() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     let (handle, clock) = (tokio::runtime::Handle::current(), server.clock());
-    let (store, ahead_s) = (server.store.clone(), Arc::clone(&server.ahead_s));
-    let stolen = Arc::new(Mutex::new(None));
-    let thief = Arc::clone(&stolen);
+    let (store, clock_ahead_s) = (server.store.clone(), Arc::clone(&server.clock_ahead_s));
+    let second_claim = Arc::new(Mutex::new(None));
+    let shared_claim = Arc::clone(&second_claim);
     let evaluator = Scripted::new(move |spec, _| {
-        if thief.lock().unwrap().is_none() {
+        if shared_claim.lock().unwrap().is_none() {
             // The slot stalls until its lease has expired, and another worker claims the shard.
-            ahead_s.fetch_add(i64::from(LEASE_S) + 1, Ordering::SeqCst);
-            let work = handle
-                .block_on(store.claim("thief", LEASE_S, clock.now()))
+            clock_ahead_s.fetch_add(i64::from(LEASE_S) + 1, Ordering::SeqCst);
+            let claimed = handle
+                .block_on(store.claim("second worker", LEASE_S, clock.now()))
                 .unwrap();
             let Some(ClaimedJob {
                 claim,
                 job: Job::Shard { shard, .. },
-            }) = work
+            }) = claimed
             else {
-                panic!("{work:?}")
+                panic!("{claimed:?}")
             };
             assert_eq!(
                 (shard.task, shard.first_episode),
                 (spec.task, spec.episodes.start)
             );
-            *thief.lock().unwrap() = Some(claim);
+            *shared_claim.lock().unwrap() = Some(claim);
         }
         Ok(())
     });
@@ -168,9 +169,10 @@ async fn result_of_a_lost_lease_is_discarded() {
     while evaluator.played.lock().unwrap().len() < 6 {
         let _ = events.recv().await;
     }
-    let claim = stolen.lock().unwrap().clone().unwrap();
+    // The second worker commits its recording of the shard.
+    let claim = second_claim.lock().unwrap().clone().unwrap();
     let scratch = tempfile::tempdir().unwrap();
-    std::fs::write(scratch.path().join("steps.parquet"), "by the thief").unwrap();
+    std::fs::write(scratch.path().join("steps.parquet"), "by the second worker").unwrap();
     let run = server.store.evaluation(id).await.unwrap().run;
     let recording = claim.recording_key(run);
     server
@@ -208,7 +210,10 @@ async fn result_of_a_lost_lease_is_discarded() {
         server.wait_for_end(id).await,
         EvaluationState::Finished { .. }
     ));
-    assert_eq!(evaluator.assembled.lock().unwrap()[0], "by the thief");
+    assert_eq!(
+        evaluator.assembled.lock().unwrap()[0],
+        "by the second worker"
+    );
     running.stop().await;
     server
         .store
@@ -221,8 +226,8 @@ async fn result_of_a_lost_lease_is_discarded() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn restarted_worker_releases_its_former_leases() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
-    // A process that ended without releasing its job; the scratch folder has its name.
+    let id = server.start_evaluation().await;
+    // A process has ended without releasing its job. The scratch folder stores the worker's name.
     let scratch = crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
     let worker = format!("{}/slot-0", scratch.worker());
     server
@@ -243,7 +248,8 @@ async fn restarted_worker_releases_its_former_leases() {
 #[tokio::test]
 async fn scratch_folder_cannot_be_shared() {
     let server = Server::new().await;
-    let _other = crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
+    let _first_process =
+        crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
     let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
     let error = running.task.await.unwrap().unwrap_err();
     assert!(error.to_string().contains("another process"), "{error}");

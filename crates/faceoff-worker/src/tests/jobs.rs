@@ -9,7 +9,8 @@ use faceoff_store::*;
 use faceoff_types::{Profile, Task, ValidationOutcome};
 use faceoff_wire::job::{JobPayload, JobReport, JobSpec, OutputFiles};
 
-async fn next(server: &Server) -> Option<JobSpec> {
+/// Claims the next job.
+async fn claim_next(server: &Server) -> Option<JobSpec> {
     let local = server.local();
     let claimed = blocking(move || local.claim("test").unwrap()).await;
     match claimed {
@@ -23,8 +24,8 @@ async fn commit(server: &Server, job: &JobSpec, report: JobReport) -> LeaseStatu
     blocking(move || local.commit(&lease, report).unwrap()).await
 }
 
-/// The report of a slot.
-async fn report(server: &Server, job: &JobSpec) -> JobReport {
+/// The report with which a slot would complete the job, after storing the job's files.
+async fn complete(server: &Server, job: &JobSpec) -> JobReport {
     match &job.payload {
         JobPayload::Validation { .. } => JobReport::Validation(ValidationOutcome::Valid {
             runtime: "native".into(),
@@ -32,17 +33,15 @@ async fn report(server: &Server, job: &JobSpec) -> JobReport {
             timing: Vec::new(),
             log: String::new(),
         }),
-        JobPayload::Shard {
-            spec,
-            output: keeps,
-            ..
-        } => {
-            let recording = match keeps {
+        JobPayload::Shard { spec, output, .. } => {
+            let recording = match output {
                 OutputFiles::Recording(key) => Some(key.clone()),
                 OutputFiles::Clips(_) | OutputFiles::None => None,
             };
             if let Some(key) = &recording {
-                server.put(&format!("{key}/steps.parquet"), b"steps").await;
+                server
+                    .put_artifact(&format!("{key}/steps.parquet"), b"steps")
+                    .await;
             }
             JobReport::Shard {
                 outcomes: spec
@@ -57,7 +56,7 @@ async fn report(server: &Server, job: &JobSpec) -> JobReport {
         }
         JobPayload::Game { .. } => panic!("no game is queued"),
         JobPayload::Scoring { meta, dataset, .. } => {
-            server.put(dataset, b"PK").await;
+            server.put_artifact(dataset, b"PK").await;
             JobReport::Scoring {
                 dataset: dataset.clone(),
                 blake3: blake3::hash(b"PK").to_string(),
@@ -70,9 +69,9 @@ async fn report(server: &Server, job: &JobSpec) -> JobReport {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn jobs_do_not_contain_the_season_secret() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     let submission = server.store.evaluation(id).await.unwrap().submission;
-    server.upload("Beta", b"archive").await;
+    server.upload("Beta", VALID_ARCHIVE).await;
     let plan = RunPlan {
         profile: Profile::Evaluation,
         tasks: Task::ALL.to_vec(),
@@ -89,7 +88,7 @@ async fn jobs_do_not_contain_the_season_secret() {
         .unwrap();
     let secret = server.store.season().await.unwrap().secret;
     let (mut validation, mut recorded, mut unrecorded, mut scored) = (0, 0, 0, 0);
-    while let Some(job) = next(&server).await {
+    while let Some(job) = claim_next(&server).await {
         let text = serde_json::to_string(&job).unwrap();
         assert!(!text.contains(&secret.to_string()), "{text}");
         match &job.payload {
@@ -105,16 +104,17 @@ async fn jobs_do_not_contain_the_season_secret() {
                 scored += 1;
             }
         }
-        let report = report(&server, &job).await;
+        let report = complete(&server, &job).await;
         assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
     }
+    // Recorded are 2 shards of each of 3 tasks; the ablation has 1 shard of each task in 6 profiles, unrecorded.
     assert_eq!((validation, recorded, unrecorded, scored), (1, 6, 18, 1));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn jobs_and_ablations_use_the_stages_variation() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     // Jobs of the started day keep the old rules.
     let stage = server.store.stages().await.unwrap()[0].clone();
     let mut rules = stage.rules.rules.clone();
@@ -130,7 +130,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
         .change_stage(Actor::Organiser, stage.id, change, server.now());
     let plan = changed.await.unwrap().plan();
     assert_eq!(plan.variation, changed_variation);
-    let job = next(&server).await.unwrap();
+    let job = claim_next(&server).await.unwrap();
     let JobPayload::Shard { spec, .. } = &job.payload else {
         panic!("expected a shard");
     };
@@ -140,10 +140,10 @@ async fn jobs_and_ablations_use_the_stages_variation() {
         .store
         .request_ablation(Actor::Organiser, submission, &plan, server.now());
     created.await.unwrap();
-    let first_report = report(&server, &job).await;
+    let first_report = complete(&server, &job).await;
     assert_eq!(commit(&server, &job, first_report).await, LeaseStatus::Held);
     let mut changed_jobs = 0;
-    while let Some(job) = next(&server).await {
+    while let Some(job) = claim_next(&server).await {
         match &job.payload {
             JobPayload::Shard {
                 spec,
@@ -156,7 +156,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
             JobPayload::Scoring { meta, .. } => assert!(meta.variation.is_none()),
             _ => {}
         }
-        let report = report(&server, &job).await;
+        let report = complete(&server, &job).await;
         assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
     }
     assert!(changed_jobs > 0);
@@ -165,7 +165,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn stage_limits_apply_to_validation_and_later_days() {
     let server = Server::new().await;
-    server.evaluation().await;
+    server.start_evaluation().await;
     let stage = server.store.stages().await.unwrap()[0].clone();
     let mut rules = stage.rules.rules.clone();
     rules.limits.pids = Some(7);
@@ -178,15 +178,15 @@ async fn stage_limits_apply_to_validation_and_later_days() {
         .store
         .change_stage(Actor::Organiser, stage.id, change, server.now());
     assert_eq!(changed.await.unwrap().plan().limits.pids, Some(7));
-    server.upload("Beta", b"archive").await;
+    server.upload("Beta", VALID_ARCHIVE).await;
     let (mut validation, mut shards) = (Vec::new(), Vec::new());
-    while let Some(job) = next(&server).await {
+    while let Some(job) = claim_next(&server).await {
         match &job.payload {
             JobPayload::Validation { agent, .. } => validation.push(agent.limits.clone()),
             JobPayload::Shard { agent, .. } => shards.push(agent.limits.clone()),
             JobPayload::Game { .. } | JobPayload::Scoring { .. } => {}
         }
-        let report = report(&server, &job).await;
+        let report = complete(&server, &job).await;
         assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
     }
     let [validation_limits] = &validation[..] else {
@@ -205,11 +205,11 @@ async fn stage_limits_apply_to_validation_and_later_days() {
 /// Plays all shards of an evaluation and returns its scoring job.
 async fn scoring_job(server: &Server) -> JobSpec {
     loop {
-        let job = next(server).await.unwrap();
+        let job = claim_next(server).await.unwrap();
         if matches!(job.payload, JobPayload::Scoring { .. }) {
             return job;
         }
-        let report = report(server, &job).await;
+        let report = complete(server, &job).await;
         assert_eq!(commit(server, &job, report).await, LeaseStatus::Held);
     }
 }
@@ -217,9 +217,9 @@ async fn scoring_job(server: &Server) -> JobSpec {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn dataset_is_kept_when_its_commit_fails() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     let job = scoring_job(&server).await;
-    let report = report(&server, &job).await;
+    let report = complete(&server, &job).await;
     let JobReport::Scoring { dataset, .. } = report.clone() else {
         panic!("{report:?}")
     };
@@ -228,59 +228,62 @@ async fn dataset_is_kept_when_its_commit_fails() {
     let (local, lease) = (server.local(), job.lease.clone());
     let failed = blocking(move || local.commit(&lease, report)).await;
     assert!(failed.is_err(), "{failed:?}");
-    assert!(server.has(&dataset).await);
+    assert!(server.has_artifact(&dataset).await);
 
     // After a restart the evaluation is scored again, which removes the first dataset.
     let server = server.reopen().await;
     server.advance(i64::from(LEASE_S) + 1);
     let job = scoring_job(&server).await;
-    let report = self::report(&server, &job).await;
+    let report = complete(&server, &job).await;
     assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
     let EvaluationState::Finished {
         dataset: current, ..
     } = server.wait_for_end(id).await
     else {
-        panic!("it finishes")
+        panic!("the evaluation finishes")
     };
     assert_ne!(current, dataset);
-    assert!(server.has(&current).await);
-    assert!(!server.has(&dataset).await);
+    assert!(server.has_artifact(&current).await);
+    assert!(!server.has_artifact(&dataset).await);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn dataset_of_a_lost_lease_is_removed() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
-    let late = scoring_job(&server).await;
+    let id = server.start_evaluation().await;
+    let expired_job = scoring_job(&server).await;
     server.advance(i64::from(LEASE_S) + 1);
     let job = scoring_job(&server).await;
-    assert_eq!(job.lease.job_id, late.lease.job_id);
-    let (first, second) = (report(&server, &job).await, report(&server, &late).await);
+    assert_eq!(job.lease.job_id, expired_job.lease.job_id);
+    let (report, late_report) = (
+        complete(&server, &job).await,
+        complete(&server, &expired_job).await,
+    );
     assert_eq!(
-        commit(&server, &late, second.clone()).await,
+        commit(&server, &expired_job, late_report.clone()).await,
         LeaseStatus::Lost
     );
-    assert_eq!(commit(&server, &job, first).await, LeaseStatus::Held);
-    let JobReport::Scoring { dataset, .. } = second else {
-        panic!("{second:?}")
+    assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
+    let JobReport::Scoring { dataset, .. } = late_report else {
+        panic!("{late_report:?}")
     };
-    assert!(!server.has(&dataset).await);
+    assert!(!server.has_artifact(&dataset).await);
     let EvaluationState::Finished {
         dataset: current, ..
     } = server.wait_for_end(id).await
     else {
-        panic!("it finishes")
+        panic!("the evaluation finishes")
     };
-    assert!(server.has(&current).await);
+    assert!(server.has_artifact(&current).await);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn lost_commit_response_keeps_the_dataset() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
-    let healthy = Scripted::new(|_, _| Ok(()));
-    let running = server.start_intercepted_slots(2, &healthy, |local| {
-        InterceptedServer::shared(local, |moment| match moment {
+    let id = server.start_evaluation().await;
+    let evaluator = Scripted::new(|_, _| Ok(()));
+    let running = server.start_intercepted_slots(2, &evaluator, |local| {
+        InterceptedServer::shared(local, |interception| match interception {
             Interception::Committed(JobReport::Scoring { .. }) => {
                 anyhow::bail!("the connection broke")
             }
@@ -288,8 +291,8 @@ async fn lost_commit_response_keeps_the_dataset() {
         })
     });
     let EvaluationState::Finished { dataset, .. } = server.wait_for_end(id).await else {
-        panic!("it finishes")
+        panic!("the evaluation finishes")
     };
     running.stop().await;
-    assert!(server.has(&dataset).await);
+    assert!(server.has_artifact(&dataset).await);
 }

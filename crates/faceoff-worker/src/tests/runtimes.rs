@@ -46,7 +46,7 @@ async fn unaccepted_runtime_is_refused_before_the_agent_runs() {
     set_runtimes(Some("python3")).await;
     let evaluator = Scripted::new(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
-    let refused = server.upload("Alpha", b"archive").await;
+    let refused = server.upload("Alpha", VALID_ARCHIVE).await;
     let refused = wait_for_verdict(&server, refused.id).await;
     let SubmissionState::Invalid { reason } = &refused.state else {
         panic!("expected a refusal, got {refused:?}");
@@ -63,7 +63,7 @@ async fn unaccepted_runtime_is_refused_before_the_agent_runs() {
 
     for (team, runtimes) in [("Beta", Some("native")), ("Gamma", None)] {
         set_runtimes(runtimes).await;
-        let valid = server.upload(team, b"archive").await;
+        let valid = server.upload(team, VALID_ARCHIVE).await;
         let valid = wait_for_verdict(&server, valid.id).await;
         assert_eq!(valid.state, SubmissionState::Valid);
         assert_eq!(valid.runtime.as_deref(), Some("native"));

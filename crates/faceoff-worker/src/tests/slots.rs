@@ -2,7 +2,7 @@
 
 use super::fixture::*;
 use crate::{cleanup, slot::Backoff};
-use faceoff_replay::{Key, Pack};
+use faceoff_replay::{ClipKey, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
 use faceoff_types::*;
@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn slots_play_each_shard_once_and_store_the_dataset() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
+    let id = server.start_evaluation().await;
     let evaluator = Scripted::new(|spec, observer| {
         for episode in spec.episodes.clone() {
             observer.on_episode_end(&outcome(spec.task, episode));
@@ -31,10 +31,11 @@ async fn slots_play_each_shard_once_and_store_the_dataset() {
         result, dataset, ..
     } = server.wait_for_end(id).await
     else {
-        panic!("it finishes")
+        panic!("the evaluation finishes")
     };
     let mut played = evaluator.played.lock().unwrap().clone();
     played.sort_unstable();
+    // Task and first episode of each shard of two episodes.
     let all: Vec<_> = Task::ALL
         .into_iter()
         .flat_map(|task| [(task, 0), (task, 2)])
@@ -68,29 +69,32 @@ async fn idle_slot_validates_submissions() {
     let server = Server::new().await;
     let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
     let mut events = server.store.events();
-    let good = server.upload("Alpha", b"archive").await.id;
-    let bad = server.upload("Beta", b"no archive").await.id;
-    let state = async |id, events: &mut tokio::sync::broadcast::Receiver<Change>| loop {
+    let valid_id = server.upload("Alpha", VALID_ARCHIVE).await.id;
+    let invalid_id = server.upload("Beta", INVALID_ARCHIVE).await.id;
+    let checked_state = async |id, events: &mut tokio::sync::broadcast::Receiver<Change>| loop {
         let state = server.store.submission(id).await.unwrap().state;
         if state.is_checked() {
             break state;
         }
         let _ = events.recv().await;
     };
-    assert_eq!(state(good, &mut events).await, SubmissionState::Valid);
-    let log = server.store.submission_log(good).await.unwrap();
+    assert_eq!(
+        checked_state(valid_id, &mut events).await,
+        SubmissionState::Valid
+    );
+    let log = server.store.submission_log(valid_id).await.unwrap();
     assert_eq!(log.as_deref(), Some("validated\n"));
     let reason = "agent.toml is missing".to_owned();
     let invalid = SubmissionState::Invalid { reason };
-    assert_eq!(state(bad, &mut events).await, invalid);
+    assert_eq!(checked_state(invalid_id, &mut events).await, invalid);
     running.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn panics_and_platform_faults_are_retried() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
-    let (calls, ahead_s) = (AtomicU32::new(0), Arc::clone(&server.ahead_s));
+    let id = server.start_evaluation().await;
+    let (calls, clock_ahead_s) = (AtomicU32::new(0), Arc::clone(&server.clock_ahead_s));
     let evaluator = Scripted::new(move |_, _| {
         match calls.fetch_add(1, Ordering::SeqCst) {
             0 => panic!("a bug of the platform"),
@@ -101,9 +105,9 @@ async fn panics_and_platform_faults_are_retried() {
                     source,
                 })
             }
-            // Skips the pause after a failure.
+            // Skips the pause of the job after a failure.
             _ => {
-                ahead_s.fetch_add(10, Ordering::SeqCst);
+                clock_ahead_s.fetch_add(10, Ordering::SeqCst);
                 Ok(())
             }
         }
@@ -126,15 +130,18 @@ async fn failed_slot_pauses_and_stops_at_shutdown() {
         first: hour,
         longest: hour,
     };
-    let id = server.evaluation().await;
-    let (started, ahead_s) = (Arc::<Mutex<Vec<_>>>::default(), Arc::clone(&server.ahead_s));
-    let slots = Arc::clone(&started);
+    let id = server.start_evaluation().await;
+    let (started, clock_ahead_s) = (
+        Arc::<Mutex<Vec<_>>>::default(),
+        Arc::clone(&server.clock_ahead_s),
+    );
+    let thread_names = Arc::clone(&started);
     let evaluator = Scripted::new(move |_, _| {
         // Skips the pause of the job, but not that of the slot.
-        ahead_s.fetch_add(10, Ordering::SeqCst);
-        let mut slots = slots.lock().unwrap();
-        slots.push(thread::current().name().map(str::to_owned));
-        match slots.len() {
+        clock_ahead_s.fetch_add(10, Ordering::SeqCst);
+        let mut thread_names = thread_names.lock().unwrap();
+        thread_names.push(thread::current().name().map(str::to_owned));
+        match thread_names.len() {
             1 => Err(PlatformFault::Recording("a broken disk".into())),
             _ => Ok(()),
         }
@@ -146,19 +153,20 @@ async fn failed_slot_pauses_and_stops_at_shutdown() {
     ));
     // Without the shutdown, the pause would outlast the test.
     running.stop().await;
-    let slots = started.lock().unwrap();
-    let (failed, played) = slots.split_first().unwrap();
-    assert_eq!(played.len(), 6);
-    assert!(!played.contains(failed), "{slots:?}");
+    let thread_names = started.lock().unwrap();
+    let (failed_slot, later_slots) = thread_names.split_first().unwrap();
+    assert_eq!(later_slots.len(), 6, "one for each shard");
+    assert!(!later_slots.contains(failed_slot), "{thread_names:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn lasting_platform_fault_fails_and_requeues_evaluation() {
     let server = Server::new().await;
-    let id = server.evaluation().await;
-    let ahead_s = Arc::clone(&server.ahead_s);
+    let id = server.start_evaluation().await;
+    let clock_ahead_s = Arc::clone(&server.clock_ahead_s);
     let evaluator = Scripted::new(move |_, _| {
-        ahead_s.fetch_add(61, Ordering::SeqCst);
+        // Skips the pause of the job after a failure.
+        clock_ahead_s.fetch_add(61, Ordering::SeqCst);
         Err(PlatformFault::Recording("no space left".into()))
     });
     let running = server.start_slots(1, &evaluator);
@@ -175,17 +183,19 @@ async fn lasting_platform_fault_fails_and_requeues_evaluation() {
         "the cause is for the log only: {reason}"
     );
     running.stop().await;
-    let broken = server.store.evaluation(id).await.unwrap();
-    let evaluations = server.store.evaluations_of(broken.team).await.unwrap();
-    let rerun = evaluations.iter().find(|one| one.rerun_of == Some(id));
-    assert_eq!(rerun.unwrap().submission, broken.submission);
+    let failed = server.store.evaluation(id).await.unwrap();
+    let evaluations = server.store.evaluations_of(failed.team).await.unwrap();
+    let rerun = evaluations
+        .iter()
+        .find(|evaluation| evaluation.rerun_of == Some(id));
+    assert_eq!(rerun.unwrap().submission, failed.submission);
 }
 
 #[tokio::test]
 async fn missed_day_is_started_once() {
     let server = Server::new().await;
-    let submission = server.upload("Alpha", b"archive").await;
-    let work = server
+    let submission = server.upload("Alpha", VALID_ARCHIVE).await;
+    let claimed = server
         .store
         .claim("test", LEASE_S, server.now())
         .await
@@ -199,7 +209,7 @@ async fn missed_day_is_started_once() {
     };
     server
         .store
-        .commit_validation(&work.claim, outcome, server.now())
+        .commit_validation(&claimed.claim, outcome, server.now())
         .await
         .unwrap();
     let plan = RunPlan {
@@ -228,16 +238,16 @@ async fn missed_day_is_started_once() {
         .change_stage(Actor::Organiser, stage, with_ablations, server.now())
         .await
         .unwrap();
-    for first in [true, false] {
+    for is_first_start in [true, false] {
         let mut events = server.store.events();
         let shutdown = CancellationToken::new();
         let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
         let schedule = tokio::spawn(schedule);
-        if first {
+        if is_first_start {
             let mut kinds = Vec::new();
             for _ in 0..3 {
                 let Change::Recorded(record) = events.recv().await.unwrap() else {
-                    panic!("nothing is claimed")
+                    panic!("every change is recorded as an event")
                 };
                 assert_eq!(record.actor, Actor::Schedule);
                 kinds.push(record.event);
@@ -274,13 +284,17 @@ async fn missed_day_is_started_once() {
 #[tokio::test]
 async fn overdue_day_ends_before_the_next_one_starts() {
     let server = Server::new().await;
-    let first = server.evaluation().await;
-    let first = server.store.evaluation(first).await.unwrap();
-    let stage = server.store.stage(first.stage_day.stage).await.unwrap();
+    let id = server.start_evaluation().await;
+    let evaluation = server.store.evaluation(id).await.unwrap();
+    let stage = server
+        .store
+        .stage(evaluation.stage_day.stage)
+        .await
+        .unwrap();
     // The next day starts in 24 hours, which is also the deadline.
-    let at = server.now().to_zoned(jiff::tz::TimeZone::UTC).time();
+    let cutoff = server.now().to_zoned(jiff::tz::TimeZone::UTC).time();
     let settings = StageSettings {
-        schedule: Some(Schedule::daily(at)),
+        schedule: Some(Schedule::daily(cutoff)),
         ..stage.settings
     };
     let scheduled = StageChange {
@@ -299,7 +313,7 @@ async fn overdue_day_ends_before_the_next_one_starts() {
     let mut kinds = Vec::new();
     for _ in 0..5 {
         let Change::Recorded(record) = events.recv().await.unwrap() else {
-            panic!("nothing is claimed")
+            panic!("every change is recorded as an event")
         };
         assert_eq!(record.actor, Actor::Schedule);
         kinds.push(record.event);
@@ -324,17 +338,17 @@ async fn overdue_day_ends_before_the_next_one_starts() {
 #[tokio::test]
 async fn ablation_plays_own_episodes_in_all_profiles() {
     let server = Server::new().await;
-    let evaluation = server.evaluation().await;
+    let evaluation = server.start_evaluation().await;
     let submission = server
         .store
         .evaluation(evaluation)
         .await
         .unwrap()
         .submission;
-    let specs = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
-    let recorded = std::sync::Arc::clone(&specs);
+    let specs = Arc::new(Mutex::new(Vec::new()));
+    let recorded_specs = Arc::clone(&specs);
     let evaluator = Scripted::new(move |spec, _| {
-        recorded.lock().unwrap().push(spec.clone());
+        recorded_specs.lock().unwrap().push(spec.clone());
         Ok(())
     });
     let plan = RunPlan {
@@ -362,25 +376,28 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     running.stop().await;
     let secret = server.store.season().await.unwrap().secret;
     let specs = std::mem::take(&mut *specs.lock().unwrap());
-    let runs: Vec<_> = specs
+    let ablation_specs: Vec<_> = specs
         .iter()
         .filter(|spec| spec.seed == secret.ablation())
         .collect();
-    assert_eq!((specs.len(), runs.len()), (6 + 18, 18));
-    for (run, profile) in runs.chunks(3).zip(Profile::ABLATION) {
-        for (run, task) in run.iter().zip(Task::ALL) {
+    // The evaluation has 6 shards; the ablation has one for each of 6 profiles and 3 tasks.
+    assert_eq!((specs.len(), ablation_specs.len()), (6 + 18, 18));
+    for (run, profile) in ablation_specs.chunks(3).zip(Profile::ABLATION) {
+        for (spec, task) in run.iter().zip(Task::ALL) {
             assert_eq!(
-                (run.profile, run.task, &run.episodes),
+                (spec.profile, spec.task, &spec.episodes),
                 (profile, task, &(0..3))
             );
-            assert_eq!(run.mismatch_seed, secret.model_mismatch());
+            assert_eq!(spec.mismatch_seed, secret.model_mismatch());
         }
     }
-    // Clips are stored of episodes that end differently than in the ideal simulator, with their ideal counterparts.
+    // Clips are stored of episodes that end differently than in the ideal simulator, with their ideal counterparts. In the
+    // scripted clips these are the episodes 1.
     let artifacts = server.store.artifacts();
     for profile in Profile::ABLATION {
         let key = Artifacts::ablation_clips_key(ablation.id, profile);
-        assert_eq!(artifacts.size_bytes(&key).await.unwrap(), None, "not yet");
+        let size = artifacts.size_bytes(&key).await.unwrap();
+        assert_eq!(size, None, "clips are not joined yet");
     }
     for _ in 0..2 {
         cleanup::clean_up(&server.store, server.now()).await;
@@ -394,13 +411,13 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
             assert_eq!(lines.collect::<Vec<_>>(), expected, "{profile}");
             for task in Task::ALL {
                 let clip = format!("{profile} 1").into_bytes();
-                assert_eq!(pack.clip(Key::motion(task, 1)).unwrap(), Some(clip));
-                assert_eq!(pack.clip(Key::motion(task, 0)).unwrap(), None);
+                assert_eq!(pack.clip(ClipKey::motion(task, 1)).unwrap(), Some(clip));
+                assert_eq!(pack.clip(ClipKey::motion(task, 0)).unwrap(), None);
             }
         }
-        // A late part has no effect.
+        // A part that arrives late has no effect.
         let late = Artifacts::ablation_part_key(ablation.id, Profile::Ideal, Task::Hit, 0);
-        server.put(&late, b"late").await;
+        server.put_artifact(&late, b"late").await;
     }
     for run in ablation.runs.into_values() {
         assert_eq!(server.store.outcomes(run).await.unwrap().len(), 9);

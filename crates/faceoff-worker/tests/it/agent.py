@@ -1,5 +1,5 @@
-"""Keeps the arm where it is, or swings it by SWING rad. With GOOD_EPISODES, it exits in the first one after so many;
-with MISCHIEF, it does what a game's opponent must not suffer from."""
+"""An agent that keeps the arm where it is, or swings it by SWING rad. With GOOD_EPISODES, it exits in the first episode
+after that many. With MISCHIEF, it misbehaves in a way that must not harm the opponent of a game."""
 import json
 import math
 import os
@@ -9,7 +9,7 @@ import time
 good_episodes = int(os.environ.get("GOOD_EPISODES", 1 << 30))
 swing = float(os.environ.get("SWING", 0))
 mischief = os.environ.get("MISCHIEF")
-begun = 0
+started_episodes = 0
 print("an agent's log", file=sys.stderr, flush=True)
 
 
@@ -24,17 +24,17 @@ for line in sys.stdin:
         env = message["env"]
         answer({"type": "ready", "protocol": 1, "interpolation": 3})
     elif kind == "reset":
-        begun += 1
-        held = None
+        started_episodes += 1
+        start_position = None
         if mischief == "crashes":
             os._exit(4)
         answer({"type": "ready", "episode": message["episode"]})
     elif kind == "step":
-        if begun > good_episodes:
+        if started_episodes > good_episodes:
             sys.exit(3)
         step = message["step"]
-        held = held or [message["obs"][i] for i in env["joint_pos_ids"]]
-        position = [held[0] + swing * math.sin(step / 10), *held[1:]]
+        start_position = start_position or [message["obs"][i] for i in env["joint_pos_ids"]]
+        position = [start_position[0] + swing * math.sin(step / 10), *start_position[1:]]
         action = [position, [0.0] * 7]
         if mischief == "silent":
             continue

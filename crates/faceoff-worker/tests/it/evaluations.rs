@@ -1,8 +1,11 @@
+//! Evaluations on a real server: their outcomes do not depend on shards, slots and restarts, and failures are reported.
+
 use crate::server::{Server, configure_stage};
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
 
+/// A plan of two episodes of each task.
 pub fn plan(episodes_per_shard: u32) -> RunPlan {
     RunPlan {
         profile: Profile::Evaluation,
@@ -23,7 +26,7 @@ pub fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
     outcomes
 }
 
-/// Plays a day with two teams; the outcomes of each.
+/// Plays a day with two teams and returns the outcomes of each.
 async fn play_day(
     server: &Server,
     episodes_per_shard: u32,
@@ -69,7 +72,7 @@ async fn play_day(
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn outcomes_do_not_depend_on_shards_and_slots() {
     let server = Server::new().await;
-    // Before the copy, since seeds depend on the stage's id.
+    // The stage is configured before the copy, since seeds depend on the stage's id.
     configure_stage(&server.store, &plan(1), Timestamp::now()).await;
     let worker = server.start_worker(2);
     for team in ["Alpha", "Beta"] {
@@ -93,20 +96,20 @@ async fn outcomes_do_not_depend_on_shards_and_slots() {
 async fn failing_agent_gets_reason_and_log() {
     let server = Server::new().await;
     let worker = server.start_worker(1);
-    let broken = server.upload("Broken", "GOOD_EPISODES = \"0\"").await;
-    let state = server.wait_for_validation(broken).await;
+    let invalid = server.upload("Broken", "GOOD_EPISODES = \"0\"").await;
+    let state = server.wait_for_validation(invalid).await;
     let SubmissionState::Invalid { reason } = &state else {
         panic!("{state:?}")
     };
     assert!(reason.contains("exited with status 3"), "{reason}");
-    let log = server.store.submission_log(broken).await.unwrap();
+    let log = server.store.submission_log(invalid).await.unwrap();
     assert!(log.unwrap().contains("an agent's log"));
 
-    // This agent fails only after a validation run of up to 500 control steps and the rest of an episode. The faults of all
-    // shards add up.
-    let late = server.upload("Late", "GOOD_EPISODES = \"15\"").await;
+    // This agent exits after 15 episodes: after its validation run, which is shorter, and in each shard of 20 episodes. The
+    // faults of all shards add up.
+    let failing_later = server.upload("Late", "GOOD_EPISODES = \"15\"").await;
     assert!(matches!(
-        server.wait_for_validation(late).await,
+        server.wait_for_validation(failing_later).await,
         SubmissionState::Valid
     ));
     let plan = RunPlan {
@@ -115,7 +118,7 @@ async fn failing_agent_gets_reason_and_log() {
         ..plan(20)
     };
     let evaluation = server.start_day(&plan, Timestamp::now()).await.remove(0);
-    assert_eq!(evaluation.submission, late);
+    assert_eq!(evaluation.submission, failing_later);
     let state = server.wait_for_end(evaluation.id).await;
     assert!(
         matches!(state, EvaluationState::AgentFailed { .. }),
@@ -140,10 +143,10 @@ async fn evaluation_continues_after_worker_restarts() {
     worker.stop().await;
     let evaluation = server.start_day(&plan(1), Timestamp::now()).await.remove(0);
     let (id, run) = (evaluation.id, evaluation.run);
-    for committed in 1..4 {
+    for committed_episodes in 1..4 {
         let worker = server.start_worker(1);
         let mut events = server.store.events();
-        while server.store.outcomes(run).await.unwrap().len() < committed {
+        while server.store.outcomes(run).await.unwrap().len() < committed_episodes {
             let _ = events.recv().await;
         }
         // Stops in the middle of the next shard.
@@ -155,6 +158,7 @@ async fn evaluation_continues_after_worker_restarts() {
         matches!(state, EvaluationState::Finished { .. }),
         "{state:?}"
     );
+    // Two episodes of each of three tasks.
     assert_eq!(server.store.outcomes(run).await.unwrap().len(), 6);
     worker.stop().await;
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     server::Server,
-    tournament::{recording, results, rules, start},
+    tournament::{recording, rules, start_round, wait_for_results},
 };
 use faceoff_store::*;
 use faceoff_types::{TeamId, TournamentId};
@@ -13,18 +13,21 @@ use std::{
     process::{Command, Stdio},
 };
 
+/// Environment of the child process: the server's folder and the tournament's id.
 const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
 const TOURNAMENT: &str = "FACEOFF_WORKER_TEST_TOURNAMENT";
+/// The line that the child process prints for each event.
 const EVENT_LINE: &str = "an event";
 const GAMES: usize = 100;
 
+/// Are all games over?
 async fn are_over(server: &Server, tournament: TournamentId) -> bool {
     let games = server.store.games(tournament, GameFilter::Rounds);
     let games = games.await.unwrap();
     games.iter().all(|game| !game.state.is_open())
 }
 
-/// Runs games until it is killed or all games are over, and prints a line for each event. Started by the test below.
+/// Runs games until the process is killed or all games are over, and prints a line for each event. Started by the test below.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "the child process of tournament_survives_killed_servers"]
 async fn child() {
@@ -50,15 +53,15 @@ async fn tournament_survives_killed_servers() {
     let server = Server::new().await;
     let mut teams: Vec<TeamId> = Vec::new();
     for number in 0..20 {
-        teams.push(server.valid(&format!("Team {number}"), "").await);
+        teams.push(server.upload_valid(&format!("Team {number}"), "").await);
     }
     let (home, away) = teams.split_at(10);
-    let all = |home: &TeamId| {
+    let pairs_of = |home: &TeamId| {
         let home = *home;
         away.iter().map(move |away| [home, *away])
     };
-    let pairs: Vec<[TeamId; 2]> = home.iter().flat_map(all).collect();
-    let games = start(&server, rules(2), &pairs).await;
+    let pairs: Vec<[TeamId; 2]> = home.iter().flat_map(pairs_of).collect();
+    let games = start_round(&server, rules(2), &pairs).await;
     assert_eq!(games.len(), GAMES);
     let tournament = games[0].tournament;
 
@@ -83,7 +86,7 @@ async fn tournament_survives_killed_servers() {
         assert_eq!(seen, events_to_live, "the child ended early");
     }
     let worker = server.start_worker(2);
-    let results = results(&server, tournament).await;
+    let results = wait_for_results(&server, tournament).await;
     worker.stop().await;
 
     let (mut lost, mut games_of_team) = (0, BTreeMap::new());
@@ -92,6 +95,7 @@ async fn tournament_survives_killed_servers() {
         for team in game.teams {
             *games_of_team.entry(team).or_insert(0) += 1;
         }
+        // Checks the recording's hash.
         recording(&server, result);
         let attempts = server.store.game_attempts(game.id).await.unwrap();
         let numbers: Vec<u32> = attempts.iter().map(|attempt| attempt.number).collect();
@@ -110,7 +114,7 @@ async fn tournament_survives_killed_servers() {
             assert_eq!(end.outcome, expected, "{attempts:?}");
         }
     }
-    assert!(lost > 0, "games were killed in the middle");
+    assert!(lost > 0, "some games were killed in the middle");
     assert!(games_of_team.len() == 20 && games_of_team.values().all(|games| *games == 10));
     let record = server.store.tournament_record(tournament).await.unwrap();
     assert!(record.rounds[0].over_at.is_some());

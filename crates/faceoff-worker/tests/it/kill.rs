@@ -12,11 +12,14 @@ use std::{
     process::{Command, Stdio},
 };
 
+/// Environment of the child process: the server's folder and the evaluation's id.
 const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
 const EVALUATION: &str = "FACEOFF_WORKER_TEST_EVALUATION";
+/// The line that the child process prints for each event.
 const EVENT_LINE: &str = "an event";
 
-/// Runs jobs until it is killed or the evaluation is over, and prints a line for each event. Started by the test below.
+/// Runs jobs until the process is killed or the evaluation is over, and prints a line for each event. Started by the
+/// test below.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "the child process of killed_evaluation_has_the_same_result"]
 async fn child() {

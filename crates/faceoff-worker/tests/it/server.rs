@@ -1,4 +1,4 @@
-//! A store, a worker, and teams with the agent `agent.py`.
+//! A server for tests: a store, a worker with slots that run jobs, and teams with the agent `agent.py`.
 
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
@@ -21,6 +21,7 @@ pub struct Server {
     _guard: Option<tempfile::TempDir>,
 }
 
+/// A running worker.
 pub struct Worker {
     shutdown: CancellationToken,
     task: JoinHandle<anyhow::Result<()>>,
@@ -104,7 +105,8 @@ impl Server {
         }
     }
 
-    /// Uploads the agent with these lines in the `[env]` of its manifest, as the HTTP server does.
+    /// Uploads the agent with these lines in the `[env]` of its manifest, as the HTTP server does. The agent is not validated
+    /// yet.
     pub async fn upload(&self, team: &str, env: &str) -> SubmissionId {
         let archive = self.path().join("upload.tar.gz");
         write_bundle(&archive, env);
@@ -141,15 +143,15 @@ impl Server {
             .id
     }
 
-    /// Uploads an agent and commits a valid validation run; the agent's team.
-    pub async fn valid(&self, team: &str, env: &str) -> TeamId {
+    /// Uploads an agent, commits a validation run with the verdict “valid”, and returns the agent's team.
+    pub async fn upload_valid(&self, team: &str, env: &str) -> TeamId {
         let id = self.upload(team, env).await;
         let (lease_s, now) = (3600, Timestamp::now());
         let claimed = self.store.claim("test", lease_s, now).await.unwrap();
         let claim = claimed.expect("a validation run is queued").claim;
         let outcome = ValidationOutcome::Valid {
             runtime: "python3".into(),
-            agent_name: "hold".into(),
+            agent_name: "passive".into(),
             timing: Vec::new(),
             log: String::new(),
         };
@@ -160,7 +162,7 @@ impl Server {
         self.store.submission(id).await.unwrap().team
     }
 
-    /// Starts a day with this plan; the evaluations in the order of the uploads.
+    /// Starts a day with this plan. Returns the evaluations in the order of the uploads.
     pub async fn start_day(&self, plan: &RunPlan, now: Timestamp) -> Vec<Evaluation> {
         let stage = configure_stage(&self.store, plan, now).await;
         let started = self.store.start_day(Actor::Organiser, stage, now);
@@ -210,9 +212,10 @@ impl Server {
     }
 }
 
+/// Writes a bundle with `agent.py`.
 fn write_bundle(archive: &Path, env: &str) {
     let manifest = format!(
-        "name = \"hold\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n[env]\n{env}\n"
+        "name = \"passive\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n[env]\n{env}\n"
     );
     let file = std::fs::File::create(archive).unwrap();
     let gzip = flate2::write::GzEncoder::new(file, flate2::Compression::fast());

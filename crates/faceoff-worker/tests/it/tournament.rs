@@ -1,4 +1,4 @@
-//! Helpers for tournaments.
+//! Helpers for tests with tournaments: rules, pairs, results and recordings.
 
 use crate::server::Server;
 use faceoff_store::*;
@@ -19,8 +19,12 @@ pub fn rules(steps: u32) -> TournamentRules {
     }
 }
 
-/// Opens a tournament and starts its first round with these pairs, on one matchday; its games.
-pub async fn start(server: &Server, rules: TournamentRules, pairs: &[[TeamId; 2]]) -> Vec<Game> {
+/// Opens a tournament and starts its first round with these pairs, on one matchday. Returns its games.
+pub async fn start_round(
+    server: &Server,
+    rules: TournamentRules,
+    pairs: &[[TeamId; 2]],
+) -> Vec<Game> {
     let mut entrants: Vec<TeamId> = pairs.iter().flatten().copied().collect();
     entrants.sort_unstable();
     entrants.dedup();
@@ -47,16 +51,17 @@ pub async fn start(server: &Server, rules: TournamentRules, pairs: &[[TeamId; 2]
     store.games(id, GameFilter::Rounds).await.unwrap()
 }
 
-pub fn pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
-    let with = |(at, home): (usize, &TeamId)| {
+/// Each team against each other one, once.
+pub fn all_pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
+    let pairs_of = |(index, home): (usize, &TeamId)| {
         let home = *home;
-        teams[at + 1..].iter().map(move |away| [home, *away])
+        teams[index + 1..].iter().map(move |away| [home, *away])
     };
-    teams.iter().enumerate().flat_map(with).collect()
+    teams.iter().enumerate().flat_map(pairs_of).collect()
 }
 
-/// Waits until a tournament's games are over; their results in the order of play.
-pub async fn results(server: &Server, tournament: TournamentId) -> Vec<GameResultRow> {
+/// Waits until a tournament's games are over. Returns their results in the order of play.
+pub async fn wait_for_results(server: &Server, tournament: TournamentId) -> Vec<GameResultRow> {
     let mut events = server.store.events();
     let round_games = || server.store.games(tournament, GameFilter::Rounds);
     let mut games = round_games().await.unwrap();
@@ -72,18 +77,18 @@ pub async fn results(server: &Server, tournament: TournamentId) -> Vec<GameResul
     games.into_iter().map(result).collect()
 }
 
-/// The stored recording of a game.
+/// The path of a game's stored recording, which must have the reported hash.
 pub fn recording(server: &Server, result: &GameResultRow) -> PathBuf {
     let recording = result.recording.as_ref().expect("a round's game has one");
     let folder = server.path().join("data/artifacts").join(&recording.key);
-    let whole = folder.join("game.zip");
-    let hash = blake3::hash(&std::fs::read(&whole).unwrap());
+    let archive = folder.join("game.zip");
+    let hash = blake3::hash(&std::fs::read(&archive).unwrap());
     assert_eq!(hash.to_string(), recording.game_blake3);
-    whole
+    archive
 }
 
-/// A file of a stored recording.
-pub fn file_of(recording: PathBuf, name: &str) -> Vec<u8> {
+/// The content of a file in a stored recording.
+pub fn read_from_recording(recording: PathBuf, name: &str) -> Vec<u8> {
     let archive = std::fs::File::open(recording).unwrap();
     let mut archive = zip::ZipArchive::new(archive).unwrap();
     let mut bytes = Vec::new();

@@ -1,4 +1,5 @@
-//! Download of the season's archive.
+//! Download of the season's archive: one file with the season's data and a *manifest*, which lists its files with their hashes.
+//! The *edition* says whether it is for the public or for organisers.
 
 use super::Client;
 use anyhow::{Context, bail};
@@ -23,8 +24,8 @@ impl Client {
     /// Organiser: downloads the season's archive to a new file and checks it against its manifest.
     ///
     /// # Errors
-    /// If the file exists, the server cannot be reached or refuses, or the download is incomplete. No file is left
-    /// then.
+    /// If the file exists, the server cannot be reached or refuses, or the download is incomplete. A failed download leaves no
+    /// file.
     pub async fn season_archive(
         &self,
         edition: Edition,
@@ -69,7 +70,7 @@ impl Client {
     }
 }
 
-/// Writes the body of a response to a file and returns its length in bytes.
+/// Writes the body of a response to the file `partial` and returns its length in bytes.
 async fn fetch(response: reqwest::Response, partial: &Path) -> anyhow::Result<u64> {
     let writing = || format!("writing {}", partial.display());
     // A download that was killed may have left a partial file.

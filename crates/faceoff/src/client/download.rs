@@ -125,9 +125,11 @@ fn is_range_not_satisfiable(error: &anyhow::Error) -> bool {
 
 /// Headers of a response that describe the complete file.
 struct FileInfo {
+    /// Length in bytes.
     total: Option<u64>,
     /// A strong ETag, which identifies one sequence of bytes.
     tag: Option<String>,
+    /// BLAKE3, hexadecimal.
     hash: Option<String>,
 }
 
@@ -166,8 +168,11 @@ impl FileInfo {
 
 /// The part of a file that has been received, and the ETag of its source.
 struct PartialFile {
+    /// Path of the complete file.
     target: PathBuf,
+    /// Path of the partial file, `TARGET.part`.
     path: PathBuf,
+    /// Path of the file with the ETag, `TARGET.part.etag`.
     tag_path: PathBuf,
     tag: Option<String>,
     /// Locked, because two downloads of one file would overwrite each other.

@@ -73,8 +73,8 @@ impl Client {
         response.text().await.context("reading the server's answer")
     }
 
-    /// The live events of a game after the event `last_event_id`, by default all. The stream ends when the server ends it; a broken connection
-    /// ends it with an error.
+    /// The live events of a game after the event `last_event_id`, by default all. The stream ends when the server ends it; a
+    /// broken connection ends it with an error.
     pub async fn watch_game(
         &self,
         id: GameId,

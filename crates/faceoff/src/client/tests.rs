@@ -25,6 +25,7 @@ const ADMIN: &str = "fo_admin_test";
 const SMALL_BUNDLE_BYTES: u64 = 64;
 /// The bundle limit of servers that accept the bundle of these tests.
 const BUNDLE_BYTES: u64 = 1 << 20;
+/// How long a claimed job is leased.
 const LEASE_SECONDS: u32 = 60;
 
 mod download;

@@ -1,4 +1,4 @@
-//! Requests about users, their teams and their tokens.
+//! Requests about users, their teams and their tokens. The API's routes call users *people*.
 
 use super::Client;
 use faceoff_api::{
@@ -193,7 +193,7 @@ impl Client {
             .await
     }
 
-    /// Organiser: opens or closes registration, or sets the divisions.
+    /// Organiser: opens or closes registration, or sets the *divisions*, groups of teams that a board can rank among themselves.
     pub async fn change_season(&self, change: &SeasonChange) -> anyhow::Result<SeasonView> {
         self.call_with_body(Method::PATCH, "/season", change).await
     }

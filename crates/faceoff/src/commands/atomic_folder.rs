@@ -111,14 +111,14 @@ impl AtomicFolder {
         self.folder.join("data")
     }
 
-    /// A place for temporary files.
+    /// A folder for temporary files, which is removed at the end.
     #[must_use]
     pub fn scratch(&self) -> &Path {
         &self.folder
     }
 
-    /// Moves the content to the target. The caller has synced its files; `folders` and the content itself are synced
-    /// here.
+    /// Moves the content to the target. The caller has synced the files to disk; `folders`, relative to the content, and the
+    /// content itself are synced here.
     ///
     /// # Errors
     /// If the target is not empty any more, or a folder cannot be synced or renamed.
@@ -139,7 +139,7 @@ impl AtomicFolder {
         Ok(content)
     }
 
-    /// Replaces the target with the content; the old target is renamed to `old_target`.
+    /// Replaces the target with the content, as [`commit`](Self::commit) does; the old target is renamed to `old_target`.
     ///
     /// # Errors
     /// If a folder cannot be synced or renamed. The target is unchanged then.

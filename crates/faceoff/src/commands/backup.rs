@@ -1,4 +1,5 @@
-//! `faceoff backup`: a complete, checked copy of a server's data folder, made while the server runs.
+//! `faceoff backup`: a complete, checked copy of a server's data folder, made while the server runs. An *artifact* is a stored
+//! file that the database refers to, e.g. a bundle or a dataset.
 
 pub mod files;
 pub mod manifest;
@@ -7,7 +8,7 @@ use super::{
     atomic_folder::{self, AtomicFolder, FolderOperation},
     output::print,
     serve::ADMIN_TOKEN_FILE,
-    storage::bytes,
+    storage::format_bytes,
 };
 use crate::config::Config;
 use anyhow::{Context, bail};
@@ -64,7 +65,7 @@ impl BackupCommand {
                 manifest.season,
                 self.folder.display(),
                 manifest.files.len(),
-                bytes(manifest.total_bytes())
+                format_bytes(manifest.total_bytes())
             );
             if manifest.missing.is_empty() {
                 text.push_str(&format!(

@@ -1,4 +1,5 @@
-//! `faceoff board`: prints a *board*, the ranking of the teams of a stage by their results.
+//! `faceoff board`: prints a *board*, the ranking of the teams of a stage by their results. A board that an organiser has
+//! *frozen* keeps its results, while new evaluations continue.
 
 pub(super) mod table;
 

@@ -152,6 +152,8 @@ fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
     read().with_context(|| format!("reading the evaluation {path}"))
 }
 
+/// An evaluation with everything that has to be equal in both. `seed` draws the episodes, `mismatch_seed` the robot's deviation
+/// from its model.
 fn comparison_input(Evaluation { manifest, summary }: &Evaluation) -> ComparedEvaluation<'_> {
     ComparedEvaluation {
         ruleset: &manifest.ruleset,

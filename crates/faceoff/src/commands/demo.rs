@@ -1,4 +1,4 @@
-//! `faceoff demo`: runs an evaluation day from an empty folder to the board, through the public API.
+//! `faceoff demo`: runs an evaluation day (an evaluation of each team) from an empty folder to the board, through the public API.
 
 use crate::{
     client::{Client, DownloadedFile},
@@ -30,8 +30,8 @@ use tokio::{
 
 /// Interval between requests for progress.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
-/// Time limit for the server's start. It only matters if the server hangs, because the end of its process is noticed at
-/// once. So it is long enough for a busy machine.
+/// Time limit for the server's start, long enough for a busy machine. It only matters if the server hangs, because the end of
+/// its process is noticed at once.
 const START_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Starts a server on an empty folder, creates a team per bundle, uploads the bundles, runs an evaluation
@@ -165,14 +165,14 @@ impl DemoCommand {
         progress.step(format_args!("{}", table::board_table(&board)));
 
         let (name, client, _) = &teams[0];
-        let own = evaluations
+        let first_evaluation = evaluations
             .iter()
             .find(|evaluation| evaluation.team_name.as_str() == name)
             .context("the first team has no evaluation")?;
         let dataset = self.data_dir.join(format!("{name}-dataset.zip"));
         let hidden_bar = ProgressBar::hidden();
         let done = client
-            .download_dataset(own.id, &dataset, None, &hidden_bar)
+            .download_dataset(first_evaluation.id, &dataset, None, &hidden_bar)
             .await?;
         let bytes = done.bytes;
         ensure!(bytes > 0, "the dataset of {name} is empty");

@@ -50,6 +50,7 @@ const SHOWN_PACKAGES: [&str; 4] = ["numpy", "scipy", "onnxruntime", "torch"];
 struct Findings {
     /// Agents can run on this host: every layer is available or given up by the configuration.
     ok: bool,
+    /// The sandbox's layers.
     features: Vec<LayerReport>,
     runtimes: Vec<RuntimeReport>,
     in_memory: MemoryReport,
@@ -114,7 +115,7 @@ struct CpuReport {
     slots: usize,
     /// CPUs that agents are bound to; empty: all.
     agent_cpus: Vec<usize>,
-    /// A reason error computation times may be unfair.
+    /// Why the agents' computation times may be unfair, and what to change.
     advice: Option<String>,
 }
 
@@ -163,13 +164,13 @@ impl Findings {
         let ok = missing_layers(&features).next().is_none();
         Self {
             ok,
-            runtimes: runtimes(config, &features),
+            runtimes: runtime_reports(config, &features),
             features,
-            in_memory: in_memory(config),
-            cpus: cpus(config),
-            descriptors: descriptors(config),
-            disks: disks(config),
-            host: host(config),
+            in_memory: memory_report(config),
+            cpus: cpu_report(config),
+            descriptors: descriptor_report(config),
+            disks: disk_reports(config),
+            host: host_checks(config),
             nats: Vec::new(),
         }
     }
@@ -184,7 +185,7 @@ fn missing_layers(features: &[LayerReport]) -> impl Iterator<Item = Layer> {
 }
 
 /// Inspects each runtime inside the sandbox, with the layers that this host has.
-fn runtimes(config: &Config, features: &[LayerReport]) -> Vec<RuntimeReport> {
+fn runtime_reports(config: &Config, features: &[LayerReport]) -> Vec<RuntimeReport> {
     let mut env = config.agent_environment();
     let unavailable = features.iter().filter(|layer| !layer.feature.available);
     env.isolation = Isolation::Sandboxed {
@@ -210,7 +211,7 @@ fn runtimes(config: &Config, features: &[LayerReport]) -> Vec<RuntimeReport> {
     found
 }
 
-fn in_memory(config: &Config) -> MemoryReport {
+fn memory_report(config: &Config) -> MemoryReport {
     let runtimes = config.agent_environment().runtimes;
     match MemoryImage::size(&runtimes, config.sandbox.resident_bytes) {
         Ok(bytes) => MemoryReport {
@@ -248,18 +249,18 @@ fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
             let interpreter = runtime.and_then(Runtime::interpreter);
             let location = interpreter.map(|path| format!(" at {}", path.display()));
             let is_installed = |name: &&str| python.packages.contains_key(*name);
-            let known: Vec<_> = SHOWN_PACKAGES
+            let shown: Vec<_> = SHOWN_PACKAGES
                 .iter()
                 .filter(|name| is_installed(name))
                 .map(|name| format!("{name} {}", python.packages[*name]))
                 .collect();
-            let more = python.packages.len() - known.len();
+            let other_count = python.packages.len() - shown.len();
             format!(
-                "{} {}{}; {}{more} other packages",
+                "{} {}{}; {}{other_count} other packages",
                 python.implementation,
                 python.version,
                 location.unwrap_or_default(),
-                known
+                shown
                     .iter()
                     .map(|package| format!("{package}, "))
                     .collect::<String>(),
@@ -290,7 +291,7 @@ fn cure(config: &Config, name: &str, content: &RuntimeContent) -> Option<String>
     })
 }
 
-fn cpus(config: &Config) -> CpuReport {
+fn cpu_report(config: &Config) -> CpuReport {
     let usable = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let slots = config.slots();
     let recommended_slots = Config::slots_on(usable);
@@ -312,7 +313,7 @@ fn cpus(config: &Config) -> CpuReport {
     }
 }
 
-fn descriptors(config: &Config) -> DescriptorReport {
+fn descriptor_report(config: &Config) -> DescriptorReport {
     let limits = config.connections.limits();
     match Descriptors::divide(Descriptors::available(), config.slots(), &limits) {
         Ok(divided) => {
@@ -345,7 +346,7 @@ fn descriptors(config: &Config) -> DescriptorReport {
     }
 }
 
-fn host(config: &Config) -> Vec<Check> {
+fn host_checks(config: &Config) -> Vec<Check> {
     let (data_dir, now) = (&config.server.data_dir, jiff::Timestamp::now());
     vec![
         clock::clock(data_dir, now),
@@ -354,16 +355,16 @@ fn host(config: &Config) -> Vec<Check> {
     ]
 }
 
-fn disks(config: &Config) -> Vec<DiskReport> {
+fn disk_reports(config: &Config) -> Vec<DiskReport> {
     let mut folders = vec![config.server.data_dir.clone(), config.scratch_dir()];
     folders.dedup_by(|second, first| second.starts_with(first));
     folders
         .into_iter()
-        .map(|folder| disk(folder, config.server.min_free_bytes))
+        .map(|folder| disk_report(folder, config.server.min_free_bytes))
         .collect()
 }
 
-fn disk(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
+fn disk_report(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
     let absolute = std::path::absolute(&folder).unwrap_or_else(|_| folder.clone());
     let existing = absolute.ancestors().find(|folder| folder.exists());
     let queried = existing.map(|folder| (folder, rustix::fs::statvfs(folder)));
@@ -408,10 +409,10 @@ mod tests {
             ok: available || given_up,
             features: vec![LayerReport { feature, given_up }],
             runtimes: Vec::new(),
-            in_memory: in_memory(&Config::default()),
-            cpus: cpus(&Config::default()),
-            descriptors: descriptors(&Config::default()),
-            disks: disks(&Config::default()),
+            in_memory: memory_report(&Config::default()),
+            cpus: cpu_report(&Config::default()),
+            descriptors: descriptor_report(&Config::default()),
+            disks: disk_reports(&Config::default()),
             host: Vec::new(),
             nats: Vec::new(),
         }
@@ -420,12 +421,12 @@ mod tests {
     #[test]
     fn full_disk_is_reported_with_its_cure() {
         let folder = std::env::temp_dir().join("not/yet/made");
-        let ample = disk(folder.clone(), 1);
+        let ample = disk_report(folder.clone(), 1);
         assert!(
             ample.free_bytes.is_some() && ample.cure.is_none(),
             "{ample:?}"
         );
-        let full = disk(folder, u64::MAX);
+        let full = disk_report(folder, u64::MAX);
         assert_eq!(full.free_bytes.is_some(), ample.free_bytes.is_some());
         assert!(
             full.cure

@@ -1,4 +1,5 @@
-//! `faceoff eval`: runs the server's evaluator locally.
+//! `faceoff eval`: evaluates an agent on this machine with the server's evaluator. A *profile* is a set of perturbations of the
+//! simulation, e.g. noise or model mismatch, the robot's deviation from its model.
 
 mod ablation;
 mod differences;
@@ -133,7 +134,7 @@ impl EvalCommand {
         fs::create_dir_all(&self.out)
             .with_context(|| format!("creating {}", self.out.display()))?;
         files::remove_earlier(&self.out)?;
-        let scratch = local_bundle::scratch_in(&self.out)?;
+        let scratch = local_bundle::create_scratch(&self.out)?;
         let bundle = local_bundle::open(
             &self.bundle,
             scratch.path(),

@@ -1,4 +1,5 @@
-//! `faceoff evaluation`: prints an evaluation or its constraint violations.
+//! `faceoff evaluation`: prints an evaluation, the run of one submission on all tasks, or its violations of the robot's
+//! constraints.
 
 use super::{
     evaluation_text::{status_text, task_table},

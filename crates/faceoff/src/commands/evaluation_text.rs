@@ -1,3 +1,5 @@
+//! Text of an evaluation's status and of its results by task. A *tier* is the class of an agent by its penalty points.
+
 use super::queue::queue_text;
 use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},

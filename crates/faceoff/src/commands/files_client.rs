@@ -1,4 +1,4 @@
-//! HTTP clients that transfer bundles and recordings between workers, server and bucket.
+//! HTTP clients that transfer bundles and recordings between workers, server and *bucket*, an object store (S3) for large files.
 
 use crate::client;
 use anyhow::Context as _;

@@ -1,4 +1,5 @@
-//! `faceoff game`: single games, and the friendly and test games of a team.
+//! `faceoff game`: single games of a tournament, and the games of a team that do not count: friendly games against another team
+//! and test games against the baseline. A game has two *sides*: 1 (home) and 2 (away).
 
 mod watch;
 
@@ -60,7 +61,7 @@ enum Action {
         /// The file to write; an existing file is replaced
         file: PathBuf,
         /// The dataset of this side, if it is public: 1 (home) or 2 (away)
-        #[arg(long, value_parser = side, conflicts_with = "both")]
+        #[arg(long, value_parser = parse_side, conflicts_with = "both")]
         side: Option<Side>,
         /// The recording of both sides with the game's seed, for faceoff verify, if it is public
         #[arg(long)]
@@ -71,7 +72,7 @@ enum Action {
         /// The game's id
         game: GameId,
         /// For organisers: the side, 1 (home) or 2 (away)
-        #[arg(long, value_parser = side)]
+        #[arg(long, value_parser = parse_side)]
         side: Option<Side>,
     },
     /// Cancel an unfinished friendly or test game that your team has requested
@@ -81,7 +82,7 @@ enum Action {
     },
 }
 
-pub(super) fn side(text: &str) -> Result<Side, String> {
+pub(super) fn parse_side(text: &str) -> Result<Side, String> {
     let side = Side::BOTH
         .into_iter()
         .find(|side| side.number().to_string() == text);
@@ -163,19 +164,19 @@ pub(super) async fn own_side(
     if let Some(side) = side {
         return Ok(side);
     }
-    let who = client
+    let caller = client
         .whoami()
         .await
         .context("the side is unknown: name it with --side, or give the team's token")?;
-    let Some(team) = who.team else {
+    let Some(team) = caller.team else {
         bail!(
             "the token does not belong to a team: name the side with --side 1 (home) or --side 2 (away)"
         );
     };
-    let own = Side::BOTH
+    let team_side = Side::BOTH
         .into_iter()
         .find(|side| game.sides[side.index()].team == team.id);
-    own.with_context(|| {
+    team_side.with_context(|| {
         let [home, away] = &game.sides;
         format!(
             "{} does not play in {} - {}",

@@ -1,4 +1,5 @@
-//! `faceoff import`: unpacks the archive of a season into a data folder that `faceoff serve` shows.
+//! `faceoff import`: unpacks the archive of a season into a data folder that `faceoff serve` shows read-only. An archive is in an
+//! *edition*, for the public or for organisers.
 
 use super::{
     atomic_folder::{self, AtomicFolder, FolderOperation, create_private},
@@ -16,12 +17,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// File name of the database in an archive and in a data folder.
-const DATABASE: (&str, &str) = ("database.sqlite3", "faceoff.sqlite3");
-/// Name of the artifact folder, in both.
+/// File name of the database in an archive.
+const ARCHIVE_DATABASE: &str = "database.sqlite3";
+/// File name of the database in a data folder.
+const DATABASE: &str = "faceoff.sqlite3";
+/// Name of the folder of artifacts (files that the database refers to), in an archive and in a data folder.
 const ARTIFACTS: &str = "artifacts";
-/// Folder for all other files of the archive.
-const REST: &str = "archive";
+/// Name of the folder, in a data folder, for all other files of the archive.
+const OTHER_FILES: &str = "archive";
 
 const IMPORT: FolderOperation = FolderOperation {
     name: "import",
@@ -90,20 +93,20 @@ pub fn import(archive: &Path, data: &Path, now: Timestamp) -> anyhow::Result<Man
     )?;
     let new_folder = AtomicFolder::create(data, &IMPORT)?;
     let folder = new_folder.content();
-    let rest = folder.join(REST);
-    for folder in [&folder, &rest] {
+    let unpacked = folder.join(OTHER_FILES);
+    for folder in [&folder, &unpacked] {
         create_private(folder)?;
     }
     let context = || format!("{} is not imported", archive.display());
-    let manifest = unpack(archive, &rest).with_context(context)?;
-    let (from, to) = (rest.join(DATABASE.0), folder.join(DATABASE.1));
+    let manifest = unpack(archive, &unpacked).with_context(context)?;
+    let (from, to) = (unpacked.join(ARCHIVE_DATABASE), folder.join(DATABASE));
     match fs::rename(&from, &to) {
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            bail!("{}: it contains no {}", context(), DATABASE.0)
+            bail!("{}: it contains no {ARCHIVE_DATABASE}", context())
         }
         result => result.with_context(|| format!("naming {}", to.display()))?,
     }
-    let (from, to) = (rest.join(ARTIFACTS), folder.join(ARTIFACTS));
+    let (from, to) = (unpacked.join(ARTIFACTS), folder.join(ARTIFACTS));
     match fs::rename(&from, &to) {
         // The season has no datasets.
         Err(error) if error.kind() == ErrorKind::NotFound => create_private(&to)?,
@@ -125,8 +128,8 @@ pub fn import(archive: &Path, data: &Path, now: Timestamp) -> anyhow::Result<Man
     }
     // The manifest remains as a record of what was imported.
     let json = serde_json::to_vec_pretty(&manifest).context("writing the manifest")?;
-    let path = rest.join(MANIFEST_NAME);
+    let path = unpacked.join(MANIFEST_NAME);
     fs::write(&path, json).with_context(|| format!("writing {}", path.display()))?;
-    new_folder.commit(data, &[REST, ARTIFACTS])?;
+    new_folder.commit(data, &[OTHER_FILES, ARTIFACTS])?;
     Ok(manifest)
 }

@@ -76,7 +76,7 @@ fn parse_link(link: &str) -> anyhow::Result<(Option<&str>, &str)> {
 #[derive(Debug, Serialize)]
 struct SignedIn<'a> {
     #[serde(flatten)]
-    who: &'a CallerView,
+    caller: &'a CallerView,
 }
 
 impl JoinCommand {
@@ -106,7 +106,7 @@ impl JoinCommand {
             }),
             accepted_terms: self.accept_terms,
         };
-        // An invitation can be used once, so unreadable credentials must be noticed before.
+        // An invitation can be used only once, so an unreadable file of credentials must be noticed first.
         let credentials = match self.sign_in {
             true => {
                 let file = credentials::path()?;
@@ -126,7 +126,7 @@ impl JoinCommand {
                 })?;
                 let login = Login {
                     token: joined.secret.clone(),
-                    made_here: true,
+                    created_by_login: true,
                     ca_file,
                 };
                 credentials.add(server, login, true);
@@ -136,12 +136,12 @@ impl JoinCommand {
                     return Err(error);
                 }
                 let view = SignedIn {
-                    who: &joined.caller,
+                    caller: &joined.caller,
                 };
                 return print(self.json, &view, || {
-                    let who = whoami::whoami_text(&joined.caller);
+                    let caller = whoami::whoami_text(&joined.caller);
                     format!(
-                        "{who}\nsigned in to {server}, token stored in {}",
+                        "{caller}\nsigned in to {server}, token stored in {}",
                         file.display()
                     )
                 });

@@ -35,7 +35,7 @@ enum Target {
         /// The game's id
         game: GameId,
         /// For organisers: the side, 1 (home) or 2 (away)
-        #[arg(long, value_parser = super::game::side, conflicts_with = "both")]
+        #[arg(long, value_parser = super::game::parse_side, conflicts_with = "both")]
         side: Option<Side>,
         /// The recording of both sides, if you may download it
         #[arg(long)]

@@ -13,9 +13,9 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// A folder for unpacked bundles and unfinished recordings. It is beside the results and not in /tmp, because a
+/// Creates a folder for unpacked bundles and unfinished recordings. It is beside the results and not in /tmp, because a
 /// recording may be larger than a memory file system. An agent that runs as another user can traverse it.
-pub(super) fn scratch_in(out: &Path) -> anyhow::Result<TempDir> {
+pub(super) fn create_scratch(out: &Path) -> anyhow::Result<TempDir> {
     tempfile::Builder::new()
         .prefix(".eval-")
         .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o755))
@@ -42,7 +42,7 @@ pub(super) fn open(
     Ok(bundle)
 }
 
-/// The server's limits and isolation, or none without a sandbox.
+/// The environment of an agent: with the server's limits and isolation, or without isolation if `no_sandbox`.
 pub(super) fn environment(config: &Config, runtime: &str, no_sandbox: bool) -> AgentEnvironment {
     let mut env = config.agent_environment();
     if no_sandbox {

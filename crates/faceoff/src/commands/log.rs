@@ -19,7 +19,7 @@ pub struct LogCommand {
     /// The id of a submission, an evaluation or a game
     id: String,
     /// For organisers, with a game: the side, 1 (home) or 2 (away)
-    #[arg(long, value_parser = super::game::side)]
+    #[arg(long, value_parser = super::game::parse_side)]
     side: Option<Side>,
     #[command(flatten)]
     server: ServerArgs,
@@ -29,7 +29,8 @@ pub struct LogCommand {
 #[derive(Debug, Serialize)]
 struct Log {
     /// `submission`, `evaluation` or `game`.
-    of: &'static str,
+    #[serde(rename = "of")]
+    kind: &'static str,
     id: String,
     /// State of a submission or evaluation; absent for a game.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,7 +83,7 @@ impl LogCommand {
         };
         let side = own_side(client, &found, self.side).await?;
         Ok(Log {
-            of: "game",
+            kind: "game",
             id: self.id.clone(),
             state: None,
             reason: None,
@@ -118,7 +119,7 @@ fn submission_log(id: &str, status: &SubmissionStatus, next: String) -> anyhow::
         SubmissionStatus::ValidationError { reason } => (Some(reason.clone()), None),
     };
     Ok(Log {
-        of: "submission",
+        kind: "submission",
         id: id.to_owned(),
         state: state_name(status)?,
         reason,
@@ -143,7 +144,7 @@ fn evaluation_log(id: &str, status: EvaluationStatus, next: String) -> anyhow::R
         | EvaluationStatus::Finished { .. } => (None, Vec::new(), None),
     };
     Ok(Log {
-        of: "evaluation",
+        kind: "evaluation",
         id: id.to_owned(),
         state,
         reason,
@@ -159,7 +160,7 @@ impl Log {
         if let Some(state) = &self.state {
             lines.push(format!(
                 "{} {}: {}",
-                self.of,
+                self.kind,
                 self.id,
                 state.replace('_', " ")
             ));

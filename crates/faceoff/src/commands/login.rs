@@ -49,7 +49,7 @@ struct LoggedIn<'a> {
     default: bool,
     file: &'a Path,
     #[serde(flatten)]
-    who: &'a CallerView,
+    caller: &'a CallerView,
 }
 
 impl LoginCommand {
@@ -64,8 +64,8 @@ impl LoginCommand {
     async fn sign_in(self) -> anyhow::Result<()> {
         let file = credentials::path()?;
         let credentials = Credentials::load(&file)?;
-        let named = self.server.or_else(|| std::env::var("FACEOFF_SERVER").ok());
-        let server = named
+        let named_server = self.server.or_else(|| std::env::var("FACEOFF_SERVER").ok());
+        let server = named_server
             .as_deref()
             .or(credentials.default_server())
             .unwrap_or(DEFAULT_SERVER);
@@ -80,7 +80,7 @@ impl LoginCommand {
                 .and_then(|login| login.ca_file.clone()),
         };
         let client = Client::new(server, None, ca_file.as_deref())?;
-        let made_here = self.name.is_some();
+        let created_by_login = self.name.is_some();
         let token = match self.name {
             Some(name) => {
                 let password = if self.password_stdin {
@@ -105,24 +105,24 @@ impl LoginCommand {
             !token.is_empty(),
             "expected a token, which begins with fo_; without one, accept an invitation (faceoff join LINK), or sign in with --name"
         );
-        let who = client.with_token(&token).whoami().await?;
+        let caller = client.with_token(&token).whoami().await?;
         let login = Login {
             token,
-            made_here,
+            created_by_login,
             ca_file,
         };
         // Loaded again, because another command may have changed the file while the user was typing.
         let mut credentials = Credentials::load(&file)?;
         let replaced = credentials
             .login(server)
-            .filter(|old| old.made_here)
+            .filter(|old| old.created_by_login)
             .cloned();
-        // A stored token that is entered again was still created here.
+        // A stored token that the user enters again was still created by an earlier login.
         let is_same = replaced
             .as_ref()
             .is_some_and(|old| old.token == login.token);
         let login = Login {
-            made_here: login.made_here || is_same,
+            created_by_login: login.created_by_login || is_same,
             ..login
         };
         credentials.add(server, login, !self.not_default);
@@ -135,12 +135,12 @@ impl LoginCommand {
             server,
             default: credentials.is_default(server),
             file: &file,
-            who: &who,
+            caller: &caller,
         };
         print(self.json, &view, || {
             let mut text = format!(
                 "{}\nsigned in to {server}, token stored in {}",
-                whoami::whoami_text(&who),
+                whoami::whoami_text(&caller),
                 file.display()
             );
             if !view.default {

@@ -37,15 +37,15 @@ impl LogoutCommand {
     async fn sign_out(self) -> anyhow::Result<()> {
         let file = credentials::path()?;
         let mut credentials = Credentials::load(&file)?;
-        let named = self.server.or_else(|| std::env::var("FACEOFF_SERVER").ok());
-        let server = named.as_deref().or(credentials.default_server());
+        let named_server = self.server.or_else(|| std::env::var("FACEOFF_SERVER").ok());
+        let server = named_server.as_deref().or(credentials.default_server());
         let server = server.context("not signed in")?.to_owned();
         let login = credentials.remove(&server).with_context(|| {
             let others: Vec<_> = credentials.servers().collect();
             format!("not signed in to {server}; there are logins to {others:?}")
         })?;
         let mut revoked = false;
-        let should_revoke = self.revoke || (login.made_here && !self.keep_token);
+        let should_revoke = self.revoke || (login.created_by_login && !self.keep_token);
         if should_revoke {
             let client = Client::new(&server, Some(&login.token), login.ca_file.as_deref())?;
             revoked = match client.revoke_own_token().await {

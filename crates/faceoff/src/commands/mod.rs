@@ -1,4 +1,4 @@
-//! One file per subcommand.
+//! The subcommands, one public module each, and the private modules that they share.
 
 mod ablation_text;
 pub mod activate;

@@ -1,3 +1,5 @@
+//! Text about the next *cutoff*, the time at which the active submission of each team is evaluated.
+
 use faceoff_api::views::me::MeView;
 use faceoff_types::SubmissionId;
 

@@ -1,3 +1,5 @@
+//! Output that several commands share: text or JSON, and the progress of downloads.
+
 use crate::client::DownloadedFile;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -39,7 +41,7 @@ pub(super) fn download_bar() -> anyhow::Result<ProgressBar> {
 pub(super) fn download_text(done: &DownloadedFile) -> String {
     let resumed = match done.resumed_at {
         0 => String::new(),
-        at => format!(" (resumed after {at})"),
+        bytes => format!(" (resumed after {bytes})"),
     };
     let checked = if done.checked { " (verified)" } else { "" };
     format!(

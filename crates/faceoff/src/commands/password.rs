@@ -15,10 +15,10 @@ pub(super) fn read_stdin() -> anyhow::Result<String> {
 /// Prompts for a secret at the terminal without echoing it.
 ///
 /// # Errors
-/// If there is no terminal; the error contains the alternative `instead`.
-pub(super) fn prompt(question: &str, instead: &str) -> anyhow::Result<String> {
+/// If there is no terminal; the error contains the `alternative`.
+pub(super) fn prompt(question: &str, alternative: &str) -> anyhow::Result<String> {
     if !std::io::stdin().is_terminal() {
-        bail!("standard input is not a terminal: {instead}");
+        bail!("standard input is not a terminal: {alternative}");
     }
     let answer = rpassword::prompt_password(question).context("reading from the terminal")?;
     Ok(answer)

@@ -22,8 +22,8 @@ impl PasswordCommand {
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let client = self.server.client()?;
-            let who = client.whoami().await?;
-            let person = who
+            let caller = client.whoami().await?;
+            let person = caller
                 .person
                 .context("the token does not belong to a user; only users have passwords")?;
             let (old, new) = read_passwords()?;

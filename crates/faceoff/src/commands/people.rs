@@ -1,4 +1,4 @@
-//! Text of users and invitations.
+//! Text of users and invitations. An invited *founder* creates a new team; a *return* restores a user's account.
 
 use super::output::lines_or;
 use faceoff_api::{

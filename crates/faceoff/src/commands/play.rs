@@ -1,4 +1,5 @@
-//! `faceoff play`: one game or a series of games between two bundles.
+//! `faceoff play`: one game or a series of games between two bundles. A *mirrored pair* is two games on one seed with swapped
+//! sides.
 
 mod bar;
 mod matchup;
@@ -19,7 +20,7 @@ use matchup::Matchup;
 use options::PlayOptions;
 use platform_fault::with_advice;
 use results::Results;
-use series_results::Kind;
+use series_results::SeriesKind;
 use std::fs;
 
 /// File of an evaluation, whose `results.json` would be overwritten.
@@ -45,8 +46,8 @@ impl PlayCommand {
         let out = &options.out;
         fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
         let series = match (options.pairs, options.games) {
-            (Some(pairs), _) => Some((Kind::MirroredPairs, pairs)),
-            (None, Some(games)) => Some((Kind::Games, games)),
+            (Some(pairs), _) => Some((SeriesKind::MirroredPairs, pairs)),
+            (None, Some(games)) => Some((SeriesKind::Games, games)),
             (None, None) => None,
         };
         if out.join(DATASET).exists() {

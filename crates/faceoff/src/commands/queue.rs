@@ -1,11 +1,13 @@
+//! Text about the position of an evaluation in the queue.
+
 use faceoff_api::views::queue::QueueView;
 
 /// Position in the queue and expected end.
 pub fn queue_text(queue: &QueueView) -> String {
     let expected = match queue.expected_at {
-        Some(at) => format!(
+        Some(end) => format!(
             "expected to finish at {}",
-            at.strftime("%Y-%m-%d %H:%M UTC")
+            end.strftime("%Y-%m-%d %H:%M UTC")
         ),
         None => "finish time unknown".to_owned(),
     };

@@ -1,4 +1,4 @@
-//! `faceoff restore`: creates a data folder from a backup.
+//! `faceoff restore`: creates a data folder from a backup. An *artifact* is a stored file that the database refers to.
 
 use super::{
     atomic_folder::{self, AtomicFolder, FolderOperation},
@@ -8,7 +8,7 @@ use super::{
     },
     output::print,
     serve::lock,
-    storage::bytes,
+    storage::format_bytes,
 };
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
@@ -77,7 +77,7 @@ impl RestoreCommand {
                     manifest.season,
                     manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
                     manifest.files.len(),
-                    bytes(manifest.total_bytes())
+                    format_bytes(manifest.total_bytes())
                 )
             });
         };
@@ -90,7 +90,7 @@ impl RestoreCommand {
                 manifest.season,
                 manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
                 manifest.files.len(),
-                bytes(manifest.total_bytes())
+                format_bytes(manifest.total_bytes())
             )];
             let missing = manifest.missing.iter();
             lines.extend(missing.map(|file| format!("missing in the backup: {file}")));
@@ -121,17 +121,17 @@ fn restore(
     // Locked until the end, so that a folder in use is noticed before anything is copied.
     let lock = match is_empty {
         Ok(()) => None,
-        Err(_) if replace => Some(lock_old(data)?),
+        Err(_) if replace => Some(lock_replaced(data)?),
         Err(error) => return Err(error),
     };
     let new_folder = AtomicFolder::create(data, &RESTORE)?;
-    let made = new_folder.content();
-    atomic_folder::create_private(&made)?;
+    let content = new_folder.content();
+    atomic_folder::create_private(&content)?;
     let mut folders = BTreeSet::from([ARTIFACTS.to_owned()]);
     for file in &manifest.files {
-        let (from, to) = (folder.join(&file.path), made.join(&file.path));
-        let inside = Path::new(&file.path).ancestors().skip(1);
-        folders.extend(inside.filter_map(|folder| Some(folder.to_str()?.to_owned())));
+        let (from, to) = (folder.join(&file.path), content.join(&file.path));
+        let parents = Path::new(&file.path).ancestors().skip(1);
+        folders.extend(parents.filter_map(|folder| Some(folder.to_str()?.to_owned())));
         if let Some(parent) = to.parent() {
             atomic_folder::create_private(parent)?;
         }
@@ -144,12 +144,12 @@ fn restore(
             copied.blake3
         );
     }
-    check_database(&made.join(DATABASE), new_folder.scratch())?;
+    check_database(&content.join(DATABASE), new_folder.scratch())?;
     super::block_on(async {
-        let skipped = Store::skip_event_ids(&made.join(DATABASE)).await;
+        let skipped = Store::skip_event_ids(&content.join(DATABASE)).await;
         skipped.context("reserving the event ids that the old server may have used")
     })?;
-    atomic_folder::create_private(&made.join(ARTIFACTS))?;
+    atomic_folder::create_private(&content.join(ARTIFACTS))?;
     let folders: Vec<&str> = folders.iter().map(String::as_str).collect();
     if lock.is_none() {
         new_folder.commit(data, &folders)?;
@@ -161,7 +161,7 @@ fn restore(
 }
 
 /// Locks a data folder that is to be replaced.
-fn lock_old(data: &Path) -> anyhow::Result<File> {
+fn lock_replaced(data: &Path) -> anyhow::Result<File> {
     ensure!(
         data.join(DATABASE).exists(),
         "{} has no {DATABASE}: --replace only replaces data folders",
@@ -187,7 +187,7 @@ fn replaced_path(data: &Path) -> anyhow::Result<PathBuf> {
     Ok(path)
 }
 
-/// Compares every file with the list and checks the database.
+/// Compares every file with the manifest and checks the database.
 fn check(folder: &Path, manifest: &Manifest) -> anyhow::Result<()> {
     for file in &manifest.files {
         let path = folder.join(&file.path);

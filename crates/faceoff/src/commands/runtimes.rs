@@ -38,6 +38,7 @@ fn runtimes_text(offered: &RuntimesView) -> String {
             cpus => format!("{cpus} CPUs"),
         }
     ));
+    // Name, runtimes and limits of each stage and tournament.
     let mut contests: Vec<_> = offered
         .stages
         .iter()
@@ -65,7 +66,7 @@ fn runtime_line(runtime: &RuntimeInventory) -> String {
         Some(version) => format!("glibc {version}"),
         None => "a C library of unknown version".to_owned(),
     };
-    let found = match &runtime.content {
+    let content = match &runtime.content {
         RuntimeContent::Python(python) => {
             let packages = python.packages.iter();
             let packages: Vec<_> = packages
@@ -89,7 +90,7 @@ fn runtime_line(runtime: &RuntimeInventory) -> String {
         RuntimeContent::Image => "container images, which contain their own files".to_owned(),
         RuntimeContent::Failed { reason } => reason.clone(),
     };
-    format!("{:<12} {found}", runtime.name)
+    format!("{:<12} {content}", runtime.name)
 }
 
 fn limits_text(limits: &AgentLimits) -> String {

@@ -1,4 +1,5 @@
-//! `faceoff score`: computes boards and tournament standings from files.
+//! `faceoff score`: computes boards and tournament standings from files. A *board* ranks teams by their results in the tasks,
+//! *standings* rank them by their games.
 
 mod lines;
 mod scored_tournament;
@@ -100,8 +101,8 @@ impl Kind {
                 weights,
                 tier_bounds,
             } => {
-                let sheet: QualifyingScores = parse(&input, file)?;
-                for row in sheet.board_with(
+                let scores: QualifyingScores = parse(&input, file)?;
+                for row in scores.board_with(
                     &weights.unwrap_or_default(),
                     &tier_bounds.unwrap_or_default(),
                 ) {
@@ -156,9 +157,10 @@ mod tests {
 
     const TOURNAMENT: Kind = Kind::Tournament(TournamentArgs::JSON);
 
-    fn score(stage: Kind, input: &str) -> (anyhow::Result<()>, Vec<Value>, String) {
+    /// Scores the input; returns the outcome, the printed rows and the warnings.
+    fn score(kind: Kind, input: &str) -> (anyhow::Result<()>, Vec<Value>, String) {
         let (mut out, mut warnings) = (Vec::new(), Vec::new());
-        let outcome = stage.score(input.as_bytes(), &mut out, &mut warnings);
+        let outcome = kind.score(input.as_bytes(), &mut out, &mut warnings);
         let lines = String::from_utf8(out).unwrap();
         let rows = lines
             .lines()
@@ -167,15 +169,16 @@ mod tests {
         (outcome, rows, String::from_utf8(warnings).unwrap())
     }
 
-    fn error(stage: Kind, input: &str) -> String {
-        let (outcome, rows, _) = score(stage, input);
+    fn error(kind: Kind, input: &str) -> String {
+        let (outcome, rows, _) = score(kind, input);
         assert_eq!(rows, Vec::<Value>::new(), "no partial board is printed");
         format!("{:#}", outcome.unwrap_err())
     }
 
-    fn tasks(hit: f64, penalty_points: f64) -> Value {
+    /// The tasks of a team with this success rate and penalty points in the task hit.
+    fn tasks(hit_rate: f64, penalty_points: f64) -> Value {
         let other = json!({"success_rate": 0.5, "penalty_points": 0});
-        let hit = json!({"success_rate": hit, "penalty_points": penalty_points});
+        let hit = json!({"success_rate": hit_rate, "penalty_points": penalty_points});
         json!({"hit": hit, "defend": other, "prepare": other})
     }
 
@@ -210,11 +213,11 @@ mod tests {
     #[test]
     fn custom_weights_and_bounds_apply() {
         let input = json!({"A": tasks(0.9, 501.0), "B": tasks(0.1, 0.0)}).to_string();
-        let stage = Kind::Qualifying {
+        let kind = Kind::Qualifying {
             weights: Some("1,0,0".parse().unwrap()),
             tier_bounds: Some("0.6,0.7".parse().unwrap()),
         };
-        let (outcome, rows, _) = score(stage, &input);
+        let (outcome, rows, _) = score(kind, &input);
         outcome.unwrap();
         let brief: Vec<_> = rows
             .iter()
@@ -237,11 +240,11 @@ mod tests {
         assert_eq!(rows[0]["games"][1]["score"], json!([4, 4]));
         assert_eq!(rows[0]["standings"][0]["team"], "B");
         assert_eq!(rows[0]["standings"][0]["points_per_round"], json!([6]));
-        let why = json!([
+        let reason = json!([
             rows[0]["games"][0]["won_by"],
             rows[0]["games"][0]["winner_led"]
         ]);
-        assert_eq!(why, json!(["tier", false]));
+        assert_eq!(reason, json!(["tier", false]));
         let record = json!({"teams": ["A", "B"], "wins": [0, 2], "draws": 0, "goals": [2, 8]});
         assert_eq!(rows[0]["head_to_head"], json!([record]));
         let best = &rows[0]["ratings"]["results"][0]["ratings"][0];
@@ -261,7 +264,7 @@ mod tests {
             "{got}"
         );
         assert!(got.contains("got 54.9"), "{got}");
-        for (stage, input, expected) in [
+        for (kind, input, expected) in [
             (
                 QUALIFYING,
                 "",
@@ -289,16 +292,16 @@ mod tests {
                 "games.json: expected value at line 1 column 1",
             ),
         ] {
-            let got = error(stage, input);
+            let got = error(kind, input);
             assert!(got.starts_with(expected), "{input:?}: {got}");
         }
         let deep = "[".repeat(100_000);
         assert!(error(TOURNAMENT, &deep).starts_with("games.json: "));
-        let not_utf8 = score_bytes(b"{\"\xff\": 1}");
+        let not_utf8 = error_of_bytes(b"{\"\xff\": 1}");
         assert!(not_utf8.starts_with("tasks.json: "), "{not_utf8}");
     }
 
-    fn score_bytes(input: &[u8]) -> String {
+    fn error_of_bytes(input: &[u8]) -> String {
         let outcome = QUALIFYING.score(input, &mut Vec::new(), &mut Vec::new());
         format!("{:#}", outcome.unwrap_err())
     }

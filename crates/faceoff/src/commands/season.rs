@@ -1,4 +1,5 @@
-//! `faceoff season`: prints the season.
+//! `faceoff season`: prints the season. Its *secret* draws the episodes of all evaluations and is published at the end; the
+//! *commitment*, its hash, is public from the start.
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;

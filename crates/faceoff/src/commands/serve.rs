@@ -1,4 +1,5 @@
-//! `faceoff serve`: API, pages, worker slots and schedule in one process.
+//! `faceoff serve`: API, pages, worker slots and schedule in one process. A *slot* runs one job at a time, e.g. the episodes of an
+//! agent or a game; the *schedule* starts evaluation days.
 
 mod archived_season;
 mod data_folder;
@@ -14,7 +15,7 @@ use super::atomic_folder::create_private;
 use crate::{client, config::Config, descriptors::Descriptors, log::LogFormat, machine};
 use anyhow::{Context, bail};
 use clap::Args;
-use data_folder::{empty_folder, link_key, set_admin_token};
+use data_folder::{empty_folder, load_or_create_link_key, set_admin_token};
 use faceoff_http::{AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig};
 use faceoff_metrics::Metrics;
 use faceoff_notify::Deliverer;
@@ -105,7 +106,7 @@ impl ServeCommand {
             .name("service".to_owned())
             .spawn(move || serve_with_low_priority(config, connections, cpus, threads, resources))
             .context("starting the service thread")?;
-        // This thread keeps its CPUs and its priority, which the threads of the slots inherit.
+        // The threads of the slots are started on this thread, because they inherit its CPUs and its priority.
         starter.run();
         service
             .join()
@@ -144,7 +145,7 @@ fn serve_with_low_priority(
 /// Lowers the priority of a runtime thread that a slot has started and that has inherited the slot's priority. Other
 /// threads already have the value `nice`.
 fn lower_priority(cpus: &[usize], nice: i32) {
-    if affinity::niceness().is_ok_and(|own| own < nice)
+    if affinity::niceness().is_ok_and(|thread_nice| thread_nice < nice)
         && let Err(error) = affinity::lower_priority(cpus)
     {
         tracing::warn!(%error, ?cpus, "cannot lower the priority of requests, which may disturb slots");
@@ -220,11 +221,11 @@ async fn serve(
         time: config.time.clone(),
         runtimes: agent.runtime_names(),
     };
-    let watch = CapacityMonitor::new(store.clone(), clock.clone(), capacity.clone());
+    let capacity_monitor = CapacityMonitor::new(store.clone(), clock.clone(), capacity.clone());
     let metrics = Metrics::new(env!("CARGO_PKG_VERSION"));
-    let link_key = link_key(&data_dir)?;
+    let link_key = load_or_create_link_key(&data_dir)?;
     let remote = remote::remote_config(&config, address, &link_key, &agent)?;
-    let site = HttpConfig {
+    let http_config = HttpConfig {
         max_bundle_bytes: config.bundle.packed_bytes,
         public_url: config.server.public_url.clone(),
         upload_dir,
@@ -242,18 +243,18 @@ async fn serve(
         Some(address) => Some(monitoring::listen(address).await?),
         None => None,
     };
-    let router = faceoff_http::router(store.clone(), site.clone());
+    let router = faceoff_http::router(store.clone(), http_config.clone());
     let tls = client::tls_client_config(None).unwrap_or_else(|error| {
         // Evaluations do not depend on webhooks, and pending deliveries are retried after the restart.
         tracing::error!(%error, "deliveries to webhooks with TLS fail: install the package ca-certificates and restart");
         client::plain_client_config()
     });
-    let rules = config.webhooks.clone();
-    let webhooks_enabled = rules.enabled;
-    let deliverer = Deliverer::new(store.clone(), clock.clone(), rules, tls)
+    let webhooks = config.webhooks.clone();
+    let webhooks_enabled = webhooks.enabled;
+    let deliverer = Deliverer::new(store.clone(), clock.clone(), webhooks, tls)
         .context("setting up the delivery of webhooks")?;
     // Kept as long as agents run.
-    let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
+    let _image = hold_in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
         slots: SlotsConfig {
             cpus,
@@ -278,6 +279,7 @@ async fn serve(
     );
 
     let shutdown = CancellationToken::new();
+    // The tasks of the server. All of them run until the shutdown.
     let mut parts = JoinSet::new();
     if let Some(remote) = remote {
         parts.spawn(faceoff_worker::dispatch(
@@ -301,7 +303,9 @@ async fn serve(
     ));
     let shutdown_requested = shutdown.clone();
     parts.spawn(async move {
-        watch.run(shutdown_requested.cancelled_owned()).await;
+        capacity_monitor
+            .run(shutdown_requested.cancelled_owned())
+            .await;
         Ok(())
     });
     parts.spawn(monitoring::count_changes(
@@ -314,7 +318,7 @@ async fn serve(
         parts.spawn(monitoring::serve_metrics(
             listener,
             store,
-            site,
+            http_config,
             shutdown.clone(),
         ));
     }
@@ -328,8 +332,8 @@ async fn serve(
         Ok(())
     });
     parts.spawn(serve_http(listener, router, connections, shutdown.clone()));
-    // Tells the parent process the address, including a port that the system has chosen, once connections are
-    // accepted. A closed standard output is no error.
+    // Once connections are accepted, the parent process can read the address, including a port that the system has chosen. A
+    // closed standard output is no error.
     let _ = writeln!(std::io::stdout(), "http://{address}");
     notify_service_manager(NotifyState::Ready);
 
@@ -341,7 +345,7 @@ async fn serve(
     }
     notify_service_manager(NotifyState::Stopping);
     shutdown.cancel();
-    let rest = async {
+    let end_of_parts = async {
         while let Some(part) = parts.join_next().await {
             let ended = part
                 .context("a part of the server panicked")
@@ -352,13 +356,13 @@ async fn serve(
         }
     };
     // A second signal stops the server immediately, which leases make safe.
-    let second = shutdown_signal()?;
+    let second_signal = shutdown_signal()?;
     tokio::select! {
-        () = rest => {
+        () = end_of_parts => {
             store.close().await;
             tracing::info!("stopped");
         }
-        name = second => tracing::warn!(signal = name, "second signal: stopping immediately"),
+        name = second_signal => tracing::warn!(signal = name, "second signal: stopping immediately"),
     }
     outcome
 }
@@ -379,7 +383,7 @@ fn unexpected_end(part: Result<anyhow::Result<()>, tokio::task::JoinError>) -> a
     }
 }
 
-/// Refuses a host that lacks a sandbox layer which the configuration does not give up.
+/// Refuses a host that lacks a *layer* (one protection) of the sandbox which the configuration does not give up.
 pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result<()> {
     let mut missing = Vec::new();
     for feature in features.iter().filter(|feature| !feature.available) {
@@ -406,7 +410,7 @@ pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Re
 }
 
 /// Lets agents use a copy of the runtimes' files in memory, if it fits.
-pub fn in_memory(
+pub fn hold_in_memory(
     runtimes: &mut BTreeMap<String, Runtime>,
     limit_bytes: u64,
 ) -> Option<MemoryImage> {
@@ -416,9 +420,9 @@ pub fn in_memory(
             tracing::info!(bytes = image.bytes, folder = %image.folder().display(), "runtime files are held in memory");
             Some(image)
         }
-        Err(why) => {
+        Err(error) => {
             tracing::warn!(
-                %why,
+                %error,
                 "runtime files are not held in memory, so agents can exchange information through the timing of file \
                 accesses; offer smaller runtimes or raise sandbox.resident_bytes"
             );

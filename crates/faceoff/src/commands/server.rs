@@ -1,4 +1,4 @@
-//! Server and token of a command.
+//! Server and token of a command: from its options, the environment or the stored login.
 
 use super::ca_file::CaFile;
 use crate::{
@@ -52,7 +52,7 @@ impl Source {
 
     /// The source of a value that clap has read from the command line or the environment.
     fn of_value(value: &str, variable: &str) -> Self {
-        if std::env::var(variable).is_ok_and(|set| set == value) {
+        if std::env::var(variable).is_ok_and(|text| text == value) {
             Self::Environment
         } else {
             Self::Option
@@ -64,9 +64,9 @@ impl Source {
 #[derive(Debug)]
 pub struct Connection {
     pub server: String,
-    pub server_from: Source,
+    pub server_source: Source,
     pub token: Option<String>,
-    pub token_from: Source,
+    pub token_source: Source,
     pub ca_file: Option<PathBuf>,
 }
 
@@ -87,7 +87,7 @@ impl Connection {
             Ok(file) => Credentials::load(&file)?,
             Err(_) => Credentials::default(),
         };
-        let (server, server_from) = match (server, credentials.default_server()) {
+        let (server, server_source) = match (server, credentials.default_server()) {
             (Some(server), _) => (server, Source::of_value(server, "FACEOFF_SERVER")),
             (None, Some(server)) => (server, Source::Login),
             (None, None) => (DEFAULT_SERVER, Source::Default),
@@ -96,7 +96,7 @@ impl Connection {
         let ca_file = ca_file
             .map(Path::to_owned)
             .or_else(|| login.as_ref()?.ca_file.clone());
-        let (token, token_from) = match (token, login) {
+        let (token, token_source) = match (token, login) {
             (Some((token, variable)), _) => (
                 Some(token.trim().to_owned()),
                 Source::of_value(token, variable),
@@ -106,9 +106,9 @@ impl Connection {
         };
         Ok(Self {
             server: server.to_owned(),
-            server_from,
+            server_source,
             token,
-            token_from,
+            token_source,
             ca_file,
         })
     }

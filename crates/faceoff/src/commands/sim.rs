@@ -1,4 +1,5 @@
-//! `faceoff sim`: the simulator alone, for comparisons, exports and measurements.
+//! `faceoff sim`: the simulator alone, for comparisons, exports and measurements. In a *control step* an agent acts once; it is
+//! divided into *substeps* of the physics.
 
 mod bench;
 mod export;
@@ -26,9 +27,9 @@ enum Action {
     Trace,
     /// Read poses from standard input, write positions, Jacobian, mass matrix and bias, one JSON object per line
     ///
-    /// Input, one line per pose: {"q": [7]} and optionally "dq": [7], or 9 numbers with the universal joint.
-    /// By default, the universal joint keeps the mallet upright, at rest. SI units, base frame of the robot. The
-    /// output has the controller's model, and the simulated one under "plant".
+    /// Input, one line per pose: {"q": [7 joint positions]} and optionally "dq": [7 joint velocities], or 9 numbers
+    /// with the universal joint. By default, the universal joint keeps the mallet upright, at rest. SI units, base
+    /// frame of the robot. The output has the controller's model, and the simulated one under "plant".
     Kinematics,
     /// Write the ideal model of robot, table and puck for other programs: URDF, MJCF, Python
     Export(export::ExportArgs),

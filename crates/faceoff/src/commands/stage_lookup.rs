@@ -1,3 +1,5 @@
+//! Lookup of a stage that a command names.
+
 use crate::client::Client;
 use anyhow::bail;
 use faceoff_api::views::stage::StageView;

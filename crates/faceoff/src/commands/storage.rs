@@ -3,7 +3,7 @@
 use faceoff_api::views::storage::StorageView;
 
 /// A number of bytes with a unit; units are powers of 1000.
-pub(super) fn bytes(bytes: u64) -> String {
+pub(super) fn format_bytes(bytes: u64) -> String {
     #[expect(clippy::cast_precision_loss, reason = "only one decimal is shown")]
     let mut shown = bytes as f64;
     for unit in ["bytes", "kB", "MB", "GB"] {
@@ -24,10 +24,10 @@ pub(super) fn storage_line(storage: &StorageView) -> String {
         "{:<40} {} bundles, {} of {}; {} datasets, {}",
         storage.team_name,
         storage.bundles,
-        bytes(storage.bundle_bytes),
-        bytes(storage.quota_bytes),
+        format_bytes(storage.bundle_bytes),
+        format_bytes(storage.quota_bytes),
         storage.datasets,
-        bytes(storage.dataset_bytes)
+        format_bytes(storage.dataset_bytes)
     );
     if storage.unmeasured_datasets > 0 {
         line.push_str(&format!(
@@ -36,7 +36,10 @@ pub(super) fn storage_line(storage: &StorageView) -> String {
         ));
     }
     if let Some(proposed) = storage.proposal_bytes.filter(|bytes| *bytes > 0) {
-        line.push_str(&format!("; trials and proposals, {}", bytes(proposed)));
+        line.push_str(&format!(
+            "; trials and proposals, {}",
+            format_bytes(proposed)
+        ));
     }
     line
 }
@@ -55,7 +58,7 @@ mod tests {
             (34_359_738_368, "34.4 GB"),
             (5_000_000_000_000, "5.0 TB"),
         ] {
-            assert_eq!(bytes(count), expected);
+            assert_eq!(format_bytes(count), expected);
         }
     }
 }

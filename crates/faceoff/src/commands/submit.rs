@@ -1,4 +1,4 @@
-//! `faceoff submit`: uploads a bundle and waits for its validation.
+//! `faceoff submit`: uploads a *bundle*, the files of an agent, and waits for its validation.
 
 mod bundle_contents;
 
@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};
 
 /// Interval between requests for the result of the validation.
-const POLL: Duration = Duration::from_millis(500);
+const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Uploads a bundle and waits for its validation; the exit status is 0 only if it is valid. Of a folder, all files are
 /// packed except those that no agent needs (version control, caches, environments, builds, editor files; see --dry-run)
@@ -104,6 +104,7 @@ async fn print_validation(client: &Client, submission: &SubmissionView) -> anyho
     }
     Ok(())
 }
+
 async fn wait_for_validation(
     client: &Client,
     mut submission: SubmissionView,
@@ -112,7 +113,7 @@ async fn wait_for_validation(
         .with_message("validating: does the agent start, respond and meet the time limits?");
     spinner.enable_steady_tick(Duration::from_millis(100));
     while submission.status == SubmissionStatus::Validating {
-        tokio::time::sleep(POLL).await;
+        tokio::time::sleep(POLL_INTERVAL).await;
         submission = client.submission(submission.id).await?;
     }
     spinner.finish_and_clear();

@@ -100,14 +100,14 @@ impl TeamCommand {
 }
 
 async fn own_team(client: &Client) -> anyhow::Result<TeamId> {
-    let who = client.whoami().await?;
-    let team = who.team.map(|team| team.id);
+    let caller = client.whoami().await?;
+    let team = caller.team.map(|team| team.id);
     team.context("the token does not belong to a team; organisers use faceoff admin")
 }
 
 async fn own_person(client: &Client) -> anyhow::Result<UserId> {
-    let who = client.whoami().await?;
-    match who.person {
+    let caller = client.whoami().await?;
+    match caller.person {
         Some(person) => Ok(person.id),
         None => bail!("the token does not belong to a user; only users can leave"),
     }
@@ -125,11 +125,11 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             link,
             declines_friendly_games,
         } => {
-            let or_null = |text: String| Some(text).filter(|text| !text.trim().is_empty());
+            let none_if_empty = |text: String| Some(text).filter(|text| !text.trim().is_empty());
             let change = TeamChange {
                 name: rename,
-                affiliation: affiliation.map(or_null),
-                link: link.map(or_null),
+                affiliation: affiliation.map(none_if_empty),
+                link: link.map(none_if_empty),
                 division: None,
                 baseline: None,
                 declines_friendly_games,
@@ -212,11 +212,16 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
 
 async fn news(client: &Client, json: bool) -> anyhow::Result<()> {
     let (announcements, questions) = (client.announcements().await?, client.questions().await?);
-    let both = serde_json::json!({ "announcements": announcements, "questions": questions });
-    print(json, &both, || {
-        let announcements = announcements
-            .iter()
-            .map(|news| format!("{}  {}\n{}\n", time_text(news.at), news.title, news.text));
+    let news = serde_json::json!({ "announcements": announcements, "questions": questions });
+    print(json, &news, || {
+        let announcements = announcements.iter().map(|announcement| {
+            format!(
+                "{}  {}\n{}\n",
+                time_text(announcement.at),
+                announcement.title,
+                announcement.text
+            )
+        });
         let answers = questions.iter().map(|question| {
             let answer = question.answer.as_deref().unwrap_or("no answer yet");
             format!(
@@ -232,8 +237,8 @@ async fn news(client: &Client, json: bool) -> anyhow::Result<()> {
     })
 }
 
-fn time_text(at: Timestamp) -> String {
-    at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+fn time_text(time: Timestamp) -> String {
+    time.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 /// A team's profile as text.

@@ -108,11 +108,13 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
 }
 
 fn token_line(token: &TokenView, now: Timestamp) -> String {
-    let time_text = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+    let time_text = |time: Timestamp| time.strftime("%Y-%m-%d %H:%M UTC").to_string();
     let state = match (token.revoked_at, token.expires_at) {
-        (Some(at), _) => format!("revoked {}", time_text(at)),
-        (None, Some(at)) if at <= now => format!("expired {}", time_text(at)),
-        (None, Some(at)) => format!("valid until {}", time_text(at)),
+        (Some(revoked_at), _) => format!("revoked {}", time_text(revoked_at)),
+        (None, Some(expires_at)) if expires_at <= now => {
+            format!("expired {}", time_text(expires_at))
+        }
+        (None, Some(expires_at)) => format!("valid until {}", time_text(expires_at)),
         (None, None) => "valid".to_owned(),
     };
     let owner = match (token.team, token.person) {
@@ -120,12 +122,12 @@ fn token_line(token: &TokenView, now: Timestamp) -> String {
         (None, Some(id)) => format!("person:{id}"),
         (None, None) => "host".to_owned(),
     };
-    let used = token.last_used_at.map_or_else(
+    let last_use = token.last_used_at.map_or_else(
         || "never used".to_owned(),
-        |at| format!("used {}", time_text(at)),
+        |time| format!("used {}", time_text(time)),
     );
     format!(
-        "{}  {:<20} {:<7} {owner}  created {}  {used}  {state}",
+        "{}  {:<20} {:<7} {owner}  created {}  {last_use}  {state}",
         token.id,
         token.name,
         token.kind,

@@ -1,4 +1,4 @@
-//! `faceoff tournament`: shows tournaments, and withdraws a team from one.
+//! `faceoff tournament`: shows tournaments, which are rounds of games between the teams' agents, and withdraws a team from one.
 
 pub(super) mod games;
 pub(super) mod lookup;
@@ -33,7 +33,7 @@ enum Action {
         /// The tournament's name or id [default: the newest]
         tournament: Option<String>,
         /// Only the games of this round
-        #[arg(long, value_parser = round)]
+        #[arg(long, value_parser = parse_round)]
         round: Option<RoundNumber>,
     },
     /// Show ratings of the submissions, by results and by goals, and head-to-head records
@@ -100,9 +100,9 @@ impl TournamentCommand {
             }
             Action::Certainty { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
-                let certainty = client.champion_shares(id).await?;
-                print(self.server.json, &certainty, || {
-                    text::champion_shares_text(&certainty)
+                let shares = client.champion_shares(id).await?;
+                print(self.server.json, &shares, || {
+                    text::champion_shares_text(&shares)
                 })
             }
             Action::Withdraw {
@@ -112,8 +112,10 @@ impl TournamentCommand {
             } => {
                 let id = find_tournament(&client, &tournament).await?;
                 let decision = Decision { reason, confirm };
-                let left = client.withdraw_from_tournament(id, &decision).await?;
-                print(self.server.json, &left, || text::tournament_text(&left))
+                let tournament = client.withdraw_from_tournament(id, &decision).await?;
+                print(self.server.json, &tournament, || {
+                    text::tournament_text(&tournament)
+                })
             }
         }
     }
@@ -126,8 +128,7 @@ struct RatingsView {
     head_to_head: Vec<faceoff_scoring::tournament::HeadToHead>,
 }
 
-/// Parses a round number.
-pub(super) fn round(text: &str) -> Result<RoundNumber, String> {
+pub(super) fn parse_round(text: &str) -> Result<RoundNumber, String> {
     let number: u32 = text
         .parse()
         .map_err(|_| format!("expected a number, got {text:?}"))?;

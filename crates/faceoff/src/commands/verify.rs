@@ -1,4 +1,5 @@
-//! `faceoff verify`: verifies that a dataset or a recorded game reproduces its score.
+//! `faceoff verify`: verifies that a dataset (the recording of an evaluation) or a recorded game reproduces its score. All seeds
+//! of a season are derived from its *secret*, whose hash, the *commitment*, is published before the season.
 
 mod failure;
 mod game;
@@ -102,7 +103,7 @@ impl VerifyCommand {
                         VerifiedRecording::Evaluation(evaluation) => {
                             describe(&self.dataset, evaluation)
                         }
-                        VerifiedRecording::Game(played) => game::describe(&self.dataset, played),
+                        VerifiedRecording::Game(game) => game::describe(&self.dataset, game),
                     };
                     println!("{text}");
                 }
@@ -179,7 +180,7 @@ impl VerifyCommand {
                 .context("reading the number of CPUs; use --workers")
                 .map_err(Failure::Local)?,
         };
-        let (verified, time) = with_progress(&dataset, workers)?;
+        let (verified, time) = verify_with_progress(&dataset, workers)?;
         Ok(SimulatedEvaluation {
             episodes: verified.episodes,
             steps: verified.steps,
@@ -192,8 +193,8 @@ impl VerifyCommand {
     }
 }
 
-/// Verifies a dataset, with a progress bar if standard error is a terminal.
-fn with_progress(
+/// Verifies a dataset, with a progress bar if standard error is a terminal. Also returns the time that the simulation took.
+fn verify_with_progress(
     dataset: &Dataset,
     workers: NonZero<usize>,
 ) -> Result<(VerifiedDataset, Duration), Failure> {

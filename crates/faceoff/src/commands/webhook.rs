@@ -157,8 +157,8 @@ pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> a
     }
 }
 
-fn time_text(at: Timestamp) -> String {
-    at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+fn time_text(time: Timestamp) -> String {
+    time.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 fn new_webhook_text(new: &NewWebhookView) -> String {
@@ -193,12 +193,8 @@ fn webhook_line(webhook: &WebhookView) -> String {
 fn delivery_line(delivery: &DeliveryView) -> String {
     let state = match delivery.state {
         DeliveryStateView::Waiting { next_at } => format!("next attempt at {}", time_text(next_at)),
-        DeliveryStateView::Delivered {
-            ended_at: settled_at,
-        } => format!("delivered {}", time_text(settled_at)),
-        DeliveryStateView::GivenUp {
-            ended_at: settled_at,
-        } => format!("failed {}", time_text(settled_at)),
+        DeliveryStateView::Delivered { ended_at } => format!("delivered {}", time_text(ended_at)),
+        DeliveryStateView::GivenUp { ended_at } => format!("failed {}", time_text(ended_at)),
     };
     let last = delivery.last.as_ref().map_or_else(String::new, |last| {
         let status = last

@@ -19,7 +19,7 @@ pub struct WhoamiCommand {
 #[derive(Debug, Serialize)]
 struct WhoamiView<'a> {
     #[serde(flatten)]
-    who: &'a CallerView,
+    caller: &'a CallerView,
     server: &'a str,
     server_from: Source,
     token_from: Source,
@@ -33,17 +33,17 @@ impl WhoamiCommand {
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let connection = self.server.connection()?;
-            let who = self.server.client()?.whoami().await?;
+            let caller = self.server.client()?.whoami().await?;
             let view = WhoamiView {
-                who: &who,
+                caller: &caller,
                 server: &connection.server,
-                server_from: connection.server_from,
-                token_from: connection.token_from,
+                server_from: connection.server_source,
+                token_from: connection.token_source,
             };
             print(self.server.json, &view, || {
                 format!(
                     "{}\nserver {} ({}), token from {}",
-                    whoami_text(&who),
+                    whoami_text(&caller),
                     view.server,
                     view.server_from.text("--server", "FACEOFF_SERVER"),
                     view.token_from.text("--token", "FACEOFF_TOKEN")
@@ -54,23 +54,23 @@ impl WhoamiCommand {
 }
 
 /// User, role, team and token as one line.
-pub(super) fn whoami_text(who: &CallerView) -> String {
-    let team = who.team.as_ref();
+pub(super) fn whoami_text(caller: &CallerView) -> String {
+    let team = caller.team.as_ref();
     let of_team = team.map(|team| format!(" of the team {} ({})", team.name, team.id));
-    let role = match who.role.as_str() {
+    let role = match caller.role.as_str() {
         "team" => "API client",
         "host" => "host, with the rights of an organiser",
         "organiser" => "organiser",
         role => role,
     };
-    let person = match &who.person {
+    let person = match &caller.person {
         Some(person) => format!("{} ({}), ", person.name, person.id),
         None => String::new(),
     };
     format!(
         "{person}{role}{}, with the token {} ({})",
         of_team.unwrap_or_default(),
-        who.token.name,
-        who.token.id
+        caller.token.name,
+        caller.token.id
     )
 }

@@ -1,9 +1,10 @@
-//! `faceoff worker`: runs a remote worker.
+//! `faceoff worker`: runs a *remote worker*, a process on another machine that runs jobs of the server. A *slot* is a place for one
+//! job at a time; NATS is the message server between workers and server.
 
 use super::{
     capabilities::own_capabilities,
     files_client::files_client,
-    serve::{check_sandbox, in_memory},
+    serve::{check_sandbox, hold_in_memory},
 };
 use crate::{config::Config, log::LogFormat};
 use anyhow::{Context as _, anyhow};
@@ -43,7 +44,7 @@ pub struct WorkerCommand {
     #[arg(long, value_name = "N")]
     slots: Option<usize>,
     /// Up to 8 labels, shown to organisers beside the name, e.g. "lab 3,borrowed"
-    #[arg(long, value_name = "TEXT,…", value_delimiter = ',', value_parser = label)]
+    #[arg(long, value_name = "TEXT,…", value_delimiter = ',', value_parser = parse_label)]
     labels: Vec<String>,
     /// Folder for temporary files, used by this worker only; overrides workers.scratch_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
@@ -88,24 +89,24 @@ impl WorkerCommand {
         check_sandbox(&probe_host(), &config.sandbox.given_up)?;
         config.check_runtimes()?;
         let mut agent = config.agent_environment();
-        let mut own = own_capabilities(&agent, config.slots())?;
+        let mut capabilities = own_capabilities(&agent, config.slots())?;
         anyhow::ensure!(
             self.labels.len() <= WorkerCapabilities::MAX_LABELS,
             "--labels: expected at most {}, got {}",
             WorkerCapabilities::MAX_LABELS,
             self.labels.len()
         );
-        own.labels = self.labels;
+        capabilities.labels = self.labels;
         let http = files_client(config.nats.ca_file.as_deref())?;
         // Kept as long as agents run.
-        let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
+        let _image = hold_in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
         let scratch_dir = config.scratch_dir();
         fs::create_dir_all(&scratch_dir)
             .with_context(|| format!("creating the folder {}", scratch_dir.display()))?;
         let worker = RemoteWorker {
             nats,
             name,
-            capabilities: own,
+            capabilities,
             http,
             ends_after: self.drain_after_idle.map(SignedDuration::unsigned_abs),
             slots: SlotsConfig {
@@ -132,17 +133,17 @@ impl WorkerCommand {
 
 async fn run_until_signal(worker: RemoteWorker) -> anyhow::Result<()> {
     let shutdown = CancellationToken::new();
-    let mut working = tokio::spawn(faceoff_worker::run_remote_worker(worker, shutdown.clone()));
+    let mut worker_task = tokio::spawn(faceoff_worker::run_remote_worker(worker, shutdown.clone()));
     let signal = super::serve::shutdown_signal()?;
     tokio::select! {
         name = signal => tracing::info!(signal = name, "shutting down: slots release their jobs"),
-        ended = &mut working => return ended.context("the worker panicked")?,
+        outcome = &mut worker_task => return outcome.context("the worker panicked")?,
     }
     shutdown.cancel();
-    let second = super::serve::shutdown_signal()?;
+    let second_signal = super::serve::shutdown_signal()?;
     tokio::select! {
-        ended = working => ended.context("the worker panicked")?,
-        name = second => {
+        outcome = worker_task => outcome.context("the worker panicked")?,
+        name = second_signal => {
             tracing::warn!(signal = name, "second signal: stopping immediately");
             Ok(())
         }
@@ -169,7 +170,7 @@ fn make_key(file: &Path) -> anyhow::Result<()> {
 }
 
 /// Parses a label; refuses invisible characters.
-fn label(text: &str) -> Result<String, String> {
+fn parse_label(text: &str) -> Result<String, String> {
     let chars = text.chars().count();
     let max = WorkerCapabilities::MAX_LABEL_CHARS;
     if (1..=max).contains(&chars) && text.chars().all(is_printable) {

@@ -58,17 +58,17 @@ impl Config {
     /// Refuses perturbations for which no robot with this mismatch seed exists.
     pub fn check_robot(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
         let settings = self.rules().variation.perturbations;
-        let [least, most] = settings.model_mismatch.static_error_m;
+        let [min_error_m, max_error_m] = settings.model_mismatch.static_error_m;
         ensure!(
             settings.model_mismatch == MismatchSettings::default()
                 || can_draw_plant(&settings, mismatch_seed),
             "evaluation.perturbations: none of 300 robots drawn from these ranges of mass and gains has its largest static \
-            error within {least} to {most} m (model_mismatch.static_error_m); widen one of the ranges"
+            error within {min_error_m} to {max_error_m} m (model_mismatch.static_error_m); widen one of the ranges"
         );
         Ok(())
     }
 
-    /// Checks that the types do not cover.
+    /// Checks the conditions that the types do not express.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         self.nats.check()?;
         if let Some(url) = &self.server.public_url {
@@ -124,9 +124,9 @@ impl Config {
             .context("evaluation.perturbations")?;
         let settings = self.settings().context("evaluation.cron")?;
         settings.check().context("evaluation")?;
-        let mut seen = BTreeSet::new();
-        if let Some(twice) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
-            bail!("evaluation.tasks: {twice} is listed twice");
+        let mut unique = BTreeSet::new();
+        if let Some(duplicate) = evaluation.tasks.iter().find(|task| !unique.insert(**task)) {
+            bail!("evaluation.tasks: {duplicate} is listed twice");
         }
         ensure!(
             self.workers.slots != Some(0),

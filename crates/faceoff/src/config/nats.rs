@@ -1,3 +1,5 @@
+//! `[nats]`: how server and remote workers (processes on other machines that run jobs) connect through a NATS message server.
+
 use anyhow::ensure;
 use faceoff_worker::NatsConfig;
 use serde::{Deserialize, Serialize};
@@ -53,7 +55,7 @@ impl NatsSection {
         })
     }
 
-    /// Checks that the types do not cover.
+    /// Checks the conditions that the types do not express.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         let has_scheme = |url: &Option<String>, schemes: &[&str]| {
             url.as_ref().is_none_or(|url| {

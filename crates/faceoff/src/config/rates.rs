@@ -1,3 +1,5 @@
+//! `[rates]`: how many requests an address or a token may send.
+
 use faceoff_http::{RateLimit, RateLimits};
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroU32;
@@ -8,7 +10,7 @@ use std::num::NonZeroU32;
 pub struct RatesConfig {
     /// Mean number of requests per second of one address or IPv6 network of 64 bits.
     pub address_per_s: u32,
-    /// Largest burst.
+    /// Largest burst: requests at once after a pause.
     pub address_burst: NonZeroU32,
     /// Mean number of requests per second with one token or session.
     pub token_per_s: u32,

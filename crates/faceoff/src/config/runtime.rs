@@ -1,12 +1,13 @@
-//! `[runtimes.NAME]`: a folder with a Python environment, or paths of the host.
+//! `[runtimes.NAME]`: a *runtime*, the environment that agents run in. It is a folder with a Python environment, or paths of the
+//! host.
 
 use anyhow::{Context as _, bail};
 use faceoff_sandbox::{Runtime, RuntimeFiles};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Agents do not see these folders of the host. `tests/runtimes.sh` has the same list.
-const COVERED: [&str; 4] = ["/tmp", "/dev", "/proc", "/agent"];
+/// Folders of the host that the sandbox replaces by private ones. `tests/runtimes.sh` has the same list.
+const PRIVATE_FOLDERS: [&str; 4] = ["/tmp", "/dev", "/proc", "/agent"];
 
 /// A runtime that the organiser offers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -94,10 +95,14 @@ impl RuntimeConfig {
     pub fn check(&self) -> anyhow::Result<()> {
         match self {
             Self::Paths { .. } => Ok(()),
-            Self::Folder(folder) if COVERED.iter().any(|covered| folder.starts_with(covered)) => {
+            Self::Folder(folder)
+                if PRIVATE_FOLDERS
+                    .iter()
+                    .any(|private| folder.starts_with(private)) =>
+            {
                 bail!(
                     "expected a folder outside of {}, which agents see as private folders, got {}",
-                    COVERED.join(", "),
+                    PRIVATE_FOLDERS.join(", "),
                     folder.display()
                 )
             }

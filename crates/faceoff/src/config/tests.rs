@@ -1,6 +1,9 @@
+//! The configuration: defaults, errors, and agreement with the documentation.
+
 use super::*;
 use std::time::Duration;
 
+/// The error of an invalid configuration.
 fn error(text: &str) -> String {
     format!("{:#}", Config::parse(text).unwrap_err())
 }
@@ -60,8 +63,8 @@ fn all_sections_are_read() {
     )
     .unwrap();
     assert_eq!(config.server.listen.port(), 80);
-    let inner = "10.1.2.3".parse().unwrap();
-    assert!(config.webhooks.check_address(inner).is_ok());
+    let private_address = "10.1.2.3".parse().unwrap();
+    assert!(config.webhooks.check_address(private_address).is_ok());
     assert_eq!(config.webhooks.ports, [443, 8443]);
     assert_eq!(config.rates.limits().token, None);
     assert_eq!(config.season.name.as_deref(), Some("Practice"));
@@ -157,8 +160,8 @@ fn commented_file_explains_all_values() {
         ("workers", "scratch_dir"),
     ] {
         let section = written[section].as_table_mut().unwrap();
-        let before = section.insert(name.to_owned(), toml::Value::Boolean(true));
-        assert_eq!(before, None, "{name}");
+        let old_value = section.insert(name.to_owned(), toml::Value::Boolean(true));
+        assert_eq!(old_value, None, "{name}");
     }
     for (section, values) in &written {
         let (_, rest) = COMMENTED

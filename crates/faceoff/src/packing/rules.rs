@@ -57,11 +57,11 @@ impl Rules {
         }
         let file = folder.join(IGNORE_FILE);
         let reading = || format!("reading {}", file.display());
-        let own = match fs::read_to_string(&file) {
+        let custom_rules = match fs::read_to_string(&file) {
             Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
-            own => own.with_context(reading)?,
+            text => text.with_context(reading)?,
         };
-        for (number, line) in own.lines().enumerate() {
+        for (number, line) in custom_rules.lines().enumerate() {
             rules
                 .add_line(None, line)
                 .with_context(|| format!("{}, line {}", file.display(), number + 1))?;
@@ -69,7 +69,7 @@ impl Rules {
         Ok(Self(rules.build().with_context(reading)?))
     }
 
-    /// The path, relative to the folder, is left out. Not called for the content of folders that are left out.
+    /// Whether a path, relative to the folder, is left out. The content of a folder that is left out is not checked.
     pub(super) fn leaves_out(&self, path: &Path, is_folder: bool) -> bool {
         matches!(self.0.matched(path, is_folder), Match::Ignore(_))
     }

@@ -1,3 +1,5 @@
+//! The files of a folder that are packed into a bundle.
+
 use super::rules::Rules;
 use anyhow::{Context, bail, ensure};
 use std::{
@@ -19,12 +21,12 @@ pub struct Selection {
 #[derive(Debug)]
 pub struct Entry {
     pub path: PathBuf,
-    pub kind: Kind,
+    pub kind: EntryKind,
 }
 
 /// Type of an entry.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum EntryKind {
     /// A folder, possibly empty.
     Folder,
     File {
@@ -67,16 +69,17 @@ impl Selection {
         Ok(selection)
     }
 
-    fn add_folder(&mut self, at: &Path, rules: &Rules) -> anyhow::Result<()> {
-        let reading = || format!("reading {}", self.folder.join(at).display());
-        let mut names = fs::read_dir(self.folder.join(at))
+    /// Adds the content of a folder, whose path is relative to the bundle's.
+    fn add_folder(&mut self, relative: &Path, rules: &Rules) -> anyhow::Result<()> {
+        let reading = || format!("reading {}", self.folder.join(relative).display());
+        let mut names = fs::read_dir(self.folder.join(relative))
             .with_context(reading)?
             .map(|entry| Ok(entry?.file_name()))
             .collect::<std::io::Result<Vec<_>>>()
             .with_context(reading)?;
         names.sort_unstable();
         for name in names {
-            let path = at.join(name);
+            let path = relative.join(name);
             let absolute = self.folder.join(&path);
             let context = || format!("reading {}", absolute.display());
             let metadata = fs::symlink_metadata(&absolute).with_context(context)?;
@@ -85,14 +88,14 @@ impl Selection {
                 continue;
             }
             let kind = if metadata.is_dir() {
-                Kind::Folder
+                EntryKind::Folder
             } else if metadata.is_file() {
-                Kind::File {
+                EntryKind::File {
                     bytes: metadata.len(),
                     executable: metadata.permissions().mode() & 0o100 != 0,
                 }
             } else if metadata.is_symlink() {
-                Kind::Link {
+                EntryKind::Link {
                     target: fs::read_link(&absolute).with_context(context)?,
                 }
             } else {
@@ -101,7 +104,7 @@ impl Selection {
                     absolute.display()
                 );
             };
-            let is_folder = kind == Kind::Folder;
+            let is_folder = kind == EntryKind::Folder;
             self.entries.push(Entry {
                 path: path.clone(),
                 kind,
@@ -126,7 +129,7 @@ impl Selection {
     /// The files, with their sizes in bytes.
     pub fn files(&self) -> impl Iterator<Item = (&Path, u64)> {
         self.entries.iter().filter_map(|entry| match entry.kind {
-            Kind::File { bytes, .. } => Some((entry.path.as_path(), bytes)),
+            EntryKind::File { bytes, .. } => Some((entry.path.as_path(), bytes)),
             _ => None,
         })
     }

@@ -1,3 +1,5 @@
+//! Reading of a file whose size the archive's header has already stated.
+
 use std::io::{self, Read};
 
 /// A reader that delivers exactly the number of bytes that the archive's header promises, or fails. With another

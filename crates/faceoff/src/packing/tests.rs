@@ -1,3 +1,5 @@
+//! Which files are packed into a bundle, and the bytes of its archive.
+
 use super::*;
 use std::{
     fs,
@@ -6,6 +8,7 @@ use std::{
 };
 use tempfile::TempDir;
 
+/// Creates a folder with these files; the content of each is the length of its path.
 fn folder(files: &[&str]) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     for file in files {
@@ -16,6 +19,7 @@ fn folder(files: &[&str]) -> TempDir {
     folder
 }
 
+/// The names of the packed files, and of those that are left out.
 fn names(folder: &Path) -> (Vec<String>, Vec<String>) {
     let selection = Selection::read(folder).unwrap();
     let text = |path: &Path| path.to_str().unwrap().to_owned();
@@ -110,7 +114,8 @@ fn pack(folder: &Path) -> Vec<u8> {
 #[test]
 fn archive_depends_only_on_the_files() {
     let files = ["agent.toml", "run", "a/b/c.txt"];
-    let make = |time: u64| {
+    // Two folders with the same files, but other times and permissions.
+    let make_folder = |time_s: u64| {
         let folder = folder(&files);
         let root = folder.path();
         for file in files {
@@ -118,19 +123,19 @@ fn archive_depends_only_on_the_files() {
         }
         fs::set_permissions(
             root.join("run"),
-            fs::Permissions::from_mode(0o700 | (time % 8) as u32),
+            fs::Permissions::from_mode(0o700 | (time_s % 8) as u32),
         )
         .unwrap();
         symlink("a/b", root.join("link")).unwrap();
         fs::create_dir(root.join("empty")).unwrap();
-        let at = std::time::UNIX_EPOCH + std::time::Duration::from_secs(time);
+        let modified = std::time::UNIX_EPOCH + std::time::Duration::from_secs(time_s);
         fs::File::open(root.join("a/b/c.txt"))
             .unwrap()
-            .set_modified(at)
+            .set_modified(modified)
             .unwrap();
         folder
     };
-    let (one, other) = (make(1_000_000), make(2_000_005));
+    let (one, other) = (make_folder(1_000_000), make_folder(2_000_005));
     let archive = pack(one.path());
     assert_eq!(archive, pack(other.path()));
 
@@ -138,10 +143,10 @@ fn archive_depends_only_on_the_files() {
     tar::Archive::new(flate2::read::GzDecoder::new(&archive[..]))
         .unpack(unpacked.path())
         .unwrap();
-    let at = |name: &str| unpacked.path().join(name);
-    assert_eq!(fs::read_to_string(at("a/b/c.txt")).unwrap(), "a/b/c.txt");
-    assert_eq!(fs::read_link(at("link")).unwrap(), PathBuf::from("a/b"));
-    assert!(at("empty").is_dir());
-    let mode = |name: &str| fs::metadata(at(name)).unwrap().permissions().mode() & 0o777;
+    let path = |name: &str| unpacked.path().join(name);
+    assert_eq!(fs::read_to_string(path("a/b/c.txt")).unwrap(), "a/b/c.txt");
+    assert_eq!(fs::read_link(path("link")).unwrap(), PathBuf::from("a/b"));
+    assert!(path("empty").is_dir());
+    let mode = |name: &str| fs::metadata(path(name)).unwrap().permissions().mode() & 0o777;
     assert_eq!((mode("run"), mode("agent.toml")), (0o755, 0o644));
 }

@@ -22,26 +22,32 @@ use std::{
 };
 use tempfile::TempDir;
 
+/// The organiser's token.
 const ADMIN: &str = "fo_admin_test";
+/// How long a claimed job is leased.
+const LEASE_SECONDS: u32 = 60;
 
+/// A fixed time for server and tests.
 fn now() -> Timestamp {
     "2026-03-01T10:00:00Z".parse().unwrap()
 }
 
 fn faceoff(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_faceoff"));
-    let done = command.args(arguments).current_dir(folder).output();
-    done.expect("the program can be started")
+    let output = command.args(arguments).current_dir(folder).output();
+    output.expect("the program can be started")
 }
 
+/// Standard output of a command that succeeded.
 #[track_caller]
-fn done(output: &Output) -> String {
+fn stdout(output: &Output) -> String {
     assert!(output.status.success(), "{output:?}");
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+/// Checks that a command failed, with all of `expected` in its error.
 #[track_caller]
-fn refused(output: &Output, expected: &[&str]) {
+fn assert_refused(output: &Output, expected: &[&str]) {
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     let stderr = String::from_utf8_lossy(&output.stderr);
     for part in expected {
@@ -63,7 +69,7 @@ fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-async fn site() -> Site {
+async fn start_site() -> Site {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     assert!(
@@ -128,10 +134,12 @@ async fn site() -> Site {
 
 /// Runs an evaluation day of one team.
 async fn run_day(store: &Store) -> EvaluationId {
+    /// Hash of the team's token, which no request uses.
+    const TOKEN_HASH: [u8; 32] = [1; 32];
     let host = Actor::Organiser;
     let name = "Alpha".parse().unwrap();
     let team = store
-        .create_team(host.clone(), &name, [1; 32], now())
+        .create_team(host.clone(), &name, TOKEN_HASH, now())
         .await
         .unwrap();
     let bundle = BundleRef {
@@ -159,11 +167,11 @@ async fn run_day(store: &Store) -> EvaluationId {
         .unwrap();
     let mut stage = Some(store.stages().await.unwrap()[0].id);
     loop {
-        let Some(ClaimedJob { claim, job: work }) = store.claim("slot 0", 60, now()).await.unwrap()
-        else {
+        let claimed = store.claim("slot 0", LEASE_SECONDS, now()).await.unwrap();
+        let Some(ClaimedJob { claim, job }) = claimed else {
             panic!("there is no job, but the day is not over");
         };
-        match work {
+        match job {
             Job::Game { .. } => panic!("no game is queued"),
             Job::Validation { .. } => {
                 let outcome = ValidationOutcome::Valid {
@@ -224,9 +232,9 @@ async fn run_day(store: &Store) -> EvaluationId {
     }
 }
 
-/// Runs blocking work beside the runtime on which the server runs.
-async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
-    tokio::task::spawn_blocking(work).await.unwrap()
+/// Runs a blocking function beside the runtime on which the server runs.
+async fn blocking<T: Send + 'static>(function: impl FnOnce() -> T + Send + 'static) -> T {
+    tokio::task::spawn_blocking(function).await.unwrap()
 }
 
 /// A running `faceoff serve`, killed on drop.
@@ -283,7 +291,8 @@ impl Drop for ServeProcess {
     }
 }
 
-async fn text(url: String, token: Option<&str>) -> (u16, String) {
+/// Status and body of a GET request.
+async fn get(url: String, token: Option<&str>) -> (u16, String) {
     let no_tls = rustls::ClientConfig::builder()
         .with_root_certificates(rustls::RootCertStore::empty())
         .with_no_client_auth();
@@ -303,7 +312,7 @@ async fn text(url: String, token: Option<&str>) -> (u16, String) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn exported_season_is_shown_on_another_host() {
-    let site = site().await;
+    let site = start_site().await;
     let other_host = tempfile::tempdir().unwrap();
     let folder = other_host.path().to_owned();
     let url = site.url.clone();
@@ -312,27 +321,27 @@ async fn exported_season_is_shown_on_another_host() {
             let command = ["admin", "--server", &url, "--token", ADMIN, "export"];
             faceoff(&folder, &[&command[..], arguments].concat())
         };
-        let message = done(&export(&["public.tar.zst", "--public"]));
+        let message = stdout(&export(&["public.tar.zst", "--public"]));
         assert!(
             message.contains("the public archive of \"Season 1\" of 2026-03-01 10:00:00"),
             "{message}"
         );
-        refused(
+        assert_refused(
             &export(&["public.tar.zst"]),
             &["already exists and was not changed"],
         );
         let message: Value =
-            serde_json::from_str(&done(&export(&["--json", "all.tar.zst"]))).unwrap();
+            serde_json::from_str(&stdout(&export(&["--json", "all.tar.zst"]))).unwrap();
         assert_eq!(message["edition"], "organiser");
-        let mut left: Vec<_> = fs::read_dir(&folder)
+        let mut files: Vec<_> = fs::read_dir(&folder)
             .unwrap()
             .map(|entry| entry.unwrap().file_name())
             .collect();
-        left.sort();
-        assert_eq!(left, ["all.tar.zst", "public.tar.zst"]);
+        files.sort();
+        assert_eq!(files, ["all.tar.zst", "public.tar.zst"]);
         for name in ["public", "all"] {
             let archive = format!("{name}.tar.zst");
-            let message = done(&faceoff(&folder, &["import", &archive, "--data", name]));
+            let message = stdout(&faceoff(&folder, &["import", &archive, "--data", name]));
             let manifest = fs::read(folder.join(name).join("archive/manifest.json")).unwrap();
             let manifest: Value = serde_json::from_slice(&manifest).unwrap();
             assert_eq!(manifest["season"], "Season 1");
@@ -341,7 +350,7 @@ async fn exported_season_is_shown_on_another_host() {
                 "{message}"
             );
         }
-        refused(
+        assert_refused(
             &faceoff(&folder, &["import", "all.tar.zst", "--data", "all"]),
             &["all is not empty", "its own folder"],
         );
@@ -364,30 +373,30 @@ async fn exported_season_is_shown_on_another_host() {
     })
     .await;
 
-    let board = text(format!("{}/api/v1/board", site.url), None).await;
+    let board = get(format!("{}/api/v1/board", site.url), None).await;
     assert!(board.1.contains("Alpha"), "{board:?}");
     for name in ["public", "all"] {
         let folder = other_host.path().to_owned();
         // The next start removes what an interrupted export has left.
-        let left = folder.join(name).join("uploads/archive-left");
-        fs::create_dir_all(&left).unwrap();
-        fs::write(left.join("snapshot.sqlite3"), "with secrets").unwrap();
+        let interrupted = folder.join(name).join("uploads/archive-left");
+        fs::create_dir_all(&interrupted).unwrap();
+        fs::write(interrupted.join("snapshot.sqlite3"), "with secrets").unwrap();
         let served = blocking(move || ServeProcess::start(&folder, name)).await;
-        assert!(!left.exists());
+        assert!(!interrupted.exists());
         assert_eq!(
-            text(format!("{}/api/v1/board", served.url), None).await,
+            get(format!("{}/api/v1/board", served.url), None).await,
             board
         );
         let path = format!("/api/v1/evaluations/{}", site.evaluation);
-        let (status, _) = text(format!("{}{path}/dataset", served.url), None).await;
+        let (status, _) = get(format!("{}{path}/dataset", served.url), None).await;
         assert_eq!(status, 200, "{name}");
-        let (_, page) = text(served.url.clone(), None).await;
+        let (_, page) = get(served.url.clone(), None).await;
         assert!(page.contains("Archived season"), "{page}");
         let token = fs::read_to_string(other_host.path().join(name).join("admin-token")).unwrap();
         let (status, events) =
-            text(format!("{}/api/v1/events", served.url), Some(token.trim())).await;
+            get(format!("{}/api/v1/events", served.url), Some(token.trim())).await;
         assert_eq!(status, 200, "{events}");
-        let (status, _) = text(format!("{}/api/v1/events", served.url), Some(ADMIN)).await;
+        let (status, _) = get(format!("{}/api/v1/events", served.url), Some(ADMIN)).await;
         assert_eq!(status, 401, "the token of the old server is invalid");
         let log = blocking(move || served.terminate()).await;
         assert!(
@@ -487,21 +496,21 @@ async fn refused_import_leaves_nothing() {
         ),
     ] {
         for data in ["new", "empty"] {
-            refused(&import(archive, data), expected);
+            assert_refused(&import(archive, data), expected);
         }
         assert!(!folder.join("new").exists());
         assert!(!folder.join("new.importing").exists());
         assert_eq!(fs::read_dir(folder.join("empty")).unwrap().count(), 0);
     }
-    refused(&import("good", "/"), &["not empty"]);
+    assert_refused(&import("good", "/"), &["not empty"]);
 
     // A foreign folder with the temporary name is kept; that of an interrupted import is removed.
     fs::create_dir(folder.join("new.importing")).unwrap();
-    refused(&import("good", "new"), &["new.importing already exists"]);
+    assert_refused(&import("good", "new"), &["new.importing already exists"]);
     fs::write(folder.join("new.importing/faceoff-import.lock"), "").unwrap();
     fs::create_dir(folder.join("new.importing/data")).unwrap();
     for data in ["new", "empty"] {
-        let message = done(&import("good", data));
+        let message = stdout(&import("good", data));
         assert!(message.contains("imported the public archive"), "{message}");
         let found = Store::archived_in(&folder.join(data))
             .await
@@ -521,23 +530,23 @@ async fn data_folder_of_an_earlier_version_can_be_archived() {
         .unwrap();
     let store = Store::open(&folder.path().join("data")).await.unwrap();
     for run in store.unsummarised_runs(0).await.unwrap() {
-        let kept = store.store_episode_summary(run, 0, "{}", now());
-        kept.await.unwrap();
+        let stored = store.store_episode_summary(run, 0, "{}", now());
+        stored.await.unwrap();
     }
     for edition in [
         faceoff_store::Edition::Public,
         faceoff_store::Edition::Organiser,
     ] {
-        let into = tempfile::tempdir().unwrap();
+        let target = tempfile::tempdir().unwrap();
         let snapshot = store
-            .snapshot(into.path(), edition, "a test", now())
+            .snapshot(target.path(), edition, "a test", now())
             .await
             .unwrap();
-        let file = into.path().join("faceoff.sqlite3");
+        let file = target.path().join("faceoff.sqlite3");
         snapshot.finish(&file).await.unwrap();
-        let archived = Store::import(into.path(), now()).await.unwrap();
+        let archived = Store::import(target.path(), now()).await.unwrap();
         assert_eq!(archived.imported_at, Some(now()));
-        let shown = Store::open(into.path()).await.unwrap();
+        let shown = Store::open(target.path()).await.unwrap();
         let stage = store.stages().await.unwrap().remove(0);
         let revision = store.board_revision(&stage).await.unwrap();
         let rows = shown.board(stage.id, revision).await.unwrap();
@@ -599,7 +608,7 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
     }
     assert!(killed > 0, "no import was killed before its end");
     // A complete import removes what the killed ones have left.
-    done(&faceoff(
+    stdout(&faceoff(
         folder,
         &["import", "season.tar.zst", "--data", "shown"],
     ));

@@ -2,6 +2,7 @@
 
 use std::process::Command;
 
+/// Exit status, standard output and standard error.
 fn faceoff(args: &[&str]) -> (Option<i32>, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
         .args(args)
@@ -31,22 +32,22 @@ fn commands(help: &str) -> Vec<String> {
 
 #[test]
 fn all_commands_have_a_help() {
-    let mut todo: Vec<Vec<String>> = vec![Vec::new()];
-    let mut seen = 0;
-    while let Some(path) = todo.pop() {
+    let mut pending: Vec<Vec<String>> = vec![Vec::new()];
+    let mut checked = 0;
+    while let Some(path) = pending.pop() {
         let mut args: Vec<&str> = path.iter().map(String::as_str).collect();
         args.push("--help");
         let (code, help, error) = faceoff(&args);
         assert_eq!(code, Some(0), "{path:?}: {error}");
         assert!(help.contains("Usage: faceoff"), "{path:?}: {help}");
-        seen += 1;
+        checked += 1;
         for command in commands(&help) {
             let mut path = path.clone();
             path.push(command);
-            todo.push(path);
+            pending.push(path);
         }
     }
-    assert!(seen > 100, "{seen} commands were found");
+    assert!(checked > 100, "{checked} commands were found");
 }
 
 #[test]

@@ -1,10 +1,15 @@
-use crate::PATIENT;
+//! `faceoff compare` on datasets of `faceoff eval`.
+
+use crate::LONG_TIME_LIMITS;
 use serde_json::Value;
 use std::{
     fs,
     path::{Path, PathBuf},
     process::{Command, Output},
 };
+
+/// An arbitrary seed, which fixes the episodes.
+const SEED: &str = "5";
 
 fn faceoff(args: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_faceoff"))
@@ -28,7 +33,7 @@ fn agent(name: &str) -> PathBuf {
 fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
     let bundle = agent(name);
     let bundle = bundle.to_str().unwrap();
-    let eval = ["eval", bundle, "--out", out, "--config", PATIENT];
+    let eval = ["eval", bundle, "--out", out, "--config", LONG_TIME_LIMITS];
     let output = faceoff(&[&eval, args].concat(), folder);
     assert!(output.status.success(), "{out}: {}", text(&output.stderr));
 }
@@ -37,18 +42,19 @@ fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
 fn local_evaluations_with_equal_episodes_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
+    // Evaluations with equal options and seeds have equal episodes.
     let common = ["--task", "hit,defend", "--episodes", "4"];
     eval(
         folder,
         "hold",
         "a",
-        &[&common[..], &["--seed", "5"]].concat(),
+        &[&common[..], &["--seed", SEED]].concat(),
     );
     eval(
         folder,
         "reckless",
         "b",
-        &[&common[..], &["--seed", "5"]].concat(),
+        &[&common[..], &["--seed", SEED]].concat(),
     );
     eval(
         folder,
@@ -56,13 +62,13 @@ fn local_evaluations_with_equal_episodes_are_compared() {
         "other-seed",
         &[&common[..], &["--seed", "6"]].concat(),
     );
-    let shorter = ["--task", "hit,defend", "--episodes", "3", "--seed", "5"];
+    let shorter = ["--task", "hit,defend", "--episodes", "3", "--seed", SEED];
     eval(folder, "hold", "shorter", &shorter);
     eval(
         folder,
         "hold",
         "ideal",
-        &[&common[..], &["--seed", "5", "--profile", "ideal"]].concat(),
+        &[&common[..], &["--seed", SEED, "--profile", "ideal"]].concat(),
     );
 
     let output = faceoff(&["compare", "a", "b", "--json"], folder);
@@ -90,11 +96,11 @@ fn local_evaluations_with_equal_episodes_are_compared() {
         let file = folder.join(out).join("results.json");
         serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
     };
-    for (side, out, only) in [("a", "a", "only_a"), ("b", "b", "only_b")] {
-        let results = results(out);
+    for (side, only_key) in [("a", "only_a"), ("b", "only_b")] {
+        let results = results(side);
         assert_eq!(view["overall"][format!("score_{side}")], results["score"]);
         for (task, counts) in view["tasks"].as_object().unwrap() {
-            let successes = counts["both"].as_u64().unwrap() + counts[only].as_u64().unwrap();
+            let successes = counts["both"].as_u64().unwrap() + counts[only_key].as_u64().unwrap();
             assert_eq!(
                 results["tasks"][task]["successes"], successes,
                 "{side} {task}"
@@ -110,11 +116,11 @@ fn local_evaluations_with_equal_episodes_are_compared() {
         .unwrap()
         .extract(&unpacked)
         .unwrap();
-    for same in ["unpacked", "a/dataset.zip"] {
-        let output = faceoff(&["compare", same, "b", "--json"], folder);
-        let mut again: Value = serde_json::from_slice(&output.stdout).unwrap();
-        again["a"]["path"] = "a".into();
-        assert_eq!(again, view, "{same}");
+    for copy in ["unpacked", "a/dataset.zip"] {
+        let output = faceoff(&["compare", copy, "b", "--json"], folder);
+        let mut copy_view: Value = serde_json::from_slice(&output.stdout).unwrap();
+        copy_view["a"]["path"] = "a".into();
+        assert_eq!(copy_view, view, "{copy}");
     }
     let table = faceoff(&["compare", "a", "a"], folder);
     let table = text(&table.stdout);

@@ -1,6 +1,6 @@
 //! `faceoff verify` and `faceoff dataset` on datasets of `faceoff eval`.
 
-use crate::PATIENT;
+use crate::LONG_TIME_LIMITS;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -8,6 +8,9 @@ use std::{
     sync::OnceLock,
 };
 use tempfile::TempDir;
+
+/// An arbitrary seed, which fixes the episodes.
+const SEED: &str = "5";
 
 fn faceoff(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_faceoff"))
@@ -20,6 +23,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+/// Evaluates the agent `hold` in two episodes per task.
 fn eval(out: &Path, extra: &[&str]) {
     let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold");
     let mut args = vec![
@@ -28,8 +32,8 @@ fn eval(out: &Path, extra: &[&str]) {
         "--out",
         out.to_str().unwrap(),
     ];
-    args.extend(["--config", PATIENT]);
-    args.extend(["--task", "hit,defend", "--episodes", "2", "--seed", "5"]);
+    args.extend(["--config", LONG_TIME_LIMITS]);
+    args.extend(["--task", "hit,defend", "--episodes", "2", "--seed", SEED]);
     args.extend(extra);
     let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
         .args(args)
@@ -50,6 +54,7 @@ fn evaluated() -> PathBuf {
     dir.path().join("out")
 }
 
+/// Standard output of a command that succeeds.
 fn stdout(args: &[&str]) -> String {
     let output = faceoff(args);
     assert!(
@@ -229,6 +234,7 @@ fn export_refers_to_the_python_package() {
 #[test]
 fn workers_and_shards_only_change_times() {
     let dir = tempfile::tempdir().unwrap();
+    // These depend on measured times.
     let measured = ["penalty_points", "computation_time", "fault"];
     let mut runs = Vec::new();
     for workers in ["1", "2", "8"] {

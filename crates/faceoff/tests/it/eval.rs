@@ -1,13 +1,19 @@
-use crate::PATIENT;
+//! `faceoff eval`: results, faults, ablations and refusals.
+
+use crate::LONG_TIME_LIMITS;
 use std::{
     fs,
     path::{Path, PathBuf},
     process::{Command, Output},
 };
 
+/// An arbitrary seed, which fixes the episodes.
+const SEED: &str = "5";
+
 const MANIFEST: &str =
     "name = \"test\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
 
+/// The example agent that keeps its arm still.
 fn hold() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold")
 }
@@ -19,7 +25,7 @@ fn eval(bundle: &Path, out: &Path, args: &[&str]) -> Output {
         .args(args)
         .arg("--out")
         .arg(out)
-        .args(["--config", PATIENT])
+        .args(["--config", LONG_TIME_LIMITS])
         // A configuration in the working folder must not have an effect.
         .current_dir(out.parent().unwrap())
         .output()
@@ -59,7 +65,7 @@ fn result_does_not_depend_on_workers_sandbox_or_packing() {
         .status()
         .unwrap();
     assert!(packed.success());
-    let common = ["--task", "hit,defend", "--episodes", "3", "--seed", "5"];
+    let common = ["--task", "hit,defend", "--episodes", "3", "--seed", SEED];
     let mut results = Vec::new();
     for (name, bundle, extra) in [
         ("folder", hold(), &[][..]),
@@ -76,13 +82,13 @@ fn result_does_not_depend_on_workers_sandbox_or_packing() {
         );
         assert!(table.contains("\ndefend          3 "), "{table}");
         results.push(result(&out));
-        let mut left: Vec<_> = out
+        let mut files: Vec<_> = out
             .read_dir()
             .unwrap()
             .map(|entry| entry.unwrap().file_name())
             .collect();
-        left.sort();
-        assert_eq!(left, ["dataset.zip", "results.json"]);
+        files.sort();
+        assert_eq!(files, ["dataset.zip", "results.json"]);
     }
     assert_eq!(results[0], results[1]);
     assert_eq!(results[0], results[2]);
@@ -131,7 +137,8 @@ fn fault_with_a_result_has_traceback_and_status_1() {
         fs::copy(hold().join(file), bundle.join(file)).unwrap();
     }
     let source = fs::read_to_string(hold().join("agent.py")).unwrap();
-    let broken = "        if self.task == 'defend':\n            print('\\x1b[31mlooking')\n            1 / 0\n        if self.pose is None";
+    let broken = "        if self.task == 'defend':\n            print('\\x1b[31mlooking')\n            1 / 0\n        \
+                  if self.pose is None";
     let source = source.replace("        if self.pose is None", broken);
     fs::write(bundle.join("agent.py"), source).unwrap();
     let out = dir.path().join("out");
@@ -187,7 +194,7 @@ fn bundle_can_be_evaluated_repeatedly_in_its_own_folder() {
         "--episodes",
         "1",
         "--config",
-        PATIENT,
+        LONG_TIME_LIMITS,
     ];
     for out in [
         &["--out", "faceoff-eval"][..],
@@ -246,7 +253,7 @@ fn ablation_compares_the_profiles_on_the_same_episodes() {
         "--episodes",
         "2",
         "--seed",
-        "5",
+        SEED,
     ];
     let output = eval(&hold(), &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -286,7 +293,7 @@ fn ablation_compares_the_profiles_on_the_same_episodes() {
         "--episodes",
         "2",
         "--seed",
-        "5",
+        SEED,
     ];
     assert!(eval(&hold(), &single, &args).status.success());
     assert_eq!(result(&single), result(&out.join("tracking_loss")));
@@ -296,11 +303,11 @@ fn ablation_compares_the_profiles_on_the_same_episodes() {
 fn rules_of_a_configuration_apply_and_verify() {
     let dir = tempfile::tempdir().unwrap();
     let config = dir.path().join("rules.toml");
-    let patient = fs::read_to_string(PATIENT).unwrap();
+    let long_time_limits = fs::read_to_string(LONG_TIME_LIMITS).unwrap();
     let rules = "[evaluation]\nweights = { hit = 1, defend = 0, prepare = 0 }\n\
                  tier_bounds = { deployable = 20, improvable = 30 }\n\
                  perturbations = { observation_noise = { puck_position_m = 0.05 } }\n";
-    fs::write(&config, format!("{patient}\n{rules}")).unwrap();
+    fs::write(&config, format!("{long_time_limits}\n{rules}")).unwrap();
     let run = |out: &Path| {
         Command::new(env!("CARGO_BIN_EXE_faceoff"))
             .arg("eval")
@@ -311,7 +318,7 @@ fn rules_of_a_configuration_apply_and_verify() {
                 "--episodes",
                 "2",
                 "--seed",
-                "5",
+                SEED,
                 "--no-sandbox",
                 "--config",
             ])
@@ -341,7 +348,7 @@ fn rules_of_a_configuration_apply_and_verify() {
 
     let impossible =
         "[evaluation]\nperturbations = { model_mismatch = { static_error_m = [0.9, 1.0] } }\n";
-    fs::write(&config, format!("{patient}\n{impossible}")).unwrap();
+    fs::write(&config, format!("{long_time_limits}\n{impossible}")).unwrap();
     let output = run(&out);
     let error = text(&output.stderr);
     assert!(

@@ -1,3 +1,5 @@
+//! `faceoff init`: the configuration file that it writes.
+
 use std::{
     fs,
     path::Path,
@@ -6,8 +8,8 @@ use std::{
 
 fn faceoff(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_faceoff"));
-    let done = command.args(arguments).current_dir(folder).output();
-    done.expect("the program can be started")
+    let output = command.args(arguments).current_dir(folder).output();
+    output.expect("the program can be started")
 }
 
 #[test]
@@ -36,8 +38,8 @@ fn configuration_is_written_once_and_valid() {
         fs::write(&file, text).expect("it can be changed");
         faceoff(folder.path(), &["doctor", "--json"])
     };
-    let found = doctor(&written);
-    let message = String::from_utf8_lossy(&found.stderr);
+    let valid = doctor(&written);
+    let message = String::from_utf8_lossy(&valid.stderr);
     assert!(!message.contains("the configuration"), "{message}");
     let misspelled = doctor(&written.replace("episodes_per_task", "episodes_pre_task"));
     assert_eq!(misspelled.status.code(), Some(1));

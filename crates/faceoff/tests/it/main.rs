@@ -13,4 +13,7 @@ mod replay;
 mod sim;
 
 /// A configuration with generous time limits, so that a busy machine causes no agent faults.
-const PATIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/patient.toml");
+const LONG_TIME_LIMITS: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../../tests/long_time_limits.toml"
+);

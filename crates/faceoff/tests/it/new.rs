@@ -1,6 +1,6 @@
 //! `faceoff new`: the new agents pass their tests and can be evaluated.
 
-use crate::PATIENT;
+use crate::LONG_TIME_LIMITS;
 use serde_json::Value;
 use std::{
     fs,
@@ -22,7 +22,8 @@ fn run(program: &str, args: &[&str], folder: &Path) -> Output {
         .unwrap()
 }
 
-fn succeed(program: &str, args: &[&str], folder: &Path) -> String {
+/// Standard output of a program that succeeds.
+fn stdout_of(program: &str, args: &[&str], folder: &Path) -> String {
     let output = run(program, args, folder);
     assert!(
         output.status.success(),
@@ -48,11 +49,11 @@ fn evaluate(bundle: &Path, task: &str) -> (f64, u64) {
         "--workers",
         "2",
         "--config",
-        PATIENT,
+        LONG_TIME_LIMITS,
         "--out",
         "result",
     ];
-    succeed(FACEOFF, &args, folder);
+    stdout_of(FACEOFF, &args, folder);
     let results = fs::read(folder.join("result/results.json")).unwrap();
     let results: Value = serde_json::from_slice(&results).unwrap();
     let task = &results["tasks"][task];
@@ -66,8 +67,9 @@ fn evaluate(bundle: &Path, task: &str) -> (f64, u64) {
     )
 }
 
+/// Creates the agent `my-agent`; returns its folder.
 fn new_agent(folder: &Path, args: &[&str]) -> PathBuf {
-    let message = succeed(FACEOFF, &[&["new", "my-agent"], args].concat(), folder);
+    let message = stdout_of(FACEOFF, &[&["new", "my-agent"], args].concat(), folder);
     assert!(message.contains("cd my-agent"), "{message}");
     folder.join("my-agent")
 }
@@ -76,7 +78,7 @@ fn new_agent(folder: &Path, args: &[&str]) -> PathBuf {
 fn python_defender_passes_its_tests_and_stops_pucks() {
     let dir = tempfile::tempdir().unwrap();
     let agent = new_agent(dir.path(), &[]);
-    succeed("python3", &["-m", "unittest"], &agent);
+    stdout_of("python3", &["-m", "unittest"], &agent);
     let readme = fs::read_to_string(agent.join("README.md")).unwrap();
     assert!(
         readme.starts_with("# my-agent\n") && !readme.contains("{{"),
@@ -91,7 +93,7 @@ fn python_defender_passes_its_tests_and_stops_pucks() {
 fn python_hitter_passes_its_tests_and_keeps_the_rules() {
     let dir = tempfile::tempdir().unwrap();
     let agent = new_agent(dir.path(), &["--lang", "python", "--example", "hitter"]);
-    succeed("python3", &["-m", "unittest"], &agent);
+    stdout_of("python3", &["-m", "unittest"], &agent);
     let (_, violations) = evaluate(&agent, "hit");
     assert_eq!(violations, 0);
 }

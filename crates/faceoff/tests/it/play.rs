@@ -1,10 +1,16 @@
-use crate::PATIENT;
+//! `faceoff play`: games, forfeits, series and refusals.
+
+use crate::LONG_TIME_LIMITS;
 use std::{
     fs,
     path::{Path, PathBuf},
     process::{Command, Output},
 };
 
+/// An arbitrary seed, which fixes the episodes.
+const SEED: &str = "5";
+
+/// The example agent that keeps its arm still.
 fn hold() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold")
 }
@@ -24,7 +30,7 @@ fn play(bundles: [&Path; 2], out: &Path, args: &[&str]) -> Output {
         .args(args)
         .arg("--out")
         .arg(out)
-        .args(["--config", PATIENT])
+        .args(["--config", LONG_TIME_LIMITS])
         .output()
         .unwrap()
 }
@@ -38,7 +44,7 @@ fn game_has_results_and_a_recording_that_verifies() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let hold = hold();
-    let args = ["--steps", "1000", "--seed", "5"];
+    let args = ["--steps", "1000", "--seed", SEED];
     let output = play([&hold, &hold], &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let table = text(&output.stdout);
@@ -47,14 +53,14 @@ fn game_has_results_and_a_recording_that_verifies() {
         "{table}"
     );
     assert!(table.contains("1000 control steps, 2 windows"), "{table}");
-    let mut left: Vec<_> = out
+    let mut files: Vec<_> = out
         .read_dir()
         .unwrap()
         .map(|entry| entry.unwrap().file_name())
         .collect();
-    left.sort();
+    files.sort();
     assert_eq!(
-        left,
+        files,
         [
             "clips",
             "game.zip",
@@ -135,8 +141,8 @@ fn game_has_results_and_a_recording_that_verifies() {
     );
     let archive = out.join("game.zip");
     let mut bytes = fs::read(&archive).unwrap();
-    let middle = bytes.len() / 3;
-    bytes[middle] ^= 1;
+    let changed = bytes.len() / 3;
+    bytes[changed] ^= 1;
     fs::write(&archive, bytes).unwrap();
     let verified = faceoff(&["verify"], &[&archive]);
     assert_eq!(verified.status.code(), Some(1));
@@ -216,7 +222,7 @@ fn mirrored_pairs_share_a_seed_and_swap_sides() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let hold = hold();
-    let args = ["--steps", "50", "--pairs", "2", "--seed", "5", "--json"];
+    let args = ["--steps", "50", "--pairs", "2", "--seed", SEED, "--json"];
     let output = play([&hold, &hold], &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert_eq!(output.stdout, fs::read(out.join("results.json")).unwrap());

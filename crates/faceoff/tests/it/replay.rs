@@ -1,6 +1,6 @@
-//! `faceoff replay`.
+//! `faceoff replay`: the page and the picture of an episode.
 
-use crate::PATIENT;
+use crate::LONG_TIME_LIMITS;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -8,6 +8,9 @@ use std::{
     sync::OnceLock,
 };
 use tempfile::TempDir;
+
+/// An arbitrary seed, which fixes the episodes.
+const SEED: &str = "5";
 
 fn faceoff(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_faceoff"))
@@ -42,11 +45,11 @@ fn evaluated() -> &'static Path {
             "--out",
             out,
             "--config",
-            PATIENT,
+            LONG_TIME_LIMITS,
             "--episodes",
             "2",
             "--seed",
-            "5",
+            SEED,
             "--workers",
             "2",
         ]);
@@ -122,7 +125,7 @@ fn fault_is_shown_with_the_agents_error() {
         "--out",
         out,
         "--config",
-        PATIENT,
+        LONG_TIME_LIMITS,
         "--task",
         "defend",
         "--episodes",

@@ -1,4 +1,4 @@
-//! `faceoff sim golden`.
+//! `faceoff sim golden`, which prints hashes of reference episodes and games of the simulator.
 
 use std::process::Command;
 

@@ -1,18 +1,21 @@
-//! Simulates strikes at a puck near the rim with the puck model.
+//! Simulates strikes at a puck near the rim with the puck model, and gives each a value from 0, a failure, to 1, a *prepared* puck: one
+//! that rests in an area from which it can be shot, or crosses the table's long axis (the middle) slowly enough.
 
 use crate::contact::{SUBSTEP, substep};
 use crate::field::{Field, Vec2};
 use crate::puck::{DRAG, Puck, Rim};
 
-/// Half width of the strip in which a puck counts as prepared, with a margin.
+/// Largest |y| at which a puck counts as prepared, with a margin, metres.
 const SAFE_Y: f64 = 0.365;
-/// Range of x in which a puck counts as prepared, with a margin.
+/// Range of x in which a puck counts as prepared, with a margin, metres.
 const SAFE_X: (f64, f64) = (-0.78, -0.22);
-/// |y| at which the episode ends.
-const CENTRE_Y: f64 = 0.01;
+/// A puck at a smaller |y| has crossed the middle, which ends the episode, metres.
+const MIDDLE_Y: f64 = 0.01;
+/// Longest sliding of the puck on one segment, seconds: it has nearly stopped then.
+const HORIZON: f64 = 8.0;
 /// Deceleration of the mallet after a strike, m/s².
 pub const BRAKE: f64 = 7.0;
-/// Number of directions of the contact normal.
+/// Number of directions of the contact normal that are compared.
 pub const NORMALS: usize = 60;
 /// Mallet speeds to compare, m/s.
 const SPEEDS: [f64; 7] = [0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.9];
@@ -39,18 +42,21 @@ pub fn is_prepared(puck: &Puck) -> bool {
     rest.y.abs() < SAFE_Y && rest.x > SAFE_X.0 && rest.x < SAFE_X.1 && puck.vel.x < 0.05
 }
 
-fn rotate(v: Vec2, angle: f64) -> Vec2 {
+fn rotate(vector: Vec2, angle: f64) -> Vec2 {
     let (sin, cos) = angle.sin_cos();
-    Vec2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y)
+    Vec2::new(
+        cos * vector.x - sin * vector.y,
+        sin * vector.x + cos * vector.y,
+    )
 }
 
-/// Evaluates the strikes of one contact normal, and stores a better one in `best`.
+/// Evaluates the strikes of the contact normal `index` (below [`NORMALS`]), and stores a better one in `best`.
 pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<Strike>) {
     let normal = rotate(
         Vec2::x(),
         std::f64::consts::TAU * index as f64 / NORMALS as f64,
     );
-    let contact = puck.pos - field.contact() * normal;
+    let contact = puck.pos - field.contact_distance() * normal;
     if (contact - field.clamp_mallet(contact)).norm() > 1e-9 {
         return;
     }
@@ -65,8 +71,8 @@ pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<St
             {
                 continue;
             }
-            let least = best.map_or(0.05, |b| b.value + 1e-9);
-            if let Some(value) = strike_value(field, puck, normal, velocity, least) {
+            let required_value = best.map_or(0.05, |best| best.value + 1e-9);
+            if let Some(value) = strike_value(field, puck, normal, velocity, required_value) {
                 *best = Some(Strike {
                     normal,
                     velocity,
@@ -78,14 +84,15 @@ pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<St
 }
 
 /// Mean value of a strike over variations of uncertain parameters (contact normal, speed), if it
-/// exceeds `least`. Gentler strikes have a small advantage.
+/// reaches `required_value`. Gentler strikes have a small advantage.
 fn strike_value(
     field: &Field,
     puck: &Puck,
     normal: Vec2,
     velocity: Vec2,
-    least: f64,
+    required_value: f64,
 ) -> Option<f64> {
+    /// Turn of the contact normal, radians, and factor of the speed.
     const VARIATIONS: [(f64, f64); 7] = [
         (0.0, 1.0),
         (0.05, 1.0),
@@ -100,8 +107,9 @@ fn strike_value(
     let mut sum = 0.0;
     for (k, (turn, factor)) in VARIATIONS.iter().enumerate() {
         sum += strike_outcome(field, *puck, rotate(normal, *turn), *factor * velocity);
+        // The mean if all further variations had the value 1.
         let possible = (sum + count - 1.0 - k as f64) / count - cost;
-        if possible < least {
+        if possible < required_value {
             return None;
         }
     }
@@ -113,25 +121,25 @@ fn strike_outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -
     let speed = velocity.norm();
     let direction = velocity / speed;
     // Contact, braking and a short rest of the mallet, in substeps.
-    let mut mallet = puck.pos - (field.contact() + 1e-4) * normal;
-    let mut v = speed;
+    let mut mallet = puck.pos - (field.contact_distance() + 1e-4) * normal;
+    let mut mallet_speed = speed;
     let mut time = 0.0;
     while time < 0.45 {
-        substep(&mut puck, field, mallet, v * direction);
-        mallet += SUBSTEP * v * direction;
+        substep(&mut puck, field, mallet, mallet_speed * direction);
+        mallet += SUBSTEP * mallet_speed * direction;
         time += SUBSTEP;
         // The reference brakes in the control step after the planned contact.
         if time > 0.01 {
-            v = (v - BRAKE * SUBSTEP).max(0.0);
+            mallet_speed = (mallet_speed - BRAKE * SUBSTEP).max(0.0);
         }
         if let Some(end) = end_value(&puck) {
             return end;
         }
-        let gap = (puck.pos - mallet).norm() - field.contact();
-        let opening = (puck.vel - v * direction).dot(&(puck.pos - mallet)) > 0.0;
+        let gap = (puck.pos - mallet).norm() - field.contact_distance();
+        let opening = (puck.vel - mallet_speed * direction).dot(&(puck.pos - mallet)) > 0.0;
         if gap > 0.03
             && opening
-            && (v == 0.0 || gap > 0.1)
+            && (mallet_speed == 0.0 || gap > 0.1)
             && puck.next_rim(field).is_none_or(|(t, _)| t > 0.02)
         {
             break;
@@ -145,27 +153,27 @@ fn end_value(puck: &Puck) -> Option<f64> {
     if puck.pos.x > -0.01 {
         return Some(0.0);
     }
-    (puck.pos.y.abs() < CENTRE_Y).then(|| crossing_value(puck.pos.x, puck.vel.x))
+    (puck.pos.y.abs() < MIDDLE_Y).then(|| crossing_value(puck.pos.x, puck.vel.x))
 }
 
-/// Value of crossing the middle at `x` with `vx`: less near the limits of a success.
+/// Value of crossing the middle at `x`, metres, with the speed `vx`, m/s: less near the limits of a success.
 fn crossing_value(x: f64, vx: f64) -> f64 {
-    let along = ((x - SAFE_X.0).min(SAFE_X.1 - x) / 0.06).clamp(0.0, 1.0);
-    let slow = ((0.09 - vx) / 0.06).clamp(0.0, 1.0);
-    along * slow
+    let x_margin = ((x - SAFE_X.0).min(SAFE_X.1 - x) / 0.06).clamp(0.0, 1.0);
+    let slowness = ((0.09 - vx) / 0.06).clamp(0.0, 1.0);
+    x_margin * slowness
 }
 
 /// Value of the position where the puck comes to rest or crosses the middle without another contact.
 pub fn slide_value(field: &Field, mut puck: Puck) -> f64 {
     for _ in 0..8 {
-        let (span, rim) = puck
-            .next_rim(field)
-            .map_or((8.0, None), |(t, r)| (t.min(8.0), Some(r)));
+        let (span, rim) = puck.next_rim(field).map_or((HORIZON, None), |(time, rim)| {
+            (time.min(HORIZON), Some(rim))
+        });
         let end = puck.pos + puck.vel * ((1.0 - (-DRAG * span).exp()) / DRAG);
-        if end.y * puck.pos.y < 0.0 || end.y.abs() < CENTRE_Y {
+        if end.y * puck.pos.y < 0.0 || end.y.abs() < MIDDLE_Y {
             // The puck crosses the middle on this segment.
-            let share = (puck.pos.y.abs() - CENTRE_Y) / (puck.pos.y - end.y).abs().max(1e-9);
-            let x = puck.pos.x + share * (end.x - puck.pos.x);
+            let path_share = (puck.pos.y.abs() - MIDDLE_Y) / (puck.pos.y - end.y).abs().max(1e-9);
+            let x = puck.pos.x + path_share * (end.x - puck.pos.x);
             let vx = puck.vel.x - DRAG * (x - puck.pos.x);
             return crossing_value(x, vx);
         }
@@ -184,14 +192,15 @@ pub fn slide_value(field: &Field, mut puck: Puck) -> f64 {
             }
         }
     }
-    let p = puck.pos;
-    if p.x > SAFE_X.0 && p.x < SAFE_X.1 && p.y.abs() < SAFE_Y {
+    let pos = puck.pos;
+    if pos.x > SAFE_X.0 && pos.x < SAFE_X.1 && pos.y.abs() < SAFE_Y {
+        // Crossing the middle at once is a little better than resting.
         return 0.97;
     }
     // Not prepared, but the next strike may be easier.
-    let off_rim = ((field.puck_y() - p.y.abs()) / 0.12).clamp(0.0, 1.0);
-    let off_end = ((p.x + field.puck_x()) / 0.2).clamp(0.0, 1.0);
-    if p.x < -0.2 {
+    let off_rim = ((field.puck_y() - pos.y.abs()) / 0.12).clamp(0.0, 1.0);
+    let off_end = ((pos.x + field.puck_x()) / 0.2).clamp(0.0, 1.0);
+    if pos.x < -0.2 {
         0.3 + 0.4 * off_rim * off_end
     } else {
         0.0

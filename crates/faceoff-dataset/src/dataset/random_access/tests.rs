@@ -1,3 +1,5 @@
+//! Tests that reading one episode accesses only a small part of the table.
+
 use super::*;
 use crate::table::{ShardTable, StepRows, TableWriter, join};
 use bytes::Bytes;
@@ -16,60 +18,61 @@ use std::{
 
 /// A table that records its accesses.
 #[derive(Clone)]
-struct Counted {
+struct RecordingTable {
     table: Bytes,
-    read: Arc<AtomicU64>,
+    /// Bytes read so far.
+    bytes_read: Arc<AtomicU64>,
     /// Start and end of each access.
     ranges: Arc<Mutex<Vec<(u64, u64)>>>,
 }
 
-struct CountedReader {
-    counted: Counted,
-    at: u64,
+struct RecordingReader {
+    table: RecordingTable,
+    position: u64,
 }
 
-impl Counted {
+impl RecordingTable {
     fn new(path: &Path) -> Self {
         Self {
             table: std::fs::read(path).unwrap().into(),
-            read: Arc::default(),
+            bytes_read: Arc::default(),
             ranges: Arc::default(),
         }
     }
 
     fn record(&self, start: u64, bytes: u64) {
-        self.read.fetch_add(bytes, Ordering::Relaxed);
+        self.bytes_read.fetch_add(bytes, Ordering::Relaxed);
         self.ranges.lock().unwrap().push((start, start + bytes));
     }
 }
 
-impl Read for CountedReader {
+impl Read for RecordingReader {
     fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
         let read = self
-            .counted
             .table
-            .slice(self.at as usize..)
+            .table
+            .slice(self.position as usize..)
             .as_ref()
             .read(out)?;
-        self.counted.record(self.at, read as u64);
-        self.at += read as u64;
+        self.table.record(self.position, read as u64);
+        self.position += read as u64;
         Ok(read)
     }
 }
 
-impl Length for Counted {
+impl Length for RecordingTable {
     fn len(&self) -> u64 {
         self.table.len() as u64
     }
 }
 
-impl ChunkReader for Counted {
-    type T = CountedReader;
+impl ChunkReader for RecordingTable {
+    type T = RecordingReader;
 
     fn get_read(&self, start: u64) -> Result<Self::T> {
-        Ok(CountedReader {
-            counted: self.clone(),
-            at: start,
+        Ok(RecordingReader {
+            table: self.clone(),
+            position: start,
         })
     }
 
@@ -79,13 +82,13 @@ impl ChunkReader for Counted {
     }
 }
 
-/// Shards of one row group each, joined.
-fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec<ShardTable> {
+/// Writes the step tables of shards with `episodes` episodes of `steps` steps; each becomes a row group.
+fn write_shards(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec<ShardTable> {
     let settings = PerturbationSettings::default();
     let (seed, plant) = (Seed::from_number(3), Plant::nominal());
     let factors = Profile::Ideal.factors();
-    let world = Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed);
-    let mut state = world.state();
+    let simulation = Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed);
+    let mut state = simulation.state();
     (0..shards)
         .map(|shard| {
             let path = dir.join(format!("{task}-{shard}.parquet"));
@@ -94,9 +97,9 @@ fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec
             for episode in shard * episodes..(shard + 1) * episodes {
                 rows.begin(episode);
                 for step in 0..steps {
-                    // Numbers that rarely repeat, like measurements.
+                    // Numbers that rarely repeat compress as badly as measurements.
                     state.q = state.q.map(|q| (q * 1e3 + 0.37).sin());
-                    rows.observe(world.observation());
+                    rows.observe(simulation.observation());
                     rows.push(&StepRow {
                         step,
                         action: &state.q.repeat(2),
@@ -107,7 +110,7 @@ fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec
                         },
                         state: &state,
                         constraints: Default::default(),
-                        next_observation: world.observation(),
+                        next_observation: simulation.observation(),
                         puck_lost: false,
                         impacts: &[],
                     });
@@ -120,36 +123,36 @@ fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec
         .collect()
 }
 
-fn write(dir: &Path, tables: &[ShardTable]) -> Counted {
+fn join_shards(dir: &Path, tables: &[ShardTable]) -> RecordingTable {
     let path = dir.join("joined.parquet");
     join(tables, dir, std::fs::File::create(&path).unwrap()).unwrap();
-    Counted::new(&path)
+    RecordingTable::new(&path)
 }
 
 #[test]
 fn read_accesses_one_row_group_of_many() {
     let dir = tempfile::tempdir().unwrap();
-    let mut tables = joined(dir.path(), Task::Hit, 40, 2, 60);
-    tables.extend(joined(dir.path(), Task::Defend, 40, 2, 60));
-    let table = write(dir.path(), &tables);
+    let mut tables = write_shards(dir.path(), Task::Hit, 40, 2, 60);
+    tables.extend(write_shards(dir.path(), Task::Defend, 40, 2, 60));
+    let table = join_shards(dir.path(), &tables);
     let metadata = ParquetMetaDataReader::new()
         .parse_and_finish(&table)
         .unwrap();
     assert_eq!(metadata.num_row_groups(), 80);
-    let data = |group: usize| -> (u64, u64) {
+    let bytes_of_group = |group: usize| -> (u64, u64) {
         let columns = metadata.row_group(group).columns().iter();
         let columns = columns.map(|column| column.byte_range());
-        columns.fold((u64::MAX, 0), |(start, end), (at, length)| {
-            (start.min(at), end.max(at + length))
+        columns.fold((u64::MAX, 0), |(start, end), (column, length)| {
+            (start.min(column), end.max(column + length))
         })
     };
     table.ranges.lock().unwrap().clear();
-    // The 17th shard of the second task.
+    // Two episodes per shard: episode 33 is in the 17th shard of the second task.
     let rows = episode(table.clone(), Task::Defend, 33, None).unwrap();
     assert_eq!(rows.num_rows(), 60);
     let accessed: Vec<usize> = (0..80)
         .filter(|group| {
-            let (start, end) = data(*group);
+            let (start, end) = bytes_of_group(*group);
             let ranges = table.ranges.lock().unwrap();
             ranges.iter().any(|(from, to)| *from < end && start < *to)
         })
@@ -160,8 +163,8 @@ fn read_accesses_one_row_group_of_many() {
 #[test]
 fn read_accesses_few_pages_of_a_row_group() {
     let dir = tempfile::tempdir().unwrap();
-    let tables = joined(dir.path(), Task::Hit, 1, 60, 500);
-    let table = write(dir.path(), &tables);
+    let tables = write_shards(dir.path(), Task::Hit, 1, 60, 500);
+    let table = join_shards(dir.path(), &tables);
     let metadata = ParquetMetaDataReader::new()
         .parse_and_finish(&table)
         .unwrap();
@@ -170,9 +173,9 @@ fn read_accesses_few_pages_of_a_row_group() {
         1,
         "30,000 rows are one row group"
     );
-    table.read.store(0, Ordering::Relaxed);
+    table.bytes_read.store(0, Ordering::Relaxed);
     let rows = episode(table.clone(), Task::Hit, 31, None).unwrap();
     assert_eq!(rows.num_rows(), 500);
-    let (read, all) = (table.read.load(Ordering::Relaxed), table.len());
+    let (read, all) = (table.bytes_read.load(Ordering::Relaxed), table.len());
     assert!(read < all / 8, "{read} of {all} bytes");
 }

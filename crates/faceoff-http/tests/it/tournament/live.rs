@@ -30,7 +30,7 @@ async fn next_event(stream: &mut Stream) -> Option<Event> {
     }
 }
 
-fn goal(step: u32, score: [u32; 2]) -> LiveEvent {
+fn goal_event(step: u32, score: [u32; 2]) -> LiveEvent {
     LiveEvent {
         step,
         event: GameEvent::Goal {
@@ -40,7 +40,7 @@ fn goal(step: u32, score: [u32; 2]) -> LiveEvent {
     }
 }
 
-fn ended(step: u32, score: [u32; 2]) -> LiveEvent {
+fn end_event(step: u32, score: [u32; 2]) -> LiveEvent {
     LiveEvent {
         step,
         event: GameEvent::Ended {
@@ -83,7 +83,12 @@ async fn live_stream_is_resumed_without_a_gap() {
         (first.name.as_str(), &first.data["attempt"]),
         ("snapshot", &json!(1))
     );
-    live.advance(game.id, 1, vec![goal(300, [1, 0])], Some(position(301)));
+    live.advance(
+        game.id,
+        1,
+        vec![goal_event(300, [1, 0])],
+        Some(position(301)),
+    );
     let event = stream.next().await.unwrap();
     assert_eq!(
         (
@@ -97,8 +102,8 @@ async fn live_stream_is_resumed_without_a_gap() {
     drop(stream);
 
     // Meanwhile there are two more goals and many positions, of which only the newest is sent.
-    live.advance(game.id, 1, vec![goal(600, [2, 0])], None);
-    live.advance(game.id, 1, vec![goal(900, [3, 0])], None);
+    live.advance(game.id, 1, vec![goal_event(600, [2, 0])], None);
+    live.advance(game.id, 1, vec![goal_event(900, [3, 0])], None);
     for step in 901..1000 {
         live.advance(game.id, 1, Vec::new(), Some(position(step)));
     }
@@ -117,7 +122,7 @@ async fn live_stream_is_resumed_without_a_gap() {
         resumed.next().await.unwrap().id,
     ];
     assert_eq!(ids, [Some("1.2".to_owned()), Some("1.3".to_owned())]);
-    live.advance(game.id, 1, vec![ended(GAME_STEPS, [3, 0])], None);
+    live.advance(game.id, 1, vec![end_event(GAME_STEPS, [3, 0])], None);
     let end = next_event(&mut resumed).await.unwrap();
     assert_eq!(
         (end.id.as_deref(), &end.data["kind"]),
@@ -159,7 +164,7 @@ async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
     assert_eq!(stream.next().await.unwrap().name, "waiting");
     live.begin(game.id, 1, GAME_STEPS);
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
-    live.advance(game.id, 1, vec![goal(5, [1, 0])], None);
+    live.advance(game.id, 1, vec![goal_event(5, [1, 0])], None);
     assert_eq!(stream.next().await.unwrap().id.as_deref(), Some("1.1"));
     // The slot shuts down, so this attempt ends without a result.
     cup.site
@@ -179,7 +184,7 @@ async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
         (restarted.name.as_str(), &restarted.data["attempt"]),
         ("snapshot", &json!(2))
     );
-    live.advance(game.id, 2, vec![goal(7, [1, 0])], None);
+    live.advance(game.id, 2, vec![goal_event(7, [1, 0])], None);
     assert_eq!(stream.next().await.unwrap().id.as_deref(), Some("2.1"));
     // An event id of the previous attempt is ignored: all events of this attempt are sent.
     let mut resumed = open(&cup, game.id, Some("1.2")).await;

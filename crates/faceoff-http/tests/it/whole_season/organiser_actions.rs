@@ -1,12 +1,15 @@
 //! Actions of the organiser and of teams on single days of the season, with checks of their effects.
 
-use super::season::{ALL_EVALUATIONS, DAYS, Season, at, date};
+use super::season::{ALL_EVALUATIONS, DAYS, Season, date, local_time};
 use crate::site::{ADMIN, Answer, string};
 use faceoff_worker::start_due;
 use reqwest::Method;
 use serde_json::{Value, json};
 
 // The days of the actions, counted from 0.
+const RENAMING: i32 = 3;
+const WITHDRAWAL: i32 = 10;
+const PAUSE: i32 = 12;
 const RETENTION_SET: i32 = 18;
 const VOIDED_EVALUATION: i32 = 20;
 const VOIDED_DAY: i32 = 25;
@@ -41,9 +44,9 @@ impl Season {
     /// Takes the actions of this day, before its cutoff.
     pub async fn perform_actions(&mut self, day: i32) {
         match day {
-            3 => self.rename().await,
-            10 => self.withdraw().await,
-            12 => self.pause().await,
+            RENAMING => self.rename().await,
+            WITHDRAWAL => self.withdraw().await,
+            PAUSE => self.pause().await,
             RETENTION_SET => self.retain_last_five().await,
             _ if day == VOIDED_EVALUATION + 1 => self.void_evaluation().await,
             _ if day == VOIDED_DAY + 1 => self.void_day().await,
@@ -80,7 +83,7 @@ impl Season {
         let renamed = Answer::read(request.json(&body).send().await.unwrap()).await;
         assert_eq!(renamed.json(200)["name"], "The Mallets");
         team.name = "The Mallets".into();
-        let names = self.teams_on_board(3).await;
+        let names = self.teams_on_board(RENAMING).await;
         assert!(names.contains(&"The Mallets".to_owned()), "{names:?}");
         assert!(!names.contains(&"Team 2".to_owned()), "{names:?}");
     }
@@ -101,7 +104,7 @@ impl Season {
 
     /// Pauses the queue, in which no job starts then, and resumes it.
     async fn pause(&mut self) {
-        self.upload(4, 12).await;
+        self.upload(4, PAUSE as usize).await;
         self.teams[4].is_inactive = false;
         let paused = self.post("/queue/pause", reason("a fan is changed")).await;
         assert_eq!(paused.status, 204, "{}", paused.body);
@@ -220,11 +223,11 @@ impl Season {
             "the day may continue until the next cutoff"
         );
         self.site
-            .set_time(at(day + 1, 18) - jiff::SignedDuration::from_millis(1));
+            .set_time(local_time(day + 1, 18) - jiff::SignedDuration::from_millis(1));
         start_due(&self.site.store, self.site.now()).await.unwrap();
         assert_eq!(states(self).await, (FINISHED_BEFORE_DEADLINE, 0, all));
         // The next cutoff ends the overfull day. The clock goes back to the morning before it.
-        self.site.set_time(at(day + 1, 10));
+        self.site.set_time(local_time(day + 1, 10));
         assert_eq!(self.teams_on_board(day).await.len(), self.active_teams());
     }
 
@@ -335,7 +338,7 @@ impl Season {
 
     /// After the last day: reveals the blind stage, signs off each stage, and closes the season.
     pub async fn sign_off(&mut self) {
-        self.site.set_time(at(DAYS + 1, 12));
+        self.site.set_time(local_time(DAYS + 1, 12));
         start_due(&self.site.store, self.site.now()).await.unwrap();
         let last_stage = self.stage_of(DAYS - 1);
         let hidden = self.board(DAYS - 1).await;

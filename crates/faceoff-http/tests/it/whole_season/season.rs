@@ -49,7 +49,7 @@ pub fn date(day: i32) -> Date {
 }
 
 /// The time at this hour of a day, in the season's time zone.
-pub fn at(day: i32, hour: i8) -> Timestamp {
+pub fn local_time(day: i32, hour: i8) -> Timestamp {
     let zone = TimeZone::get(ZONE).unwrap();
     date(day)
         .at(hour, 0, 0, 0)
@@ -62,7 +62,7 @@ impl Season {
     /// Three stages: two weeks of warm-up, two months whose best day counts, and two blind weeks.
     pub async fn start() -> Self {
         let site = Site::start().await;
-        site.set_time(at(0, 8));
+        site.set_time(local_time(0, 8));
         let mut season = Self {
             site,
             teams: Vec::new(),
@@ -74,7 +74,7 @@ impl Season {
             .change_stage(
                 &first_stage.to_string(),
                 json!({
-                    "name": "Warm-up", "closes_at": at(14, 12), "zone": ZONE, "schedule": { "daily": "18:00" },
+                    "name": "Warm-up", "closes_at": local_time(14, 12), "zone": ZONE, "schedule": { "daily": "18:00" },
                     "episodes_per_task": EPISODES, "episodes_per_shard": EPISODES_PER_SHARD, "max_faults": 10,
                     "confirm": "Qualifying",
                 }),
@@ -91,7 +91,7 @@ impl Season {
             ),
         ] {
             let mut body = json!({
-                "name": name, "opens_at": at(opening_day, 12), "closes_at": at(closing_day, 12), "zone": ZONE,
+                "name": name, "opens_at": local_time(opening_day, 12), "closes_at": local_time(closing_day, 12), "zone": ZONE,
                 "schedule": { "daily": "18:00" },
             });
             for (key, value) in settings.as_object().unwrap() {
@@ -141,7 +141,7 @@ impl Season {
 
     /// Adds the new teams of the day, and uploads new submissions.
     pub async fn morning(&mut self, day: i32) {
-        self.site.set_time(at(day, 10));
+        self.site.set_time(local_time(day, 10));
         let number = usize::try_from(day).unwrap();
         let team_count = (FIRST_TEAMS + number).min(TEAMS);
         for index in self.teams.len()..team_count {
@@ -192,7 +192,7 @@ impl Season {
         let cutoff: Timestamp = string(&view["next_cutoff"]["at"]).parse().unwrap();
         assert_eq!(
             (cutoff, &view["next_cutoff"]["day"]),
-            (at(day, 18), &json!(date(day)))
+            (local_time(day, 18), &json!(date(day)))
         );
         self.site.set_time(cutoff - SignedDuration::from_millis(1));
         start_due(&self.site.store, self.site.now()).await.unwrap();

@@ -23,7 +23,8 @@ ARCHIVES = ("dataset.zip", "game.zip")
 # Header of a file in a zip: the fixed part ends with the lengths of the name and extra field that follow.
 LOCAL_HEADER_BYTES = 30
 LOCAL_HEADER_LENGTHS = struct.Struct("<HH")
-LOCAL_HEADER_LENGTHS_AT = 26
+LOCAL_HEADER_LENGTHS_OFFSET = 26
+# Files are hashed in pieces of this size.
 CHECK_BYTES = 1 << 24
 
 
@@ -168,7 +169,7 @@ class Container:
         whole = pa.memory_map(str(self.path)).read_buffer()
         header = memoryview(whole)[entry.header_offset :][:LOCAL_HEADER_BYTES]
         if len(header) == LOCAL_HEADER_BYTES:
-            lengths = LOCAL_HEADER_LENGTHS.unpack_from(header, LOCAL_HEADER_LENGTHS_AT)
+            lengths = LOCAL_HEADER_LENGTHS.unpack_from(header, LOCAL_HEADER_LENGTHS_OFFSET)
             start = entry.header_offset + LOCAL_HEADER_BYTES + sum(lengths)
             if start + entry.file_size <= whole.size:
                 return whole.slice(start, entry.file_size)

@@ -1,4 +1,4 @@
-"""The dataset of an evaluation."""
+"""The dataset of an evaluation: the recording of all its episodes, with the results."""
 
 from __future__ import annotations
 

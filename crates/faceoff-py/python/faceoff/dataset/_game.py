@@ -1,4 +1,4 @@
-"""The recording of a game, or of one side of it."""
+"""The recording of a game, or of one side of it. A game consists of rallies; its two robots are sides 1 and 2."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class SideArrays:
     actions: Floats
     """The agent's actions, shape (N, *action_shape); NaN without an answer."""
     effects: npt.NDArray[np.str_]
-    """`in_time`, `late`, `fault` or `held` per step, shape (N,)."""
+    """What became of the answer to each step: `in_time` (it was commanded), `late`, `fault`, or `held` (an earlier
+    fault); shape (N,)."""
     puck: Floats
     """True x, y, yaw and their rates after the step, shape (N, 6)."""
     joint_pos: Floats
@@ -233,9 +234,9 @@ class Game:
 
     def rally_rows(self, rally: Rally, name: str, columns: Sequence[str] | None) -> pa.Table:
         """The control steps of a rally of this game: `Rally.table`."""
-        known = ["motion", *(f"side-{side}" for side in self.sides)]
-        if name not in known:
-            raise ArgumentError(f"name: expected one of {', '.join(known)}, got {name!r}")
+        names = ["motion", *(f"side-{side}" for side in self.sides)]
+        if name not in names:
+            raise ArgumentError(f"name: expected one of {', '.join(names)}, got {name!r}")
         return self._rows(name).read(rally.game_step, rally.steps, columns)
 
     def check_side(self, side: int) -> None:

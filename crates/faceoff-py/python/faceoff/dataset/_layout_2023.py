@@ -19,9 +19,11 @@ __all__ = ["ENVIRONMENTS", "to_2023"]
 ENVIRONMENTS = {"hit": "7dof-hit", "defend": "7dof-defend", "prepare": "7dof-prepare"}
 """Names of the tasks in 2023."""
 
+# Codes of the tiers, how safe the agent is for a real robot.
 TIERS = {"deployable": 0, "improvable": 1, "non_deployable": 2}
 # The oldest pickle protocol that supports these types.
 PICKLE_PROTOCOL = 2
+# Key of the group of constraints on the agent's time.
 TIME = "Computation Time"
 
 Transition = tuple[Any, Any, float, Any, bool, bool]

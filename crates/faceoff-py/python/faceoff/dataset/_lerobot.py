@@ -20,6 +20,7 @@ from ._select import Selection, select
 
 __all__ = ["to_lerobot"]
 
+# Constants of LeRobot's format.
 VERSION = "v3.0"
 FPS = 50
 FILES_PER_CHUNK = 1000
@@ -272,14 +273,14 @@ def _info(
     dataset: Dataset,
     selection: Selection,
     features: Mapping[str, dict[str, Any]],
-    frames: int,
+    frame_count: int,
     data_file_mb: int,
 ) -> dict[str, Any]:
     return {
         "codebase_version": VERSION,
         "robot_type": "iiwa14_air_hockey",
         "total_episodes": len(selection.episodes),
-        "total_frames": frames,
+        "total_frames": frame_count,
         "total_tasks": 1,
         "chunks_size": FILES_PER_CHUNK,
         "data_files_size_in_mb": data_file_mb,

@@ -21,7 +21,8 @@ __all__ = ["to_minari"]
 
 # The protocol's bound for numbers in an action.
 ACTION_MAX = 1e4
-ROOT = "MINARI_DATASETS_PATH"
+# The environment variable with Minari's folder of datasets.
+ROOT_VARIABLE = "MINARI_DATASETS_PATH"
 
 
 def to_minari(
@@ -34,7 +35,7 @@ def to_minari(
     root: str | os.PathLike[str] | None = None,
     data_format: str = "arrow",
     dtype: str = "float32",
-    **about: Any,
+    **metadata: Any,
 ) -> Any:
     """Writes the episodes of one task as a Minari dataset for `minari.load_dataset`.
 
@@ -55,7 +56,7 @@ def to_minari(
         root: folder for datasets instead of ``MINARI_DATASETS_PATH`` or Minari's default.
         data_format: a format of Minari: `arrow`, `parquet` or `hdf5`.
         dtype: `float32` or `float64`.
-        about: arguments of ``minari.create_dataset_from_buffers``, e.g. `author`, `description`, `env`.
+        metadata: further arguments of ``minari.create_dataset_from_buffers``, e.g. `author`, `description`, `env`.
 
     Returns:
         The `minari.MinariDataset`.
@@ -78,15 +79,15 @@ def to_minari(
     if dtype not in ("float32", "float64"):
         raise ArgumentError(f"dtype: expected 'float32' or 'float64', got {dtype!r}")
     selection = select(dataset, _find_task(dataset, dataset_id, task), episodes)
-    number = np.dtype(dtype).type
+    scalar = np.dtype(dtype).type
     width = int(np.prod(selection.action_shape))
-    buffers = [_buffer(EpisodeBuffer, episode, reward, number) for episode in selection.episodes]
+    buffers = [_buffer(EpisodeBuffer, episode, reward, scalar) for episode in selection.episodes]
     observation_len = buffers[0].observations.shape[1]
-    about = {
+    metadata = {
         "algorithm_name": dataset.agent,
         "description": f"Agent {dataset.agent} in {selection.task}, profile {dataset.profile}, "
         f"ruleset {dataset.ruleset}",
-        **about,
+        **metadata,
     }
     with _datasets_root(root), warnings.catch_warnings():
         # Minari warns of each missing field about the author.
@@ -94,10 +95,10 @@ def to_minari(
         exported = minari.create_dataset_from_buffers(
             dataset_id=dataset_id,
             buffer=buffers,
-            observation_space=Box(-np.inf, np.inf, (observation_len,), number),
-            action_space=Box(-ACTION_MAX, ACTION_MAX, (width,), number),
+            observation_space=Box(-np.inf, np.inf, (observation_len,), scalar),
+            action_space=Box(-ACTION_MAX, ACTION_MAX, (width,), scalar),
             data_format=data_format,
-            **about,
+            **metadata,
         )
         exported.storage.update_episode_metadata(
             [
@@ -125,15 +126,15 @@ def _find_task(dataset: Dataset, dataset_id: str, task: str | None) -> str:
     raise ArgumentError(f"task: expected one of {', '.join(dataset.tasks)}, got none")
 
 
-def _buffer(buffer_class: Any, episode: Episode, reward: Reward, number: type[Any]) -> Any:
+def _buffer(buffer_class: Any, episode: Episode, reward: Reward, scalar: type[Any]) -> Any:
     arrays = episode.to_numpy()
     steps = episode.steps
     flags = np.zeros((2, steps), dtype=bool)
     flags[:, -1] = episode.terminated, episode.truncated
     missing = np.full((1, arrays.constraints.shape[1]), np.nan)
     return buffer_class(
-        observations=arrays.observations.astype(number),
-        actions=arrays.actions.reshape(steps, -1).astype(number),
+        observations=arrays.observations.astype(scalar),
+        actions=arrays.actions.reshape(steps, -1).astype(scalar),
         rewards=checked_rewards(reward, episode, arrays),
         terminations=flags[0],
         truncations=flags[1],
@@ -151,12 +152,12 @@ def _datasets_root(root: str | os.PathLike[str] | None) -> Iterator[None]:
     if root is None:
         yield
         return
-    before = os.environ.get(ROOT)
-    os.environ[ROOT] = str(Path(root).absolute())
+    before = os.environ.get(ROOT_VARIABLE)
+    os.environ[ROOT_VARIABLE] = str(Path(root).absolute())
     try:
         yield
     finally:
         if before is None:
-            del os.environ[ROOT]
+            del os.environ[ROOT_VARIABLE]
         else:
-            os.environ[ROOT] = before
+            os.environ[ROOT_VARIABLE] = before

@@ -1,4 +1,4 @@
-"""The environment of one world."""
+"""The environment of one world, a simulated table with one robot, or two in `hit`."""
 
 from __future__ import annotations
 
@@ -93,9 +93,9 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
 
     def _new_rows(self) -> Rows:
         length = self.observation_space.shape[0]  # type: ignore[index]
-        return Rows.make(1, length, finals=False, states=self._reward is not None)
+        return Rows.make(1, length, final_observations=False, states=self._reward is not None)
 
-    def _open(self) -> _native.Worlds:
+    def _require_worlds(self) -> _native.Worlds:
         if self._worlds is None:
             raise ClosedError("expected an open environment, got one that was closed: make a new one")
         return self._worlds
@@ -105,7 +105,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begins an episode. Returns its first observation, and info with ``seed`` and ``episode_number``."""
-        worlds = self._open()
+        worlds = self._require_worlds()
         if seed is not None:
             seed_number("seed", seed)
         number, puck = read_options(options)
@@ -127,7 +127,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         Info has ``constraints``, 4 values in the order of :data:`faceoff.gym.CONSTRAINTS`, and at the end of
         an episode ``success``, ``end`` (the reason), ``violations`` (4 bools) and ``steps``.
         """
-        worlds = self._open()
+        worlds = self._require_worlds()
         checked = numbers("action", action, self._action_shape)  # type: ignore[arg-type]
         rows = self._rows
         before = None if self._reward is None else (rows.observations[0].copy(), rows.next_states[0].copy())
@@ -160,7 +160,7 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
     @exclusive
     def save(self) -> _native.Snapshot:
         """The exact state of the world; it can be pickled."""
-        return self._open().save(0)
+        return self._require_worlds().save(0)
 
     @exclusive
     def restore(self, state: _native.Snapshot) -> tuple[Observation, dict[str, Any]]:
@@ -170,17 +170,17 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         """
         if not isinstance(state, _native.Snapshot):
             raise ArgumentTypeError(f"state: expected what save() returned, got {state!r:.80}")
-        self._open().restore(0, state, self._rows.arrays())
+        self._require_worlds().restore(0, state, self._rows.arrays())
         self._is_started = True
         return self._rows.observations[0].copy(), self._origin()
 
     @property
     def state(self) -> State:
         """The present true state."""
-        return State(np.array(self._open().state(0)))
+        return State(np.array(self._require_worlds().state(0)))
 
     def _origin(self) -> dict[str, Any]:
-        [(seed, number)] = self._open().origins()
+        [(seed, number)] = self._require_worlds().origins()
         return {"seed": seed, "episode_number": number}
 
     def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]

@@ -16,8 +16,13 @@ HEIGHT, WIDTH = 360, 640
 #: Metres per pixel: the table with a margin.
 SCALE = 2.16 / WIDTH
 
+#: Of the table, m.
 HALF_LENGTH, HALF_WIDTH, HALF_GOAL = model.TABLE_LENGTH_M / 2, model.TABLE_WIDTH_M / 2, model.GOAL_WIDTH_M / 2
 
+#: Of the painted circle in the middle, m.
+CENTRE_CIRCLE_RADIUS = 0.15
+
+#: Colours: red, green, blue.
 FLOOR = (58, 64, 72)
 TABLE = (238, 241, 244)
 LINES = (176, 190, 204)
@@ -44,7 +49,7 @@ def _table() -> Picture:
     picture[:] = FLOOR
     picture[(np.abs(x) <= HALF_LENGTH) & (np.abs(y) <= HALF_WIDTH)] = TABLE
     middle = (np.abs(x) < SCALE) & (np.abs(y) <= HALF_WIDTH)
-    circle = np.abs(np.hypot(x, y) - 0.15) < SCALE
+    circle = np.abs(np.hypot(x, y) - CENTRE_CIRCLE_RADIUS) < SCALE
     picture[middle | circle] = LINES
     picture[(np.abs(np.abs(x) - HALF_LENGTH) < 3 * SCALE) & (np.abs(y) <= HALF_GOAL)] = GOALS
     return picture

@@ -20,21 +20,25 @@ class Rows:
     """Results of a step: a row per world."""
 
     observations: Singles
+    #: Last observations of episodes whose successor has begun in the same step.
     final_observations: Singles
     rewards: Floats
     terminated: Bools
     truncated: Bools
+    #: (worlds, 12): numbers about each world's episode, which the properties below name.
     facts: Floats
+    #: (worlds, 33): true states after the step.
     states: Floats
+    #: (worlds, 33): present true states, those of the new episode where one has begun.
     next_states: Floats
 
     @classmethod
-    def make(cls, worlds: int, observation_len: int, *, finals: bool, states: bool) -> Rows:
-        """Zeroed arrays for so many worlds; final observations and true states are empty unless requested."""
+    def make(cls, worlds: int, observation_len: int, *, final_observations: bool, states: bool) -> Rows:
+        """Zeroed arrays for that many worlds; final observations and true states are empty unless requested."""
         state_rows = worlds if states else 0
         return cls(
             np.zeros((worlds, observation_len), np.float32),
-            np.zeros((worlds if finals else 0, observation_len), np.float32),
+            np.zeros((worlds if final_observations else 0, observation_len), np.float32),
             np.zeros(worlds),
             np.zeros(worlds, np.bool_),
             np.zeros(worlds, np.bool_),

@@ -1,4 +1,4 @@
-"""The environment of many worlds, stepped together by threads."""
+"""The environment of many worlds (simulated tables), stepped together by threads."""
 
 from __future__ import annotations
 
@@ -123,11 +123,11 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         return Rows.make(
             self.num_envs,
             self.single_observation_space.shape[0],  # type: ignore[index]
-            finals=self.autoreset_mode.name == "SAME_STEP",
+            final_observations=self.autoreset_mode.name == "SAME_STEP",
             states=self._reward is not None,
         )
 
-    def _open(self) -> _native.Worlds:
+    def _require_worlds(self) -> _native.Worlds:
         if self._worlds is None:
             raise ClosedError("expected an open environment, got one that was closed: make a new one")
         return self._worlds
@@ -147,7 +147,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             seed: s for seeds s, s + 1, …; or a sequence with one per world, None to continue with its next episode.
             options: ``reset_mask``, and ``episode`` and ``puck`` as for :meth:`AirHockeyEnv.reset`, for all worlds.
         """
-        worlds = self._open()
+        worlds = self._require_worlds()
         if options is not None and not isinstance(options, Mapping):
             raise ArgumentTypeError(f"options: expected a mapping, got {options!r:.80}")
         options = dict(options or {})
@@ -204,7 +204,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         Infos are arrays, each with a mask (``constraints`` and ``_constraints``, …), as
         :class:`gymnasium.vector.SyncVectorEnv` collects them from :class:`AirHockeyEnv`.
         """
-        worlds = self._open()
+        worlds = self._require_worlds()
         checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
         before = self._before()
         rows = self._rows_to_write(keep=False)
@@ -214,7 +214,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
     @exclusive
     def send(self, actions: Any) -> None:
         """Begins a step in other threads; :meth:`recv` waits for it. No other method may be called in between."""
-        worlds = self._open()
+        worlds = self._require_worlds()
         checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
         worlds.send(checked, self._reward is not None)
         self._sent = (checked, *self._before())
@@ -222,7 +222,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
     @exclusive
     def recv(self) -> Step:
         """Waits for the step that was sent, and returns its result as :meth:`step` does."""
-        worlds = self._open()
+        worlds = self._require_worlds()
         if self._sent is None:
             raise OrderError("recv: expected a step that was sent, got none: call send() first")
         worlds.recv(self._rows_to_write(keep=False).arrays())
@@ -332,7 +332,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
     @exclusive
     def save(self) -> list[_native.Snapshot]:
         """The exact state of every world. States can be pickled, and restored into an :class:`AirHockeyEnv`, too."""
-        worlds = self._open()
+        worlds = self._require_worlds()
         return [worlds.save(world) for world in range(self.num_envs)]
 
     @exclusive
@@ -340,7 +340,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self, states: Sequence[_native.Snapshot]
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
         """Restores a saved state in every world. Returns observations and infos as :meth:`reset` does."""
-        worlds = self._open()
+        worlds = self._require_worlds()
         if len(states) != self.num_envs:
             raise ArgumentError(f"states: expected one for each of {self.num_envs} worlds, got {len(states)}")
         for index, state in enumerate(states):
@@ -359,7 +359,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
     @property
     def state(self) -> State:
         """The present true state of all worlds; the first dimension of each array is the world."""
-        worlds = self._open()
+        worlds = self._require_worlds()
         return State(np.array([worlds.state(world) for world in range(self.num_envs)]))
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...]:  # type: ignore[override]
@@ -374,7 +374,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
     def close_extras(self, **kwargs: Any) -> None:
         """Releases worlds and threads; called by ``close``."""
         if getattr(self, "_worlds", None) is not None:
-            self._open().close()
+            self._require_worlds().close()
             self._worlds = None
 
     def __getstate__(self) -> dict[str, Any]:

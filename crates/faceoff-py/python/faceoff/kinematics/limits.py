@@ -9,8 +9,9 @@ from faceoff.kinematics import model, plain
 from faceoff.kinematics.arrays import Floats, broadcast, joints
 from faceoff.kinematics.poses import forward, heights
 
-_POSITION = model.LIMIT_FRACTION * np.array(model.POSITION_LIMIT_RAD)
-_VELOCITY = model.LIMIT_FRACTION * np.array(model.VELOCITY_LIMIT_RAD_S)
+# What the rules allow for each joint, ±: rad and rad/s.
+_MAX_POSITION_RAD = model.LIMIT_FRACTION * np.array(model.POSITION_LIMIT_RAD)
+_MAX_VELOCITY_RAD_S = model.LIMIT_FRACTION * np.array(model.VELOCITY_LIMIT_RAD_S)
 
 
 class Constraints(NamedTuple):
@@ -47,8 +48,8 @@ def constraints(q: ArrayLike, dq: ArrayLike) -> Constraints:
     return Constraints(
         ee=np.stack(over_table, axis=-1),
         link=model.LINK_HEIGHT_M - heights(pose),
-        joint_pos=np.concatenate([pose - _POSITION, -_POSITION - pose], axis=-1),
-        joint_vel=np.concatenate([rates - _VELOCITY, -_VELOCITY - rates], axis=-1),
+        joint_pos=np.concatenate([pose - _MAX_POSITION_RAD, -_MAX_POSITION_RAD - pose], axis=-1),
+        joint_vel=np.concatenate([rates - _MAX_VELOCITY_RAD_S, -_MAX_VELOCITY_RAD_S - rates], axis=-1),
     )
 
 
@@ -59,5 +60,5 @@ def speed_share(dq: ArrayLike) -> Floats:
 
 def speed_share_unchecked(dq: Floats) -> Floats:
     """`speed_share` without the check of its argument: (..., 7), rad/s, of any magnitude."""
-    share: Floats = np.max(np.abs(dq) / _VELOCITY, axis=-1)
+    share: Floats = np.max(np.abs(dq) / _MAX_VELOCITY_RAD_S, axis=-1)
     return share

@@ -49,11 +49,11 @@ class MalletMotion:
         """(worlds, 2): commanded velocities of the mallets, m/s."""
         return self._speed.copy()
 
-    def restart(self, which: npt.NDArray[np.bool_]) -> None:
-        """Moves the mallets of the worlds in the mask `which` (worlds,) to their start, at rest."""
-        self._q[which] = self._start
-        self._xy[which] = forward(self._start)[:2]
-        self._speed[which] = 0.0
+    def restart(self, is_restarted: npt.NDArray[np.bool_]) -> None:
+        """Moves the mallets of the worlds in the mask `is_restarted` (worlds,) to their start, at rest."""
+        self._q[is_restarted] = self._start
+        self._xy[is_restarted] = forward(self._start)[:2]
+        self._speed[is_restarted] = 0.0
 
     def command(self, actions: Floats) -> Floats:
         """Converts (worlds, 2) shares of the maximum speed along x and y to (worlds, 14) raw actions.

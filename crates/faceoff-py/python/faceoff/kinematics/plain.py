@@ -8,7 +8,8 @@ the universal joint at the rod's tip. All functions take any sequences of number
 `inverse` has two ways to choose among the many poses that put the mallet at a point:
 
 - Without a start it returns *the* pose of the point, in closed form: joints 3, 5 and 7 at zero, joint 1 turned
-  towards the point, joints 2, 4 and 6 in a vertical plane, elbow up. The hand's angle is a fixed linear function
+  towards the point, joints 2, 4 and 6 in a vertical plane, elbow up. The angle of the hand (the part from joint 6
+  to the end effector) is a fixed linear function
   of the reach, chosen so that the start pose of an episode is the pose of its own point. Poses change smoothly with
   their points, so `posture_velocities` can give the joint velocities for a moving point.
 - From a start `q0` it moves all seven joints as little as it can: damped least squares, each joint weighted by its
@@ -50,10 +51,13 @@ JOINT_MARGIN_RAD = 0.01
 HEIGHT_MARGIN_M = 0.01
 # A pose is a solution if its end effector is this close to the point, metres.
 TOLERANCE_M = 1e-6
-# The iteration stops at this distance, metres.
+# The least-squares iteration stops when the end effector is this close to the point, metres.
 GOAL_M = 1e-10
+# Most iterations.
 ITERATIONS = 100
+# Longest step of an iteration, in joint space.
 STEP_LIMIT_RAD = 0.3
+# Added to the diagonal of the normal equations, so that they always have a solution.
 DAMPING = 1e-6
 
 # The arm in one plane: height of joint 2, then from joint 2 to 4, from 4 to 6, from 6 to the end effector.
@@ -76,6 +80,7 @@ JOINT_BOUND_RAD = tuple(
     )
     for joint, limit in enumerate(POSITION_LIMIT_RAD)
 )
+# Weight of each joint in least squares: a fast joint moves more.
 WEIGHT = tuple(limit * limit for limit in VELOCITY_LIMIT_RAD_S)
 
 Vector = tuple[float, float, float]
@@ -186,11 +191,11 @@ def constraints(q: Sequence[float], dq: Sequence[float]) -> dict[str, float]:
 
 def _chain(q: Sequence[float]) -> tuple[list[Vector], list[Vector]]:
     """Origins of links 1…7 and of the end effector, and the joints' axes."""
-    x, y, z, at = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    x, y, z, origin = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     origins: list[Vector] = []
     axes: list[Vector] = []
     for joint, (angle, (_, along_y, along_z)) in enumerate(zip(q, LINK_OFFSET_M)):
-        at = _sum(at, _sum(_scaled(y, along_y), _scaled(z, along_z)))
+        origin = _sum(origin, _sum(_scaled(y, along_y), _scaled(z, along_z)))
         # A link's frame in its parent's at angle 0: aligned, half a turn about y + z, a quarter turn about x.
         if joint in (1, 2, 4, 6):
             x, y, z = _scaled(x, -1.0), z, y
@@ -201,15 +206,15 @@ def _chain(q: Sequence[float]) -> tuple[list[Vector], list[Vector]]:
             _sum(_scaled(x, cosine), _scaled(y, sine)),
             _sum(_scaled(y, cosine), _scaled(x, -sine)),
         )
-        origins.append(at)
+        origins.append(origin)
         axes.append(z)
-    origins.append(_sum(at, _scaled(z, END_EFFECTOR_Z_M)))
+    origins.append(_sum(origin, _scaled(z, END_EFFECTOR_Z_M)))
     return origins, axes
 
 
 def _jacobian(origins: Sequence[Vector], axes: Sequence[Vector]) -> list[list[float]]:
     tip = origins[JOINTS]
-    columns = [_cross(axis, _sum(tip, _scaled(at, -1.0))) for axis, at in zip(axes, origins)]
+    columns = [_cross(axis, _sum(tip, _scaled(origin, -1.0))) for axis, origin in zip(axes, origins)]
     return [[column[row] for column in columns] for row in range(3)]
 
 
@@ -244,7 +249,8 @@ def _least_squares(point: Vector, q0: Sequence[float]) -> list[float]:
         rows = _jacobian(origins, axes)
         # Change of the wrist's height with each joint; joint 7's axis passes through the wrist.
         rise = [
-            _cross(axis, _sum(origins[6], _scaled(at, -1.0)))[2] for axis, at in zip(axes, origins)
+            _cross(axis, _sum(origins[6], _scaled(origin, -1.0)))[2]
+            for axis, origin in zip(axes, origins)
         ]
         step = _step(rows, rise, error, deficit, WEIGHT)
         usable = [

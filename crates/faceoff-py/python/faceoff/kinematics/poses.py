@@ -11,11 +11,16 @@ from faceoff.kinematics.arrays import Floats, broadcast, joints, points
 
 _OFFSETS = np.array(model.LINK_OFFSET_M)
 _MOUNTS = np.array(model.LINK_MOUNT)
+# Of commanded joint positions, ± rad.
 _BOUND = np.array(plain.JOINT_BOUND_RAD)
+# Of each joint in least squares: a fast joint moves more.
 _WEIGHT = np.array(model.VELOCITY_LIMIT_RAD_S) ** 2
+# The hand (from joint 6 to the end effector) from straight up in the start pose, rad.
 _HAND_START = plain.START_HAND_RAD
+# Lengths of the arm's three parts in its vertical plane, m.
 _UPPER, _FOREARM, _HAND = plain.UPPER_ARM_M, plain.FOREARM_M, plain.HAND_M
-_HEIGHT = model.LINK_HEIGHT_M + plain.HEIGHT_MARGIN_M
+# Minimum height of elbow and wrist, m.
+_MIN_HEIGHT = model.LINK_HEIGHT_M + plain.HEIGHT_MARGIN_M
 
 
 def forward(q: ArrayLike) -> Floats:
@@ -115,17 +120,17 @@ def _frames(q: Floats) -> tuple[Floats, Floats]:
     leading = q.shape[:-1]
     origins = np.empty((*leading, model.JOINTS + 1, 3))
     rotations = np.empty((*leading, model.JOINTS, 3, 3))
-    at = np.zeros((*leading, 3))
+    origin = np.zeros((*leading, 3))
     rotation = np.broadcast_to(np.eye(3), (*leading, 3, 3))
     for joint in range(model.JOINTS):
-        at = at + rotation @ _OFFSETS[joint]
+        origin = origin + rotation @ _OFFSETS[joint]
         mounted = rotation @ _MOUNTS[joint]
         sine, cosine = np.sin(q[..., joint, None]), np.cos(q[..., joint, None])
         x, y = mounted[..., 0], mounted[..., 1]
         rotation = np.stack([x * cosine + y * sine, y * cosine - x * sine, mounted[..., 2]], axis=-1)
-        origins[..., joint, :] = at
+        origins[..., joint, :] = origin
         rotations[..., joint, :, :] = rotation
-    origins[..., model.JOINTS, :] = at + rotation[..., 2] * model.END_EFFECTOR_Z_M
+    origins[..., model.JOINTS, :] = origin + rotation[..., 2] * model.END_EFFECTOR_Z_M
     return origins, rotations
 
 
@@ -175,7 +180,7 @@ def _least_squares(point: Floats, q0: Floats) -> Floats:
         pose = q[active]
         origins, axes = _chain(pose)
         error = point[active] - origins[:, -1]
-        deficit = _HEIGHT - origins[:, 6, 2]
+        deficit = _MIN_HEIGHT - origins[:, 6, 2]
         unfinished = (np.sqrt(np.sum(error * error, axis=-1)) >= plain.GOAL_M) | (deficit > 0.0)
         if not unfinished.any():
             break
@@ -187,9 +192,9 @@ def _least_squares(point: Floats, q0: Floats) -> Floats:
         step = _step(rows, rise, error, deficit, np.broadcast_to(_WEIGHT, pose.shape))
         stuck = (np.abs(pose + step) > _BOUND) & (np.abs(pose) >= _BOUND) & (pose * step > 0.0)
         usable = np.where(stuck, 0.0, _WEIGHT)
-        redo = stuck.any(axis=-1)
-        if redo.any():
-            step[redo] = _step(rows[redo], rise[redo], error[redo], deficit[redo], usable[redo])
+        again = stuck.any(axis=-1)
+        if again.any():
+            step[again] = _step(rows[again], rise[again], error[again], deficit[again], usable[again])
         length = np.sqrt(np.sum(step * step, axis=-1, keepdims=True))
         share = np.minimum(1.0, plain.STEP_LIMIT_RAD / np.maximum(length, 1e-300))
         q[active] = np.clip(pose + share * step, -_BOUND, _BOUND)
@@ -225,7 +230,7 @@ def is_solution(q: Floats, point: Floats) -> NDArray[np.bool_]:
     origins, _ = _chain(q)
     error = point - origins[..., -1, :]
     near = np.sum(error * error, axis=-1) <= plain.TOLERANCE_M**2
-    high = np.min(origins[..., [3, 6], 2], axis=-1) >= _HEIGHT - 1e-9
+    high = np.min(origins[..., [3, 6], 2], axis=-1) >= _MIN_HEIGHT - 1e-9
     solved: NDArray[np.bool_] = near & high & np.all(np.abs(q) <= _BOUND, axis=-1)
     return solved
 

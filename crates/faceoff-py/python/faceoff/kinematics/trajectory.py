@@ -1,8 +1,8 @@
 """Trajectories of the mallet, as actions for every interpolation of the protocol.
 
-A trajectory is a minimum-jerk polynomial of the mallet's position over time, followed by the postures of `inverse`. Its
-knots, one per control step, are exact. Between them the controller interpolates; the deviation is what a polynomial of
-its order cannot follow within 20 ms.
+A trajectory is a minimum-jerk polynomial of the mallet's position over time. The joints follow it with the postures
+that `inverse` gives for each position. Its knots, one per control step, are exact. Between them the controller
+interpolates; the deviation is what a polynomial of its order cannot follow within 20 ms.
 """
 
 from dataclasses import dataclass

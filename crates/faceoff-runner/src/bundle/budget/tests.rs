@@ -1,4 +1,4 @@
-//! The budget's own failures: timeout, cancellation, and limits that no archive of a test reaches.
+//! Tests of the budget's own failures: timeout, cancellation, and limits that are too large for an archive in a test.
 
 use super::*;
 
@@ -22,22 +22,19 @@ fn timeout_is_a_platform_fault_and_cancellation_is_none() {
     elapsed.set(Duration::from_secs(61));
     let read_error = reader.read(&mut [0; 10]).unwrap_err();
     // The budget's failure is reported, even if a library replaces the error.
-    let message: Result<(), _> =
+    let result: Result<(), _> =
         budget.prefer_own_failure(Err(BundleError::from_read_error("x")(read_error)));
     assert!(
-        matches!(&message, Err(BundleError::Io(error)) if error.kind() == io::ErrorKind::TimedOut),
-        "{message:?}"
+        matches!(&result, Err(BundleError::Io(error)) if error.kind() == io::ErrorKind::TimedOut),
+        "{result:?}"
     );
 
     elapsed.set(Duration::ZERO);
     let budget = Budget::new(&LIMITS, &now, &is_cancelled);
     budget.count_entry().unwrap();
     cancelled.set(true);
-    let message = budget.prefer_own_failure(budget.count_entry());
-    assert!(
-        matches!(message, Err(BundleError::Cancelled)),
-        "{message:?}"
-    );
+    let result = budget.prefer_own_failure(budget.count_entry());
+    assert!(matches!(result, Err(BundleError::Cancelled)), "{result:?}");
 }
 
 #[test]
@@ -62,9 +59,11 @@ fn overhead_is_counted_for_any_reader() {
     let (now, never) = (Instant::now, || false);
     let budget = Budget::new(&LIMITS, &now, &never);
     let mut reader = MeteredReader::new(io::repeat(0), &budget);
-    let read = io::copy(&mut reader, &mut io::sink()).unwrap_err();
-    let message = budget.prefer_own_failure(Err::<(), _>(BundleError::from_read_error("")(read)));
-    let BundleError::Invalid(message) = message.unwrap_err() else {
+    let read_error = io::copy(&mut reader, &mut io::sink()).unwrap_err();
+    let result = budget.prefer_own_failure(Err::<(), _>(BundleError::from_archive_read_error(
+        read_error,
+    )));
+    let BundleError::Invalid(message) = result.unwrap_err() else {
         panic!("expected a refusal of the archive");
     };
     assert!(message.contains("than its files explain"), "{message}");

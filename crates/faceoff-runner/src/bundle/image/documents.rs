@@ -1,5 +1,5 @@
-//! Finds the layers of a container image in the JSON documents of its archive. An archive has a list of images, written by Docker, or an
-//! *OCI layout* (the format of the Open Container Initiative), or both.
+//! Finds the layers of a container image in the JSON documents of its archive. An archive has a list of images, written
+//! by Docker, or an *OCI layout* (the format of the Open Container Initiative), or both.
 
 use super::{
     archive::{Archive, DOCKER_LIST, OCI_INDEX},
@@ -225,7 +225,7 @@ pub(super) fn read(archive: &mut Archive<'_>) -> Result<ImageParts, BundleError>
         .map(layer_part);
     let variables = config.config.and_then(|config| config.env);
     Ok(ImageParts {
-        env: env::read(&variables.unwrap_or_default())?,
+        env: env::parse(&variables.unwrap_or_default())?,
         layers: layers.collect::<Result<_, BundleError>>()?,
     })
 }

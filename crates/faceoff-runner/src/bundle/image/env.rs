@@ -14,7 +14,7 @@ const MAX_BYTES: usize = 64 << 10;
 /// Parses the variables of an image's `ENV`, each `NAME=VALUE`. Of two variables with the same name, the later one
 /// applies. Names that no shell supports are left out: an image inherits them from its base image and cannot remove
 /// them.
-pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, BundleError> {
+pub(super) fn parse(entries: &[String]) -> Result<BTreeMap<String, String>, BundleError> {
     if entries.len() > MAX_VARIABLES {
         return Err(invalid(format_args!(
             "sets {} variables (ENV); at most {MAX_VARIABLES} are allowed",
@@ -26,7 +26,7 @@ pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, Bundl
             "sets variables (ENV) of more than {MAX_BYTES} bytes"
         )));
     }
-    let read_one = |entry: &String| {
+    let parse_entry = |entry: &String| {
         let shown = |text: &str| {
             escape_unprintable(text)
                 .chars()
@@ -53,7 +53,7 @@ pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, Bundl
     };
     entries
         .iter()
-        .filter_map(|entry| read_one(entry).transpose())
+        .filter_map(|entry| parse_entry(entry).transpose())
         .collect()
 }
 
@@ -61,10 +61,11 @@ pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, Bundl
 mod tests {
     use super::*;
 
+    /// The parsed variables, or the error, as a text.
     fn result_text(entries: &[&str]) -> String {
         let entries: Vec<String> = entries.iter().map(|&entry| entry.to_owned()).collect();
-        match read(&entries) {
-            Ok(read) => format!("{read:?}"),
+        match parse(&entries) {
+            Ok(variables) => format!("{variables:?}"),
             Err(error) => error.to_string(),
         }
     }

@@ -25,7 +25,7 @@ pub(super) fn apply<'a>(
     let mut packed_layer = BufReader::with_capacity(64 << 10, archive.open(&layer.name)?);
     let head = packed_layer
         .fill_buf()
-        .map_err(BundleError::from_read_error(""))?;
+        .map_err(BundleError::from_archive_read_error)?;
     let format = ArchiveFormat::detect(head);
     let is_compressed = matches!(format, Some(ArchiveFormat::TarGz | ArchiveFormat::TarZst));
     // An uncompressed layer has the same digest as a blob and as a layer, so it is hashed while it is applied.
@@ -36,13 +36,13 @@ pub(super) fn apply<'a>(
         Some(ArchiveFormat::TarGz) => {
             let streams: MultiStreamReader<'_, _, flate2::bufread::GzDecoder<_>> =
                 MultiStreamReader::new(packed_layer, budget)
-                    .map_err(BundleError::from_read_error(""))?;
+                    .map_err(BundleError::from_archive_read_error)?;
             apply_tar(streams, &layer.diff_id, root, budget)
         }
         Some(ArchiveFormat::TarZst) => {
             let streams: MultiStreamReader<'_, _, zstd::Decoder<'static, _>> =
                 MultiStreamReader::new(packed_layer, budget)
-                    .map_err(BundleError::from_read_error(""))?;
+                    .map_err(BundleError::from_archive_read_error)?;
             apply_tar(streams, &layer.diff_id, root, budget)
         }
         Some(ArchiveFormat::Zip) => Err(unsupported_format("a .zip")),
@@ -72,6 +72,6 @@ fn apply_tar<'a>(
         &mut MeteredReader::new(&mut hashed, budget),
         &mut io::sink(),
     )
-    .map_err(BundleError::from_read_error(""))?;
+    .map_err(BundleError::from_archive_read_error)?;
     diff_id.check("its uncompressed content", hashed.into_hash())
 }

@@ -1,5 +1,5 @@
-//! The root folder of a container image, to which its *layers* (archives) are applied one over another. A layer hides entries of lower
-//! layers by *whiteouts*: empty files with special names.
+//! The root folder of a container image, to which its *layers* (archives) are applied one over another. A layer hides
+//! entries of lower layers by *whiteouts*: empty files with special names.
 
 use super::messages::{dockerfile_hint, invalid};
 use crate::bundle::{
@@ -475,7 +475,7 @@ impl<'a> Root<'a> {
 
 impl Sink for Root<'_> {
     /// An existing folder stays unchanged, because all folders have the same mode.
-    fn folder(&mut self, entry: &str, _mode: u32) -> Result<(), BundleError> {
+    fn add_folder(&mut self, entry: &str, _mode: u32) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
@@ -494,7 +494,12 @@ impl Sink for Root<'_> {
     }
 
     /// Set-id bits are dropped: they have no effect in the sandbox, and many images have some.
-    fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError> {
+    fn add_file(
+        &mut self,
+        entry: &str,
+        mode: u32,
+        content: &mut dyn Read,
+    ) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
@@ -502,8 +507,9 @@ impl Sink for Root<'_> {
         write_new(entry, &disk_path, mode, content, self.budget)
     }
 
-    /// [`Root::finish`] creates the link on the disk. It may point anywhere, because it is followed only inside of the sandbox.
-    fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+    /// [`Root::finish`] creates the link on the disk. It may point anywhere, because it is followed only inside of the
+    /// sandbox.
+    fn add_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
@@ -514,7 +520,7 @@ impl Sink for Root<'_> {
 
     /// Adds another name of a file or link of this layer or a layer below. The folders of both names are resolved; the
     /// last components are not followed.
-    fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+    fn add_hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
@@ -560,7 +566,7 @@ impl Sink for Root<'_> {
 
     /// Devices, pipes and sockets are left out, because they could not be opened in the sandbox. Whiteouts in the
     /// format of overlayfs are refused, because layers saved by container engines do not contain them.
-    fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {
+    fn add_special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };

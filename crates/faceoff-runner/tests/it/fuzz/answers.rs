@@ -1,3 +1,5 @@
+//! Fuzz test of agents' answers (lines of JSON): each is valid, or an agent fault with a printable message.
+
 use super::{assert_outcomes, fuzz, mutation::mutate};
 use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation, escape_unprintable};
 use faceoff_wire::{
@@ -7,6 +9,7 @@ use faceoff_wire::{
 };
 use serde_json::Value;
 
+/// Texts that mutations insert.
 const WORDS: [&str; 24] = [
     "NaN",
     "-Infinity",
@@ -34,6 +37,7 @@ const WORDS: [&str; 24] = [
     "\u{1b}[2J",
 ];
 
+/// A valid answer to step 7.
 fn act(interpolation: Interpolation) -> String {
     fn nest(shape: &[usize], numbers: &mut impl Iterator<Item = String>) -> String {
         match shape.split_first() {

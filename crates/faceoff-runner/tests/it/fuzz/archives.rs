@@ -1,3 +1,5 @@
+//! Fuzz test of bundles: each archive is unpacked inside of its folder, or refused as invalid.
+
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use crate::archives::{MANIFEST, Tar, write};
 use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
@@ -11,6 +13,7 @@ use std::{
 use tar::EntryType;
 use zip::{ZipWriter, write::SimpleFileOptions};
 
+/// Limits that mutations exceed often.
 const LIMITS: BundleLimits = BundleLimits {
     packed_bytes: 4000,
     unpacked_bytes: 20_000,
@@ -18,6 +21,7 @@ const LIMITS: BundleLimits = BundleLimits {
     unpack_s: 600,
 };
 
+/// Names of entries, valid and malicious.
 const NAMES: [&str; 22] = [
     "agent.toml",
     "agent.py",
@@ -43,6 +47,7 @@ const NAMES: [&str; 22] = [
     "\u{1b}[2J",
 ];
 
+/// Targets of links, inside and outside of the bundle.
 const TARGETS: [&str; 12] = [
     "agent.py",
     "..",
@@ -58,6 +63,7 @@ const TARGETS: [&str; 12] = [
     "agent.toml",
 ];
 
+/// Modes of entries, some with set-id bits.
 const MODES: [u32; 6] = [0o644, 0o755, 0o600, 0o000, 0o4755, 0o2644];
 
 struct Entry {
@@ -84,7 +90,7 @@ fn entries(rng: &mut Rng) -> Vec<Entry> {
         file(&format!("{top}weights/w.bin"), &[7; 600]),
     ];
     for _ in 0..rng.below(4) {
-        let at = rng.below(entries.len() + 1);
+        let position = rng.below(entries.len() + 1);
         let mut entry = file(rng.pick::<&str>(&NAMES), b"x");
         entry.kind = *rng.pick(&[
             EntryType::Regular,
@@ -108,7 +114,7 @@ fn entries(rng: &mut Rng) -> Vec<Entry> {
             4 => mutate(&mut entry.content, &["name = 3"], rng),
             _ => {}
         }
-        entries.insert(at, entry);
+        entries.insert(position, entry);
     }
     if rng.once_in(10) {
         entries[0].kind = *rng.pick(&[EntryType::Directory, EntryType::Symlink]);
@@ -177,6 +183,7 @@ fn zip_of(entries: &[Entry], rng: &mut Rng) -> Vec<u8> {
     bytes
 }
 
+/// A tar or zip archive, with mutations.
 fn archive(rng: &mut Rng) -> Vec<u8> {
     let entries = entries(rng);
     let mut bytes = match rng.below(3) {
@@ -208,8 +215,8 @@ fn check_tree(root: &Path, folder: &Path, bytes: &mut u64) {
         let (path, metadata) = (entry.path(), entry.metadata().unwrap());
         let mode = metadata.permissions().mode();
         if metadata.is_symlink() {
-            if let Ok(place) = path.canonicalize() {
-                assert!(place.starts_with(root), "{} leads out", path.display());
+            if let Ok(target) = path.canonicalize() {
+                assert!(target.starts_with(root), "{} leads out", path.display());
             }
         } else {
             assert_eq!(mode & 0o7000, 0, "{}", path.display());

@@ -1,3 +1,5 @@
+//! Fuzz test of datasets: each is read, or refused as differing, altered or unreadable.
+
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use faceoff_dataset::{
     Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble,
@@ -16,6 +18,7 @@ use std::{
 use tempfile::TempDir;
 use zip::ZipArchive;
 
+/// Texts that mutations insert.
 const WORDS: [&str; 16] = [
     "null",
     "-1",
@@ -62,22 +65,22 @@ fn record_dataset(dir: &Path) {
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let interpolation = Some(Interpolation::Linear);
-        let mut course =
+        let mut running =
             RunningEpisode::begin(&arena, spec.task, episode, interpolation, &mut recorder);
         let outcome = loop {
-            let question = course.question().unwrap();
+            let question = running.question().unwrap();
             if question.step == 30 {
                 let line = Some("oops".to_owned());
                 let fault = faceoff_types::AgentFaultKind::NonFinite;
-                break course.outcome_after_fault(Phase::Step, fault, line);
+                break running.outcome_after_fault(Phase::Step, fault, line);
             }
             let action = question.observation[6..13].to_vec();
-            let answered = AnswerTiming {
+            let timing = AnswerTiming {
                 computation_time_s: 0.001,
                 host_time_s: 0.0,
                 cpu_time_s: None,
             };
-            if let Some(outcome) = course.answer(&action, answered).unwrap() {
+            if let Some(outcome) = running.answer(&action, timing).unwrap() {
                 break outcome;
             }
         };
@@ -173,7 +176,7 @@ impl ValidRecording {
     }
 }
 
-/// Reads everything until the first error.
+/// Reads the whole dataset, and stops at the first error.
 fn read(path: &Path, rng: &mut Rng) -> Result<(), VerifyError> {
     let dataset = if rng.once_in(2) {
         Dataset::open(path)?

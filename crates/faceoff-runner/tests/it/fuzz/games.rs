@@ -1,3 +1,5 @@
+//! Fuzz test of recordings of games: each is read, or refused as differing, altered or unreadable.
+
 use super::{assert_outcomes, datasets::ValidRecording, fuzz, rng::Rng};
 use faceoff_dataset::{
     DatasetError,
@@ -27,22 +29,22 @@ fn record_game(out: &Path) {
     };
     let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
-    let mut course = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
-    while course.end().is_none() {
+    let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    while game.end().is_none() {
         let entries = Side::BOTH.map(|side| RallyEntry::Ready {
-            startup_s: course.needs_start(side).then_some(0.25),
+            startup_s: game.needs_start(side).then_some(0.25),
             interpolation: Interpolation::Linear,
             reset_s: 0.125,
         });
-        course.start_rally(entries).unwrap();
-        while course.is_in_rally() {
-            let step = course.rally_steps();
+        game.start_rally(entries).unwrap();
+        while game.is_in_rally() {
+            let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {
-                let question = course.question(side).unwrap()?;
+                let question = game.question(side).unwrap()?;
                 Some(question.observation[6..13].to_vec())
             });
             let responses = Side::BOTH.map(|side| {
-                let answered = AnswerTiming {
+                let timing = AnswerTiming {
                     computation_time_s: if step == 7 { 0.03125 } else { 0.001953125 },
                     host_time_s: 0.0,
                     cpu_time_s: None,
@@ -54,30 +56,27 @@ fn record_game(out: &Path) {
                             kind: AgentFaultKind::NonFinite,
                             line: Some("oops".to_owned()),
                         },
-                        timing: answered,
+                        timing,
                     },
-                    Some(action) => Response::Answer {
-                        action,
-                        timing: answered,
-                    },
+                    Some(action) => Response::Answer { action, timing },
                 }
             });
-            course.answer(responses).unwrap();
+            game.answer(responses).unwrap();
         }
     }
-    let record_game = RecordedGame {
+    let recorded = RecordedGame {
         spec: &spec,
         agents: &["one".to_owned(), "other".to_owned()],
-        finished: course.finish(),
+        finished: game.finish(),
         calibration: GameCalibration {
             sides: [SlotTiming::default(); 2],
         },
         logs: &["log of one\n".to_owned(), "log of the other\n".to_owned()],
     };
-    record_game.write(out).unwrap();
+    recorded.write(out).unwrap();
 }
 
-/// Reads everything until the first error.
+/// Reads the whole recording, and stops at the first error.
 fn read(path: &Path) -> Result<(), VerifyError> {
     GameRecording::is_at(path)?;
     let recording = GameRecording::open(path)?;
@@ -86,6 +85,7 @@ fn read(path: &Path) -> Result<(), VerifyError> {
     verify_game(&recording, &|_| ()).map(drop)
 }
 
+/// Reads a mutated recording; returns the label of the outcome.
 fn read_mutated(valid: &ValidRecording, dir: &Path, rng: &mut Rng) -> &'static str {
     match read(&valid.write_mutated(dir, rng)) {
         Ok(()) => "read",

@@ -1,3 +1,5 @@
+//! Fuzz test of container images: each is unpacked inside of its root, or refused as invalid.
+
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use crate::{
     archives::{Tar, write},
@@ -7,6 +9,7 @@ use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
 use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 use tar::EntryType;
 
+/// Limits that mutations exceed often.
 const LIMITS: BundleLimits = BundleLimits {
     packed_bytes: 200_000,
     unpacked_bytes: 60_000,
@@ -14,7 +17,7 @@ const LIMITS: BundleLimits = BundleLimits {
     unpack_s: 600,
 };
 
-/// Few names, so that entries of different layers collide.
+/// Names of entries; few, so that entries of different layers collide.
 const NAMES: [&str; 32] = [
     "a",
     "a/",
@@ -50,7 +53,7 @@ const NAMES: [&str; 32] = [
     "",
 ];
 
-/// `HOST` is replaced by a folder of the host.
+/// Targets of links. `HOST` is replaced by a folder of the host.
 const TARGETS: [&str; 16] = [
     "a",
     "b",
@@ -70,6 +73,7 @@ const TARGETS: [&str; 16] = [
     "",
 ];
 
+/// A layer of random entries.
 fn layer(rng: &mut Rng, host: &str) -> Tar {
     (0..rng.below(10)).fold(Tar::new(), |tar, _| {
         let name = *rng.pick::<&str>(&NAMES);
@@ -110,10 +114,11 @@ fn layer(rng: &mut Rng, host: &str) -> Tar {
     })
 }
 
+/// An image with an agent's layer at a random position, with mutations.
 fn archive(rng: &mut Rng, host: &str) -> Vec<u8> {
     let mut layers: Vec<Tar> = (0..rng.below(5)).map(|_| layer(rng, host)).collect();
-    let at = rng.below(layers.len() + 1);
-    layers.insert(at, agent_layer());
+    let position = rng.below(layers.len() + 1);
+    layers.insert(position, agent_layer());
     let image =
         TestImage::new(layers).packed(*rng.pick(&[Packing::Plain, Packing::Gzip, Packing::Zstd]));
     let tar = if rng.once_in(2) {
@@ -156,9 +161,9 @@ fn image_is_unpacked_inside_or_refused_as_invalid() {
     let host = root.join("h");
     fs::create_dir(&host).unwrap();
     fs::write(host.join("secret"), "secret").unwrap();
-    let shown = host.to_str().unwrap();
+    let host_path = host.to_str().unwrap();
     let outcomes = fuzz("images", 3000, |rng| {
-        let packed = write(&root, "upload", &archive(rng, shown));
+        let packed = write(&root, "upload", &archive(rng, host_path));
         let into = root.join("out");
         let label = match unpack(&packed, &into, &LIMITS, &|| false) {
             Ok(bundle) => {
@@ -167,9 +172,9 @@ fn image_is_unpacked_inside_or_refused_as_invalid() {
                 let mut unpacked = 0;
                 check_tree(&image.root, &mut unpacked);
                 assert!(unpacked <= 2 * LIMITS.unpacked_bytes);
-                for place in ["agent", "dev", "etc", "proc", "sys", "tmp"] {
-                    let metadata = image.root.join(place).symlink_metadata();
-                    assert!(metadata.unwrap().is_dir(), "{place}");
+                for folder in ["agent", "dev", "etc", "proc", "sys", "tmp"] {
+                    let metadata = image.root.join(folder).symlink_metadata();
+                    assert!(metadata.unwrap().is_dir(), "{folder}");
                 }
                 "accepted".to_owned()
             }

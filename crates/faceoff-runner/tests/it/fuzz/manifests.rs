@@ -1,3 +1,5 @@
+//! Fuzz test of manifests (`agent.toml`): each is parsed, or the wrong key is named.
+
 use super::{assert_outcomes, fuzz, mutation::mutate};
 use faceoff_types::is_printable;
 use faceoff_wire::{Manifest, ManifestError};
@@ -8,6 +10,7 @@ const VALID: [&str; 2] = [
     "# a comment\nname = 'x'\ncommand = ['''./agent''']\nruntime = \"native\"\nenv = { A = \"\\u0061\" }\n",
 ];
 
+/// Texts that mutations insert.
 const WORDS: [&str; 24] = [
     "\"\"",
     "''",

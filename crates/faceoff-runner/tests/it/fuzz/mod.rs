@@ -17,14 +17,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Prints how to repeat a failed run.
-struct Run<'a> {
+/// Prints how to repeat the run if it panics.
+struct RunGuard<'a> {
     target: &'a str,
     seed: u64,
     number: u64,
 }
 
-impl Drop for Run<'_> {
+impl Drop for RunGuard<'_> {
     #[expect(clippy::print_stderr, reason = "a panic is about to be reported")]
     fn drop(&mut self) {
         if std::thread::panicking() {
@@ -38,7 +38,8 @@ impl Drop for Run<'_> {
     }
 }
 
-fn number(variable: &str) -> Option<u64> {
+/// The number in an environment variable, if it is set.
+fn env_number(variable: &str) -> Option<u64> {
     let value = env::var(variable).ok()?;
     Some(value.parse().expect("a whole number"))
 }
@@ -49,16 +50,16 @@ fn number(variable: &str) -> Option<u64> {
 fn fuzz(
     target: &str,
     runs: u64,
-    mut once: impl FnMut(&mut Rng) -> String,
+    mut run_once: impl FnMut(&mut Rng) -> String,
 ) -> BTreeMap<String, u64> {
-    let seed = number("FUZZ_SEED").unwrap_or(1);
-    let minutes = number("FUZZ_MINUTES").map(|minutes| Duration::from_secs(60 * minutes));
+    let seed = env_number("FUZZ_SEED").unwrap_or(1);
+    let minutes = env_number("FUZZ_MINUTES").map(|minutes| Duration::from_secs(60 * minutes));
     let started = Instant::now();
-    let first = number("FUZZ_RUN");
+    let repeated_run = env_number("FUZZ_RUN");
     let mut outcomes = BTreeMap::new();
     let mut runs_done = 0;
-    for number in first.unwrap_or(0).. {
-        let is_done = match (first, minutes) {
+    for number in repeated_run.unwrap_or(0).. {
+        let is_done = match (repeated_run, minutes) {
             (Some(_), _) => runs_done == 1,
             (None, Some(minutes)) => started.elapsed() >= minutes && runs_done >= runs,
             (None, None) => runs_done >= runs,
@@ -66,25 +67,25 @@ fn fuzz(
         if is_done {
             break;
         }
-        let run = Run {
+        let guard = RunGuard {
             target,
             seed,
             number,
         };
         *outcomes
-            .entry(once(&mut Rng::new(target, seed, number)))
+            .entry(run_once(&mut Rng::new(target, seed, number)))
             .or_default() += 1;
-        drop(run);
+        drop(guard);
         runs_done += 1;
     }
     println!("fuzz target {target}: {runs_done} runs with seed {seed}: {outcomes:#?}");
     outcomes
 }
 
-/// Asserts that every kind occurred. A repeated single run is not checked.
+/// Asserts that every kind of outcome occurred; `FUZZ_RUN` repeats a single run, which is not checked.
 #[track_caller]
 fn assert_outcomes(outcomes: &BTreeMap<String, u64>, kinds: &[&str]) {
-    if number("FUZZ_RUN").is_some() {
+    if env_number("FUZZ_RUN").is_some() {
         return;
     }
     let missing: Vec<_> = kinds

@@ -1,4 +1,6 @@
-/// SplitMix64: good enough to choose mutations.
+//! The random numbers of a fuzz run, determined by its seed.
+
+/// The generator SplitMix64, with its constants: good enough to choose mutations.
 pub struct Rng(u64);
 
 impl Rng {
@@ -12,6 +14,7 @@ impl Rng {
         rng
     }
 
+    /// The next 64 random bits.
     fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;

@@ -1,9 +1,10 @@
-//! Uncertainty of ratings: the bootstrap over games or mirrored pairs of games.
+//! Uncertainty of ratings: the bootstrap over *sampling units*, which are single games or mirrored pairs (two games with the
+//! same seed and swapped sides). The ratings are fitted again to many samples of the units, drawn with replacement.
 
 use super::{bradley_terry::Model, pools::pool_numbers, trial_counts::TrialCounts};
 use crate::draws::Draws;
 
-/// Bootstrap samples for the intervals of a pool.
+/// Bootstrap samples for the intervals of a pool (the submissions that games connect).
 pub const RESAMPLES: u32 = 1000;
 
 /// Minimum number of usable samples for an interval: with fewer, single samples would determine its ends.
@@ -56,48 +57,58 @@ impl Samples {
                 continue;
             }
             samples.usable += 1;
-            for (all, strength) in samples.strengths.iter_mut().zip(fit(&drawn)) {
-                all.push(strength);
+            for (strengths, strength) in samples.strengths.iter_mut().zip(fit(&drawn)) {
+                strengths.push(strength);
             }
         }
-        for all in &mut samples.strengths {
-            all.sort_unstable_by(f64::total_cmp);
+        for strengths in &mut samples.strengths {
+            strengths.sort_unstable_by(f64::total_cmp);
         }
         samples
     }
 
     /// The 2.5 % and 97.5 % quantiles of a submission's strength; `None` with too few usable samples.
     pub(super) fn interval95(&self, submission: usize) -> Option<[f64; 2]> {
-        let all = &self.strengths[submission];
+        let strengths = &self.strengths[submission];
         if self.usable < MIN_USABLE_SAMPLES {
             return None;
         }
         // The smallest value that at least this share of the samples does not exceed.
-        let quantile = |per_mille: usize| all[(per_mille * all.len()).div_ceil(1000) - 1];
+        let quantile =
+            |per_mille: usize| strengths[(per_mille * strengths.len()).div_ceil(1000) - 1];
         Some([quantile(25), quantile(975)])
     }
 }
 
+/// The key of the random draws: a hash of the units.
 fn key(units: &[Vec<TrialCounts>]) -> blake3::Hasher {
     let mut key = blake3::Hasher::new_derive_key(STREAM);
-    let mut number = |number: u64| {
+    let mut add = |number: u64| {
         key.update(&number.to_le_bytes());
     };
     for unit in units {
-        number(unit.len() as u64);
+        add(unit.len() as u64);
         for trials in unit {
-            trials.sides.iter().for_each(|side| number(*side as u64));
-            trials.won.iter().for_each(|won| number(u64::from(*won)));
+            trials.sides.iter().for_each(|side| add(*side as u64));
+            trials.won.iter().for_each(|won| add(u64::from(*won)));
         }
     }
     key
 }
 
-/// Fits a sample, starting at the strengths of all games, so that a step or two are enough.
+/// The fit of a sample. It starts at the strengths that all games give, so that a step or two are enough.
 pub(super) fn fit_from<'a>(
     start: &'a [f64],
-    value: f64,
+    trials_per_count: f64,
     prior_sd: f64,
 ) -> impl Fn(&[&TrialCounts]) -> Vec<f64> + 'a {
-    move |drawn| Model::new(start.len(), drawn.iter().copied(), value, prior_sd).fit(start)
+    move |drawn| {
+        Model::new(
+            start.len(),
+            drawn.iter().copied(),
+            trials_per_count,
+            prior_sd,
+        )
+        .fit(start)
+    }
 }

@@ -1,8 +1,8 @@
-//! The Bradley–Terry model: side a wins a trial against b with probability 1 / (1 + e^(θ_b − θ_a)). The prior of the
-//! strengths θ is independent and normal around 0; the fit is the most probable θ.
+//! The Bradley–Terry model: side a wins a trial (a game or a goal) against b with probability 1 / (1 + e^(θ_b − θ_a)). The
+//! prior of the strengths θ is independent and normal around 0; the fit is the most probable θ.
 //!
 //! The order of operations is fixed and functions are those of `libm`, so that published ratings have the same bits on
-//! every machine. Matrix products of libraries select instructions by the CPU.
+//! every machine. A linear algebra library would not guarantee that, since it selects instructions by the CPU.
 
 use super::trial_counts::TrialCounts;
 
@@ -21,11 +21,11 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// `value` is the number of trials per count of [`TrialCounts`]: ½ for half games, 1 for goals.
+    /// `trials_per_count` is the number of trials per count of [`TrialCounts`]: ½ for half games, 1 for goals.
     pub(super) fn new<'a>(
         submissions: usize,
         trial_counts: impl Iterator<Item = &'a TrialCounts>,
-        value: f64,
+        trials_per_count: f64,
         prior_sd: f64,
     ) -> Self {
         let mut won = vec![0_u64; submissions * submissions];
@@ -39,7 +39,7 @@ impl Model {
             for b in a + 1..submissions {
                 let counts = [won[a * submissions + b], won[b * submissions + a]];
                 if counts != [0, 0] {
-                    pairs.push(([a, b], counts.map(|count| value * count as f64)));
+                    pairs.push(([a, b], counts.map(|count| trials_per_count * count as f64)));
                 }
             }
         }
@@ -61,7 +61,7 @@ impl Model {
                 break;
             }
             // Far from the maximum a full step may decrease the posterior by more than rounding errors.
-            let floor = log_posterior - 1e-12 * log_posterior.abs();
+            let lowest_allowed = log_posterior - 1e-12 * log_posterior.abs();
             let mut scale = 1.0;
             let (moved, moved_log_posterior) = loop {
                 let moved: Vec<f64> = strengths
@@ -70,7 +70,7 @@ impl Model {
                     .map(|(strength, change)| strength + scale * change)
                     .collect();
                 let moved_log_posterior = self.log_posterior(&moved);
-                if moved_log_posterior >= floor || scale < 1e-6 {
+                if moved_log_posterior >= lowest_allowed || scale < 1e-6 {
                     break (moved, moved_log_posterior);
                 }
                 scale /= 2.0;
@@ -83,13 +83,14 @@ impl Model {
     fn log_posterior(&self, strengths: &[f64]) -> f64 {
         let mut sum = 0.0;
         for ([a, b], [won_a, won_b]) in &self.pairs {
-            let lead = strengths[*a] - strengths[*b];
-            sum -= won_a * log1p_exp(-lead) + won_b * log1p_exp(lead);
+            let difference = strengths[*a] - strengths[*b];
+            sum -= won_a * log1p_exp(-difference) + won_b * log1p_exp(difference);
         }
         let squares: f64 = strengths.iter().map(|strength| strength * strength).sum();
         sum - self.prior_precision / 2.0 * squares
     }
 
+    /// The step of Newton's method: the gradient of the log posterior, divided by its curvature.
     fn newton_step(&self, strengths: &[f64]) -> Vec<f64> {
         let n = self.submissions;
         let mut gradient: Vec<f64> = strengths
@@ -121,36 +122,38 @@ fn log1p_exp(x: f64) -> f64 {
     x.max(0.0) + libm::log1p(libm::exp(-x.abs()))
 }
 
-/// Solves `matrix · x = right` by Cholesky decomposition of the lower triangle. The matrix is positive definite, as a sum
-/// of the prior's diagonal and the squares of the pairs.
-fn solve(matrix: &mut [f64], mut right: Vec<f64>) -> Vec<f64> {
-    let n = right.len();
+/// Solves `matrix · x = right_side` by Cholesky decomposition of the lower triangle. The matrix is positive definite, as a
+/// sum of the prior's diagonal and of a positive semidefinite term for each pair.
+fn solve(matrix: &mut [f64], right_side: Vec<f64>) -> Vec<f64> {
+    let n = right_side.len();
     for row in 0..n {
         for column in 0..=row {
-            let mut rest = matrix[row * n + column];
+            let mut remainder = matrix[row * n + column];
             for k in 0..column {
-                rest -= matrix[row * n + k] * matrix[column * n + k];
+                remainder -= matrix[row * n + k] * matrix[column * n + k];
             }
             matrix[row * n + column] = if row == column {
-                rest.sqrt()
+                remainder.sqrt()
             } else {
-                rest / matrix[column * n + column]
+                remainder / matrix[column * n + column]
             };
         }
     }
+    // Forward substitution with the triangle, then backward substitution with its transpose, in place.
+    let mut x = right_side;
     for row in 0..n {
         for k in 0..row {
-            right[row] -= matrix[row * n + k] * right[k];
+            x[row] -= matrix[row * n + k] * x[k];
         }
-        right[row] /= matrix[row * n + row];
+        x[row] /= matrix[row * n + row];
     }
     for row in (0..n).rev() {
         for k in row + 1..n {
-            right[row] -= matrix[k * n + row] * right[k];
+            x[row] -= matrix[k * n + row] * x[k];
         }
-        right[row] /= matrix[row * n + row];
+        x[row] /= matrix[row * n + row];
     }
-    right
+    x
 }
 
 #[cfg(test)]

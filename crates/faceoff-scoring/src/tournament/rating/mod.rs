@@ -15,4 +15,4 @@ pub use bootstrap::{MIN_USABLE_SAMPLES, RESAMPLES};
 pub use ratings::{Pool, Prior, RatedSubmission, Rating, RatingError, Ratings, rate};
 pub use sampling_units::InvalidPair;
 pub(super) use sampling_units::sampling_units;
-pub use scale::{CENTRE, POINTS_PER_TENFOLD, PRIOR_SD, expected_score};
+pub use scale::{MEAN_RATING, POINTS_PER_TENFOLD, PRIOR_SD, expected_score};

@@ -1,4 +1,4 @@
-//! Pools of comparable submissions: those that games connect.
+//! Pools of comparable submissions: two submissions are in one pool if a chain of games connects them.
 
 use super::trial_counts::TrialCounts;
 
@@ -28,10 +28,10 @@ pub(super) fn pool_numbers<'a>(
     numbers
 }
 
-fn find_root(leader: &mut [usize], mut member: usize) -> usize {
-    while leader[member] != member {
-        leader[member] = leader[leader[member]]; // Path halving.
-        member = leader[member];
+fn find_root(parents: &mut [usize], mut member: usize) -> usize {
+    while parents[member] != member {
+        parents[member] = parents[parents[member]]; // Path halving.
+        member = parents[member];
     }
     member
 }

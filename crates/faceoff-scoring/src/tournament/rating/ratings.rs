@@ -1,9 +1,11 @@
+//! Ratings of submissions by the Bradley–Terry model, with intervals.
+
 use super::{
     bootstrap::{RESAMPLES, Samples, fit_from},
     bradley_terry::Model,
     pools::pool_numbers,
     sampling_units::{InvalidPair, sampling_units},
-    scale::{CENTRE, PRIOR_SD, PRIOR_SD_STRENGTH, rating_of},
+    scale::{MEAN_RATING, PRIOR_SD, PRIOR_SD_STRENGTH, rating_of},
     trial_counts::TrialCounts,
 };
 use crate::tournament::{game::PlayedGame, side::Side, submission_label::SubmissionLabel};
@@ -11,7 +13,8 @@ use faceoff_types::TeamName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Maximum number of submissions in a pool: the computation is cubic in it, times a thousand for the intervals.
+/// Maximum number of submissions in a pool. The computation time is cubic in this number, times a thousand for the
+/// intervals.
 const MAX_POOL: usize = 200;
 
 /// Ratings from results and from goals.
@@ -102,10 +105,10 @@ pub enum RatingError {
     TooMany(usize),
 }
 
-/// Rates the submissions of `games`, which are those that count.
+/// Rates the submissions of `games`; the caller leaves out games that do not count.
 ///
 /// In the Bradley–Terry model, a beats b with probability 1 / (1 + 10^((R_b − R_a) / 400)). The prior of each rating is
-/// normal around [`CENTRE`] with standard deviation [`PRIOR_SD`]; ratings are the maximum of the posterior. Intervals are
+/// normal around [`MEAN_RATING`] with standard deviation [`PRIOR_SD`]; ratings are the maximum of the posterior. Intervals are
 /// percentiles of the same estimate over games drawn with replacement; a mirrored pair is drawn as a whole.
 ///
 /// # Errors
@@ -124,7 +127,7 @@ pub fn rate<'a>(games: impl IntoIterator<Item = &'a PlayedGame>) -> Result<Ratin
     let input = RatingInput { units, numbers };
     Ok(Ratings {
         prior: Prior {
-            mean: CENTRE,
+            mean: MEAN_RATING,
             sd: PRIOR_SD,
         },
         resamples: RESAMPLES,
@@ -156,7 +159,7 @@ impl RatingBasis {
     }
 
     /// Trials per count of [`Self::trials_won`].
-    const fn value(self) -> f64 {
+    const fn trials_per_count(self) -> f64 {
         match self {
             Self::Results => 0.5,
             Self::Goals => 1.0,
@@ -164,13 +167,16 @@ impl RatingBasis {
     }
 }
 
-/// All games in sampling units, and their submissions, numbered by name.
+/// The games and submissions that are rated.
 struct RatingInput<'a> {
+    /// The sampling units of the bootstrap: single games and mirrored pairs.
     units: Vec<Vec<&'a PlayedGame>>,
+    /// All submissions, numbered by name from 0.
     numbers: BTreeMap<RatedSubmission, usize>,
 }
 
 impl RatingInput<'_> {
+    /// The pools of submissions that games connect, with their ratings.
     fn pools(&self, basis: RatingBasis) -> Result<Vec<Pool>, RatingError> {
         let units: Vec<Vec<TrialCounts>> = self
             .units
@@ -184,20 +190,20 @@ impl RatingInput<'_> {
             .collect();
         let pool_of = pool_numbers(self.numbers.len(), units.iter().flatten());
         // For each pool its members and units; all games of a unit are between the same two submissions.
-        let count = pool_of.iter().max().map_or(0, |last| last + 1);
-        let mut members = vec![Vec::new(); count];
+        let pool_count = pool_of.iter().max().map_or(0, |last| last + 1);
+        let mut members = vec![Vec::new(); pool_count];
         let mut index_in_pool = vec![0; self.numbers.len()];
         for (submission, pool) in pool_of.iter().enumerate() {
             index_in_pool[submission] = members[*pool].len();
             members[*pool].push(submission);
         }
-        let mut units_by_pool = vec![Vec::new(); count];
+        let mut units_by_pool = vec![Vec::new(); pool_count];
         for unit in units {
             let pool = pool_of[unit[0].sides[0]];
-            let in_pool = |counts: &TrialCounts| {
+            let with_pool_indices = |counts: &TrialCounts| {
                 TrialCounts::new(counts.sides.map(|side| index_in_pool[side]), counts.won)
             };
-            units_by_pool[pool].push(unit.iter().map(in_pool).collect::<Vec<_>>());
+            units_by_pool[pool].push(unit.iter().map(with_pool_indices).collect::<Vec<_>>());
         }
         let rated: Vec<&RatedSubmission> = self.numbers.keys().collect();
         members
@@ -216,6 +222,7 @@ impl RatingInput<'_> {
             .collect()
     }
 
+    /// The trials of a game; `None` if it has no influence on the ratings.
     fn trial_counts(&self, game: &PlayedGame, basis: RatingBasis) -> Option<TrialCounts> {
         let sides = Side::BOTH.map(|side| self.numbers[&RatedSubmission::from_side(game, side)]);
         Some(TrialCounts::new(sides, basis.trials_won(game)?)).filter(TrialCounts::is_informative)
@@ -236,7 +243,7 @@ fn rate_pool(rated: &[&RatedSubmission], units: Vec<Vec<TrialCounts>>, basis: Ra
     let strengths = Model::new(
         rated.len(),
         units.iter().flatten(),
-        basis.value(),
+        basis.trials_per_count(),
         PRIOR_SD_STRENGTH,
     )
     .fit(&vec![0.0; rated.len()]);
@@ -244,7 +251,7 @@ fn rate_pool(rated: &[&RatedSubmission], units: Vec<Vec<TrialCounts>>, basis: Ra
     let samples = Samples::draw(
         rated.len(),
         units,
-        fit_from(&strengths, basis.value(), PRIOR_SD_STRENGTH),
+        fit_from(&strengths, basis.trials_per_count(), PRIOR_SD_STRENGTH),
     );
     let mut ratings: Vec<Rating> = rated
         .iter()

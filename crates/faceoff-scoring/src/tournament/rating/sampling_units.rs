@@ -1,4 +1,4 @@
-//! Sampling units of the bootstrap: single games and mirrored pairs of games.
+//! Sampling units of the bootstrap: single games, and mirrored pairs (two games with the same seed and swapped sides).
 
 use crate::tournament::{game::PlayedGame, submission_label::SubmissionLabel};
 use faceoff_types::TeamName;

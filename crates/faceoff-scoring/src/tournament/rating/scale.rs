@@ -1,10 +1,12 @@
-/// Mean of the prior and of each pool, in rating points.
-pub const CENTRE: f64 = 1500.0;
+//! The scale of ratings. A submission's *strength* is the natural logarithm of its odds; *rating points* are on the Elo scale.
 
-/// Difference of ratings with odds of ten to one (Elo scale).
+/// Mean of the prior and of each pool, in rating points.
+pub const MEAN_RATING: f64 = 1500.0;
+
+/// Difference of two ratings at which the odds are ten to one (Elo scale).
 pub const POINTS_PER_TENFOLD: f64 = 400.0;
 
-/// Standard deviation of the prior around [`CENTRE`], in rating points.
+/// Standard deviation of the prior around [`MEAN_RATING`], in rating points.
 ///
 /// It is that of a new player in Glicko (M. E. Glickman, Applied Statistics 48, 1999). A dozen games outweigh it, and it
 /// keeps the rating of an unbeaten side finite.
@@ -17,7 +19,7 @@ const POINTS_PER_STRENGTH: f64 = POINTS_PER_TENFOLD / std::f64::consts::LN_10;
 pub(super) const PRIOR_SD_STRENGTH: f64 = PRIOR_SD / POINTS_PER_STRENGTH;
 
 pub(super) fn rating_of(strength: f64) -> f64 {
-    CENTRE + POINTS_PER_STRENGTH * strength
+    MEAN_RATING + POINTS_PER_STRENGTH * strength
 }
 
 /// Expected share of a game, or probability of the next goal, for a rating against another one:

@@ -1,3 +1,5 @@
+//! Trials between two submissions, the observations of the rating model.
+
 /// The numbers of trials that two submissions won against each other. Either a game is one trial with two halves, of which
 /// a draw gives one to each side, or each goal is a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

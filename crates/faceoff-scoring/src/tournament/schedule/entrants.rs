@@ -1,3 +1,5 @@
+//! The entrants of a tournament: all teams that have ever entered it.
+
 use super::error::ScheduleError;
 use faceoff_types::TeamName;
 
@@ -23,7 +25,7 @@ impl Entrants {
         match teams.len() {
             0 | 1 => Err(ScheduleError::TooFew(teams.len())),
             got if got > MAX_ENTRANTS => Err(ScheduleError::TooMany {
-                most: MAX_ENTRANTS,
+                max: MAX_ENTRANTS,
                 got,
             }),
             _ => Ok(Self(teams)),

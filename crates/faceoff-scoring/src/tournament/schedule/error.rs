@@ -1,3 +1,5 @@
+//! Errors of a schedule.
+
 use faceoff_types::{RoundNumber, TeamName};
 
 /// Why a schedule or the next round is impossible.
@@ -8,14 +10,16 @@ pub enum ScheduleError {
     TooFew(usize),
     /// Fewer than two finalists are left.
     #[error(
-        "a final needs at least two teams, {0} of the finalists are left; no more games are played"
+        "a final needs at least two teams, but {0} of the finalists are left; the tournament ends here"
     )]
     TooFewFinalists(usize),
     /// The tournament has too many teams.
-    #[error("a tournament has at most {most} teams, there are {got}; divide them")]
+    #[error(
+        "a tournament has at most {max} teams, there are {got}; split them into several tournaments"
+    )]
     TooMany {
         /// The maximum number of teams.
-        most: usize,
+        max: usize,
         /// The number of teams.
         got: usize,
     },

@@ -1,3 +1,5 @@
+//! The schedule of each tournament format: round robin, Swiss, and groups followed by a final.
+
 use super::{
     error::ScheduleError,
     groups::{draw_groups, finalists, group_matchdays},
@@ -42,7 +44,7 @@ impl Schedule for TournamentFormat {
     ) -> Result<Option<Round>, ScheduleError> {
         progress.check()?;
         let Some(number) = progress
-            .next_number()
+            .next_round_number()
             .filter(|number| *number <= self.last_round())
         else {
             return Ok(None);
@@ -106,7 +108,8 @@ impl Schedule for TournamentFormat {
     }
 }
 
-/// Checks the numbers of groups and finalists against the number of teams.
+/// Checks the numbers of groups and finalists against the number of teams; `advance` is the number of teams of each group that
+/// reach the final.
 fn check_groups(teams: usize, groups: u32, advance: u32) -> Result<usize, ScheduleError> {
     let count = groups as usize;
     if count < 1 || teams / count.max(1) < 2 {
@@ -117,9 +120,9 @@ fn check_groups(teams: usize, groups: u32, advance: u32) -> Result<usize, Schedu
     }
     let smallest = teams / count;
     if advance < 1 || advance as usize > smallest || count * (advance as usize) < 2 {
-        let least = if count == 1 { 2 } else { 1 };
+        let min_advance = if count == 1 { 2 } else { 1 };
         return Err(ScheduleError::Format(format!(
-            "advance: expected {least} to {smallest}, the size of the smallest group, got {advance}"
+            "advance: expected {min_advance} to {smallest}, the size of the smallest group, got {advance}"
         )));
     }
     Ok(count)

@@ -1,3 +1,5 @@
+//! Group stage of a tournament: the draw of the groups, their games and standings, and the finalists.
+
 use super::{
     progress::{PairingCounts, Progress},
     round::{Matchday, Round},
@@ -21,11 +23,11 @@ pub(super) fn draw_groups(
 ) -> Vec<Vec<TeamName>> {
     let mut teams = teams;
     draws.shuffle(&mut teams);
-    let mut all = vec![Vec::new(); groups];
+    let mut drawn = vec![Vec::new(); groups];
     for (index, team) in teams.into_iter().enumerate() {
-        all[index % groups].push(team.clone());
+        drawn[index % groups].push(team.clone());
     }
-    all
+    drawn
 }
 
 /// A round robin in each group; matchday n of the round combines matchday n of all groups.
@@ -33,18 +35,18 @@ pub(super) fn group_matchdays(
     groups: &[Vec<TeamName>],
     pairing_counts: &PairingCounts<'_>,
 ) -> Vec<Matchday> {
-    let mut all = Vec::<Matchday>::new();
+    let mut matchdays = Vec::<Matchday>::new();
     for group in groups {
         let group: Vec<&TeamName> = group.iter().collect();
         for (day, mut matchday) in round_robin(&group, pairing_counts).into_iter().enumerate() {
-            if all.len() == day {
-                all.push(Matchday::default());
+            if matchdays.len() == day {
+                matchdays.push(Matchday::default());
             }
-            all[day].pairings.append(&mut matchday.pairings);
-            all[day].byes.append(&mut matchday.byes);
+            matchdays[day].pairings.append(&mut matchday.pairings);
+            matchdays[day].byes.append(&mut matchday.byes);
         }
     }
-    all
+    matchdays
 }
 
 /// The standings of a group, from the games between its members.
@@ -68,20 +70,20 @@ pub(super) fn group_standings(
 /// The best `advance` active teams of each group, in the order of the groups. A team without a row in the standings, since
 /// all others of its group left, is the last of its group.
 pub(super) fn finalists(progress: &Progress<'_>, round: &Round, advance: usize) -> Vec<TeamName> {
-    let mut all = Vec::new();
+    let mut finalists = Vec::new();
     for group in &round.groups {
         let standings = group_standings(group, round, progress.games, progress.departures);
         let ranked = standings.into_iter().map(|row| row.team);
-        let mut order: Vec<TeamName> = ranked.collect();
+        let mut ranking: Vec<TeamName> = ranked.collect();
         for team in group {
-            if !order.contains(team) {
-                order.push(team.clone());
+            if !ranking.contains(team) {
+                ranking.push(team.clone());
             }
         }
-        let active = order
+        let active = ranking
             .into_iter()
             .filter(|team| !progress.departures.contains(team));
-        all.extend(active.take(advance));
+        finalists.extend(active.take(advance));
     }
-    all
+    finalists
 }

@@ -1,3 +1,5 @@
+//! Maximum matching: how many new pairs of teams are possible.
+
 use petgraph::{
     algo::maximum_matching,
     graph::{NodeIndex, UnGraph},
@@ -32,9 +34,9 @@ mod tests {
         let mut best = most_pairs_by_enumeration(rest, may_meet);
         for (index, other) in rest.iter().enumerate() {
             if may_meet(*first, *other) {
-                let mut left = rest.to_vec();
-                left.remove(index);
-                best = best.max(1 + most_pairs_by_enumeration(&left, may_meet));
+                let mut remaining = rest.to_vec();
+                remaining.remove(index);
+                best = best.max(1 + most_pairs_by_enumeration(&remaining, may_meet));
             }
         }
         best

@@ -1,3 +1,5 @@
+//! The progress of a tournament: its rounds and results so far, with checks that they match.
+
 use super::{
     entrants::Entrants,
     error::ScheduleError,
@@ -40,11 +42,11 @@ impl<'a> Progress<'a> {
             .find(|round| self.open_pairings(round, &finished).next().is_some());
         match unfinished {
             Some(round) => Some(round.number),
-            None => self.next_number(),
+            None => self.next_round_number(),
         }
     }
 
-    /// Round and pair of teams, sorted by name, of each game with a result.
+    /// For each game with a result its round and its two teams, sorted by name.
     fn finished_pairings(&self) -> BTreeSet<(u32, [&'a TeamName; 2])> {
         self.games
             .iter()
@@ -66,7 +68,7 @@ impl<'a> Progress<'a> {
         })
     }
 
-    pub(super) fn next_number(&self) -> Option<RoundNumber> {
+    pub(super) fn next_round_number(&self) -> Option<RoundNumber> {
         let next = u32::try_from(self.rounds.len()).ok()?.checked_add(1)?;
         next.try_into().ok()
     }
@@ -87,8 +89,8 @@ impl<'a> Progress<'a> {
             for pairing in round.pairings() {
                 scheduled.insert((expected, sorted_by_name(pairing.teams())));
             }
-            let paired = round.pairings().flat_map(Pairing::teams);
-            for team in paired.chain(round.byes()) {
+            let paired_teams = round.pairings().flat_map(Pairing::teams);
+            for team in paired_teams.chain(round.byes()) {
                 self.check_entrant(team, || format!("round {expected}"))?;
             }
         }
@@ -146,6 +148,7 @@ impl<'a> Progress<'a> {
 
 /// Numbers of scheduled games between teams.
 pub(super) struct PairingCounts<'a> {
+    /// For each `[home, away]` the number of games.
     home_games: BTreeMap<[&'a TeamName; 2], u32>,
 }
 

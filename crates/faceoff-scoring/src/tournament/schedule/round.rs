@@ -1,3 +1,5 @@
+//! The schedule of a round: its games, divided into matchdays.
+
 use faceoff_types::{RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 

@@ -1,3 +1,5 @@
+//! Round robins, in which each team plays each other one.
+
 use super::{
     progress::PairingCounts,
     round::{Matchday, Pairing},
@@ -18,24 +20,27 @@ pub(super) fn round_robin<'a>(
     if count < 2 {
         return Vec::new();
     }
-    let circle = if count.is_multiple_of(2) {
+    let circle_positions = if count.is_multiple_of(2) {
         count - 1
     } else {
         count
     };
-    (0..circle)
+    (0..circle_positions)
         .map(|day| {
             let mut matchday = Matchday::default();
             // The position off the circle: the last team or, with an odd number of teams, empty.
-            if circle < count {
+            if circle_positions < count {
                 matchday
                     .pairings
-                    .push(pairing(teams, [day, circle], pairing_counts));
+                    .push(pairing(teams, [day, circle_positions], pairing_counts));
             } else {
                 matchday.byes.push(teams[day].clone());
             }
-            for step in 1..=(circle - 1) / 2 {
-                let positions = [(day + step) % circle, (day + circle - step) % circle];
+            for distance in 1..=(circle_positions - 1) / 2 {
+                let positions = [
+                    (day + distance) % circle_positions,
+                    (day + circle_positions - distance) % circle_positions,
+                ];
                 matchday
                     .pairings
                     .push(pairing(teams, positions, pairing_counts));
@@ -62,8 +67,9 @@ fn pairing<'a>(
     }
 }
 
-/// With all positions on one circle, each has home games against the next half of the circle. With an even number the
-/// opposite position is in neither half; there the lower number is the home team.
+/// Is `a` the home team in its first game against `b`? Both are positions on a circle of all `count` teams. Each team has home
+/// games against the half of the circle ahead of it. With an even number of teams the opposite position is in neither half;
+/// there the lower number is the home team.
 fn is_home_at_first([a, b]: [usize; 2], count: usize) -> bool {
     let ahead = (b + count - a) % count;
     if 2 * ahead == count {

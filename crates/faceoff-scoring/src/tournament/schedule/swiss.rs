@@ -1,3 +1,5 @@
+//! Swiss tournaments: in each round, teams with similar results play each other, without repeats if possible.
+
 use super::{
     matching::most_pairs,
     progress::{PairingCounts, Progress},
@@ -71,7 +73,7 @@ fn next_bye(teams: &[&TeamName], rounds: &[Round]) -> usize {
         .unwrap_or(0)
 }
 
-/// Pairs of indices into `teams`, whose number is even.
+/// The pairs of the round, as indices into `teams`. The number of teams is even.
 fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<[usize; 2]> {
     let count = teams.len();
     let games: Vec<u32> = teams
@@ -79,11 +81,11 @@ fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<
         .flat_map(|a| teams.iter().map(|b| pairing_counts.games(a, b)))
         .collect();
     let have_not_met = |a: usize, b: usize| games[count * a + b] == 0;
-    let mut left: Vec<usize> = (0..count).collect();
+    let mut remaining: Vec<usize> = (0..count).collect();
     // Maximum number of new pairs among the remaining teams.
-    let mut new_pairs = most_pairs(&left, have_not_met);
+    let mut new_pairs = most_pairs(&remaining, have_not_met);
     let mut pairs = Vec::new();
-    while let Some((upper, others)) = left.split_first() {
+    while let Some((upper, others)) = remaining.split_first() {
         let upper = *upper;
         let without = |opponent: usize| -> Vec<usize> {
             let rest = others.iter().copied();
@@ -105,7 +107,7 @@ fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<
         });
         let opponent = opponent.expect("the number of teams outside a maximum matching is even");
         new_pairs -= 1;
-        left = without(opponent);
+        remaining = without(opponent);
         pairs.push([upper, opponent]);
     }
     pairs
@@ -117,15 +119,16 @@ fn pairing<'a>(
     pairing_counts: &PairingCounts<'a>,
     draws: &mut Draws,
 ) -> Pairing {
-    let lead = pairing_counts.home_balance(a) - pairing_counts.home_balance(b);
-    let lead = if lead == 0 {
+    let balance = pairing_counts.home_balance(a) - pairing_counts.home_balance(b);
+    // Positive if `a` had more home games.
+    let lead = if balance == 0 {
         pairing_counts.home_lead(a, b)
     } else {
-        lead
+        balance
     };
     // Drawn in all cases, so that later draws do not depend on this one.
-    let coin = draws.below(2) == 0;
-    let [home, away] = if lead < 0 || (lead == 0 && coin) {
+    let is_heads = draws.below(2) == 0;
+    let [home, away] = if lead < 0 || (lead == 0 && is_heads) {
         [a, b]
     } else {
         [b, a]

@@ -1,3 +1,5 @@
+//! The tables of a tournament: the standings of all rounds, or those of the final and of each group.
+
 use super::{groups::group_standings, progress::Progress};
 use crate::tournament::{
     bye::Bye,
@@ -32,21 +34,21 @@ pub enum TableScope {
 
 /// The table of all rounds, with the byes that give points.
 pub(super) fn overall_table(progress: &Progress<'_>, byes: &[Bye]) -> Table {
-    let all = score_tournament_with(progress.games, progress.departures, byes);
     Table {
         scope: TableScope::Tournament,
-        standings: all.standings,
+        standings: score_tournament_with(progress.games, progress.departures, byes).standings,
     }
 }
 
 /// The tables of the final and of each group.
 pub(super) fn group_tables(progress: &Progress<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
-    if let Some(last) = progress.rounds.get(1) {
+    // The first round is the group stage, the second the final.
+    if let Some(final_round) = progress.rounds.get(1) {
         let final_games: Vec<PlayedGame> = progress
             .games
             .iter()
-            .filter(|game| game.round() == last.number.get())
+            .filter(|game| game.round() == final_round.number.get())
             .cloned()
             .collect();
         tables.push(Table {

@@ -1,3 +1,5 @@
+//! Tests of file transfers: timeouts by tokio's paused clock, and retries against an HTTP server of a few lines.
+
 use super::*;
 use crate::remote::job_files::JobFiles;
 use faceoff_types::BundleRef;
@@ -47,6 +49,7 @@ async fn slow_transfer_with_progress_has_no_time_limit() {
         async |_, progress| {
             attempts.fetch_add(1, Ordering::Relaxed);
             for _ in 0..20 {
+                // Shorter than the stall timeout of 60 s.
                 sleep(Duration::from_secs(50)).await;
                 progress.add(1);
             }
@@ -66,7 +69,7 @@ async fn buffered_data_extends_the_stall_timeout() {
             let bytes = 4 << 20;
             progress.set_total(bytes);
             progress.add(bytes as usize);
-            // Over a link of 128 kbit/s.
+            // The time that the slowest supported link needs.
             sleep(Duration::from_secs(bytes / SLOWEST_BYTES_PER_S)).await;
             Ok(())
         },
@@ -109,15 +112,15 @@ async fn transfer_stops_when_the_job_has_ended() {
 
 #[tokio::test(start_paused = true)]
 async fn busy_server_is_retried_for_a_minute() {
-    for (retry_after, delay_s) in [(None, 2), (Some(10), 10), (Some(3600), 30)] {
-        let (began, attempts) = (Instant::now(), AtomicU32::new(0));
+    for (retry_after_s, expected_delay_s) in [(None, 2), (Some(10), 10), (Some(3600), 30)] {
+        let (started_at, attempts) = (Instant::now(), AtomicU32::new(0));
         let transfer = file_transfer(TransferTimeouts::default());
         let result = transfer.run(
             async |_, _| {
                 attempts.fetch_add(1, Ordering::Relaxed);
                 Err(TransientError::Busy {
                     status: StatusCode::SERVICE_UNAVAILABLE,
-                    retry_after: retry_after.map(Duration::from_secs),
+                    retry_after: retry_after_s.map(Duration::from_secs),
                 }
                 .into())
             },
@@ -128,14 +131,14 @@ async fn busy_server_is_retried_for_a_minute() {
             error.to_string(),
             "the server answered 503 Service Unavailable"
         );
-        assert_eq!(attempts.into_inner(), 60 / delay_s + 1);
+        assert_eq!(attempts.into_inner(), 60 / expected_delay_s + 1);
         // By tokio's paused clock.
-        assert_eq!(began.elapsed().as_secs(), 60);
+        assert_eq!(started_at.elapsed().as_secs(), 60);
     }
 }
 
-/// Access to the files of `listener`.
-fn files(listener: &TcpListener) -> JobFiles {
+/// Access to the files of the server at `listener`.
+fn job_files(listener: &TcpListener) -> JobFiles {
     JobFiles {
         grant: "grant".into(),
         files_url: format!("http://{}", listener.local_addr().unwrap()),
@@ -147,7 +150,8 @@ async fn listener() -> TcpListener {
     TcpListener::bind(("127.0.0.1", 0)).await.unwrap()
 }
 
-fn file(folder: &tempfile::TempDir, bytes: u64) -> PathBuf {
+/// Creates a file of this size.
+fn create_file(folder: &tempfile::TempDir, bytes: u64) -> PathBuf {
     let path = folder.path().join("steps.parquet");
     let file = std::fs::File::create(&path).unwrap();
     file.set_len(bytes).unwrap();
@@ -155,7 +159,7 @@ fn file(folder: &tempfile::TempDir, bytes: u64) -> PathBuf {
 }
 
 /// Reads the head of an HTTP request.
-async fn head(connection: &mut TcpStream) -> String {
+async fn read_head(connection: &mut TcpStream) -> String {
     let mut head = Vec::new();
     while !head.ends_with(b"\r\n\r\n") {
         head.push(connection.read_u8().await.unwrap());
@@ -163,7 +167,8 @@ async fn head(connection: &mut TcpStream) -> String {
     String::from_utf8(head).unwrap()
 }
 
-async fn body(connection: &mut TcpStream, bytes: u64) {
+/// Reads this part of the body of an HTTP request.
+async fn read_body(connection: &mut TcpStream, bytes: u64) {
     let read = tokio::io::copy(&mut connection.take(bytes), &mut tokio::io::sink()).await;
     assert_eq!(read.unwrap(), bytes);
 }
@@ -178,9 +183,9 @@ async fn respond(mut connection: TcpStream, status: &str) {
 async fn upload_is_retried_after_transient_errors() {
     const BYTES: u64 = 100_000;
     let folder = tempfile::tempdir().unwrap();
-    let (path, listener) = (file(&folder, BYTES), listener().await);
-    let (files, transfer) = (files(&listener), file_transfer(immediate_retries()));
-    let serves = async {
+    let (path, listener) = (create_file(&folder, BYTES), listener().await);
+    let (files, transfer) = (job_files(&listener), file_transfer(immediate_retries()));
+    let server = async {
         for status in [
             "408 Request Timeout",
             "500 Internal Server Error",
@@ -188,44 +193,44 @@ async fn upload_is_retried_after_transient_errors() {
             "502 Bad Gateway",
         ] {
             let (mut connection, _) = listener.accept().await.unwrap();
-            let head = head(&mut connection).await;
+            let head = read_head(&mut connection).await;
             assert!(
                 head.starts_with("PUT /work/files/steps.parquet HTTP/1.1"),
                 "{head}"
             );
             assert!(head.contains("authorization: Grant grant"), "{head}");
-            body(&mut connection, BYTES).await;
+            read_body(&mut connection, BYTES).await;
             respond(connection, status).await;
         }
         // An interruption in the middle of the body.
         let (mut connection, _) = listener.accept().await.unwrap();
-        head(&mut connection).await;
-        body(&mut connection, BYTES / 2).await;
+        read_head(&mut connection).await;
+        read_body(&mut connection, BYTES / 2).await;
         drop(connection);
         let (mut connection, _) = listener.accept().await.unwrap();
-        head(&mut connection).await;
-        body(&mut connection, BYTES).await;
+        read_head(&mut connection).await;
+        read_body(&mut connection, BYTES).await;
         respond(connection, "204 No Content").await;
     };
     let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
-    let (stored, ()) = tokio::join!(stored, serves);
+    let (stored, ()) = tokio::join!(stored, server);
     stored.unwrap();
 }
 
 #[tokio::test]
 async fn upload_is_given_up_after_many_interruptions() {
     let folder = tempfile::tempdir().unwrap();
-    let (path, listener) = (file(&folder, 64 << 20), listener().await);
-    let (files, transfer) = (files(&listener), file_transfer(immediate_retries()));
-    let serves = async {
+    let (path, listener) = (create_file(&folder, 64 << 20), listener().await);
+    let (files, transfer) = (job_files(&listener), file_transfer(immediate_retries()));
+    let server = async {
         for _ in 0..transfer.timeouts.max_interrupted {
             let (mut connection, _) = listener.accept().await.unwrap();
-            head(&mut connection).await;
-            body(&mut connection, 1000).await;
+            read_head(&mut connection).await;
+            read_body(&mut connection, 1000).await;
         }
     };
     let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
-    let (stored, ()) = tokio::join!(stored, serves);
+    let (stored, ()) = tokio::join!(stored, server);
     assert!(is_connection_error(&stored.unwrap_err()));
 }
 
@@ -233,14 +238,14 @@ async fn upload_is_given_up_after_many_interruptions() {
 async fn refused_download_is_not_retried() {
     let folder = tempfile::tempdir().unwrap();
     let listener = listener().await;
-    let (files, transfer) = (files(&listener), file_transfer(immediate_retries()));
+    let (files, transfer) = (job_files(&listener), file_transfer(immediate_retries()));
     let bundle = BundleRef {
         key: "bundles/x".into(),
         bytes: 1,
         blake3: "00".into(),
         file_name: "agent.tar.gz".into(),
     };
-    let serves = async {
+    let server = async {
         for (status, message) in [
             ("403 Forbidden", "the server answered 403 Forbidden"),
             ("507 Insufficient Storage", "no storage space"),
@@ -250,7 +255,7 @@ async fn refused_download_is_not_retried() {
                 files.fetch_bundle(&transfer, &bundle, archive, never_ends),
                 async {
                     let (mut connection, _) = listener.accept().await.unwrap();
-                    head(&mut connection).await;
+                    read_head(&mut connection).await;
                     respond(connection, status).await;
                 }
             );
@@ -258,7 +263,7 @@ async fn refused_download_is_not_retried() {
             assert!(error.contains(message), "{error}");
         }
     };
-    serves.await;
+    server.await;
 }
 
 /// Over this slow link the whole file takes far longer than the stall timeout. The test advances the clock only after it has
@@ -268,30 +273,30 @@ async fn upload_over_a_slow_link_needs_one_attempt() {
     /// More than all buffers on the way can hold.
     const PIECE: u64 = 48 << 20;
     const PIECES: u64 = 4;
-    let (hold, held) = std::sync::mpsc::channel::<()>();
+    let (test_running, test_ended) = std::sync::mpsc::channel::<()>();
     // A blocking task keeps tokio's paused clock from advancing automatically.
-    let holds = tokio::task::spawn_blocking(move || held.recv());
+    let blocking_task = tokio::task::spawn_blocking(move || test_ended.recv());
     let folder = tempfile::tempdir().unwrap();
     let socket = TcpSocket::new_v4().unwrap();
     socket.set_recv_buffer_size(1 << 16).unwrap();
     socket.bind(([127, 0, 0, 1], 0).into()).unwrap();
     let listener = socket.listen(1).unwrap();
-    let (path, files) = (file(&folder, PIECES * PIECE), files(&listener));
+    let (path, files) = (create_file(&folder, PIECES * PIECE), job_files(&listener));
     let transfer = file_transfer(TransferTimeouts::default());
-    let began = Instant::now();
-    let serves = async {
+    let started_at = Instant::now();
+    let server = async {
         let (mut connection, _) = listener.accept().await.unwrap();
-        head(&mut connection).await;
+        read_head(&mut connection).await;
         for _ in 0..PIECES {
-            body(&mut connection, PIECE).await;
+            read_body(&mut connection, PIECE).await;
             tokio::time::advance(transfer.timeouts.stall * 2 / 3).await;
         }
         respond(connection, "204 No Content").await;
     };
     let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
-    let (stored, ()) = tokio::join!(stored, serves);
+    let (stored, ()) = tokio::join!(stored, server);
     stored.unwrap();
-    assert!(began.elapsed() > transfer.timeouts.stall * 2);
-    drop(hold);
-    assert!(holds.await.unwrap().is_err());
+    assert!(started_at.elapsed() > transfer.timeouts.stall * 2);
+    drop(test_running);
+    assert!(blocking_task.await.unwrap().is_err());
 }

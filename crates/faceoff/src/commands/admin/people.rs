@@ -1,4 +1,5 @@
-//! `faceoff admin people` and `faceoff admin registration`: users and teams of the season.
+//! `faceoff admin people` and `faceoff admin registration`: users and teams of the season. A *division* is a group of teams that
+//! a board can rank among themselves.
 
 use super::team_lookup::find_team;
 use crate::{

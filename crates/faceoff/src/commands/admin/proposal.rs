@@ -23,7 +23,7 @@ use jiff::civil::Date;
 pub(super) enum ProposalAction {
     /// List trials and proposed re-evaluations, the newest first
     List,
-    /// Show one with its evaluations and the ranks it would change
+    /// Show a trial or proposal with its evaluations and the ranks that it would change
     Show {
         /// The id of the trial or proposal
         proposal: ProposalId,
@@ -159,6 +159,7 @@ fn proposal_line(proposal: &ProposalView) -> String {
     )
 }
 
+/// A proposal as several lines: subject, evaluations, and the board rows that it would change.
 fn proposal_text(proposal: &ProposalView) -> String {
     let mut lines = vec![proposal_line(proposal)];
     lines.extend(proposal.evaluations.iter().map(evaluation_line));

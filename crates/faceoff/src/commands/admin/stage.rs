@@ -1,4 +1,5 @@
 //! `faceoff admin stage`: creates, changes and lists the season's *stages*, periods with their own rules, cutoffs and board.
+//! The *ruleset* is the simulator's version, from which a stage's rules may deviate.
 
 use crate::{
     client::Client,
@@ -181,7 +182,7 @@ impl StageOptions {
 
     fn schedule(&self) -> anyhow::Result<Option<Schedule>> {
         let schedule = match (self.daily, &self.cron) {
-            (Some(at), _) => Schedule::daily(at),
+            (Some(time_of_day), _) => Schedule::daily(time_of_day),
             (None, Some(pattern)) => Schedule::cron(pattern).context("--cron")?,
             (None, None) => {
                 ensure!(
@@ -413,8 +414,9 @@ fn stage_text(stage: &StageView) -> String {
         .collect();
     let blind = if settings.blind { ", blind" } else { "" };
     format!(
-        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  cutoff   {next_cutoff}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
-        episodes per task ({}), at most {} faults\n  score    weights {}, tiers up to {} \
+        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  cutoff   {next_cutoff}\n  \
+         deadline {}\n  rules    revision {} since {}: {}, {} \
+         episodes per task ({}), at most {} faults\n  score    weights {}, tiers up to {} \
          points per episode, perturbations {}{overrides}\n  board    by {}, {result}\n  datasets public {}\n  kept     {}",
         stage.name,
         stage.id,

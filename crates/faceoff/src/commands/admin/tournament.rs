@@ -9,7 +9,7 @@ use crate::{
         tournament::{
             games,
             lookup::{find_tournament, find_tournament_or_newest},
-            round, text,
+            parse_round, text,
         },
     },
 };
@@ -80,7 +80,7 @@ pub(super) enum TournamentAction {
         disqualified: bool,
         /// The first round whose games with the disqualified team do not count [default: the running round, or the
         /// next]
-        #[arg(long, value_name = "ROUND", value_parser = round, requires = "disqualified")]
+        #[arg(long, value_name = "ROUND", value_parser = parse_round, requires = "disqualified")]
         from_round: Option<RoundNumber>,
         /// The team's name, as confirmation
         #[arg(long, value_name = "TEAM")]

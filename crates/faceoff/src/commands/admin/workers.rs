@@ -115,9 +115,9 @@ fn busy_line(busy: &BusySlotView) -> String {
 }
 
 fn ban_lines(ban: &WorkerBanView) -> String {
-    let at = ban.at.strftime("%Y-%m-%d %H:%M UTC");
+    let banned_at = ban.at.strftime("%Y-%m-%d %H:%M UTC");
     let mut lines = vec![format!(
-        "{:<24} banned since {at}: {}",
+        "{:<24} banned since {banned_at}: {}",
         ban.worker, ban.reason
     )];
     let evaluations = ban.evaluations.iter();

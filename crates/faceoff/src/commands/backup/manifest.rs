@@ -13,7 +13,7 @@ use std::{
 pub const MANIFEST: &str = "backup.json";
 /// File name of the database, in a backup and in a data folder.
 pub const DATABASE: &str = "faceoff.sqlite3";
-/// Name of the artifact folder, in both.
+/// Name of the folder of artifacts (files that the database refers to), in a backup and in a data folder.
 pub const ARTIFACTS: &str = "artifacts";
 /// Version of the manifest's format.
 pub const FORMAT: u32 = 1;

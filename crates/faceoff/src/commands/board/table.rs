@@ -21,8 +21,8 @@ pub(super) fn board_text(board: &BoardView) -> String {
         text.push_str(", provisional");
     }
     if let Some(frozen) = &board.frozen {
-        let at = frozen.at.strftime("%Y-%m-%d %H:%M UTC");
-        let _ = write!(text, "\nfrozen since {at}: {}", frozen.reason);
+        let frozen_at = frozen.at.strftime("%Y-%m-%d %H:%M UTC");
+        let _ = write!(text, "\nfrozen since {frozen_at}: {}", frozen.reason);
     }
     text.push('\n');
     match (board.rows.is_empty(), board.blind) {

@@ -1,4 +1,4 @@
-//! `faceoff dataset download`.
+//! `faceoff dataset download`: downloads the dataset of an evaluation, the record of its control steps.
 
 use crate::{
     client::Client,

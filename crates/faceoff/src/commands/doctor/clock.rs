@@ -1,4 +1,4 @@
-//! Checks of the clock and the time zone that determine cutoffs.
+//! Checks of the clock and the time zone that determine *cutoffs*, the times at which evaluation days start.
 
 use super::check::Check;
 use faceoff_types::Zone;
@@ -17,7 +17,7 @@ pub fn clock(data_dir: &Path, now: Timestamp) -> Check {
         .iter()
         .filter_map(|name| data_dir.join(name).metadata().ok()?.modified().ok())
         .max();
-    if let Some(newest) = newest.and_then(|at| Timestamp::try_from(at).ok())
+    if let Some(newest) = newest.and_then(|modified| Timestamp::try_from(modified).ok())
         && newest.duration_since(now) > FILE_TIME_TOLERANCE
     {
         return Check {

@@ -1,4 +1,5 @@
-//! Text output of `faceoff doctor`.
+//! Text output of `faceoff doctor`. A *layer* is one protection of the sandbox, which the configuration may *give up*; a *cure*
+//! says how to fix a problem.
 
 use super::{Findings, LayerReport};
 use faceoff_sandbox::HostFeature;

@@ -1,4 +1,4 @@
-//! `faceoff eval --ablation`: the same episodes under each perturbation alone.
+//! `faceoff eval --ablation`: the same episodes under each perturbation alone. A *profile* is a set of perturbations.
 
 use super::{
     files::{ABLATION, write_json},

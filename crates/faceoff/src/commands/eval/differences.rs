@@ -2,8 +2,8 @@
 
 use faceoff_types::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
 
-/// Further packages are only counted.
-const MAX_NAMED: usize = 6;
+/// Number of packages that a sentence names; further ones are only counted.
+const MAX_NAMED_PACKAGES: usize = 6;
 
 /// Compares a runtime of this machine with the server's; one sentence per difference.
 pub(super) fn compare_runtimes(local: &RuntimeInventory, remote: &RuntimeInventory) -> Vec<String> {
@@ -130,7 +130,7 @@ pub(super) fn compare_machines(local: &AgentMachine, remote: &AgentMachine) -> V
 
 /// The first packages, and the number of the others.
 fn package_list(packages: &[String]) -> String {
-    let (first, rest) = packages.split_at(packages.len().min(MAX_NAMED));
+    let (first, rest) = packages.split_at(packages.len().min(MAX_NAMED_PACKAGES));
     match rest.len() {
         0 => first.join(", "),
         more => format!("{} and {more} more", first.join(", ")),
@@ -186,7 +186,7 @@ mod tests {
         let many: Vec<(String, &str)> = (0..9).map(|n| (format!("p{n}"), "1")).collect();
         let many: Vec<(&str, &str)> = many
             .iter()
-            .map(|(name, one)| (name.as_str(), *one))
+            .map(|(name, version)| (name.as_str(), *version))
             .collect();
         let found = compare_runtimes(&python("3.11.2", &[]), &python("3.11.2", &many));
         assert!(found[0].ends_with("p5 1 and 3 more"), "{found:?}");

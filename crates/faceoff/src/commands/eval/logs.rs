@@ -1,4 +1,5 @@
-//! Standard error of the agent's processes.
+//! Standard error of the agent's processes. A *shard* is a range of episodes that one process at a time runs; a *fault* of the
+//! agent, e.g. a crash, ends its process, and a new one continues the shard.
 
 use faceoff_types::{AgentFault, escape_unprintable};
 

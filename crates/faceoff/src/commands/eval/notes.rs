@@ -1,6 +1,8 @@
+//! Notes of `faceoff eval`: lines that are not part of its result.
+
 use std::fmt;
 
-/// Stream of notes that are not part of the result.
+/// The stream that notes are printed to.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Notes {
     /// Together with the result.

@@ -1,3 +1,5 @@
+//! Threads that run the shards of an evaluation in parallel. A *shard* is a range of episodes of one task.
+
 use super::logs::Logs;
 use anyhow::Context;
 use faceoff_runner::{

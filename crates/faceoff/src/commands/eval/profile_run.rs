@@ -1,4 +1,4 @@
-//! Runs, assembles and scores all episodes of one profile.
+//! Runs and scores all episodes of one *profile*, a set of perturbations, and assembles their recordings into a dataset.
 
 use super::{
     files::{LOG, RESULTS, remove_earlier, write_json},
@@ -105,7 +105,7 @@ pub(super) fn run_profile(
     })
 }
 
-/// One shard per task and worker, which starts each agent as rarely as possible.
+/// Divides the episodes into shards: one per task and worker, so that few agent processes are started.
 fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
     let workers = u32::try_from(setup.envs.len()).unwrap_or(u32::MAX);
     let per_shard = setup.episodes.div_ceil(workers);
@@ -134,7 +134,7 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
 
 /// Prints all faults, and the agent's output before the first one.
 fn print_faults(notes: Notes, faults: &[AgentFault], logs: &Logs) {
-    const LINES: usize = 40;
+    const MAX_LINES: usize = 40;
     for fault in faults {
         notes.print(format_args!("fault: {fault}"));
     }
@@ -149,7 +149,7 @@ fn print_faults(notes: Notes, faults: &[AgentFault], logs: &Logs) {
         return;
     }
     notes.print(format_args!("the agent's output before its first fault:"));
-    let left_out = lines.len().saturating_sub(LINES);
+    let left_out = lines.len().saturating_sub(MAX_LINES);
     if left_out > 0 {
         notes.print(format_args!("  … {left_out} more lines"));
     }

@@ -15,8 +15,10 @@ use std::path::Path;
 #[derive(Debug)]
 pub(super) struct ServerStage {
     url: String,
+    /// Runtimes and machine of the server.
     server: RuntimesView,
     stage: StageView,
+    /// Runtimes and limits of agents in the stage.
     offer: StageResources,
 }
 

@@ -1,7 +1,10 @@
+//! Table of an evaluation's result by task. A *tier* is the class of an agent by its penalty points.
+
 use faceoff_types::EvaluationResult;
 use std::fmt::Write as _;
 
-/// The result as text.
+/// The result as text. The columns from `ee` to `time` count the violations of each constraint: end effector, links, joint
+/// positions, joint velocities, computation time.
 pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
     let mut out = String::new();
     let line = |out: &mut String, args: std::fmt::Arguments<'_>| {
@@ -33,29 +36,29 @@ pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
             "time mean/p99/max [ms]"
         ),
     );
-    for (task, r) in &result.tasks {
-        let [low, high] = r.success_ci95;
-        let v = r.violations;
-        let t = r.computation_time_s;
+    for (task, task_result) in &result.tasks {
+        let [low, high] = task_result.success_ci95;
+        let violations = task_result.violations;
+        let time_s = task_result.computation_time_s;
         line(
             &mut out,
             format_args!(
                 "{task:<8} {:>8} {:>6.1} % {:>17} {:>8.1}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4}  {:>23}",
-                r.episodes,
-                100.0 * r.success_rate,
+                task_result.episodes,
+                100.0 * task_result.success_rate,
                 format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high),
-                r.penalty_points,
-                r.tier.title(),
-                v.ee,
-                v.link,
-                v.joint_pos,
-                v.joint_vel,
-                v.computation_time,
+                task_result.penalty_points,
+                task_result.tier.title(),
+                violations.ee,
+                violations.link,
+                violations.joint_pos,
+                violations.joint_vel,
+                violations.computation_time,
                 format!(
                     "{:.2} / {:.2} / {:.2}",
-                    1e3 * t.mean,
-                    1e3 * t.p99,
-                    1e3 * t.max
+                    1e3 * time_s.mean,
+                    1e3 * time_s.p99,
+                    1e3 * time_s.max
                 ),
             ),
         );

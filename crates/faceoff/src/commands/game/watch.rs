@@ -1,4 +1,5 @@
-//! `faceoff game watch`: prints the live events of a game.
+//! `faceoff game watch`: prints the live events of a game. A *snapshot* describes the current state when a stream begins, a
+//! *happening* is e.g. a goal or a foul. An *attempt* is one run of the game, repeated after a platform fault.
 
 use crate::client::{ApiError, Client, ServerEvent};
 use anyhow::Context;
@@ -60,7 +61,11 @@ async fn read_stream(
     printer: &mut EventPrinter,
 ) -> anyhow::Result<u32> {
     let mut received = 0;
-    let mut events = Box::pin(client.watch_game(id, printer.last.as_deref()).await?);
+    let mut events = Box::pin(
+        client
+            .watch_game(id, printer.last_event_id.as_deref())
+            .await?,
+    );
     while let Some(event) = events.next().await {
         let event = match event {
             Ok(event) => event,
@@ -81,8 +86,7 @@ async fn read_stream(
 struct EventPrinter {
     teams: [String; 2],
     json: bool,
-    /// Id of the last event.
-    last: Option<String>,
+    last_event_id: Option<String>,
     /// Number of the attempt whose snapshot was printed.
     attempt: Option<u32>,
     is_waiting: bool,
@@ -94,7 +98,7 @@ impl EventPrinter {
         Self {
             teams: game.sides.map(|side| side.team_name.to_string()),
             json,
-            last: None,
+            last_event_id: None,
             attempt: None,
             is_waiting: false,
             is_over: false,
@@ -113,7 +117,7 @@ impl EventPrinter {
             println!("{line}");
         }
         if event.id.is_some() {
-            self.last.clone_from(&event.id);
+            self.last_event_id.clone_from(&event.id);
         }
         Ok(())
     }
@@ -128,10 +132,10 @@ impl EventPrinter {
                 let is_new = self.attempt.replace(snapshot.attempt) != Some(snapshot.attempt);
                 is_new.then(|| {
                     let [home, away] = &self.teams;
-                    let [goals, conceded] = snapshot.score;
+                    let [home_goals, away_goals] = snapshot.score;
                     let minutes = f64::from(snapshot.steps) * CONTROL_STEP_S / 60.0;
                     format!(
-                        "{home} - {away}, attempt {} of a game of {minutes:.1} minutes: {goals} : {conceded} so far",
+                        "{home} - {away}, attempt {} of a game of {minutes:.1} minutes: {home_goals} : {away_goals} so far",
                         snapshot.attempt
                     )
                 })
@@ -162,7 +166,7 @@ impl EventPrinter {
 
     fn happening_line(&self, happening: &LiveEvent) -> String {
         let team = |side: Side| &self.teams[side.index()];
-        let scored = |[home, away]: [u32; 2]| format!("{home} : {away}");
+        let score_text = |[home, away]: [u32; 2]| format!("{home} : {away}");
         let text = match &happening.event {
             GameEvent::RallyBegun { rally, serves } => format!(
                 "rally {} begins, the puck is on the side of {}",
@@ -171,10 +175,10 @@ impl EventPrinter {
             ),
             GameEvent::Restarted { side } => format!("{} is restarted", team(*side)),
             GameEvent::Goal { by, score } => {
-                format!("goal by {}: {}", team(*by), scored(*score))
+                format!("goal by {}: {}", team(*by), score_text(*score))
             }
             GameEvent::Foul { by, score } => {
-                format!("foul by {}: {}", team(*by), scored(*score))
+                format!("foul by {}: {}", team(*by), score_text(*score))
             }
             GameEvent::Stuck => "the puck is stuck in the middle; no foul".to_owned(),
             GameEvent::LeftTable => "the puck left the table".to_owned(),
@@ -188,8 +192,8 @@ impl EventPrinter {
                 forfeits,
             } => {
                 let mut text = match winner {
-                    Some(side) => format!("{} wins, {}", team(*side), scored(*score)),
-                    None => format!("a draw, {}", scored(*score)),
+                    Some(side) => format!("{} wins, {}", team(*side), score_text(*score)),
+                    None => format!("a draw, {}", score_text(*score)),
                 };
                 for (side, cause) in Side::BOTH.into_iter().zip(forfeits) {
                     if let Some(cause) = cause {
@@ -218,7 +222,7 @@ mod tests {
         EventPrinter {
             teams: ["Ajax".to_owned(), "Zed".to_owned()],
             json: false,
-            last: None,
+            last_event_id: None,
             attempt: None,
             is_waiting: false,
             is_over: false,

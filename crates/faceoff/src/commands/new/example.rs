@@ -1,3 +1,5 @@
+//! The behaviours that `faceoff new` offers for an agent.
+
 use clap::ValueEnum;
 
 /// Behaviour of a new agent.

@@ -1,3 +1,5 @@
+//! The progress bar of `faceoff play`.
+
 use anyhow::Context;
 use faceoff_episode::{GameStepRow, RallyRow};
 use faceoff_runner::GameObserver;
@@ -11,7 +13,7 @@ pub(super) struct Bar {
 }
 
 impl Bar {
-    /// A bar of so many control steps in total.
+    /// A bar of `steps` control steps.
     pub(super) fn steps(steps: u32) -> anyhow::Result<Self> {
         let style = ProgressStyle::with_template(
             "{msg:9} {bar:40} {pos}/{len} steps, {per_sec}, {eta} left",
@@ -25,17 +27,18 @@ impl Bar {
         })
     }
 
-    /// Starts the next game of a series. `done` steps belong to finished games; those of failed attempts do not count.
-    pub(super) fn next(&mut self, title: &str, done: u64, all: u64) {
+    /// Starts the next game of a series. `finished_steps` are those of finished games, without failed attempts; `total_steps`
+    /// are those of the series.
+    pub(super) fn start_game(&mut self, title: &str, finished_steps: u64, total_steps: u64) {
         self.title = format!("{title} ");
-        self.bar.set_length(all);
-        self.bar.set_position(done);
+        self.bar.set_length(total_steps);
+        self.bar.set_position(finished_steps);
         self.bar.set_message(format!("{title} 0 : 0"));
     }
 
-    /// Runs `line`, which prints above the bar.
-    pub(super) fn above(&self, line: impl FnOnce()) {
-        self.bar.suspend(line);
+    /// Runs `print_line`, whose output appears above the bar.
+    pub(super) fn print_above(&self, print_line: impl FnOnce()) {
+        self.bar.suspend(print_line);
     }
 
     pub(super) fn finish(&self) {

@@ -1,3 +1,5 @@
+//! The two bundles of `faceoff play`, and the settings of all games between them.
+
 use super::options::PlayOptions;
 use crate::{commands::local_bundle, config::Config};
 use anyhow::Context;
@@ -10,11 +12,11 @@ use faceoff_worker::CpuLayout;
 use std::{fs, path::Path};
 use tempfile::TempDir;
 
-/// Two bundles and the settings of all games between them.
+/// Two bundles and the settings of their games.
 pub(super) struct Matchup {
     bundles: [Bundle; 2],
     envs: [AgentEnvironment; 2],
-    /// Its seed is replaced for each game.
+    /// Settings of a game; each game replaces the seed.
     spec: GameSpec,
     /// Holds the unpacked bundles.
     _scratch: TempDir,
@@ -29,6 +31,7 @@ pub(super) fn load_config(options: &PlayOptions) -> anyhow::Result<Config> {
     Ok(config)
 }
 
+/// The seed of the model mismatch, the robot's deviation from its model.
 fn mismatch_seed(options: &PlayOptions) -> Seed {
     options
         .mismatch_seed
@@ -37,7 +40,7 @@ fn mismatch_seed(options: &PlayOptions) -> Seed {
 
 impl Matchup {
     pub(super) fn open(options: &PlayOptions, config: Config) -> anyhow::Result<Self> {
-        let scratch = local_bundle::scratch_in(&options.out)?;
+        let scratch = local_bundle::create_scratch(&options.out)?;
         let open = |path: &Path, name: &str| -> anyhow::Result<Bundle> {
             let scratch = scratch.path().join(name);
             fs::create_dir(&scratch).with_context(|| format!("creating {}", scratch.display()))?;

@@ -1,3 +1,5 @@
+//! The arguments of `faceoff play`.
+
 use clap::Args;
 use faceoff_types::{GAME_WINDOWS, MAX_GAME_STEPS, Profile, Seed, WINDOW_STEPS};
 use std::path::PathBuf;

@@ -1,3 +1,5 @@
+//! Advice about a *platform fault*, a failure of the evaluator or the host that is no fault of an agent.
+
 use faceoff_runner::PlatformFault;
 
 /// Adds advice to a platform fault.

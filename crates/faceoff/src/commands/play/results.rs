@@ -1,3 +1,5 @@
+//! The file `results.json` of `faceoff play`.
+
 use anyhow::Context;
 use serde::Serialize;
 use std::{

@@ -6,7 +6,7 @@ use super::{
     options::PlayOptions,
     platform_fault::with_advice,
     results::Results,
-    series_results::{Kind, Series, SeriesGame, SeriesResults},
+    series_results::{Series, SeriesGame, SeriesKind, SeriesResults},
     table,
 };
 use anyhow::Context;
@@ -15,7 +15,7 @@ use faceoff_runner::{GameReport, PlatformFault};
 use std::path::{Path, PathBuf};
 
 /// Attempts per game; after that many failures on a busy host, the series ends.
-const ATTEMPTS: u32 = 5;
+const MAX_ATTEMPTS: u32 = 5;
 
 /// A recording of an earlier series in a folder.
 pub(super) fn find_earlier(out: &Path) -> Option<PathBuf> {
@@ -30,17 +30,18 @@ pub(super) fn find_earlier(out: &Path) -> Option<PathBuf> {
 pub(super) fn play(
     options: &PlayOptions,
     matchup: &Matchup,
-    kind: Kind,
+    kind: SeriesKind,
     count: u32,
     results: &Results,
 ) -> anyhow::Result<()> {
+    // For each game of a pair: whether the sides are swapped.
     let halves: &[bool] = match kind {
-        Kind::MirroredPairs => &[false, true],
-        Kind::Games => &[false],
+        SeriesKind::MirroredPairs => &[false, true],
+        SeriesKind::Games => &[false],
     };
     let mut bar = Bar::steps(options.steps)?;
-    let all_steps = u64::from(options.steps) * u64::from(count) * halves.len() as u64;
-    let mut done_steps = 0;
+    let total_steps = u64::from(options.steps) * u64::from(count) * halves.len() as u64;
+    let mut finished_steps = 0;
     let series = Series {
         kind,
         count,
@@ -53,34 +54,34 @@ pub(super) fn play(
         println!("{}", table::series_head(matchup.agents(), kind));
     }
     for number in 1..=count {
-        let begun = games.len();
+        let first_game = games.len();
         for (half, swapped) in (1..).zip(halves) {
             let (seed, swapped, folder) = match kind {
-                Kind::MirroredPairs => (
+                SeriesKind::MirroredPairs => (
                     options.seed.derive("pair", &number.to_le_bytes()),
                     *swapped,
                     format!("pair-{number}/half-{half}"),
                 ),
-                Kind::Games => (
+                SeriesKind::Games => (
                     options.seed.derive("game", &number.to_le_bytes()),
                     number % 2 == 0,
                     format!("game-{number}"),
                 ),
             };
-            bar.next(&folder, done_steps, all_steps);
+            bar.start_game(&folder, finished_steps, total_steps);
             let out = options.out.join(&folder);
             let report =
                 play_with_retries(|| matchup.play(seed, swapped, &out, &mut bar), &folder)?;
             let score = &report.archives.score;
             Results::clear_in(&out)?.write(score)?;
-            done_steps += u64::from(options.steps);
-            let pair = (kind == Kind::MirroredPairs).then_some(number);
+            finished_steps += u64::from(options.steps);
+            let pair = (kind == SeriesKind::MirroredPairs).then_some(number);
             games.push(SeriesGame::new(score, folder, pair, swapped)?);
         }
         let summary = SeriesResults::new(&series, &games)?;
         json = results.write(&summary)?;
         if !options.json {
-            bar.above(|| println!("{}", table::series_line(number, &games[begun..])));
+            bar.print_above(|| println!("{}", table::series_line(number, &games[first_game..])));
             if number == count {
                 bar.finish();
                 print!("{}", table::series_table(&summary));
@@ -108,7 +109,7 @@ fn play_with_retries(
     let mut attempt = 1;
     loop {
         match play() {
-            Err(PlatformFault::HostBusy(_)) if attempt < ATTEMPTS => attempt += 1,
+            Err(PlatformFault::HostBusy(_)) if attempt < MAX_ATTEMPTS => attempt += 1,
             result => {
                 return result.map_err(with_advice).with_context(|| {
                     format!("{folder} has no result; earlier results remain valid")

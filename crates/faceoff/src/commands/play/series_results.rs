@@ -11,7 +11,7 @@ use serde::Serialize;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Kind {
+pub(super) enum SeriesKind {
     /// Two games on one seed, with swapped sides.
     MirroredPairs,
     /// Games with their own seeds and alternating home sides.
@@ -20,23 +20,23 @@ pub(super) enum Kind {
 
 /// Settings of a series. Pairs are in the sequence of the command line.
 pub(super) struct Series<'a> {
-    pub(super) kind: Kind,
+    pub(super) kind: SeriesKind,
     /// Requested number of pairs or games.
     pub(super) count: u32,
     pub(super) agents: [&'a str; 2],
-    /// The games' seeds are derived from its seed.
+    /// Settings of all games, and the seed from which the games' seeds are derived.
     pub(super) spec: &'a GameSpec,
 }
 
 /// `results.json` of a series. Pairs of numbers are in the sequence of the command line.
 #[derive(Debug, Serialize)]
 pub(super) struct SeriesResults {
-    pub(super) series: Kind,
+    pub(super) series: SeriesKind,
     /// Requested number of pairs or games; a series that ended early has fewer.
     wanted: u32,
     pub(super) ruleset: Ruleset,
     pub(super) profile: Profile,
-    /// The games' seeds are derived from it.
+    /// The seed from which the games' seeds are derived.
     pub(super) seed: Seed,
     mismatch_seed: Seed,
     pub(super) steps: u32,
@@ -46,7 +46,7 @@ pub(super) struct SeriesResults {
     pub(super) draws: u32,
     /// The first agent's goals minus the second's, per pair or per game.
     pub(super) goal_difference: GoalDifference,
-    /// Of mirrored pairs, if there are at least two.
+    /// The variance of mirrored pairs compared with that of independent games; absent with fewer than two pairs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) spread: Option<VarianceComparison>,
     pub(super) games: Vec<SeriesGame>,
@@ -71,7 +71,8 @@ pub(super) struct SeriesGame {
     /// 0 or 1; `None`: a draw.
     pub(super) winner: Option<u32>,
     #[serde(flatten)]
-    why: ResultReason,
+    reason: ResultReason,
+    /// The game as the scoring of tournaments reads it.
     #[serde(skip)]
     entry: PlayedGame,
 }
@@ -117,7 +118,7 @@ impl SeriesGame {
             score: in_agent_sequence(entry.score()),
             penalty_points,
             winner,
-            why: score.reason,
+            reason: score.reason,
             entry,
         })
     }
@@ -136,10 +137,10 @@ impl SeriesResults {
             agents,
             spec,
         } = *series;
-        let won = |agent| games.iter().filter(|game| game.winner == agent).count() as u32;
+        let count_won_by = |agent| games.iter().filter(|game| game.winner == agent).count() as u32;
         let games_per_row = match kind {
-            Kind::MirroredPairs => 2,
-            Kind::Games => 1,
+            SeriesKind::MirroredPairs => 2,
+            SeriesKind::Games => 1,
         };
         let differences = games
             .chunks(games_per_row)
@@ -155,8 +156,8 @@ impl SeriesResults {
             mismatch_seed: spec.mismatch_seed,
             steps: spec.steps,
             agents: agents.map(str::to_owned),
-            wins: [won(Some(0)), won(Some(1))],
-            draws: won(None),
+            wins: [count_won_by(Some(0)), count_won_by(Some(1))],
+            draws: count_won_by(None),
             goal_difference: GoalDifference::from_differences(differences),
             spread: pairs.variances,
             games: games.to_vec(),

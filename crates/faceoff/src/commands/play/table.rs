@@ -1,9 +1,12 @@
-use super::series_results::{Kind, SeriesGame, SeriesResults};
+//! Tables of `faceoff play`: the result of a game, and of a series of games.
+
+use super::series_results::{SeriesGame, SeriesKind, SeriesResults};
 use faceoff_scoring::tournament::GameScore;
 use faceoff_types::Side;
 use std::fmt::Write as _;
 
-/// The result of a game as text.
+/// The result of a game as text. The columns from `ee` to `time` count the violations of each constraint: end effector, links,
+/// joint positions, joint velocities, computation time.
 pub(super) fn game_table(game: &GameScore) -> String {
     let mut out = String::new();
     let mut line = |args: std::fmt::Arguments<'_>| {
@@ -34,7 +37,7 @@ pub(super) fn game_table(game: &GameScore) -> String {
         "time mean/p99/max [ms]"
     ));
     for (number, side) in (1..).zip(&game.sides) {
-        let (v, t) = (side.violations, side.computation_time_s);
+        let (violations, time_s) = (side.violations, side.computation_time_s);
         line(format_args!(
             "{number:<4} {:<20} {:>5} {:>5} {:>5} {:>8.1}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4} {:>6} {:>6}  {:>23}",
             side.agent,
@@ -43,18 +46,18 @@ pub(super) fn game_table(game: &GameScore) -> String {
             side.fouls,
             side.penalty_points,
             side.tier.title(),
-            v.ee,
-            v.link,
-            v.joint_pos,
-            v.joint_vel,
-            v.computation_time,
+            violations.ee,
+            violations.link,
+            violations.joint_pos,
+            violations.joint_vel,
+            violations.computation_time,
             side.late_answers,
             side.faults,
             format!(
                 "{:.2} / {:.2} / {:.2}",
-                1e3 * t.mean,
-                1e3 * t.p99,
-                1e3 * t.max
+                1e3 * time_s.mean,
+                1e3 * time_s.p99,
+                1e3 * time_s.max
             ),
         ));
     }
@@ -79,10 +82,10 @@ pub(super) fn game_table(game: &GameScore) -> String {
 
 /// The end of an agent's log.
 pub(super) fn log_tail(side: Side, log: &str) -> String {
-    const LINES: usize = 10;
+    const MAX_LINES: usize = 10;
     let lines: Vec<&str> = log.lines().collect();
     let mut out = format!("the end of the log of side {}:\n", side.number());
-    for line in &lines[lines.len().saturating_sub(LINES)..] {
+    for line in &lines[lines.len().saturating_sub(MAX_LINES)..] {
         out.push_str("  ");
         out.push_str(line);
         out.push('\n');
@@ -91,13 +94,13 @@ pub(super) fn log_tail(side: Side, log: &str) -> String {
 }
 
 /// Title and column headings of a series.
-pub(super) fn series_head([first, second]: [&str; 2], kind: Kind) -> String {
+pub(super) fn series_head([first, second]: [&str; 2], kind: SeriesKind) -> String {
     let columns = match kind {
-        Kind::MirroredPairs => {
+        SeriesKind::MirroredPairs => {
             let [home, away] = ["at home", "away"];
             format!("{:>5}  {home:<15} {away:<15} {:>10}", "pair", "difference")
         }
-        Kind::Games => format!("{:>5}  {:<15} {:>10}", "game", "goals", "difference"),
+        SeriesKind::Games => format!("{:>5}  {:<15} {:>10}", "game", "goals", "difference"),
     };
     format!("{first} against {second}; goals, and the result of {first}\n{columns}")
 }
@@ -124,8 +127,8 @@ pub(super) fn series_table(results: &SeriesResults) -> String {
     let [first, second] = &results.agents;
     let [won, lost] = results.wins;
     let (singular, plural) = match results.series {
-        Kind::MirroredPairs => ("pair", "mirrored pairs"),
-        Kind::Games => ("game", "games"),
+        SeriesKind::MirroredPairs => ("pair", "mirrored pairs"),
+        SeriesKind::Games => ("game", "games"),
     };
     let difference = &results.goal_difference;
     let interval_text = |interval: Option<[f64; 2]>| match interval {

@@ -1,3 +1,5 @@
+//! The output of `faceoff replay`: an HTML page from `templates/replay`, or one SVG picture.
+
 use super::{
     plots::{self, Plots},
     recording::{EpisodeRecording, time_s},
@@ -6,19 +8,27 @@ use super::{
 use askama::Template;
 use faceoff_types::escape_unprintable;
 
+/// Width of the page's content and of the picture.
 const WIDTH_PX: u32 = 900;
+/// Height of the two lines of text above the table in the picture.
+const TITLE_PX: u32 = 58;
+/// Height of the table as a share of its width in the picture, without its empty lower margin.
+const TABLE_ASPECT: f64 = 0.55;
 
 #[derive(Template)]
 #[template(path = "replay/page.html")]
 struct Page<'a> {
     recording: &'a EpisodeRecording,
     headline: String,
+    /// Causes of penalty points.
     losses: Vec<String>,
     duration_s: String,
+    /// The table from above, as SVG.
     table: String,
     plots: Plots,
     /// Positions that the script animates, as JSON that contains only numbers.
     motion: String,
+    /// Index of the last position.
     last: usize,
 }
 
@@ -26,7 +36,7 @@ struct Page<'a> {
 pub fn html(recording: &EpisodeRecording) -> anyhow::Result<String> {
     let motion = serde_json::json!({
         "puck": round(recording.puck.iter().map(|[x, y, _]| [*x, *y])),
-        "seen": round(recording.seen.iter().copied()),
+        "observed": round(recording.observed_puck.iter().copied()),
         "mallet": round(recording.mallet.iter().copied()),
         // Recorded from the first step on.
         "opponent": round(recording.opponent.first().into_iter().chain(&recording.opponent).copied()),
@@ -48,9 +58,9 @@ pub fn html(recording: &EpisodeRecording) -> anyhow::Result<String> {
 /// The content of the page as one picture.
 pub fn svg(recording: &EpisodeRecording) -> anyhow::Result<String> {
     let plots = plots::draw(recording, WIDTH_PX)?;
-    let table = table_view::svg(recording, WIDTH_PX, "y=\"58\"");
-    let table_px = f64::from(WIDTH_PX) * 0.55;
-    let plots_top = 58.0 + table_px;
+    let table = table_view::svg(recording, WIDTH_PX, &format!("y=\"{TITLE_PX}\""));
+    let table_px = f64::from(WIDTH_PX) * TABLE_ASPECT;
+    let plots_top = f64::from(TITLE_PX) + table_px;
     let placed = plots
         .svg
         .replacen("<svg ", &format!("<svg y=\"{plots_top:.0}\" "), 1);

@@ -1,14 +1,18 @@
+//! Plots of an episode over time: positions, joint speeds, constraints and computation times.
+
 use super::recording::{CONSTRAINTS, EpisodeRecording, time_s};
 use faceoff_scoring::COMPUTATION_TIME_LIMITS_S;
-use faceoff_sim::model::LIMIT_FRACTION;
+use faceoff_sim::{JOINTS, model::LIMIT_FRACTION};
 use plotters::prelude::*;
 use std::ops::Range;
 
 /// Space for labels left of the plot, px.
 const LABELS_PX: u32 = 56;
+/// Space around each chart, px.
 const MARGIN_PX: u32 = 8;
 /// Space for the legend right of the plot, px.
 const LEGEND_PX: u32 = 150;
+/// Height of a chart, px.
 const CHART_PX: u32 = 150;
 
 /// One colour per line, the palette of Okabe and Ito, which colour-blind readers can distinguish.
@@ -28,13 +32,15 @@ struct Chart {
     /// Limits, drawn as red lines.
     bounds: Vec<f64>,
     /// The plot shows at most this range of values.
-    window: Range<f64>,
+    max_range: Range<f64>,
 }
 
 struct Line {
     name: String,
+    /// Time (s) and value.
     points: Vec<(f64, f64)>,
-    dots: bool,
+    /// Draw dots instead of a line.
+    is_dotted: bool,
 }
 
 /// All plots of an episode, one below the other.
@@ -66,20 +72,24 @@ pub fn draw(recording: &EpisodeRecording, width_px: u32) -> anyhow::Result<Plots
 }
 
 fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
-    let puck = |axis: usize, name: &str| Chart {
+    let puck_chart = |axis: usize, name: &str| Chart {
         caption: format!("puck {name} (m), table frame: true and observed"),
         lines: vec![
             Line::from_start(
                 "observed",
-                recording.seen.iter().map(|position| position[axis]),
+                recording
+                    .observed_puck
+                    .iter()
+                    .map(|position| position[axis]),
             )
             .dotted(),
             Line::from_start("true", recording.puck.iter().map(|position| position[axis])),
         ],
         bounds: Vec::new(),
-        window: f64::MIN..f64::MAX,
+        max_range: f64::MIN..f64::MAX,
     };
-    let constraint = |group: usize, scale: f64| {
+    // `group` is an index of `CONSTRAINTS`; `scale` converts its unit to the chart's.
+    let constraint_line = |group: usize, scale: f64| {
         let values = recording
             .constraints
             .iter()
@@ -87,8 +97,8 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
         Line::after_steps(CONSTRAINTS[group].0, values)
     };
     vec![
-        puck(0, "x"),
-        puck(1, "y"),
+        puck_chart(0, "x"),
+        puck_chart(1, "y"),
         Chart {
             caption: "mallet (m), table frame".to_owned(),
             lines: vec![
@@ -96,11 +106,11 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
                 Line::from_start("y", recording.mallet.iter().map(|position| position[1])),
             ],
             bounds: Vec::new(),
-            window: f64::MIN..f64::MAX,
+            max_range: f64::MIN..f64::MAX,
         },
         Chart {
             caption: "joint speeds, % of their limits (filtered; at most 95 % allowed)".to_owned(),
-            lines: (0..7)
+            lines: (0..JOINTS)
                 .map(|joint| {
                     let shares = recording
                         .speed_share
@@ -110,19 +120,19 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
                 })
                 .collect(),
             bounds: vec![-100.0 * LIMIT_FRACTION, 100.0 * LIMIT_FRACTION],
-            window: -120.0..120.0,
+            max_range: -120.0..120.0,
         },
         Chart {
             caption: "constraints (mm): violated above 0".to_owned(),
-            lines: vec![constraint(2, 1e3), constraint(3, 1e3)],
+            lines: vec![constraint_line(2, 1e3), constraint_line(3, 1e3)],
             bounds: vec![0.0],
-            window: -60.0..40.0,
+            max_range: -60.0..40.0,
         },
         Chart {
             caption: "constraints (rad, rad/s): violated above 0".to_owned(),
-            lines: vec![constraint(0, 1.0), constraint(1, 1.0)],
+            lines: vec![constraint_line(0, 1.0), constraint_line(1, 1.0)],
             bounds: vec![0.0],
-            window: -1.5..0.5,
+            max_range: -1.5..0.5,
         },
         Chart {
             caption: "computation time (ms): penalty from 20 ms".to_owned(),
@@ -131,7 +141,7 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
                 recording.computation_time_s.iter().map(|s| 1e3 * s),
             )],
             bounds: vec![1e3 * COMPUTATION_TIME_LIMITS_S[0]],
-            window: 0.0..f64::MAX,
+            max_range: 0.0..f64::MAX,
         },
     ]
 }
@@ -145,7 +155,7 @@ impl Line {
                 .enumerate()
                 .map(|(k, value)| (time_s(k), value))
                 .collect(),
-            dots: false,
+            is_dotted: false,
         }
     }
 
@@ -159,7 +169,7 @@ impl Line {
     }
 
     fn dotted(mut self) -> Self {
-        self.dots = true;
+        self.is_dotted = true;
         self
     }
 }
@@ -172,7 +182,7 @@ impl Chart {
             .iter()
             .flat_map(|line| &line.points)
             .map(|(_, value)| *value);
-        let values = values.map(|value| value.clamp(self.window.start, self.window.end));
+        let values = values.map(|value| value.clamp(self.max_range.start, self.max_range.end));
         let (low, high) = values
             .chain(self.bounds.iter().copied())
             .fold((f64::MAX, f64::MIN), |(low, high), value| {
@@ -220,17 +230,19 @@ impl Chart {
                 .points
                 .iter()
                 .map(|(time, value)| (*time, value.clamp(low, high)));
-            if line.dots {
-                chart.draw_series(shown.map(|at| Circle::new(at, 1, BLACK.mix(0.6).filled())))?;
+            if line.is_dotted {
+                chart.draw_series(
+                    shown.map(|point| Circle::new(point, 1, BLACK.mix(0.6).filled())),
+                )?;
             } else {
                 chart.draw_series(LineSeries::new(shown, colour.stroke_width(1)))?;
             }
         }
         let (axis, _) = chart.plotting_area().get_pixel_range();
-        // The library can only place a legend inside the plot, where it would hide the end of the episode.
+        // The library can only place a legend inside the plot, where it would hide the end of the episode. Positions are in px.
         let mut y = 14;
         for (line, colour) in self.lines.iter().zip(COLOURS) {
-            let colour = if line.dots { BLACK } else { colour };
+            let colour = if line.is_dotted { BLACK } else { colour };
             let x = axis.end + 10;
             area.draw(&PathElement::new(
                 [(x, y), (x + 14, y)],

@@ -1,3 +1,5 @@
+//! The recording of one episode, read from a dataset for the drawings.
+
 use anyhow::Context;
 use arrow_array::{
     Array, RecordBatch,
@@ -25,6 +27,7 @@ pub struct EpisodeRecording {
     pub agent: String,
     pub profile: String,
     pub outcome: EpisodeOutcome,
+    /// Penalty points of the episode.
     pub points: f64,
     pub seed: String,
     /// Reason of the episode's end, as text.
@@ -32,7 +35,7 @@ pub struct EpisodeRecording {
     /// x, y, yaw after k steps.
     pub puck: Vec<[f64; 3]>,
     /// x, y of the puck as observed by the agent after k steps.
-    pub seen: Vec<[f64; 2]>,
+    pub observed_puck: Vec<[f64; 2]>,
     /// x, y of the mallet after k steps.
     pub mallet: Vec<[f64; 2]>,
     /// x, y of the opponent's mallet, from the first step on; empty without an opponent.
@@ -80,8 +83,8 @@ impl EpisodeRecording {
         let end_reason = describe_end(task, record.outcome.end, last, record.outcome.steps, fault);
 
         let to_table_frame = |[x, y]: [f64; 2]| [x - TABLE.base_x_m, y];
-        let seen = columns.rows(["obs_puck_x", "obs_puck_y"])?.into_iter();
-        let last_seen = match record.last_observation[..] {
+        let observed = columns.rows(["obs_puck_x", "obs_puck_y"])?.into_iter();
+        let last_observed = match record.last_observation[..] {
             [x, y, ..] => Some([x, y]),
             _ => None,
         };
@@ -95,8 +98,9 @@ impl EpisodeRecording {
         };
         let speeds: Vec<[f64; JOINTS]> =
             columns.rows(std::array::from_fn(|i| format!("dq_{}", i + 1)))?;
-        let share =
-            |dq: [f64; JOINTS]| std::array::from_fn(|i| dq[i] / LINKS[i].velocity_limit_rad_s);
+        let share = |speed: [f64; JOINTS]| {
+            std::array::from_fn(|i| speed[i] / LINKS[i].velocity_limit_rad_s)
+        };
         let manifest = dataset.manifest();
         Ok(Self {
             agent: escape_unprintable(&manifest.agent).into_owned(),
@@ -108,7 +112,7 @@ impl EpisodeRecording {
                 .chain(puck)
                 .map(|[x, y, yaw, ..]| [x, y, yaw])
                 .collect(),
-            seen: seen.chain(last_seen).map(to_table_frame).collect(),
+            observed_puck: observed.chain(last_observed).map(to_table_frame).collect(),
             mallet: std::iter::once([start_x, start_y])
                 .chain(mallet)
                 .map(to_table_frame)
@@ -188,6 +192,7 @@ pub fn time_s(steps: usize) -> f64 {
     steps as f64 * CONTROL_STEP_S
 }
 
+/// The dataset's table of an episode: a row per control step.
 struct Columns<'a>(&'a RecordBatch);
 
 impl Columns<'_> {
@@ -198,11 +203,13 @@ impl Columns<'_> {
             .as_ref())
     }
 
+    /// The column has no value in any row.
     fn is_absent(&self, name: &str) -> anyhow::Result<bool> {
         let column = self.column(name)?;
         Ok(column.null_count() == column.len())
     }
 
+    /// The values of the named columns, row by row.
     fn rows<const N: usize>(&self, names: [impl AsRef<str>; N]) -> anyhow::Result<Vec<[f64; N]>> {
         let mut rows = vec![[0.0; N]; self.0.num_rows()];
         for (i, name) in names.iter().enumerate() {
@@ -214,6 +221,7 @@ impl Columns<'_> {
         Ok(rows)
     }
 
+    /// The values of a column in nanoseconds, as seconds.
     fn seconds(&self, name: &str) -> anyhow::Result<Vec<f64>> {
         let column = self.column(name)?.as_primitive::<Int64Type>();
         #[expect(clippy::cast_precision_loss, reason = "for a picture")]

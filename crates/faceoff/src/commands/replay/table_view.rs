@@ -1,3 +1,5 @@
+//! The picture of the table from above, with the paths of puck and mallets.
+
 use super::recording::{CONSTRAINTS, EpisodeRecording};
 use faceoff_sim::{
     episode::task::{PLAYABLE_Y_M, TASK_RULES},
@@ -22,7 +24,7 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
          <g transform=\"scale(1 -1)\" fill=\"none\" stroke-width=\"0.004\">\n",
         f64::from(width_px) * height / width
     );
-    let goal = TABLE.goal_width_m / 2.0;
+    let half_goal = TABLE.goal_width_m / 2.0;
     out += &format!(
         "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#fbfbf8\" stroke=\"#333\"/>\n\
          <path d=\"M0 {}V{}\" stroke=\"#bbb\"/>\n",
@@ -30,8 +32,8 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
     );
     for x in [-half_length, half_length] {
         out += &format!(
-            "<path d=\"M{x} {}V{goal}\" stroke=\"#c33\" stroke-width=\"0.012\"/>\n",
-            -goal
+            "<path d=\"M{x} {}V{half_goal}\" stroke=\"#c33\" stroke-width=\"0.012\"/>\n",
+            -half_goal
         );
     }
     out += &target_zone(recording.outcome.task);
@@ -43,7 +45,7 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
     );
     out += &path(&recording.mallet, "#2a6fb0", "");
     out += &path(&puck, "#c0392b", "");
-    for [x, y] in &recording.seen {
+    for [x, y] in &recording.observed_puck {
         out += &format!("<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"0.003\" fill=\"#888\"/>\n");
     }
     for (group, (name, ..)) in CONSTRAINTS.iter().enumerate() {
@@ -59,25 +61,25 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
             );
         }
     }
-    let (puck_r, mallet_r) = (PUCK.radius_m, TOOL.cylinder_radius_m);
+    let (puck_radius, mallet_radius) = (PUCK.radius_m, TOOL.cylinder_radius_m);
     if let Some([x, y, _]) = recording.puck.first() {
         out += &format!(
-            "<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_r}\" stroke=\"#c0392b\" stroke-dasharray=\"0.01 0.008\"/>\n"
+            "<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_radius}\" stroke=\"#c0392b\" stroke-dasharray=\"0.01 0.008\"/>\n"
         );
     }
     if let Some([x, y]) = recording.opponent.last() {
-        out += &disc("opponent", *x, *y, mallet_r, "#e8c27c");
+        out += &disc("opponent", *x, *y, mallet_radius, "#e8c27c");
     }
     if let Some([x, y]) = recording.mallet.last() {
-        out += &disc("mallet", *x, *y, mallet_r, "#7fb2e0");
+        out += &disc("mallet", *x, *y, mallet_radius, "#7fb2e0");
     }
-    if let Some([x, y]) = recording.seen.last() {
+    if let Some([x, y]) = recording.observed_puck.last() {
         out += &format!(
-            "<circle id=\"seen\" cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_r}\" stroke=\"#777\"/>\n"
+            "<circle id=\"observed\" cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_radius}\" stroke=\"#777\"/>\n"
         );
     }
     if let Some([x, y, _]) = recording.puck.last() {
-        out += &disc("puck", *x, *y, puck_r, "#e06a5c");
+        out += &disc("puck", *x, *y, puck_radius, "#e06a5c");
     }
     out + "</g>\n</svg>\n"
 }

@@ -1,3 +1,5 @@
+//! Output as lines of JSON.
+
 use anyhow::Context as _;
 use std::io::Write;
 

@@ -1,3 +1,5 @@
+//! The result of a tournament that `faceoff score` computes.
+
 use faceoff_scoring::tournament::{HeadToHead, Tournament, rating::Ratings};
 use serde::Serialize;
 

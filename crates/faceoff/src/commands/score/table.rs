@@ -11,50 +11,54 @@ use std::{fmt::Write as _, io::Write};
 /// Writes games, standings, records and ratings.
 pub fn write(out: &mut impl Write, scored: &ScoredTournament) -> anyhow::Result<()> {
     let mut text = String::new();
-    tables(&mut text, scored).expect("writing to memory cannot fail");
+    write_tables(&mut text, scored).expect("writing to memory cannot fail");
     out.write_all(text.as_bytes()).context("standard output")
 }
 
 pub(in crate::commands) fn standings_table(rows: &[StandingsRow]) -> String {
     let mut out = String::new();
-    standings(&mut out, rows).expect("writing to memory cannot fail");
+    write_standings(&mut out, rows).expect("writing to memory cannot fail");
     out
 }
 
 /// Head-to-head records and ratings.
 pub(in crate::commands) fn ratings_text(rated: &Ratings, records: &[HeadToHead]) -> String {
     let mut out = String::new();
-    self::records(&mut out, records)
-        .and_then(|()| ratings(&mut out, rated))
+    write_records(&mut out, records)
+        .and_then(|()| write_ratings(&mut out, rated))
         .expect("writing to memory cannot fail");
     out.trim().to_owned()
 }
 
-fn tables(out: &mut String, scored: &ScoredTournament) -> std::fmt::Result {
-    games(out, &scored.tournament.games)?;
-    standings(out, &scored.tournament.standings)?;
-    records(out, &scored.head_to_head)?;
+fn write_tables(out: &mut String, scored: &ScoredTournament) -> std::fmt::Result {
+    write_games(out, &scored.tournament.games)?;
+    write_standings(out, &scored.tournament.standings)?;
+    write_records(out, &scored.head_to_head)?;
     if let Some(ratings) = &scored.ratings {
-        self::ratings(out, ratings)?;
+        write_ratings(out, ratings)?;
     }
     Ok(())
 }
 
-/// The width of a column.
-fn width<'a>(heading: &str, cells: impl Iterator<Item = &'a str>) -> usize {
+/// The width of a column in characters.
+fn column_width<'a>(heading: &str, cells: impl Iterator<Item = &'a str>) -> usize {
     cells
         .map(|cell| cell.chars().count())
         .fold(heading.chars().count(), usize::max)
 }
 
-fn pair(numbers: [u32; 2]) -> String {
+/// Two numbers, e.g. the goals of both sides, as `3-1`.
+fn hyphenated(numbers: [u32; 2]) -> String {
     format!("{}-{}", numbers[0], numbers[1])
 }
 
-fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
+fn write_games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
     let teams = |side: usize| games.iter().map(move |game| game.teams()[side].as_str());
-    let (home, away) = (width("home", teams(0)), width("away", teams(1)));
-    let winner = width("winner", teams(0).chain(teams(1)));
+    let (home, away) = (
+        column_width("home", teams(0)),
+        column_width("away", teams(1)),
+    );
+    let winner = column_width("winner", teams(0).chain(teams(1)));
     writeln!(
         out,
         "{:>5}  {:<home$}  {:<away$}  {:>7}  {:>7}  {:>7}  {:>15}  {:<winner$}  reason",
@@ -67,9 +71,9 @@ fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
             out,
             "{:>5}  {first:<home$}  {second:<away$}  {:>7}  {:>7}  {:>7}  {:>15}  {:<winner$}  {}",
             game.round(),
-            pair(game.score),
-            pair(game.goals()),
-            game.fouls().map_or_else(|| "?".to_owned(), pair),
+            hyphenated(game.score),
+            hyphenated(game.goals()),
+            game.fouls().map_or_else(|| "?".to_owned(), hyphenated),
             points.join(" / "),
             game.winner.as_ref().map_or("draw", |team| team.as_str()),
             game.result
@@ -82,9 +86,9 @@ fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
     Ok(())
 }
 
-fn standings(out: &mut String, standings: &[StandingsRow]) -> std::fmt::Result {
+fn write_standings(out: &mut String, standings: &[StandingsRow]) -> std::fmt::Result {
     let names = standings.iter().map(|row| row.team.as_str());
-    let team = width("team", names);
+    let team = column_width("team", names);
     writeln!(
         out,
         "\n{:>4}  {:<team$}  {:>6}  {:>4}  {:>5}  {:>6}  {:>9}  {:>14}  points per round",
@@ -114,13 +118,13 @@ fn standings(out: &mut String, standings: &[StandingsRow]) -> std::fmt::Result {
     Ok(())
 }
 
-fn records(out: &mut String, records: &[HeadToHead]) -> std::fmt::Result {
+fn write_records(out: &mut String, records: &[HeadToHead]) -> std::fmt::Result {
     let names = |side: usize| {
         records
             .iter()
             .map(move |record| record.teams[side].as_str())
     };
-    let (first, second) = (width("A", names(0)), width("B", names(1)));
+    let (first, second) = (column_width("A", names(0)), column_width("B", names(1)));
     writeln!(
         out,
         "\n{:<first$}  {:<second$}  {:>6}  {:>5}  {:>6}  {:>9}",
@@ -140,10 +144,10 @@ fn records(out: &mut String, records: &[HeadToHead]) -> std::fmt::Result {
     Ok(())
 }
 
-fn ratings(out: &mut String, ratings: &Ratings) -> std::fmt::Result {
-    for (by, pools) in [("results", &ratings.results), ("goals", &ratings.goals)] {
+fn write_ratings(out: &mut String, ratings: &Ratings) -> std::fmt::Result {
+    for (basis, pools) in [("results", &ratings.results), ("goals", &ratings.goals)] {
         for (number, pool) in (1..).zip(pools) {
-            write!(out, "\nratings by {by}")?;
+            write!(out, "\nratings by {basis}")?;
             if pools.len() > 1 {
                 write!(
                     out,
@@ -152,7 +156,7 @@ fn ratings(out: &mut String, ratings: &Ratings) -> std::fmt::Result {
                 )?;
             }
             writeln!(out)?;
-            self::pool(out, pool)?;
+            write_pool(out, pool)?;
         }
     }
     writeln!(
@@ -162,7 +166,8 @@ fn ratings(out: &mut String, ratings: &Ratings) -> std::fmt::Result {
     )
 }
 
-fn pool(out: &mut String, pool: &Pool) -> std::fmt::Result {
+/// The ratings of a *pool*, teams or submissions that games connect with each other.
+fn write_pool(out: &mut String, pool: &Pool) -> std::fmt::Result {
     let names: Vec<String> = pool
         .ratings
         .iter()
@@ -171,10 +176,10 @@ fn pool(out: &mut String, pool: &Pool) -> std::fmt::Result {
             None => row.rated.team.to_string(),
         })
         .collect();
-    let wide = width("team", names.iter().map(String::as_str));
+    let name_width = column_width("team", names.iter().map(String::as_str));
     writeln!(
         out,
-        "{:<wide$}  {:>6}  {:>15}  {:>5}",
+        "{:<name_width$}  {:>6}  {:>15}  {:>5}",
         "team", "rating", "95 % interval", "games"
     )?;
     for (name, row) in names.iter().zip(&pool.ratings) {
@@ -186,7 +191,7 @@ fn pool(out: &mut String, pool: &Pool) -> std::fmt::Result {
         };
         writeln!(
             out,
-            "{name:<wide$}  {:>6.0}  {interval:>15}  {:>5}",
+            "{name:<name_width$}  {:>6.0}  {interval:>15}  {:>5}",
             row.rating, row.games
         )?;
     }

@@ -51,7 +51,9 @@ impl FromStr for TeamAndRound {
             .map_err(|_| format!("round: expected a number, got {round:?}"))?;
         Ok(Self {
             team: team.parse().map_err(|error| format!("{error}"))?,
-            round: number.try_into().map_err(|why| format!("round: {why}"))?,
+            round: number
+                .try_into()
+                .map_err(|error| format!("round: {error}"))?,
         })
     }
 }
@@ -77,7 +79,7 @@ impl TournamentArgs {
             })
             .collect();
         let departures = self.departures(games)?;
-        let ratings = match rate(departures.counting(games)) {
+        let ratings = match rate(departures.counting_games(games)) {
             Ok(ratings) => Some(ratings),
             Err(RatingError::Pair(invalid)) => return Err(invalid.into()),
             Err(too_many @ RatingError::TooMany(_)) => {
@@ -87,7 +89,7 @@ impl TournamentArgs {
         };
         let scored = ScoredTournament {
             tournament: score_tournament_with(games, &departures, &byes),
-            head_to_head: head_to_head(departures.counting(games)),
+            head_to_head: head_to_head(departures.counting_games(games)),
             ratings,
         };
         for repeated in &scored.tournament.repeated_pairings {
@@ -106,12 +108,14 @@ impl TournamentArgs {
     }
 
     fn departures(self, games: &[PlayedGame]) -> anyhow::Result<Departures> {
-        let list = |teams: Vec<TeamAndRound>, left_as| {
-            teams.into_iter().map(move |left| Departure {
-                team: left.team,
-                kind: left_as,
-                from_round: left.round,
-            })
+        let list = |teams: Vec<TeamAndRound>, kind| {
+            teams
+                .into_iter()
+                .map(move |TeamAndRound { team, round }| Departure {
+                    team,
+                    kind,
+                    from_round: round,
+                })
         };
         let departures = Departures::new(
             list(self.withdrawn, DepartureKind::Withdrawn)
@@ -133,6 +137,7 @@ mod tests {
     use serde_json::{Value, json};
 
     impl TournamentArgs {
+        /// `--json`, without departures and byes.
         pub const JSON: Self = Self {
             withdrawn: Vec::new(),
             disqualified: Vec::new(),
@@ -146,12 +151,14 @@ mod tests {
         serde_json::from_value(games.clone()).unwrap()
     }
 
-    fn printed(args: TournamentArgs, input: &Value) -> anyhow::Result<(String, String)> {
+    /// Scores the games; returns standard output and the warnings.
+    fn score(args: TournamentArgs, input: &Value) -> anyhow::Result<(String, String)> {
         let (mut out, mut warnings) = (Vec::new(), Vec::new());
         args.score(&games(input), &mut out, &mut warnings)?;
         Ok((String::from_utf8(out)?, String::from_utf8(warnings)?))
     }
 
+    /// `--table`, with departures as `TEAM=ROUND`.
     fn table(withdrawn: &[&str], disqualified: &[&str]) -> TournamentArgs {
         let list = |teams: &[&str]| teams.iter().map(|team| team.parse().unwrap()).collect();
         TournamentArgs {
@@ -173,11 +180,11 @@ mod tests {
         let mut unfinished = game(2, "Ajax", "Zed", [3, 4]);
         unfinished["submissions"] = json!(["v1", "v2"]);
         let input = json!([game(1, "Zed", "Ajax", [0, 2]), unfinished]);
-        let (out, warnings) = printed(table(&["Zed=2"], &[]), &input).unwrap();
+        let (out, warnings) = score(table(&["Zed=2"], &[]), &input).unwrap();
         assert_eq!(warnings, "");
         let lines: Vec<Vec<&str>> = out
             .lines()
-            .map(|l| l.split_whitespace().collect())
+            .map(|line| line.split_whitespace().collect())
             .collect();
         let words = |line: usize| lines[line].join(" ");
         assert_eq!(
@@ -211,7 +218,7 @@ mod tests {
             labelled(2, [2, 0], "v1"),
             labelled(3, [0, 1], "v2")
         ]);
-        let (out, _) = printed(table(&[], &[]), &input).unwrap();
+        let (out, _) = score(table(&[], &[]), &input).unwrap();
         assert!(
             out.contains(
                 "ratings by results, pool 1 of 2 (the pools have no games against each other)"
@@ -231,7 +238,7 @@ mod tests {
     #[test]
     fn disqualified_team_is_ranked_last() {
         let input = json!([game(1, "Zed", "Ajax", [0, 2])]);
-        let (out, _) = printed(table(&[], &["Zed=2"]), &input).unwrap();
+        let (out, _) = score(table(&[], &["Zed=2"]), &input).unwrap();
         let position = |text: &str| out.find(text).unwrap();
         assert!(position("   1  Ajax") < position("   2  Zed "), "{out}");
         assert!(out.contains("(disqualified)"), "{out}");
@@ -251,7 +258,7 @@ mod tests {
             assert_eq!(text.parse::<TeamAndRound>().unwrap_err(), expected);
         }
         let input = json!([game(1, "Zed", "Ajax", [0, 2])]);
-        let error = |args| format!("{:#}", printed(args, &input).unwrap_err());
+        let error = |args| format!("{:#}", score(args, &input).unwrap_err());
         assert_eq!(
             error(table(&["Zde=1"], &[])),
             "Zde is named as withdrawn or disqualified, but has no game; check the name"
@@ -263,11 +270,11 @@ mod tests {
     }
 
     #[test]
-    fn large_field_is_scored_without_ratings() {
+    fn too_many_teams_are_scored_without_ratings() {
         let chain: Vec<Value> = (0..200)
             .map(|n| game(1, &format!("T{n}"), &format!("T{}", n + 1), [1, 0]))
             .collect();
-        let (out, warnings) = printed(TournamentArgs::JSON, &json!(chain)).unwrap();
+        let (out, warnings) = score(TournamentArgs::JSON, &json!(chain)).unwrap();
         let out: Value = serde_json::from_str(&out).unwrap();
         assert_eq!(out["standings"].as_array().unwrap().len(), 201);
         assert_eq!(out.get("ratings"), None);
@@ -281,7 +288,7 @@ mod tests {
     fn invalid_mirrored_pair_is_refused() {
         let mut half = game(1, "Zed", "Ajax", [0, 2]);
         half["pair"] = json!(1);
-        let error = printed(TournamentArgs::JSON, &json!([half, half])).unwrap_err();
+        let error = score(TournamentArgs::JSON, &json!([half, half])).unwrap_err();
         assert!(error.to_string().contains("sides swapped"), "{error}");
     }
 }

@@ -1,7 +1,7 @@
-//! Serves an archived season read-only, without schedule and slots.
+//! Serves an archived season read-only, without schedule and worker slots. Its data folder was created by `faceoff import`.
 
 use super::{
-    data_folder::{empty_folder, link_key, lock, set_admin_token},
+    data_folder::{empty_folder, load_or_create_link_key, lock, set_admin_token},
     http::{serve_http, shutdown_signal},
 };
 use crate::{config::Config, machine};
@@ -27,7 +27,7 @@ pub async fn serve(
     let data_dir = config.server.data_dir.clone();
     let _lock = lock(&data_dir)?;
     let upload_dir = data_dir.join("uploads");
-    // A process that was killed may have left an unfinished archive.
+    // A process that was killed while a visitor downloaded the archive may have left a temporary file.
     empty_folder(&upload_dir)?;
     let store = Store::open(&data_dir)
         .await
@@ -62,7 +62,7 @@ pub async fn serve(
             },
             agent_resources: AgentResources::none(),
             rate_limits: config.rates.limits(),
-            link_key: link_key(&data_dir)?,
+            link_key: load_or_create_link_key(&data_dir)?,
             metrics: Metrics::new(env!("CARGO_PKG_VERSION")),
             process: machine::process,
             webhooks: config.webhooks.clone(),

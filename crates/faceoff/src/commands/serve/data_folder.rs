@@ -1,4 +1,5 @@
-//! The data folder: its lock and its secrets.
+//! The data folder: its lock and its secrets. The *host* is the person who runs the server; the *host's token* has all rights of
+//! an organiser.
 
 use super::super::atomic_folder::create_private;
 use anyhow::{Context, bail};
@@ -15,7 +16,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Name of the file with the host's organiser token.
+/// Name of the file with the host's token.
 pub const ADMIN_TOKEN_FILE: &str = "admin-token";
 
 /// Name of the file with the key that signs links. Backups do not contain it.
@@ -25,7 +26,7 @@ const LINK_KEY_FILE: &str = "links.key";
 const LOCK_FILE: &str = "serving.lock";
 
 /// How long the lock of a dead process may remain: until a child that it has forked calls exec.
-const MAX_LOCK_AFTERLIFE: Duration = Duration::from_secs(10);
+const MAX_STALE_LOCK: Duration = Duration::from_secs(10);
 
 /// Locks the data folder for this process, until the file is dropped or the process ends. The holder of the lock may
 /// remove what other processes have left.
@@ -43,7 +44,7 @@ pub fn lock(data_dir: &Path) -> anyhow::Result<File> {
         .mode(0o600)
         .open(&path)
         .with_context(context)?;
-    let begun = Instant::now();
+    let started_at = Instant::now();
     loop {
         match file.try_lock() {
             Ok(()) => break,
@@ -54,7 +55,7 @@ pub fn lock(data_dir: &Path) -> anyhow::Result<File> {
             }
             Err(TryLockError::WouldBlock) => {
                 let holder = read_holder(&mut file);
-                if holder.is_some_and(is_alive) || begun.elapsed() > MAX_LOCK_AFTERLIFE {
+                if holder.is_some_and(is_alive) || started_at.elapsed() > MAX_STALE_LOCK {
                     let holder = holder.map_or_else(
                         || "another process".to_owned(),
                         |id| format!("process {id}"),
@@ -70,11 +71,11 @@ pub fn lock(data_dir: &Path) -> anyhow::Result<File> {
         }
     }
     // A restore may have renamed the folder in between.
-    let (locked, named) = (
+    let (locked, current) = (
         file.metadata().with_context(context)?,
         fs::metadata(&path).with_context(context)?,
     );
-    if (locked.dev(), locked.ino()) != (named.dev(), named.ino()) {
+    if (locked.dev(), locked.ino()) != (current.dev(), current.ino()) {
         bail!(
             "the data folder {} has just been replaced; start again",
             data_dir.display()
@@ -119,7 +120,7 @@ pub fn empty_folder(folder: &Path) -> anyhow::Result<()> {
 }
 
 /// The hash of the host's token, which is created at the first start.
-fn admin_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
+fn load_or_create_host_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
     let file = data_dir.join(ADMIN_TOKEN_FILE);
     match fs::read_to_string(&file) {
         Ok(token) if token.trim().is_empty() => bail!(
@@ -138,17 +139,17 @@ fn admin_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
 
 /// Writes a private file under a temporary name and renames it, so that a crash cannot leave half a secret.
 fn write_secret(file: &Path, secret: &str) -> anyhow::Result<()> {
-    let fresh = file.with_extension("new");
+    let temporary = file.with_extension("new");
     let write = || -> std::io::Result<()> {
         let mut writer = OpenOptions::new()
             .write(true)
             .create(true)
             .truncate(true)
             .mode(0o600)
-            .open(&fresh)?;
+            .open(&temporary)?;
         writeln!(writer, "{secret}")?;
         writer.sync_all()?;
-        fs::rename(&fresh, file)
+        fs::rename(&temporary, file)
     };
     write().with_context(|| format!("writing {}", file.display()))
 }
@@ -157,7 +158,7 @@ fn write_secret(file: &Path, secret: &str) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// If the key cannot be read or written, or is invalid.
-pub fn link_key(data_dir: &Path) -> anyhow::Result<LinkKey> {
+pub fn load_or_create_link_key(data_dir: &Path) -> anyhow::Result<LinkKey> {
     let file = data_dir.join(LINK_KEY_FILE);
     match fs::read_to_string(&file) {
         Ok(text) => LinkKey::from_hex(text.trim()).with_context(|| {
@@ -175,16 +176,21 @@ pub fn link_key(data_dir: &Path) -> anyhow::Result<LinkKey> {
     }
 }
 
-/// Registers the token of the file in the store, or a new one if it has been revoked.
+/// Registers the host's token in the store. If the token in the file has been revoked, creates a new one first.
 ///
 /// # Errors
 /// If the file or the database cannot be read or written.
 pub async fn set_admin_token(store: &Store, data_dir: &Path, now: Timestamp) -> anyhow::Result<()> {
-    if !store.set_host_token(admin_token(data_dir)?, now).await? {
+    if !store
+        .set_host_token(load_or_create_host_token(data_dir)?, now)
+        .await?
+    {
         let file = data_dir.join(ADMIN_TOKEN_FILE);
         tracing::warn!(file = %file.display(), "the token in the file was revoked; creating a new one");
         fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
-        store.set_host_token(admin_token(data_dir)?, now).await?;
+        store
+            .set_host_token(load_or_create_host_token(data_dir)?, now)
+            .await?;
     }
     Ok(())
 }
@@ -197,11 +203,11 @@ mod tests {
     #[test]
     fn data_folder_has_one_lock_holder_at_a_time() {
         let folder = tempfile::tempdir().unwrap();
-        let held = lock(folder.path()).unwrap();
+        let lock_file = lock(folder.path()).unwrap();
         let refused = lock(folder.path()).unwrap_err().to_string();
-        let own = format!("in use by process {}", std::process::id());
-        assert!(refused.contains(&own), "{refused}");
-        drop(held);
+        let expected = format!("in use by process {}", std::process::id());
+        assert!(refused.contains(&expected), "{refused}");
+        drop(lock_file);
         // The id of a process that has ended, and invalid content.
         for content in ["999999999", "", "words"] {
             fs::write(folder.path().join(LOCK_FILE), content).unwrap();
@@ -212,20 +218,25 @@ mod tests {
     #[test]
     fn link_key_is_created_once_and_private() {
         let folder = tempfile::tempdir().unwrap();
-        let first = link_key(folder.path()).unwrap().to_hex();
-        assert_eq!(link_key(folder.path()).unwrap().to_hex(), first);
+        let first = load_or_create_link_key(folder.path()).unwrap().to_hex();
+        assert_eq!(
+            load_or_create_link_key(folder.path()).unwrap().to_hex(),
+            first
+        );
         let file = folder.path().join(LINK_KEY_FILE);
         assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
         fs::write(&file, "no key\n").unwrap();
-        let refused = link_key(folder.path()).unwrap_err().to_string();
+        let refused = load_or_create_link_key(folder.path())
+            .unwrap_err()
+            .to_string();
         assert!(refused.contains("64 hexadecimal digits"), "{refused}");
     }
 
     #[test]
     fn host_token_is_created_once_and_private() {
         let folder = tempfile::tempdir().unwrap();
-        let first = admin_token(folder.path()).unwrap();
-        assert_eq!(admin_token(folder.path()).unwrap(), first);
+        let first = load_or_create_host_token(folder.path()).unwrap();
+        assert_eq!(load_or_create_host_token(folder.path()).unwrap(), first);
         let file = folder.path().join(ADMIN_TOKEN_FILE);
         assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
         let token = fs::read_to_string(&file).unwrap();
@@ -233,7 +244,7 @@ mod tests {
         assert_eq!(hash_token(token.trim()), first);
         fs::write(&file, "\n").unwrap();
         assert!(
-            admin_token(folder.path()).is_err(),
+            load_or_create_host_token(folder.path()).is_err(),
             "an empty token must not be accepted"
         );
     }

@@ -27,12 +27,12 @@ pub async fn serve_metrics(
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     let router = faceoff_http::monitoring_router(store, config);
-    let until = shutdown.cancelled_owned();
-    faceoff_http::serve(listener, router, ConnectionLimits::default(), until).await;
+    let shutdown = shutdown.cancelled_owned();
+    faceoff_http::serve(listener, router, ConnectionLimits::default(), shutdown).await;
     Ok(())
 }
 
-/// Counts changes until `shutdown`.
+/// Counts the recorded changes of the season as metrics, until `shutdown`.
 pub async fn count_changes(
     store: Store,
     metrics: Metrics,

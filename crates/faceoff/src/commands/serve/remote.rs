@@ -1,4 +1,5 @@
-//! Configuration of remote workers.
+//! Settings for *remote workers*, processes on other machines that run the server's jobs. They receive jobs through a NATS message
+//! server, and transfer files through the server itself or through a *bucket*, an object store (S3).
 
 use crate::{
     commands::{capabilities::own_capabilities, files_client::bucket_client},
@@ -9,10 +10,10 @@ use faceoff_runner::AgentEnvironment;
 use faceoff_worker::{BucketConfig, RemoteConfig};
 use std::net::SocketAddr;
 
-/// The settings of remote workers; `None` if NATS is not configured.
+/// The settings of remote workers; `None` if NATS is not configured. `address` is where the server listens.
 pub(super) fn remote_config(
     config: &Config,
-    listens_on: SocketAddr,
+    address: SocketAddr,
     link_key: &LinkKey,
     agent: &AgentEnvironment,
 ) -> anyhow::Result<Option<RemoteConfig>> {
@@ -31,11 +32,11 @@ pub(super) fn remote_config(
         }),
         None => None,
     };
-    let files = config.nats.files_url.clone();
-    let files = files.or_else(|| config.server.public_url.clone());
+    let files_url = config.nats.files_url.clone();
+    let files_url = files_url.or_else(|| config.server.public_url.clone());
     Ok(Some(RemoteConfig {
         nats,
-        files_url: files.unwrap_or_else(|| format!("http://{listens_on}")),
+        files_url: files_url.unwrap_or_else(|| format!("http://{address}")),
         key: link_key.grant_key(),
         bucket,
         checked_episodes: config.workers.checked_episodes,

@@ -1,4 +1,5 @@
-//! Inventory of the runtimes, taken once while the server starts.
+//! Inventory of the *runtimes*, the environments that agents run in, e.g. a Python with packages. It is taken once while the
+//! server starts.
 
 use crate::{config::Config, machine};
 use anyhow::Context as _;
@@ -47,9 +48,9 @@ pub fn agent_resources(config: &Config, cpus: &CpuLayout) -> anyhow::Result<Agen
                     RuntimeContent::Image => {
                         tracing::info!(runtime = runtime.name, "container images available");
                     }
-                    RuntimeContent::Failed { reason: why } => tracing::warn!(
+                    RuntimeContent::Failed { reason } => tracing::warn!(
                         runtime = runtime.name,
-                        why,
+                        reason,
                         "runtime does not work; run `faceoff doctor` for details"
                     ),
                 }

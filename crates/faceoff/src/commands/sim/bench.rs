@@ -1,4 +1,5 @@
-//! `faceoff sim bench`: measures the speed of the simulator on one core.
+//! `faceoff sim bench`: measures the speed of the simulator on one core, in *control steps*, in which an agent acts once, and in
+//! *substeps* of the physics, into which they are divided.
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
@@ -35,7 +36,7 @@ pub struct BenchArgs {
     json: bool,
 }
 
-/// Interpolation of the agent that holds still.
+/// How the robot interpolates between the actions of the agent that holds still.
 const HOLD_INTERPOLATION: Interpolation = Interpolation::Cubic;
 
 #[derive(Debug, Clone, Copy, ValueEnum, Serialize)]
@@ -109,15 +110,16 @@ impl BenchArgs {
         Ok(())
     }
 
+    /// Runs the episodes of a task; returns the number of control steps and the time they took.
     fn play_episodes(&self, task: Task) -> (u64, Duration) {
         let arena = Arena::new(self.profile, self.seed, self.seed.model_mismatch());
-        let hold = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
-        let hold = &hold[..HOLD_INTERPOLATION.len()];
+        let action = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
+        let action = &action[..HOLD_INTERPOLATION.len()];
         let (mut steps, mut time) = (0, Duration::ZERO);
         for index in 0..self.episodes {
             let start = Instant::now();
             let mut episode = arena.episode(task, index, HOLD_INTERPOLATION);
-            while episode.step(black_box(hold)).end.is_none() {
+            while episode.step(black_box(action)).end.is_none() {
                 black_box(episode.observation());
             }
             time += start.elapsed();
@@ -126,6 +128,7 @@ impl BenchArgs {
         (steps, time)
     }
 
+    /// Runs a game with as many windows as there are episodes; returns as [`play_episodes`](Self::play_episodes).
     fn play_game(&self) -> (u64, Duration) {
         let (factors, settings) = (self.profile.factors(), PerturbationSettings::default());
         let setup = GameSetup {
@@ -135,13 +138,13 @@ impl BenchArgs {
             settings,
             seed: self.seed,
         };
-        let hold = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
-        let hold = &hold[..HOLD_INTERPOLATION.len()];
+        let action = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
+        let action = &action[..HOLD_INTERPOLATION.len()];
         let steps = u64::from(self.episodes) * u64::from(WINDOW_STEPS);
         let start = Instant::now();
         let mut game = Game::new(setup);
         for _ in 0..steps {
-            black_box(game.step([Command::Act(black_box(hold)); 2]));
+            black_box(game.step([Command::Act(black_box(action)); 2]));
             black_box((game.observation(0), game.observation(1)));
         }
         (steps, start.elapsed())

@@ -1,4 +1,5 @@
-//! `faceoff sim export`: writes the ideal model for other programs.
+//! `faceoff sim export`: writes the ideal model for other programs. The *plant* is the simulated robot; the controller has its own
+//! model of it.
 
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};

@@ -1,11 +1,15 @@
 //! `faceoff sim kinematics`: computes positions, Jacobian and dynamics of poses, for comparison with other programs.
+//!
+//! `q` are joint positions (rad), `dq` joint velocities (rad/s), `ddq` accelerations (rad/s²), `ee` is the end effector. The arm has
+//! seven *driven* joints and, at its end, a passive *universal joint* with the mallet. The *plant* is the simulated robot with all
+//! of them; the controller's model has the driven joints only.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use faceoff_sim::{
     ConstraintValues, JOINTS,
     dynamics::arm::{Bodies, Kinematics, controller_torques, mass_matrix, plant_bias},
     model::DOFS,
-    robot::{inverse_kinematics::with_zero_universal, universal_joint::vertical},
+    robot::{inverse_kinematics::with_zero_universal, universal_joint::mallet_vertical_angles},
 };
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead as _, IsTerminal as _, Read as _, Write};
@@ -27,17 +31,25 @@ struct Pose {
 /// One line of the output, in the robot's base frame. Matrices are lists of rows.
 #[derive(Debug, Serialize)]
 struct PoseModel {
+    /// Origin of each link, m.
     links: [[f64; 3]; JOINTS],
+    /// Rotation matrix of each link.
     rotations: [[f64; 9]; JOINTS],
+    /// Position of the end effector, m.
     ee: [f64; 3],
+    /// Linear velocity of the end effector in the first three rows, angular velocity in the others.
     jacobian: [[f64; JOINTS]; 6],
+    /// Mass matrix.
     mass: [[f64; JOINTS]; JOINTS],
+    /// Torques that the motion and gravity require without acceleration, N m.
     bias: [f64; JOINTS],
+    /// Torques that gravity requires, N m.
     gravity: [f64; JOINTS],
     constraints: Constraints,
     plant: Plant,
 }
 
+/// The largest value of each group of constraints: above 0 if it is violated.
 #[derive(Debug, Serialize)]
 struct Constraints {
     joint_pos: f64,
@@ -49,7 +61,9 @@ struct Constraints {
 #[derive(Debug, Serialize)]
 struct Plant {
     q: [f64; DOFS],
+    /// Centre of the mallet's cylinder, m.
     mallet: [f64; 3],
+    /// Direction of the cylinder's axis.
     mallet_axis: [f64; 3],
     mass: [[f64; DOFS]; DOFS],
     bias: [f64; DOFS],
@@ -90,17 +104,18 @@ pub fn run() -> Result<()> {
 fn evaluate_line(line: &str) -> Result<PoseModel> {
     let pose: Pose = serde_json::from_str(line)
         .context("expected a pose, as in {\"q\": [7 numbers], \"dq\": [7 numbers]}")?;
-    let q = match joints("q", &pose.q)? {
+    let q = match parse_joints("q", &pose.q)? {
         Joints::Driven(driven) => {
             let ee = Kinematics::new(&with_zero_universal(&driven)).end_effector;
-            let universal = vertical(ee.x, ee.y, [0.0; 2]);
+            let universal = mallet_vertical_angles(ee.x, ee.y, [0.0; 2]);
             let mut q = with_zero_universal(&driven);
             q[JOINTS..].copy_from_slice(&universal);
             q
         }
         Joints::All(q) => q,
     };
-    let dq = match pose.dq.as_deref().map(|dq| joints("dq", dq)).transpose()? {
+    let dq = pose.dq.as_deref().map(|dq| parse_joints("dq", dq));
+    let dq = match dq.transpose()? {
         None => [0.0; DOFS],
         Some(Joints::Driven(driven)) => with_zero_universal(&driven),
         Some(Joints::All(dq)) => dq,
@@ -108,26 +123,28 @@ fn evaluate_line(line: &str) -> Result<PoseModel> {
     Ok(evaluate(&q, &dq))
 }
 
+/// One number per joint.
 enum Joints {
     Driven([f64; JOINTS]),
+    /// The driven joints and the two axes of the universal joint.
     All([f64; DOFS]),
 }
 
-fn joints(field: &str, given: &[f64]) -> Result<Joints> {
-    if let Some(number) = given
+fn parse_joints(field: &str, numbers: &[f64]) -> Result<Joints> {
+    if let Some(number) = numbers
         .iter()
         .find(|number| number.is_nan() || number.abs() > NUMBER_LIMIT)
     {
         bail!("{field}: expected numbers within ±{NUMBER_LIMIT}, got {number}");
     }
-    if let Ok(driven) = given.try_into() {
+    if let Ok(driven) = numbers.try_into() {
         Ok(Joints::Driven(driven))
-    } else if let Ok(all) = given.try_into() {
+    } else if let Ok(all) = numbers.try_into() {
         Ok(Joints::All(all))
     } else {
         bail!(
             "{field}: expected {JOINTS} numbers, or {DOFS} with the universal joint's, got {}",
-            given.len()
+            numbers.len()
         )
     }
 }
@@ -137,7 +154,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
     let ee = kinematics.end_effector.origin;
     let mut jacobian = [[0.0; JOINTS]; 6];
     for (joint, axis) in kinematics.axes.iter().take(JOINTS).enumerate() {
-        let (linear, angular) = (axis.at(ee).lane(0), axis.angular.lane(0));
+        let (linear, angular) = (axis.velocity_at(ee).lane(0), axis.angular.lane(0));
         for row in 0..3 {
             jacobian[row][joint] = linear[row];
             jacobian[row + 3][joint] = angular[row];
@@ -162,7 +179,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
         }
     }
     let plant = bodies.plant(&[1.0; DOFS]);
-    let lower = mass_matrix(&kinematics, &plant);
+    let lower_triangle = mass_matrix(&kinematics, &plant);
     let positions: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
     let ConstraintValues {
         joint_pos,
@@ -188,7 +205,9 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
             q: *q,
             mallet: kinematics.cylinder_centre().lane(0),
             mallet_axis: kinematics.mallet_axis.lane(0),
-            mass: std::array::from_fn(|i| std::array::from_fn(|j| lower[i.max(j)][i.min(j)])),
+            mass: std::array::from_fn(|i| {
+                std::array::from_fn(|j| lower_triangle[i.max(j)][i.min(j)])
+            }),
             bias: plant_bias(&kinematics, &plant, dq),
         },
     }

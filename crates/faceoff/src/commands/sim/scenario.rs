@@ -1,4 +1,5 @@
-//! The scenario of `faceoff sim trace`, parsed and checked field by field.
+//! The scenario of `faceoff sim trace`, parsed and checked field by field: the initial state of puck and robots, and the actions of
+//! the robots or the motion of a mallet.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use faceoff_sim::{Interpolation, JOINTS, MalletState, model::INITIAL_Q};
@@ -19,7 +20,7 @@ const NUMBER_LIMIT: f64 = 1e4;
 /// The fields of the file, before they are checked.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Raw {
+struct RawScenario {
     task: Option<Task>,
     profile: Option<Profile>,
     seed: Option<Value>,
@@ -43,13 +44,13 @@ pub struct Scenario {
     pub seed: Seed,
     /// [x, y, yaw, vx, vy, yaw rate].
     pub puck: [f64; 6],
-    /// Initial joint positions, one per robot.
+    /// Initial joint positions (rad) of each robot.
     pub joints: Vec<[f64; JOINTS]>,
-    /// One per robot.
+    /// How each robot interpolates between its actions.
     pub interpolation: Vec<Interpolation>,
-    /// Per robot and control step, row-major.
+    /// Actions by robot and control step, row-major.
     pub actions: Vec<Vec<Vec<f64>>>,
-    /// Imposed mallet of robot 1, per ms.
+    /// Prescribed states of a mallet, one per ms, instead of that of robot 1.
     pub mallet: Vec<MalletState>,
     /// Duration of the scenario, ms.
     pub duration_ms: u64,
@@ -69,7 +70,7 @@ impl Scenario {
             "the scenario is longer than {INPUT_LIMIT_BYTES} bytes"
         );
         let mut json = serde_json::Deserializer::from_str(&text);
-        let raw: Raw = serde_path_to_error::deserialize(&mut json)
+        let raw: RawScenario = serde_path_to_error::deserialize(&mut json)
             .map_err(|error| match error.path().to_string().as_str() {
                 "." => anyhow::anyhow!("{}", error.inner()),
                 path => anyhow::anyhow!("{path}: {}", error.inner()),
@@ -80,7 +81,7 @@ impl Scenario {
         Self::check(raw)
     }
 
-    fn check(raw: Raw) -> Result<Self> {
+    fn check(raw: RawScenario) -> Result<Self> {
         let robots = match (raw.task, raw.robots) {
             (Some(Task::Hit), None | Some(2)) | (None, Some(2)) => 2,
             (Some(Task::Hit), Some(other)) => {
@@ -90,21 +91,23 @@ impl Scenario {
             (Some(task), Some(other)) => bail!("robots: expected 1 with task {task}, got {other}"),
             (None, Some(other)) => bail!("robots: expected 1 or 2, got {other}"),
         };
-        let commanded = if raw.task == Some(Task::Hit) {
+        // The simulator commands the opponent of hit.
+        let robots_with_actions = if raw.task == Some(Task::Hit) {
             1
         } else {
             robots
         };
-        let joints = joints(raw.joints.unwrap_or_default(), robots)?;
-        let interpolation = interpolations(&raw.interpolation.unwrap_or_default(), commanded)?;
-        let actions = actions(&raw.actions.unwrap_or_default(), &interpolation)?;
+        let joints = parse_joints(&raw.joints.unwrap_or_default(), robots)?;
+        let interpolation =
+            complete_interpolations(&raw.interpolation.unwrap_or_default(), robots_with_actions)?;
+        let actions = parse_actions(&raw.actions.unwrap_or_default(), &interpolation)?;
         let mallet = raw
             .mallet
             .unwrap_or_default()
             .iter()
             .enumerate()
-            .map(|(k, row)| {
-                let [x, y, z, vx, vy] = numbers(row, || format!("mallet[{k}]"))?;
+            .map(|(index, row)| {
+                let [x, y, z, vx, vy] = to_array(row, || format!("mallet[{index}]"))?;
                 Ok(MalletState {
                     position: [x, y, z],
                     velocity: [vx, vy],
@@ -121,8 +124,8 @@ impl Scenario {
         Ok(Self {
             task: raw.task,
             profile: raw.profile.unwrap_or(Profile::Ideal),
-            seed: seed(raw.seed)?,
-            puck: numbers(&raw.puck, || "puck".to_owned())?,
+            seed: parse_seed(raw.seed)?,
+            puck: to_array(&raw.puck, || "puck".to_owned())?,
             joints,
             interpolation,
             actions,
@@ -133,63 +136,68 @@ impl Scenario {
     }
 }
 
-fn seed(value: Option<Value>) -> Result<Seed> {
+fn parse_seed(value: Option<Value>) -> Result<Seed> {
     let text = match value {
         None | Some(Value::Null) => "0".to_owned(),
         Some(Value::Number(number)) => number.to_string(),
         Some(Value::String(text)) => text,
         Some(other) => bail!(
             "seed: expected a number or 64 hexadecimal digits, got {}",
-            kind(&other)
+            json_type(&other)
         ),
     };
     text.parse().with_context(|| format!("seed: {text}"))
 }
 
-fn joints(given: Vec<Vec<f64>>, robots: usize) -> Result<Vec<[f64; JOINTS]>> {
+/// The joint positions of each robot; those that are left out are the initial ones of episodes.
+fn parse_joints(raw: &[Vec<f64>], robots: usize) -> Result<Vec<[f64; JOINTS]>> {
     ensure!(
-        given.len() <= robots,
+        raw.len() <= robots,
         "joints: expected at most {robots} robots, got {}",
-        given.len()
+        raw.len()
     );
     let mut joints = vec![INITIAL_Q; robots];
-    for (robot, q) in given.iter().enumerate() {
-        joints[robot] = numbers(q, || format!("joints[{robot}]"))?;
+    for (robot, positions) in raw.iter().enumerate() {
+        joints[robot] = to_array(positions, || format!("joints[{robot}]"))?;
     }
     Ok(joints)
 }
 
-fn interpolations(given: &[Interpolation], robots: usize) -> Result<Vec<Interpolation>> {
+/// The interpolation of each robot; those that are left out are cubic.
+fn complete_interpolations(raw: &[Interpolation], robots: usize) -> Result<Vec<Interpolation>> {
     ensure!(
-        given.len() <= robots,
+        raw.len() <= robots,
         "interpolation: expected at most {robots} robots with actions, got {}",
-        given.len()
+        raw.len()
     );
     let mut all = vec![Interpolation::Cubic; robots];
-    all[..given.len()].copy_from_slice(given);
+    all[..raw.len()].copy_from_slice(raw);
     Ok(all)
 }
 
-fn actions(given: &[Vec<Value>], interpolation: &[Interpolation]) -> Result<Vec<Vec<Vec<f64>>>> {
+fn parse_actions(
+    raw: &[Vec<Value>],
+    interpolation: &[Interpolation],
+) -> Result<Vec<Vec<Vec<f64>>>> {
     ensure!(
-        given.len() <= interpolation.len(),
+        raw.len() <= interpolation.len(),
         "actions: expected at most {} robots with actions, got {}",
         interpolation.len(),
-        given.len()
+        raw.len()
     );
     let mut all = vec![Vec::new(); interpolation.len()];
-    for (robot, steps) in given.iter().enumerate() {
+    for (robot, steps) in raw.iter().enumerate() {
         for (step, action) in steps.iter().enumerate() {
             let field = || format!("actions[{robot}][{step}]");
             let shape = interpolation[robot].shape();
             let len = interpolation[robot].len();
             let mut flat = Vec::with_capacity(len);
             // The recordings of REFERENCE.md concatenate the rows of an action.
-            let in_rows = match action {
+            let input_shape = match action {
                 Value::Array(items) if items.len() == len => &[len][..],
                 _ => shape,
             };
-            flatten(action, in_rows, &mut flat).with_context(|| {
+            flatten(action, input_shape, &mut flat).with_context(|| {
                 let shape: String = shape.iter().map(|n| format!("[{n}]")).collect();
                 format!("{}: expected numbers of shape {shape}", field())
             })?;
@@ -200,10 +208,11 @@ fn actions(given: &[Vec<Value>], interpolation: &[Interpolation]) -> Result<Vec<
     Ok(all)
 }
 
-fn flatten(value: &Value, shape: &[usize], into: &mut Vec<f64>) -> Result<()> {
+/// Appends the numbers of nested lists of this shape to `flat`.
+fn flatten(value: &Value, shape: &[usize], flat: &mut Vec<f64>) -> Result<()> {
     match (value, shape) {
         (Value::Number(number), []) => {
-            into.push(number.as_f64().context("a number that is too large")?);
+            flat.push(number.as_f64().context("a number that is too large")?);
             Ok(())
         }
         (Value::Array(items), [length, inner @ ..]) => {
@@ -212,19 +221,19 @@ fn flatten(value: &Value, shape: &[usize], into: &mut Vec<f64>) -> Result<()> {
                 "got {} items instead of {length}",
                 items.len()
             );
-            items.iter().try_for_each(|item| flatten(item, inner, into))
+            items.iter().try_for_each(|item| flatten(item, inner, flat))
         }
-        (other, []) => bail!("got {} instead of a number", kind(other)),
-        (other, _) => bail!("got {} instead of a list", kind(other)),
+        (other, []) => bail!("got {} instead of a number", json_type(other)),
+        (other, _) => bail!("got {} instead of a list", json_type(other)),
     }
 }
 
-fn numbers<const N: usize>(given: &[f64], field: impl Fn() -> String) -> Result<[f64; N]> {
-    check_finite(given, &field)?;
-    given
+fn to_array<const N: usize>(numbers: &[f64], field: impl Fn() -> String) -> Result<[f64; N]> {
+    check_finite(numbers, &field)?;
+    numbers
         .try_into()
         .ok()
-        .with_context(|| format!("{}: expected {N} numbers, got {}", field(), given.len()))
+        .with_context(|| format!("{}: expected {N} numbers, got {}", field(), numbers.len()))
 }
 
 fn check_finite(numbers: &[f64], field: impl Fn() -> String) -> Result<()> {
@@ -243,7 +252,7 @@ fn check_finite(numbers: &[f64], field: impl Fn() -> String) -> Result<()> {
     }
 }
 
-fn kind(value: &Value) -> &'static str {
+fn json_type(value: &Value) -> &'static str {
     match value {
         Value::Null => "null",
         Value::Bool(_) => "a boolean",

@@ -1,4 +1,4 @@
-//! `faceoff sim trace`: open-loop simulation, for comparison with other simulators.
+//! `faceoff sim trace`: simulates actions that are given in advance (open-loop), for comparison with other simulators.
 
 use super::scenario::Scenario;
 use anyhow::{Context as _, Result, ensure};
@@ -16,17 +16,26 @@ use std::io::{IsTerminal as _, Write};
 #[derive(Debug, Serialize)]
 struct Line {
     t_ms: u64,
+    /// x, y, yaw and their velocities.
     puck: [f64; 6],
+    /// Joint positions, rad.
     q: Vec<[f64; JOINTS]>,
+    /// Joint velocities, rad/s.
     dq: Vec<[f64; JOINTS]>,
+    /// Joint velocities as the robot's sensors filter them, rad/s.
     dq_filtered: Vec<[f64; JOINTS]>,
+    /// Angles of the passive universal joint, which holds the mallet, rad.
     universal: Vec<[f64; 2]>,
+    /// Joint torques, N m.
     torque: Vec<[f64; JOINTS]>,
+    /// Position of the end effector.
     ee: Vec<[f64; 3]>,
+    /// x, y, z, vx, vy.
     mallet: Vec<[f64; 5]>,
     constraints: Vec<Constraints>,
 }
 
+/// The largest value of each group of constraints: above 0 if it is violated.
 #[derive(Debug, Serialize)]
 struct Constraints {
     joint_pos: f64,
@@ -67,7 +76,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     let mut opponent = (scenario.task == Some(faceoff_types::Task::Hit)).then(Opponent::new);
     let mut steps = 0;
     let mut end = None;
-    impose(&mut world, scenario, 0);
+    impose_mallet(&mut world, scenario, 0);
     write_state(&world, 0, out)?;
     for t_ms in 0..scenario.duration_ms {
         if t_ms % SUBSTEPS as u64 == 0 {
@@ -87,7 +96,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
         world.set_air_force(force);
         world.substep();
         let t_ms = t_ms + 1;
-        impose(&mut world, scenario, t_ms);
+        impose_mallet(&mut world, scenario, t_ms);
         if t_ms % scenario.every_ms == 0 {
             write_state(&world, t_ms, out)?;
         }
@@ -116,8 +125,8 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     Ok(())
 }
 
-/// Imposes the mallet of this millisecond, or the last one at rest.
-fn impose(world: &mut World, scenario: &Scenario, t_ms: u64) {
+/// Sets the mallet to the scenario's state for this millisecond; after the last one, it stays there at rest.
+fn impose_mallet(world: &mut World, scenario: &Scenario, t_ms: u64) {
     let row = usize::try_from(t_ms)
         .ok()
         .and_then(|t| scenario.mallet.get(t))
@@ -138,14 +147,17 @@ fn write_state(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
     let mut state = Line {
         t_ms,
         puck: world.puck().state(),
-        q: robots.clone().map(|r| world.joints(r)).collect(),
-        dq: robots.clone().map(|r| world.joint_velocities(r)).collect(),
+        q: robots.clone().map(|robot| world.joints(robot)).collect(),
+        dq: robots
+            .clone()
+            .map(|robot| world.joint_velocities(robot))
+            .collect(),
         dq_filtered: robots
             .clone()
-            .map(|r| *world.filtered_velocities(r))
+            .map(|robot| *world.filtered_velocities(robot))
             .collect(),
-        universal: robots.clone().map(|r| world.universal(r)).collect(),
-        torque: robots.clone().map(|r| *world.torques(r)).collect(),
+        universal: robots.clone().map(|robot| world.universal(robot)).collect(),
+        torque: robots.clone().map(|robot| *world.torques(robot)).collect(),
         ee: Vec::new(),
         mallet: Vec::new(),
         constraints: Vec::new(),

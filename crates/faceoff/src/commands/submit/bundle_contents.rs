@@ -1,4 +1,4 @@
-//! Text of the content of a bundle.
+//! The content of a bundle as `faceoff submit` shows it: packed files and those that are left out.
 
 use crate::packing::{BundleFile, IGNORE_FILE, LARGE_BYTES, Selection};
 use indicatif::HumanBytes;
@@ -67,12 +67,12 @@ pub(super) fn packing_summary(selection: &Selection, archive_bytes: u64) -> Vec<
     const MAX_NAMES: usize = 6;
     let (files, bytes) = selection
         .files()
-        .fold((0_u64, 0_u64), |(files, all), (_, bytes)| {
-            (files + 1, all + bytes)
+        .fold((0_u64, 0_u64), |(files, total_bytes), (_, bytes)| {
+            (files + 1, total_bytes + bytes)
         });
-    let s = if files == 1 { "" } else { "s" };
+    let plural = if files == 1 { "" } else { "s" };
     let mut lines = vec![format!(
-        "packing {files} file{s}, {} ({} compressed)",
+        "packing {files} file{plural}, {} ({} compressed)",
         HumanBytes(bytes),
         HumanBytes(archive_bytes)
     )];

@@ -56,7 +56,8 @@ fn purpose_text(purpose: &PurposeView) -> String {
     }
 }
 
-fn pair(numbers: [u32; 2]) -> String {
+/// Two numbers, e.g. the goals of both sides, as `3-1`.
+fn hyphenated(numbers: [u32; 2]) -> String {
     format!("{}-{}", numbers[0], numbers[1])
 }
 
@@ -72,9 +73,9 @@ fn state_text(game: &GameView) -> String {
             let winner = result.winner.as_ref();
             format!(
                 "{:>7}  {:>7}  {:>7}  {:>15}  {}: {}",
-                pair(result.score),
-                pair(result.goals),
-                pair(result.fouls),
+                hyphenated(result.score),
+                hyphenated(result.goals),
+                hyphenated(result.fouls),
                 points.join(" / "),
                 winner.map_or("draw", |team| team.as_str()),
                 result.because
@@ -136,7 +137,7 @@ pub(in crate::commands) fn game_text(game: &GameView) -> String {
 pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String {
     let line = |attempt: &GameAttemptView| {
         let end = match (attempt.end, attempt.ended_at) {
-            (Some(end), Some(at)) => {
+            (Some(end), Some(ended_at)) => {
                 let outcome = match end {
                     AttemptOutcomeView::Played => "finished",
                     AttemptOutcomeView::Broken => "platform fault",
@@ -144,7 +145,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
                     AttemptOutcomeView::Lost => "lost with its slot",
                     AttemptOutcomeView::CalledOff => "cancelled",
                 };
-                format!("{outcome} {}", at.strftime("%Y-%m-%d %H:%M:%S UTC"))
+                format!("{outcome} {}", ended_at.strftime("%Y-%m-%d %H:%M:%S UTC"))
             }
             _ => "running".to_owned(),
         };

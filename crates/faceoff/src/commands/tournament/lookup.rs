@@ -1,3 +1,5 @@
+//! Lookup of a tournament that a command names.
+
 use crate::client::Client;
 use anyhow::{Context, bail};
 use faceoff_types::TournamentId;

@@ -44,8 +44,8 @@ fn phase_text(head: &TournamentHead) -> String {
     format!("{phase}{paused}{champion}")
 }
 
-fn time_text(at: Timestamp) -> String {
-    at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+fn time_text(time: Timestamp) -> String {
+    time.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 /// A tournament with rules, teams, rounds and standings.

@@ -1,3 +1,5 @@
+//! The failures of `faceoff verify`, and their exit statuses.
+
 use crate::exit::Exit;
 use anyhow::anyhow;
 use faceoff_dataset::{
@@ -10,12 +12,14 @@ use faceoff_dataset::{
 pub(super) enum Failure {
     #[error(transparent)]
     Verify(#[from] VerifyError),
+    /// The seeds are not derived from the season's secret, or the secret does not match its commitment.
     #[error("{error}{hint}")]
     Season {
         #[source]
         error: SeasonMismatch,
         hint: &'static str,
     },
+    /// This machine or the command line, not the recording, is the cause.
     #[error("{0:#}")]
     Local(anyhow::Error),
 }

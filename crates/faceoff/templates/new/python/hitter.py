@@ -12,6 +12,9 @@ from puck import Puck
 SHOT_SPEED = 1.6  # speed of the mallet in a shot, m/s
 RUN_UP = 0.16  # distance over which the mallet accelerates to that speed, m
 WAIT_SPEED = 0.35  # the agent waits while the puck is faster than this, m/s
+WAIT_DISTANCE = 0.14  # distance from the goal line at which the mallet waits, m
+MAX_SHOT_STEPS = 20  # longest shot, control steps
+SIDEWAYS_GAIN = 6  # speed towards the line of the shot per distance from it, 1/s
 
 
 class Hitter(Agent):
@@ -19,8 +22,8 @@ class Hitter(Agent):
 
     def start(self) -> None:
         self.mallet, self.puck = Mallet(self.env), Puck(self.env)
-        self.contact_distance = self.puck.radius + self.mallet.radius
-        self.opponent_goal = 2 * self.mallet.middle - self.mallet.goal
+        self.contact_distance = self.puck.radius + self.mallet.radius  # of the centres of puck and mallet, m
+        self.opponent_goal = 2 * self.mallet.middle - self.mallet.goal  # x of the opponent's goal line, m
         self.started = False
 
     def reset(self) -> None:
@@ -39,23 +42,24 @@ class Hitter(Agent):
             return self.shoot(self.shot)
         if puck.speed > WAIT_SPEED or puck.x > mallet.middle - 0.15:
             # The puck is too fast or too far away: wait in front of the goal, on the puck's side.
-            return mallet.move_to(mallet.goal + 0.14, max(-0.1, min(0.1, 0.3 * puck.y)), 1.0)
+            return mallet.move_to(mallet.goal + WAIT_DISTANCE, max(-0.1, min(0.1, 0.3 * puck.y)), 1.0)
         # Start behind the puck, on the line from the centre of the opponent's goal through the puck.
         distance = math.hypot(self.opponent_goal - puck.x, puck.y)
         back = self.contact_distance + RUN_UP
         start = mallet.nearest_allowed(
             puck.x - back * (self.opponent_goal - puck.x) / distance, puck.y + back * puck.y / distance
         )
+        # Shoot once the mallet is there (m) and almost at rest (m/s).
         if math.dist(start, (mallet.x, mallet.y)) < 0.012 and math.hypot(mallet.vx, mallet.vy) < 0.1:
             length = math.dist(start, (puck.x, puck.y))
-            return self.shoot(((puck.x - start[0]) / length, (puck.y - start[1]) / length, 20))
+            return self.shoot(((puck.x - start[0]) / length, (puck.y - start[1]) / length, MAX_SHOT_STEPS))
         return mallet.move_to(*self.waypoint(*start), 1.0)
 
     def shoot(self, shot: tuple[float, float, int]) -> list[list[float]]:
         """One step of a shot, or a braking step once it has ended."""
         mallet, puck = self.mallet, self.puck
         dx, dy, steps_left = shot
-        ahead = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy
+        ahead = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy  # distance of the puck in the shot's direction
         if steps_left == 0 or ahead < 0.0:
             self.shot = None
             return mallet.move_at_velocity(0.0, 0.0)
@@ -63,7 +67,8 @@ class Hitter(Agent):
         self.shot = (dx, dy, min(steps_left, 2 if ahead < self.contact_distance + 0.005 else steps_left) - 1)
         # Follow the puck sideways, because it may be rolling.
         across = (puck.y - mallet.y) * dx - (puck.x - mallet.x) * dy
-        return mallet.move_at_velocity(SHOT_SPEED * dx - 6 * across * dy, SHOT_SPEED * dy + 6 * across * dx)
+        sideways = SIDEWAYS_GAIN * across
+        return mallet.move_at_velocity(SHOT_SPEED * dx - sideways * dy, SHOT_SPEED * dy + sideways * dx)
 
     def waypoint(self, x: float, y: float) -> tuple[float, float]:
         """The target point, or a point beside the puck if the direct path would touch it."""

@@ -17,9 +17,9 @@ class Mallet:
 
     def __init__(self, env: dict[str, Any]) -> None:
         robot, table = env["robot"], env["table"]
-        self.dt: float = env["dt"]
+        self.dt: float = env["dt"]  # length of a control step, s
         self.radius: float = env["mallet"]["radius"]
-        self.height: float = robot["ee_desired_height"]
+        self.height: float = robot["ee_desired_height"]  # of the end effector, m
         self.middle: float = abs(robot["base_frame"][0][0][3])  # x of the table's centre
         self.goal: float = self.middle - table["length"] / 2  # x of our goal line
         self.x_min: float = self.goal + self.radius + MARGIN
@@ -48,14 +48,14 @@ class Mallet:
         change = math.hypot(vx - self.vx, vy - self.vy)
         share = min(1.0, ACCELERATION * self.dt / max(change, 1e-9))
         vx, vy = self.vx + share * (vx - self.vx), self.vy + share * (vy - self.vy)
-        for _ in range(5):
+        for _ in range(5):  # attempts
             x, y = self.x + 0.5 * self.dt * (self.vx + vx), self.y + 0.5 * self.dt * (self.vy + vy)
             allowed = self.nearest_allowed(x, y)
             vx, vy = vx * (allowed[0] == x), vy * (allowed[1] == y)
             x, y = allowed
             q, reached = inverse((x, y, self.height))
-            speeds = posture_velocities((x, y, self.height), (vx, vy))
-            mean_speeds = [(b - a) / self.dt for a, b in zip(self.q, q)]
+            speeds = posture_velocities((x, y, self.height), (vx, vy))  # at the end of the step
+            mean_speeds = [(end - start) / self.dt for start, end in zip(self.q, q)]
             load = max(speed_share(speeds), speed_share(mean_speeds)) / SPEED_SHARE
             if reached and load <= 1.0:
                 self.q, self.x, self.y, self.vx, self.vy = q, x, y, vx, vy

@@ -5,7 +5,8 @@ use clap::{Args, ValueEnum};
 use faceoff_types::{Profile, Publication};
 use serde_json::{Map, Value, json};
 
-/// Rules and settings of a tournament. Options that are left out do not change, or are those of the Robot Air Hockey Challenge 2023.
+/// Rules and settings of a tournament. An option that is left out keeps its value; in a new tournament it has the value of the
+/// Robot Air Hockey Challenge 2023.
 #[derive(Debug, Args)]
 pub(in crate::commands::admin) struct TournamentOptions {
     /// Pairing: round robin; drawn groups and a final of their best teams; Swiss system

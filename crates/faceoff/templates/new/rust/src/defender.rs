@@ -11,6 +11,10 @@ const INCOMING_VX: f64 = -0.3;
 const MEET_DISTANCE: f64 = 0.3;
 /// A mallet that retreats at this fraction of the puck's speed stops it.
 const RETREAT_RATIO: f64 = 0.31;
+/// Time before the contact at which the mallet begins to retreat, s.
+const RETREAT_TIME: f64 = 0.12;
+/// Distance from the goal line at which the mallet waits, m.
+const WAIT_DISTANCE: f64 = 0.14;
 
 pub struct Policy {
     mallet: Mallet,
@@ -48,10 +52,11 @@ impl Agent for Policy {
 
         if puck.vx > INCOMING_VX {
             // The puck is no danger: wait in front of the goal, on the puck's side.
-            return Ok(mallet.move_to([mallet.goal + 0.14, (0.3 * puck.y).clamp(-0.1, 0.1)], 1.0));
+            let wait_y = (0.3 * puck.y).clamp(-0.1, 0.1);
+            return Ok(mallet.move_to([mallet.goal + WAIT_DISTANCE, wait_y], 1.0));
         }
         let gap = (puck.x - mallet.x).hypot(puck.y - mallet.y) - self.contact_distance;
-        if gap < 0.12 * puck.speed() {
+        if gap < RETREAT_TIME * puck.speed() {
             // The contact is near: retreat in the puck's direction.
             return Ok(mallet.move_at_velocity(RETREAT_RATIO * puck.vx, RETREAT_RATIO * puck.vy));
         }

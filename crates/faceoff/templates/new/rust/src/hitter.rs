@@ -11,6 +11,12 @@ const SHOT_SPEED: f64 = 1.6;
 const RUN_UP: f64 = 0.16;
 /// The agent waits while the puck is faster than this, m/s.
 const WAIT_SPEED: f64 = 0.35;
+/// Distance from the goal line at which the mallet waits, m.
+const WAIT_DISTANCE: f64 = 0.14;
+/// Longest shot, control steps.
+const MAX_SHOT_STEPS: u32 = 20;
+/// Speed towards the line of the shot per distance from it, 1/s.
+const SIDEWAYS_GAIN: f64 = 6.0;
 
 /// A shot: its direction, and the remaining control steps.
 struct Shot {
@@ -50,6 +56,7 @@ impl Policy {
     /// One step of a shot, or a braking step once it has ended.
     fn shoot(&mut self, Shot { dx, dy, steps_left }: Shot) -> Action {
         let (mallet, puck) = (&mut self.mallet, self.puck.state);
+        // Distance of the puck in the shot's direction.
         let ahead = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy;
         if steps_left == 0 || ahead < 0.0 {
             return mallet.move_at_velocity(0.0, 0.0);
@@ -67,9 +74,10 @@ impl Policy {
         });
         // Follow the puck sideways, because it may be rolling.
         let across = (puck.y - mallet.y) * dx - (puck.x - mallet.x) * dy;
+        let sideways = SIDEWAYS_GAIN * across;
         mallet.move_at_velocity(
-            SHOT_SPEED * dx - 6.0 * across * dy,
-            SHOT_SPEED * dy + 6.0 * across * dx,
+            SHOT_SPEED * dx - sideways * dy,
+            SHOT_SPEED * dy + sideways * dx,
         )
     }
 
@@ -119,7 +127,8 @@ impl Agent for Policy {
         let (mallet, puck) = (&mut self.mallet, self.puck.state);
         if puck.speed() > WAIT_SPEED || puck.x > self.middle - 0.15 {
             // The puck is too fast or too far away: wait in front of the goal, on the puck's side.
-            return Ok(mallet.move_to([mallet.goal + 0.14, (0.3 * puck.y).clamp(-0.1, 0.1)], 1.0));
+            let wait_y = (0.3 * puck.y).clamp(-0.1, 0.1);
+            return Ok(mallet.move_to([mallet.goal + WAIT_DISTANCE, wait_y], 1.0));
         }
         // Start behind the puck, on the line from the centre of the opponent's goal through the puck.
         let distance = (self.opponent_goal - puck.x).hypot(puck.y);
@@ -129,13 +138,14 @@ impl Agent for Policy {
             puck.y + back * puck.y / distance,
         );
         let remaining = (start[0] - mallet.x).hypot(start[1] - mallet.y);
+        // Shoot once the mallet is there (m) and almost at rest (m/s).
         if remaining < 0.012 && mallet.vx.hypot(mallet.vy) < 0.1 {
             let (to_x, to_y) = (puck.x - start[0], puck.y - start[1]);
             let length = to_x.hypot(to_y);
             return Ok(self.shoot(Shot {
                 dx: to_x / length,
                 dy: to_y / length,
-                steps_left: 20,
+                steps_left: MAX_SHOT_STEPS,
             }));
         }
         let waypoint = self.waypoint(start);

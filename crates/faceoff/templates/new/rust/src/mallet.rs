@@ -24,7 +24,9 @@ const MARGIN: f64 = 0.015;
 
 /// The commanded mallet. It starts at the arm's pose, and the arm follows it. All in the robot's base frame.
 pub struct Mallet {
+    /// Length of a control step, s.
     dt: f64,
+    /// Height of the end effector, m.
     height: f64,
     /// x of our goal line, m.
     pub goal: f64,
@@ -32,6 +34,7 @@ pub struct Mallet {
     y_max: f64,
     /// Largest used joint speeds, rad/s.
     max_speeds: [f64; 7],
+    /// Joint positions, rad.
     q: [f64; 7],
     pub x: f64,
     pub y: f64,
@@ -100,6 +103,7 @@ impl Mallet {
             vx = if x == target[0] { vx } else { 0.0 };
             vy = if y == target[1] { vy } else { 0.0 };
             let q = inverse(x, y, self.height);
+            // The joint speeds at the end of the step, from the joint positions one millisecond later.
             let next = inverse(x + 0.001 * vx, y + 0.001 * vy, self.height);
             let speeds: [f64; 7] = std::array::from_fn(|i| (next[i] - q[i]) / 0.001);
             let load = (0..7).fold(0.0_f64, |load, i| {

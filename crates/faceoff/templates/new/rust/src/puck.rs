@@ -8,6 +8,8 @@ const GAIN: f64 = 0.35;
 const DRAG: f64 = 0.5;
 /// Fraction of the speed across the rim that remains after a bounce.
 const RESTITUTION: f64 = 0.75;
+/// A larger change of the velocity is a hit or a bounce, not noise, m/s.
+const HIT_CHANGE: f64 = 0.7;
 
 /// Position (m) and velocity (m/s) in the robot's base frame.
 #[derive(Debug, Clone, Copy, Default)]
@@ -26,7 +28,9 @@ impl Motion {
 
 /// The estimated puck.
 pub struct Puck {
+    /// Length of a control step, s.
     dt: f64,
+    /// y of a puck that touches the rim, m.
     y_max: f64,
     last_observed: Option<[f64; 2]>,
     pub state: Motion,
@@ -58,7 +62,8 @@ impl Puck {
             // There are two measurements of the velocity: the observed one, and the distance since the last step.
             let new_vx = 0.5 * (vx + (x - self.state.x) / self.dt);
             let new_vy = 0.5 * (vy + (y - self.state.y) / self.dt);
-            let was_hit = (new_vx - expected.vx).abs() + (new_vy - expected.vy).abs() > 0.7;
+            let change = (new_vx - expected.vx).abs() + (new_vy - expected.vy).abs();
+            let was_hit = change > HIT_CHANGE;
             let gain = if was_hit { 1.0 } else { GAIN };
             let vx = expected.vx + gain * (new_vx - expected.vx);
             let vy = expected.vy + gain * (new_vy - expected.vy);
@@ -70,13 +75,14 @@ impl Puck {
     /// The motion after some time (s, at most 1.5), with bounces off the long rims but no other contacts.
     pub fn predict(&self, time: f64) -> Motion {
         let time = time.min(1.5);
-        let (slide, fade) = (time * (1.0 - 0.5 * DRAG * time), 1.0 - DRAG * time);
+        let distance_factor = time * (1.0 - 0.5 * DRAG * time);
+        let speed_factor = 1.0 - DRAG * time;
         let Motion { x, y, vx, vy } = self.state;
         let mut predicted = Motion {
-            x: x + vx * slide,
-            y: y + vy * slide,
-            vx: vx * fade,
-            vy: vy * fade,
+            x: x + vx * distance_factor,
+            y: y + vy * distance_factor,
+            vx: vx * speed_factor,
+            vy: vy * speed_factor,
         };
         while predicted.y.abs() > self.y_max {
             let rim = self.y_max.copysign(predicted.y);

@@ -4,12 +4,15 @@ use crate::{AGENT_INFO, mallet::forward, policy::Policy};
 use faceoff_agent::serve;
 use serde_json::{Value, json};
 
-const POSE: [f64; 7] = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0];
+/// Joint positions at the start of an episode, rad.
+const INITIAL_POSE: [f64; 7] = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0];
+/// Speed limits of the joints, degrees/s.
 const VELOCITY_LIMIT_DEGREES: [f64; 7] = [85.0, 85.0, 100.0, 75.0, 130.0, 135.0, 135.0];
 
+/// The evaluator's first message: metres, radians, seconds.
 fn hello() -> Value {
-    let position = [2.96706, 2.0944, 2.96706, 2.0944, 2.96706, 2.0944, 3.05433];
-    let velocity = VELOCITY_LIMIT_DEGREES.map(f64::to_radians);
+    let position_limit = [2.96706, 2.0944, 2.96706, 2.0944, 2.96706, 2.0944, 3.05433];
+    let velocity_limit = VELOCITY_LIMIT_DEGREES.map(f64::to_radians);
     let range = |limit: [f64; 7]| json!([limit.map(|x| -x), limit]);
     json!({"type": "hello", "protocol": 1, "task": "defend", "agent_id": 1, "env": {
         "dt": 0.02,
@@ -19,17 +22,18 @@ fn hello() -> Value {
         "robot": {
             "ee_desired_height": 0.1645,
             "base_frame": [[[1, 0, 0, -1.51], [0, 1, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]]],
-            "joint_pos_limit": range(position),
-            "joint_vel_limit": range(velocity),
+            "joint_pos_limit": range(position_limit),
+            "joint_vel_limit": range(velocity_limit),
         },
     }})
 }
 
-/// The agent's answers to these puck states, one per control step.
+/// The agent's answers to `hello` and `reset`, and then to these puck states (x, y, yaw and their velocities), one per control
+/// step.
 fn answers(pucks: &[[f64; 6]]) -> Vec<Value> {
-    let mut messages = vec![hello(), json!({"type": "reset", "episode": 17})];
+    let mut messages = vec![hello(), json!({"type": "reset", "episode": 0})];
     for (step, puck) in pucks.iter().enumerate() {
-        let observation = [&puck[..], &POSE, &[0.0; 7]].concat();
+        let observation = [&puck[..], &INITIAL_POSE, &[0.0; 7]].concat();
         messages.push(json!({"type": "step", "step": step, "obs": observation}));
     }
     messages.push(json!({"type": "bye"}));
@@ -75,23 +79,25 @@ fn agent_keeps_its_limits() {
             ]
         })
         .collect();
-    let mut last = POSE;
+    let mut last_pose = INITIAL_POSE;
     for answer in &answers(&pucks)[2..] {
         let [pose, speeds]: [[f64; 7]; 2] =
             serde_json::from_value(answer["action"].clone()).expect("positions and velocities");
         for joint in 0..7 {
+            // The rules allow 95 % of a joint's speed limit.
             let limit = 0.95 * VELOCITY_LIMIT_DEGREES[joint].to_radians();
             assert!(speeds[joint].abs() < limit, "joint {joint}");
             assert!(
-                (pose[joint] - last[joint]).abs() < 0.02 * limit,
+                (pose[joint] - last_pose[joint]).abs() < 0.02 * limit,
                 "joint {joint}"
             );
         }
+        // The whole mallet stays on its own side of the table: the base is 1.51 m from the centre of the table.
         let [x, y] = forward(&pose);
         assert!(
             x > 1.51 - 0.974 + 0.04815 && y.abs() < 0.519 - 0.04815,
             "{x} {y}"
         );
-        last = pose;
+        last_pose = pose;
     }
 }

@@ -1,14 +1,14 @@
-//! The measurements of one phase, as a table and as JSON.
+//! A phase of the measurement, in which a number of simulated workers run shards: its numbers as a table and as JSON.
 
-use crate::stub::{Measurements, Retries};
+use crate::simulated_worker::{Measurements, Retries};
 use serde_json::{Value, json};
 use std::{fmt::Write as _, time::Duration};
 
-/// A phase with a number of workers.
+/// The measurements of a phase.
 pub(crate) struct Phase {
     pub(crate) workers: usize,
     /// From the first request for a job to the last result stored in NATS.
-    pub(crate) took: Duration,
+    pub(crate) duration: Duration,
     pub(crate) measurements: Measurements,
 }
 
@@ -18,21 +18,22 @@ impl Phase {
     }
 
     pub(crate) fn shards_per_s(&self) -> f64 {
-        self.shards() as f64 / self.took.as_secs_f64()
+        self.shards() as f64 / self.duration.as_secs_f64()
     }
 
     /// The part of the workers' time in which they slept, which represents running agents.
     pub(crate) fn efficiency(&self) -> f64 {
-        self.measurements.slept_s / (self.workers as f64 * self.took.as_secs_f64())
+        self.measurements.slept_s / (self.workers as f64 * self.duration.as_secs_f64())
     }
 
+    /// A row of the table of all phases; latencies are medians in ms.
     pub(crate) fn line(&self) -> String {
         let [job, start, files, result] = self.series();
         format!(
             "| {} | {} | {:.1} | {:.2} | {:.4} | {} | {} | {} | {} |",
             self.workers,
             self.shards(),
-            self.took.as_secs_f64(),
+            self.duration.as_secs_f64(),
             self.shards_per_s(),
             self.efficiency(),
             ms(quantile(&job, 0.5)),
@@ -42,6 +43,7 @@ impl Phase {
         )
     }
 
+    /// A table of the latencies.
     pub(crate) fn latencies(&self) -> String {
         let mut text = String::from("| ms | p50 | p95 | p99 | max |\n|---|---|---|---|---|\n");
         for (name, series) in SERIES.into_iter().zip(self.series()) {
@@ -69,7 +71,7 @@ impl Phase {
         json!({
             "workers": self.workers,
             "shards": self.shards(),
-            "took_s": self.took.as_secs_f64(),
+            "took_s": self.duration.as_secs_f64(),
             "shards_per_s": self.shards_per_s(),
             "slept_s": self.measurements.slept_s,
             "efficiency": self.efficiency(),
@@ -78,6 +80,7 @@ impl Phase {
         })
     }
 
+    /// The sorted latencies of [`SERIES`], in seconds.
     fn series(&self) -> [Vec<f64>; 4] {
         let measurements = &self.measurements;
         [
@@ -105,8 +108,8 @@ const QUANTILES: [(&str, f64); 4] = [("p50", 0.5), ("p95", 0.95), ("p99", 0.99),
 /// The smallest of the sorted numbers that is at least as large as this share of them.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let rank = (share * sorted.len() as f64).ceil() as usize;
-    let at = rank.saturating_sub(1);
-    sorted.get(at).copied().unwrap_or(f64::NAN)
+    let index = rank.saturating_sub(1);
+    sorted.get(index).copied().unwrap_or(f64::NAN)
 }
 
 fn ms(seconds: f64) -> String {

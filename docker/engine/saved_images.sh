@@ -1,10 +1,10 @@
 # Sourced by docker/test-engine.sh: the same image, saved by several programs, gives the same outcome in the same episodes.
 # shellcheck shell=sh
 : "${work:?}" "${run:?}" "${repository:?}" "${program:?}"
-#
+
 # same_as_first NAME ARCHIVE: compares the results of an evaluation on this host, without times, with the first ones.
 same_as_first() {
-    quietly "$program" eval "$2" --episodes 2 --seed 0 --config "$repository/tests/patient.toml" --out "$work/evals/$1"
+    quietly "$program" eval "$2" --episodes 2 --seed 0 --config "$repository/tests/long_time_limits.toml" --out "$work/evals/$1"
     python3 - "$work/evals/$1/results.json" "$work/evals/first" <<'END' || fail "$1 has a different outcome from the first"
 import json, pathlib, sys
 found = json.loads(pathlib.Path(sys.argv[1]).read_text())

@@ -1,7 +1,7 @@
 # Sourced by docker/test-engine.sh: entry point and doctor report the features that a container lacks.
 # shellcheck shell=sh
 : "${work:?}" "${run:?}" "${folder:?}"
-#
+
 # doctor_in OPTIONS…: runs doctor in a container with these options; stores its status and the output.
 doctor_in() {
     status=0

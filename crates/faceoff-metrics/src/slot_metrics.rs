@@ -1,3 +1,6 @@
+//! Metrics of slots. A *slot* is a place in a worker that runs one job at a time: a validation run (the check of an upload),
+//! a shard (some episodes of an evaluation) or a game.
+
 use crate::float_gauge::FloatGauge;
 use faceoff_types::{EpisodeOutcome, RoundTrips, SlotTiming};
 use prometheus_client::{
@@ -12,30 +15,35 @@ use std::{
 };
 
 /// Bucket bounds, seconds: a validation run takes seconds, a shard up to minutes, a game many minutes.
-const JOB_DURATIONS_S: [f64; 10] = [0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 180.0, 600.0, 1800.0];
+const JOB_DURATION_BUCKETS_S: [f64; 10] =
+    [0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 180.0, 600.0, 1800.0];
 /// Bucket bounds, seconds, around the control period of 20 ms.
-const ANSWER_TIMES_S: [f64; 11] = [
+const ANSWER_TIME_BUCKETS_S: [f64; 11] = [
     0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.2, 1.0,
 ];
 
 /// Metrics of slots: jobs, durations, episodes and timing.
 #[derive(Clone)]
-pub struct Slots {
+pub struct SlotMetrics {
     busy: Gauge,
     jobs: Family<JobEndLabels, Counter>,
     durations: Family<JobLabels, Histogram, fn() -> Histogram>,
     episodes: Family<TaskLabels, Counter>,
     faults: Family<TaskLabels, Counter>,
-    answers: Family<TaskLabels, Histogram, fn() -> Histogram>,
+    answer_times: Family<TaskLabels, Histogram, fn() -> Histogram>,
     round_trips: Family<RoundTripLabels, FloatGauge>,
-    stall: Family<SlotLabels, FloatGauge>,
+    longest_stall: Family<SlotLabels, FloatGauge>,
     reruns: Counter,
     stuck_count: Gauge,
+    /// Names of the stuck slots' threads.
     stuck_names: Arc<Mutex<Vec<String>>>,
 }
 
+// The field names of structs with `EncodeLabelSet` are the names of labels.
+
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct JobEndLabels {
+    /// Kind of the job.
     work: &'static str,
     end: &'static str,
 }
@@ -66,6 +74,7 @@ impl JobEnd {
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct JobLabels {
+    /// Kind of the job.
     work: &'static str,
 }
 
@@ -82,99 +91,99 @@ struct SlotLabels {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct RoundTripLabels {
     slot: String,
-    /// `p50`, `p99` or `max`.
+    /// The statistic: `p50`, `p99` or `max`.
     of: &'static str,
 }
 
-impl Slots {
-    pub(crate) fn new(all: &mut Registry) -> Self {
-        let slots = Self {
+impl SlotMetrics {
+    pub(crate) fn new(registry: &mut Registry) -> Self {
+        let metrics = Self {
             busy: Gauge::default(),
             jobs: Family::default(),
-            durations: Family::new_with_constructor(|| Histogram::new(JOB_DURATIONS_S)),
+            durations: Family::new_with_constructor(|| Histogram::new(JOB_DURATION_BUCKETS_S)),
             episodes: Family::default(),
             faults: Family::default(),
-            answers: Family::new_with_constructor(|| Histogram::new(ANSWER_TIMES_S)),
+            answer_times: Family::new_with_constructor(|| Histogram::new(ANSWER_TIME_BUCKETS_S)),
             round_trips: Family::default(),
-            stall: Family::default(),
+            longest_stall: Family::default(),
             reruns: Counter::default(),
             stuck_count: Gauge::default(),
             stuck_names: Arc::default(),
         };
-        all.register("slots_busy", "Slots that run a job", slots.busy.clone());
-        all.register(
+        registry.register("slots_busy", "Slots that run a job", metrics.busy.clone());
+        registry.register(
             "slots_standing_still",
             "Slots that are stuck although their agent was ended",
-            slots.stuck_count.clone(),
+            metrics.stuck_count.clone(),
         );
-        all.register(
+        registry.register(
             "units",
             "Jobs that slots have ended, by kind and outcome",
-            slots.jobs.clone(),
+            metrics.jobs.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "unit_duration",
             "Duration of jobs",
             Unit::Seconds,
-            slots.durations.clone(),
+            metrics.durations.clone(),
         );
-        all.register(
+        registry.register(
             "episodes",
             "Episodes that were run and committed",
-            slots.episodes.clone(),
+            metrics.episodes.clone(),
         );
-        all.register(
+        registry.register(
             "agent_faults",
             "Episodes that an agent ended by breaking the protocol or a limit",
-            slots.faults.clone(),
+            metrics.faults.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "agent_answer",
             "Mean time of an agent's answers, of each episode",
             Unit::Seconds,
-            slots.answers.clone(),
+            metrics.answer_times.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "round_trip",
             "Round trips to an agent that answers at once, of the slot's last shard: the time that the host adds to every answer",
             Unit::Seconds,
-            slots.round_trips.clone(),
+            metrics.round_trips.clone(),
         );
-        all.register_with_unit(
+        registry.register_with_unit(
             "host_stall",
             "Longest delay of one answer by the host, of the slot's last shard",
             Unit::Seconds,
-            slots.stall.clone(),
+            metrics.longest_stall.clone(),
         );
-        all.register(
+        registry.register(
             "host_noise_reruns",
             "Episodes that were repeated because the host kept an agent from answering",
-            slots.reruns.clone(),
+            metrics.reruns.clone(),
         );
-        slots
+        metrics
     }
 
-    /// Records that a slot starts a job of the kind `work`. The slot is busy until the guard is dropped.
+    /// Records that a slot starts a job. The slot is busy until the guard is dropped.
     #[must_use]
-    pub fn start_job(&self, work: &'static str) -> BusySlot {
+    pub fn start_job(&self, job_kind: &'static str) -> BusySlot {
         self.busy.inc();
         BusySlot {
-            slots: self.clone(),
-            work,
+            metrics: self.clone(),
+            job_kind,
         }
     }
 
-    /// Sets the slots that are stuck although their agent was ended, by the names of their threads.
-    pub fn set_stuck(&self, names: Vec<String>) {
+    /// Sets the slots that are stuck although their agent was ended. `thread_names` are the names of their threads.
+    pub fn set_stuck(&self, thread_names: Vec<String>) {
         self.stuck_count
-            .set(i64::try_from(names.len()).unwrap_or(i64::MAX));
+            .set(i64::try_from(thread_names.len()).unwrap_or(i64::MAX));
         *self
             .stuck_names
             .lock()
-            .unwrap_or_else(PoisonError::into_inner) = names;
+            .unwrap_or_else(PoisonError::into_inner) = thread_names;
     }
 
-    /// The slots of [`Self::set_stuck`].
+    /// The names of the stuck slots' threads, from [`Self::set_stuck`].
     #[must_use]
     pub fn stuck(&self) -> Vec<String> {
         let names = self.stuck_names.lock();
@@ -190,8 +199,8 @@ impl Slots {
             self.episodes.get_or_create(&labels).inc();
             let faults = self.faults.get_or_create_owned(&labels);
             faults.inc_by(outcome.fault.is_some().into());
-            let answers = self.answers.get_or_create_owned(&labels);
-            answers.observe(outcome.computation_time.mean_s);
+            let answer_times = self.answer_times.get_or_create_owned(&labels);
+            answer_times.observe(outcome.computation_time.mean_s);
         }
         self.reruns.inc_by(timing.host_noise_reruns.into());
         let RoundTrips { p50, p99, max, .. } = timing.before_s.worse(timing.during_s);
@@ -202,43 +211,43 @@ impl Slots {
                 .set(seconds);
         }
         let slot = slot.to_owned();
-        self.stall
+        self.longest_stall
             .get_or_create(&SlotLabels { slot })
             .set(timing.longest_stall_s);
     }
 }
 
-impl fmt::Debug for Slots {
+impl fmt::Debug for SlotMetrics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Slots").finish_non_exhaustive()
+        f.debug_struct("SlotMetrics").finish_non_exhaustive()
     }
 }
 
 /// Guard of a slot that runs a job.
 #[derive(Debug)]
 pub struct BusySlot {
-    slots: Slots,
-    work: &'static str,
+    metrics: SlotMetrics,
+    job_kind: &'static str,
 }
 
 impl BusySlot {
     /// Records the end of the job.
-    pub fn end(self, end: JobEnd, took: Duration) {
-        let work = self.work;
+    pub fn end(self, end: JobEnd, duration: Duration) {
+        let work = self.job_kind;
         let end = end.as_str();
-        self.slots
+        self.metrics
             .jobs
             .get_or_create(&JobEndLabels { work, end })
             .inc();
-        self.slots
+        self.metrics
             .durations
             .get_or_create(&JobLabels { work })
-            .observe(took.as_secs_f64());
+            .observe(duration.as_secs_f64());
     }
 }
 
 impl Drop for BusySlot {
     fn drop(&mut self) {
-        self.slots.busy.dec();
+        self.metrics.busy.dec();
     }
 }

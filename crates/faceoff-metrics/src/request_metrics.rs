@@ -1,3 +1,5 @@
+//! Metrics of HTTP requests.
+
 use prometheus_client::{
     encoding::EncodeLabelSet,
     metrics::{counter::Counter, family::Family, histogram::Histogram},
@@ -5,18 +7,20 @@ use prometheus_client::{
 };
 use std::{fmt, time::Duration};
 
-/// Bucket bounds, seconds: a cached board takes less than the first, a request that times out 30.
-const DURATIONS_S: [f64; 12] = [
+/// Bucket bounds, seconds. A cached board takes less than 0.001, and a request times out after 30.
+const DURATION_BUCKETS_S: [f64; 12] = [
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0,
 ];
 
 /// Metrics of requests by route. A route is the pattern of the path, so that the number of series is bounded.
 #[derive(Clone)]
-pub struct Web {
+pub struct RequestMetrics {
     requests: Family<ResponseLabels, Counter>,
     durations: Family<RouteLabels, Histogram, fn() -> Histogram>,
     refused: Family<RefusalLabels, Counter>,
 }
+
+// The field names of the following structs are the names of labels.
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct ResponseLabels {
@@ -35,34 +39,40 @@ struct RefusalLabels {
     because: &'static str,
 }
 
-impl Web {
-    pub(crate) fn new(all: &mut Registry) -> Self {
-        let web = Self {
+impl RequestMetrics {
+    pub(crate) fn new(registry: &mut Registry) -> Self {
+        let metrics = Self {
             requests: Family::default(),
-            durations: Family::new_with_constructor(|| Histogram::new(DURATIONS_S)),
+            durations: Family::new_with_constructor(|| Histogram::new(DURATION_BUCKETS_S)),
             refused: Family::default(),
         };
-        all.register("requests", "Requests answered", web.requests.clone());
-        all.register_with_unit(
+        registry.register("requests", "Requests answered", metrics.requests.clone());
+        registry.register_with_unit(
             "request_duration",
             "From the head of a request to the head of its response",
             Unit::Seconds,
-            web.durations.clone(),
+            metrics.durations.clone(),
         );
-        all.register(
+        registry.register(
             "refused",
             "Requests that were refused before their handlers: by the rate limit, or too many at once",
-            web.refused.clone(),
+            metrics.refused.clone(),
         );
-        web
+        metrics
     }
 
     /// Records a response. `route` is the pattern of the request's path; `None` if there is no such path. All methods
     /// that the server does not know are counted together.
-    pub fn record_response(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {
+    pub fn record_response(
+        &self,
+        method: &str,
+        route: Option<&str>,
+        status: u16,
+        duration: Duration,
+    ) {
         let method = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
             .into_iter()
-            .find(|known| *known == method)
+            .find(|candidate| *candidate == method)
             .unwrap_or("other");
         let route = route.unwrap_or("none").to_owned();
         let route_labels = RouteLabels {
@@ -74,18 +84,22 @@ impl Web {
             status,
         };
         self.requests.get_or_create(&response_labels).inc();
-        let took_s = took.as_secs_f64();
-        self.durations.get_or_create(&route_labels).observe(took_s);
+        let duration_s = duration.as_secs_f64();
+        self.durations
+            .get_or_create(&route_labels)
+            .observe(duration_s);
     }
 
-    /// Records a request that was refused before its handler was called; `because` is the value of the label.
-    pub fn record_refusal(&self, because: &'static str) {
-        self.refused.get_or_create(&RefusalLabels { because }).inc();
+    /// Records a request that was refused before its handler was called.
+    pub fn record_refusal(&self, reason: &'static str) {
+        self.refused
+            .get_or_create(&RefusalLabels { because: reason })
+            .inc();
     }
 }
 
-impl fmt::Debug for Web {
+impl fmt::Debug for RequestMetrics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Web").finish_non_exhaustive()
+        f.debug_struct("RequestMetrics").finish_non_exhaustive()
     }
 }

@@ -1,3 +1,5 @@
+//! Errors in the rules and settings of a stage.
+
 use crate::{
     InvalidLimit, InvalidPerturbation, InvalidRuntimes, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK,
 };
@@ -13,7 +15,7 @@ pub enum InvalidStageRules {
     Tasks,
     #[error("episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]
     Episodes(u32),
-    /// None, or more than are ever played.
+    /// No episode per shard, or more than a task can have.
     #[error("episodes_per_shard: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]
     Shards(u32),
     #[error("ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {0}")]

@@ -1,4 +1,5 @@
-//! A worker with one slot that uses the protocol of `faceoff worker`, but sleeps instead of running agents.
+//! A simulated worker with one slot (a place for one running job). It uses the protocol of `faceoff worker`, but sleeps instead of
+//! running agents.
 
 use crate::evaluations::Evaluations;
 use anyhow::{Context as _, ensure};
@@ -26,7 +27,8 @@ use std::{
 };
 use uuid::Uuid;
 
-/// These are a worker's own (`remote/far_server.rs` and `remote/connection.rs` of `faceoff-worker`).
+/// The times of `faceoff worker` (`remote/` in `crates/faceoff-worker`): how long it waits for the server's response and for a job,
+/// its pause after a failure, and how often it renews its *lease*, the right to run a job for a time.
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(5);
 const PULL_EXPIRY: Duration = Duration::from_secs(5);
 const RETRY_DELAY: Duration = Duration::from_secs(2);
@@ -43,12 +45,13 @@ const FILES: [&str; 6] = [
     "report.json",
     "shard.json",
 ];
-/// After more failures than this the server counts as broken, not as busy.
+/// After more failures than this the server counts as faulty, not as busy.
 const MAX_FAILURES: u32 = 100;
 /// The size of each file but the largest.
 const SMALL_BYTES: usize = 1024;
 
-pub(crate) struct Stub {
+/// A worker that is connected to NATS.
+pub(crate) struct SimulatedWorker {
     number: usize,
     name: String,
     capabilities: WorkerCapabilities,
@@ -136,17 +139,21 @@ impl Measurements {
 /// A job that the server has allowed this worker to start.
 struct StartedJob {
     lease: Lease,
+    /// The permission for the job's files.
     grant: String,
     files_url: String,
+    /// The evaluation.
     part_of: Uuid,
+    /// The hash of the agent's bundle.
     bundle: String,
     spec: ShardSpec,
+    /// The name of the recording on the server.
     recording: String,
     /// When the job was received.
     received_at: Instant,
 }
 
-impl Stub {
+impl SimulatedWorker {
     pub(crate) async fn connect(
         number: usize,
         nats: &str,
@@ -199,7 +206,7 @@ impl Stub {
         plan: &Plan,
         measurements: &mut Measurements,
     ) -> anyhow::Result<bool> {
-        let free = Instant::now();
+        let free_since = Instant::now();
         let job = self.next_job(&mut measurements.retries).await?;
         let started = Instant::now();
         self.fetch_bundle(&job).await?;
@@ -208,9 +215,9 @@ impl Stub {
             .mul_f64(1.0 + plan.spread * self.random_offset(measurements.job_s.len()));
         let played = async {
             tokio::time::sleep(sleep).await;
-            let slept = Instant::now();
+            let slept_until = Instant::now();
             let stored = self.store_files(&job).await?;
-            anyhow::Ok(stored.map(|failed| (slept.elapsed(), failed)))
+            anyhow::Ok(stored.map(|failures| (slept_until.elapsed(), failures)))
         };
         let mut renewals = 0;
         let lease_lost = self.renew_lease(&job, sleep, &mut renewals);
@@ -219,25 +226,27 @@ impl Stub {
             () = lease_lost => None,
         };
         measurements.retries.renewals += renewals;
-        let Some((files, failed)) = played else {
+        let Some((files_duration, failures)) = played else {
             return Ok(false);
         };
-        let sending = Instant::now();
+        let sending_since = Instant::now();
         measurements.retries.results += self.send_result(&job).await?;
         measurements
             .job_s
-            .push(job.received_at.duration_since(free).as_secs_f64());
+            .push(job.received_at.duration_since(free_since).as_secs_f64());
         measurements
             .start_s
             .push(started.duration_since(job.received_at).as_secs_f64());
-        measurements.files_s.push(files.as_secs_f64());
-        measurements.result_s.push(sending.elapsed().as_secs_f64());
+        measurements.files_s.push(files_duration.as_secs_f64());
+        measurements
+            .result_s
+            .push(sending_since.elapsed().as_secs_f64());
         measurements.slept_s += sleep.as_secs_f64();
-        measurements.retries.files += failed;
+        measurements.retries.files += failures;
         Ok(true)
     }
 
-    /// The next job that it may start, without a time limit.
+    /// The next job that this worker may start. There is no time limit.
     async fn next_job(&self, retries: &mut Retries) -> anyhow::Result<StartedJob> {
         let mut failed = 0;
         loop {
