@@ -1,6 +1,7 @@
-//! Conversions between Rust values and columns. Ids, names, tasks, profiles and days use
-//! `sqlx::types::Text`. A stored value that does not decode to its type is reported as
-//! [`StoreError::Damaged`](crate::StoreError::Damaged).
+//! Rust types of columns. `sqlx.toml` beside this crate's manifest names the type of each column; queries need to name only those of
+//! computed columns. Ids, names, tasks and profiles implement sqlx's traits (`faceoff_types::sqlite_text!`), types of other crates (dates,
+//! UUIDs) are wrapped in `sqlx::types::Text`, and the other wrappers are here. A stored value that does not decode to its type is reported
+//! as [`StoreError::Damaged`](crate::StoreError::Damaged).
 
 use jiff::Timestamp;
 use serde::{Serialize, de::DeserializeOwned};

@@ -8,7 +8,7 @@ use crate::{
 };
 use jiff::Timestamp;
 use serde_json::Value;
-use sqlx::{Sqlite, SqliteConnection, Transaction, types::Text};
+use sqlx::{Sqlite, SqliteConnection, Transaction};
 use std::ops::{Deref, DerefMut};
 
 /// An open write transaction. It is the connection for statements, and collects the events to publish.
@@ -86,7 +86,7 @@ async fn append(
         Some(Value::String(kind)) => kind,
         _ => return Err(damaged(&"it has no kind")),
     };
-    let (actor, now, payload) = (Text(actor), Instant(now), Json(payload));
+    let (now, payload) = (Instant(now), Json(payload));
     let (subject_kind, subject_id) = subject.columns();
     Ok(sqlx::query_scalar!(
         r#"INSERT INTO events (at, actor, subject_kind, subject_id, kind, payload)

@@ -38,6 +38,8 @@ mod runtimes;
 mod schedule;
 mod seed;
 mod seed_label;
+#[cfg(feature = "sqlx")]
+mod sqlite;
 mod stage;
 mod stage_limits;
 mod stage_settings;

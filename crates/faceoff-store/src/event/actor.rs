@@ -75,3 +75,5 @@ mod tests {
         assert!("team:none".parse::<Actor>().is_err());
     }
 }
+
+faceoff_types::sqlite_text!(Actor);

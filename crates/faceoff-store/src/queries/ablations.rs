@@ -26,7 +26,7 @@ pub(crate) async fn newest(
 }
 
 async fn from_row(connection: &mut SqliteConnection, row: AblationRow) -> Result<Ablation> {
-    let (id, submission) = (row.id.0, row.submission_id.0);
+    let (id, submission) = (row.id, row.submission_id);
     let (mut run_by_profile, mut episodes_total, mut episodes_per_task) = (BTreeMap::new(), 0, 0);
     for run in ablations::runs(connection, id).await? {
         let plan = runs::find(connection, run).await?.plan;

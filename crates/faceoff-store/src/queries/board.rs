@@ -41,19 +41,19 @@ pub struct BoardRecord {
 
 /// A row of the statements that read boards.
 pub(super) struct BoardRow {
-    pub(super) team: Text<TeamId>,
-    pub(super) name: Text<TeamName>,
+    pub(super) team: TeamId,
+    pub(super) name: TeamName,
     pub(super) invited_at: Instant,
     pub(super) affiliation: Option<String>,
     pub(super) link: Option<String>,
-    pub(super) division: Option<Text<DivisionName>>,
+    pub(super) division: Option<DivisionName>,
     pub(super) retired_at: Option<Instant>,
     pub(super) is_baseline: bool,
-    pub(super) submission: Text<SubmissionId>,
+    pub(super) submission: SubmissionId,
     pub(super) submitted_at: Instant,
     pub(super) agent_name: Option<String>,
-    pub(super) evaluation: Text<EvaluationId>,
-    pub(super) run: Text<RunId>,
+    pub(super) evaluation: EvaluationId,
+    pub(super) run: RunId,
     pub(super) day: Text<Date>,
     pub(super) released_at: Option<Instant>,
     pub(super) extra_for: Option<String>,
@@ -65,23 +65,23 @@ impl From<BoardRow> for BoardRecord {
     fn from(row: BoardRow) -> Self {
         Self {
             team: Team {
-                id: row.team.0,
-                name: row.name.0,
+                id: row.team,
+                name: row.name,
                 created_at: row.invited_at.0,
                 disqualified: None,
                 profile: TeamProfile {
                     affiliation: row.affiliation,
                     link: row.link,
-                    division: row.division.map(|name| name.0),
+                    division: row.division,
                 },
                 retired_at: row.retired_at.map(|at| at.0),
                 is_baseline: row.is_baseline,
             },
-            submission: row.submission.0,
+            submission: row.submission,
             submitted_at: row.submitted_at.0,
             agent_name: row.agent_name,
-            evaluation: row.evaluation.0,
-            run: row.run.0,
+            evaluation: row.evaluation,
+            run: row.run,
             day: row.day.0,
             released_at: row.released_at.map(|at| at.0),
             extra_for: row.extra_for,
@@ -96,16 +96,16 @@ macro_rules! select_board {
     ($name:literal, $tail:literal, $($argument:expr),* $(,)?) => {
         sqlx::query_as!(
             crate::queries::board::BoardRow,
-            $name + r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
-                      t.created_at AS "invited_at: Instant", t.affiliation, t.link,
-                      t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
-                      t.is_baseline AS "is_baseline: bool",
-                      s.id AS "submission: Text<SubmissionId>",
-                      s.created_at AS "submitted_at: Instant", s.agent_name,
-                      e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
-                      e.day AS "day: Text<Date>", d.released_at AS "released_at: Instant",
-                      e.extra_for, e.finished_at AS "finished_at!: Instant",
-                      e.result AS "result!: Json<EvaluationResult>" "# + $tail,
+            $name + r#"SELECT t.id AS team, t.name,
+                      t.created_at AS invited_at, t.affiliation, t.link,
+                      t.division, t.retired_at,
+                      t.is_baseline,
+                      s.id AS submission,
+                      s.created_at AS submitted_at, s.agent_name,
+                      e.id AS evaluation, e.run_id AS run,
+                      e.day, d.released_at,
+                      e.extra_for, e.finished_at AS "finished_at!",
+                      e.result AS "result!" "# + $tail,
             $($argument),*
         )
     };
@@ -134,7 +134,7 @@ impl Store {
     /// As [`board_revision`](Self::board_revision), of the evaluations within the time limits of `scope`.
     #[boxed]
     pub async fn board_revision_within(&self, stage: &Stage, scope: &BoardScope) -> Result<u32> {
-        let (id, finished_until) = (Text(stage.id), scope.finished_until.map(Instant));
+        let (id, finished_until) = (stage.id, scope.finished_until.map(Instant));
         let last_day = scope.last_day.map(Text);
         let newest = sqlx::query_scalar!(
             r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
@@ -157,13 +157,13 @@ impl Store {
         revision: u32,
         scope: &BoardScope,
     ) -> Result<Vec<Date>> {
-        let (stage, finished_until) = (Text(stage), scope.finished_until.map(Instant));
+        let finished_until = scope.finished_until.map(Instant);
         let last_day = scope.last_day.map(Text);
         let days = sqlx::query_scalar!(
-            r#"SELECT DISTINCT day AS "day: Text<Date>" FROM evaluations
+            "SELECT DISTINCT day FROM evaluations
                WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
                  AND (?3 IS NULL OR finished_at <= ?3) AND (?4 IS NULL OR day <= ?4)
-               ORDER BY day"#,
+               ORDER BY day",
             stage,
             revision,
             finished_until,
@@ -190,12 +190,12 @@ impl Store {
         revision: u32,
         scope: &BoardScope,
     ) -> Result<Vec<BoardRecord>> {
-        let (stage, finished_until) = (Text(stage), scope.finished_until.map(Instant));
+        let finished_until = scope.finished_until.map(Instant);
         let excluded = Json(&scope.excluded);
         let last_day = scope.last_day.map(Text);
         let rows = select_board!(
             "/* board */ ",
-            r#"FROM teams t
+            "FROM teams t
                JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
                                                 WHERE n.team_id = t.id AND n.stage_id = ?1
                                                   AND n.revision = ?2 AND n.state = 'finished'
@@ -209,7 +209,7 @@ impl Store {
                JOIN stages g ON g.id = e.stage_id
                WHERE CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
                           ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
-               ORDER BY t.name"#,
+               ORDER BY t.name",
             stage,
             revision,
             finished_until,

@@ -7,10 +7,8 @@ use crate::{
     queries::board::{BoardRecord, BoardScope, select_board},
     store::Store,
 };
-use faceoff_types::{
-    DivisionName, EvaluationId, EvaluationResult, RunId, StageId, SubmissionId, TeamId, TeamName,
-};
-use jiff::{Timestamp, civil::Date};
+use faceoff_types::StageId;
+use jiff::Timestamp;
 use sqlx::types::Text;
 
 /// The days of a stage from which its board is computed.
@@ -40,7 +38,7 @@ impl Store {
         days: BoardDays,
         scope: &BoardScope,
     ) -> Result<Vec<BoardRecord>> {
-        let (stage, finished_until) = (Text(stage), scope.finished_until.map(Instant));
+        let finished_until = scope.finished_until.map(Instant);
         let excluded = Json(&scope.excluded);
         let last_day = scope.last_day.map(Text);
         let (max_days, only_final_day) = match days {
@@ -50,7 +48,7 @@ impl Store {
         };
         let rows = select_board!(
             "/* board of days */ ",
-            r#"FROM (SELECT n.rowid AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
+            "FROM (SELECT n.rowid AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
                      FROM evaluations n
                      WHERE n.stage_id = ?1 AND n.revision = ?2 AND n.state = 'finished'
                        AND n.voided_at IS NULL AND (?5 IS NULL OR n.finished_at <= ?5)
@@ -64,7 +62,7 @@ impl Store {
                WHERE a.age <= ?3 AND (NOT ?4 OR d.is_final = 1)
                  AND CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
                           ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
-               ORDER BY t.name, e.day"#,
+               ORDER BY t.name, e.day",
             stage,
             revision,
             max_days,

@@ -2,7 +2,7 @@
 
 use crate::{column::Json, error::Result};
 use faceoff_types::RunId;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 use std::collections::HashMap;
 
 /// Number of episodes done in each of these runs, as reported by the workers, in one query.
@@ -15,7 +15,7 @@ pub(crate) async fn of_runs(
     }
     let runs = Json(runs);
     let rows = sqlx::query!(
-        r#"SELECT s.run_id AS "run: Text<RunId>", SUM(j.progress) AS "episodes_done!: u32"
+        r#"SELECT s.run_id AS run, SUM(j.progress) AS "episodes_done!: u32"
            FROM shards s JOIN jobs j ON j.id = s.job_id
            WHERE s.run_id IN (SELECT value FROM json_each(?)) GROUP BY s.run_id"#,
         runs,
@@ -24,6 +24,6 @@ pub(crate) async fn of_runs(
     .await?;
     Ok(rows
         .into_iter()
-        .map(|row| (row.run.0, row.episodes_done))
+        .map(|row| (row.run, row.episodes_done))
         .collect())
 }

@@ -19,11 +19,11 @@ pub(crate) async fn evaluations_of_proposal(
     proposal: ProposalId,
 ) -> Result<Vec<ProposedEvaluation>> {
     let rows = proposed_evaluations::of_proposal(connection, proposal).await?;
-    let runs: Vec<_> = rows.iter().map(|row| row.run.0).collect();
+    let runs: Vec<_> = rows.iter().map(|row| row.run).collect();
     let progress_by_run = progress::of_runs(connection, &runs).await?;
     rows.into_iter()
         .map(|row| {
-            let episodes_done = progress_by_run.get(&row.run.0).copied().unwrap_or(0);
+            let episodes_done = progress_by_run.get(&row.run).copied().unwrap_or(0);
             row.into_evaluation(episodes_done)
         })
         .collect()
@@ -45,9 +45,9 @@ impl Store {
     ) -> Result<(Proposal, ProposedEvaluation)> {
         let mut tx = self.database.read.begin().await?;
         let row = proposed_evaluations::find(&mut tx, id).await?;
-        let proposal = proposals::find(&mut tx, row.proposal.0).await?;
-        let progress_by_run = progress::of_runs(&mut tx, &[row.run.0]).await?;
-        let episodes_done = progress_by_run.get(&row.run.0).copied().unwrap_or(0);
+        let proposal = proposals::find(&mut tx, row.proposal).await?;
+        let progress_by_run = progress::of_runs(&mut tx, &[row.run]).await?;
+        let episodes_done = progress_by_run.get(&row.run).copied().unwrap_or(0);
         Ok((proposal, row.into_evaluation(episodes_done)?))
     }
 

@@ -15,7 +15,7 @@ use crate::{
 };
 use faceoff_types::{EvaluationId, GameId, RunId, StageDay, SubmissionId, TeamId};
 use jiff::{SignedDuration, Timestamp};
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 use std::collections::{BTreeMap, HashMap};
 
 /// Position of a submission, evaluation or game in the queue, among those of its kind.
@@ -89,10 +89,10 @@ struct OpenJob {
     episodes: Option<u32>,
     /// Owner of the account: a team, a tournament, or empty for the platform.
     holder: String,
-    run: Option<Text<RunId>>,
-    validation_of: Option<Text<SubmissionId>>,
-    scoring_of: Option<Text<EvaluationId>>,
-    game: Option<Text<GameId>>,
+    run: Option<RunId>,
+    validation_of: Option<SubmissionId>,
+    scoring_of: Option<EvaluationId>,
+    game: Option<GameId>,
     game_steps: Option<u32>,
     is_paused: bool,
 }
@@ -101,11 +101,9 @@ async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
     Ok(sqlx::query_as!(
         OpenJob,
         r#"SELECT j.account_no AS "account!: i64", j.batch, j.queue_no, j.state = 'leased' AS "is_leased!: bool",
-                  j.claimable_at AS "claimable_at: Instant", j.charged_ms, j.progress AS "progress: u32",
-                  l.urgency AS "urgency: u32", s.end_episode - s.first_episode AS "episodes?: u32",
-                  a.holder, s.run_id AS "run?: Text<RunId>",
-                  v.submission_id AS "validation_of?: Text<SubmissionId>",
-                  c.evaluation_id AS "scoring_of?: Text<EvaluationId>", g.id AS "game?: Text<GameId>",
+                  j.claimable_at, j.charged_ms, j.progress, l.urgency,
+                  s.end_episode - s.first_episode AS "episodes?: u32", a.holder, s.run_id AS "run?",
+                  v.submission_id AS "validation_of?", c.evaluation_id AS "scoring_of?", g.id AS "game?",
                   json_extract(t.rules, '$.steps') AS "game_steps?: u32", t.paused_at IS NOT NULL AS "is_paused!: bool"
            FROM jobs j JOIN accounts a ON a.account_no = j.account_no JOIN lanes l ON l.lane = a.lane
            LEFT JOIN shards s ON s.job_id = j.id LEFT JOIN validation_runs v ON v.job_id = j.id
@@ -120,9 +118,8 @@ async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
 /// All accounts by number, without their jobs.
 async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, AccountQueue>> {
     let rows = sqlx::query!(
-        r#"SELECT a.account_no, a.lane, l.urgency AS "urgency: u32", l.rank AS "rank: u32",
-                  l.served_ms AS of_lane, a.served_ms
-           FROM accounts a JOIN lanes l ON l.lane = a.lane"#
+        "SELECT a.account_no, a.lane, l.urgency, l.rank, l.served_ms AS of_lane, a.served_ms
+           FROM accounts a JOIN lanes l ON l.lane = a.lane"
     )
     .fetch_all(connection)
     .await?;
@@ -206,7 +203,7 @@ impl<'a> JobGroups<'a> {
 
     /// Adds a job. Returns the index of its group, and the whole duration of the job.
     fn add_job(&mut self, job: &OpenJob) -> (usize, DurationMs) {
-        let group_of_run = |run: &Text<RunId>| self.index_by_run.get(&run.0).copied();
+        let group_of_run = |run: &RunId| self.index_by_run.get(run).copied();
         if let Some(group) = job.run.as_ref().and_then(group_of_run) {
             let mean_ms = episode_ms(&self.evaluations[group], self.durations);
             let duration = job.episodes.zip(mean_ms);
@@ -217,7 +214,7 @@ impl<'a> JobGroups<'a> {
         }
         if let Some(id) = &job.scoring_of {
             let is_target =
-                |(target, _): &(GroupTarget, JobGroup)| *target == GroupTarget::Evaluation(id.0);
+                |(target, _): &(GroupTarget, JobGroup)| *target == GroupTarget::Evaluation(*id);
             if let Some(group) = self.groups.iter().position(is_target) {
                 // The scoring job is queued already.
                 self.groups[group].1.follow_up = None;
@@ -227,10 +224,10 @@ impl<'a> JobGroups<'a> {
         if let Some(id) = &job.game {
             let duration = job.game_steps.zip(self.durations.game_step_ms);
             let duration = duration.map(|(steps, ms)| f64::from(steps) * ms);
-            return (self.push(GroupTarget::Game(id.0)), duration);
+            return (self.push(GroupTarget::Game(*id)), duration);
         }
         let (target, duration) = match &job.validation_of {
-            Some(id) => (GroupTarget::Submission(id.0), self.durations.validation_ms),
+            Some(id) => (GroupTarget::Submission(*id), self.durations.validation_ms),
             None if job.urgency == SCORING_URGENCY => {
                 (GroupTarget::WithoutPosition, self.durations.scoring_ms)
             }

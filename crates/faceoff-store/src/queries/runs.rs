@@ -63,7 +63,7 @@ impl Store {
             if !shard.log.is_empty() {
                 log.push_str(&format!(
                     "== {} from episode {} ==\n",
-                    shard.task.0, shard.first_episode
+                    shard.task, shard.first_episode
                 ));
                 log.push_str(shard.log.trim_end());
                 log.push('\n');

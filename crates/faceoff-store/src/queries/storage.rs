@@ -6,7 +6,6 @@ use crate::{
     store::Store,
 };
 use faceoff_types::{TeamId, TeamName};
-use sqlx::types::Text;
 
 /// Disk usage of a team's files.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,8 +36,8 @@ pub enum StorageScope {
 
 /// A row of the statement. Bundles were called archives when its columns were named.
 struct StorageRow {
-    team: Text<TeamId>,
-    name: Text<TeamName>,
+    team: TeamId,
+    name: TeamName,
     archives: u32,
     archive_bytes: i64,
     datasets: u32,
@@ -54,8 +53,8 @@ impl TryFrom<StorageRow> for TeamStorage {
             u64::try_from(sum).map_err(|_| StoreError::Damaged(format!("files of {sum} bytes")))
         };
         Ok(Self {
-            team: row.team.0,
-            name: row.name.0,
+            team: row.team,
+            name: row.name,
             bundles: row.archives,
             bundle_bytes: bytes(row.archive_bytes)?,
             datasets: row.datasets,
@@ -74,10 +73,10 @@ impl Store {
         team: Option<TeamId>,
         scope: StorageScope,
     ) -> Result<Vec<TeamStorage>> {
-        let (team, all) = (team.map(Text), scope == StorageScope::All);
+        let all = scope == StorageScope::All;
         let rows = sqlx::query_as!(
             StorageRow,
-            r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
+            r#"SELECT t.id AS team, t.name,
                       (SELECT COUNT(*) FROM submissions s WHERE s.team_id = t.id AND s.bundle_removed_at IS NULL)
                       AS "archives!: u32",
                       (SELECT COALESCE(SUM(s.bundle_bytes), 0) FROM submissions s

@@ -1,12 +1,12 @@
 //! The context of an event's subject: the ids that decide who may see the event.
 
-use crate::{boxed, column::Instant, error::Result, event::Subject, store::Store};
+use crate::{boxed, error::Result, event::Subject, store::Store};
 use faceoff_types::{
     AblationId, EvaluationId, GameId, QuestionId, StageId, SubmissionId, TeamId, TournamentId,
     UserId,
 };
 use jiff::{Timestamp, civil::Date};
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// An event's subject, with the entities that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,11 +64,9 @@ async fn evaluation_context(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<SubjectContext> {
-    let id = Text(id);
     let row = sqlx::query!(
-        r#"SELECT e.team_id AS "team: Text<TeamId>", e.submission_id AS "submission: Text<SubmissionId>",
-                  e.stage_id AS "stage: Text<StageId>", e.day AS "day: Text<Date>",
-                  e.finished_at AS "finished_at: Instant", d.released_at IS NOT NULL AS "is_released!: bool"
+        r#"SELECT e.team_id AS team, e.submission_id AS submission, e.stage_id AS stage, e.day, e.finished_at,
+                  d.released_at IS NOT NULL AS "is_released!: bool"
            FROM evaluations e LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day WHERE e.id = ?"#,
         id
     )
@@ -76,10 +74,10 @@ async fn evaluation_context(
     .await?;
     Ok(row.map_or(SubjectContext::Organisers, |row| {
         SubjectContext::Evaluation {
-            stage: row.stage.0,
+            stage: row.stage,
             day: row.day.0,
-            submission: row.submission.0,
-            team: row.team.0,
+            submission: row.submission,
+            team: row.team,
             finished_at: row.finished_at.map(|at| at.0),
             is_released: row.is_released,
         }
@@ -90,16 +88,12 @@ async fn submission_context(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<SubjectContext> {
-    let key = Text(id);
-    let team = sqlx::query_scalar!(
-        r#"SELECT team_id AS "team: Text<TeamId>" FROM submissions WHERE id = ?"#,
-        key
-    );
+    let team = sqlx::query_scalar!("SELECT team_id AS team FROM submissions WHERE id = ?", id);
     let team = team.fetch_optional(connection).await?;
     Ok(team.map_or(SubjectContext::Organisers, |team| {
         SubjectContext::Submission {
             submission: id,
-            team: team.0,
+            team,
         }
     }))
 }
@@ -108,27 +102,25 @@ async fn ablation_context(
     connection: &mut SqliteConnection,
     id: AblationId,
 ) -> Result<SubjectContext> {
-    let id = Text(id);
     let row = sqlx::query!(
-        r#"SELECT s.id AS "submission: Text<SubmissionId>", s.team_id AS "team: Text<TeamId>"
-           FROM ablations a JOIN submissions s ON s.id = a.submission_id WHERE a.id = ?"#,
+        "SELECT s.id AS submission, s.team_id AS team
+           FROM ablations a JOIN submissions s ON s.id = a.submission_id WHERE a.id = ?",
         id
     )
     .fetch_optional(connection)
     .await?;
     Ok(
         row.map_or(SubjectContext::Organisers, |row| SubjectContext::Ablation {
-            submission: row.submission.0,
-            team: row.team.0,
+            submission: row.submission,
+            team: row.team,
         }),
     )
 }
 
 async fn game_context(connection: &mut SqliteConnection, id: GameId) -> Result<SubjectContext> {
-    let id = Text(id);
     let row = sqlx::query!(
-        r#"SELECT tournament_id AS "tournament: Text<TournamentId>", home_team_id AS "home: Text<TeamId>",
-                  away_team_id AS "away: Text<TeamId>", purpose IN ('round', 'replay') AS "is_public!: bool"
+        r#"SELECT tournament_id AS tournament, home_team_id AS home, away_team_id AS away,
+                  purpose IN ('round', 'replay') AS "is_public!: bool"
            FROM games WHERE id = ?"#,
         id
     )
@@ -136,22 +128,18 @@ async fn game_context(connection: &mut SqliteConnection, id: GameId) -> Result<S
     .await?;
     Ok(
         row.map_or(SubjectContext::Organisers, |row| SubjectContext::Game {
-            tournament: row.tournament.0,
-            teams: [row.home.0, row.away.0],
+            tournament: row.tournament,
+            teams: [row.home, row.away],
             is_public: row.is_public,
         }),
     )
 }
 
 async fn user_context(connection: &mut SqliteConnection, id: UserId) -> Result<SubjectContext> {
-    let id = Text(id);
-    let team = sqlx::query_scalar!(
-        r#"SELECT team_id AS "team: Text<TeamId>" FROM people WHERE id = ?"#,
-        id
-    );
+    let team = sqlx::query_scalar!("SELECT team_id AS team FROM people WHERE id = ?", id);
     let team = team.fetch_optional(connection).await?;
     Ok(SubjectContext::User {
-        team: team.flatten().map(|team| team.0),
+        team: team.flatten(),
     })
 }
 
@@ -159,14 +147,10 @@ async fn question_context(
     connection: &mut SqliteConnection,
     id: QuestionId,
 ) -> Result<SubjectContext> {
-    let id = Text(id);
-    let team = sqlx::query_scalar!(
-        r#"SELECT team_id AS "team: Text<TeamId>" FROM questions WHERE id = ?"#,
-        id
-    );
+    let team = sqlx::query_scalar!("SELECT team_id AS team FROM questions WHERE id = ?", id);
     let team = team.fetch_optional(connection).await?;
     Ok(SubjectContext::Question {
-        team: team.flatten().map(|team| team.0),
+        team: team.flatten(),
     })
 }
 

@@ -8,7 +8,6 @@ use crate::{
     workers::WorkerName,
 };
 use faceoff_types::{EvaluationId, GameId};
-use sqlx::types::Text;
 
 /// Finished results to which a worker has contributed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -36,7 +35,7 @@ impl Store {
         let holder = worker.holder();
         let mut connection = self.database.read.acquire().await?;
         let evaluations = sqlx::query_scalar!(
-            r#"SELECT e.id AS "id!: Text<EvaluationId>"
+            r#"SELECT e.id AS "id!"
                FROM jobs j JOIN shards s ON s.job_id = j.id JOIN evaluations e ON e.run_id = s.run_id
                WHERE j.state = 'done' AND j.worker >= 'remote/' AND j.worker < 'remote0'
                  AND j.worker >= ?1 || '/' AND j.worker < ?1 || '0'
@@ -48,7 +47,7 @@ impl Store {
         .fetch_all(&mut *connection)
         .await?;
         let games = sqlx::query_scalar!(
-            r#"SELECT g.id AS "id!: Text<GameId>" FROM games g
+            r#"SELECT g.id AS "id!" FROM games g
                JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt
                WHERE a.worker >= ?1 || '/' AND a.worker < ?1 || '0'
                ORDER BY a.ended_at DESC LIMIT ?2"#,
@@ -57,9 +56,6 @@ impl Store {
         )
         .fetch_all(&mut *connection)
         .await?;
-        Ok(WorkerResults {
-            evaluations: evaluations.into_iter().map(|id| id.0).collect(),
-            games: games.into_iter().map(|id| id.0).collect(),
-        })
+        Ok(WorkerResults { evaluations, games })
     }
 }

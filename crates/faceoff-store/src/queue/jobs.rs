@@ -87,7 +87,7 @@ pub(crate) async fn claim_next(
                     ORDER BY j.batch, j.queue_no LIMIT 1)
                WHERE l.lane IN (SELECT value FROM json_each(?6))
                ORDER BY l.urgency, l.served_ms, l.rank, f.batch, a.served_ms, f.queue_no LIMIT 1)
-           RETURNING id AS "id!: Text<Uuid>", kind AS "kind!", attempts AS "attempts!: u32""#,
+           RETURNING id AS "id!", kind AS "kind!", attempts AS "attempts!""#,
         worker,
         nonce,
         lease_until,

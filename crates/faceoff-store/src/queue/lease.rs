@@ -125,8 +125,7 @@ pub(crate) async fn lease_holder(
 /// All leases of `holder` and of every name `holder/…`, with the kinds of their jobs.
 pub(crate) async fn leases(tx: &mut Tx, holder: &str) -> Result<Vec<(JobClaim, String)>> {
     let rows = sqlx::query!(
-        r#"SELECT id AS "id!: Text<Uuid>", kind, worker AS "worker!", nonce AS "nonce!: Text<Uuid>",
-                  claimable_at AS "lease_until: Instant"
+        r#"SELECT id AS "id!", kind, worker AS "worker!", nonce AS "nonce!", claimable_at AS lease_until
            FROM jobs
            WHERE state IN ('queued', 'leased') AND state = 'leased'
              AND (worker = ?1 OR substr(worker, 1, length(?1) + 1) = ?1 || '/')"#,
@@ -210,7 +209,7 @@ pub(crate) async fn requeue_failed(
     let failures = sqlx::query_scalar!(
         r#"UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                             charged_ms = 0, failures = failures + 1
-           WHERE id = ? RETURNING failures AS "failures!: u32""#,
+           WHERE id = ? RETURNING failures AS "failures!""#,
         id,
     )
     .fetch_one(&mut *connection)

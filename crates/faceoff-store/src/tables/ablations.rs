@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{AblationId, Profile, RunId, SubmissionId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 use std::collections::BTreeMap;
 
 /// An ablation: runs of a submission on the same episodes without any perturbation, with each one alone, and with all.
@@ -48,8 +48,8 @@ pub enum AblationState {
 
 /// An ablation without its runs.
 pub(crate) struct AblationRow {
-    pub(crate) id: Text<AblationId>,
-    pub(crate) submission_id: Text<SubmissionId>,
+    pub(crate) id: AblationId,
+    pub(crate) submission_id: SubmissionId,
     pub(crate) created_at: Instant,
     pub(crate) finished_at: Option<Instant>,
     pub(crate) reason: Option<String>,
@@ -60,13 +60,10 @@ pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     submission: SubmissionId,
 ) -> Result<Option<AblationRow>> {
-    let submission = Text(submission);
     Ok(sqlx::query_as!(
         AblationRow,
-        r#"SELECT id AS "id: Text<AblationId>", submission_id AS "submission_id: Text<SubmissionId>",
-                  created_at AS "created_at: Instant",
-                  finished_at AS "finished_at: Instant", reason
-           FROM ablations WHERE submission_id = ? ORDER BY created_at DESC, id DESC LIMIT 1"#,
+        "SELECT id, submission_id, created_at, finished_at, reason
+           FROM ablations WHERE submission_id = ? ORDER BY created_at DESC, id DESC LIMIT 1",
         submission
     )
     .fetch_optional(connection)
@@ -74,12 +71,10 @@ pub(crate) async fn newest(
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: AblationId) -> Result<AblationRow> {
-    let id = Text(id);
     sqlx::query_as!(
         AblationRow,
-        r#"SELECT id AS "id: Text<AblationId>", submission_id AS "submission_id: Text<SubmissionId>",
-                  created_at AS "created_at: Instant", finished_at AS "finished_at: Instant", reason
-           FROM ablations WHERE id = ?"#,
+        "SELECT id, submission_id, created_at, finished_at, reason
+           FROM ablations WHERE id = ?",
         id
     )
     .fetch_optional(connection)
@@ -92,25 +87,23 @@ pub(crate) async fn of_run(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<Option<AblationId>> {
-    let run = Text(run);
     let found = sqlx::query_scalar!(
-        r#"SELECT ablation_id AS "id: Text<AblationId>" FROM ablation_runs WHERE run_id = ?"#,
+        "SELECT ablation_id AS id FROM ablation_runs WHERE run_id = ?",
         run
     )
     .fetch_optional(connection)
     .await?;
-    Ok(found.map(|id| id.0))
+    Ok(found)
 }
 
 pub(crate) async fn runs(connection: &mut SqliteConnection, id: AblationId) -> Result<Vec<RunId>> {
-    let id = Text(id);
     let runs = sqlx::query_scalar!(
-        r#"SELECT run_id AS "id: Text<RunId>" FROM ablation_runs WHERE ablation_id = ?"#,
+        "SELECT run_id AS id FROM ablation_runs WHERE ablation_id = ?",
         id
     )
     .fetch_all(connection)
     .await?;
-    Ok(runs.into_iter().map(|id| id.0).collect())
+    Ok(runs)
 }
 
 /// Adds an ablation. [`StoreError::Conflict`] while another ablation of the submission is open.
@@ -120,7 +113,7 @@ pub(crate) async fn insert(
     submission: SubmissionId,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, submission, now) = (Text(id), Text(submission), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "INSERT INTO ablations (id, submission_id, created_at) VALUES (?, ?, ?)",
         id,
@@ -146,7 +139,6 @@ pub(crate) async fn insert_run(
     id: AblationId,
     run: RunId,
 ) -> Result<()> {
-    let (id, run) = (Text(id), Text(run));
     sqlx::query!(
         "INSERT INTO ablation_runs (ablation_id, run_id) VALUES (?, ?)",
         id,
@@ -164,7 +156,7 @@ pub(crate) async fn set_ended(
     reason: Option<&str>,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE ablations SET finished_at = ?, reason = ? WHERE id = ? AND finished_at IS NULL",
         now,
@@ -181,7 +173,6 @@ pub(crate) async fn all_complete(
     connection: &mut SqliteConnection,
     id: AblationId,
 ) -> Result<bool> {
-    let id = Text(id);
     Ok(sqlx::query_scalar!(
         r#"SELECT NOT EXISTS (SELECT 1 FROM ablation_runs a JOIN runs r ON r.id = a.run_id
                               WHERE a.ablation_id = ? AND r.state <> 'played') AS "played!: bool""#,

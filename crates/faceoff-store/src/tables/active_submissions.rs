@@ -3,7 +3,7 @@
 use crate::{column::Instant, error::Result};
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// Makes a submission that passed its validation its team's active one. Returns false if the team has a newer
 /// submission, or has chosen one since this upload.
@@ -13,7 +13,7 @@ pub(crate) async fn put_newest(
     submission: SubmissionId,
     uploaded_at: Timestamp,
 ) -> Result<bool> {
-    let (team, submission, since) = (Text(team), Text(submission), Instant(uploaded_at));
+    let since = Instant(uploaded_at);
     let put = sqlx::query!(
         "INSERT INTO active_submissions (team_id, submission_id, since) VALUES (?, ?, ?)
          ON CONFLICT (team_id) DO UPDATE SET submission_id = excluded.submission_id, since = excluded.since
@@ -34,7 +34,7 @@ pub(crate) async fn choose(
     submission: SubmissionId,
     now: Timestamp,
 ) -> Result<()> {
-    let (team, submission, now) = (Text(team), Text(submission), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "INSERT OR REPLACE INTO active_submissions (team_id, submission_id, since) VALUES (?, ?, ?)",
         team,
@@ -51,7 +51,6 @@ pub(crate) async fn remove(
     connection: &mut SqliteConnection,
     submission: SubmissionId,
 ) -> Result<()> {
-    let submission = Text(submission);
     sqlx::query!(
         "DELETE FROM active_submissions WHERE submission_id = ?",
         submission

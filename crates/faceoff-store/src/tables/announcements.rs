@@ -3,7 +3,7 @@
 use crate::{column::Instant, error::Result};
 use faceoff_types::AnnouncementId;
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A public announcement of the organisers.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,14 +21,14 @@ pub(crate) async fn newest(
     limit: u32,
 ) -> Result<Vec<Announcement>> {
     let rows = sqlx::query!(
-        r#"SELECT id AS "id: Text<AnnouncementId>", at AS "at: Instant", title, text
-           FROM announcements ORDER BY at DESC, id DESC LIMIT ?"#,
+        "SELECT id, at, title, text
+           FROM announcements ORDER BY at DESC, id DESC LIMIT ?",
         limit
     )
     .fetch_all(connection)
     .await?;
     let announcements = rows.into_iter().map(|row| Announcement {
-        id: row.id.0,
+        id: row.id,
         at: row.at.0,
         title: row.title,
         text: row.text,
@@ -40,7 +40,7 @@ pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     announcement: &Announcement,
 ) -> Result<()> {
-    let (id, at) = (Text(announcement.id), Instant(announcement.at));
+    let (id, at) = (announcement.id, Instant(announcement.at));
     sqlx::query!(
         "INSERT INTO announcements (id, at, title, text) VALUES (?, ?, ?, ?)",
         id,

@@ -43,6 +43,8 @@ impl FromStr for Edition {
     }
 }
 
+faceoff_types::sqlite_text!(Edition);
+
 /// Description of an archive; a season that was imported from one is read-only.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArchivedSeason {
@@ -61,14 +63,13 @@ pub struct ArchivedSeason {
 /// Reads the description; `None` if the database is not that of an archive.
 pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Option<ArchivedSeason>> {
     let row = sqlx::query!(
-        r#"SELECT edition AS "edition: Text<Edition>", made_at AS "made_at: Instant", program, commitment,
-                  imported_at AS "imported_at: Instant"
-           FROM archived"#
+        "SELECT edition, made_at, program, commitment, imported_at
+           FROM archived"
     )
     .fetch_optional(connection)
     .await?;
     Ok(row.map(|row| ArchivedSeason {
-        edition: row.edition.0,
+        edition: row.edition,
         made_at: row.made_at.0,
         program: row.program,
         commitment: row.commitment,
@@ -81,7 +82,7 @@ pub(crate) async fn put(
     connection: &mut SqliteConnection,
     archived: &ArchivedSeason,
 ) -> Result<()> {
-    let (edition, made_at) = (Text(archived.edition), Instant(archived.made_at));
+    let (edition, made_at) = (archived.edition, Instant(archived.made_at));
     let imported_at = archived.imported_at.map(Instant);
     sqlx::query!(
         "INSERT OR REPLACE INTO archived (id, edition, made_at, program, commitment, imported_at)
@@ -100,15 +101,12 @@ pub(crate) async fn put(
 /// The public seeds of days, in an archive without the season's secret.
 pub(crate) async fn seeds(connection: &mut SqliteConnection) -> Result<BTreeMap<StageDay, Seed>> {
     let rows = sqlx::query!(
-        r#"SELECT stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", seed AS "seed: Bytes32"
-           FROM archived_seeds"#
+        "SELECT stage_id AS stage, day, seed
+           FROM archived_seeds"
     )
     .fetch_all(connection)
     .await?;
-    let stage_day = |stage: Text<StageId>, day: Text<Date>| StageDay {
-        stage: stage.0,
-        date: day.0,
-    };
+    let stage_day = |stage: StageId, day: Text<Date>| StageDay { stage, date: day.0 };
     Ok(rows
         .into_iter()
         .map(|row| (stage_day(row.stage, row.day), Seed::from_bytes(row.seed.0)))
@@ -121,7 +119,7 @@ pub(crate) async fn put_seed(
     seed: &Seed,
 ) -> Result<()> {
     let (stage, day, seed) = (
-        Text(stage_day.stage),
+        stage_day.stage,
         Text(stage_day.date),
         Bytes32(*seed.as_bytes()),
     );
@@ -159,16 +157,16 @@ pub enum ArtifactOwner {
 /// All artifacts of an organiser's archive, except the datasets of evaluations.
 pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<ArchivedArtifact>> {
     let bundles = sqlx::query!(
-        r#"SELECT id AS "id: Text<SubmissionId>", bundle_key, bundle_blake3 FROM submissions
+        "SELECT id, bundle_key, bundle_blake3 FROM submissions
            WHERE bundle_removed_at IS NULL
              AND (state = 'valid'
                   OR team_id IN (SELECT id FROM teams WHERE disqualified_at IS NOT NULL OR retired_by_organiser = 1))
-           ORDER BY created_at, id"#
+           ORDER BY created_at, id"
     )
     .fetch_all(&mut *connection)
     .await?;
     let datasets = sqlx::query!(
-        r#"SELECT id AS "id: Text<EvaluationId>", dataset AS "dataset!", dataset_blake3 AS "dataset_blake3!"
+        r#"SELECT id, dataset AS "dataset!", dataset_blake3 AS "dataset_blake3!"
            FROM proposed_evaluations WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
              AND id NOT IN (SELECT id FROM evaluations)
              AND proposal_id NOT IN (SELECT id FROM proposals WHERE outcome = 'dropped') ORDER BY created_at, id"#
@@ -176,7 +174,7 @@ pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<A
     .fetch_all(&mut *connection)
     .await?;
     let games = sqlx::query!(
-        r#"SELECT g.id AS "id: Text<GameId>", a.recording AS "key!", a.game_blake3 AS "game!", a.home_blake3 AS "home!",
+        r#"SELECT g.id, a.recording AS "key!", a.game_blake3 AS "game!", a.home_blake3 AS "home!",
                   a.away_blake3 AS "away!"
            FROM games g JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt
            WHERE a.recording IS NOT NULL ORDER BY g.game_no"#
@@ -192,18 +190,18 @@ pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<A
         files.map(|(name, blake3)| ArchivedArtifact {
             key: format!("{}/{name}.zip", row.key),
             blake3,
-            owner: ArtifactOwner::Game(row.id.0),
+            owner: ArtifactOwner::Game(row.id),
         })
     });
     let bundles = bundles.into_iter().map(|row| ArchivedArtifact {
         key: row.bundle_key,
         blake3: row.bundle_blake3,
-        owner: ArtifactOwner::Bundle(row.id.0),
+        owner: ArtifactOwner::Bundle(row.id),
     });
     let datasets = datasets.into_iter().map(|row| ArchivedArtifact {
         key: row.dataset,
         blake3: row.dataset_blake3,
-        owner: ArtifactOwner::ProposedEvaluation(row.id.0),
+        owner: ArtifactOwner::ProposedEvaluation(row.id),
     });
     Ok(bundles.chain(datasets).chain(games).collect())
 }

@@ -9,7 +9,7 @@ use crate::{
 };
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 use std::collections::HashSet;
 
 /// Upload and storage quota of a team, in bytes.
@@ -78,7 +78,7 @@ pub(crate) async fn usage(
     team: TeamId,
     day_start: Timestamp,
 ) -> Result<UploadUsage> {
-    let (team, day_start) = (Text(team), Instant(day_start));
+    let day_start = Instant(day_start);
     let row = sqlx::query!(
         r#"SELECT COALESCE(SUM(CASE WHEN created_at >= ? AND state <> 'validation_error'
                                     THEN bundle_bytes ELSE 0 END), 0) AS "day_bytes!: i64",
@@ -108,7 +108,7 @@ pub(crate) async fn refused(
 ) -> Result<Vec<(SubmissionId, String)>> {
     let uploaded_until = Instant(uploaded_until);
     let rows = sqlx::query!(
-        r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_key FROM submissions s
+        "SELECT s.id, s.bundle_key FROM submissions s
            WHERE s.bundle_removed_at IS NULL AND s.state IN ('invalid', 'validation_error')
              AND (s.state = 'invalid' OR s.created_at <= ?)
              AND NOT EXISTS (SELECT 1 FROM contestants c WHERE c.submission_id = s.id)
@@ -116,14 +116,14 @@ pub(crate) async fn refused(
                              WHERE t.id = s.team_id AND (t.disqualified_at IS NOT NULL OR t.retired_by_organiser = 1))
              AND NOT EXISTS (SELECT 1 FROM submissions o
                              WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
-                               AND o.state IN ('validating', 'valid'))"#,
+                               AND o.state IN ('validating', 'valid'))",
         uploaded_until,
     )
     .fetch_all(connection)
     .await?;
     Ok(rows
         .into_iter()
-        .map(|row| (row.id.0, row.bundle_key))
+        .map(|row| (row.id, row.bundle_key))
         .collect())
 }
 
@@ -132,7 +132,7 @@ pub(crate) async fn set_refused_removed(
     id: SubmissionId,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE submissions SET bundle_removed_at = ?, bundle_gone = 1
          WHERE id = ? AND state IN ('invalid', 'validation_error') AND bundle_removed_at IS NULL",
@@ -159,7 +159,7 @@ pub(crate) async fn set_removed(
     reason: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE submissions SET bundle_removed_at = ?, bundle_removed_for = ? WHERE id = ?",
         now,
@@ -178,7 +178,7 @@ pub(crate) async fn set_deleted(
     actor: &Actor,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, actor, now) = (Text(id), Text(actor), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE submissions SET deleted_at = ?, deleted_by = ? WHERE id = ?",
         now,
@@ -198,20 +198,20 @@ pub(crate) async fn deletable(
 ) -> Result<Vec<(SubmissionId, String)>> {
     let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
-        r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_key FROM submissions s
+        "SELECT s.id, s.bundle_key FROM submissions s
            JOIN teams t ON t.id = s.team_id
            WHERE s.bundle_removed_at IS NOT NULL AND s.bundle_removed_at <= ? AND s.bundle_gone = 0
              AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
              AND NOT EXISTS (SELECT 1 FROM submissions o
                              WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
-                               AND o.bundle_removed_at IS NULL)"#,
+                               AND o.bundle_removed_at IS NULL)",
         removed_until
     )
     .fetch_all(connection)
     .await?;
     Ok(rows
         .into_iter()
-        .map(|row| (row.id.0, row.bundle_key))
+        .map(|row| (row.id, row.bundle_key))
         .collect())
 }
 
@@ -220,7 +220,6 @@ pub(crate) async fn set_file_deleted(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("UPDATE submissions SET bundle_gone = 1 WHERE id = ?", id)
         .execute(connection)
         .await?;
@@ -232,11 +231,10 @@ pub(crate) async fn check_available(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<()> {
-    let text = Text(id);
     let removed = sqlx::query!(
-        r#"SELECT bundle_removed_at AS "at!: Instant", bundle_removed_for AS reason FROM submissions
+        r#"SELECT bundle_removed_at AS "at!", bundle_removed_for AS reason FROM submissions
            WHERE id = ? AND bundle_removed_at IS NOT NULL"#,
-        text
+        id
     )
     .fetch_optional(connection)
     .await?;
@@ -267,7 +265,6 @@ pub(crate) async fn uses(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<BundleUses> {
-    let id = Text(id);
     Ok(sqlx::query_as!(
         BundleUses,
         r#"SELECT EXISTS (SELECT 1 FROM active_submissions WHERE submission_id = ?1) AS "is_active!: bool",

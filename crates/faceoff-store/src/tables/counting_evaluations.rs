@@ -20,10 +20,9 @@ pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<Vec<EvaluationStatus>> {
-    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let rows = sqlx::query!(
-        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>",
-                  state = 'open' AS "is_open!: bool",
+        r#"SELECT id, run_id AS run, state = 'open' AS "is_open!: bool",
                   state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
            FROM evaluations WHERE stage_id = ? AND day = ? ORDER BY created_at, id"#,
         stage,
@@ -34,8 +33,8 @@ pub(crate) async fn of_day(
     Ok(rows
         .into_iter()
         .map(|row| EvaluationStatus {
-            id: row.id.0,
-            run: row.run.0,
+            id: row.id,
+            run: row.run,
             is_open: row.is_open,
             counts: row.counts,
         })
@@ -47,10 +46,9 @@ pub(crate) async fn of_day_and_team(
     stage_day: StageDay,
     team: TeamId,
 ) -> Result<Vec<EvaluationStatus>> {
-    let (stage, day, team) = (Text(stage_day.stage), Text(stage_day.date), Text(team));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let rows = sqlx::query!(
-        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>",
-                  state = 'open' AS "is_open!: bool",
+        r#"SELECT id, run_id AS run, state = 'open' AS "is_open!: bool",
                   state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
            FROM evaluations WHERE stage_id = ? AND day = ? AND team_id = ? ORDER BY created_at, id"#,
         stage,
@@ -62,8 +60,8 @@ pub(crate) async fn of_day_and_team(
     Ok(rows
         .into_iter()
         .map(|row| EvaluationStatus {
-            id: row.id.0,
-            run: row.run.0,
+            id: row.id,
+            run: row.run,
             is_open: row.is_open,
             counts: row.counts,
         })
@@ -75,7 +73,7 @@ pub(crate) async fn revision_of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<Option<u32>> {
-    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_scalar!(
         r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations WHERE stage_id = ? AND day = ?"#,
         stage,
@@ -90,18 +88,18 @@ pub(crate) async fn incomplete_of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<Vec<(EvaluationId, RunId)>> {
-    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let rows = sqlx::query!(
-        r#"SELECT e.id AS "id: Text<EvaluationId>", e.run_id AS "run: Text<RunId>"
+        "SELECT e.id, e.run_id AS run
            FROM evaluations e JOIN runs r ON r.id = e.run_id
            WHERE e.stage_id = ? AND e.day = ? AND e.state = 'open' AND r.state <> 'played'
-           ORDER BY e.created_at, e.id"#,
+           ORDER BY e.created_at, e.id",
         stage,
         day
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows.into_iter().map(|row| (row.id.0, row.run.0)).collect())
+    Ok(rows.into_iter().map(|row| (row.id, row.run)).collect())
 }
 
 /// The open evaluations of a team.
@@ -109,15 +107,14 @@ pub(crate) async fn open_of_team(
     connection: &mut SqliteConnection,
     team: TeamId,
 ) -> Result<Vec<(EvaluationId, RunId)>> {
-    let team = Text(team);
     let rows = sqlx::query!(
-        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>"
-           FROM evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id"#,
+        "SELECT id, run_id AS run
+           FROM evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id",
         team
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows.into_iter().map(|row| (row.id.0, row.run.0)).collect())
+    Ok(rows.into_iter().map(|row| (row.id, row.run)).collect())
 }
 
 /// Voids an evaluation: it does not count any more.
@@ -126,7 +123,7 @@ pub(crate) async fn set_voided(
     id: EvaluationId,
     ruling: &Ruling,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(ruling.at));
+    let at = Instant(ruling.at);
     sqlx::query!(
         "UPDATE evaluations SET voided_at = ?, voided_for = ? WHERE id = ?",
         at,
@@ -144,7 +141,7 @@ pub(crate) async fn set_published(
     id: EvaluationId,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE evaluations SET published_at = ? WHERE id = ?",
         now,

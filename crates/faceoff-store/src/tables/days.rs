@@ -25,15 +25,12 @@ pub struct Day {
 /// The days that were started later than on their date, each with the reason.
 pub(crate) async fn missed(connection: &mut SqliteConnection) -> Result<Vec<(StageDay, String)>> {
     let rows = sqlx::query!(
-        r#"SELECT stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", missed_for AS "reason!"
+        r#"SELECT stage_id AS stage, day, missed_for AS "reason!"
            FROM days WHERE missed_for IS NOT NULL"#
     )
     .fetch_all(connection)
     .await?;
-    let stage_day = |stage: Text<StageId>, day: Text<Date>| StageDay {
-        stage: stage.0,
-        date: day.0,
-    };
+    let stage_day = |stage: StageId, day: Text<Date>| StageDay { stage, date: day.0 };
     Ok(rows
         .into_iter()
         .map(|row| (stage_day(row.stage, row.day), row.reason))
@@ -43,8 +40,8 @@ pub(crate) async fn missed(connection: &mut SqliteConnection) -> Result<Vec<(Sta
 /// All days, the newest cutoff first, each with the number of its finished evaluations.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u32)>> {
     let rows = sqlx::query!(
-        r#"SELECT d.stage_id AS "stage: Text<StageId>", d.day AS "day: Text<Date>", d.cutoff_at AS "cutoff_at: Instant",
-                  d.deadline_at AS "deadline_at: Instant", d.released_at AS "released_at: Instant",
+        r#"SELECT d.stage_id AS stage, d.day, d.cutoff_at,
+                  d.deadline_at, d.released_at,
                   (SELECT COUNT(*) FROM evaluations e
                    WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'finished'
                      AND e.voided_at IS NULL) AS "finished!: u32"
@@ -57,7 +54,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
         .map(|row| {
             let day = Day {
                 stage_day: StageDay {
-                    stage: row.stage.0,
+                    stage: row.stage,
                     date: row.day.0,
                 },
                 cutoff_at: row.cutoff_at.0,
@@ -74,12 +71,10 @@ pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Option<Day>> {
-    let id = Text(stage);
     let row = sqlx::query!(
-        r#"SELECT day AS "day: Text<Date>", cutoff_at AS "cutoff_at: Instant",
-                  deadline_at AS "deadline_at: Instant", released_at AS "released_at: Instant"
-           FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1"#,
-        id
+        "SELECT day, cutoff_at, deadline_at, released_at
+           FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1",
+        stage
     )
     .fetch_optional(connection)
     .await?;
@@ -96,11 +91,10 @@ pub(crate) async fn newest(
 
 /// The day; [`StoreError::NotFound`] if its cutoff has not passed.
 pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
-    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let row = sqlx::query!(
-        r#"SELECT cutoff_at AS "cutoff_at: Instant", deadline_at AS "deadline_at: Instant",
-                  released_at AS "released_at: Instant"
-           FROM days WHERE stage_id = ? AND day = ?"#,
+        "SELECT cutoff_at, deadline_at, released_at
+           FROM days WHERE stage_id = ? AND day = ?",
         stage,
         day
     )
@@ -120,12 +114,10 @@ pub(crate) async fn unreleased(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Vec<Day>> {
-    let id = Text(stage);
     let rows = sqlx::query!(
-        r#"SELECT day AS "day: Text<Date>", cutoff_at AS "cutoff_at: Instant",
-                  deadline_at AS "deadline_at: Instant"
-           FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day"#,
-        id
+        "SELECT day, cutoff_at, deadline_at
+           FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day",
+        stage
     )
     .fetch_all(connection)
     .await?;
@@ -150,12 +142,12 @@ pub(crate) async fn overdue(
 ) -> Result<Vec<StageDay>> {
     let now = Instant(now);
     let rows = sqlx::query!(
-        r#"SELECT d.stage_id AS "stage: Text<StageId>", d.day AS "day: Text<Date>" FROM days d
+        "SELECT d.stage_id AS stage, d.day FROM days d
            WHERE d.released_at IS NULL AND d.deadline_at <= ?
              AND EXISTS (SELECT 1 FROM evaluations e JOIN runs r ON r.id = e.run_id
                          WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'open'
                            AND r.state <> 'played')
-           ORDER BY d.cutoff_at"#,
+           ORDER BY d.cutoff_at",
         now
     )
     .fetch_all(connection)
@@ -163,7 +155,7 @@ pub(crate) async fn overdue(
     Ok(rows
         .into_iter()
         .map(|row| StageDay {
-            stage: row.stage.0,
+            stage: row.stage,
             date: row.day.0,
         })
         .collect())
@@ -176,7 +168,7 @@ pub(crate) async fn set_deadline(
     deadline_at: Option<Timestamp>,
 ) -> Result<()> {
     let (stage, day, deadline_at) = (
-        Text(stage_day.stage),
+        stage_day.stage,
         Text(stage_day.date),
         deadline_at.map(Instant),
     );
@@ -193,7 +185,7 @@ pub(crate) async fn set_deadline(
 
 /// Has the day's cutoff passed?
 pub(crate) async fn exists(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<bool> {
-    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM days WHERE stage_id = ? AND day = ?) AS "exists!: bool""#,
         stage,
@@ -219,7 +211,7 @@ pub(crate) async fn insert(
             cutoff_at: newest.cutoff_at,
         });
     }
-    let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
+    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
     let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cutoff_at, deadline_at) VALUES (?, ?, ?, ?)",
@@ -251,7 +243,7 @@ pub(crate) async fn insert_missed(
         }
         Err(error) => return Err(error),
     }
-    let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
+    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
     let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cutoff_at, deadline_at, missed_for) VALUES (?, ?, ?, ?, ?)",
@@ -272,7 +264,7 @@ pub(crate) async fn set_released(
     stage_day: StageDay,
     now: Timestamp,
 ) -> Result<bool> {
-    let (stage, day, now) = (Text(stage_day.stage), Text(stage_day.date), Instant(now));
+    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
     let released = sqlx::query!(
         "UPDATE days SET released_at = ? WHERE stage_id = ? AND day = ? AND released_at IS NULL",
         now,

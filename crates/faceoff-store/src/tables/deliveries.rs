@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{DeliveryId, WebhookId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A message to a webhook.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,8 +58,8 @@ pub struct DeliveryAttempt {
 }
 
 struct DeliveryRow {
-    id: Text<DeliveryId>,
-    webhook_id: Text<WebhookId>,
+    id: DeliveryId,
+    webhook_id: WebhookId,
     event_id: Option<i64>,
     kind: String,
     body: String,
@@ -82,13 +82,13 @@ impl TryFrom<DeliveryRow> for Delivery {
             (None, Some(at)) if row.is_delivered => DeliveryState::Delivered { at: at.0 },
             (None, Some(at)) => DeliveryState::GivenUp { at: at.0 },
             _ => {
-                let message = format!("delivery {}: neither waiting nor settled", row.id.0);
+                let message = format!("delivery {}: neither waiting nor settled", row.id);
                 return Err(StoreError::Damaged(message));
             }
         };
         Ok(Self {
-            id: row.id.0,
-            webhook: row.webhook_id.0,
+            id: row.id,
+            webhook: row.webhook_id,
             event: row.event_id,
             kind: row.kind,
             body: row.body,
@@ -109,10 +109,8 @@ macro_rules! select_deliveries {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             DeliveryRow,
-            r#"SELECT id AS "id: Text<DeliveryId>", webhook_id AS "webhook_id: Text<WebhookId>", event_id, kind, body,
-                      created_at AS "created_at: Instant", attempts AS "attempts: u32", next_at AS "next_at: Instant",
-                      state = 'delivered' AS "is_delivered!: bool", settled_at AS "settled_at: Instant",
-                      last_at AS "last_at: Instant", last_status AS "last_status: u16", last_error
+            r#"SELECT id, webhook_id, event_id, kind, body, created_at, attempts, next_at,
+                      state = 'delivered' AS "is_delivered!: bool", settled_at, last_at, last_status, last_error
                FROM webhook_deliveries "# + $tail
             $(, $argument)*
         )
@@ -143,7 +141,7 @@ pub(crate) async fn due(
 /// When the next waiting delivery is due.
 pub(crate) async fn next_due(connection: &mut SqliteConnection) -> Result<Option<Timestamp>> {
     let next = sqlx::query_scalar!(
-        r#"SELECT next_at AS "next_at!: Instant" FROM webhook_deliveries
+        r#"SELECT next_at AS "next_at!" FROM webhook_deliveries
            WHERE state = 'waiting' AND next_at IS NOT NULL
              AND webhook_id IN (SELECT id FROM webhooks WHERE dead_at IS NULL) ORDER BY next_at LIMIT 1"#
     );
@@ -156,7 +154,6 @@ pub(crate) async fn of_webhook(
     webhook: WebhookId,
     limit: u32,
 ) -> Result<Vec<Delivery>> {
-    let webhook = Text(webhook);
     let rows = select_deliveries!(
         "WHERE webhook_id = ?1 ORDER BY created_at DESC, id DESC LIMIT ?2",
         webhook,
@@ -166,7 +163,6 @@ pub(crate) async fn of_webhook(
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: DeliveryId) -> Result<Delivery> {
-    let id = Text(id);
     let row = select_deliveries!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?;
@@ -175,11 +171,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: DeliveryId) -> R
 
 /// Adds a delivery that is due at once.
 pub(crate) async fn insert(connection: &mut SqliteConnection, delivery: &Delivery) -> Result<()> {
-    let (id, webhook, created_at) = (
-        Text(delivery.id),
-        Text(delivery.webhook),
-        Instant(delivery.created_at),
-    );
+    let (id, webhook, created_at) = (delivery.id, delivery.webhook, Instant(delivery.created_at));
     sqlx::query!(
         "INSERT INTO webhook_deliveries (id, webhook_id, event_id, kind, body, created_at, attempts, next_at, state)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, 0, ?6, 'waiting')",
@@ -202,7 +194,7 @@ pub(crate) async fn set_attempt(
     attempt: &DeliveryAttempt,
     state: DeliveryState,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(attempt.at));
+    let at = Instant(attempt.at);
     let (name, next_at, settled_at) = match state {
         DeliveryState::Pending { next_at } => ("waiting", Some(Instant(next_at)), None),
         DeliveryState::Delivered { at } => ("delivered", None, Some(Instant(at))),
@@ -230,7 +222,7 @@ pub(crate) async fn give_up(
     webhook: WebhookId,
     now: Timestamp,
 ) -> Result<()> {
-    let (webhook, now) = (Text(webhook), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE webhook_deliveries SET state = 'given_up', next_at = NULL, settled_at = ?
          WHERE webhook_id = ? AND state = 'waiting'",

@@ -2,16 +2,14 @@
 
 use crate::error::{Result, StoreError};
 use faceoff_types::DivisionName;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// All divisions, in the organisers' order.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<DivisionName>> {
-    let names = sqlx::query_scalar!(
-        r#"SELECT name AS "name: Text<DivisionName>" FROM divisions ORDER BY position"#
-    )
-    .fetch_all(connection)
-    .await?;
-    Ok(names.into_iter().map(|name| name.0).collect())
+    let names = sqlx::query_scalar!("SELECT name FROM divisions ORDER BY position")
+        .fetch_all(connection)
+        .await?;
+    Ok(names)
 }
 
 /// The division of this name, with the organisers' spelling. [`StoreError::Conflict`] if there is none.

@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{DepartureKind, RoundNumber, TeamId, TeamName, TournamentId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A team of a tournament.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,19 +44,16 @@ pub(crate) async fn all(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<Entrant>> {
-    let id = Text(tournament);
     let rows = sqlx::query!(
-        r#"SELECT e.team_id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
-                  e.entered_at AS "entered_at: Instant", e.left_as, e.from_round AS "from_round: u32",
-                  e.left_at AS "left_at: Instant", e.left_for
-           FROM entrants e JOIN teams t ON t.id = e.team_id WHERE e.tournament_id = ? ORDER BY t.name"#,
-        id
+        "SELECT e.team_id AS team, t.name, e.entered_at, e.left_as, e.from_round, e.left_at, e.left_for
+           FROM entrants e JOIN teams t ON t.id = e.team_id WHERE e.tournament_id = ? ORDER BY t.name",
+        tournament
     )
     .fetch_all(connection)
     .await?;
     rows.into_iter()
         .map(|row| {
-            let team = row.team.0;
+            let team = row.team;
             let departure = match (
                 row.left_as.as_deref(),
                 row.from_round,
@@ -87,7 +84,7 @@ pub(crate) async fn all(
             };
             Ok(Entrant {
                 team,
-                name: row.name.0,
+                name: row.name,
                 entered_at: row.entered_at.0,
                 departure,
             })
@@ -101,7 +98,6 @@ pub(crate) async fn remove(
     tournament: TournamentId,
     team: TeamId,
 ) -> Result<()> {
-    let (tournament, team) = (Text(tournament), Text(team));
     sqlx::query!(
         "DELETE FROM entrants WHERE tournament_id = ? AND team_id = ?",
         tournament,
@@ -118,7 +114,7 @@ pub(crate) async fn put(
     team: TeamId,
     now: Timestamp,
 ) -> Result<()> {
-    let (tournament, team, now) = (Text(tournament), Text(team), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "INSERT OR IGNORE INTO entrants (tournament_id, team_id, entered_at) VALUES (?, ?, ?)",
         tournament,
@@ -136,7 +132,7 @@ pub(crate) async fn set_departure(
     team: TeamId,
     departure: &Departure,
 ) -> Result<()> {
-    let (tournament, team, at) = (Text(tournament), Text(team), Instant(departure.at));
+    let at = Instant(departure.at);
     let (left_as, from_round) = (label(departure.kind), departure.from_round.get());
     sqlx::query!(
         "UPDATE entrants SET left_as = ?, from_round = ?, left_at = ?, left_for = ?

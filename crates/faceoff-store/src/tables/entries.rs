@@ -4,8 +4,8 @@ use crate::{
     column::Instant,
     error::{Result, StoreError},
 };
-use faceoff_types::{EvaluationId, RunId, StageDay, StageId, SubmissionId, TeamId};
-use jiff::{Timestamp, civil::Date};
+use faceoff_types::{EvaluationId, RunId, StageDay, SubmissionId, TeamId};
+use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
 /// The fixed data of an evaluation, without its state.
@@ -24,29 +24,26 @@ pub(crate) struct Entry {
 
 /// The evaluation with this id.
 pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<Entry> {
-    let id_text = Text(id);
     let row = sqlx::query!(
-        r#"SELECT submission_id AS "submission: Text<SubmissionId>", team_id AS "team: Text<TeamId>",
-                  stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", revision AS "revision: u32",
-                  run_id AS "run: Text<RunId>",
-                  rerun_of AS "rerun_of: Text<EvaluationId>"
-           FROM evaluations WHERE id = ?"#,
-        id_text
+        "SELECT submission_id AS submission, team_id AS team, stage_id AS stage, day, revision, run_id AS run,
+                  rerun_of
+           FROM evaluations WHERE id = ?",
+        id
     )
     .fetch_optional(connection)
     .await?
     .ok_or(StoreError::NotFound("evaluation"))?;
     Ok(Entry {
         id,
-        submission: row.submission.0,
-        team: row.team.0,
+        submission: row.submission,
+        team: row.team,
         stage_day: StageDay {
-            stage: row.stage.0,
+            stage: row.stage,
             date: row.day.0,
         },
         revision: row.revision,
-        run: row.run.0,
-        rerun_of: row.rerun_of.map(|id| id.0),
+        run: row.run,
+        rerun_of: row.rerun_of,
     })
 }
 
@@ -57,9 +54,9 @@ pub(crate) async fn insert(
     entry: &Entry,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, submission, team) = (Text(entry.id), Text(entry.submission), Text(entry.team));
-    let (stage, day) = (Text(entry.stage_day.stage), Text(entry.stage_day.date));
-    let (run, now, rerun_of) = (Text(entry.run), Instant(now), entry.rerun_of.map(Text));
+    let (id, submission, team) = (entry.id, entry.submission, entry.team);
+    let (stage, day) = (entry.stage_day.stage, Text(entry.stage_day.date));
+    let (run, now, rerun_of) = (entry.run, Instant(now), entry.rerun_of);
     sqlx::query!(
         "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at, state,
                                   rerun_of)
@@ -95,7 +92,6 @@ pub(crate) async fn set_extra(
     id: EvaluationId,
     reason: &str,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE evaluations SET extra_for = ? WHERE id = ?",
         reason,
@@ -112,7 +108,6 @@ pub(crate) async fn copy_extra(
     id: EvaluationId,
     original: EvaluationId,
 ) -> Result<()> {
-    let (id, original) = (Text(id), Text(original));
     sqlx::query!(
         "UPDATE evaluations SET extra_for = (SELECT o.extra_for FROM evaluations o WHERE o.id = ?) WHERE id = ?",
         original,

@@ -3,7 +3,7 @@
 
 use crate::{column::Json, error::Result};
 use faceoff_types::RunId;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 use std::collections::HashMap;
 
 /// The summaries of these runs that have the format `version`.
@@ -17,17 +17,14 @@ pub(crate) async fn of_runs(
     }
     let runs = Json(runs);
     let rows = sqlx::query!(
-        r#"SELECT run_id AS "run: Text<RunId>", summary FROM episode_summaries
-           WHERE version = ? AND run_id IN (SELECT value FROM json_each(?))"#,
+        "SELECT run_id AS run, summary FROM episode_summaries
+           WHERE version = ? AND run_id IN (SELECT value FROM json_each(?))",
         version,
         runs,
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| (row.run.0, row.summary))
-        .collect())
+    Ok(rows.into_iter().map(|row| (row.run, row.summary)).collect())
 }
 
 /// Stores a summary, replacing an earlier one.
@@ -37,7 +34,6 @@ pub(crate) async fn put(
     version: u32,
     summary: &str,
 ) -> Result<()> {
-    let run = Text(run);
     sqlx::query!(
         "INSERT INTO episode_summaries (run_id, version, summary) VALUES (?, ?, ?)
          ON CONFLICT (run_id) DO UPDATE SET version = excluded.version, summary = excluded.summary",

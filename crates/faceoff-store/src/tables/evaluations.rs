@@ -101,17 +101,17 @@ impl EvaluationState {
 
 /// An evaluation with its run, without the run's progress.
 pub(crate) struct EvaluationRow {
-    id: Text<EvaluationId>,
-    submission_id: Text<SubmissionId>,
-    team_id: Text<TeamId>,
-    stage_id: Text<StageId>,
+    id: EvaluationId,
+    submission_id: SubmissionId,
+    team_id: TeamId,
+    stage_id: StageId,
     day: Text<Date>,
     revision: u32,
     released_at: Option<Instant>,
     deadline_at: Option<Instant>,
-    rerun_of: Option<Text<EvaluationId>>,
-    run_id: Text<RunId>,
-    profile: Text<Profile>,
+    rerun_of: Option<EvaluationId>,
+    run_id: RunId,
+    profile: Profile,
     tasks: Json<Vec<Task>>,
     episodes_per_task: u32,
     episodes_per_shard: u32,
@@ -138,18 +138,15 @@ pub(crate) struct EvaluationRow {
 impl EvaluationRow {
     /// The run, if it is running: its progress is part of the evaluation's state.
     pub(crate) fn open_run(&self) -> Option<RunId> {
-        (self.state == "open" && self.run_state == RunState::Running).then_some(self.run_id.0)
+        (self.state == "open" && self.run_state == RunState::Running).then_some(self.run_id)
     }
 
     pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<Evaluation> {
         let damaged = |problem: &str| {
-            StoreError::Damaged(format!(
-                "evaluation {}: {} {problem}",
-                self.id.0, self.state
-            ))
+            StoreError::Damaged(format!("evaluation {}: {} {problem}", self.id, self.state))
         };
         let plan = RunPlan {
-            profile: self.profile.0,
+            profile: self.profile,
             tasks: self.tasks.0,
             episodes_per_task: self.episodes_per_task,
             episodes_per_shard: self.episodes_per_shard,
@@ -208,18 +205,18 @@ impl EvaluationRow {
             (_, run) => return Err(damaged(&format!("with a run that is {run:?}"))),
         };
         Ok(Evaluation {
-            id: self.id.0,
-            submission: self.submission_id.0,
-            team: self.team_id.0,
+            id: self.id,
+            submission: self.submission_id,
+            team: self.team_id,
             stage_day: StageDay {
-                stage: self.stage_id.0,
+                stage: self.stage_id,
                 date: self.day.0,
             },
             revision: self.revision,
             released_at: self.released_at.map(|at| at.0),
             deadline_at: self.deadline_at.map(|at| at.0),
-            rerun_of: self.rerun_of.map(|id| id.0),
-            run: self.run_id.0,
+            rerun_of: self.rerun_of,
+            run: self.run_id,
             plan,
             created_at: self.created_at.0,
             extra_for: self.extra_for,
@@ -239,26 +236,13 @@ macro_rules! select_evaluations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             EvaluationRow,
-            r#"SELECT e.id AS "id: Text<EvaluationId>",
-                      e.submission_id AS "submission_id: Text<SubmissionId>",
-                      e.team_id AS "team_id: Text<TeamId>", e.stage_id AS "stage_id: Text<StageId>",
-                      e.day AS "day: Text<Date>", e.revision AS "revision: u32",
-                      d.released_at AS "released_at: Instant", d.deadline_at AS "deadline_at: Instant",
-                      e.rerun_of AS "rerun_of: Text<EvaluationId>", e.run_id AS "run_id: Text<RunId>", r.profile AS "profile: Text<Profile>",
-                      r.tasks AS "tasks: Json<Vec<Task>>",
-                      r.episodes_per_task AS "episodes_per_task: u32",
-                      r.episodes_per_shard AS "episodes_per_shard: u32",
-                      r.max_faults AS "max_faults: u32",
-                      r.variation AS "variation: Json<Variation>",
-                      r.limits AS "limits: Json<Box<StageLimits>>", r.state AS "run_state: RunState",
-                      e.created_at AS "created_at: Instant", e.state,
-                      e.finished_at AS "finished_at: Instant",
-                      e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
-                      e.reason, e.unplayed AS "unplayed: bool", e.extra_for, e.voided_at AS "voided_at: Instant", e.voided_for,
-                      e.published_at AS "published_at: Instant",
-                      e.dataset_removed_at AS "dataset_removed_at: Instant", e.dataset_removed_for
+            "SELECT e.id, e.submission_id, e.team_id, e.stage_id, e.day, e.revision, d.released_at, d.deadline_at,
+                      e.rerun_of, e.run_id, r.profile, r.tasks, r.episodes_per_task, r.episodes_per_shard, r.max_faults,
+                      r.variation, r.limits, r.state AS run_state, e.created_at, e.state, e.finished_at, e.result,
+                      e.dataset, e.dataset_blake3, e.reason, e.unplayed, e.extra_for, e.voided_at, e.voided_for,
+                      e.published_at, e.dataset_removed_at, e.dataset_removed_for
                FROM evaluations e JOIN runs r ON r.id = e.run_id 
-               LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day "# + $tail
+               LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day " + $tail
             $(, $argument)*
         )
     };
@@ -268,7 +252,6 @@ pub(crate) async fn find(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<EvaluationRow> {
-    let id = Text(id);
     select_evaluations!("WHERE e.id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -280,7 +263,6 @@ pub(crate) async fn of_team(
     connection: &mut SqliteConnection,
     team: TeamId,
 ) -> Result<Vec<EvaluationRow>> {
-    let team = Text(team);
     Ok(select_evaluations!(
         "WHERE e.team_id = ? ORDER BY e.created_at DESC, e.id DESC",
         team
@@ -294,11 +276,7 @@ pub(crate) async fn created_at(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<Option<Timestamp>> {
-    let id = Text(id);
-    let at = sqlx::query_scalar!(
-        r#"SELECT created_at AS "at: Instant" FROM evaluations WHERE id = ?"#,
-        id
-    );
+    let at = sqlx::query_scalar!("SELECT created_at AS at FROM evaluations WHERE id = ?", id);
     Ok(at.fetch_optional(connection).await?.map(|at| at.0))
 }
 
@@ -311,8 +289,8 @@ pub(crate) async fn of_team_after(
     (queued_at, id): (Timestamp, Option<EvaluationId>),
     limit: u32,
 ) -> Result<Vec<EvaluationRow>> {
-    let (team, day) = (Text(team), date.map(Text));
-    let (queued_at, id) = (Instant(queued_at), id.map(Text));
+    let day = date.map(Text);
+    let queued_at = Instant(queued_at);
     Ok(select_evaluations!(
         "WHERE e.team_id = ?1 AND (?2 IS NULL OR e.day = ?2)
            AND e.created_at <= ?3 AND (e.created_at < ?3 OR ?4 IS NULL OR e.id < ?4)
@@ -335,7 +313,7 @@ pub(crate) async fn on_date_after(
     (queued_at, id): (Timestamp, Option<EvaluationId>),
     limit: u32,
 ) -> Result<Vec<EvaluationRow>> {
-    let (day, queued_at, id) = (Text(date), Instant(queued_at), id.map(Text));
+    let (day, queued_at) = (Text(date), Instant(queued_at));
     Ok(select_evaluations!(
         "WHERE e.day = ?1 AND e.created_at >= ?2 AND (e.created_at > ?2 OR ?3 IS NULL OR e.id > ?3)
          ORDER BY e.created_at, e.id LIMIT ?4",
@@ -353,7 +331,7 @@ pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<Vec<EvaluationRow>> {
-    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(select_evaluations!(
         "WHERE e.stage_id = ? AND e.day = ? ORDER BY e.created_at, e.id",
         stage,
@@ -368,26 +346,17 @@ pub(crate) async fn of_run(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<Option<EvaluationId>> {
-    let run = Text(run);
-    let found = sqlx::query_scalar!(
-        r#"SELECT id AS "id: Text<EvaluationId>" FROM evaluations WHERE run_id = ?"#,
-        run
-    )
-    .fetch_optional(connection)
-    .await?;
-    Ok(found.map(|id| id.0))
+    let found = sqlx::query_scalar!("SELECT id FROM evaluations WHERE run_id = ?", run)
+        .fetch_optional(connection)
+        .await?;
+    Ok(found)
 }
 
 pub(crate) async fn run_of(connection: &mut SqliteConnection, id: EvaluationId) -> Result<RunId> {
-    let id = Text(id);
-    sqlx::query_scalar!(
-        r#"SELECT run_id AS "id: Text<RunId>" FROM evaluations WHERE id = ?"#,
-        id
-    )
-    .fetch_optional(connection)
-    .await?
-    .map(|run| run.0)
-    .ok_or(StoreError::NotFound("evaluation"))
+    sqlx::query_scalar!("SELECT run_id AS id FROM evaluations WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("evaluation"))
 }
 
 /// Number of a team's evaluations on a day that ended by a platform fault.
@@ -396,7 +365,7 @@ pub(crate) async fn count_platform_failed(
     team: TeamId,
     stage_day: StageDay,
 ) -> Result<usize> {
-    let (team, stage, day) = (Text(team), Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let count = sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
            WHERE team_id = ? AND stage_id = ? AND day = ? AND state = 'platform_failed'"#,
@@ -417,7 +386,7 @@ pub(crate) async fn set_finished(
     dataset_blake3: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, result, now) = (Text(id), Json(result), Instant(now));
+    let (result, now) = (Json(result), Instant(now));
     // The slot time is unknown if the evaluation comes from a proposal whose run was cleared before it was applied.
     sqlx::query!(
         "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
@@ -455,7 +424,7 @@ pub(crate) async fn set_failed(
     failure: Failure<'_>,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     let (state, reason) = match failure {
         Failure::Agent => ("agent_failed", None),
         Failure::Platform(reason) => ("platform_failed", Some(reason)),
@@ -481,7 +450,7 @@ pub(crate) async fn count_open(
     stage_day: Option<StageDay>,
 ) -> Result<u32> {
     let (stage, day) = (
-        stage_day.map(|day| Text(day.stage)),
+        stage_day.map(|day| day.stage),
         stage_day.map(|day| Text(day.date)),
     );
     Ok(sqlx::query_scalar!(

@@ -8,7 +8,7 @@ use crate::{
 };
 use faceoff_types::RunId;
 use serde_json::{Map, Value};
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// Selects events; a field with `None` matches any event.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -25,7 +25,7 @@ pub struct EventFilter {
 struct EventRow {
     id: i64,
     at: Instant,
-    actor: Text<Actor>,
+    actor: Actor,
     subject_kind: String,
     subject_id: String,
     kind: String,
@@ -44,7 +44,7 @@ impl TryFrom<EventRow> for EventRecord {
         Ok(Self {
             id: row.id,
             at: row.at.0,
-            actor: row.actor.0,
+            actor: row.actor,
             subject: Subject::from_columns(&row.subject_kind, &row.subject_id)
                 .map_err(|error| damaged(&error))?,
             event: serde_json::from_value::<Event>(fields.into())
@@ -61,9 +61,8 @@ pub(crate) async fn after(
 ) -> Result<Vec<EventRecord>> {
     let rows = sqlx::query_as!(
         EventRow,
-        r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
-                  kind, payload AS "payload: Json<Map<String, Value>>"
-           FROM events WHERE id > ? ORDER BY id LIMIT ?"#,
+        "SELECT id, at, actor, subject_kind, subject_id, kind, payload
+           FROM events WHERE id > ? ORDER BY id LIMIT ?",
         after,
         limit,
     )
@@ -95,7 +94,6 @@ pub(crate) async fn remove_progress(
     run: RunId,
 ) -> Result<()> {
     let (subject_kind, subject_id) = subject.columns();
-    let run = Text(run);
     sqlx::query!(
         "DELETE FROM events WHERE subject_kind = ? AND subject_id = ? AND kind = 'shard_committed'
                             AND payload ->> 'run' = ?",
@@ -127,13 +125,12 @@ pub(crate) async fn newest(
             let (subject_kind, subject_id) = subject.columns();
             sqlx::query_as!(
                 EventRow,
-                r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
-                          kind, payload AS "payload: Json<Map<String, Value>>"
+                "SELECT id, at, actor, subject_kind, subject_id, kind, payload
                    FROM events
                    WHERE subject_kind = ?1 AND subject_id = ?2 AND id < ?3
                      AND (?4 IS NULL OR actor = ?4 OR substr(actor, 1, length(?4) + 1) = ?4 || ':')
                      AND (?5 IS NULL OR kind = ?5)
-                   ORDER BY id DESC LIMIT ?6"#,
+                   ORDER BY id DESC LIMIT ?6",
                 subject_kind,
                 subject_id,
                 before,
@@ -147,13 +144,12 @@ pub(crate) async fn newest(
         None => {
             sqlx::query_as!(
                 EventRow,
-                r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
-                          kind, payload AS "payload: Json<Map<String, Value>>"
+                "SELECT id, at, actor, subject_kind, subject_id, kind, payload
                    FROM events
                    WHERE id < ?1
                      AND (?2 IS NULL OR actor = ?2 OR substr(actor, 1, length(?2) + 1) = ?2 || ':')
                      AND (?3 IS NULL OR kind = ?3)
-                   ORDER BY id DESC LIMIT ?4"#,
+                   ORDER BY id DESC LIMIT ?4",
                 before,
                 actor,
                 kind,

@@ -2,16 +2,15 @@
 
 use crate::{column::Instant, error::Result, tables::rulings::Ruling};
 use faceoff_types::StageId;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// Time and reason of the freeze of a stage's boards; `None` if they are not frozen.
 pub(crate) async fn find(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Option<Ruling>> {
-    let stage = Text(stage);
     let row = sqlx::query!(
-        r#"SELECT frozen_at AS "at: Instant", reason FROM frozen_boards WHERE stage_id = ?"#,
+        "SELECT frozen_at AS at, reason FROM frozen_boards WHERE stage_id = ?",
         stage
     )
     .fetch_optional(connection)
@@ -24,15 +23,13 @@ pub(crate) async fn find(
 
 /// All stages with frozen boards.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(StageId, Ruling)>> {
-    let rows = sqlx::query!(
-        r#"SELECT stage_id AS "stage: Text<StageId>", frozen_at AS "at: Instant", reason FROM frozen_boards"#
-    )
-    .fetch_all(connection)
-    .await?;
+    let rows = sqlx::query!("SELECT stage_id AS stage, frozen_at AS at, reason FROM frozen_boards")
+        .fetch_all(connection)
+        .await?;
     let ruling = |at, reason| Ruling { at, reason };
     Ok(rows
         .into_iter()
-        .map(|row| (row.stage.0, ruling(row.at.0, row.reason)))
+        .map(|row| (row.stage, ruling(row.at.0, row.reason)))
         .collect())
 }
 
@@ -41,7 +38,7 @@ pub(crate) async fn insert(
     stage: StageId,
     ruling: &Ruling,
 ) -> Result<()> {
-    let (stage, at) = (Text(stage), Instant(ruling.at));
+    let at = Instant(ruling.at);
     sqlx::query!(
         "INSERT INTO frozen_boards (stage_id, frozen_at, reason) VALUES (?, ?, ?)",
         stage,
@@ -54,7 +51,6 @@ pub(crate) async fn insert(
 }
 
 pub(crate) async fn remove(connection: &mut SqliteConnection, stage: StageId) -> Result<()> {
-    let stage = Text(stage);
     sqlx::query!("DELETE FROM frozen_boards WHERE stage_id = ?", stage)
         .execute(connection)
         .await?;

@@ -2,11 +2,10 @@
 
 use crate::error::Result;
 use faceoff_types::TeamId;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// Does the team decline friendly games?
 pub(crate) async fn declines(connection: &mut SqliteConnection, team: TeamId) -> Result<bool> {
-    let team = Text(team);
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM friendly_games_declined WHERE team_id = ?) AS "declines!: bool""#,
         team
@@ -20,7 +19,6 @@ pub(crate) async fn set(
     team: TeamId,
     declines: bool,
 ) -> Result<()> {
-    let team = Text(team);
     if declines {
         sqlx::query!(
             "INSERT OR IGNORE INTO friendly_games_declined (team_id) VALUES (?)",

@@ -7,7 +7,7 @@ use crate::{
 };
 use faceoff_types::{GameId, Side};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// An attempt of a worker's slot at a game.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,12 +54,10 @@ pub(crate) async fn all(
     connection: &mut SqliteConnection,
     game: GameId,
 ) -> Result<Vec<GameAttempt>> {
-    let id = Text(game);
     let rows = sqlx::query!(
-        r#"SELECT number AS "number: u32", worker, begun_at AS "begun_at: Instant", ended_at AS "ended_at: Instant",
-                  outcome AS "outcome: AttemptOutcome", reason
-           FROM game_attempts WHERE game_id = ? ORDER BY number"#,
-        id
+        "SELECT number, worker, begun_at, ended_at, outcome, reason
+           FROM game_attempts WHERE game_id = ? ORDER BY number",
+        game
     )
     .fetch_all(connection)
     .await?;
@@ -88,11 +86,11 @@ pub(crate) async fn begin(
     worker: &str,
     now: Timestamp,
 ) -> Result<u32> {
-    let (id, now) = (Text(game), Instant(now));
+    let (id, now) = (game, Instant(now));
     Ok(sqlx::query_scalar!(
         r#"INSERT INTO game_attempts (game_id, number, worker, begun_at)
            VALUES (?1, (SELECT COALESCE(MAX(number), 0) + 1 FROM game_attempts WHERE game_id = ?1), ?2, ?3)
-           RETURNING number AS "number!: u32""#,
+           RETURNING number AS "number!""#,
         id,
         worker,
         now,
@@ -107,11 +105,10 @@ pub(crate) async fn transfer(
     game: GameId,
     worker: &str,
 ) -> Result<()> {
-    let id = Text(game);
     sqlx::query!(
         "UPDATE game_attempts SET worker = ? WHERE game_id = ? AND ended_at IS NULL",
         worker,
-        id,
+        game,
     )
     .execute(connection)
     .await?;
@@ -126,7 +123,7 @@ pub(crate) async fn end(
     reason: Option<&str>,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(game), Instant(now));
+    let (id, now) = (game, Instant(now));
     sqlx::query!(
         "UPDATE game_attempts SET ended_at = ?, outcome = ?, reason = ? WHERE game_id = ? AND ended_at IS NULL",
         now,
@@ -146,11 +143,10 @@ pub(crate) async fn set_voided(
     attempt: u32,
     reason: &str,
 ) -> Result<()> {
-    let id = Text(game);
     sqlx::query!(
         "UPDATE game_attempts SET reason = ? WHERE game_id = ? AND number = ?",
         reason,
-        id,
+        game,
         attempt,
     )
     .execute(connection)
@@ -165,7 +161,7 @@ pub(crate) async fn commit(
     commit: &GameCommit,
     now: Timestamp,
 ) -> Result<u32> {
-    let (id, now, score) = (Text(game), Instant(now), Json(&commit.score));
+    let (id, now, score) = (game, Instant(now), Json(&commit.score));
     let recording = commit.recording.as_ref();
     let (key, game_blake3) = (
         recording.map(|recording| &recording.key),
@@ -178,7 +174,7 @@ pub(crate) async fn commit(
         r#"UPDATE game_attempts
            SET ended_at = ?, outcome = 'played', score = ?, recording = ?, game_blake3 = ?, home_blake3 = ?,
                away_blake3 = ?, home_log = ?, away_log = ?
-           WHERE game_id = ? AND ended_at IS NULL RETURNING number AS "number!: u32""#,
+           WHERE game_id = ? AND ended_at IS NULL RETURNING number AS "number!""#,
         now,
         score,
         key,
@@ -200,11 +196,10 @@ pub(crate) async fn log(
     game: GameId,
     side: Side,
 ) -> Result<Option<String>> {
-    let id = Text(game);
     let logs = sqlx::query!(
         "SELECT a.home_log, a.away_log FROM games g JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt
          WHERE g.id = ?",
-        id
+        game
     )
     .fetch_optional(connection)
     .await?;

@@ -12,7 +12,7 @@ pub(crate) async fn requeue(
     id: GameId,
     job: Uuid,
 ) -> Result<()> {
-    let (id, job) = (Text(id), Text(job));
+    let job = Text(job);
     sqlx::query!(
         "UPDATE games SET state = 'queued', job_id = ?, attempt = NULL, ended_at = NULL, reason = NULL WHERE id = ?",
         job,
@@ -25,7 +25,6 @@ pub(crate) async fn requeue(
 
 /// Marks a running game as queued: its job waits for a slot again.
 pub(crate) async fn set_waiting(connection: &mut SqliteConnection, id: GameId) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE games SET state = 'queued', attempt = NULL WHERE id = ? AND state = 'running'",
         id
@@ -40,7 +39,6 @@ pub(crate) async fn set_running(
     id: GameId,
     attempt: u32,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE games SET state = 'running', attempt = ? WHERE id = ?",
         attempt,
@@ -58,7 +56,7 @@ pub(crate) async fn set_played(
     attempt: u32,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE games SET state = 'played', attempt = ?, ended_at = ? WHERE id = ?",
         attempt,
@@ -93,7 +91,7 @@ pub(crate) async fn set_without_result(
         NoResult::Void => "void",
         NoResult::Cancelled => "cancelled",
     };
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE games SET state = ?, attempt = NULL, ended_at = ?, reason = ? WHERE id = ?",
         state,

@@ -14,20 +14,20 @@ use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
 
 struct GameRow {
-    id: Text<GameId>,
-    tournament: Text<TournamentId>,
+    id: GameId,
+    tournament: TournamentId,
     purpose: String,
     round: Option<u32>,
     matchday: Option<u32>,
     pairing: Option<u32>,
     second_half: Option<bool>,
     replay: Option<u32>,
-    asked_by: Option<Text<TeamId>>,
-    home_team: Text<TeamId>,
-    away_team: Text<TeamId>,
-    home_submission: Text<SubmissionId>,
-    away_submission: Text<SubmissionId>,
-    seed: Text<GameSeedLabel>,
+    asked_by: Option<TeamId>,
+    home_team: TeamId,
+    away_team: TeamId,
+    home_submission: SubmissionId,
+    away_submission: SubmissionId,
+    seed: GameSeedLabel,
     created_at: Instant,
     state: String,
     attempt: Option<u32>,
@@ -43,7 +43,7 @@ struct GameRow {
 
 impl GameRow {
     fn purpose(&self) -> Option<GamePurpose> {
-        let asked_by = self.asked_by.as_ref().map(|team| team.0);
+        let asked_by = self.asked_by;
         let entry = || {
             Some(ScheduleEntry {
                 round: RoundNumber::try_from(self.round?).ok()?,
@@ -111,17 +111,17 @@ impl TryFrom<GameRow> for Game {
 
     fn try_from(mut row: GameRow) -> Result<Self> {
         let damaged = |row: &GameRow, field| {
-            StoreError::Damaged(format!("game {}: {field} {:?}", row.id.0, row.state))
+            StoreError::Damaged(format!("game {}: {field} {:?}", row.id, row.state))
         };
         let purpose = row.purpose().ok_or_else(|| damaged(&row, "purpose"))?;
         let state = row.state().ok_or_else(|| damaged(&row, "state"))?;
         Ok(Self {
-            id: row.id.0,
-            tournament: row.tournament.0,
+            id: row.id,
+            tournament: row.tournament,
             purpose,
-            teams: [row.home_team.0, row.away_team.0],
-            submissions: [row.home_submission.0, row.away_submission.0],
-            seed: row.seed.0,
+            teams: [row.home_team, row.away_team],
+            submissions: [row.home_submission, row.away_submission],
+            seed: row.seed,
             created_at: row.created_at.0,
             state,
         })
@@ -133,17 +133,12 @@ macro_rules! select_games {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             GameRow,
-            r#"SELECT g.id AS "id: Text<GameId>", g.tournament_id AS "tournament: Text<TournamentId>", g.purpose,
-                      g.round AS "round: u32", g.matchday AS "matchday: u32", g.pairing AS "pairing: u32",
-                      g.second_half AS "second_half: bool", g.replay AS "replay: u32",
-                      g.asked_by AS "asked_by: Text<TeamId>",
-                      g.home_team_id AS "home_team: Text<TeamId>", g.away_team_id AS "away_team: Text<TeamId>",
-                      g.home_submission_id AS "home_submission: Text<SubmissionId>",
-                      g.away_submission_id AS "away_submission: Text<SubmissionId>",
-                      g.seed AS "seed: Text<GameSeedLabel>", g.created_at AS "created_at: Instant", g.state,
-                      g.attempt AS "attempt: u32", g.ended_at AS "ended_at: Instant", g.reason,
-                      a.begun_at AS "begun_at?: Instant", a.score AS "score?: Json<Value>", a.recording AS "recording?",
-                      a.game_blake3 AS "game_blake3?", a.home_blake3 AS "home_blake3?", a.away_blake3 AS "away_blake3?"
+            r#"SELECT g.id, g.tournament_id AS tournament, g.purpose, g.round, g.matchday, g.pairing, g.second_half,
+                      g.replay, g.asked_by, g.home_team_id AS home_team, g.away_team_id AS away_team,
+                      g.home_submission_id AS home_submission, g.away_submission_id AS away_submission, g.seed,
+                      g.created_at, g.state, g.attempt, g.ended_at, g.reason, a.begun_at AS "begun_at?",
+                      a.score AS "score?", a.recording AS "recording?", a.game_blake3 AS "game_blake3?",
+                      a.home_blake3 AS "home_blake3?", a.away_blake3 AS "away_blake3?"
                FROM games g LEFT JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt "# + $tail
             $(, $argument)*
         )
@@ -155,7 +150,6 @@ fn parse_all(rows: Vec<GameRow>) -> Result<Vec<Game>> {
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: GameId) -> Result<Game> {
-    let id = Text(id);
     select_games!("WHERE g.id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -168,10 +162,9 @@ pub(crate) async fn of_rounds(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<Game>> {
-    let id = Text(tournament);
     let rows = select_games!(
         "WHERE g.tournament_id = ? AND g.purpose = 'round' ORDER BY g.round, g.pairing, g.second_half",
-        id
+        tournament
     );
     parse_all(rows.fetch_all(connection).await?)
 }
@@ -188,22 +181,21 @@ pub(crate) async fn pending(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<PendingGame>> {
-    let id = Text(tournament);
     let rows = sqlx::query!(
-        r#"SELECT g.id AS "game: Text<GameId>", g.round AS "round!: u32"
+        r#"SELECT g.id AS game, g.round AS "round!"
            FROM games g
            JOIN entrants home ON home.tournament_id = g.tournament_id AND home.team_id = g.home_team_id
            JOIN entrants away ON away.tournament_id = g.tournament_id AND away.team_id = g.away_team_id
            WHERE g.tournament_id = ? AND g.purpose = 'round' AND g.state <> 'played'
              AND home.left_as IS NULL AND away.left_as IS NULL
            ORDER BY g.round, g.pairing, g.second_half"#,
-        id
+        tournament
     );
     let pending = rows.fetch_all(connection).await?.into_iter().map(|row| {
         let round = RoundNumber::try_from(row.round)
-            .map_err(|error| StoreError::Damaged(format!("game {}: {error}", row.game.0)))?;
+            .map_err(|error| StoreError::Damaged(format!("game {}: {error}", row.game)))?;
         Ok(PendingGame {
-            game: row.game.0,
+            game: row.game,
             round,
         })
     });
@@ -215,11 +207,10 @@ pub(crate) async fn of_replays(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<Game>> {
-    let id = Text(tournament);
     let rows = select_games!(
         "WHERE g.tournament_id = ? AND g.purpose = 'replay'
          ORDER BY g.replay, g.round, g.pairing, g.second_half",
-        id
+        tournament
     );
     parse_all(rows.fetch_all(connection).await?)
 }
@@ -230,12 +221,11 @@ pub(crate) async fn test_and_friendly(
     tournament: TournamentId,
     team: Option<TeamId>,
 ) -> Result<Vec<Game>> {
-    let (id, team) = (Text(tournament), team.map(Text));
     let rows = select_games!(
         "WHERE g.tournament_id = ?1 AND g.purpose IN ('test', 'friendly')
            AND (?2 IS NULL OR g.home_team_id = ?2 OR g.away_team_id = ?2)
          ORDER BY g.game_no DESC",
-        id,
+        tournament,
         team
     );
     parse_all(rows.fetch_all(connection).await?)
@@ -246,10 +236,9 @@ pub(crate) async fn open(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<Game>> {
-    let id = Text(tournament);
     let rows = select_games!(
         "WHERE g.tournament_id = ? AND g.state IN ('queued', 'running') ORDER BY g.game_no",
-        id
+        tournament
     );
     parse_all(rows.fetch_all(connection).await?)
 }
@@ -257,24 +246,17 @@ pub(crate) async fn open(
 /// The game that a job plays.
 pub(crate) async fn of_job(connection: &mut SqliteConnection, job: Uuid) -> Result<Option<GameId>> {
     let job = Text(job);
-    let found = sqlx::query_scalar!(
-        r#"SELECT id AS "id: Text<GameId>" FROM games WHERE job_id = ?"#,
-        job
-    )
-    .fetch_optional(connection)
-    .await?;
-    Ok(found.map(|id| id.0))
+    let found = sqlx::query_scalar!("SELECT id FROM games WHERE job_id = ?", job)
+        .fetch_optional(connection)
+        .await?;
+    Ok(found)
 }
 
 /// The job that plays a game, or played it last.
 pub(crate) async fn job_of(connection: &mut SqliteConnection, id: GameId) -> Result<Uuid> {
-    let id = Text(id);
-    let found = sqlx::query_scalar!(
-        r#"SELECT job_id AS "job: Text<Uuid>" FROM games WHERE id = ?"#,
-        id
-    )
-    .fetch_optional(connection)
-    .await?;
+    let found = sqlx::query_scalar!("SELECT job_id AS job FROM games WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?;
     found
         .flatten()
         .map(|job| job.0)
@@ -287,7 +269,7 @@ pub(crate) async fn insert(
     game: &Game,
     job: Uuid,
 ) -> Result<()> {
-    let (id, tournament, purpose) = (Text(game.id), Text(game.tournament), game.purpose.label());
+    let (id, tournament, purpose) = (game.id, game.tournament, game.purpose.label());
     let (round, matchday, pairing, second_half) = match game.purpose.schedule_entry() {
         None => (None, None, None, None),
         Some(entry) => (
@@ -299,13 +281,13 @@ pub(crate) async fn insert(
     };
     let (replay, asked_by) = match game.purpose {
         GamePurpose::Round(_) => (None, None),
-        GamePurpose::Test { asked_by } => (None, asked_by.map(Text)),
-        GamePurpose::Friendly { asked_by } => (None, Some(Text(asked_by))),
+        GamePurpose::Test { asked_by } => (None, asked_by),
+        GamePurpose::Friendly { asked_by } => (None, Some(asked_by)),
         GamePurpose::Replay { replay, .. } => (Some(replay), None),
     };
-    let [home, away] = game.teams.map(Text);
-    let [home_submission, away_submission] = game.submissions.map(Text);
-    let (seed, created_at, job) = (Text(game.seed), Instant(game.created_at), Text(job));
+    let [home, away] = game.teams;
+    let [home_submission, away_submission] = game.submissions;
+    let (seed, created_at, job) = (game.seed, Instant(game.created_at), Text(job));
     sqlx::query!(
         "INSERT INTO games (id, tournament_id, purpose, round, matchday, pairing, second_half, replay, asked_by,
                             home_team_id, away_team_id, home_submission_id, away_submission_id, seed, created_at,
@@ -340,7 +322,7 @@ pub(crate) async fn count_requested(
     team: TeamId,
     since: Timestamp,
 ) -> Result<u32> {
-    let (team, since) = (Text(team), Instant(since));
+    let since = Instant(since);
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM games
            WHERE asked_by = ? AND created_at >= ?"#,
@@ -356,10 +338,9 @@ pub(crate) async fn last_replay(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<u32> {
-    let id = Text(tournament);
     Ok(sqlx::query_scalar!(
         r#"SELECT COALESCE(MAX(replay), 0) AS "last!: u32" FROM games WHERE tournament_id = ?"#,
-        id
+        tournament
     )
     .fetch_one(connection)
     .await?)
@@ -379,7 +360,6 @@ pub(crate) async fn needs_submission(
     connection: &mut SqliteConnection,
     submission: SubmissionId,
 ) -> Result<bool> {
-    let id = Text(submission);
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM round_submissions r JOIN tournaments t ON t.id = r.tournament_id
                           WHERE r.submission_id = ?1 AND t.closed_at IS NULL)
@@ -387,7 +367,7 @@ pub(crate) async fn needs_submission(
                OR EXISTS (SELECT 1 FROM games WHERE away_submission_id = ?1 AND state IN ('queued', 'running'))
                OR EXISTS (SELECT 1 FROM tournaments WHERE baseline_id = ?1 AND closed_at IS NULL)
                AS "needs!: bool""#,
-        id
+        submission
     )
     .fetch_one(connection)
     .await?)

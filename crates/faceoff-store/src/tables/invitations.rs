@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{InvitationId, TeamId, UserId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// The role of the user who accepts an invitation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,25 +21,21 @@ pub enum InvitationRole {
 }
 
 impl InvitationRole {
-    const fn columns(self) -> (&'static str, Option<Text<TeamId>>, Option<Text<UserId>>) {
+    const fn columns(self) -> (&'static str, Option<TeamId>, Option<UserId>) {
         match self {
             Self::Organiser => ("organiser", None, None),
-            Self::Member(team) => ("member", Some(Text(team)), None),
+            Self::Member(team) => ("member", Some(team), None),
             Self::Founder => ("founder", None, None),
-            Self::PasswordReset(user) => ("return", None, Some(Text(user))),
+            Self::PasswordReset(user) => ("return", None, Some(user)),
         }
     }
 
-    fn from_columns(
-        role: &str,
-        team: Option<Text<TeamId>>,
-        user: Option<Text<UserId>>,
-    ) -> Result<Self> {
+    fn from_columns(role: &str, team: Option<TeamId>, user: Option<UserId>) -> Result<Self> {
         Ok(match (role, team, user) {
             ("organiser", None, None) => Self::Organiser,
             ("founder", None, None) => Self::Founder,
-            ("member", Some(team), None) => Self::Member(team.0),
-            ("return", None, Some(user)) => Self::PasswordReset(user.0),
+            ("member", Some(team), None) => Self::Member(team),
+            ("return", None, Some(user)) => Self::PasswordReset(user),
             _ => return Err(StoreError::Damaged(format!("invited as {role:?}"))),
         })
     }
@@ -72,15 +68,15 @@ pub struct Invitation {
 }
 
 struct InvitationRow {
-    id: Text<InvitationId>,
+    id: InvitationId,
     role: String,
-    team_id: Option<Text<TeamId>>,
-    person_id: Option<Text<UserId>>,
+    team_id: Option<TeamId>,
+    person_id: Option<UserId>,
     note: String,
     created_at: Instant,
     expires_at: Instant,
     accepted_at: Option<Instant>,
-    accepted_by: Option<Text<UserId>>,
+    accepted_by: Option<UserId>,
     revoked_at: Option<Instant>,
 }
 
@@ -89,14 +85,14 @@ impl TryFrom<InvitationRow> for Invitation {
     fn try_from(row: InvitationRow) -> Result<Self> {
         let state = match (row.accepted_at, row.accepted_by, row.revoked_at) {
             (Some(at), Some(user), None) => InvitationState::Accepted {
-                user: user.0,
+                user,
                 accepted_at: at.0,
             },
             (_, _, Some(at)) => InvitationState::Revoked { revoked_at: at.0 },
             _ => InvitationState::Open,
         };
         Ok(Self {
-            id: row.id.0,
+            id: row.id,
             role: InvitationRole::from_columns(&row.role, row.team_id, row.person_id)?,
             note: row.note,
             created_at: row.created_at.0,
@@ -111,11 +107,8 @@ macro_rules! select_invitations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             InvitationRow,
-            r#"SELECT id AS "id: Text<InvitationId>", role, team_id AS "team_id: Text<TeamId>",
-                      person_id AS "person_id: Text<UserId>", note, created_at AS "created_at: Instant",
-                      expires_at AS "expires_at: Instant", accepted_at AS "accepted_at: Instant",
-                      accepted_by AS "accepted_by: Text<UserId>", revoked_at AS "revoked_at: Instant"
-               FROM invitations "# + $tail
+            "SELECT id, role, team_id, person_id, note, created_at, expires_at, accepted_at, accepted_by, revoked_at
+               FROM invitations " + $tail
             $(, $argument)*
         )
     };
@@ -133,7 +126,6 @@ pub(crate) async fn find(
     connection: &mut SqliteConnection,
     id: InvitationId,
 ) -> Result<Invitation> {
-    let id = Text(id);
     select_invitations!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -159,7 +151,7 @@ pub(crate) async fn count_open(
     team: TeamId,
     now: Timestamp,
 ) -> Result<i64> {
-    let (team, now) = (Text(team), Instant(now));
+    let now = Instant(now);
     Ok(sqlx::query_scalar!(
         "SELECT COUNT(*) FROM invitations
          WHERE team_id = ? AND accepted_at IS NULL AND revoked_at IS NULL AND expires_at > ?",
@@ -175,7 +167,7 @@ pub(crate) async fn insert(
     invitation: &Invitation,
     code_hash: [u8; 32],
 ) -> Result<()> {
-    let (id, code_hash) = (Text(invitation.id), Bytes32(code_hash));
+    let (id, code_hash) = (invitation.id, Bytes32(code_hash));
     let (role, team, user) = invitation.role.columns();
     let created_at = Instant(invitation.created_at);
     let expires_at = Instant(invitation.expires_at);
@@ -202,7 +194,7 @@ pub(crate) async fn set_accepted(
     user: UserId,
     accepted_at: Timestamp,
 ) -> Result<()> {
-    let (id, user, accepted_at) = (Text(id), Text(user), Instant(accepted_at));
+    let accepted_at = Instant(accepted_at);
     sqlx::query!(
         "UPDATE invitations SET accepted_at = ?, accepted_by = ? WHERE id = ?",
         accepted_at,
@@ -219,7 +211,7 @@ pub(crate) async fn set_revoked(
     id: InvitationId,
     revoked_at: Timestamp,
 ) -> Result<()> {
-    let (id, revoked_at) = (Text(id), Instant(revoked_at));
+    let revoked_at = Instant(revoked_at);
     sqlx::query!(
         "UPDATE invitations SET revoked_at = ? WHERE id = ?",
         revoked_at,

@@ -1,8 +1,8 @@
 //! Recent durations of jobs: the slot time (time for which a worker's slot was occupied) that the queue has charged.
 
 use crate::{column::Instant, error::Result};
-use faceoff_types::{EvaluationId, RunId, StageDay, StageId, TeamId};
-use jiff::{SignedDuration, Timestamp, civil::Date, tz::TimeZone};
+use faceoff_types::{EvaluationId, RunId, StageDay, TeamId};
+use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::HashMap;
 
@@ -54,14 +54,12 @@ pub(crate) async fn open_evaluations(
     connection: &mut SqliteConnection,
 ) -> Result<Vec<OpenEvaluation>> {
     let rows = sqlx::query!(
-        r#"SELECT e.id AS "id!: Text<EvaluationId>", e.team_id AS "team!: Text<TeamId>",
-                  e.stage_id AS "stage!: Text<StageId>", e.day AS "day!: Text<Date>", e.run_id AS "run!: Text<RunId>",
-                  r.max_faults AS "max_faults!: u32",
-                  SUM(CASE WHEN j.state = 'done' AND j.charged_ms > 0 THEN s.end_episode - s.first_episode ELSE 0 END)
-                      AS "done_episodes!: u32",
+        r#"SELECT e.id AS "id!", e.team_id AS "team!", e.stage_id AS "stage!", e.day AS "day!", e.run_id AS "run!",
+                  r.max_faults AS "max_faults!",
+                  SUM(CASE WHEN j.state = 'done' AND j.charged_ms > 0
+                           THEN s.end_episode - s.first_episode ELSE 0 END) AS "done_episodes!: u32",
                   SUM(CASE WHEN j.state = 'done' THEN j.charged_ms ELSE 0 END) AS "done_ms!: i64",
-                  SUM(CASE WHEN j.state <> 'done' THEN s.end_episode - s.first_episode ELSE 0 END)
-                      AS "episodes_left!: u32",
+                  SUM(CASE WHEN j.state <> 'done' THEN s.end_episode - s.first_episode ELSE 0 END) AS "episodes_left!: u32",
                   SUM(j.state <> 'done') AS "shards_left!: u32"
            FROM evaluations e JOIN runs r ON r.id = e.run_id JOIN shards s ON s.run_id = e.run_id
            JOIN jobs j ON j.id = s.job_id
@@ -72,13 +70,13 @@ pub(crate) async fn open_evaluations(
     Ok(rows
         .into_iter()
         .map(|row| OpenEvaluation {
-            id: row.id.0,
-            team: row.team.0,
+            id: row.id,
+            team: row.team,
             stage_day: StageDay {
-                stage: row.stage.0,
+                stage: row.stage,
                 date: row.day.0,
             },
-            run: row.run.0,
+            run: row.run,
             done: (row.done_episodes, row.done_ms),
             episodes_left: row.episodes_left,
             shards_left: row.shards_left,
@@ -101,7 +99,7 @@ pub(crate) async fn recent(
         Instant(since),
     );
     let rows = sqlx::query!(
-        r#"SELECT e.team_id AS "team!: Text<TeamId>", SUM(e.slot_ms) AS "slot_ms!: i64",
+        r#"SELECT e.team_id AS "team!", SUM(e.slot_ms) AS "slot_ms!: i64",
                   SUM(r.episodes_per_task * json_array_length(r.tasks)) AS "episodes!: i64"
            FROM evaluations e JOIN runs r ON r.id = e.run_id
            WHERE e.day >= ? AND e.finished_at >= ? AND e.state = 'finished' AND e.slot_ms > 0 GROUP BY +e.team_id"#,
@@ -116,7 +114,7 @@ pub(crate) async fn recent(
     });
     let finished = rows
         .into_iter()
-        .map(|row| (row.team.0, row.slot_ms, row.episodes));
+        .map(|row| (row.team, row.slot_ms, row.episodes));
     // Slot time in milliseconds and number of episodes.
     let mut by_team: HashMap<TeamId, (i64, i64)> = HashMap::new();
     for (team, ms, episodes) in finished.chain(running).filter(|(_, _, count)| *count > 0) {

@@ -77,8 +77,8 @@ pub enum ProposalOutcome {
 }
 
 struct ProposalRow {
-    id: Text<ProposalId>,
-    stage: Text<StageId>,
+    id: ProposalId,
+    stage: StageId,
     revision: u32,
     kind: String,
     day: Option<Text<Date>>,
@@ -92,7 +92,7 @@ impl TryFrom<ProposalRow> for Proposal {
     type Error = StoreError;
     fn try_from(row: ProposalRow) -> Result<Self> {
         let damaged =
-            |problem: &str| StoreError::Damaged(format!("proposal {}: {problem}", row.id.0));
+            |problem: &str| StoreError::Damaged(format!("proposal {}: {problem}", row.id));
         let kind = ProposalKind::from_columns(&row.kind, row.day.as_ref().map(|day| day.0));
         let outcome = match (row.outcome.as_deref(), row.settled_at) {
             (None, None) => None,
@@ -101,8 +101,8 @@ impl TryFrom<ProposalRow> for Proposal {
             _ => return Err(damaged("unknown outcome")),
         };
         Ok(Self {
-            id: row.id.0,
-            stage: row.stage.0,
+            id: row.id,
+            stage: row.stage,
             revision: row.revision,
             kind: kind.ok_or_else(|| damaged("unknown kind"))?,
             reason: row.reason,
@@ -117,10 +117,8 @@ macro_rules! select_proposals {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             ProposalRow,
-            r#"SELECT id AS "id: Text<ProposalId>", stage_id AS "stage: Text<StageId>", revision AS "revision: u32",
-                      kind, day AS "day: Text<Date>", reason, created_at AS "created_at: Instant",
-                      settled_at AS "settled_at: Instant", outcome
-               FROM proposals "# + $tail
+            "SELECT id, stage_id AS stage, revision, kind, day, reason, created_at, settled_at, outcome
+               FROM proposals " + $tail
             $(, $argument)*
         )
     };
@@ -134,7 +132,6 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Proposa
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: ProposalId) -> Result<Proposal> {
-    let id = Text(id);
     select_proposals!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -143,11 +140,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: ProposalId) -> R
 }
 
 pub(crate) async fn insert(connection: &mut SqliteConnection, proposal: &Proposal) -> Result<()> {
-    let (id, stage, kind) = (
-        Text(proposal.id),
-        Text(proposal.stage),
-        proposal.kind.label(),
-    );
+    let (id, stage, kind) = (proposal.id, proposal.stage, proposal.kind.label());
     let (day, created_at) = (proposal.kind.day().map(Text), Instant(proposal.created_at));
     sqlx::query!(
         "INSERT INTO proposals (id, stage_id, revision, kind, day, reason, created_at)
@@ -174,7 +167,7 @@ pub(crate) async fn set_outcome(
         ProposalOutcome::Applied(at) => ("applied", at),
         ProposalOutcome::Dropped(at) => ("dropped", at),
     };
-    let (id, decided_at) = (Text(id), Instant(decided_at));
+    let decided_at = Instant(decided_at);
     sqlx::query!(
         "UPDATE proposals SET outcome = ?, settled_at = ? WHERE id = ?",
         label,

@@ -32,12 +32,12 @@ pub struct ProposedEvaluation {
 
 /// A proposed evaluation with its run, without the run's progress.
 pub(crate) struct ProposedEvaluationRow {
-    id: Text<EvaluationId>,
-    pub(crate) proposal: Text<ProposalId>,
-    submission: Text<SubmissionId>,
-    team: Text<TeamId>,
-    replaces: Option<Text<EvaluationId>>,
-    pub(crate) run: Text<RunId>,
+    id: EvaluationId,
+    pub(crate) proposal: ProposalId,
+    submission: SubmissionId,
+    team: TeamId,
+    replaces: Option<EvaluationId>,
+    pub(crate) run: RunId,
     run_state: RunState,
     episodes_total: u32,
     created_at: Instant,
@@ -51,7 +51,7 @@ pub(crate) struct ProposedEvaluationRow {
 
 impl ProposedEvaluationRow {
     pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<ProposedEvaluation> {
-        let id = self.id.0;
+        let id = self.id;
         let damaged = || {
             StoreError::Damaged(format!(
                 "proposed evaluation {id}: {} and incomplete",
@@ -88,11 +88,11 @@ impl ProposedEvaluationRow {
         };
         Ok(ProposedEvaluation {
             id,
-            proposal: self.proposal.0,
-            submission: self.submission.0,
-            team: self.team.0,
-            replaces: self.replaces.map(|id| id.0),
-            run: self.run.0,
+            proposal: self.proposal,
+            submission: self.submission,
+            team: self.team,
+            replaces: self.replaces,
+            run: self.run,
             created_at: self.created_at.0,
             state,
         })
@@ -104,13 +104,10 @@ macro_rules! select_proposed_evaluations {
     ($tail:literal, $argument:expr) => {
         sqlx::query_as!(
             ProposedEvaluationRow,
-            r#"SELECT d.id AS "id: Text<EvaluationId>", d.proposal_id AS "proposal: Text<ProposalId>",
-                      d.submission_id AS "submission: Text<SubmissionId>", d.team_id AS "team: Text<TeamId>",
-                      d.replaces AS "replaces: Text<EvaluationId>", d.run_id AS "run: Text<RunId>",
-                      r.state AS "run_state: RunState",
-                      r.episodes_per_task * json_array_length(r.tasks) AS "episodes_total!: u32",
-                      d.created_at AS "created_at: Instant", d.state, d.finished_at AS "finished_at: Instant",
-                      d.reason, d.dataset, d.dataset_blake3, d.result AS "result: Json<EvaluationResult>"
+            r#"SELECT d.id, d.proposal_id AS proposal, d.submission_id AS submission, d.team_id AS team, d.replaces,
+                      d.run_id AS run, r.state AS run_state,
+                      r.episodes_per_task * json_array_length(r.tasks) AS "episodes_total!: u32", d.created_at, d.state,
+                      d.finished_at, d.reason, d.dataset, d.dataset_blake3, d.result
                FROM proposed_evaluations d JOIN runs r ON r.id = d.run_id "# + $tail,
             $argument
         )
@@ -122,7 +119,6 @@ pub(crate) async fn find(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<ProposedEvaluationRow> {
-    let id = Text(id);
     let row = select_proposed_evaluations!("WHERE d.id = ?", id).fetch_optional(connection);
     row.await?.ok_or(StoreError::NotFound("evaluation"))
 }
@@ -132,7 +128,6 @@ pub(crate) async fn of_proposal(
     connection: &mut SqliteConnection,
     proposal: ProposalId,
 ) -> Result<Vec<ProposedEvaluationRow>> {
-    let proposal = Text(proposal);
     let evaluations = select_proposed_evaluations!(
         "WHERE d.proposal_id = ? ORDER BY d.created_at, d.id",
         proposal
@@ -145,15 +140,14 @@ pub(crate) async fn of_run(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<Option<(EvaluationId, ProposalId)>> {
-    let run = Text(run);
     let found = sqlx::query!(
-        r#"SELECT id AS "id: Text<EvaluationId>", proposal_id AS "proposal: Text<ProposalId>"
-           FROM proposed_evaluations WHERE run_id = ?"#,
+        "SELECT id, proposal_id AS proposal
+           FROM proposed_evaluations WHERE run_id = ?",
         run
     )
     .fetch_optional(connection)
     .await?;
-    Ok(found.map(|row| (row.id.0, row.proposal.0)))
+    Ok(found.map(|row| (row.id, row.proposal)))
 }
 
 /// The proposed evaluation that a job scores, with its run and its proposal.
@@ -163,31 +157,22 @@ pub(crate) async fn of_job(
 ) -> Result<Option<(EvaluationId, RunId, ProposalId)>> {
     let job = Text(job);
     let found = sqlx::query!(
-        r#"SELECT d.id AS "id: Text<EvaluationId>", d.run_id AS "run: Text<RunId>",
-                  d.proposal_id AS "proposal: Text<ProposalId>"
+        "SELECT d.id, d.run_id AS run, d.proposal_id AS proposal
            FROM proposed_evaluation_scorings s JOIN proposed_evaluations d ON d.id = s.proposed_evaluation_id
-           WHERE s.job_id = ?"#,
+           WHERE s.job_id = ?",
         job
     )
     .fetch_optional(connection)
     .await?;
-    Ok(found.map(|row| (row.id.0, row.run.0, row.proposal.0)))
+    Ok(found.map(|row| (row.id, row.run, row.proposal)))
 }
 
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     evaluation: &ProposedEvaluation,
 ) -> Result<()> {
-    let (id, proposal, submission) = (
-        Text(evaluation.id),
-        Text(evaluation.proposal),
-        Text(evaluation.submission),
-    );
-    let (team, replaces, run) = (
-        Text(evaluation.team),
-        evaluation.replaces.map(Text),
-        Text(evaluation.run),
-    );
+    let (id, proposal, submission) = (evaluation.id, evaluation.proposal, evaluation.submission);
+    let (team, replaces, run) = (evaluation.team, evaluation.replaces, evaluation.run);
     let created_at = Instant(evaluation.created_at);
     sqlx::query!(
         "INSERT INTO proposed_evaluations
@@ -212,7 +197,7 @@ pub(crate) async fn insert_scoring(
     id: EvaluationId,
     job: Uuid,
 ) -> Result<()> {
-    let (id, job) = (Text(id), Text(job));
+    let job = Text(job);
     sqlx::query!(
         "INSERT INTO proposed_evaluation_scorings (proposed_evaluation_id, job_id) VALUES (?, ?)",
         id,
@@ -228,9 +213,8 @@ pub(crate) async fn job_of(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<Option<Uuid>> {
-    let id = Text(id);
     let job = sqlx::query_scalar!(
-        r#"SELECT job_id AS "id: Text<Uuid>" FROM proposed_evaluation_scorings WHERE proposed_evaluation_id = ?"#,
+        "SELECT job_id AS id FROM proposed_evaluation_scorings WHERE proposed_evaluation_id = ?",
         id
     )
     .fetch_optional(connection)
@@ -246,7 +230,7 @@ pub(crate) async fn set_finished(
     dataset_blake3: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, result, now) = (Text(id), Json(result), Instant(now));
+    let (result, now) = (Json(result), Instant(now));
     sqlx::query!(
         "UPDATE proposed_evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?,
                                          dataset_blake3 = ?
@@ -268,7 +252,7 @@ pub(crate) async fn set_failed(
     failure: Failure<'_>,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     let (state, reason) = match failure {
         Failure::Agent => ("agent_failed", None),
         Failure::Platform(reason) => ("platform_failed", Some(reason)),
@@ -291,7 +275,6 @@ pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
     proposal: Option<ProposalId>,
 ) -> Result<u32> {
-    let proposal = proposal.map(Text);
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM proposed_evaluations
            WHERE state = 'open' AND (?1 IS NULL OR proposal_id = ?1)"#,
@@ -309,17 +292,14 @@ pub(crate) async fn dropped_with_datasets(
 ) -> Result<Vec<(EvaluationId, String)>> {
     let dropped_until = Instant(dropped_until);
     let rows = sqlx::query!(
-        r#"SELECT d.id AS "id: Text<EvaluationId>", d.dataset AS "dataset!"
+        r#"SELECT d.id, d.dataset AS "dataset!"
            FROM proposals p JOIN proposed_evaluations d ON d.proposal_id = p.id
            WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND d.dataset IS NOT NULL AND d.dataset_removed_at IS NULL"#,
         dropped_until
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| (row.id.0, row.dataset))
-        .collect())
+    Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
 }
 
 pub(crate) async fn set_dataset_removed(
@@ -327,7 +307,7 @@ pub(crate) async fn set_dataset_removed(
     id: EvaluationId,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE proposed_evaluations SET dataset_removed_at = ? WHERE id = ?",
         now,

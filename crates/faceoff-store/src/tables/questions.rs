@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{QuestionId, TeamId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// The organisers' answer to a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,8 +31,8 @@ pub struct Question {
 }
 
 struct QuestionRow {
-    id: Text<QuestionId>,
-    team_id: Option<Text<TeamId>>,
+    id: QuestionId,
+    team_id: Option<TeamId>,
     asked_at: Instant,
     text: String,
     answer: Option<String>,
@@ -45,8 +45,8 @@ impl From<QuestionRow> for Question {
         let is_public = row.public;
         let answer = row.answer.zip(row.answered_at);
         Self {
-            id: row.id.0,
-            team: row.team_id.map(|team| team.0),
+            id: row.id,
+            team: row.team_id,
             at: row.asked_at.0,
             text: row.text,
             answer: answer.map(|(text, at)| Reply {
@@ -62,9 +62,8 @@ impl From<QuestionRow> for Question {
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Question>> {
     let rows = sqlx::query_as!(
         QuestionRow,
-        r#"SELECT id AS "id: Text<QuestionId>", team_id AS "team_id: Text<TeamId>", asked_at AS "asked_at: Instant",
-                  text, answer, answered_at AS "answered_at: Instant", public AS "public: bool"
-           FROM questions ORDER BY asked_at DESC, id DESC"#
+        "SELECT id, team_id, asked_at, text, answer, answered_at, public
+           FROM questions ORDER BY asked_at DESC, id DESC"
     )
     .fetch_all(connection)
     .await?;
@@ -79,7 +78,6 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: QuestionId) -> R
 
 /// Number of a team's unanswered questions.
 pub(crate) async fn count_open(connection: &mut SqliteConnection, team: TeamId) -> Result<i64> {
-    let team = Text(team);
     Ok(sqlx::query_scalar!(
         "SELECT COUNT(*) FROM questions WHERE team_id = ? AND answer IS NULL",
         team
@@ -89,11 +87,7 @@ pub(crate) async fn count_open(connection: &mut SqliteConnection, team: TeamId) 
 }
 
 pub(crate) async fn insert(connection: &mut SqliteConnection, question: &Question) -> Result<()> {
-    let (id, team, at) = (
-        Text(question.id),
-        question.team.map(Text),
-        Instant(question.at),
-    );
+    let (id, team, at) = (question.id, question.team, Instant(question.at));
     sqlx::query!(
         "INSERT INTO questions (id, team_id, asked_at, text) VALUES (?, ?, ?, ?)",
         id,
@@ -111,7 +105,7 @@ pub(crate) async fn set_answer(
     id: QuestionId,
     answer: &Reply,
 ) -> Result<()> {
-    let (id, at) = (Text(id), Instant(answer.at));
+    let at = Instant(answer.at);
     sqlx::query!(
         "UPDATE questions SET answer = ?, answered_at = ?, public = ? WHERE id = ?",
         answer.text,

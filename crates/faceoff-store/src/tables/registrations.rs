@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{DivisionName, RegistrationId, TeamId, TeamName};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// State of a registration.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,35 +47,32 @@ pub struct Registration {
 }
 
 struct RegistrationRow {
-    id: Text<RegistrationId>,
-    team_name: Text<TeamName>,
+    id: RegistrationId,
+    team_name: TeamName,
     affiliation: Option<String>,
     link: Option<String>,
-    division: Option<Text<DivisionName>>,
+    division: Option<DivisionName>,
     contact: String,
     accepted_terms: Option<u32>,
     created_at: Instant,
     decided_at: Option<Instant>,
     reason: Option<String>,
-    team_id: Option<Text<TeamId>>,
+    team_id: Option<TeamId>,
 }
 
 impl From<RegistrationRow> for Registration {
     fn from(row: RegistrationRow) -> Self {
         let state = match (row.decided_at, row.team_id, row.reason) {
-            (Some(at), Some(team), _) => RegistrationState::Approved {
-                at: at.0,
-                team: team.0,
-            },
+            (Some(at), Some(team), _) => RegistrationState::Approved { at: at.0, team },
             (Some(at), None, Some(reason)) => RegistrationState::Refused { at: at.0, reason },
             _ => RegistrationState::Pending,
         };
         Self {
-            id: row.id.0,
-            team_name: row.team_name.0,
+            id: row.id,
+            team_name: row.team_name,
             affiliation: row.affiliation,
             link: row.link,
-            division: row.division.map(|name| name.0),
+            division: row.division,
             contact: row.contact,
             accepted_terms: row.accepted_terms,
             created_at: row.created_at.0,
@@ -89,11 +86,9 @@ macro_rules! select_registrations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             RegistrationRow,
-            r#"SELECT id AS "id: Text<RegistrationId>", team_name AS "team_name: Text<TeamName>", affiliation, link,
-                      division AS "division: Text<DivisionName>", contact, accepted_terms AS "accepted_terms: u32",
-                      created_at AS "created_at: Instant", decided_at AS "decided_at: Instant", reason,
-                      team_id AS "team_id: Text<TeamId>"
-               FROM registrations "# + $tail
+            "SELECT id, team_name, affiliation, link, division, contact, accepted_terms, created_at, decided_at,
+                      reason, team_id
+               FROM registrations " + $tail
             $(, $argument)*
         )
     };
@@ -111,7 +106,6 @@ pub(crate) async fn find(
     connection: &mut SqliteConnection,
     id: RegistrationId,
 ) -> Result<Registration> {
-    let id = Text(id);
     select_registrations!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -135,9 +129,8 @@ pub(crate) async fn code_hash(
     connection: &mut SqliteConnection,
     id: RegistrationId,
 ) -> Result<[u8; 32]> {
-    let id = Text(id);
     let hash = sqlx::query_scalar!(
-        r#"SELECT code_hash AS "hash: Bytes32" FROM registrations WHERE id = ?"#,
+        "SELECT code_hash AS hash FROM registrations WHERE id = ?",
         id
     )
     .fetch_one(connection)
@@ -170,7 +163,7 @@ pub(crate) async fn insert(
     registration: &Registration,
     code_hash: [u8; 32],
 ) -> Result<()> {
-    let (id, code_hash) = (Text(registration.id), Bytes32(code_hash));
+    let (id, code_hash) = (registration.id, Bytes32(code_hash));
     let name = registration.team_name.as_str();
     let division = registration.division.as_ref().map(DivisionName::as_str);
     let created_at = Instant(registration.created_at);
@@ -199,7 +192,7 @@ pub(crate) async fn set_approved(
     team: TeamId,
     approved_at: Timestamp,
 ) -> Result<()> {
-    let (id, team, approved_at) = (Text(id), Text(team), Instant(approved_at));
+    let approved_at = Instant(approved_at);
     sqlx::query!(
         "UPDATE registrations SET state = 'approved', decided_at = ?, team_id = ? WHERE id = ?",
         approved_at,
@@ -217,7 +210,7 @@ pub(crate) async fn set_refused(
     reason: &str,
     refused_at: Timestamp,
 ) -> Result<()> {
-    let (id, refused_at) = (Text(id), Instant(refused_at));
+    let refused_at = Instant(refused_at);
     sqlx::query!(
         "UPDATE registrations SET state = 'refused', decided_at = ?, reason = ? WHERE id = ?",
         refused_at,

@@ -8,7 +8,7 @@ use crate::{
 use faceoff_types::{EvaluationId, Retention, StageId, SubmissionId, TeamId, Tier};
 use jiff::Timestamp;
 use serde::Deserialize;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 use std::cmp::Ordering;
 
 /// The retention of a stage; everything is kept if none is set.
@@ -16,9 +16,8 @@ pub(crate) async fn of_stage(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Retention> {
-    let stage = Text(stage);
     let retention = sqlx::query_scalar!(
-        r#"SELECT retention AS "retention: Json<Retention>" FROM stage_retentions WHERE stage_id = ?"#,
+        "SELECT retention FROM stage_retentions WHERE stage_id = ?",
         stage
     )
     .fetch_optional(connection)
@@ -31,11 +30,11 @@ pub(crate) async fn stages_with_removals(
     connection: &mut SqliteConnection,
 ) -> Result<Vec<StageId>> {
     let stages = sqlx::query_scalar!(
-        r#"SELECT stage_id AS "stage: Text<StageId>" FROM stage_retentions WHERE retention <> '{}'"#
+        "SELECT stage_id AS stage FROM stage_retentions WHERE retention <> '{}'"
     )
     .fetch_all(connection)
     .await?;
-    Ok(stages.into_iter().map(|stage| stage.0).collect())
+    Ok(stages)
 }
 
 pub(crate) async fn set(
@@ -43,7 +42,7 @@ pub(crate) async fn set(
     stage: StageId,
     retention: &Retention,
 ) -> Result<()> {
-    let (stage, retention) = (Text(stage), Json(retention));
+    let retention = Json(retention);
     sqlx::query!(
         "INSERT OR REPLACE INTO stage_retentions (stage_id, retention) VALUES (?, ?)",
         stage,
@@ -98,13 +97,11 @@ pub(crate) async fn scored_evaluations(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Vec<ScoredEvaluation>> {
-    let stage = Text(stage);
     let rows = sqlx::query!(
-        r#"SELECT e.id AS "id: Text<EvaluationId>", e.team_id AS "team: Text<TeamId>", e.revision AS "revision: u32",
-                  e.voided_at IS NULL AS "counts!: bool", e.dataset_removed_at IS NULL AS "is_kept!: bool",
+        r#"SELECT e.id, e.team_id AS team, e.revision, e.voided_at IS NULL AS "counts!: bool",
+                  e.dataset_removed_at IS NULL AS "is_kept!: bool",
                   t.disqualified_at IS NOT NULL OR t.retired_by_organiser = 1 AS "is_evidence!: bool",
-                  e.dataset_bytes AS "bytes: u64", s.created_at AS "submitted_at: Instant",
-                  e.result AS "rank!: Json<Rank>"
+                  e.dataset_bytes AS bytes, s.created_at AS submitted_at, e.result AS "rank!: Json<Rank>"
            FROM evaluations e JOIN teams t ON t.id = e.team_id JOIN submissions s ON s.id = e.submission_id
            WHERE e.stage_id = ? AND e.state = 'finished'
            ORDER BY e.team_id, e.day DESC, e.created_at DESC, e.id DESC"#,
@@ -115,8 +112,8 @@ pub(crate) async fn scored_evaluations(
     Ok(rows
         .into_iter()
         .map(|row| ScoredEvaluation {
-            id: row.id.0,
-            team: row.team.0,
+            id: row.id,
+            team: row.team,
             revision: row.revision,
             counts: row.counts,
             has_dataset: row.is_kept,
@@ -133,7 +130,6 @@ pub(crate) async fn count_proposals(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<u32> {
-    let stage = Text(stage);
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM proposals WHERE stage_id = ? AND outcome IS NULL"#,
         stage
@@ -150,9 +146,9 @@ pub(crate) async fn idle_bundles(
     stage: StageId,
     removable: &[EvaluationId],
 ) -> Result<Vec<(SubmissionId, u64)>> {
-    let (stage, removable) = (Text(stage), Json(removable));
+    let removable = Json(removable);
     let rows = sqlx::query!(
-        r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_bytes AS "bytes: u64"
+        "SELECT s.id, s.bundle_bytes AS bytes
            FROM submissions s JOIN teams t ON t.id = s.team_id
            WHERE s.state = 'valid' AND s.bundle_removed_at IS NULL
              AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
@@ -173,13 +169,13 @@ pub(crate) async fn idle_bundles(
                              WHERE r.submission_id = s.id AND o.closed_at IS NULL)
              AND NOT EXISTS (SELECT 1 FROM tournaments o WHERE o.baseline_id = s.id AND o.closed_at IS NULL)
              AND NOT EXISTS (SELECT 1 FROM games g WHERE g.home_submission_id = s.id AND g.state IN ('queued', 'running'))
-             AND NOT EXISTS (SELECT 1 FROM games g WHERE g.away_submission_id = s.id AND g.state IN ('queued', 'running'))"#,
+             AND NOT EXISTS (SELECT 1 FROM games g WHERE g.away_submission_id = s.id AND g.state IN ('queued', 'running'))",
         stage,
         removable,
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows.into_iter().map(|row| (row.id.0, row.bytes)).collect())
+    Ok(rows.into_iter().map(|row| (row.id, row.bytes)).collect())
 }
 
 /// Marks an evaluation's dataset as removed, also in the proposal that it came from. The file is deleted later.
@@ -189,7 +185,7 @@ pub(crate) async fn set_dataset_removed(
     reason: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE evaluations SET dataset_removed_at = ?, dataset_removed_for = ? WHERE id = ?",
         now,
@@ -216,7 +212,7 @@ pub(crate) async fn deletable_datasets(
 ) -> Result<Vec<(EvaluationId, String)>> {
     let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
-        r#"SELECT e.id AS "id: Text<EvaluationId>", e.dataset AS "dataset!" FROM evaluations e
+        r#"SELECT e.id, e.dataset AS "dataset!" FROM evaluations e
            JOIN teams t ON t.id = e.team_id
            WHERE e.dataset_removed_at IS NOT NULL AND e.dataset_removed_at <= ? AND e.dataset_gone = 0
              AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0"#,
@@ -224,10 +220,7 @@ pub(crate) async fn deletable_datasets(
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| (row.id.0, row.dataset))
-        .collect())
+    Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
 }
 
 /// Records that the file of a removed dataset was deleted.
@@ -235,7 +228,6 @@ pub(crate) async fn set_dataset_file_deleted(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("UPDATE evaluations SET dataset_gone = 1 WHERE id = ?", id)
         .execute(connection)
         .await?;
@@ -248,7 +240,7 @@ pub(crate) async fn unmeasured(
     connection: &mut SqliteConnection,
 ) -> Result<Vec<(EvaluationId, String)>> {
     let rows = sqlx::query!(
-        r#"SELECT id AS "id!: Text<EvaluationId>", dataset AS "dataset!: String" FROM evaluations
+        r#"SELECT id AS "id!", dataset AS "dataset!: String" FROM evaluations
            WHERE state = 'finished' AND dataset_bytes IS NULL AND dataset_removed_at IS NULL
            UNION
            SELECT id, dataset FROM proposed_evaluations
@@ -256,10 +248,7 @@ pub(crate) async fn unmeasured(
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| (row.id.0, row.dataset))
-        .collect())
+    Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
 }
 
 /// Stores the size of the dataset of an evaluation, or of the proposed evaluation with this id.
@@ -270,7 +259,6 @@ pub(crate) async fn set_dataset_bytes(
 ) -> Result<()> {
     let bytes = i64::try_from(bytes)
         .map_err(|_| StoreError::Damaged(format!("a dataset of {bytes} bytes")))?;
-    let id = Text(id);
     sqlx::query!(
         "UPDATE evaluations SET dataset_bytes = ? WHERE id = ? AND state = 'finished'",
         bytes,
@@ -293,7 +281,6 @@ pub(crate) async fn copy_dataset_bytes(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE evaluations SET dataset_bytes =
              (SELECT d.dataset_bytes FROM proposed_evaluations d WHERE d.id = evaluations.id)

@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{RoundNumber, SubmissionId, TeamId, TournamentId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 use std::collections::BTreeMap;
 
 /// A started round.
@@ -58,24 +58,22 @@ pub(crate) async fn all(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<TournamentRound>> {
-    let id = Text(tournament);
     let mut submissions = BTreeMap::<u32, Vec<(TeamId, SubmissionId)>>::new();
     let rows = sqlx::query!(
-        r#"SELECT round AS "round: u32", team_id AS "team: Text<TeamId>", submission_id AS "submission: Text<SubmissionId>"
-           FROM round_submissions WHERE tournament_id = ? ORDER BY round, team_id"#,
-        id
+        "SELECT round, team_id AS team, submission_id AS submission
+           FROM round_submissions WHERE tournament_id = ? ORDER BY round, team_id",
+        tournament
     )
     .fetch_all(&mut *connection)
     .await?;
     for row in rows {
         let round = submissions.entry(row.round).or_default();
-        round.push((row.team.0, row.submission.0));
+        round.push((row.team, row.submission));
     }
     let rows = sqlx::query!(
-        r#"SELECT number AS "number: u32", started_at AS "started_at: Instant", over_at AS "over_at: Instant",
-                  groups AS "groups: Json<Vec<Vec<TeamId>>>", byes AS "byes: Json<Vec<(u32, TeamId)>>"
-           FROM rounds WHERE tournament_id = ? ORDER BY number"#,
-        id
+        "SELECT number, started_at, over_at, groups, byes
+           FROM rounds WHERE tournament_id = ? ORDER BY number",
+        tournament
     )
     .fetch_all(connection)
     .await?;
@@ -104,10 +102,9 @@ pub(crate) async fn count(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<u32> {
-    let id = Text(tournament);
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM rounds WHERE tournament_id = ?"#,
-        id
+        tournament
     )
     .fetch_one(connection)
     .await?)
@@ -118,11 +115,7 @@ pub(crate) async fn insert(
     tournament: TournamentId,
     round: &TournamentRound,
 ) -> Result<()> {
-    let (id, number, started_at) = (
-        Text(tournament),
-        round.number.get(),
-        Instant(round.started_at),
-    );
+    let (id, number, started_at) = (tournament, round.number.get(), Instant(round.started_at));
     let byes: Vec<(u32, TeamId)> = round
         .byes
         .iter()
@@ -140,7 +133,7 @@ pub(crate) async fn insert(
     .execute(&mut *connection)
     .await?;
     for (team, submission) in &round.submissions {
-        let (team, submission) = (Text(*team), Text(*submission));
+        let (team, submission) = (*team, *submission);
         sqlx::query!(
             "INSERT INTO round_submissions (tournament_id, round, team_id, submission_id) VALUES (?, ?, ?, ?)",
             id,
@@ -161,7 +154,7 @@ pub(crate) async fn set_ended(
     round: RoundNumber,
     now: Timestamp,
 ) -> Result<bool> {
-    let (id, number, now) = (Text(tournament), round.get(), Instant(now));
+    let (id, number, now) = (tournament, round.get(), Instant(now));
     let updated = sqlx::query!(
         "UPDATE rounds SET over_at = ? WHERE tournament_id = ? AND number = ? AND over_at IS NULL",
         now,

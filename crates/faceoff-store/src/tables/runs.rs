@@ -5,11 +5,9 @@ use crate::{
     error::{Result, StoreError},
     tables::plan::RunPlan,
 };
-use faceoff_types::{
-    Profile, Ruleset, RunId, SeedLabel, StageLimits, SubmissionId, Task, Variation,
-};
+use faceoff_types::{Ruleset, RunId, SeedLabel, SubmissionId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A finished run whose shards (with the outcomes of their episodes) can be deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,9 +50,9 @@ pub(crate) async fn insert(
     run: &Run,
     contestants: &[SubmissionId],
 ) -> Result<()> {
-    let (id, plan) = (Text(run.id), &run.plan);
-    let (profile, seed, tasks) = (Text(plan.profile), Text(run.seed), Json(&plan.tasks));
-    let ruleset = Text(run.ruleset);
+    let (id, plan) = (run.id, &run.plan);
+    let (profile, seed, tasks) = (plan.profile, run.seed, Json(&plan.tasks));
+    let ruleset = run.ruleset;
     let limits = (!plan.limits.is_none()).then_some(Json(&plan.limits));
     let variation = (!plan.variation.is_none()).then_some(Json(&plan.variation));
     sqlx::query!(
@@ -76,7 +74,7 @@ pub(crate) async fn insert(
     .execute(&mut *connection)
     .await?;
     for (side, submission) in (0_u32..).zip(contestants) {
-        let submission = Text(*submission);
+        let submission = *submission;
         sqlx::query!(
             "INSERT INTO contestants (run_id, side, submission_id) VALUES (?, ?, ?)",
             id,
@@ -90,24 +88,20 @@ pub(crate) async fn insert(
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result<Run> {
-    let id_text = Text(id);
     let row = sqlx::query!(
-        r#"SELECT profile AS "profile: Text<Profile>", seed AS "seed: Text<SeedLabel>",
-                  tasks AS "tasks: Json<Vec<Task>>", episodes_per_task AS "episodes_per_task: u32",
-                  episodes_per_shard AS "episodes_per_shard: u32", max_faults AS "max_faults: u32",
-                  keeps_recordings AS "keeps_recordings: bool", ruleset AS "ruleset: Text<Ruleset>",
-                  variation AS "variation: Json<Variation>", limits AS "limits: Json<Box<StageLimits>>"
-           FROM runs WHERE id = ?"#,
-        id_text,
+        "SELECT profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults, keeps_recordings, ruleset,
+                  variation, limits
+           FROM runs WHERE id = ?",
+        id,
     )
     .fetch_optional(connection)
     .await?
     .ok_or(StoreError::NotFound("run"))?;
     Ok(Run {
         id,
-        ruleset: row.ruleset.0,
+        ruleset: row.ruleset,
         plan: RunPlan {
-            profile: row.profile.0,
+            profile: row.profile,
             tasks: row.tasks.0,
             episodes_per_task: row.episodes_per_task,
             episodes_per_shard: row.episodes_per_shard,
@@ -118,7 +112,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
                 .unwrap_or_default(),
             limits: row.limits.map(|limits| limits.0).unwrap_or_default(),
         },
-        seed: row.seed.0,
+        seed: row.seed,
         keeps_recordings: row.keeps_recordings,
     })
 }
@@ -128,20 +122,18 @@ pub(crate) async fn contestants(
     connection: &mut SqliteConnection,
     id: RunId,
 ) -> Result<Vec<SubmissionId>> {
-    let id = Text(id);
     let rows = sqlx::query_scalar!(
-        r#"SELECT submission_id AS "id: Text<SubmissionId>" FROM contestants
-           WHERE run_id = ? ORDER BY side"#,
+        "SELECT submission_id AS id FROM contestants
+           WHERE run_id = ? ORDER BY side",
         id,
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows.into_iter().map(|id| id.0).collect())
+    Ok(rows)
 }
 
 /// Marks a run as running. True if the claimed shard is its first.
 pub(crate) async fn begin(connection: &mut SqliteConnection, id: RunId) -> Result<bool> {
-    let id = Text(id);
     let begun = sqlx::query!(
         "UPDATE runs SET state = 'running' WHERE id = ? AND state = 'queued'",
         id
@@ -153,7 +145,6 @@ pub(crate) async fn begin(connection: &mut SqliteConnection, id: RunId) -> Resul
 
 /// Marks a run as complete.
 pub(crate) async fn set_complete(connection: &mut SqliteConnection, id: RunId) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("UPDATE runs SET state = 'played' WHERE id = ?", id)
         .execute(connection)
         .await?;
@@ -162,7 +153,6 @@ pub(crate) async fn set_complete(connection: &mut SqliteConnection, id: RunId) -
 
 /// Stops a run that is not complete.
 pub(crate) async fn set_stopped(connection: &mut SqliteConnection, id: RunId) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE runs SET state = 'stopped' WHERE id = ? AND state IN ('queued', 'running')",
         id
@@ -179,15 +169,15 @@ pub(crate) async fn with_old_recordings(
 ) -> Result<Vec<RunId>> {
     let ended_until = Instant(ended_until);
     let runs = sqlx::query_scalar!(
-        r#"SELECT r.id AS "id: Text<RunId>"
+        "SELECT r.id
            FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
            WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL
-             AND COALESCE(e.finished_at, d.finished_at) <= ?"#,
+             AND COALESCE(e.finished_at, d.finished_at) <= ?",
         ended_until,
     )
     .fetch_all(connection)
     .await?;
-    Ok(runs.into_iter().map(|id| id.0).collect())
+    Ok(runs)
 }
 
 pub(crate) async fn set_recordings_removed(
@@ -195,7 +185,7 @@ pub(crate) async fn set_recordings_removed(
     id: RunId,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "UPDATE runs SET recordings_removed_at = ? WHERE id = ?",
         now,
@@ -214,7 +204,7 @@ pub(crate) async fn clearable(
 ) -> Result<Vec<ClearableRun>> {
     let ended_until = Instant(ended_until);
     let rows = sqlx::query!(
-        r#"SELECT r.id AS "run!: Text<RunId>",
+        r#"SELECT r.id AS "run!",
                   r.state = 'played'
                       AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
                       AS "wants_summary!: bool"
@@ -230,7 +220,7 @@ pub(crate) async fn clearable(
     Ok(rows
         .into_iter()
         .map(|row| ClearableRun {
-            run: row.run.0,
+            run: row.run,
             needs_summary: row.wants_summary,
         })
         .collect())
@@ -241,7 +231,7 @@ pub(crate) async fn set_cleared(
     id: RunId,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
+    let now = Instant(now);
     sqlx::query!("UPDATE runs SET cleared_at = ? WHERE id = ?", now, id)
         .execute(connection)
         .await?;
@@ -253,13 +243,9 @@ pub(crate) async fn cleared_at(
     connection: &mut SqliteConnection,
     id: RunId,
 ) -> Result<Option<Timestamp>> {
-    let id = Text(id);
-    let row = sqlx::query!(
-        r#"SELECT cleared_at AS "at: Instant" FROM runs WHERE id = ?"#,
-        id
-    )
-    .fetch_optional(connection)
-    .await?
-    .ok_or(StoreError::NotFound("run"))?;
+    let row = sqlx::query!("SELECT cleared_at AS at FROM runs WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("run"))?;
     Ok(row.at.map(|at| at.0))
 }

@@ -10,7 +10,7 @@ pub(crate) async fn insert(
     evaluation: EvaluationId,
     job: Uuid,
 ) -> Result<()> {
-    let (evaluation, job) = (Text(evaluation), Text(job));
+    let job = Text(job);
     sqlx::query!(
         "INSERT INTO scorings (evaluation_id, job_id) VALUES (?, ?)",
         evaluation,
@@ -28,12 +28,12 @@ pub(crate) async fn of_job(
 ) -> Result<Option<EvaluationId>> {
     let job = Text(job);
     let found = sqlx::query_scalar!(
-        r#"SELECT evaluation_id AS "id: Text<EvaluationId>" FROM scorings WHERE job_id = ?"#,
+        "SELECT evaluation_id AS id FROM scorings WHERE job_id = ?",
         job
     )
     .fetch_optional(connection)
     .await?;
-    Ok(found.map(|id| id.0))
+    Ok(found)
 }
 
 /// The job that scores an evaluation; `None` before it is queued.
@@ -41,9 +41,8 @@ pub(crate) async fn job_of(
     connection: &mut SqliteConnection,
     evaluation: EvaluationId,
 ) -> Result<Option<Uuid>> {
-    let evaluation = Text(evaluation);
     let found = sqlx::query_scalar!(
-        r#"SELECT job_id AS "id: Text<Uuid>" FROM scorings WHERE evaluation_id = ?"#,
+        "SELECT job_id AS id FROM scorings WHERE evaluation_id = ?",
         evaluation
     )
     .fetch_optional(connection)

@@ -32,9 +32,9 @@ pub struct Season {
 
 pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
     let row = sqlx::query!(
-        r#"SELECT name, secret AS "secret: Bytes32", created_at AS "created_at: Instant",
-                  closed_at AS "closed_at: Instant", paused_at AS "paused_at: Instant", paused_for,
-                  takes_registrations AS "takes_registrations: bool",
+        r#"SELECT name, secret, created_at,
+                  closed_at, paused_at, paused_for,
+                  takes_registrations,
                   (SELECT commitment FROM archived) AS "archived_commitment?: String"
            FROM season"#
     )

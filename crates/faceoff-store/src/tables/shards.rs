@@ -85,9 +85,9 @@ impl ShardCommit {
 }
 
 struct ShardRow {
-    id: Text<ShardId>,
-    run: Text<RunId>,
-    task: Text<Task>,
+    id: ShardId,
+    run: RunId,
+    task: Task,
     first_episode: u32,
     end_episode: u32,
     recording: Option<String>,
@@ -96,8 +96,8 @@ struct ShardRow {
 impl From<ShardRow> for Shard {
     fn from(row: ShardRow) -> Self {
         Self {
-            id: row.id.0,
-            task: row.task.0,
+            id: row.id,
+            task: row.task,
             first_episode: row.first_episode,
             end_episode: row.end_episode,
             recording: row.recording,
@@ -110,10 +110,8 @@ macro_rules! select_shards {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             ShardRow,
-            r#"SELECT id AS "id: Text<ShardId>", run_id AS "run: Text<RunId>",
-                      task AS "task: Text<Task>", first_episode AS "first_episode: u32",
-                      end_episode AS "end_episode: u32", recording
-               FROM shards "# + $tail
+            "SELECT id, run_id AS run, task, first_episode, end_episode, recording
+               FROM shards " + $tail
             $(, $argument)*
         )
     };
@@ -128,7 +126,7 @@ pub(crate) async fn of_job(
     Ok(select_shards!("WHERE job_id = ?", job)
         .fetch_optional(connection)
         .await?
-        .map(|row| (row.run.0, row.into())))
+        .map(|row| (row.run, row.into())))
 }
 
 /// A shard that a worker has committed.
@@ -145,18 +143,18 @@ pub(crate) async fn committed_by_worker(
     holder: &str,
 ) -> Result<Vec<CommittedShard>> {
     let rows = sqlx::query!(
-        r#"SELECT s.id AS "id: Text<ShardId>", s.job_id AS "job: Text<Uuid>", s.recording
+        "SELECT s.id, s.job_id AS job, s.recording
            FROM jobs j JOIN shards s ON s.job_id = j.id JOIN runs r ON r.id = s.run_id
            -- 0 is what follows / among characters
            WHERE j.state = 'done' AND j.worker >= 'remote/' AND j.worker < 'remote0'
              AND j.worker >= ?1 || '/' AND j.worker < ?1 || '0'
-             AND r.state = 'running' AND s.committed_at IS NOT NULL"#,
+             AND r.state = 'running' AND s.committed_at IS NOT NULL",
         holder,
     )
     .fetch_all(connection)
     .await?;
     let committed = rows.into_iter().map(|row| CommittedShard {
-        id: row.id.0,
+        id: row.id,
         job: row.job.0,
         recording: row.recording,
     });
@@ -165,7 +163,6 @@ pub(crate) async fn committed_by_worker(
 
 /// Deletes the result of a committed shard.
 pub(crate) async fn clear_result(connection: &mut SqliteConnection, id: ShardId) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE shards SET committed_at = NULL, recording = NULL, agent_faults = NULL, outcomes = NULL, log = NULL
          WHERE id = ?",
@@ -178,7 +175,6 @@ pub(crate) async fn clear_result(connection: &mut SqliteConnection, id: ShardId)
 
 /// The shards of a run, by task and first episode.
 pub(crate) async fn of_run(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Shard>> {
-    let run = Text(run);
     let shards = select_shards!("WHERE run_id = ? ORDER BY position", run)
         .fetch_all(connection)
         .await?;
@@ -187,9 +183,8 @@ pub(crate) async fn of_run(connection: &mut SqliteConnection, run: RunId) -> Res
 
 /// The jobs of a run's shards that are not committed.
 pub(crate) async fn open_jobs(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Uuid>> {
-    let run = Text(run);
     let jobs = sqlx::query_scalar!(
-        r#"SELECT job_id AS "id: Text<Uuid>" FROM shards WHERE run_id = ? AND committed_at IS NULL"#,
+        "SELECT job_id AS id FROM shards WHERE run_id = ? AND committed_at IS NULL",
         run,
     )
     .fetch_all(connection)
@@ -205,7 +200,8 @@ pub(crate) async fn insert(
     position: u32,
     job: Uuid,
 ) -> Result<()> {
-    let (id, run, job, task) = (Text(shard.id), Text(run), Text(job), Text(shard.task));
+    let job = Text(job);
+    let (id, task) = (shard.id, shard.task);
     sqlx::query!(
         "INSERT INTO shards (id, run_id, job_id, position, task, first_episode, end_episode)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -229,7 +225,7 @@ pub(crate) async fn commit(
     commit: &ShardCommit,
     now: Timestamp,
 ) -> Result<()> {
-    let (id_text, now, outcomes) = (Text(id), Instant(now), Json(&commit.outcomes));
+    let (id_text, now, outcomes) = (id, Instant(now), Json(&commit.outcomes));
     let agent_faults = commit.agent_faults();
     let stored = sqlx::query!(
         "UPDATE shards SET committed_at = ?, recording = ?, outcomes = ?, agent_faults = ?, log = ?
@@ -259,11 +255,9 @@ pub(crate) struct ShardSums {
 }
 
 pub(crate) async fn sums(connection: &mut SqliteConnection, run: RunId) -> Result<ShardSums> {
-    let run = Text(run);
     Ok(sqlx::query_as!(
         ShardSums,
-        r#"SELECT COALESCE(SUM(agent_faults), 0) AS "agent_faults!: i64",
-                  COUNT(*) - COUNT(committed_at) AS "open!: i64"
+        r#"SELECT COALESCE(SUM(agent_faults), 0) AS "agent_faults!: i64", COUNT(*) - COUNT(committed_at) AS "open!: i64"
            FROM shards WHERE run_id = ?"#,
         run,
     )
@@ -276,9 +270,8 @@ pub(crate) async fn outcomes(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<Vec<EpisodeOutcome>> {
-    let run = Text(run);
     let shards = sqlx::query_scalar!(
-        r#"SELECT outcomes AS "outcomes!: Json<Vec<EpisodeOutcome>>" FROM shards
+        r#"SELECT outcomes AS "outcomes!" FROM shards
            WHERE run_id = ? AND outcomes IS NOT NULL ORDER BY position"#,
         run,
     )
@@ -289,7 +282,7 @@ pub(crate) async fn outcomes(
 
 /// A committed shard with agent faults.
 pub(crate) struct FaultyShard {
-    pub(crate) task: Text<Task>,
+    pub(crate) task: Task,
     pub(crate) first_episode: u32,
     pub(crate) outcomes: Json<Vec<EpisodeOutcome>>,
     pub(crate) log: String,
@@ -300,11 +293,9 @@ pub(crate) async fn with_agent_faults(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<Vec<FaultyShard>> {
-    let run = Text(run);
     Ok(sqlx::query_as!(
         FaultyShard,
-        r#"SELECT task AS "task: Text<Task>", first_episode AS "first_episode: u32",
-                  outcomes AS "outcomes!: Json<Vec<EpisodeOutcome>>", log AS "log!"
+        r#"SELECT task, first_episode, outcomes AS "outcomes!", log AS "log!"
            FROM shards WHERE run_id = ? AND agent_faults > 0 ORDER BY position"#,
         run,
     )
@@ -317,10 +308,9 @@ pub(crate) async fn delete_without_faults(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<()> {
-    let run = Text(run);
     let jobs = sqlx::query_scalar!(
-        r#"DELETE FROM shards WHERE run_id = ? AND COALESCE(agent_faults, 0) = 0
-           RETURNING job_id AS "job: Text<Uuid>""#,
+        "DELETE FROM shards WHERE run_id = ? AND COALESCE(agent_faults, 0) = 0
+           RETURNING job_id AS job",
         run,
     )
     .fetch_all(&mut *connection)

@@ -22,12 +22,12 @@ impl SignOff {
     /// Reads a sign-off from its columns, which are set together.
     pub(crate) fn from_columns(
         signed_off_at: Option<Instant>,
-        actor: Option<Text<Actor>>,
+        actor: Option<Actor>,
         disqualified_teams: Option<Json<Vec<TeamId>>>,
     ) -> Option<Self> {
         Some(Self {
             signed_off_at: signed_off_at?.0,
-            actor: actor?.0,
+            actor: actor?,
             disqualified_teams: disqualified_teams?.0,
         })
     }
@@ -38,11 +38,10 @@ pub(crate) async fn check_not_signed_off(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<()> {
-    let id = Text(stage);
     let sign_off = sqlx::query!(
-        r#"SELECT name, finalised_at AS "at!: Instant", finalised_by AS "by!: String"
+        r#"SELECT name, finalised_at AS "at!", finalised_by AS "by!: String"
            FROM stages WHERE id = ? AND finalised_at IS NOT NULL"#,
-        id
+        stage
     )
     .fetch_optional(connection)
     .await?;
@@ -63,7 +62,7 @@ pub(crate) async fn sign_off(
     actor: &Actor,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, actor, now) = (Text(stage), Text(actor), Instant(now));
+    let (id, now) = (stage, Instant(now));
     sqlx::query!(
         "UPDATE stages SET finalised_at = ?, finalised_by = ?,
                 finalised_without = (SELECT json_group_array(id) FROM teams WHERE disqualified_at IS NOT NULL)
@@ -79,10 +78,9 @@ pub(crate) async fn sign_off(
 
 /// Number of a stage's open evaluations.
 pub(crate) async fn count_open(connection: &mut SqliteConnection, stage: StageId) -> Result<u32> {
-    let id = Text(stage);
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations WHERE stage_id = ? AND state = 'open'"#,
-        id
+        stage
     )
     .fetch_one(connection)
     .await?)
@@ -90,10 +88,9 @@ pub(crate) async fn count_open(connection: &mut SqliteConnection, stage: StageId
 
 /// Number of a stage's evaluations with a score, including voided ones.
 pub(crate) async fn count_scored(connection: &mut SqliteConnection, stage: StageId) -> Result<u32> {
-    let id = Text(stage);
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations WHERE stage_id = ? AND state = 'finished'"#,
-        id
+        stage
     )
     .fetch_one(connection)
     .await?)
@@ -104,10 +101,9 @@ pub(crate) async fn final_cutoff(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Option<Timestamp>> {
-    let id = Text(stage);
     let cutoff_at = sqlx::query_scalar!(
-        r#"SELECT cutoff_at AS "cutoff_at: Instant" FROM days WHERE stage_id = ? AND is_final = 1"#,
-        id
+        "SELECT cutoff_at FROM days WHERE stage_id = ? AND is_final = 1",
+        stage
     )
     .fetch_optional(connection)
     .await?;
@@ -119,7 +115,7 @@ pub(crate) async fn set_final_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<()> {
-    let (stage, day) = (Text(stage_day.stage), Text(stage_day.date));
+    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     sqlx::query!(
         "UPDATE days SET is_final = 1 WHERE stage_id = ? AND day = ?",
         stage,

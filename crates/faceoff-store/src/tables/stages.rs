@@ -10,7 +10,7 @@ use faceoff_types::{
     DayDeadline, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, TeamId, Zone,
 };
 use jiff::{SignedDuration, Timestamp, civil::Date};
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A part of the season with its own days, rules and board.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,16 +154,16 @@ impl Stage {
 }
 
 struct StageRow {
-    id: Text<StageId>,
-    name: Text<StageName>,
+    id: StageId,
+    name: StageName,
     opens_at: Instant,
     closes_at: Option<Instant>,
-    zone: Text<Zone>,
+    zone: Zone,
     settings: Json<StageSettings>,
     names_seeds: bool,
     configured: bool,
     finalised_at: Option<Instant>,
-    finalised_by: Option<Text<Actor>>,
+    finalised_by: Option<Actor>,
     finalised_without: Option<Json<Vec<TeamId>>>,
     revision: u32,
     since: Instant,
@@ -173,11 +173,11 @@ struct StageRow {
 impl From<StageRow> for Stage {
     fn from(row: StageRow) -> Self {
         Self {
-            id: row.id.0,
-            name: row.name.0,
+            id: row.id,
+            name: row.name,
             opens_at: row.opens_at.0,
             closes_at: row.closes_at.map(|at| at.0),
-            zone: row.zone.0,
+            zone: row.zone,
             settings: row.settings.0,
             rules: Revision {
                 number: row.revision,
@@ -199,16 +199,11 @@ impl From<StageRow> for Stage {
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>> {
     let rows = sqlx::query_as!(
         StageRow,
-        r#"SELECT s.id AS "id: Text<StageId>", s.name AS "name: Text<StageName>", s.opens_at AS "opens_at: Instant",
-                  s.closes_at AS "closes_at: Instant", s.zone AS "zone: Text<Zone>",
-                  s.settings AS "settings: Json<StageSettings>", s.names_seeds AS "names_seeds: bool",
-                  s.configured AS "configured: bool", s.finalised_at AS "finalised_at: Instant",
-                  s.finalised_by AS "finalised_by: Text<Actor>",
-                  s.finalised_without AS "finalised_without: Json<Vec<TeamId>>", r.revision AS "revision: u32", r.since AS "since: Instant",
-                  r.rules AS "rules: Json<StageRules>"
+        "SELECT s.id, s.name, s.opens_at, s.closes_at, s.zone, s.settings, s.names_seeds, s.configured,
+                  s.finalised_at, s.finalised_by, s.finalised_without, r.revision, r.since, r.rules
            FROM stages s JOIN stage_revisions r ON r.stage_id = s.id
            WHERE r.revision = (SELECT MAX(n.revision) FROM stage_revisions n WHERE n.stage_id = s.id)
-           ORDER BY s.opens_at, s.id"#
+           ORDER BY s.opens_at, s.id"
     )
     .fetch_all(connection)
     .await?;
@@ -237,10 +232,9 @@ pub(crate) async fn revisions(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Vec<Revision>> {
-    let stage = Text(stage);
     let rows = sqlx::query!(
-        r#"SELECT revision AS "revision: u32", since AS "since: Instant", rules AS "rules: Json<StageRules>"
-           FROM stage_revisions WHERE stage_id = ? ORDER BY revision"#,
+        "SELECT revision, since, rules
+           FROM stage_revisions WHERE stage_id = ? ORDER BY revision",
         stage
     )
     .fetch_all(connection)
@@ -257,11 +251,10 @@ pub(crate) async fn revisions(
 
 /// The stage that takes its rules from the configuration, even if it has no rules yet.
 pub(crate) async fn find_configured(connection: &mut SqliteConnection) -> Result<Option<StageId>> {
-    let id =
-        sqlx::query_scalar!(r#"SELECT id AS "id: Text<StageId>" FROM stages WHERE configured = 1"#)
-            .fetch_optional(connection)
-            .await?;
-    Ok(id.map(|id| id.0))
+    let id = sqlx::query_scalar!("SELECT id FROM stages WHERE configured = 1")
+        .fetch_optional(connection)
+        .await?;
+    Ok(id)
 }
 
 /// Adds a stage with its first rules. [`StoreError::StageNameTaken`] if another stage has its name.
@@ -270,8 +263,8 @@ pub(crate) async fn insert(
     stage: &Stage,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, name, opens_at) = (Text(stage.id), stage.name.as_str(), Instant(stage.opens_at));
-    let (closes_at, zone) = (stage.closes_at.map(Instant), Text(&stage.zone));
+    let (id, name, opens_at) = (stage.id, stage.name.as_str(), Instant(stage.opens_at));
+    let (closes_at, zone) = (stage.closes_at.map(Instant), &stage.zone);
     let (settings, now) = (Json(&stage.settings), Instant(now));
     sqlx::query!(
         "INSERT INTO stages (id, name, opens_at, closes_at, zone, settings, names_seeds, configured, created_at)
@@ -297,7 +290,7 @@ pub(crate) async fn insert_revision(
     stage: StageId,
     revision: &Revision,
 ) -> Result<()> {
-    let (stage, since, rules) = (Text(stage), Instant(revision.since), Json(&revision.rules));
+    let (since, rules) = (Instant(revision.since), Json(&revision.rules));
     sqlx::query!(
         "INSERT INTO stage_revisions (stage_id, revision, since, rules) VALUES (?, ?, ?, ?)",
         stage,
@@ -316,7 +309,7 @@ pub(crate) async fn replace_revision(
     stage: StageId,
     revision: &Revision,
 ) -> Result<()> {
-    let (stage, since, rules) = (Text(stage), Instant(revision.since), Json(&revision.rules));
+    let (since, rules) = (Instant(revision.since), Json(&revision.rules));
     sqlx::query!(
         "UPDATE stage_revisions SET since = ?, rules = ? WHERE stage_id = ? AND revision = ?",
         since,
@@ -331,8 +324,8 @@ pub(crate) async fn replace_revision(
 
 /// Stores everything of a stage except its rules. [`StoreError::StageNameTaken`] if another stage has its name.
 pub(crate) async fn update(connection: &mut SqliteConnection, stage: &Stage) -> Result<()> {
-    let (id, name, opens_at) = (Text(stage.id), stage.name.as_str(), Instant(stage.opens_at));
-    let (closes_at, zone) = (stage.closes_at.map(Instant), Text(&stage.zone));
+    let (id, name, opens_at) = (stage.id, stage.name.as_str(), Instant(stage.opens_at));
+    let (closes_at, zone) = (stage.closes_at.map(Instant), &stage.zone);
     let settings = Json(&stage.settings);
     sqlx::query!(
         "UPDATE stages SET name = ?, opens_at = ?, closes_at = ?, zone = ?, settings = ?, configured = ?

@@ -8,7 +8,7 @@ use crate::{
 };
 use faceoff_types::{BundleRef, SubmissionId, TeamId, ValidationTiming};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// An agent that a team has uploaded.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,8 +77,8 @@ impl SubmissionState {
 pub(crate) const VALIDATION_FAILED: &str = "because its validation run failed";
 
 struct SubmissionRow {
-    id: Text<SubmissionId>,
-    team_id: Text<TeamId>,
+    id: SubmissionId,
+    team_id: TeamId,
     bundle_key: String,
     bundle_bytes: u64,
     bundle_blake3: String,
@@ -93,11 +93,11 @@ struct SubmissionRow {
     withdrawn_at: Option<Instant>,
     label: Option<String>,
     note: Option<String>,
-    same_as: Option<Text<SubmissionId>>,
+    same_as: Option<SubmissionId>,
     removed_at: Option<Instant>,
     removed_for: Option<String>,
     deleted_at: Option<Instant>,
-    deleted_by: Option<Text<Actor>>,
+    deleted_by: Option<Actor>,
 }
 
 impl TryFrom<SubmissionRow> for Submission {
@@ -112,13 +112,13 @@ impl TryFrom<SubmissionRow> for Submission {
             (state, _) => {
                 return Err(StoreError::Damaged(format!(
                     "submission {}: state {state:?} does not match its reason",
-                    row.id.0
+                    row.id
                 )));
             }
         };
         Ok(Self {
-            id: row.id.0,
-            team: row.team_id.0,
+            id: row.id,
+            team: row.team_id,
             bundle: BundleRef {
                 key: row.bundle_key,
                 bytes: row.bundle_bytes,
@@ -134,7 +134,7 @@ impl TryFrom<SubmissionRow> for Submission {
             withdrawn_at: row.withdrawn_at.map(|at| at.0),
             label: row.label,
             note: row.note,
-            duplicate_of: row.same_as.map(|id| id.0),
+            duplicate_of: row.same_as,
             bundle_removed: row.removed_at.map(|at| Ruling {
                 at: at.0,
                 reason: row
@@ -146,7 +146,7 @@ impl TryFrom<SubmissionRow> for Submission {
                 .zip(row.deleted_by)
                 .map(|(at, actor)| Deletion {
                     deleted_at: at.0,
-                    actor: actor.0,
+                    actor,
                 }),
         })
     }
@@ -157,21 +157,21 @@ macro_rules! select_submissions {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             SubmissionRow,
-            r#"SELECT s.id AS "id: Text<SubmissionId>", s.team_id AS "team_id: Text<TeamId>",
-                      s.bundle_key, s.bundle_bytes AS "bundle_bytes: u64", s.bundle_blake3,
-                      s.bundle_file_name, s.created_at AS "created_at: Instant",
+            r#"SELECT s.id, s.team_id,
+                      s.bundle_key, s.bundle_bytes, s.bundle_blake3,
+                      s.bundle_file_name, s.created_at,
                       s.agent_name, s.runtime, s.state, s.reason,
-                      s.timing AS "timing: Json<Vec<ValidationTiming>>",
+                      s.timing,
                       EXISTS (SELECT 1 FROM active_submissions a
                               WHERE a.team_id = s.team_id AND a.submission_id = s.id)
                       AS "active!: bool",
-                      s.withdrawn_at AS "withdrawn_at: Instant", s.label, s.note,
+                      s.withdrawn_at, s.label, s.note,
                       (SELECT o.id FROM submissions o
                        WHERE o.team_id = s.team_id AND o.bundle_blake3 = s.bundle_blake3
                          AND (o.created_at, o.id) < (s.created_at, s.id)
-                       ORDER BY o.created_at, o.id LIMIT 1) AS "same_as: Text<SubmissionId>",
-                      s.bundle_removed_at AS "removed_at: Instant", s.bundle_removed_for AS removed_for,
-                      s.deleted_at AS "deleted_at: Instant", s.deleted_by AS "deleted_by: Text<Actor>"
+                       ORDER BY o.created_at, o.id LIMIT 1) AS "same_as: SubmissionId",
+                      s.bundle_removed_at AS removed_at, s.bundle_removed_for AS removed_for,
+                      s.deleted_at, s.deleted_by
                FROM submissions s "# + $tail
             $(, $argument)*
         )
@@ -182,7 +182,6 @@ pub(crate) async fn find(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<Submission> {
-    let id = Text(id);
     select_submissions!("WHERE s.id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -195,7 +194,6 @@ pub(crate) async fn of_team(
     connection: &mut SqliteConnection,
     team: TeamId,
 ) -> Result<Vec<Submission>> {
-    let team = Text(team);
     select_submissions!(
         "WHERE s.team_id = ? ORDER BY s.created_at DESC, s.id DESC",
         team
@@ -212,11 +210,7 @@ pub(crate) async fn created_at(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<Option<Timestamp>> {
-    let id = Text(id);
-    let at = sqlx::query_scalar!(
-        r#"SELECT created_at AS "at: Instant" FROM submissions WHERE id = ?"#,
-        id
-    );
+    let at = sqlx::query_scalar!("SELECT created_at AS at FROM submissions WHERE id = ?", id);
     Ok(at.fetch_optional(connection).await?.map(|at| at.0))
 }
 
@@ -228,7 +222,7 @@ pub(crate) async fn of_team_after(
     (uploaded_at, id): (Timestamp, Option<SubmissionId>),
     limit: u32,
 ) -> Result<Vec<Submission>> {
-    let (team, uploaded_at, id) = (Text(team), Instant(uploaded_at), id.map(Text));
+    let uploaded_at = Instant(uploaded_at);
     select_submissions!(
         "WHERE s.team_id = ?1 AND s.created_at <= ?2 AND (s.created_at < ?2 OR ?3 IS NULL OR s.id < ?3)
          ORDER BY s.created_at DESC, s.id DESC LIMIT ?4",
@@ -263,7 +257,6 @@ pub(crate) async fn log(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<Option<String>> {
-    let id = Text(id);
     sqlx::query_scalar!("SELECT log FROM submissions WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -280,7 +273,7 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let bytes = i64::try_from(bundle.bytes)
         .map_err(|_| StoreError::Conflict("the bundle is larger than any disk".into()))?;
-    let (id, team, now) = (Text(id), Text(team), Instant(now));
+    let now = Instant(now);
     sqlx::query!(
         "INSERT INTO submissions (id, team_id, bundle_key, bundle_bytes, bundle_blake3,
                                   bundle_file_name, created_at, state)
@@ -305,7 +298,7 @@ pub(crate) async fn set_valid(
     timing: &[ValidationTiming],
     log: &str,
 ) -> Result<()> {
-    let (id, timing) = (Text(id), Json(timing));
+    let timing = Json(timing);
     sqlx::query!(
         "UPDATE submissions SET state = 'valid', agent_name = ?, runtime = ?, timing = ?, log = ? WHERE id = ?",
         agent_name,
@@ -327,7 +320,7 @@ pub(crate) async fn set_invalid(
     timing: &[ValidationTiming],
     log: &str,
 ) -> Result<()> {
-    let (id, timing) = (Text(id), Json(timing));
+    let timing = Json(timing);
     sqlx::query!(
         "UPDATE submissions SET state = 'invalid', agent_name = ?, runtime = ?, reason = ?, timing = ?, log = ?
          WHERE id = ?",
@@ -348,7 +341,6 @@ pub(crate) async fn set_validation_error(
     id: SubmissionId,
     reason: &str,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE submissions SET state = 'validation_error', reason = ? WHERE id = ?",
         reason,
@@ -365,7 +357,7 @@ pub(crate) async fn set_withdrawn(
     id: SubmissionId,
     withdrawn_at: Option<Timestamp>,
 ) -> Result<()> {
-    let (id, withdrawn_at) = (Text(id), withdrawn_at.map(Instant));
+    let withdrawn_at = withdrawn_at.map(Instant);
     sqlx::query!(
         "UPDATE submissions SET withdrawn_at = ? WHERE id = ?",
         withdrawn_at,
@@ -381,7 +373,6 @@ pub(crate) async fn set_label(
     id: SubmissionId,
     label: Option<&str>,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("UPDATE submissions SET label = ? WHERE id = ?", label, id)
         .execute(connection)
         .await?;
@@ -393,7 +384,6 @@ pub(crate) async fn set_note(
     id: SubmissionId,
     note: Option<&str>,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("UPDATE submissions SET note = ? WHERE id = ?", note, id)
         .execute(connection)
         .await?;

@@ -5,9 +5,9 @@ use crate::{
     error::{Result, StoreError},
     tables::{rulings::Ruling, terms, users},
 };
-use faceoff_types::{DivisionName, TeamId, TeamName};
+use faceoff_types::{DivisionName, StageName, TeamId, TeamName};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A participant of the season: it submits agents, which are evaluated.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,14 +36,14 @@ pub struct TeamProfile {
 }
 
 struct TeamRow {
-    id: Text<TeamId>,
-    name: Text<TeamName>,
+    id: TeamId,
+    name: TeamName,
     created_at: Instant,
     disqualified_at: Option<Instant>,
     disqualified_for: Option<String>,
     affiliation: Option<String>,
     link: Option<String>,
-    division: Option<Text<DivisionName>>,
+    division: Option<DivisionName>,
     retired_at: Option<Instant>,
     is_baseline: bool,
 }
@@ -51,14 +51,14 @@ struct TeamRow {
 impl From<TeamRow> for Team {
     fn from(row: TeamRow) -> Self {
         Self {
-            id: row.id.0,
-            name: row.name.0,
+            id: row.id,
+            name: row.name,
             created_at: row.created_at.0,
             disqualified: Ruling::from_columns(row.disqualified_at, row.disqualified_for),
             profile: TeamProfile {
                 affiliation: row.affiliation,
                 link: row.link,
-                division: row.division.map(|name| name.0),
+                division: row.division,
             },
             retired_at: row.retired_at.map(|at| at.0),
             is_baseline: row.is_baseline,
@@ -71,12 +71,9 @@ macro_rules! select_teams {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             TeamRow,
-            r#"SELECT id AS "id: Text<TeamId>", name AS "name: Text<TeamName>",
-                      created_at AS "created_at: Instant",
-                      disqualified_at AS "disqualified_at: Instant", disqualified_for,
-                      affiliation, link, division AS "division: Text<DivisionName>",
-                      retired_at AS "retired_at: Instant", is_baseline AS "is_baseline: bool"
-               FROM teams "# + $tail
+            "SELECT id, name, created_at, disqualified_at, disqualified_for, affiliation, link, division, retired_at,
+                      is_baseline
+               FROM teams " + $tail
             $(, $argument)*
         )
     };
@@ -89,7 +86,6 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Team>> 
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: TeamId) -> Result<Team> {
-    let id = Text(id);
     select_teams!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -99,7 +95,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: TeamId) -> Resul
 
 /// Adds a team. [`StoreError::TeamNameTaken`] if the name exists, regardless of case.
 pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Result<()> {
-    let (id, name) = (Text(team.id), Text(&team.name));
+    let (id, name) = (team.id, &team.name);
     let created_at = Instant(team.created_at);
     let division = team.profile.division.as_ref().map(DivisionName::as_str);
     sqlx::query!(
@@ -123,7 +119,7 @@ pub(crate) async fn set_name(
     id: TeamId,
     name: &TeamName,
 ) -> Result<()> {
-    let (id, text) = (Text(id), name.as_str());
+    let text = name.as_str();
     sqlx::query!("UPDATE teams SET name = ? WHERE id = ?", text, id)
         .execute(connection)
         .await
@@ -136,7 +132,6 @@ pub(crate) async fn set_profile(
     id: TeamId,
     profile: &TeamProfile,
 ) -> Result<()> {
-    let id = Text(id);
     let division = profile.division.as_ref().map(DivisionName::as_str);
     sqlx::query!(
         "UPDATE teams SET affiliation = ?, link = ?, division = ? WHERE id = ?",
@@ -157,7 +152,7 @@ pub(crate) async fn set_retired(
     retired_at: Option<Timestamp>,
     is_by_organiser: bool,
 ) -> Result<()> {
-    let (id, is_by_organiser) = (Text(id), is_by_organiser && retired_at.is_some());
+    let is_by_organiser = is_by_organiser && retired_at.is_some();
     let retired_at = retired_at.map(Instant);
     sqlx::query!(
         "UPDATE teams SET retired_at = ?, retired_by_organiser = ? WHERE id = ?",
@@ -175,7 +170,6 @@ pub(crate) async fn set_baseline(
     id: TeamId,
     is_baseline: bool,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE teams SET is_baseline = ? WHERE id = ?",
         is_baseline,
@@ -190,8 +184,7 @@ pub(crate) async fn set_baseline(
 pub(crate) async fn signed_off_stage(
     connection: &mut SqliteConnection,
     id: TeamId,
-) -> Result<Option<String>> {
-    let id = Text(id);
+) -> Result<Option<StageName>> {
     Ok(sqlx::query_scalar!(
         "SELECT g.name FROM stages g
          WHERE g.finalised_at IS NOT NULL
@@ -217,11 +210,9 @@ pub(crate) async fn evidence(
     connection: &mut SqliteConnection,
     id: TeamId,
 ) -> Result<Option<Evidence>> {
-    let id = Text(id);
     let row = sqlx::query!(
-        r#"SELECT disqualified_at AS "disqualified_at: Instant", disqualified_for,
-                  retired_at AS "retired_at: Instant", retired_by_organiser AS "by_organiser: bool"
-           FROM teams WHERE id = ?"#,
+        "SELECT disqualified_at, disqualified_for, retired_at, retired_by_organiser AS by_organiser
+           FROM teams WHERE id = ?",
         id
     )
     .fetch_optional(connection)
@@ -240,7 +231,6 @@ pub(crate) async fn set_disqualified(
     id: TeamId,
     ruling: Option<&Ruling>,
 ) -> Result<()> {
-    let id = Text(id);
     let disqualified_at = ruling.map(|ruling| Instant(ruling.at));
     let reason = ruling.map(|ruling| &ruling.reason);
     sqlx::query!(

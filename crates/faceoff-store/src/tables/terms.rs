@@ -16,11 +16,9 @@ pub struct Terms {
 
 /// All versions, the newest first.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Terms>> {
-    let rows = sqlx::query!(
-        r#"SELECT version AS "version: u32", since AS "since: Instant", text FROM terms ORDER BY version DESC"#
-    )
-    .fetch_all(connection)
-    .await?;
+    let rows = sqlx::query!("SELECT version, since, text FROM terms ORDER BY version DESC")
+        .fetch_all(connection)
+        .await?;
     let terms = rows.into_iter().map(|row| Terms {
         version: row.version,
         since: row.since.0,

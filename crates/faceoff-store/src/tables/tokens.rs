@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{TeamId, TokenId, UserId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// The owner of a token, as whom its requests act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,24 +28,24 @@ impl TokenOwner {
         }
     }
 
-    const fn team(self) -> Option<Text<TeamId>> {
+    const fn team(self) -> Option<TeamId> {
         match self {
-            Self::Team(id) => Some(Text(id)),
+            Self::Team(id) => Some(id),
             Self::Host | Self::User(_) => None,
         }
     }
 
-    const fn user(self) -> Option<Text<UserId>> {
+    const fn user(self) -> Option<UserId> {
         match self {
-            Self::User(id) => Some(Text(id)),
+            Self::User(id) => Some(id),
             Self::Host | Self::Team(_) => None,
         }
     }
 
-    fn from_columns(team: Option<Text<TeamId>>, user: Option<Text<UserId>>) -> Self {
+    fn from_columns(team: Option<TeamId>, user: Option<UserId>) -> Self {
         match (team, user) {
-            (Some(team), _) => Self::Team(team.0),
-            (None, Some(user)) => Self::User(user.0),
+            (Some(team), _) => Self::Team(team),
+            (None, Some(user)) => Self::User(user),
             (None, None) => Self::Host,
         }
     }
@@ -94,10 +94,10 @@ impl Token {
 }
 
 struct TokenRow {
-    id: Text<TokenId>,
+    id: TokenId,
     is_key: bool,
-    team_id: Option<Text<TeamId>>,
-    person_id: Option<Text<UserId>>,
+    team_id: Option<TeamId>,
+    person_id: Option<UserId>,
     name: String,
     created_at: Instant,
     expires_at: Option<Instant>,
@@ -108,7 +108,7 @@ struct TokenRow {
 impl From<TokenRow> for Token {
     fn from(row: TokenRow) -> Self {
         Self {
-            id: row.id.0,
+            id: row.id,
             kind: if row.is_key {
                 TokenKind::ApiToken
             } else {
@@ -129,10 +129,8 @@ macro_rules! select_tokens {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             TokenRow,
-            r#"SELECT id AS "id: Text<TokenId>", kind = 'key' AS "is_key!: bool",
-                      team_id AS "team_id: Text<TeamId>", person_id AS "person_id: Text<UserId>", name,
-                      created_at AS "created_at: Instant", expires_at AS "expires_at: Instant",
-                      last_used_at AS "last_used_at: Instant", revoked_at AS "revoked_at: Instant"
+            r#"SELECT id, kind = 'key' AS "is_key!: bool", team_id, person_id, name, created_at, expires_at,
+                      last_used_at, revoked_at
                FROM tokens "# + $tail
             $(, $argument)*
         )
@@ -148,7 +146,6 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Token>>
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: TokenId) -> Result<Token> {
-    let id = Text(id);
     select_tokens!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -170,15 +167,11 @@ pub(crate) async fn by_hash(
 
 /// The stored hash of a token.
 pub(crate) async fn hash_of(connection: &mut SqliteConnection, id: TokenId) -> Result<[u8; 32]> {
-    let id = Text(id);
-    sqlx::query_scalar!(
-        r#"SELECT hash AS "hash: Bytes32" FROM tokens WHERE id = ?"#,
-        id
-    )
-    .fetch_optional(connection)
-    .await?
-    .map(|hash| hash.0)
-    .ok_or(StoreError::NotFound("token"))
+    sqlx::query_scalar!("SELECT hash FROM tokens WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .map(|hash| hash.0)
+        .ok_or(StoreError::NotFound("token"))
 }
 
 /// Number of an owner's valid tokens and sessions at `now`.
@@ -189,9 +182,9 @@ pub(crate) async fn count_valid(
 ) -> Result<i64> {
     let (kind, team, user, now) = (owner.kind(), owner.team(), owner.user(), Instant(now));
     Ok(sqlx::query_scalar!(
-        r#"SELECT COUNT(*) FROM tokens
+        "SELECT COUNT(*) FROM tokens
            WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL
-             AND (expires_at IS NULL OR expires_at > ?)"#,
+             AND (expires_at IS NULL OR expires_at > ?)",
         kind,
         team,
         user,
@@ -207,7 +200,7 @@ pub(crate) async fn insert(
     token: &Token,
     hash: [u8; 32],
 ) -> Result<()> {
-    let (id, hash, kind) = (Text(token.id), Bytes32(hash), token.kind.name());
+    let (id, hash, kind) = (token.id, Bytes32(hash), token.kind.name());
     let owner = token.owner;
     let (owner_kind, team, user) = (owner.kind(), owner.team(), owner.user());
     let (created_at, expires_at) = (Instant(token.created_at), token.expires_at.map(Instant));
@@ -236,7 +229,7 @@ pub(crate) async fn set_hash(
     id: TokenId,
     hash: [u8; 32],
 ) -> Result<()> {
-    let (id, hash) = (Text(id), Bytes32(hash));
+    let hash = Bytes32(hash);
     sqlx::query!(
         "UPDATE tokens SET hash = ?, last_used_at = NULL WHERE id = ?",
         hash,
@@ -253,7 +246,7 @@ pub(crate) async fn set_last_used(
     id: TokenId,
     used_at: Timestamp,
 ) -> Result<()> {
-    let (id, used_at) = (Text(id), Instant(used_at));
+    let used_at = Instant(used_at);
     sqlx::query!(
         "UPDATE tokens SET last_used_at = ? WHERE id = ?",
         used_at,
@@ -269,7 +262,7 @@ pub(crate) async fn revoke(
     id: TokenId,
     revoked_at: Timestamp,
 ) -> Result<()> {
-    let (id, revoked_at) = (Text(id), Instant(revoked_at));
+    let revoked_at = Instant(revoked_at);
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ? WHERE id = ? AND revoked_at IS NULL",
         revoked_at,
@@ -289,7 +282,6 @@ pub(crate) async fn revoke_others(
 ) -> Result<()> {
     let (kind, team, user) = (owner.kind(), owner.team(), owner.user());
     let revoked_at = Instant(revoked_at);
-    let kept = kept.map(Text);
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ?
          WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL AND id IS NOT ?",

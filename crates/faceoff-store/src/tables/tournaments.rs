@@ -9,7 +9,7 @@ use faceoff_types::{
     StageId, StageName, SubmissionId, TournamentId, TournamentRules, TournamentSettings,
 };
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A tournament: rounds of games among teams.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,14 +36,14 @@ pub struct Tournament {
 }
 
 struct TournamentRow {
-    id: Text<TournamentId>,
+    id: TournamentId,
     number: u32,
-    name: Text<StageName>,
+    name: StageName,
     created_at: Instant,
-    stage: Option<Text<StageId>>,
+    stage: Option<StageId>,
     rules: Json<TournamentRules>,
     settings: Json<TournamentSettings>,
-    baseline: Option<Text<SubmissionId>>,
+    baseline: Option<SubmissionId>,
     paused_at: Option<Instant>,
     paused_for: Option<String>,
     closed_at: Option<Instant>,
@@ -52,14 +52,14 @@ struct TournamentRow {
 impl From<TournamentRow> for Tournament {
     fn from(row: TournamentRow) -> Self {
         Self {
-            id: row.id.0,
+            id: row.id,
             number: row.number,
-            name: row.name.0,
+            name: row.name,
             created_at: row.created_at.0,
-            stage: row.stage.map(|id| id.0),
+            stage: row.stage,
             rules: row.rules.0,
             settings: row.settings.0,
-            baseline: row.baseline.map(|id| id.0),
+            baseline: row.baseline,
             paused: Ruling::from_columns(row.paused_at, row.paused_for),
             closed_at: row.closed_at.map(|at| at.0),
         }
@@ -71,12 +71,9 @@ macro_rules! select_tournaments {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             TournamentRow,
-            r#"SELECT id AS "id: Text<TournamentId>", number AS "number: u32", name AS "name: Text<StageName>",
-                      created_at AS "created_at: Instant", stage_id AS "stage: Text<StageId>",
-                      rules AS "rules: Json<TournamentRules>", settings AS "settings: Json<TournamentSettings>",
-                      baseline_id AS "baseline: Text<SubmissionId>", paused_at AS "paused_at: Instant", paused_for,
-                      closed_at AS "closed_at: Instant"
-               FROM tournaments "# + $tail
+            "SELECT id, number, name, created_at, stage_id AS stage, rules, settings, baseline_id AS baseline,
+                      paused_at, paused_for, closed_at
+               FROM tournaments " + $tail
             $(, $argument)*
         )
     };
@@ -94,7 +91,6 @@ pub(crate) async fn find(
     connection: &mut SqliteConnection,
     id: TournamentId,
 ) -> Result<Tournament> {
-    let id = Text(id);
     select_tournaments!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -131,8 +127,8 @@ pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
 ) -> Result<()> {
-    let (id, name) = (Text(tournament.id), tournament.name.as_str());
-    let (created_at, stage) = (Instant(tournament.created_at), tournament.stage.map(Text));
+    let (id, name) = (tournament.id, tournament.name.as_str());
+    let (created_at, stage) = (Instant(tournament.created_at), tournament.stage);
     let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
     sqlx::query!(
         "INSERT INTO tournaments (id, number, name, created_at, stage_id, rules, settings) VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -155,12 +151,9 @@ pub(crate) async fn update(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
 ) -> Result<()> {
-    let (id, name) = (Text(tournament.id), tournament.name.as_str());
+    let (id, name) = (tournament.id, tournament.name.as_str());
     let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
-    let (baseline, closed_at) = (
-        tournament.baseline.map(Text),
-        tournament.closed_at.map(Instant),
-    );
+    let (baseline, closed_at) = (tournament.baseline, tournament.closed_at.map(Instant));
     let paused_at = tournament.paused.as_ref().map(|paused| Instant(paused.at));
     let paused_for = tournament.paused.as_ref().map(|paused| &paused.reason);
     sqlx::query!(

@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{TeamId, UserId, UserName};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// A user with an account: an organiser, or a member of one team for the whole season.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,9 +27,9 @@ pub struct User {
 }
 
 struct UserRow {
-    id: Text<UserId>,
-    name: Text<UserName>,
-    team_id: Option<Text<TeamId>>,
+    id: UserId,
+    name: UserName,
+    team_id: Option<TeamId>,
     joined_at: Instant,
     left_at: Option<Instant>,
     has_password: bool,
@@ -39,9 +39,9 @@ struct UserRow {
 impl From<UserRow> for User {
     fn from(row: UserRow) -> Self {
         Self {
-            id: row.id.0,
-            name: row.name.0,
-            team: row.team_id.map(|id| id.0),
+            id: row.id,
+            name: row.name,
+            team: row.team_id,
             joined_at: row.joined_at.0,
             left_at: row.left_at.map(|at| at.0),
             has_password: row.has_password,
@@ -55,10 +55,8 @@ macro_rules! select_users {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             UserRow,
-            r#"SELECT id AS "id: Text<UserId>", name AS "name: Text<UserName>",
-                      team_id AS "team_id: Text<TeamId>", joined_at AS "joined_at: Instant",
-                      left_at AS "left_at: Instant", password IS NOT NULL AS "has_password!: bool",
-                      accepted_terms AS "accepted_terms: u32"
+            r#"SELECT id, name, team_id, joined_at, left_at, password IS NOT NULL AS "has_password!: bool",
+                      accepted_terms
                FROM people "# + $tail
             $(, $argument)*
         )
@@ -73,7 +71,6 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<User>> 
 
 /// The members of a team, including those who have left, by name.
 pub(crate) async fn of_team(connection: &mut SqliteConnection, team: TeamId) -> Result<Vec<User>> {
-    let team = Text(team);
     let rows = select_users!("WHERE team_id = ? ORDER BY name", team)
         .fetch_all(connection)
         .await?;
@@ -81,7 +78,6 @@ pub(crate) async fn of_team(connection: &mut SqliteConnection, team: TeamId) -> 
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: UserId) -> Result<User> {
-    let id = Text(id);
     select_users!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -95,13 +91,13 @@ pub(crate) async fn find_with_password(
     name: &str,
 ) -> Result<Option<(UserId, String)>> {
     let row = sqlx::query!(
-        r#"SELECT id AS "id: Text<UserId>", password AS "password!" FROM people
+        r#"SELECT id, password AS "password!" FROM people
            WHERE name = ? AND password IS NOT NULL AND left_at IS NULL"#,
         name
     )
     .fetch_optional(connection)
     .await?;
-    Ok(row.map(|row| (row.id.0, row.password)))
+    Ok(row.map(|row| (row.id, row.password)))
 }
 
 /// Adds a user. [`StoreError::UserNameTaken`] if the name exists, regardless of case.
@@ -110,8 +106,8 @@ pub(crate) async fn insert(
     user: &User,
     password: Option<&str>,
 ) -> Result<()> {
-    let (id, name) = (Text(user.id), user.name.as_str());
-    let (team, joined_at) = (user.team.map(Text), Instant(user.joined_at));
+    let (id, name) = (user.id, user.name.as_str());
+    let (team, joined_at) = (user.team, Instant(user.joined_at));
     sqlx::query!(
         "INSERT INTO people (id, name, team_id, joined_at, password, accepted_terms) VALUES (?, ?, ?, ?, ?, ?)",
         id,
@@ -138,7 +134,6 @@ pub(crate) async fn set_password(
     id: UserId,
     password: &str,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("UPDATE people SET password = ? WHERE id = ?", password, id)
         .execute(connection)
         .await?;
@@ -150,7 +145,6 @@ pub(crate) async fn set_accepted_terms(
     id: UserId,
     version: u32,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!(
         "UPDATE people SET accepted_terms = ? WHERE id = ?",
         version,
@@ -167,7 +161,7 @@ pub(crate) async fn set_left(
     id: UserId,
     left_at: Timestamp,
 ) -> Result<()> {
-    let (id, left_at) = (Text(id), Instant(left_at));
+    let left_at = Instant(left_at);
     sqlx::query!(
         "UPDATE people SET left_at = ?, password = NULL WHERE id = ?",
         left_at,
@@ -195,7 +189,6 @@ pub(crate) async fn lacks_accepted_terms(
     team: TeamId,
     version: u32,
 ) -> Result<bool> {
-    let team = Text(team);
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM people WHERE team_id = ?1 AND left_at IS NULL)
               AND NOT EXISTS (SELECT 1 FROM people

@@ -10,7 +10,7 @@ pub(crate) async fn insert(
     submission: SubmissionId,
     job: Uuid,
 ) -> Result<()> {
-    let (submission, job) = (Text(submission), Text(job));
+    let job = Text(job);
     sqlx::query!(
         "INSERT INTO validation_runs (submission_id, job_id) VALUES (?, ?)",
         submission,
@@ -28,10 +28,10 @@ pub(crate) async fn of_job(
 ) -> Result<Option<SubmissionId>> {
     let job = Text(job);
     let found = sqlx::query_scalar!(
-        r#"SELECT submission_id AS "id: Text<SubmissionId>" FROM validation_runs WHERE job_id = ?"#,
+        "SELECT submission_id AS id FROM validation_runs WHERE job_id = ?",
         job
     )
     .fetch_optional(connection)
     .await?;
-    Ok(found.map(|id| id.0))
+    Ok(found)
 }

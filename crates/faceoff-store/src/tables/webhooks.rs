@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_types::{TeamId, WebhookId};
 use jiff::Timestamp;
-use sqlx::{SqliteConnection, types::Text};
+use sqlx::SqliteConnection;
 
 /// An address to which events are sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,8 +54,8 @@ impl std::fmt::Debug for WebhookSecrets {
 }
 
 struct WebhookRow {
-    id: Text<WebhookId>,
-    team_id: Option<Text<TeamId>>,
+    id: WebhookId,
+    team_id: Option<TeamId>,
     name: String,
     url: String,
     about: Json<Vec<String>>,
@@ -71,8 +71,8 @@ impl From<WebhookRow> for Webhook {
     fn from(row: WebhookRow) -> Self {
         let disabled = row.dead_at.zip(row.dead_for);
         Self {
-            id: row.id.0,
-            team: row.team_id.map(|team| team.0),
+            id: row.id,
+            team: row.team_id,
             name: row.name,
             url: row.url,
             topics: row.about.0,
@@ -90,11 +90,9 @@ macro_rules! select_webhooks {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             WebhookRow,
-            r#"SELECT id AS "id: Text<WebhookId>", team_id AS "team_id: Text<TeamId>", name, url,
-                      about AS "about: Json<Vec<String>>", created_at AS "created_at: Instant", seen,
-                      failing_since AS "failing_since: Instant", dead_at AS "dead_at: Instant", dead_for,
-                      old_secret_until AS "old_secret_until: Instant"
-               FROM webhooks "# + $tail
+            "SELECT id, team_id, name, url, about, created_at, seen, failing_since, dead_at, dead_for,
+                      old_secret_until
+               FROM webhooks " + $tail
             $(, $argument)*
         )
     };
@@ -109,7 +107,6 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Webhook
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: WebhookId) -> Result<Webhook> {
-    let id = Text(id);
     select_webhooks!("WHERE id = ?", id)
         .fetch_optional(connection)
         .await?
@@ -138,7 +135,6 @@ pub(crate) async fn with_new_events(
 
 /// Number of an owner's webhooks.
 pub(crate) async fn count(connection: &mut SqliteConnection, team: Option<TeamId>) -> Result<i64> {
-    let team = team.map(Text);
     Ok(
         sqlx::query_scalar!("SELECT COUNT(*) FROM webhooks WHERE team_id IS ?", team)
             .fetch_one(connection)
@@ -151,7 +147,7 @@ pub(crate) async fn insert(
     webhook: &Webhook,
     secret: [u8; 32],
 ) -> Result<()> {
-    let (id, team, secret) = (Text(webhook.id), webhook.team.map(Text), Bytes32(secret));
+    let (id, team, secret) = (webhook.id, webhook.team, Bytes32(secret));
     let (about, created_at) = (Json(&webhook.topics), Instant(webhook.created_at));
     sqlx::query!(
         "INSERT INTO webhooks (id, team_id, name, url, about, secret, created_at, seen) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
@@ -171,7 +167,7 @@ pub(crate) async fn insert(
 
 /// Stores the fields that the owner can change, and the state.
 pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook) -> Result<()> {
-    let (id, about) = (Text(webhook.id), Json(&webhook.topics));
+    let (id, about) = (webhook.id, Json(&webhook.topics));
     let failing_since = webhook.failing_since.map(Instant);
     let (dead_at, dead_for) = match &webhook.disabled {
         Some(disabled) => (Some(Instant(disabled.at)), Some(disabled.reason.clone())),
@@ -199,7 +195,6 @@ pub(crate) async fn set_seen(
     id: WebhookId,
     seen: i64,
 ) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("UPDATE webhooks SET seen = ? WHERE id = ?", seen, id)
         .execute(connection)
         .await?;
@@ -213,7 +208,7 @@ pub(crate) async fn set_secret(
     secret: [u8; 32],
     old_secret_until: Timestamp,
 ) -> Result<()> {
-    let (id, secret) = (Text(id), Bytes32(secret));
+    let secret = Bytes32(secret);
     let old_secret_until = Instant(old_secret_until);
     sqlx::query!(
         "UPDATE webhooks SET old_secret = secret, old_secret_until = ?, secret = ? WHERE id = ?",
@@ -232,11 +227,9 @@ pub(crate) async fn secrets(
     id: WebhookId,
     now: Timestamp,
 ) -> Result<WebhookSecrets> {
-    let id = Text(id);
     let row = sqlx::query!(
-        r#"SELECT secret AS "secret: Bytes32", old_secret AS "old_secret: Bytes32",
-                  old_secret_until AS "until: Instant"
-           FROM webhooks WHERE id = ?"#,
+        "SELECT secret, old_secret, old_secret_until AS until
+           FROM webhooks WHERE id = ?",
         id
     )
     .fetch_optional(connection)
@@ -250,7 +243,6 @@ pub(crate) async fn secrets(
 }
 
 pub(crate) async fn delete(connection: &mut SqliteConnection, id: WebhookId) -> Result<()> {
-    let id = Text(id);
     sqlx::query!("DELETE FROM webhooks WHERE id = ?", id)
         .execute(connection)
         .await?;

@@ -56,7 +56,7 @@ pub(crate) async fn delete(connection: &mut SqliteConnection, worker: &str) -> R
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<WorkerBan>> {
     let rows = sqlx::query_as!(
         BanRow,
-        r#"SELECT worker, banned_at AS "at: Instant", reason FROM worker_bans ORDER BY worker"#,
+        "SELECT worker, banned_at AS at, reason FROM worker_bans ORDER BY worker",
     )
     .fetch_all(connection)
     .await?;
