@@ -1,4 +1,5 @@
-//! Replays in a real browser, compared with the server's clips.
+//! Replays of episodes in a real browser, compared with the server's *clips*. A clip is the recorded motion of an episode, in
+//! *samples* at equal intervals.
 
 use crate::{
     CONFIG, Team,
@@ -14,7 +15,8 @@ use faceoff_tests::{
 use serde_json::Value;
 use std::{io::Write, path::Path};
 
-/// A server with a released evaluation, and the path of its page.
+/// Starts a server and waits for an evaluation whose results are public. Returns the server and the path of the evaluation's
+/// page.
 pub fn released_evaluation(scratch: &Path) -> (Server, String) {
     let server = Server::start(&scratch.join("data"), CONFIG);
     let team = Team::create(&server, "Alpha");
@@ -25,8 +27,8 @@ pub fn released_evaluation(scratch: &Path) -> (Server, String) {
     (server, path.replace("/api/v1", ""))
 }
 
-/// Moves the slider to a sample.
-fn scrub(page: &Page, sample: usize) {
+/// Moves the replay's slider to a sample, and waits until the sample is drawn.
+fn show_sample(page: &Page, sample: usize) {
     let _ = page.evaluate(&format!(
         "(() => {{
             const slider = document.querySelector('#replay input[type=range]');
@@ -37,13 +39,13 @@ fn scrub(page: &Page, sample: usize) {
     page.wait_until(&format!(
         "document.querySelector('#replay').dataset.step == '{sample}'"
     ));
-    // The sample is drawn two frames later.
+    // The browser draws the sample at most two frames later.
     let _ = page.evaluate(
         "new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(() => drawn(1))))",
     );
 }
 
-/// Presses the button of this name.
+/// Presses the button with this text.
 fn press(page: &Page, name: &str) {
     let pressed = page.evaluate(&format!(
         "(() => {{
@@ -56,18 +58,18 @@ fn press(page: &Page, name: &str) {
     assert_eq!(pressed, true, "there is a button {name:?}");
 }
 
-/// The centre of the pixels with the puck's colour in the flat view, and their number.
+/// The pixels with the puck's colour in the flat view: x and y of their centre, and their number.
 fn puck_pixels(page: &Page) -> [f64; 3] {
     let found = page.evaluate(
         "(() => {
             const canvases = [...document.querySelectorAll('#replay canvas')];
             const canvas = canvases.find(canvas => canvas.checkVisibility() && canvas.getContext('2d') !== null && canvas.width > 300);
             const { data, width, height } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-            const probe = document.createElement('i');
-            probe.style.color = 'var(--rp-puck)';
-            document.querySelector('#replay').append(probe);
-            const colour = getComputedStyle(probe).color.match(/\\d+/g).map(Number);
-            probe.remove();
+            const coloured = document.createElement('i');
+            coloured.style.color = 'var(--rp-puck)';
+            document.querySelector('#replay').append(coloured);
+            const colour = getComputedStyle(coloured).color.match(/\\d+/g).map(Number);
+            coloured.remove();
             let [x, y, count] = [0, 0, 0];
             for (let i = 0; i < width * height; i++) {
                 if (colour.every((part, k) => Math.abs(part - data[4 * i + k]) < 12)) {
@@ -92,9 +94,9 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
         .bytes()
         .expect("the clip comes whole");
     // The HTTP client has decompressed the clip; its reader expects it compressed.
-    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
-    packed.write_all(&bytes).expect("memory can be written");
-    let clip = Clip::read(&packed.finish().expect("memory can be written"));
+    let mut compressed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    compressed.write_all(&bytes).expect("memory can be written");
+    let clip = Clip::read(&compressed.finish().expect("memory can be written"));
     let positions = clip.expect("it is a clip").puck_positions();
     assert!(
         positions.len() > 20,
@@ -111,9 +113,9 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
     );
     // The picture changes with the sample and is not a single colour.
     let [first, second] = ["first.png", "second.png"].map(|name| scratch.path().join(name));
-    scrub(&page, 0);
+    show_sample(&page, 0);
     page.screenshot(&first);
-    scrub(&page, positions.len() - 1);
+    show_sample(&page, positions.len() - 1);
     page.screenshot(&second);
     let [first, second] = [first, second].map(|file| std::fs::read(file).expect("it was written"));
     assert!(
@@ -121,9 +123,14 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
         "{} bytes",
         first.len()
     );
-    let calls = page.evaluate("Number(document.querySelector('#replay').dataset.drawCalls)");
-    let calls = calls.as_f64().expect("the replay reports its draw calls");
-    assert!((5.0..=50.0).contains(&calls), "{calls} draw calls");
+    let draw_calls = page.evaluate("Number(document.querySelector('#replay').dataset.drawCalls)");
+    let draw_calls = draw_calls
+        .as_f64()
+        .expect("the replay reports its draw calls");
+    assert!(
+        (5.0..=50.0).contains(&draw_calls),
+        "{draw_calls} draw calls"
+    );
 
     press(&page, "Flat");
     page.wait_for("#replay[data-view=flat]");
@@ -137,24 +144,26 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
         2 * positions.len() / 3,
         positions.len() - 1,
     ];
-    let seen: Vec<[f64; 3]> = samples
+    let drawn: Vec<[f64; 3]> = samples
         .iter()
         .map(|sample| {
-            scrub(&page, *sample);
+            show_sample(&page, *sample);
             puck_pixels(&page)
         })
         .collect();
-    // Two samples give the scale from metres to pixels: equal for both axes, y upwards.
-    let far = (0..4).max_by(|a, b| {
+    // The first sample and the one farthest from it give the scale from metres to pixels. It is equal for both axes; y points
+    // upwards.
+    let farthest = (0..samples.len()).max_by(|a, b| {
         let from_start = |i: &usize| (positions[samples[*i]][0] - positions[0][0]).abs();
         from_start(a).total_cmp(&from_start(b))
     });
-    let far = far.expect("there are four samples");
-    let scale = (seen[far][0] - seen[0][0]) / (positions[samples[far]][0] - positions[0][0]);
-    assert!(scale > 100.0, "{scale} pixels per metre: {seen:?}");
-    for (sample, [x, y, count]) in samples.iter().zip(&seen) {
-        let expected_x = seen[0][0] + scale * (positions[*sample][0] - positions[0][0]);
-        let expected_y = seen[0][1] - scale * (positions[*sample][1] - positions[0][1]);
+    let farthest = farthest.expect("there are samples");
+    let scale =
+        (drawn[farthest][0] - drawn[0][0]) / (positions[samples[farthest]][0] - positions[0][0]);
+    assert!(scale > 100.0, "{scale} pixels per metre: {drawn:?}");
+    for (sample, [x, y, count]) in samples.iter().zip(&drawn) {
+        let expected_x = drawn[0][0] + scale * (positions[*sample][0] - positions[0][0]);
+        let expected_y = drawn[0][1] - scale * (positions[*sample][1] - positions[0][1]);
         assert!(*count > 20.0, "the puck is drawn at sample {sample}");
         assert!(
             (x - expected_x).abs() < 3.0 && (y - expected_y).abs() < 3.0,
@@ -163,11 +172,11 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
     }
     assert_eq!(page.console_errors(), [""; 0]);
 
-    // A link opens a sample and a view.
+    // A link can name a sample and a view.
     let linked = browser.open(&format!("{}{path}#t=7&flat=1", server.url));
     linked.wait_for("#replay[data-state=ready][data-view=flat]");
     linked.wait_until("document.querySelector('#replay').dataset.step == '7'");
-    // No page overflows, in any window.
+    // No page is wider than its window.
     for view in [View::PHONE, View::PHONE.dark(), View::DESKTOP.dark()] {
         for path in [path.clone(), format!("{path}/embed")] {
             let page = browser.open_in(view, &format!("{}{path}", server.url));
@@ -177,17 +186,17 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
         }
     }
     // Without scripts the page shows the whole episode as one picture.
-    let still = browser.open_in(
+    let page_without_scripts = browser.open_in(
         View::PHONE.without_scripts(),
         &format!("{}{path}", server.url),
     );
-    let path_data =
-        still.evaluate("document.querySelector('.still .trajectory.puck').getAttribute('d')");
-    let points = path_data
+    let curve = page_without_scripts
+        .evaluate("document.querySelector('.still .trajectory.puck').getAttribute('d')");
+    let points = curve
         .as_str()
-        .map_or(0, |path| path.matches(['M', 'L']).count());
+        .map_or(0, |curve| curve.matches(['M', 'L']).count());
     assert_eq!(points, positions.len());
-    assert_eq!(still.overflow(), 0);
+    assert_eq!(page_without_scripts.overflow(), 0);
 }
 
 #[test]
@@ -201,16 +210,16 @@ fn missing_episode_is_reported_as_not_found() {
         "fetch('/api/v1{evaluation}/episodes/prepare/99/motion').then(answer => answer.status)"
     ));
     assert_eq!(answer, 404);
-    let absent = browser.open(&format!("{}{evaluation}/episodes/prepare/99", server.url));
+    let missing_page = browser.open(&format!("{}{evaluation}/episodes/prepare/99", server.url));
     assert!(
-        absent.text("h1").contains("Not found"),
+        missing_page.text("h1").contains("Not found"),
         "{}",
-        absent.text("h1")
+        missing_page.text("h1")
     );
 }
 
 #[test]
-fn compared_replays_run_in_step() {
+fn compared_replays_show_same_sample() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let teams = ["Alpha", "Beta"].map(|name| Team::create(&server, name));
@@ -218,15 +227,21 @@ fn compared_replays_run_in_step() {
         .each_ref()
         .map(|team| team.submit(&server, &repository().join("agents/hold")));
     let day = start_day(&server);
-    let [a, b] = [0, 1].map(|index: usize| {
+    let [left_page, right_page] = [0, 1].map(|index: usize| {
         let path = evaluation_path(&day, &submissions[index]);
         let finished = teams[index].wait_until_finished(&server, &path);
         assert_eq!(finished["state"], "finished", "{finished}");
         path.replace("/api/v1", "")
     });
-    let other = b.rsplit('/').next().expect("the path ends with the id");
+    let right_id = right_page
+        .rsplit('/')
+        .next()
+        .expect("the path ends with the id");
     let browser = Browser::start(scratch.path());
-    let page = browser.open(&format!("{}{a}/compare/{other}/defend/1", server.url));
+    let page = browser.open(&format!(
+        "{}{left_page}/compare/{right_id}/defend/1",
+        server.url
+    ));
     page.wait_until("document.querySelectorAll('.replay[data-state=ready]').length == 2");
     let _ = page.evaluate(
         "(() => {
@@ -238,10 +253,11 @@ fn compared_replays_run_in_step() {
     page.wait_until(
         "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.step == '12')",
     );
+    // axe-core finds violations of accessibility rules.
     let axe = axe_script();
     let mut found = faults(&page, &axe, "an episode twice");
     page.set_view(View::DESKTOP);
-    page.go_to(&format!("{}{a}/compare/{other}", server.url));
+    page.go_to(&format!("{}{left_page}/compare/{right_id}", server.url));
     found.extend(faults(&page, &axe, "a comparison"));
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
@@ -261,7 +277,7 @@ fn replay_without_webgl_shows_flat_view_with_reason() {
     page.go_to(&format!("{}{evaluation}/episodes/hit/0", server.url));
     page.wait_for("#replay[data-state=ready][data-view=flat]");
     assert!(page.text("#replay").contains("has no 3-D support"));
-    scrub(&page, 3);
+    show_sample(&page, 3);
     let [_, _, count] = puck_pixels(&page);
     assert!(count > 20.0, "the puck is drawn");
 }
@@ -280,8 +296,8 @@ fn repeatedly_opened_replays_leak_no_memory() {
             server.url
         ));
         page.wait_for("#replay[data-state=ready]");
-        scrub(&page, 20);
-        scrub(&page, 0);
+        show_sample(&page, 20);
+        show_sample(&page, 0);
         heap_bytes.push(page.script_bytes());
     }
     let max = |samples: &[f64]| samples.iter().copied().fold(0.0, f64::max);
@@ -290,8 +306,8 @@ fn repeatedly_opened_replays_leak_no_memory() {
     assert_eq!(page.console_errors(), [""; 0]);
 }
 
-/// Script CPU time per frame that 19 of 20 frames may take, in ms.
-const FRAME_MS: f64 = 4.0;
+/// CPU time of scripts that 19 of 20 frames may take, in milliseconds per frame.
+const MAX_FRAME_MS: f64 = 4.0;
 
 #[test]
 #[ignore = "its verdict depends on the speed of the machine; `make frames` runs it"]
@@ -306,23 +322,23 @@ fn frames_need_little_script_time() {
     let samples = samples.as_str().and_then(|text| text.parse().ok());
     let samples: usize = samples.expect("the slider has an end");
     // The first pass creates cached objects and is not measured.
-    let mut frames = Vec::new();
+    let mut frame_times_ms = Vec::new();
     for pass in 0..2 {
         for sample in (0..samples).rev() {
             let before = page.script_cpu_s();
-            scrub(&page, sample);
+            show_sample(&page, sample);
             if pass > 0 {
-                frames.push(1e3 * (page.script_cpu_s() - before));
+                frame_times_ms.push(1e3 * (page.script_cpu_s() - before));
             }
         }
     }
-    frames.sort_by(f64::total_cmp);
-    let percentile = |percent: usize| frames[(frames.len() - 1) * percent / 100];
+    frame_times_ms.sort_by(f64::total_cmp);
+    let percentile = |percent: usize| frame_times_ms[(frame_times_ms.len() - 1) * percent / 100];
     println!(
         "script per frame, ms of CPU: median {:.2}, 95th percentile {:.2}, of {} frames",
         percentile(50),
         percentile(95),
-        frames.len()
+        frame_times_ms.len()
     );
-    assert!(percentile(95) <= FRAME_MS, "{frames:?}");
+    assert!(percentile(95) <= MAX_FRAME_MS, "{frame_times_ms:?}");
 }

@@ -1,4 +1,5 @@
-//! Retention: the server automatically removes files whose stage does not keep them any longer, and reports it.
+//! Retention: a *stage* (a part of the season) has rules for how long the server keeps files. The server automatically removes
+//! files after that time, and reports it.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{repository, server::Server};
@@ -6,13 +7,15 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use std::{fs, path::Path};
 
-fn change_stage(server: &Server, stage: &str, body: &Value) -> (u16, Value) {
-    let request = server.request(Method::PATCH, stage, &server.admin_token);
+/// Changes the stage at this API path. Returns the status and body of the response.
+fn change_stage(server: &Server, stage_path: &str, body: &Value) -> (u16, Value) {
+    let request = server.request(Method::PATCH, stage_path, &server.admin_token);
     let answer = request.json(body).send().expect("the server answers");
     let status = answer.status().as_u16();
     (status, answer.json().expect("the API speaks JSON"))
 }
 
+/// Whether a zip archive is anywhere below the folder.
 fn has_archive(folder: &Path) -> bool {
     let entries = fs::read_dir(folder).expect("a folder can be read");
     entries
@@ -40,19 +43,20 @@ fn expired_dataset_is_removed_and_result_stays() {
 
     let stages = server.poll("/api/v1/stages", &team.token, |_| true);
     let id = stages[0]["id"].as_str().expect("a stage has an id");
-    let stage = format!("/api/v1/stages/{id}");
-    let soon = jiff::Timestamp::now() + jiff::SignedDuration::from_secs(2);
-    let (status, answer) = change_stage(&server, &stage, &json!({ "closes_at": soon }));
+    let stage_path = format!("/api/v1/stages/{id}");
+    let closes_at = jiff::Timestamp::now() + jiff::SignedDuration::from_secs(2);
+    let (status, answer) = change_stage(&server, &stage_path, &json!({ "closes_at": closes_at }));
     assert_eq!(status, 200, "{answer:#}");
-    let closed = server.poll(&stage, &team.token, |stage| stage["phase"] == "closed");
+    let closed = server.poll(&stage_path, &team.token, |stage| stage["phase"] == "closed");
     assert_eq!(closed["retention"], json!({}));
-    let mut body = json!({ "retention": { "until": soon } });
-    let (status, refused) = change_stage(&server, &stage, &body);
+    // The change removes files, so the server demands a confirmation.
+    let mut body = json!({ "retention": { "until": closes_at } });
+    let (status, refused) = change_stage(&server, &stage_path, &body);
     assert_eq!(status, 409, "{refused:#}");
     let detail = refused["detail"].as_str().expect("a problem has a detail");
     assert!(detail.contains("1 datasets of 1 teams"), "{detail}");
     body["confirm"] = refused["confirm"].clone();
-    let (status, answer) = change_stage(&server, &stage, &body);
+    let (status, answer) = change_stage(&server, &stage_path, &body);
     assert_eq!(status, 200, "{answer:#}");
 
     // A server looks for expired files when it starts.
@@ -63,10 +67,10 @@ fn expired_dataset_is_removed_and_result_stays() {
     });
     assert_eq!(after["result"], finished["result"], "the result stays");
     assert_eq!(after["dataset"], Value::Null);
-    let gone = server.get(&dataset, Some(&team.token));
-    assert_eq!(gone.status(), 410);
+    let download = server.get(&dataset, Some(&team.token));
+    assert_eq!(download.status(), 410);
     assert!(
         has_archive(&folder.path().join("artifacts/datasets")),
-        "the file follows a day later"
+        "the server deletes the file a day later"
     );
 }

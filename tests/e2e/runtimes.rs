@@ -1,4 +1,5 @@
-//! A stage that accepts agents of one runtime only, from the organiser's command to the team's verdict.
+//! A *stage* (a part of the season) that accepts agents of one *runtime* (an environment such as the interpreter `python3`) only:
+//! from the organiser's command to the validation of a team's submission.
 
 use crate::{
     CONFIG, Team,
@@ -14,7 +15,7 @@ use serde_json::json;
 fn stage_refuses_other_runtimes_and_names_accepted_ones() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    let change = |runtimes: &str| {
+    let set_runtimes = |runtimes: &str| {
         let args = [
             "stage",
             "change",
@@ -25,12 +26,12 @@ fn stage_refuses_other_runtimes_and_names_accepted_ones() {
         ];
         admin(&server, &[&args[..], &[runtimes]].concat())
     };
-    change("julia").expect_refusal(
+    set_runtimes("julia").expect_refusal(
         REFUSED,
         &["runtimes: expected runtimes", "native", "\"julia\""],
     );
-    change("../x").expect_refusal(REFUSED, &["runtimes", "dots, dashes"]);
-    change("").expect_refusal(REFUSED, &["runtimes"]);
+    set_runtimes("../x").expect_refusal(REFUSED, &["runtimes", "dots, dashes"]);
+    set_runtimes("").expect_refusal(REFUSED, &["runtimes"]);
     let args = ["stage", "change", "Qualifying", "--runtimes"];
     admin(&server, &args).expect_refusal(USAGE_ERROR, &["--runtimes"]);
     let unconfirmed = admin(&server, &[&args[..], &["native"]].concat());
@@ -38,12 +39,12 @@ fn stage_refuses_other_runtimes_and_names_accepted_ones() {
 
     let team = Team::create(&server, "Alpha");
     let python = python_bundle(scratch.path(), "python", &python_agent("say(hold)"));
-    let first = team.submit(&server, &python);
+    let python_submission = team.submit(&server, &python);
     assert_eq!(
-        (&first["state"], &first["runtime"]),
+        (&python_submission["state"], &python_submission["runtime"]),
         (&json!("valid"), &json!("python3"))
     );
-    let output = change("native").expect_success();
+    let output = set_runtimes("native").expect_success();
     assert!(output.contains("runtimes native only"), "{output}");
 
     let refused = team.submit(&server, &python);
@@ -52,9 +53,11 @@ fn stage_refuses_other_runtimes_and_names_accepted_ones() {
     for text in ["“Qualifying”", "native only", "names python3 in agent.toml"] {
         assert!(reason.contains(text), "{reason}");
     }
-    assert_eq!(refused["timing"], json!(null), "it was not started");
+    assert_eq!(refused["timing"], json!(null), "the agent was not started");
     // A submission that was valid before can be active, but the command reports that the stage excludes it.
-    let id = first["id"].as_str().expect("a submission has an id");
+    let id = python_submission["id"]
+        .as_str()
+        .expect("a submission has an id");
     let active = member(&server, &team.token, "activate", &[id]).expect_success();
     assert!(
         active.contains("excluded from the next cutoff") && active.contains("native only"),
@@ -71,11 +74,11 @@ fn stage_refuses_other_runtimes_and_names_accepted_ones() {
     let status = faceoff(&status, "").expect_success();
     assert!(status.contains("excluded from the next cutoff"), "{status}");
     admin(&server, &["start-day"]).expect_refusal(REFUSED, &["that the stage accepts"]);
-    let native = team.submit(&server, &reference("striker", scratch.path()));
+    let native_submission = team.submit(&server, &reference("striker", scratch.path()));
     assert_eq!(
-        (&native["state"], &native["runtime"]),
+        (&native_submission["state"], &native_submission["runtime"]),
         (&json!("valid"), &json!("native"))
     );
-    let output = change("all").expect_success();
+    let output = set_runtimes("all").expect_success();
     assert!(!output.contains("runtime"), "{output}");
 }

@@ -1,5 +1,6 @@
-//! Teams share slots fairly, whatever their agents do. The log of a real server with one slot shows in which order it
-//! starts its jobs.
+//! Teams share a server's *slots* (places for one running job each) fairly, whatever their agents do. The log of a real server
+//! with one slot shows in which order it starts its jobs. An evaluation consists of *shards* (jobs of some episodes) and a
+//! *scoring* job; a new upload gets a *validation run*.
 
 use crate::{Team, evaluation_path, start_day};
 use faceoff_tests::{
@@ -9,7 +10,7 @@ use faceoff_tests::{
 use serde_json::{Value, json};
 use std::{collections::BTreeMap, path::Path};
 
-/// One slot, small shards, and time limits that a sleeping agent exceeds.
+/// One slot and small shards. A test with sleeping agents lowers the time limit for the start of an agent.
 const CONFIG: &str = concat!(
     include_str!("../long_time_limits.toml"),
     r#"
@@ -22,17 +23,21 @@ slots = 1
 "#
 );
 
+/// Episodes of an evaluation with [`CONFIG`], one per shard.
+const EPISODES: usize = 12;
+/// Episodes of an evaluation that runs for a while, with [`with_startup_limit`].
+const MANY_EPISODES: usize = 40;
+
 /// A configuration with this time limit for the start of an agent.
-fn with_startup_s(seconds: f64) -> String {
-    let changed = [
-        ("startup_s = 600.0", format!("startup_s = {seconds:.1}")),
-        // More episodes keep the evaluation running for a while.
+fn with_startup_limit(limit_s: f64) -> String {
+    let replacements = [
+        ("startup_s = 600.0", format!("startup_s = {limit_s:.1}")),
         (
             "episodes_per_task = 12",
-            "episodes_per_task = 40".to_owned(),
+            format!("episodes_per_task = {MANY_EPISODES}"),
         ),
     ];
-    changed
+    replacements
         .iter()
         .fold(CONFIG.to_owned(), |config, (from, to)| {
             assert!(config.contains(from), "{from}");
@@ -47,95 +52,109 @@ struct LoggedJob {
     kind: &'static str,
     /// Id of the submission, evaluation or ablation.
     subject: String,
-    /// Milliseconds within the day.
-    from: i64,
-    to: i64,
+    /// Milliseconds since midnight, as for `end_ms`.
+    start_ms: i64,
+    end_ms: i64,
 }
 
 impl LoggedJob {
     fn duration_ms(&self) -> i64 {
-        self.to - self.from
+        self.end_ms - self.start_ms
     }
 }
 
-/// Milliseconds within the day of a line's time stamp, `2026-03-01T10:00:00.123456Z`.
-fn stamp(line: &str) -> i64 {
+/// The time stamp of a log line, such as `2026-03-01T10:00:00.123456Z`, in milliseconds since midnight.
+fn time_ms(line: &str) -> i64 {
     let time = line.split_once('T').expect("a time stamp").1;
     let number = |range: std::ops::Range<usize>| -> i64 { time[range].parse().expect("digits") };
     ((number(0..2) * 60 + number(3..5)) * 60 + number(6..8)) * 1000 + number(9..12)
 }
 
-/// All started jobs, in order.
+/// All jobs that the server has started, in order.
 fn logged_jobs(server: &Server) -> Vec<LoggedJob> {
-    let mut started: Vec<(String, LoggedJob)> = Vec::new();
+    /// Length of a UUID as text.
+    const ID_LENGTH: usize = 36;
+    let mut jobs_by_id: Vec<(String, LoggedJob)> = Vec::new();
     for line in server.log().lines() {
         let Some((_, rest)) = line.split_once("faceoff_worker::slot: ") else {
             continue;
         };
         let field = |name: &str| rest.split_once(name).map(|(_, rest)| rest.to_owned());
-        let id = field("job=").expect("a job id")[..36].to_owned();
+        let id = field("job=").expect("a job id")[..ID_LENGTH].to_owned();
         if rest.starts_with("started") {
             let description = field("description=").expect("a description");
-            let (kind, before) = if description.starts_with("validation run") {
+            let (kind, text_before_id) = if description.starts_with("validation run") {
                 ("validation", "submission ")
             } else if description.starts_with("scoring") {
                 ("scoring", "evaluation ")
             } else {
                 ("shard", " of ")
             };
-            let subject = description.split_once(before).expect("a subject").1[..36].to_owned();
+            let subject = description.split_once(text_before_id).expect("a subject").1[..ID_LENGTH]
+                .to_owned();
             // The slot ends each job before it starts the next. The end of the last job is not used.
-            let (from, to) = (stamp(line), stamp(line));
             let job = LoggedJob {
                 kind,
                 subject,
-                from,
-                to,
+                start_ms: time_ms(line),
+                end_ms: time_ms(line),
             };
-            started.push((id, job));
+            jobs_by_id.push((id, job));
         } else {
-            let job = started.iter_mut().rfind(|job| job.0 == id);
-            job.expect("the job was started before").1.to = stamp(line);
+            let job = jobs_by_id.iter_mut().rfind(|job| job.0 == id);
+            job.expect("the job was started before").1.end_ms = time_ms(line);
         }
     }
-    started.into_iter().map(|job| job.1).collect()
+    jobs_by_id.into_iter().map(|job| job.1).collect()
 }
 
-/// Asserts that two kinds of jobs alternate by slot time while both are pending: one kind gets consecutive jobs only while
-/// the other is ahead, and by no more than the other's longest job. This holds on a slow machine, too.
+/// Asserts that two kinds of jobs get equal slot time while both are pending. One kind gets several jobs in a row only while
+/// the other kind has had more time, and these jobs take no longer than the other kind's longest job. This holds on a slow
+/// machine, too.
 fn assert_fair_shares(
     jobs: &[LoggedJob],
-    one: impl Fn(&LoggedJob) -> bool,
-    other: impl Fn(&LoggedJob) -> bool,
+    is_first_kind: impl Fn(&LoggedJob) -> bool,
+    is_second_kind: impl Fn(&LoggedJob) -> bool,
 ) {
-    for (kind, opposite) in [
+    for (is_kind, is_other_kind) in [
         (
-            &one as &dyn Fn(&LoggedJob) -> bool,
-            &other as &dyn Fn(&LoggedJob) -> bool,
+            &is_first_kind as &dyn Fn(&LoggedJob) -> bool,
+            &is_second_kind as &dyn Fn(&LoggedJob) -> bool,
         ),
-        (&other, &one),
+        (&is_second_kind, &is_first_kind),
     ] {
-        let both: Vec<&LoggedJob> = jobs.iter().filter(|job| one(job) || other(job)).collect();
+        let both: Vec<&LoggedJob> = jobs
+            .iter()
+            .filter(|job| is_first_kind(job) || is_second_kind(job))
+            .collect();
         // Before the first and after the last job of the other kind, none of it is pending.
-        let opposites = || both.iter().enumerate().filter(|(_, job)| opposite(job));
-        let first = opposites().next().expect("there are some").0;
-        let last = opposites().next_back().expect("there are some").0;
-        let longest = opposites().map(|(_, job)| job.duration_ms()).max();
-        // The time between a claim and its line in the log belongs to neither job.
-        let longest = longest.unwrap_or_default() + 2000;
-        for run in both[first..last].chunk_by(|a, b| kind(a) == kind(b)) {
-            if kind(run[0]) {
-                // The last of them was started while this kind was not ahead.
-                let before_last: i64 = run[..run.len() - 1]
+        let others = || {
+            both.iter()
+                .enumerate()
+                .filter(|(_, job)| is_other_kind(job))
+        };
+        let first = others().next().expect("there are jobs of the other kind").0;
+        let last = others()
+            .next_back()
+            .expect("there are jobs of the other kind")
+            .0;
+        let longest_ms = others().map(|(_, job)| job.duration_ms()).max();
+        // The time between a claim and its line in the log belongs to no job: at most 2 s.
+        let longest_ms = longest_ms.unwrap_or_default() + 2000;
+        for in_a_row in both[first..last].chunk_by(|a, b| is_kind(a) == is_kind(b)) {
+            if is_kind(in_a_row[0]) {
+                // When the last of these jobs started, this kind had not had more time than the other.
+                let before_last_ms: i64 = in_a_row[..in_a_row.len() - 1]
                     .iter()
                     .map(|job| job.duration_ms())
                     .sum();
-                assert!(before_last <= longest, "{run:#?}\nin {jobs:#?}");
+                assert!(before_last_ms <= longest_ms, "{in_a_row:#?}\nin {jobs:#?}");
             }
         }
     }
 }
 
+/// An agent that never answers.
 fn sleeping_bundle(scratch: &Path) -> Vec<u8> {
     pack(&python_bundle(
         scratch,
@@ -148,7 +167,8 @@ fn quick_bundle(scratch: &Path) -> std::path::PathBuf {
     python_bundle(scratch, "quick", &python_agent("say(hold)"))
 }
 
-fn shards_of(jobs: &[LoggedJob], evaluation: &str) -> usize {
+/// The number of an evaluation's shards among the jobs.
+fn count_shards(jobs: &[LoggedJob], evaluation: &str) -> usize {
     jobs.iter()
         .filter(|job| job.kind == "shard" && evaluation.ends_with(&job.subject))
         .count()
@@ -156,17 +176,17 @@ fn shards_of(jobs: &[LoggedJob], evaluation: &str) -> usize {
 
 #[test]
 fn running_evaluation_keeps_its_share_beside_sleeping_uploads() {
-    // uploads of two teams, and several of one
+    // The numbers of uploads by two teams.
     for uploads in [[1, 1], [3, 0]] {
         let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-        let server = Server::start(&scratch.path().join("data"), &with_startup_s(10.0));
+        let server = Server::start(&scratch.path().join("data"), &with_startup_limit(10.0));
         let quick_team = Team::create(&server, "Quick");
         let submission = quick_team.submit(&server, &quick_bundle(scratch.path()));
         assert_eq!(submission["state"], "valid", "{submission:#}");
-        let before = logged_jobs(&server).len();
+        let earlier_jobs = logged_jobs(&server).len();
         let day = start_day(&server);
         let evaluation = evaluation_path(&day, &submission);
-        // the evaluation is running
+        // Waits until the evaluation runs.
         let _ = server.poll(&evaluation, &quick_team.token, |answer| {
             answer["episodes_done"].as_u64() >= Some(2)
                 || answer["state"] != "running" && answer["state"] != "queued"
@@ -184,8 +204,8 @@ fn running_evaluation_keeps_its_share_beside_sleeping_uploads() {
             let verdict = verdict_of(&server, id);
             assert_eq!(verdict["state"], "invalid", "{verdict:#}");
         }
-        let jobs = &logged_jobs(&server)[before..];
-        assert_eq!(shards_of(jobs, &evaluation), 40);
+        let jobs = &logged_jobs(&server)[earlier_jobs..];
+        assert_eq!(count_shards(jobs, &evaluation), MANY_EPISODES);
         assert_fair_shares(
             jobs,
             |job| job.kind == "validation",
@@ -209,7 +229,7 @@ fn evaluations_share_slots_and_ablations_run_after_them() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let teams: BTreeMap<&str, (Team, Value)> = [
-        // it sleeps, so it is slow on every machine
+        // This agent sleeps, so it is slow on every machine.
         (
             "Slow",
             "if message['step'] == 0: time.sleep(1.5)\nsay(hold)",
@@ -225,7 +245,7 @@ fn evaluations_share_slots_and_ablations_run_after_them() {
         (name, (team, submission))
     })
     .collect();
-    let before = logged_jobs(&server).len();
+    let earlier_jobs = logged_jobs(&server).len();
     let slow_id = teams["Slow"].1["id"].as_str().expect("an id");
     let requested = server.post(
         &format!("/api/v1/submissions/{slow_id}/ablation"),
@@ -243,12 +263,12 @@ fn evaluations_share_slots_and_ablations_run_after_them() {
         let finished = teams[name].0.wait_until_finished(&server, path);
         assert_eq!(finished["state"], "finished", "{finished:#}");
     }
-    let jobs = &logged_jobs(&server)[before..];
+    let jobs = &logged_jobs(&server)[earlier_jobs..];
     let is_shard_of =
         |path: &str, job: &LoggedJob| job.kind == "shard" && path.ends_with(&job.subject);
     let [slow, quick] = &evaluations;
     for path in &evaluations {
-        assert_eq!(shards_of(jobs, path), 12);
+        assert_eq!(count_shards(jobs, path), EPISODES);
     }
     assert_fair_shares(
         jobs,
@@ -256,19 +276,19 @@ fn evaluations_share_slots_and_ablations_run_after_them() {
         |job| is_shard_of(quick, job),
     );
     // Ablations do not delay the day. One job of the ablation may have started before the day.
-    let counts = |job: &LoggedJob| is_shard_of(slow, job) || is_shard_of(quick, job);
+    let is_of_day = |job: &LoggedJob| is_shard_of(slow, job) || is_shard_of(quick, job);
     let last = jobs
         .iter()
-        .rposition(counts)
+        .rposition(is_of_day)
         .expect("both evaluations are finished");
     let first = jobs
         .iter()
-        .position(counts)
+        .position(is_of_day)
         .expect("both evaluations are finished");
     assert!(
         jobs[first..=last]
             .iter()
-            .all(|job| counts(job) || job.kind == "scoring"),
+            .all(|job| is_of_day(job) || job.kind == "scoring"),
         "{jobs:#?}"
     );
 }

@@ -1,5 +1,5 @@
-//! A long run of everything at once: evaluations, valid and invalid uploads, readers, a disk that fills up and is freed,
-//! and `kill -9`. At the end each result equals that of an undisturbed run, each upload has the right verdict, and no
+//! A soak test, a long run of everything at once: evaluations, valid and invalid uploads, visitors of pages, a disk that fills up
+//! and is freed, and `kill -9`. At the end each result equals that of an undisturbed run, each upload has the right verdict, and no
 //! files are left over.
 #![expect(clippy::print_stdout, reason = "it prints a summary of its run")]
 
@@ -31,38 +31,41 @@ const SWING: &str = "import math\n\
      p[0] += 0.3 * math.sin(0.02 * message['step'] * (1 + message['step'] / 200))\n\
      say({'type': 'act', 'step': message['step'], 'action': [p, [0.0] * 7]})";
 /// Sleeps once an episode, so that evaluations last as long as the disturbances.
-const PAUSE: &str = "if message['step'] == 0:\n    time.sleep(1)\n";
+const PAUSE_PER_EPISODE: &str = "if message['step'] == 0:\n    time.sleep(1)\n";
 
-/// A number from the environment.
-fn setting(name: &str, default: u64) -> u64 {
+/// A number from an environment variable.
+fn number_from_environment(name: &str, default: u64) -> u64 {
     env::var(name).map_or(default, |text| text.parse().expect("a number"))
 }
 
-/// Random numbers from a seed: the index of the next draw.
-struct Random(u64);
+/// Random numbers from a seed.
+struct Random {
+    /// Index of the last number.
+    index: u64,
+}
 
 impl Random {
     fn from_seed(seed: u64) -> Self {
-        Self(seed << 32)
+        Self { index: seed << 32 }
     }
 
     /// A number below `limit`.
     fn below(&mut self, limit: u64) -> u64 {
-        self.0 += 1;
-        (draw(self.0) * limit as f64) as u64
+        self.index += 1;
+        (draw(self.index) * limit as f64) as u64
     }
 
-    fn millis_below(&mut self, limit: u64) -> Duration {
-        Duration::from_millis(self.below(limit))
+    fn millis_below(&mut self, limit_ms: u64) -> Duration {
+        Duration::from_millis(self.below(limit_ms))
     }
 }
 
-/// Counts of actions and of their responses.
+/// Counts of actions, such as `disk filled`, and of requests with the status of the response, such as `page 200`.
 #[derive(Debug, Default)]
 struct Tally(Mutex<BTreeMap<String, u64>>);
 
 impl Tally {
-    fn add(&self, action: impl Into<String>) {
+    fn count(&self, action: impl Into<String>) {
         *lock(&self.0).entry(action.into()).or_default() += 1;
     }
 }
@@ -74,7 +77,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// State that all threads share.
-struct Soak {
+struct SoakState {
     /// The server's current address; it changes with each restart.
     url: Mutex<String>,
     end: Instant,
@@ -82,7 +85,7 @@ struct Soak {
     client: Client,
 }
 
-impl Soak {
+impl SoakState {
     fn is_over(&self) -> bool {
         Instant::now() >= self.end
     }
@@ -101,12 +104,12 @@ impl Soak {
         });
         match answer {
             Ok((status, body)) => {
-                self.tally.add(format!("{action} {status}"));
+                self.tally.count(format!("{action} {status}"));
                 Some((status, body))
             }
             // The server was killed.
             Err(_) => {
-                self.tally.add(format!("{action} broken off"));
+                self.tally.count(format!("{action} broken off"));
                 None
             }
         }
@@ -123,14 +126,14 @@ impl Soak {
         }
     }
 
-    /// Uploads archives in turn until the end; returns the ids of the accepted ones, with the expected verdicts.
+    /// Uploads archives in turn until the end. Returns the ids of the accepted submissions with their expected states.
     fn upload(
         &self,
         token: &str,
         archives: &[(Vec<u8>, &'static str)],
     ) -> Vec<(String, &'static str)> {
         let mut accepted = Vec::new();
-        for (archive, verdict) in archives.iter().cycle() {
+        for (archive, expected_state) in archives.iter().cycle() {
             if self.is_over() {
                 return accepted;
             }
@@ -143,7 +146,7 @@ impl Soak {
             if let Some((201, body)) = answer {
                 let body: Value = serde_json::from_str(&body).expect("the API speaks JSON");
                 let id = body["id"].as_str().expect("a submission has an id");
-                accepted.push((id.to_owned(), *verdict));
+                accepted.push((id.to_owned(), *expected_state));
             }
             thread::sleep(Duration::from_secs(6));
         }
@@ -159,7 +162,8 @@ struct Contestant {
 }
 
 impl Contestant {
-    fn enter(server: &Server, name: &str, bundle: &Path, bundle_without_pauses: PathBuf) -> Self {
+    /// Creates a team that submits `bundle`.
+    fn create(server: &Server, name: &str, bundle: &Path, bundle_without_pauses: PathBuf) -> Self {
         let team = Team::create(server, name);
         let submission = team.submit(server, bundle);
         assert_eq!(submission["state"], "valid", "{submission:#}");
@@ -170,11 +174,15 @@ impl Contestant {
         }
     }
 
-    fn python(server: &Server, folder: &Path, name: &str, on_step: &str) -> Self {
+    /// Creates a team whose agent runs this code in each step, and sleeps once an episode.
+    fn with_python_agent(server: &Server, folder: &Path, name: &str, on_step: &str) -> Self {
         let bundle =
             |name: &str, on_step: &str| python_bundle(folder, name, &python_agent(on_step));
-        let with_pauses = bundle(&format!("paced-{name}"), &format!("{PAUSE}{on_step}"));
-        Self::enter(server, name, &with_pauses, bundle(name, on_step))
+        let with_pauses = bundle(
+            &format!("pausing-{name}"),
+            &format!("{PAUSE_PER_EPISODE}{on_step}"),
+        );
+        Self::create(server, name, &with_pauses, bundle(name, on_step))
     }
 }
 
@@ -185,26 +193,30 @@ fn assert_no_unexpected_errors(log: &str) {
     }
 }
 
-/// Fills the disk, kills and restarts the server until the end.
-fn disturb(disk: &mut SmallDisk, soak: &Soak, random: &mut Random) {
-    while !soak.is_over() {
+/// Until the end, repeatedly fills the disk, kills and restarts the server, or does both.
+fn disturb(disk: &mut SmallDisk, state: &SoakState, random: &mut Random) {
+    while !state.is_over() {
         thread::sleep(Duration::from_secs(4) + random.millis_below(20_000));
-        let kind = random.below(3);
-        let full = (kind != 0).then(|| {
-            soak.tally.add("disk filled");
-            let full = FilledDisk::fill(&disk.data_dir);
+        let (fills_disk, kills_server) = match random.below(3) {
+            0 => (false, true),
+            1 => (true, false),
+            _ => (true, true),
+        };
+        let filled_disk = fills_disk.then(|| {
+            state.tally.count("disk filled");
+            let filled_disk = FilledDisk::fill(&disk.data_dir);
             thread::sleep(random.millis_below(12_000));
-            full
+            filled_disk
         });
-        if kind != 1 {
-            soak.tally.add("server killed");
+        if kills_server {
+            state.tally.count("server killed");
             assert_no_unexpected_errors(&disk.server.log());
             let pause = random.millis_below(3000);
             disk.kill_and_restart(|| {
-                drop(full);
+                drop(filled_disk);
                 thread::sleep(pause);
             });
-            lock(&soak.url).clone_from(&disk.server.url);
+            lock(&state.url).clone_from(&disk.server.url);
         }
     }
 }
@@ -212,11 +224,11 @@ fn disturb(disk: &mut SmallDisk, soak: &Soak, random: &mut Random) {
 #[test]
 #[ignore = "it runs for an hour by default; `make soak` runs it alone"]
 fn disturbed_server_reaches_undisturbed_results() {
-    let minutes = setting("SOAK_MINUTES", 60);
-    let mut random = Random::from_seed(setting("SOAK_SEED", 2026));
+    let minutes = number_from_environment("SOAK_MINUTES", 60);
+    let mut random = Random::from_seed(number_from_environment("SOAK_SEED", 2026));
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let folder = scratch.path();
-    // Episodes of each task; two of the teams need more than a second for each.
+    // Episodes of each task. The agents of two teams need more than a second for each, so there is work until the end.
     let episodes = u32::try_from(4 * minutes).expect("some hours") + 6;
     let config = format!(
         "{}\n[server]\nmin_free_bytes = {}\n[evaluation]\nepisodes_per_task = {episodes}\n\
@@ -228,28 +240,33 @@ fn disturbed_server_reaches_undisturbed_results() {
     let server = &disk.server;
     let striker = reference("striker", folder);
     let contestants = [
-        Contestant::python(server, folder, "holds", HOLD),
-        Contestant::python(server, folder, "swings", SWING),
-        Contestant::enter(server, "strikes", &striker, striker.clone()),
+        Contestant::with_python_agent(server, folder, "holds", HOLD),
+        Contestant::with_python_agent(server, folder, "swings", SWING),
+        Contestant::create(server, "strikes", &striker, striker.clone()),
     ];
     let day = start_day(server);
     let evaluations: Vec<String> = contestants
         .iter()
         .map(|contestant| evaluation_path(&day, &contestant.submission))
         .collect();
-    let uploaders: Vec<Team> = ["Ann", "Bob"].map(|name| Team::create(server, name)).into();
+    let uploading_teams: Vec<Team> = ["Ann", "Bob"].map(|name| Team::create(server, name)).into();
     let unknown_runtime = python_bundle(folder, "unknown", &python_agent(HOLD));
     let manifest = "name = \"unknown\"\ncommand = [\"python3\"]\nruntime = \"none\"\n";
     fs::write(unknown_runtime.join("agent.toml"), manifest).expect("a scratch file can be written");
-    let good = pack(&python_bundle(folder, "good", &python_agent(HOLD)));
-    let truncated = good[..good.len() / 2].to_vec();
+    let valid = pack(&python_bundle(folder, "valid", &python_agent(HOLD)));
+    let truncated = valid[..valid.len() / 2].to_vec();
+    // Archives with the expected state of the submission.
     let archives = [
-        (good, "valid"),
+        (valid, "valid"),
         (b"no archive at all".to_vec(), "refused at once"),
         (truncated, "invalid"),
         (pack(&unknown_runtime), "invalid"),
         (
-            pack(&python_bundle(folder, "bad", &python_agent("say({})"))),
+            pack(&python_bundle(
+                folder,
+                "invalid-answers",
+                &python_agent("say({})"),
+            )),
             "invalid",
         ),
     ];
@@ -264,7 +281,7 @@ fn disturbed_server_reaches_undisturbed_results() {
     .to_vec();
     pages.extend(evaluations.iter().map(|path| path.replace("/api/v1", "")));
 
-    let soak = Soak {
+    let state = SoakState {
         url: Mutex::new(server.url.clone()),
         end: Instant::now() + Duration::from_secs(60 * minutes),
         tally: Tally::default(),
@@ -275,13 +292,13 @@ fn disturbed_server_reaches_undisturbed_results() {
     };
     let accepted: Vec<(usize, String, &str)> = thread::scope(|scope| {
         for _ in 0..3 {
-            scope.spawn(|| soak.fetch_pages(&pages));
+            scope.spawn(|| state.fetch_pages(&pages));
         }
-        let upload_threads: Vec<_> = uploaders
+        let upload_threads: Vec<_> = uploading_teams
             .iter()
-            .map(|team| scope.spawn(|| soak.upload(&team.token, &archives)))
+            .map(|team| scope.spawn(|| state.upload(&team.token, &archives)))
             .collect();
-        disturb(&mut disk, &soak, &mut random);
+        disturb(&mut disk, &state, &mut random);
         let results = upload_threads.into_iter().enumerate();
         results
             .flat_map(|(team, thread)| {
@@ -295,7 +312,7 @@ fn disturbed_server_reaches_undisturbed_results() {
 
     let server = &disk.server;
     for (team, id, expected) in &accepted {
-        let verdict = uploaders[*team].verdict(server, id);
+        let verdict = uploading_teams[*team].verdict(server, id);
         assert_eq!(verdict["state"], *expected, "{verdict:#}");
     }
     for (contestant, evaluation) in contestants.iter().zip(&evaluations) {
@@ -322,13 +339,13 @@ fn disturbed_server_reaches_undisturbed_results() {
     let wal = fs::metadata(disk.data_dir.join("faceoff.sqlite3-wal"));
     let wal_bytes = wal.map_or(0, |file| file.len());
     assert!(wal_bytes < WAL_LIMIT_BYTES, "{wal_bytes} bytes");
-    let tally = lock(&soak.tally.0).clone();
+    let tally = lock(&state.tally.0).clone();
     println!(
         "{minutes} minutes: {tally:#?}; {} accepted uploads, {episodes} episodes of each task",
         accepted.len()
     );
-    let answers: BTreeSet<&str> = tally.keys().map(String::as_str).collect();
-    let expected = BTreeSet::from([
+    let actions: BTreeSet<&str> = tally.keys().map(String::as_str).collect();
+    let expected_actions = BTreeSet::from([
         "disk filled",
         "server killed",
         "page 200",
@@ -341,6 +358,6 @@ fn disturbed_server_reaches_undisturbed_results() {
         "upload 507",
         "upload broken off",
     ]);
-    assert!(answers.is_subset(&expected), "{answers:?}");
-    assert!(tally.contains_key("upload 201"), "{answers:?}");
+    assert!(actions.is_subset(&expected_actions), "{actions:?}");
+    assert!(tally.contains_key("upload 201"), "{actions:?}");
 }

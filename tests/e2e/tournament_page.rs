@@ -19,6 +19,7 @@ fn mark(page: &Page) {
 
 #[test]
 fn round_pages_update_live_and_can_hide_results() {
+    // axe-core finds violations of accessibility rules.
     let axe = axe_script();
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
@@ -42,7 +43,7 @@ fn round_pages_update_live_and_can_hide_results() {
     let tournament = browser.open(&format!("{}/tournaments/{cup}", server.url));
     mark(&tournament);
 
-    // The queue is paused until the pages are open.
+    // No game starts until the pages are open.
     let pause = json!({ "reason": "Until the pages are open" });
     let paused = server.post("/api/v1/queue/pause", &server.admin_token, &pause);
     assert!(paused.status().is_success(), "{}", paused.status());
@@ -53,8 +54,8 @@ fn round_pages_update_live_and_can_hide_results() {
     );
     let game = game.as_str().expect("a path is text");
     let watched = browser.open(&format!("{}{game}", server.url));
-    let later = browser.open(&format!("{}{game}", server.url));
-    later.navigate_by("document.querySelector('form.spoilers').requestSubmit()");
+    let spoiler_free = browser.open(&format!("{}{game}", server.url));
+    spoiler_free.navigate_by("document.querySelector('form.spoilers').requestSubmit()");
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     assert!(resumed.status().is_success(), "{}", resumed.status());
 
@@ -80,27 +81,31 @@ fn round_pages_update_live_and_can_hide_results() {
         format!("/tournaments/{cup}"),
         "/tournaments".to_owned(),
     ] {
-        later.go_to(&format!("{}{path}", server.url));
-        let html = later.html();
+        spoiler_free.go_to(&format!("{}{path}", server.url));
+        let html = spoiler_free.html();
         assert!(!html.contains(because), "{path}: {html}");
-        assert!(later.text("main").contains("hidden"), "{path}");
+        assert!(spoiler_free.text("main").contains("hidden"), "{path}");
     }
-    later.go_to(&format!("{}{game}?show=result", server.url));
-    assert!(later.html().contains(because), "this result alone is shown");
+    spoiler_free.go_to(&format!("{}{game}?show=result", server.url));
+    assert!(
+        spoiler_free.html().contains(because),
+        "this result alone is shown"
+    );
 
-    let two = tournament.evaluate(
+    // The page of a pair of teams.
+    let pair_path = tournament.evaluate(
         "document.querySelector('a[href*=\"/teams/\"][href^=\"/tournaments/\"]').pathname",
     );
-    let two = two.as_str().expect("a path is text").to_owned();
+    let pair_path = pair_path.as_str().expect("a path is text").to_owned();
     let mut found = Vec::new();
     for (page, path) in [
         (&tournament, "/tournaments".to_owned()),
         (&tournament, format!("/tournaments/{cup}")),
-        (&tournament, two.clone()),
-        (&later, two),
-        (&later, format!("/tournaments/{cup}")),
+        (&tournament, pair_path.clone()),
+        (&spoiler_free, pair_path),
+        (&spoiler_free, format!("/tournaments/{cup}")),
         (&watched, game.to_owned()),
-        (&later, game.to_owned()),
+        (&spoiler_free, game.to_owned()),
     ] {
         page.set_view(View::DESKTOP);
         page.go_to(&format!("{}{path}", server.url));

@@ -9,7 +9,7 @@ use std::{
     process::Command,
 };
 
-/// The configuration of the server that made the folder.
+/// The configuration of the server that wrote the data folder.
 const CONFIG: &str = r#"
 [evaluation]
 episodes_per_task = 2
@@ -20,20 +20,28 @@ slots = 1
 lease_s = 5
 "#;
 
+/// The ruleset (version of the competition's rules) of the first release.
+const FIRST_RULESET: &str = "airhockey-2023.1";
+/// The current ruleset.
+const CURRENT_RULESET: &str = "airhockey-2023.3";
+/// Rows of the board with results of the first ruleset.
+const FIRST_BOARD_ROWS: usize = 2;
+
 /// The last API responses of the earlier version, with the teams' tokens.
 struct RecordedAnswers(Value);
 
 impl RecordedAnswers {
     fn read(data_dir: &Path) -> Self {
-        let text = fs::read(data_dir.join("told.json"))
+        let json = fs::read(data_dir.join("told.json"))
             .expect("the fixture has its server's last answers");
-        Self(serde_json::from_slice(&text).expect("it is JSON"))
+        Self(serde_json::from_slice(&json).expect("it is JSON"))
     }
 
     fn token(&self, team: &str) -> &str {
         self.0["tokens"][team].as_str().expect("a team has a token")
     }
 
+    /// The answer with this name, such as `day two Alpha`: the evaluation of the team Alpha on the second day.
     fn answer(&self, name: &str) -> &Value {
         let answer = &self.0["answers"][name];
         assert!(answer.is_object(), "the fixture has no answer {name}");
@@ -47,10 +55,11 @@ impl RecordedAnswers {
     }
 }
 
-pub(crate) fn unpack(archive: &str, into: &Path) {
+/// Unpacks an archive of `tests/fixtures` into a folder.
+pub(crate) fn unpack(archive: &str, folder: &Path) {
     let file = File::open(repository().join("tests/fixtures").join(archive)).expect("a fixture");
     tar::Archive::new(GzDecoder::new(file))
-        .unpack(into)
+        .unpack(folder)
         .expect("the fixture unpacks");
 }
 
@@ -87,7 +96,7 @@ fn first_release_data_folder_is_upgraded_and_continued() {
     let server = Server::start(&data_dir, CONFIG);
     let admin = server.admin_token.clone();
 
-    // Ended evaluations are unchanged. The first day is released; the second has running evaluations.
+    // Finished evaluations are unchanged. The results of the first day are public; the second day has running evaluations.
     for name in [
         "day one Alpha",
         "day one Beta",
@@ -105,7 +114,7 @@ fn first_release_data_folder_is_upgraded_and_continued() {
         if name.starts_with("day one") {
             assert!(released_at.is_string(), "{name}");
         }
-        // Fields that the old version did not have.
+        // The earlier version did not have the following fields.
         let stage = get(&server, "/api/v1/stages", &admin)[0].take();
         let fields = found.as_object_mut().expect("an answer is an object");
         assert_eq!(fields.remove("stage"), Some(stage["id"].clone()), "{name}");
@@ -114,7 +123,10 @@ fn first_release_data_folder_is_upgraded_and_continued() {
         assert_eq!(fields.remove("public"), Some(false.into()), "{name}");
         let next = fields.remove("next").expect("an answer has this field");
         assert!(next.is_string(), "{name}");
-        assert_eq!(stage["names_seeds"], false, "its days keep their seeds");
+        assert_eq!(
+            stage["names_seeds"], false,
+            "the seeds of its days do not derive from its id"
+        );
         assert_eq!(&found, recorded.answer(name), "{name}");
     }
     for (ablation, evaluation) in [
@@ -149,15 +161,16 @@ fn first_release_data_folder_is_upgraded_and_continued() {
         |answer| answer["state"] != "validating",
     );
     assert_eq!(validated["state"], "valid", "{validated:#}");
-    let slow = recorded.answer("day two Alpha")["submission"]
+    let alpha_submission = recorded.answer("day two Alpha")["submission"]
         .as_str()
         .expect("an id");
     let ablation = server.poll(
-        &format!("/api/v1/submissions/{slow}/ablation"),
+        &format!("/api/v1/submissions/{alpha_submission}/ablation"),
         alpha,
         |answer| answer["state"] != "open",
     );
     assert_eq!(ablation["state"], "finished", "{ablation:#}");
+    // An ablation evaluates the submission under each perturbation of the simulator: six profiles.
     assert_eq!(ablation["tasks"]["hit"].as_array().map(Vec::len), Some(6));
 
     // The last evaluation released the second day, and no evaluation was repeated.
@@ -170,6 +183,7 @@ fn first_release_data_folder_is_upgraded_and_continued() {
             "{day:#}"
         );
     }
+    // The date of the fixture's second day.
     let second_day = get(&server, "/api/v1/evaluations?day=2026-11-19", &admin);
     assert_eq!(
         second_day.as_array().map(Vec::len),
@@ -187,7 +201,7 @@ fn first_release_data_folder_is_upgraded_and_continued() {
         );
     }
     // The board of the first ruleset stays until a result of the next one exists; boards never mix rulesets.
-    assert_board(&server, "/api/v1/board", FIRST_RULESET, 2);
+    assert_board(&server, "/api/v1/board", FIRST_RULESET, FIRST_BOARD_ROWS);
     let started = server.post("/api/v1/days", &admin, &serde_json::json!({}));
     assert!(started.status().is_success(), "starting a day");
     let today = get(&server, "/api/v1/evaluations", &admin);
@@ -200,25 +214,28 @@ fn first_release_data_folder_is_upgraded_and_continued() {
         beta["id"].as_str().expect("it has an id")
     );
     let finished = server.poll(&path, &admin, |answer| answer["state"] == "finished");
-    assert_eq!(finished["result"]["ruleset"], "airhockey-2023.3");
+    assert_eq!(finished["result"]["ruleset"], CURRENT_RULESET);
     let board = get(&server, "/api/v1/board", &admin);
-    assert_eq!(board["ruleset"], "airhockey-2023.3");
+    assert_eq!(board["ruleset"], CURRENT_RULESET);
     for row in board["rows"].as_array().expect("a board has rows") {
-        assert_eq!(row["ruleset"], "airhockey-2023.3", "{board:#}");
+        assert_eq!(row["ruleset"], CURRENT_RULESET, "{board:#}");
     }
-    assert_board(&server, "/api/v1/board?revision=1", FIRST_RULESET, 2);
+    assert_board(
+        &server,
+        "/api/v1/board?revision=1",
+        FIRST_RULESET,
+        FIRST_BOARD_ROWS,
+    );
 }
 
-/// The ruleset of the first release.
-const FIRST_RULESET: &str = "airhockey-2023.1";
-
+/// Asserts that the board has this number of rows, all with results of this ruleset.
 fn assert_board(server: &Server, path: &str, ruleset: &str, rows: usize) {
     let board = get(server, path, &server.admin_token);
     assert_eq!(board["ruleset"], ruleset);
-    let shown = board["rows"].as_array().expect("a board has rows");
-    assert_eq!(shown.len(), rows, "{board:#}");
+    let board_rows = board["rows"].as_array().expect("a board has rows");
+    assert_eq!(board_rows.len(), rows, "{board:#}");
     assert!(
-        shown.iter().all(|row| row["ruleset"] == ruleset),
+        board_rows.iter().all(|row| row["ruleset"] == ruleset),
         "{board:#}"
     );
 }

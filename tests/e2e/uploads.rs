@@ -1,5 +1,5 @@
-//! Uploads that could take upload slots, disk space or time from other teams: slow, refused and endless ones. Meanwhile
-//! another team's evaluation gets its undisturbed result.
+//! Uploads that could take upload slots, disk space or time from other teams: slow, refused and oversized ones. Meanwhile the
+//! evaluation of another team, the honest team, gets its undisturbed result. A *bundle* is the archive with a team's agent.
 
 use crate::{
     Team,
@@ -24,9 +24,11 @@ use std::{
 use tar::{EntryType, Header};
 
 const MIB: usize = 1 << 20;
-const GZIP: [u8; 4] = [0x1f, 0x8b, 8, 0];
+/// The first bytes of a gzip archive.
+const GZIP_START: [u8; 4] = [0x1f, 0x8b, 8, 0];
 
-fn hold() -> PathBuf {
+/// The folder of an agent that holds still.
+fn hold_folder() -> PathBuf {
     repository().join("agents/hold")
 }
 
@@ -61,7 +63,7 @@ struct HonestTeam {
 impl HonestTeam {
     fn create(server: &Server) -> Self {
         let team = Team::create(server, "Honest");
-        let submission = team.submit(server, &hold());
+        let submission = team.submit(server, &hold_folder());
         assert_eq!(submission["state"], "valid", "{submission:#}");
         Self { team, submission }
     }
@@ -72,7 +74,7 @@ impl HonestTeam {
     }
 
     fn assert_undisturbed(&self, server: &Server, evaluation: &str, scratch: &Path) {
-        assert_undisturbed(server, &self.team, evaluation, &hold(), scratch);
+        assert_undisturbed(server, &self.team, evaluation, &hold_folder(), scratch);
     }
 }
 
@@ -81,7 +83,7 @@ impl HonestTeam {
 enum Slowness {
     /// Single bytes with pauses.
     ByteByByte,
-    /// The header, and then nothing.
+    /// The header of the request, and then nothing.
     NothingAfterHeader,
     /// Continuously, but below the minimum rate.
     BelowMinRate,
@@ -104,14 +106,14 @@ impl SlowUpload {
             .write_all(head.as_bytes())
             .expect("the server reads it");
         if !matches!(slowness, Slowness::NothingAfterHeader) {
-            stream.write_all(&GZIP).expect("the server reads it");
+            stream.write_all(&GZIP_START).expect("the server reads it");
         }
         Self { stream, slowness }
     }
 
     /// Continues until the server closes the connection; returns its response.
     fn run(mut self) -> String {
-        let (piece, pause) = match self.slowness {
+        let (chunk, pause) = match self.slowness {
             Slowness::ByteByByte => (vec![0; 1], Duration::from_millis(700)),
             Slowness::NothingAfterHeader => (Vec::new(), Duration::from_secs(1)),
             Slowness::BelowMinRate => (vec![0; 2000], Duration::from_millis(200)),
@@ -129,7 +131,7 @@ impl SlowUpload {
                     if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
                 {
                     // After its response the server reads no more.
-                    let _ = self.stream.write_all(&piece);
+                    let _ = self.stream.write_all(&chunk);
                 }
                 Err(_) => break,
             }
@@ -147,7 +149,7 @@ fn slow_uploads_time_out_without_blocking_other_teams() {
     let server = Server::start(&data_dir, &config);
     let honest = HonestTeam::create(&server);
 
-    // More than sixteen uploads, which once was the total limit: several per team.
+    // Eighteen uploads, two per team. An earlier version had a limit of sixteen uploads of all teams together.
     let variants = [
         Slowness::ByteByByte,
         Slowness::NothingAfterHeader,
@@ -156,28 +158,28 @@ fn slow_uploads_time_out_without_blocking_other_teams() {
     let slow_teams: Vec<_> = (0..9)
         .map(|number| Team::create(&server, &format!("Slow {number}")))
         .collect();
-    let mut slow = Vec::new();
+    let mut slow_uploads = Vec::new();
     for (number, team) in slow_teams.iter().enumerate() {
         for upload in 0..2 {
             let slowness = variants[(number + upload) % variants.len()];
-            slow.push(SlowUpload::begin(&server, &team.token, slowness));
+            slow_uploads.push(SlowUpload::begin(&server, &team.token, slowness));
         }
     }
-    let upload_threads: Vec<_> = slow
+    let upload_threads: Vec<_> = slow_uploads
         .into_iter()
-        .map(|slow| thread::spawn(move || slow.run()))
+        .map(|upload| thread::spawn(move || upload.run()))
         .collect();
     let evaluation = honest.start_evaluation(&server);
 
     // Other teams can upload; a slow team cannot. On a slow host, its upload slots may be free again by now.
-    let id = honest.team.upload(&server, pack(&hold()));
+    let id = honest.team.upload(&server, pack(&hold_folder()));
     let verdict = honest.team.verdict(&server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
-    let third = server.upload(&slow_teams[0].token, pack(&hold()));
-    if third.status() != 201 {
-        assert_eq!(third.status(), 429);
-        assert!(third.headers().contains_key("retry-after"));
-        let problem: Value = third.json().expect("a problem is JSON");
+    let third_upload = server.upload(&slow_teams[0].token, pack(&hold_folder()));
+    if third_upload.status() != 201 {
+        assert_eq!(third_upload.status(), 429);
+        assert!(third_upload.headers().contains_key("retry-after"));
+        let problem: Value = third_upload.json().expect("a problem is JSON");
         assert_eq!(problem["type"], "/problems#too-many-uploads", "{problem:#}");
     }
 
@@ -199,15 +201,17 @@ fn slow_uploads_time_out_without_blocking_other_teams() {
     honest.assert_undisturbed(&server, &evaluation, scratch.path());
 }
 
-/// A tar archive of one kind of entry.
+/// The bytes of a tar archive.
 struct Tar(Vec<u8>);
 
 impl Tar {
+    /// An archive with the manifest of a bundle.
     fn new() -> Self {
         let manifest = b"name = \"long\"\ncommand = [\"python3\"]\nruntime = \"python3\"\n";
         Self(Vec::new()).entry(EntryType::Regular, "agent.toml", manifest)
     }
 
+    /// Appends an entry, even one whose kind must not have content.
     fn entry(mut self, kind: EntryType, name: &str, content: &[u8]) -> Self {
         let mut header = Header::new_gnu();
         let field = &mut header.as_gnu_mut().expect("a GNU header").name;
@@ -222,7 +226,8 @@ impl Tar {
         self
     }
 
-    fn gz(mut self) -> Vec<u8> {
+    /// Ends the archive and compresses it.
+    fn compress(mut self) -> Vec<u8> {
         self.0.extend_from_slice(&[0; 1024]);
         let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
         encoder
@@ -232,7 +237,7 @@ impl Tar {
     }
 }
 
-/// A pax header with a comment of almost a MiB.
+/// A pax header (metadata of a tar entry) with a comment of almost a MiB.
 fn pax_comment() -> Vec<u8> {
     let length = MIB - 8;
     let mut record = format!("{length} comment=").into_bytes();
@@ -242,11 +247,11 @@ fn pax_comment() -> Vec<u8> {
 }
 
 /// A zip with this many folders.
-fn many_entries(entries: u32) -> Vec<u8> {
+fn many_folders(folders: u32) -> Vec<u8> {
     let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let options = zip::write::SimpleFileOptions::default();
-    for entry in 0..entries {
-        zip.add_directory(format!("f{entry}"), options)
+    for folder in 0..folders {
+        zip.add_directory(format!("f{folder}"), options)
             .expect("writing to memory does not fail");
     }
     zip.finish()
@@ -263,38 +268,39 @@ fn oversized_archive_structures_are_refused() {
     let honest = HonestTeam::create(&server);
     let team = Team::create(&server, "Endless");
     let evaluation = honest.start_evaluation(&server);
+    // Archives of 350 MiB, which compress to less than 2 MiB.
     let repeated_entries = |kind, content: &[u8]| {
         let tar = (0..350).fold(Tar::new(), |tar, _| tar.entry(kind, "long", content));
-        tar.gz()
+        tar.compress()
     };
-    let empty = GzEncoder::new(Vec::new(), Compression::fast());
-    let mut streams = empty
+    let empty_stream = GzEncoder::new(Vec::new(), Compression::fast());
+    let mut many_streams = empty_stream
         .finish()
         .expect("writing to memory does not fail")
         .repeat(70_000);
-    streams.extend(Tar::new().gz());
-    let overhead = "more bytes than its files explain";
+    many_streams.extend(Tar::new().compress());
+    let too_much_overhead = "more bytes than its files explain";
     let archives = [
         (
             repeated_entries(EntryType::XHeader, &pax_comment()),
-            overhead,
+            too_much_overhead,
         ),
         (
             repeated_entries(EntryType::GNULongName, &vec![b'n'; MIB]),
-            overhead,
+            too_much_overhead,
         ),
         (
             Tar::new()
                 .entry(EntryType::Directory, "d", &vec![0; 350 * MIB])
-                .gz(),
-            overhead,
+                .compress(),
+            too_much_overhead,
         ),
-        (streams, "compressed streams"),
+        (many_streams, "compressed streams"),
         (
-            Tar::new().entry(EntryType::GNUSparse, "s", b"").gz(),
+            Tar::new().entry(EntryType::GNUSparse, "s", b"").compress(),
             "sparse",
         ),
-        (many_entries(3000), "more than 1000 folders"),
+        (many_folders(3000), "more than 1000 folders"),
     ];
     for (archive, reason) in archives {
         assert!(archive.len() < 2 * MIB, "{} bytes", archive.len());
@@ -321,9 +327,10 @@ fn refused_uploads_are_removed_from_disk() {
     let evaluation = honest.start_evaluation(&server);
     let bundle =
         |name: &str, on_step: &str| python_bundle(scratch.path(), name, &python_agent(on_step));
-    let wrong = bundle("wrong", "say(hold)");
-    fs::write(wrong.join("agent.toml"), "name = 3\n").expect("a scratch file can be written");
-    let falls = bundle("falls", "sys.stderr.write('I fall\\n')\nsys.exit(9)");
+    let invalid_manifest = bundle("invalid-manifest", "say(hold)");
+    fs::write(invalid_manifest.join("agent.toml"), "name = 3\n")
+        .expect("a scratch file can be written");
+    let crashing = bundle("crashing", "sys.stderr.write('I crash\\n')\nsys.exit(9)");
     let no_tar = {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
         encoder
@@ -332,11 +339,11 @@ fn refused_uploads_are_removed_from_disk() {
         encoder.finish().expect("writing to memory does not fail")
     };
     let bundles = data_dir.join("artifacts/bundles");
-    let mut refused = Vec::new();
+    let mut refused_submissions = Vec::new();
     for (archive, reason, log) in [
-        (pack(&wrong), "agent.toml", ""),
+        (pack(&invalid_manifest), "agent.toml", ""),
         (no_tar, "damaged", ""),
-        (pack(&falls), "status 9", "I fall"),
+        (pack(&crashing), "status 9", "I crash"),
     ] {
         let id = team.upload(&server, archive);
         let verdict = team.verdict(&server, &id);
@@ -346,19 +353,19 @@ fn refused_uploads_are_removed_from_disk() {
             assert!(text.contains(part), "{verdict:#}");
         }
         wait_until("the archive is removed", || count_files(&bundles) == 1);
-        refused.push((id, verdict));
+        refused_submissions.push((id, verdict));
     }
-    // A body that is no archive, and uploads that break off, in the middle or before the first byte.
+    // A body that is no archive, and uploads whose client disconnects, in the middle or before the first byte.
     assert_eq!(
         server.upload(&team.token, b"#!/bin/sh".to_vec()).status(),
         415
     );
     for slowness in [Slowness::BelowMinRate, Slowness::NothingAfterHeader] {
-        let broken = SlowUpload::begin(&server, &team.token, slowness);
+        let upload = SlowUpload::begin(&server, &team.token, slowness);
         wait_until("the upload has started", || {
             count_files(&data_dir.join("uploads")) == 1
         });
-        drop(broken);
+        drop(upload);
         wait_until("its partial file is removed", || {
             count_files(&data_dir.join("uploads")) == 0
         });
@@ -368,45 +375,44 @@ fn refused_uploads_are_removed_from_disk() {
     server.kill();
 
     // The next start removes bundles that an earlier version or a kill has left: here one that no submission names.
-    let owner = fs::read_dir(&bundles)
+    let folder_of_honest_team = fs::read_dir(&bundles)
         .expect("there are bundles")
         .map(|entry| entry.expect("a folder can be read").path())
         .find(|folder| count_files(folder) == 1)
         .expect("the honest team's folder");
-    let leftover = owner.join("0190-unreferenced.tar.gz");
+    let leftover = folder_of_honest_team.join("0190-unreferenced.tar.gz");
     let file = fs::File::create(&leftover).expect("a scratch file can be written");
     let long_ago = SystemTime::now() - Duration::from_secs(7 * 24 * 3600);
     file.set_modified(long_ago).expect("a file has a time");
     let server = Server::start(&data_dir, CONFIG);
     wait_until("the leftover file is removed", || !leftover.exists());
     assert_eq!(count_files(&bundles), 1);
-    for (id, mut verdict) in refused {
+    for (id, mut verdict) in refused_submissions {
         let path = format!("/api/v1/submissions/{id}");
         let mut current: Value = server
             .get(&path, Some(&team.token))
             .json()
             .expect("the API speaks JSON");
-        // The bundle may have been removed before or after the verdict was read; the second name is deprecated.
+        // The bundle may have been removed before or after the verdict was read. Both fields report it; the second is deprecated.
         for view in [&mut current, &mut verdict] {
             let fields = view.as_object_mut().expect("a submission is an object");
             for name in ["bundle_removed", "archive_removed"] {
                 fields.remove(name);
             }
         }
-        assert_eq!(current, verdict, "its reason and log stay");
+        assert_eq!(current, verdict, "the reason and the log stay");
     }
 }
 
 #[test]
 fn upload_quota_is_per_team_and_reported_in_bytes() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let bundle = pack(&hold());
-    let size = bundle.len();
-    let config = format!(
-        "{CONFIG}\n[uploads]\nday_bytes = {}\nstored_bytes = {}\n",
-        5 * size,
-        2 * size + size / 2
-    );
+    let bundle = pack(&hold_folder());
+    let bundle_bytes = bundle.len();
+    // Five bundles a day, and two stored ones.
+    let (day_bytes, stored_bytes) = (5 * bundle_bytes, 2 * bundle_bytes + bundle_bytes / 2);
+    let config =
+        format!("{CONFIG}\n[uploads]\nday_bytes = {day_bytes}\nstored_bytes = {stored_bytes}\n");
     let server = Server::start(&scratch.path().join("data"), &config);
     let (greedy, other) = (
         Team::create(&server, "Greedy"),
@@ -417,17 +423,18 @@ fn upload_quota_is_per_team_and_reported_in_bytes() {
         let verdict = greedy.verdict(&server, &id);
         assert_eq!(verdict["state"], "valid", "{verdict:#}");
     }
-    let refused = |answer: reqwest::blocking::Response, status: u16, kind: &str, limit: usize| {
-        assert_eq!(answer.status(), status);
-        let problem: Value = answer.json().expect("a problem is JSON");
-        assert_eq!(problem["type"], format!("/problems#{kind}"), "{problem:#}");
-        assert_eq!(problem["limit_bytes"], limit, "{problem:#}");
-        let detail = problem["detail"].as_str().expect("a problem has a detail");
-        assert!(detail.contains(&limit.to_string()), "{detail}");
-    };
-    let full = server.upload(&greedy.token, bundle.clone());
-    refused(full, 409, "stored-quota-spent", 2 * size + size / 2);
-    // The same without Content-Length.
+    let assert_refused =
+        |answer: reqwest::blocking::Response, status: u16, kind: &str, limit: usize| {
+            assert_eq!(answer.status(), status);
+            let problem: Value = answer.json().expect("a problem is JSON");
+            assert_eq!(problem["type"], format!("/problems#{kind}"), "{problem:#}");
+            assert_eq!(problem["limit_bytes"], limit, "{problem:#}");
+            let detail = problem["detail"].as_str().expect("a problem has a detail");
+            assert!(detail.contains(&limit.to_string()), "{detail}");
+        };
+    let over_quota = server.upload(&greedy.token, bundle.clone());
+    assert_refused(over_quota, 409, "stored-quota-spent", stored_bytes);
+    // The same upload without Content-Length.
     let without_length = server
         .request(Method::POST, "/api/v1/submissions", &greedy.token)
         .header("content-type", "application/octet-stream")
@@ -436,16 +443,11 @@ fn upload_quota_is_per_team_and_reported_in_bytes() {
         )))
         .send()
         .expect("the server answers");
-    refused(
-        without_length,
-        409,
-        "stored-quota-spent",
-        2 * size + size / 2,
-    );
+    assert_refused(without_length, 409, "stored-quota-spent", stored_bytes);
 
     // Refused uploads do not count as stored, but count for the day.
     let mut truncated = bundle.clone();
-    truncated.truncate(size / 2);
+    truncated.truncate(bundle_bytes / 2);
     for _ in 0..3 {
         let id = other.upload(&server, truncated.clone());
         let verdict = other.verdict(&server, &id);

@@ -1,5 +1,5 @@
-//! Commands for users: invitations, tokens, team registration, announcements and questions. Invalid values end with a
-//! message and the matching exit status.
+//! Commands about users (organisers and members of teams): invitations, tokens, team registration, announcements and questions.
+//! Each also gets invalid values, which end with a message and the matching exit status.
 
 use crate::{
     CONFIG,
@@ -13,6 +13,7 @@ use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 
 const UNKNOWN_ID: &str = "00000000-0000-7000-8000-000000000000";
 
+/// `faceoff join`: accepts an invitation.
 fn join(server: &Server, link: &str, args: &[&str]) -> CommandOutput {
     faceoff(
         &[&["join", link, "--server", &server.url], args].concat(),
@@ -20,9 +21,9 @@ fn join(server: &Server, link: &str, args: &[&str]) -> CommandOutput {
     )
 }
 
-/// The first word of a text that contains this part.
+/// The first word of a text that contains this part, such as the prefix of a token.
 #[track_caller]
-fn word(text: &str, part: &str) -> String {
+fn find_word(text: &str, part: &str) -> String {
     let found = text.split_whitespace().find(|word| word.contains(part));
     found
         .unwrap_or_else(|| panic!("no {part} in {text:?}"))
@@ -33,13 +34,14 @@ fn id(value: &Value) -> String {
     value["id"].as_str().expect("it has an id").to_owned()
 }
 
-/// Invites a user with these arguments and accepts the invitation; returns the user's token.
+/// Invites a user with these arguments of `faceoff admin people`, and accepts the invitation with this name. Returns the user's
+/// token.
 #[track_caller]
-pub fn invite_and_join(server: &Server, invite: &[&str], name: &str) -> String {
-    let invited = admin(server, &[&["people"], invite].concat()).expect_success();
+pub fn invite_and_join(server: &Server, invite_args: &[&str], name: &str) -> String {
+    let invited = admin(server, &[&["people"], invite_args].concat()).expect_success();
     assert!(invited.contains("is not shown again"), "{invited}");
-    let link = word(&invited, "/join/fo_invite_");
-    word(
+    let link = find_word(&invited, "/join/fo_invite_");
+    find_word(
         &join(server, &link, &["--name", name]).expect_success(),
         "fo_person_",
     )
@@ -59,7 +61,7 @@ fn commands_invite_and_remove_users() {
 
     // An organiser, by a link that is valid once.
     let invited = people(&["invite-organiser", "Grace"]).expect_success();
-    let link = word(&invited, "/join/fo_invite_");
+    let link = find_word(&invited, "/join/fo_invite_");
     join(&server, "nonsense", &["--name", "Grace"])
         .expect_refusal(FAILED, &["expected a link like"]);
     join(&server, &format!("{link}x"), &["--name", "Grace"])
@@ -74,7 +76,7 @@ fn commands_invite_and_remove_users() {
         output.contains("organiser") && output.contains("not shown again"),
         "{output}"
     );
-    let grace = word(&output, "fo_person_");
+    let grace = find_word(&output, "fo_person_");
     join(&server, &link, &["--name", "Grace again"]).expect_refusal(REFUSED, &["409"]);
     people(&["invite-organiser", ""]).expect_refusal(REFUSED, &["note", "1 to"]);
     let account = member(&server, &grace, "whoami", &[]).expect_success();
@@ -85,13 +87,13 @@ fn commands_invite_and_remove_users() {
 
     // A member of a team, with a password.
     let team = admin_as(&server, &grace, &["create-team", "Alpha"]).expect_success();
-    word(&team, "fo_team_");
+    find_word(&team, "fo_team_");
     people(&["invite-member", "Unknown", "Ada"]).expect_refusal(
         FAILED,
         &["there is no team \"Unknown\"", "faceoff admin teams"],
     );
     let invited = people(&["invite-member", "Alpha", "Ada"]).expect_success();
-    let link = word(&invited, "/join/fo_invite_");
+    let link = find_word(&invited, "/join/fo_invite_");
     let with_password = |password: &str| {
         let args = [
             "join",
@@ -106,7 +108,7 @@ fn commands_invite_and_remove_users() {
     };
     with_password("too short\n").expect_refusal(REFUSED, &["password", "12"]);
     let output = with_password("a dozen characters, and more\n").expect_success();
-    let ada = word(&output, "fo_person_");
+    let ada = find_word(&output, "fo_person_");
     assert!(output.contains("of the team Alpha"), "{output}");
     let members = member(&server, &ada, "team", &["members"]).expect_success();
     assert!(
@@ -127,19 +129,22 @@ fn commands_invite_and_remove_users() {
 
     // The founder of a team.
     let invited = people(&["invite-team", "a founder"]).expect_success();
-    let link = word(&invited, "/join/fo_invite_");
-    let founder = ["--name", "Bob", "--affiliation", "TU"];
-    join(&server, &link, &founder).expect_refusal(USAGE_ERROR, &["--team"]);
+    let link = find_word(&invited, "/join/fo_invite_");
+    let founder_args = ["--name", "Bob", "--affiliation", "TU"];
+    join(&server, &link, &founder_args).expect_refusal(USAGE_ERROR, &["--team"]);
     join(&server, &link, &["--name", "Bob"]).expect_refusal(REFUSED, &["expected the team's name"]);
-    let taken = [&founder[..], &["--team", "alpha"]].concat();
-    join(&server, &link, &taken).expect_refusal(REFUSED, &["exists already"]);
-    let right = [&founder[..], &["--team", "Beta"]].concat();
-    let output = join(&server, &link, &right).expect_success();
+    let with_taken_name = [&founder_args[..], &["--team", "alpha"]].concat();
+    join(&server, &link, &with_taken_name).expect_refusal(REFUSED, &["exists already"]);
+    let with_new_name = [&founder_args[..], &["--team", "Beta"]].concat();
+    let output = join(&server, &link, &with_new_name).expect_success();
     assert!(output.contains("of the team Beta"), "{output}");
 
     // A revoked link.
     let invited = people(&["invite-member", "Beta", "Carl"]).expect_success();
-    let (invitation, link) = (word(&invited, "-"), word(&invited, "/join/fo_invite_"));
+    let (invitation, link) = (
+        find_word(&invited, "-"),
+        find_word(&invited, "/join/fo_invite_"),
+    );
     let revoked = people(&["uninvite", &invitation]).expect_success();
     assert!(revoked.contains("revoked"), "{revoked}");
     join(&server, &link, &["--name", "Carl"]).expect_refusal(REFUSED, &["409"]);
@@ -150,12 +155,12 @@ fn commands_invite_and_remove_users() {
         assert!(all.contains(&format!("for {note},")), "{note}: {all}");
     }
 
-    // A user without password and token gets a link to the same account.
+    // A user who has lost password and token gets a link to the same account.
     people(&["invite-back", "Zoe"]).expect_refusal(FAILED, &["there is no user \"Zoe\""]);
     let invited = people(&["invite-back", "Ada"]).expect_success();
-    let link = word(&invited, "/join/fo_invite_");
+    let link = find_word(&invited, "/join/fo_invite_");
     join(&server, &link, &["--name", "Eve"]).expect_refusal(REFUSED, &["leave the name out"]);
-    let ada = word(&join(&server, &link, &[]).expect_success(), "fo_person_");
+    let ada = find_word(&join(&server, &link, &[]).expect_success(), "fo_person_");
     let account = member(&server, &ada, "whoami", &["--json"]).json();
     assert_eq!(
         (&account["role"], &account["person"]["name"]),
@@ -176,8 +181,8 @@ fn commands_invite_and_remove_users() {
     member(&server, &ada, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401"]);
     people(&["invite-back", "Ada"]).expect_refusal(REFUSED, &["has left"]);
     let list = admin(&server, &["people", "list", "--json"]).json();
-    let names: Vec<_> = list.as_array().expect("a list").iter().collect();
-    assert_eq!(names.len(), 3, "{list:#}");
+    // Grace, Bob, and Ada, who has left.
+    assert_eq!(list.as_array().map(Vec::len), Some(3), "{list:#}");
 }
 
 #[test]
@@ -189,7 +194,7 @@ fn commands_create_list_rotate_and_revoke_tokens() {
     let is_valid = |token: &str| member(&server, token, "whoami", &[]).code == Some(0);
 
     let made = tokens(&["create", "laptop", "--days", "30"]).expect_success();
-    let laptop = word(&made, "fo_person_");
+    let laptop = find_word(&made, "fo_person_");
     assert!(
         made.contains("not shown again") && is_valid(&laptop),
         "{made}"
@@ -203,59 +208,63 @@ fn commands_create_list_rotate_and_revoke_tokens() {
     tokens(&["create", "ci", "--team", UNKNOWN_ID]).expect_refusal(REFUSED, &["404"]);
     let team = admin(&server, &["create-team", "Alpha", "--json"]).json();
     let made = tokens(&["create", "ci", "--team", &id(&team), "--json"]).json();
-    let ci = made["secret"]
+    let ci_token = made["secret"]
         .as_str()
         .expect("it is shown once")
         .to_owned();
-    let account = member(&server, &ci, "whoami", &[]).expect_success();
+    let account = member(&server, &ci_token, "whoami", &[]).expect_success();
     assert!(
         account.contains("API client of the team Alpha"),
         "{account}"
     );
 
     let list = tokens(&["list"]).expect_success();
-    let of_laptop = list.lines().find(|line| line.contains("laptop"));
-    let of_laptop = of_laptop.expect("it is listed").to_owned();
-    assert!(of_laptop.contains("valid until"), "{of_laptop}");
-    for secret in [&laptop, &ci, &grace, &server.admin_token] {
+    let laptop_line = list.lines().find(|line| line.contains("laptop"));
+    let laptop_line = laptop_line.expect("it is listed").to_owned();
+    assert!(laptop_line.contains("valid until"), "{laptop_line}");
+    for secret in [&laptop, &ci_token, &grace, &server.admin_token] {
         assert!(!list.contains(secret.as_str()), "a list shows no secret");
     }
-    let id_of_laptop = of_laptop
+    let laptop_id = laptop_line
         .split_whitespace()
         .next()
         .expect("its id comes first");
 
     // A rotated token is invalid at once.
-    let rotated = tokens(&["rotate", id_of_laptop]).expect_success();
-    let fresh = word(&rotated, "fo_person_");
-    assert!(!is_valid(&laptop) && is_valid(&fresh));
+    let rotated = tokens(&["rotate", laptop_id]).expect_success();
+    let new_laptop = find_word(&rotated, "fo_person_");
+    assert!(!is_valid(&laptop) && is_valid(&new_laptop));
     member(&server, &laptop, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401"]);
-    let by_host = admin(&server, &["token", "rotate", id_of_laptop]);
-    by_host.expect_refusal(NOT_ALLOWED, &["403", "only by that user"]);
+    // The token of the server's host may revoke the tokens of users, and not rotate them.
+    let refused_rotation = admin(&server, &["token", "rotate", laptop_id]);
+    refused_rotation.expect_refusal(NOT_ALLOWED, &["403", "only by that user"]);
     for verb in ["rotate", "revoke"] {
         tokens(&[verb, UNKNOWN_ID]).expect_refusal(REFUSED, &["404"]);
         tokens(&[verb, "laptop"]).expect_refusal(USAGE_ERROR, &["laptop"]);
     }
-    let revoked = admin(&server, &["token", "revoke", id_of_laptop]).expect_success();
+    let revoked = admin(&server, &["token", "revoke", laptop_id]).expect_success();
     assert!(revoked.contains("revoked 2"), "{revoked}");
-    assert!(!is_valid(&fresh) && is_valid(&grace));
-    member(&server, &fresh, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
-    tokens(&["rotate", id_of_laptop]).expect_refusal(REFUSED, &["create another one"]);
+    assert!(!is_valid(&new_laptop) && is_valid(&grace));
+    member(&server, &new_laptop, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    tokens(&["rotate", laptop_id]).expect_refusal(REFUSED, &["create another one"]);
     // A second revocation changes nothing.
-    tokens(&["revoke", id_of_laptop]).expect_success();
+    tokens(&["revoke", laptop_id]).expect_success();
     // Users have the same commands for their own tokens without `admin`.
-    let own = |args: &[&str]| member(&server, &grace, "token", args);
-    let created = own(&["create", "office"]).expect_success();
-    let list = own(&["list"]).expect_success();
-    let of_office = list.lines().find(|line| line.contains(" office "));
-    let of_office = word(of_office.expect("it is listed"), "-");
-    let fresh = word(&own(&["rotate", &of_office]).expect_success(), "fo_person_");
-    assert!(!is_valid(&word(&created, "fo_person_")) && is_valid(&fresh));
-    own(&["revoke", &of_office]).expect_success();
-    assert!(!is_valid(&fresh));
-    own(&["revoke", "office"]).expect_refusal(USAGE_ERROR, &["office"]);
+    let own_tokens = |args: &[&str]| member(&server, &grace, "token", args);
+    let created = own_tokens(&["create", "office"]).expect_success();
+    let list = own_tokens(&["list"]).expect_success();
+    let office_line = list.lines().find(|line| line.contains(" office "));
+    let office_id = find_word(office_line.expect("it is listed"), "-");
+    let new_office = find_word(
+        &own_tokens(&["rotate", &office_id]).expect_success(),
+        "fo_person_",
+    );
+    assert!(!is_valid(&find_word(&created, "fo_person_")) && is_valid(&new_office));
+    own_tokens(&["revoke", &office_id]).expect_success();
+    assert!(!is_valid(&new_office));
+    own_tokens(&["revoke", "office"]).expect_refusal(USAGE_ERROR, &["office"]);
     let revoked = tokens(&["revoke", &id(&made)]).expect_success();
-    assert!(revoked.contains("ci") && !is_valid(&ci));
+    assert!(revoked.contains("ci") && !is_valid(&ci_token));
 }
 
 #[test]
@@ -307,8 +316,11 @@ fn commands_register_teams_and_publish_announcements() {
     );
     registration(&["divisions", "Open", "open"]).expect_refusal(REFUSED, &["listed twice"]);
     registration(&["divisions", "<b>"]).expect_refusal(USAGE_ERROR, &["letters, digits"]);
-    let divided = registration(&["divisions", "Open", "Students"]).expect_success();
-    assert!(divided.contains("divisions: Open, Students"), "{divided}");
+    let with_divisions = registration(&["divisions", "Open", "Students"]).expect_success();
+    assert!(
+        with_divisions.contains("divisions: Open, Students"),
+        "{with_divisions}"
+    );
     let mut students = team("Alpha");
     students["team"]["division"] = json!("Students");
     let (_, alpha) = register(&students);
@@ -320,8 +332,8 @@ fn commands_register_teams_and_publish_announcements() {
     );
 
     let link = alpha["join_link"].as_str().expect("it is shown once");
-    let consenting = ["--name", "Ada", "--accept-terms", "1"];
-    join(&server, link, &consenting).expect_refusal(REFUSED, &["is pending"]);
+    let join_args = ["--name", "Ada", "--accept-terms", "1"];
+    join(&server, link, &join_args).expect_refusal(REFUSED, &["is pending"]);
     registration(&["approve", UNKNOWN_ID]).expect_refusal(REFUSED, &["404", "registration"]);
     registration(&["approve", "Alpha"]).expect_refusal(USAGE_ERROR, &["Alpha"]);
     let approved = registration(&["approve", &id(&alpha)]).expect_success();
@@ -331,11 +343,11 @@ fn commands_register_teams_and_publish_announcements() {
     let refused = registration(&["refuse", &id(&beta), "one team each"]).expect_success();
     assert!(refused.contains("refused: one team each"), "{refused}");
     registration(&["refuse", &id(&beta), "again"]).expect_refusal(REFUSED, &["was refused"]);
-    let of_beta = beta["join_link"].as_str().expect("it is shown once");
-    join(&server, of_beta, &consenting).expect_refusal(REFUSED, &["one team each"]);
+    let beta_link = beta["join_link"].as_str().expect("it is shown once");
+    join(&server, beta_link, &join_args).expect_refusal(REFUSED, &["one team each"]);
     join(&server, link, &["--name", "Ada"]).expect_refusal(REFUSED, &["consent to version 1"]);
-    let output = join(&server, link, &consenting).expect_success();
-    let ada = word(&output, "fo_person_");
+    let output = join(&server, link, &join_args).expect_success();
+    let ada = find_word(&output, "fo_person_");
     assert!(
         member(&server, &ada, "team", &["show"])
             .expect_success()
@@ -349,20 +361,20 @@ fn commands_register_teams_and_publish_announcements() {
     );
     assert_eq!(register(&team("Gamma")).0, 409);
 
-    // Other terms stop uploads until a member has accepted them.
+    // New terms stop uploads until a member has accepted them.
     fs::write(&terms, "Be fair, and quick.").expect("a scratch file can be written");
     assert!(publish(&terms).expect_success().contains("version 2"));
-    let of_team = |args: &[&str]| member(&server, &ada, "team", args);
+    let team_command = |args: &[&str]| member(&server, &ada, "team", args);
     let upload = || server.upload(&ada, vec![0x1f, 0x8b, 8, 0]).status();
     assert_eq!(upload(), 403);
     assert!(
-        of_team(&["terms"])
+        team_command(&["terms"])
             .expect_success()
             .contains("Be fair, and quick.")
     );
-    of_team(&["terms", "--accept", "7"]).expect_refusal(REFUSED, &["expected 2", "got 7"]);
-    of_team(&["terms", "--accept", "two"]).expect_refusal(USAGE_ERROR, &["--accept"]);
-    of_team(&["terms", "--accept", "2"]).expect_success();
+    team_command(&["terms", "--accept", "7"]).expect_refusal(REFUSED, &["expected 2", "got 7"]);
+    team_command(&["terms", "--accept", "two"]).expect_refusal(USAGE_ERROR, &["--accept"]);
+    team_command(&["terms", "--accept", "2"]).expect_success();
     assert_eq!(upload(), 201);
 
     // Announcements, questions and their answers.
@@ -379,15 +391,15 @@ fn commands_register_teams_and_publish_announcements() {
             .expect_success()
             .contains("no questions yet")
     );
-    of_team(&["ask", ""]).expect_refusal(REFUSED, &["text"]);
-    of_team(&["ask", "May we use two arms?"]).expect_success();
+    team_command(&["ask", ""]).expect_refusal(REFUSED, &["text"]);
+    team_command(&["ask", "May we use two arms?"]).expect_success();
     let questions = admin(&server, &["questions", "--json"]).json();
-    let asked = id(&questions[0]);
+    let question_id = id(&questions[0]);
     admin(&server, &["answer", UNKNOWN_ID, "No."]).expect_refusal(REFUSED, &["404", "question"]);
     admin(&server, &["answer", "first", "No."]).expect_refusal(USAGE_ERROR, &["first"]);
-    admin(&server, &["answer", &asked, ""]).expect_refusal(REFUSED, &["text"]);
-    admin(&server, &["answer", &asked, "No.", "--public"]).expect_success();
-    let news = of_team(&["news"]).expect_success();
+    admin(&server, &["answer", &question_id, ""]).expect_refusal(REFUSED, &["text"]);
+    admin(&server, &["answer", &question_id, "No.", "--public"]).expect_success();
+    let news = team_command(&["news"]).expect_success();
     for part in [
         "No day on Sunday",
         "The power is off.",
@@ -402,52 +414,55 @@ fn commands_register_teams_and_publish_announcements() {
 fn server_start_replaces_revoked_host_token() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data = scratch.path().join("data");
-    let file = data.join("admin-token");
-    let by_file = |server: &Server, args: &[&str]| {
+    let token_file = data.join("admin-token");
+    // Runs an organiser's command with the token in the data folder.
+    let with_token_file = |server: &Server, args: &[&str]| {
         let folder = data.to_string_lossy();
         let options = ["admin", "--server", &server.url, "--data-dir", &folder];
         faceoff(&[&options[..], args].concat(), "")
     };
     let server = Server::start(&data, CONFIG);
-    let first = server.admin_token.clone();
+    let first_token = server.admin_token.clone();
     let grace = invite_and_join(&server, &["invite-organiser", "Grace"], "Grace");
     // A start with a valid token keeps the token.
     server.kill();
     let server = Server::start(&data, CONFIG);
-    assert_eq!(server.admin_token, first);
-    by_file(&server, &["people", "list"]).expect_success();
+    assert_eq!(server.admin_token, first_token);
+    with_token_file(&server, &["people", "list"]).expect_success();
 
     let list = admin_as(&server, &grace, &["token", "list", "--json"]).json();
     let list = list.as_array().expect("a list");
-    let of_host = list.iter().find(|token| token["name"] == "admin-token");
-    let of_host = id(of_host.expect("the host has a token"));
+    let host_token = list.iter().find(|token| token["name"] == "admin-token");
+    let host_token_id = id(host_token.expect("the host has a token"));
     // The host's token cannot be rotated: the file would keep the old one, and the next start would use it.
-    admin_as(&server, &grace, &["token", "rotate", &of_host])
+    admin_as(&server, &grace, &["token", "rotate", &host_token_id])
         .expect_refusal(REFUSED, &["data folder", "revoke it"]);
-    admin_as(&server, &grace, &["token", "revoke", &of_host]).expect_success();
-    by_file(&server, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    admin_as(&server, &grace, &["token", "revoke", &host_token_id]).expect_success();
+    with_token_file(&server, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
     server.kill();
 
     let server = Server::start(&data, CONFIG);
-    assert_ne!(server.admin_token, first);
+    assert_ne!(server.admin_token, first_token);
     server.wait_for_log("was revoked; creating a new one", 1);
-    let mode = fs::metadata(&file)
+    let mode = fs::metadata(&token_file)
         .expect("the file exists")
         .permissions()
         .mode();
     assert_eq!(mode & 0o777, 0o600);
-    by_file(&server, &["people", "list"]).expect_success();
-    admin_as(&server, &first, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    with_token_file(&server, &["people", "list"]).expect_success();
+    admin_as(&server, &first_token, &["people", "list"])
+        .expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
     admin_as(&server, &grace, &["people", "list"]).expect_success();
     // A revoked token stays revoked, even if it is written back to the file.
     server.kill();
-    fs::write(&file, format!("{first}\n")).expect("the file can be written");
+    fs::write(&token_file, format!("{first_token}\n")).expect("the file can be written");
     let server = Server::start(&data, CONFIG);
-    assert_ne!(server.admin_token, first);
-    admin_as(&server, &first, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
+    assert_ne!(server.admin_token, first_token);
+    admin_as(&server, &first_token, &["people", "list"])
+        .expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
     // A missing token is reported, too.
-    fs::remove_file(&file).expect("the file can be removed");
-    by_file(&server, &["people", "list"]).expect_refusal(
+    fs::remove_file(&token_file).expect("the file can be removed");
+    with_token_file(&server, &["people", "list"]).expect_refusal(
         NOT_ALLOWED,
         &["reading the organiser's token from", "--data-dir"],
     );

@@ -1,4 +1,4 @@
-//! Visibility of a team's data, and the errors for other callers.
+//! Visibility of a team's data (dataset, submission), and the errors that other callers get.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{repository, server::Server};
@@ -45,7 +45,7 @@ fn dataset_and_submission_are_visible_to_their_team_only() {
     );
     assert_problem(server.get(&path, Some(&other.token)), 404);
 
-    // An invalid id, and the id of no evaluation.
+    // An id in an invalid form, and an id that no evaluation has.
     assert_problem(
         server.get("/api/v1/evaluations/seventeen", Some(&owner.token)),
         404,
@@ -65,6 +65,7 @@ fn oversized_and_non_archive_uploads_are_refused() {
     let config = format!("{CONFIG}\n[bundle]\npacked_bytes = 4096\n");
     let server = Server::start(&scratch.path().join("data"), &config);
     let team = Team::create(&server, "Big");
+    // Bundles begin with these bytes of a gzip archive.
     let mut large = vec![0x1f, 0x8b];
     large.resize(5000, 0);
     assert_problem(server.upload(&team.token, large), 413);

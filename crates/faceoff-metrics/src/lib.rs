@@ -1,18 +1,18 @@
 //! Metrics of a server for Prometheus (OpenMetrics text).
 //!
-//! Requests ([`RequestMetrics`]), jobs of slots ([`SlotMetrics`]) and events ([`Metrics::record_event`]) are counted as they happen. The
-//! state of the queue, disks and the process is passed as [`GaugeValues`] when the metrics are read. No metric names a
-//! team, a user or a score, so that operators learn nothing about teams from them. No clock is read and nothing is stored;
-//! counters start at 0 with the process, as Prometheus expects.
+//! Requests ([`RequestMetrics`]), jobs of slots ([`SlotMetrics`]) and events ([`Metrics::record_event`]) are counted as
+//! they happen. The state of the queue, disks and the process is passed as [`GaugeValues`] when the metrics are read.
+//! No metric names a team, a user or a score, so that operators learn nothing about teams from them. No clock is read
+//! and nothing is stored; counters start at 0 with the process, as Prometheus expects.
 
 mod float_gauge;
 mod gauges;
-mod slot_metrics;
 mod request_metrics;
+mod slot_metrics;
 
 pub use gauges::{Disk, GaugeValues, Process, Queue};
-pub use slot_metrics::{BusySlot, JobEnd, SlotMetrics};
 pub use request_metrics::RequestMetrics;
+pub use slot_metrics::{BusySlot, JobEnd, SlotMetrics};
 
 use gauges::Gauges;
 use prometheus_client::{

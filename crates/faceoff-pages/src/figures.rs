@@ -56,7 +56,7 @@ pub(super) fn score_interval(
     weights: &TaskWeights,
 ) -> [f64; 2] {
     let distances = tasks.iter().map(|(task, result)| {
-        let weight = weights.of(*task).as_f64();
+        let weight = weights.weight(*task).as_f64();
         result
             .success_ci95
             .map(|end| 100.0 * weight * (end - result.success_rate))

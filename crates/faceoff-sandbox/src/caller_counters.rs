@@ -40,17 +40,17 @@ impl CallerCounters {
         }
     }
 
-    /// Time since `before` in which the thread was runnable and did not run, or the hypervisor had stopped all of its
+    /// Time since `earlier` in which the thread was runnable and did not run, or the hypervisor had stopped all of its
     /// CPUs. Zero if the host has no such counters.
     #[must_use]
-    pub fn run_delay_since(&self, before: &Self) -> Duration {
-        let each = std::iter::zip(&before.ticks, &self.ticks);
-        let stolen = each.map(|(before, now)| now.stolen.saturating_sub(before.stolen));
+    pub fn run_delay_since(&self, earlier: &Self) -> Duration {
+        let each = std::iter::zip(&earlier.ticks, &self.ticks);
+        let stolen = each.map(|(earlier, now)| now.stolen.saturating_sub(earlier.stolen));
         let log_reader_run_time = self
             .log_reader_run_time
-            .saturating_sub(before.log_reader_run_time);
+            .saturating_sub(earlier.log_reader_run_time);
         self.wait_time
-            .saturating_sub(before.wait_time)
+            .saturating_sub(earlier.wait_time)
             .saturating_sub(log_reader_run_time)
             + ticks_to_duration(stolen.min().unwrap_or_default())
     }
@@ -73,9 +73,9 @@ mod tests {
             let pinned = scope.spawn(|| {
                 affinity::pin_current_thread(&[cpu]).unwrap();
                 let read = || CallerCounters::read("", &[], Duration::ZERO);
-                let before = read();
+                let earlier = read();
                 // The other thread never sleeps and uses the same CPU.
-                while read().run_delay_since(&before) < Duration::from_millis(20) {}
+                while read().run_delay_since(&earlier) < Duration::from_millis(20) {}
                 is_done.store(true, Ordering::Relaxed);
             });
             scope.spawn(|| {
@@ -122,13 +122,13 @@ mod tests {
                 })
                 .collect(),
         };
-        let before = with_steal_ticks(&[1, 5]);
+        let earlier = with_steal_ticks(&[1, 5]);
         assert_eq!(
-            with_steal_ticks(&[4, 7]).run_delay_since(&before),
+            with_steal_ticks(&[4, 7]).run_delay_since(&earlier),
             Duration::from_millis(20)
         );
         assert_eq!(
-            with_steal_ticks(&[4, 5]).run_delay_since(&before),
+            with_steal_ticks(&[4, 5]).run_delay_since(&earlier),
             Duration::ZERO
         );
     }

@@ -105,9 +105,10 @@ impl CpuSamples {
 
     /// Adds another sample, taken while the answer is still pending.
     pub fn add(&mut self, now: CpuReading) {
-        let before = self.last.as_ref().unwrap_or(&self.first);
-        if let (Some(earlier), Some(waits)) = (&before.waits, &now.waits) {
-            self.ledger.add(earlier, waits, now.idle_since(before));
+        let earlier_reading = self.last.as_ref().unwrap_or(&self.first);
+        if let (Some(earlier), Some(waits)) = (&earlier_reading.waits, &now.waits) {
+            self.ledger
+                .add(earlier, waits, now.idle_since(earlier_reading));
         }
         self.last = Some(now);
     }

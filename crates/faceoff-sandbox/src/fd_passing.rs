@@ -3,14 +3,14 @@
 
 use std::os::fd::{AsRawFd, BorrowedFd};
 
-/// `SO_PASSRIGHTS` of Linux 6.16, on by default.
+/// The socket option `SO_PASSRIGHTS` of Linux 6.16: does the socket accept file descriptors? On by default.
 const PASS_RIGHTS: libc::c_int = 83;
 
 /// Makes the kernel refuse descriptors sent to this socket. Older kernels accept a descriptor and close it when the
 /// accompanying bytes are read, which counts as the agent's answer time.
 pub(crate) fn disable(socket: BorrowedFd<'_>) {
-    let off: libc::c_int = 0;
-    let size = size_of_val(&off) as libc::socklen_t;
+    let disabled: libc::c_int = 0;
+    let size = size_of_val(&disabled) as libc::socklen_t;
     #[expect(unsafe_code, reason = "rustix does not know the option")]
     // SAFETY: the kernel reads the number at this address, and keeps no reference.
     let result = unsafe {
@@ -18,7 +18,7 @@ pub(crate) fn disable(socket: BorrowedFd<'_>) {
             socket.as_raw_fd(),
             libc::SOL_SOCKET,
             PASS_RIGHTS,
-            (&raw const off).cast(),
+            (&raw const disabled).cast(),
             size,
         )
     };

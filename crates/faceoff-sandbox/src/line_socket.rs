@@ -266,10 +266,10 @@ pub(crate) fn wait_for(
 /// [`wait_for`] for several descriptors at once.
 pub(crate) fn wait_for_any(fds: &mut [PollFd<'_>], deadline: Instant) -> io::Result<bool> {
     loop {
-        let left = deadline.saturating_duration_since(Instant::now());
+        let time_left = deadline.saturating_duration_since(Instant::now());
         let timeout = Timespec {
-            tv_sec: i64::try_from(left.as_secs()).unwrap_or(i64::MAX),
-            tv_nsec: i64::from(left.subsec_nanos()),
+            tv_sec: i64::try_from(time_left.as_secs()).unwrap_or(i64::MAX),
+            tv_nsec: i64::from(time_left.subsec_nanos()),
         };
         match poll(fds, Some(&timeout)) {
             Ok(0) => return Ok(false),

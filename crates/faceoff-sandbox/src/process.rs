@@ -7,9 +7,9 @@ use crate::{
     command_check::check_command,
     error::IoContext,
     exit_cause::{ExitCause, ExitReport},
-    inherited_descriptors,
     launch::{Launch, LaunchedAgent},
     line_socket::{Closed, LineSocket, wait_for_any},
+    open_output,
     poll_interval::PollInterval,
     process_tree::ProcessTree,
     status_pipe::StatusPipe,
@@ -372,7 +372,7 @@ impl AgentProcess {
 
     /// Has the agent closed its output while it still runs, with no unread output left?
     fn output_is_abandoned(&self) -> Result<bool, SandboxError> {
-        let is_open = inherited_descriptors::is_open_in_tree(
+        let is_open = open_output::is_open_in_tree(
             &self.output_name,
             &self.tree.processes(),
             self.tree.pid(),

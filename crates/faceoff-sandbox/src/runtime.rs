@@ -241,8 +241,8 @@ fn existing_paths(paths: &[&str]) -> Vec<PathBuf> {
     for path in paths {
         let path = PathBuf::from(path);
         // `/bin` matters only if it is a link; a real folder of programs is not shown.
-        let is_shown =
-            path != Path::new("/bin") || fs::symlink_metadata(&path).is_ok_and(|m| m.is_symlink());
+        let is_shown = path != Path::new("/bin")
+            || fs::symlink_metadata(&path).is_ok_and(|metadata| metadata.is_symlink());
         if is_shown && path.exists() {
             for link in link_chain(&path) {
                 push_new(&mut found, link);

@@ -92,8 +92,8 @@ impl StatusPipe {
     /// bubblewrap writes them, so no parser is needed.
     fn number(&self, key: &str) -> Option<i32> {
         let text = std::str::from_utf8(&self.text).ok()?;
-        let after = text.split_once(&format!("\"{key}\":"))?.1.trim_start();
-        let digits = after.find(|c: char| !c.is_ascii_digit())?;
-        after[..digits].parse().ok()
+        let rest = text.split_once(&format!("\"{key}\":"))?.1.trim_start();
+        let digits = rest.find(|c: char| !c.is_ascii_digit())?;
+        rest[..digits].parse().ok()
     }
 }

@@ -123,12 +123,12 @@ fn drain_until_closed(
         let limit = usize::try_from(available)
             .unwrap_or(CHUNK_BYTES)
             .clamp(1, CHUNK_BYTES);
-        let before = own_cpu_time();
+        let cpu_time_before = own_cpu_time();
         match recv(log, &mut chunk[..limit], RecvFlags::DONTWAIT) {
             Ok((0, _)) => return,
             Ok((count, _)) => {
                 keep_end(&chunk[..count]);
-                let cpu_time = own_cpu_time().saturating_sub(before);
+                let cpu_time = own_cpu_time().saturating_sub(cpu_time_before);
                 if is_stopped {
                     remaining_bytes_after_stop -= count.min(remaining_bytes_after_stop);
                     if remaining_bytes_after_stop == 0 {

@@ -98,10 +98,15 @@ impl WaitLedger {
     pub(crate) const EMPTY: Self = Self(BTreeMap::new());
 
     /// Adds a sample without an answer. `idle_between`: the time since the last sample in which none of the agent's threads ran.
-    pub(crate) fn add(&mut self, before: &ThreadWaits, now: &ThreadWaits, idle_between: Duration) {
+    pub(crate) fn add(
+        &mut self,
+        previous: &ThreadWaits,
+        now: &ThreadWaits,
+        idle_between: Duration,
+    ) {
         for (id, thread) in &now.threads {
             let account = self.0.entry(*id).or_default();
-            let earlier = before.threads.get(id);
+            let earlier = previous.threads.get(id);
             // If it had slept in between, waking up would have cost a time slice.
             if earlier.is_some_and(|earlier| {
                 earlier.is_runnable && earlier.time_slices == thread.time_slices
@@ -161,17 +166,17 @@ impl Account {
 }
 
 impl ThreadWaits {
-    /// The longest countable wait of a thread since `before`, which was `wall` ago.
+    /// The longest countable wait of a thread since `baseline`, which was `wall` ago.
     pub(crate) fn longest_since(
         &self,
-        before: &Self,
+        baseline: &Self,
         wall: Duration,
         ledger: &WaitLedger,
         answer: AnswerState,
     ) -> Duration {
         let countable_wait = |(id, now): (&u32, &ThreadState)| {
             // Nothing is known about a thread that was not tracked before.
-            let earlier = before.threads.get(id)?;
+            let earlier = baseline.threads.get(id)?;
             let counted_from = ledger.discarded_wait(*id).max(earlier.wait_time);
             if now.is_background {
                 return None;
@@ -348,11 +353,11 @@ mod tests {
 
     #[test]
     fn waits_count_only_for_threads_that_ran_afterwards() {
-        let before = waits(&[(1, "500 100 3", "S", "0"), (2, "70 0 1", "R", "0")]);
+        let baseline = waits(&[(1, "500 100 3", "S", "0"), (2, "70 0 1", "R", "0")]);
         let ledger = WaitLedger::default();
         let longest = |threads, answer| {
             let now = waits(threads);
-            now.longest_since(&before, WALL, &ledger, answer)
+            now.longest_since(&baseline, WALL, &ledger, answer)
         };
         use AnswerState::{Pending, Received};
         for answer in [Received, Pending] {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// Weight of a task's success rate in the overall score, in percent.
 pub(crate) fn weight_percent(weights: &TaskWeights, task: Task) -> f64 {
     // `count` is in millionths of the total weight.
-    f64::from(weights.of(task).count()) / 1e4
+    f64::from(weights.weight(task).count()) / 1e4
 }
 
 /// The overall score in percent, from success rates as fractions. Missing tasks count as 0.

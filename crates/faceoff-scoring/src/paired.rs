@@ -86,7 +86,7 @@ pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTal
     // Tasks with weight 0 have no influence.
     let weighted = || {
         let has_influence = |task: &Task, tally: &PairedTally| {
-            tally.episodes() > 0 && weights.of(*task).count() > 0
+            tally.episodes() > 0 && weights.weight(*task).count() > 0
         };
         tallies
             .iter()
@@ -101,8 +101,8 @@ pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTal
     let mut tosses_by_weight = BTreeMap::<i128, u32>::new();
     let mut difference = 0;
     for (task, tally) in weighted() {
-        let weight =
-            i128::from(weights.of(*task).count()) * (denominator / i128::from(tally.episodes()));
+        let weight = i128::from(weights.weight(*task).count())
+            * (denominator / i128::from(tally.episodes()));
         *tosses_by_weight.entry(weight).or_default() += tally.only_a + tally.only_b;
         difference += weight * (i128::from(tally.only_a) - i128::from(tally.only_b));
     }
@@ -214,7 +214,8 @@ mod tests {
                     .map(|(task, tally)| {
                         let discordant = tally.only_a + tally.only_b;
                         let lead = 2.0 * f64::from(only_a(*task)) - f64::from(discordant);
-                        f64::from(weights.of(*task).count()) * lead / f64::from(tally.episodes())
+                        f64::from(weights.weight(*task).count()) * lead
+                            / f64::from(tally.episodes())
                     })
                     .sum()
             };

@@ -14,7 +14,8 @@ pub const MAX_DEADLINE_H: u32 = 744;
 pub enum DayDeadline {
     /// The schedule's next cutoff; without a schedule there is no deadline.
     #[default]
-    NextCut,
+    #[serde(rename = "next_cut")]
+    NextCutoff,
     /// No deadline.
     Never,
     /// Hours after the cutoff, 1 to 744.
@@ -24,7 +25,7 @@ pub enum DayDeadline {
 impl fmt::Display for DayDeadline {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NextCut => f.write_str("next-cut"),
+            Self::NextCutoff => f.write_str("next-cut"),
             Self::Never => f.write_str("never"),
             Self::Hours(hours) => write!(f, "{hours}h"),
         }
@@ -41,7 +42,7 @@ impl FromStr for DayDeadline {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let hours = || s.strip_suffix('h')?.parse().ok();
         match s {
-            "next-cut" => Ok(Self::NextCut),
+            "next-cut" => Ok(Self::NextCutoff),
             "never" => Ok(Self::Never),
             _ => hours()
                 .map(Self::Hours)
@@ -57,7 +58,7 @@ mod tests {
     #[test]
     fn deadline_round_trips_and_bad_text_is_refused() {
         for (deadline, json) in [
-            (DayDeadline::NextCut, r#""next_cut""#),
+            (DayDeadline::NextCutoff, r#""next_cut""#),
             (DayDeadline::Never, r#""never""#),
             (DayDeadline::Hours(30), r#"{"hours":30}"#),
         ] {

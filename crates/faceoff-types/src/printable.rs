@@ -1,10 +1,10 @@
-//! Makes untrusted text (agents' logs, names and lines, files) safe to show. Characters that control a terminal, are
-//! invisible or change the reading order become visible escapes.
+//! Makes untrusted text, such as agents' logs and names, safe to show. Characters that control a terminal, are invisible
+//! or change the reading order become visible escapes.
 
 use std::{borrow::Cow, fmt::Write as _};
 
-/// Is this character safe to show? Not so control characters, including line breaks, overrides of the writing
-/// direction, and invisible characters.
+/// Is this character safe to show? Control characters, including line breaks, are not; nor are invisible characters and
+/// those that override the writing direction.
 #[must_use]
 pub fn is_printable(c: char) -> bool {
     let deceptive = matches!(

@@ -5,8 +5,7 @@ use std::{fmt, str::FromStr};
 
 /// The rules and the simulator behaviour that a published score refers to.
 ///
-/// A change of behaviour (a constant of the simulator, the version of the contact detection library, a bound
-/// of a tier)
+/// A change of behaviour (a constant of the simulator, the version of the contact detection library, a bound of a tier)
 /// needs a new ruleset. Recordings and running evaluations keep the ruleset that they started with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Ruleset {

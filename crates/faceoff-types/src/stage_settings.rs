@@ -38,7 +38,7 @@ impl Default for StageSettings {
             schedule: None,
             ablation_episodes: 0,
             episodes_per_shard: 50,
-            day_deadline: DayDeadline::NextCut,
+            day_deadline: DayDeadline::NextCutoff,
             blind: false,
             publishes: Publication::AtClose,
             standings: CountingResult::Latest,

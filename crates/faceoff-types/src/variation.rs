@@ -119,7 +119,7 @@ impl TaskWeights {
     }
 
     #[must_use]
-    pub const fn of(&self, task: Task) -> Millionths {
+    pub const fn weight(&self, task: Task) -> Millionths {
         match task {
             Task::Hit => self.hit,
             Task::Defend => self.defend,

@@ -149,7 +149,7 @@ impl Default for EvaluationConfig {
             cron: None,
             days_off: Vec::new(),
             zone: Zone::UTC,
-            day_deadline: DayDeadline::NextCut,
+            day_deadline: DayDeadline::NextCutoff,
             max_faults: 10,
             ablation_episodes: 0,
             weights: TaskWeights::default(),

@@ -1,4 +1,7 @@
-//! False results from a remote worker: it takes jobs like any other worker and reports results that it never computed.
+//! False results from a remote worker: it takes jobs like any other worker and reports results that it never computed. The
+//! tests write the messages of the workers' protocol by hand. There, `order` is a job, `outcomes` are results, `asks` are
+//! requests of workers, and `handed_in` announces a sent result. A *lease* is the right to run a job once; a *grant* is its
+//! secret for the transfer of files. A *nonce* distinguishes the leases of one job.
 
 use super::{
     EPISODES, ReferenceRun, local_config, queue_evaluation, resume, server_config, start_server,
@@ -21,7 +24,7 @@ use serde_json::{Value, json};
 use std::{collections::BTreeSet, fs, path::Path, time::Duration};
 use tokio::runtime::Runtime;
 
-/// A client that speaks the workers' protocol and runs no jobs.
+/// A client that uses the workers' protocol and runs no jobs.
 struct FakeWorker {
     client: Client,
 }
@@ -55,7 +58,7 @@ impl FakeWorker {
                 .await;
             let Ok(consumer) = consumer else {
                 // The server has not created it yet.
-                tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+                tokio::time::sleep(Duration::from_millis(100)).await;
                 continue;
             };
             let jobs = consumer.batch().max_messages(1).messages().await;
@@ -64,9 +67,9 @@ impl FakeWorker {
             };
             job.ack().await.expect("NATS is there");
             let job: Value = serde_json::from_slice(&job.payload).expect("a job is JSON");
-            let begin =
+            let start_request =
                 json!({ "kind": "begin", "lease": job["order"]["lease"], "slot": "slot-0" });
-            if self.request(&begin).await["kind"] == "yes" {
+            if self.request(&start_request).await["kind"] == "yes" {
                 return job;
             }
         }
@@ -101,9 +104,10 @@ impl FakeWorker {
     }
 
     /// Sends a worker's result message again: as that worker, as another worker, with a changed result, and with a forged lease.
-    async fn repeat_result(&self, result: &Value, when: &str) {
-        let mut stolen = result.clone();
-        let success = &mut stolen["outcome"]["report"]["outcomes"][0]["success"];
+    /// Calls with different labels send different message ids, since NATS stores only one message of each id.
+    async fn repeat_result(&self, result: &Value, label: &str) {
+        let mut changed = result.clone();
+        let success = &mut changed["outcome"]["report"]["outcomes"][0]["success"];
         *success = json!(!success.as_bool().unwrap_or_default());
         let mut forged = result.clone();
         forged["lease"]["nonce"] = json!("00000000-0000-4000-8000-000000000000");
@@ -111,13 +115,12 @@ impl FakeWorker {
             .as_str()
             .expect("a lease has a nonce");
         for (subject, message, variant) in [
-            ("faceoff.outcomes.honest", result, "again"),
-            ("faceoff.outcomes.thief", result, "as a thief"),
-            ("faceoff.outcomes.thief", &stolen, "changed"),
+            ("faceoff.outcomes.honest", result, "repeated"),
+            ("faceoff.outcomes.thief", result, "stolen"),
+            ("faceoff.outcomes.thief", &changed, "stolen-and-changed"),
             ("faceoff.outcomes.honest", &forged, "forged"),
         ] {
-            // NATS would not store two messages with the same id.
-            self.publish(subject, &format!("{nonce} {variant} {when}"), message)
+            self.publish(subject, &format!("{nonce} {variant} {label}"), message)
                 .await;
         }
     }
@@ -127,38 +130,41 @@ impl FakeWorker {
         let message = json!({
             "lease": lease, "grant": job["grant"], "outcome": { "kind": "done", "report": report },
         });
-        let id = [&lease["unit"], &lease["nonce"]].map(|id| id.as_str().expect("an id is a text"));
-        self.publish("faceoff.outcomes.liar", &id.join("/"), &message)
+        let ids = [&lease["unit"], &lease["nonce"]].map(|id| id.as_str().expect("an id is a text"));
+        self.publish("faceoff.outcomes.liar", &ids.join("/"), &message)
             .await;
     }
 
-    async fn publish(&self, subject: &'static str, id: &str, message: &Value) {
+    async fn publish(&self, subject: &'static str, message_id: &str, message: &Value) {
         let mut headers = HeaderMap::new();
-        headers.insert("Nats-Msg-Id", id);
+        headers.insert("Nats-Msg-Id", message_id);
         let payload = serde_json::to_vec(message).expect("it is JSON");
-        let sent = jetstream::new(self.client.clone())
+        let acknowledgement = jetstream::new(self.client.clone())
             .publish_with_headers(subject, headers, payload.into())
             .await;
-        sent.expect("NATS is there")
+        acknowledgement
+            .expect("NATS is there")
             .await
             .expect("NATS stores results");
     }
 }
 
-/// A real worker's first result, in a season with another secret and so with other episodes.
+/// A real worker's first result, in a season with another secret. Seeds of episodes depend on it, so the episodes differ from
+/// those of other seasons.
 struct OtherSeasonResult {
     message: Value,
+    /// Names and contents of the recording's files.
     files: Vec<(String, Vec<u8>)>,
 }
 
 impl OtherSeasonResult {
     fn compute(folder: &Path) -> Self {
         fs::create_dir_all(folder).expect("a scratch folder can be made");
-        let data = folder.join("data");
-        let _ = queue_evaluation(&data, folder, &local_config());
+        let data_dir = folder.join("data");
+        let _ = queue_evaluation(&data_dir, folder, &local_config());
         let nats = Nats::start(&folder.join("nats"));
         let file_relay = Relay::start();
-        let server = Server::start(&data, &server_config(&nats, file_relay.address()));
+        let server = Server::start(&data_dir, &server_config(&nats, file_relay.address()));
         file_relay.set_target(server.address().into());
         let runtime = Runtime::new().expect("a runtime starts");
         let mut messages = runtime.block_on(async {
@@ -181,10 +187,10 @@ impl OtherSeasonResult {
         // Files are stored before the result is sent, and stay until all shards are complete.
         server.kill();
         let key = message["outcome"]["report"]["recording"].as_str();
-        let stored = data
+        let recording = data_dir
             .join("artifacts")
             .join(key.expect("a shard is recorded"));
-        let files = fs::read_dir(stored).expect("the recording is there");
+        let files = fs::read_dir(recording).expect("the recording is there");
         let files = files.map(|file| {
             let file = file.expect("a folder can be read");
             let name = file.file_name().into_string().expect("names are text");
@@ -196,14 +202,14 @@ impl OtherSeasonResult {
         }
     }
 
-    /// Whether a job is for the same episodes of the same task.
-    fn fits(&self, job: &Value) -> bool {
+    /// Whether a job is for the same task, with the same number of its episode.
+    fn matches_job(&self, job: &Value) -> bool {
         let spec = &job["order"]["assignment"]["spec"];
-        let played = &self.message["outcome"]["report"]["outcomes"][0];
-        played["task"] == spec["task"] && played["episode"] == spec["episodes"]["start"]
+        let outcome = &self.message["outcome"]["report"]["outcomes"][0];
+        outcome["task"] == spec["task"] && outcome["episode"] == spec["episodes"]["start"]
     }
 
-    /// Report and recording, adapted to this job.
+    /// Report and files of the recording, changed so that they name this job.
     fn adapted_to(&self, job: &Value) -> (Value, Vec<(String, Vec<u8>)>) {
         let assignment = &job["order"]["assignment"];
         let mut report = self.message["outcome"]["report"].clone();
@@ -220,7 +226,7 @@ impl OtherSeasonResult {
     }
 }
 
-/// Uploads a file of a job as its worker does.
+/// Uploads a file of a job's recording as its worker does.
 fn upload_file(job: &Value, name: &str, bytes: Vec<u8>) {
     let text = |field: &str| {
         job[field]
@@ -229,13 +235,13 @@ fn upload_file(job: &Value, name: &str, bytes: Vec<u8>) {
             .to_owned()
     };
     let client = http().build().expect("a client needs nothing");
-    let stored = client
+    let response = client
         .put(format!("{}/work/files/{name}", text("files")))
         .header("authorization", format!("Grant {}", text("grant")))
         .body(bytes)
         .send()
         .expect("the server answers");
-    assert_eq!(stored.status(), 204, "{name}");
+    assert_eq!(response.status(), 204, "{name}");
 }
 
 #[test]
@@ -255,7 +261,7 @@ fn recording_of_other_episodes_is_rejected_and_worker_banned() {
     let fake = runtime.block_on(FakeWorker::connect(&nats));
     let job = loop {
         let job = runtime.block_on(fake.take_job());
-        if other_result.fits(&job) {
+        if other_result.matches_job(&job) {
             break job;
         }
     };
@@ -293,11 +299,11 @@ fn missing_result_message_requeues_job() {
     let runtime = Runtime::new().expect("a runtime starts");
     let fake = runtime.block_on(FakeWorker::connect(&nats));
     let job = runtime.block_on(fake.take_job());
-    // A false message and a loss in NATS look the same: the server finds no result.
-    let sent = json!({
+    // For the server a false announcement looks like a loss in NATS: it finds no result message with this sequence number.
+    let announcement = json!({
         "kind": "handed_in", "lease": job["order"]["lease"], "episodes_done": 1, "sequence": 1_000_000,
     });
-    assert_eq!(runtime.block_on(fake.request(&sent))["kind"], "yes");
+    assert_eq!(runtime.block_on(fake.request(&announcement))["kind"], "yes");
     server.wait_for_log("NATS has lost a result: the job is queued again", 1);
     let other = Worker::start(scratch.path(), "other", &worker_config(nats.address(), 1));
     reference_run.assert_equal_result(&server);
@@ -330,29 +336,29 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
     let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
     resume(&server);
     let shards = 3 * EPISODES as usize;
-    let mut all = Vec::new();
+    let mut results = Vec::new();
     runtime.block_on(async {
-        // The subscription delivers the copies, too.
-        let mut seen = BTreeSet::new();
-        while seen.len() < shards {
+        // The subscription delivers the repeated messages, too.
+        let mut nonces = BTreeSet::new();
+        while nonces.len() < shards {
             let message = messages.next().await.expect("NATS is there");
             let result: Value = serde_json::from_slice(&message.payload).expect("it is JSON");
             if result["outcome"]["kind"] != "done"
-                || !seen.insert(result["lease"]["nonce"].to_string())
+                || !nonces.insert(result["lease"]["nonce"].to_string())
             {
                 continue;
             }
-            fake.repeat_result(&result, "at once").await;
-            all.push(result);
+            fake.repeat_result(&result, "early").await;
+            results.push(result);
         }
     });
     reference_run.assert_equal_result(&server);
     runtime.block_on(async {
-        for result in &all {
+        for result in &results {
             fake.repeat_result(result, "late").await;
         }
     });
-    // All messages are processed, and none of them counts.
+    // The server processes all messages and accepts no repeated one.
     server.wait_for_log("without a valid grant", 2 * shards);
     runtime.block_on(async {
         let jetstream = jetstream::new(fake.client.clone());
@@ -372,9 +378,9 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
         }
     });
     let log = server.log();
-    let counts =
+    let is_accepted_from_thief =
         |line: &str| line.contains("result accepted job=") && line.contains("worker=thief");
-    assert!(!log.lines().any(counts), "{log}");
+    assert!(!log.lines().any(is_accepted_from_thief), "{log}");
     assert!(log.contains("over already"), "{log}");
     let view = server.get("/api/v1/workers", Some(&server.admin_token));
     let view: Value = view.json().expect("the API speaks JSON");
@@ -394,19 +400,19 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
     file_relay.set_target(server.address().into());
     resume(&server);
     let runtime = Runtime::new().expect("a runtime starts");
-    let may_work = json!({
+    let admission_request = json!({
         "kind": "may_work", "program": "0".repeat(64), "version": "1", "runtimes": [], "slots": 1,
     });
     let fake = runtime.block_on(async {
         let fake = FakeWorker::connect(&nats).await;
-        let (reported, open) = (fake.take_job().await, fake.take_job().await);
-        fake.report_shard(&reported).await;
+        let (reported_job, other_job) = (fake.take_job().await, fake.take_job().await);
+        fake.report_shard(&reported_job).await;
         server.wait_for_log("a worker is banned", 1);
-        // Its other lease is lost, and it gets no more jobs.
-        let lease = &open["order"]["lease"];
-        let renew = json!({ "kind": "renew", "lease": lease, "episodes_done": 0 });
-        assert_eq!(fake.request(&renew).await["kind"], "no");
-        let answer = fake.request(&may_work).await;
+        // The banned worker loses its other lease and gets no more jobs.
+        let lease = &other_job["order"]["lease"];
+        let renewal = json!({ "kind": "renew", "lease": lease, "episodes_done": 0 });
+        assert_eq!(fake.request(&renewal).await["kind"], "no");
+        let answer = fake.request(&admission_request).await;
         let reason = answer["reason"].as_str().expect("a refusal has a reason");
         assert!(
             reason.contains("accepts no results of this worker"),
@@ -415,9 +421,9 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
         fake
     });
     let view = server.get("/api/v1/workers", Some(&server.admin_token));
-    let banned: Value = view.json().expect("the API speaks JSON");
-    assert_eq!(banned["bans"][0]["worker"], "liar", "{banned:#}");
-    let reason = banned["bans"][0]["reason"].as_str().unwrap_or_default();
+    let view: Value = view.json().expect("the API speaks JSON");
+    assert_eq!(view["bans"][0]["worker"], "liar", "{view:#}");
+    let reason = view["bans"][0]["reason"].as_str().unwrap_or_default();
     assert!(
         reason.contains("differs from the simulation") && reason.contains("damaged or incomplete"),
         "{reason}"
@@ -429,7 +435,7 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
     file_relay.set_target(server.address().into());
     let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
     reference_run.assert_equal_result(&server);
-    let answer = runtime.block_on(fake.request(&may_work));
+    let answer = runtime.block_on(fake.request(&admission_request));
     assert_eq!(answer["kind"], "no", "{answer:#}");
     let listed = admin(&server, &["worker", "list"]).expect_success();
     assert!(
@@ -438,11 +444,11 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
     );
     let readmitted = admin(&server, &["worker", "readmit", "liar"]).expect_success();
     assert_eq!(readmitted.trim(), "liar is readmitted");
-    let answer = runtime.block_on(fake.request(&may_work));
+    let answer = runtime.block_on(fake.request(&admission_request));
     let reason = answer["reason"].as_str().unwrap_or_default();
     assert!(
         reason.contains("another program"),
-        "it is checked like any other worker: {answer:#}"
+        "a readmitted worker is checked like any other: {answer:#}"
     );
     honest.stop();
 }
@@ -462,6 +468,7 @@ fn false_game_result_bans_worker_and_real_one_is_accepted() {
         let submission = team.submit(&server, &repository().join("agents/hold"));
         assert_eq!(submission["state"], "valid", "{submission:#}");
     }
+    // A short game of 1500 control steps.
     let rules = [
         "--format",
         "round-robin",
@@ -489,8 +496,8 @@ fn false_game_result_bans_worker_and_real_one_is_accepted() {
     assert!(reason.contains("game.zip was not stored"), "{view:#}");
 
     let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
-    let path = cup["id"].as_str().expect("a tournament has an id");
-    let path = format!("/api/v1/tournaments/{path}");
+    let id = cup["id"].as_str().expect("a tournament has an id");
+    let path = format!("/api/v1/tournaments/{id}");
     let _ = server.poll(&path, &server.admin_token, |view| view["phase"] == "played");
     let games = server.get(&format!("{path}/games"), Some(&server.admin_token));
     let games: Value = games.json().expect("the API speaks JSON");

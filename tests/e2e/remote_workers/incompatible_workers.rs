@@ -1,4 +1,5 @@
-//! Workers that lack a runtime of their server, and a second server on the same streams.
+//! Workers that lack a *runtime* (an environment for agents, such as an interpreter) of their server, and a second server that uses
+//! the same streams of the message broker NATS.
 
 use super::{server_config, worker_config};
 use crate::Team;
@@ -13,22 +14,26 @@ fn worker_without_required_runtime_gets_no_jobs() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let nats = Nats::start(&scratch.path().join("nats"));
     let file_relay = Relay::start();
-    let runtime = "[runtimes.other]\nread_only_paths = [\"/usr/lib\", \"/lib\", \"/lib64\"]\npath = \"/usr/bin\"\n";
-    let config = server_config(&nats, file_relay.address()) + runtime;
+    let runtime_config = "[runtimes.other]\nread_only_paths = [\"/usr/lib\", \"/lib\", \"/lib64\"]\npath = \"/usr/bin\"\n";
+    let config = server_config(&nats, file_relay.address()) + runtime_config;
     let server = Server::start(&scratch.path().join("data"), &config);
     file_relay.set_target(server.address().into());
-    let lacks = Worker::start(scratch.path(), "lacks", &worker_config(nats.address(), 1));
-    lacks.wait_for_log("lacks runtimes that the server offers to agents: other", 1);
+    let incompatible = Worker::start(
+        scratch.path(),
+        "incompatible",
+        &worker_config(nats.address(), 1),
+    );
+    incompatible.wait_for_log("lacks runtimes that the server offers to agents: other", 1);
     // `doctor` reports the same before a worker is started.
-    for (runtimes, expected) in [
+    for (runtimes_config, expected) in [
         ("", "would give no jobs"),
-        (runtime, "would give jobs to a worker \"asks\""),
+        (runtime_config, "would give jobs to a worker \"candidate\""),
     ] {
-        let file = scratch.path().join("asks.toml");
-        fs::write(&file, worker_config(nats.address(), 1) + runtimes)
+        let file = scratch.path().join("candidate.toml");
+        fs::write(&file, worker_config(nats.address(), 1) + runtimes_config)
             .expect("a file can be written");
         let doctor = Command::new(program("faceoff"))
-            .args(["doctor", "--name", "asks", "--config"])
+            .args(["doctor", "--name", "candidate", "--config"])
             .arg(&file)
             .output()
             .expect("the program can be started");
@@ -39,10 +44,10 @@ fn worker_without_required_runtime_gets_no_jobs() {
         );
     }
     // Another server on the same streams reports the conflict and answers no worker while the first one runs.
-    let other = Server::start(&scratch.path().join("other"), &config);
-    other.wait_for_log("is another server's", 1);
+    let second_server = Server::start(&scratch.path().join("second"), &config);
+    second_server.wait_for_log("is another server's", 1);
 
-    // Clients without a grant get no files.
+    // A grant is the secret with which a worker gets the files of its job. Clients without a grant get no files.
     for header in [None, Some("Grant 00.00")] {
         let mut request = server.request(
             reqwest::Method::GET,
@@ -62,7 +67,7 @@ fn worker_without_required_runtime_gets_no_jobs() {
     let compatible = Worker::start_with_arguments(
         scratch.path(),
         "compatible",
-        &(worker_config(nats.address(), 1) + runtime),
+        &(worker_config(nats.address(), 1) + runtime_config),
         &["--labels", "lab 3,rack"],
     );
     let finished = team.wait_until_finished(&server, &evaluation);
@@ -73,8 +78,8 @@ fn worker_without_required_runtime_gets_no_jobs() {
         "{}",
         compatible.log()
     );
-    let problems = other
-        .get("/api/v1/workers", Some(&other.admin_token))
+    let problems = second_server
+        .get("/api/v1/workers", Some(&second_server.admin_token))
         .json::<Value>();
     let problems = problems.expect("the API speaks JSON")["problems"].to_string();
     assert!(
@@ -82,8 +87,12 @@ fn worker_without_required_runtime_gets_no_jobs() {
             && problems.contains("give each server its own nats.name"),
         "{problems}"
     );
-    drop(other);
-    assert!(!lacks.log().contains("started job="), "{}", lacks.log());
+    drop(second_server);
+    assert!(
+        !incompatible.log().contains("started job="),
+        "{}",
+        incompatible.log()
+    );
     let view = server.get("/api/v1/workers", Some(&server.admin_token));
     let view: Value = view.json().expect("the API speaks JSON");
     let labels = json!(["lab 3", "rack"]);

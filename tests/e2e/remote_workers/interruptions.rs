@@ -1,5 +1,5 @@
-//! Interruptions of remote workers: cut and slow links, full disks, wrong clocks. Each run ends with the result of a local
-//! slot, and no agent gets a fault.
+//! Interruptions of remote workers: cut and slow network connections, full disks, wrong clocks. Each evaluation ends with the
+//! same result as on a single machine, and no agent gets a fault.
 
 use super::{ReferenceRun, resume, server_config, start_server, wait_for_workers, worker_config};
 use crate::{dataset, entry};
@@ -13,8 +13,9 @@ use faceoff_tests::{
 use jiff::Timestamp;
 use std::{fs, path::PathBuf, process::Command, time::Duration};
 
-const SCRATCH_BYTES: u64 = 64 << 20;
-/// With this seed the first file connection breaks within 300 kB, inside a bundle of more than a megabyte.
+/// Size of the small disk for a worker's temporary files.
+const SCRATCH_DISK_BYTES: u64 = 64 << 20;
+/// Seed for the relay of file transfers: the first connection breaks within 300 kB, inside a bundle of more than a megabyte.
 const SEED_BREAKING_BUNDLE: u64 = 65;
 
 #[test]
@@ -47,7 +48,7 @@ fn disconnected_worker_stops_and_another_gets_its_job() {
 }
 
 #[test]
-fn slow_and_breaking_links_lose_no_result() {
+fn slow_and_breaking_connections_lose_no_result() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
@@ -106,21 +107,26 @@ fn worker_with_full_disk_releases_jobs_until_it_has_space() {
         &server_config(&nats, file_relay.address()),
         &file_relay,
     );
-    let disk = MountedDisk::at(&scratch.path().join("full/scratch"), SCRATCH_BYTES);
+    let disk = MountedDisk::at(&scratch.path().join("full/scratch"), SCRATCH_DISK_BYTES);
     let mut command = disk.namespace_command();
     command.arg(program("faceoff"));
     let config = worker_config(nats.address(), 1);
-    let full = Worker::start_with_command(command, scratch.path(), "full", &config, &[]);
+    let full_disk_worker =
+        Worker::start_with_command(command, scratch.path(), "full", &config, &[]);
     wait_for_workers(&server, 1);
-    let filled = FilledDisk::fill(&disk.outside_path());
+    let filled_disk = FilledDisk::fill(&disk.outside_path());
     resume(&server);
-    full.wait_for_log("disk full: job released", 3);
+    full_disk_worker.wait_for_log("disk full: job released", 3);
     let other = Worker::start(scratch.path(), "other", &config);
     other.wait_for_log("committed", 2);
-    assert!(!full.log().contains("committed"), "{}", full.log());
+    assert!(
+        !full_disk_worker.log().contains("committed"),
+        "{}",
+        full_disk_worker.log()
+    );
     other.stop();
-    drop(filled);
-    full.wait_for_log("committed", 1);
+    drop(filled_disk);
+    full_disk_worker.wait_for_log("committed", 1);
 
     let (evaluation, token) = (
         reference_run.evaluation.clone(),
@@ -161,12 +167,12 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
         &server_config(&nats, file_relay.address()),
         &file_relay,
     );
-    let began = Timestamp::now();
-    let workers = [("early", "-3600"), ("late", "+3600")].map(|(name, offset)| {
+    let started_at = Timestamp::now();
+    let workers = [("behind", "-3600"), ("ahead", "+3600")].map(|(name, offset_s)| {
         let mut command = Command::new(program("faceoff"));
         command
             .env("LD_PRELOAD", faketime_library())
-            .env("FAKETIME", offset)
+            .env("FAKETIME", offset_s)
             // Only the wall clock is wrong; the monotonic clock is right.
             .env("FAKETIME_DONT_FAKE_MONOTONIC", "1")
             .env("DONT_FAKE_MONOTONIC", "1")
@@ -182,17 +188,17 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
     wait_for_workers(&server, workers.len());
     resume(&server);
     reference_run.assert_equal_result(&server);
-    for (worker, hours) in workers.into_iter().zip([-1.0, 1.0]) {
+    for (worker, expected_offset_h) in workers.into_iter().zip([-1.0, 1.0]) {
         let log = worker.log();
         assert!(log.contains("committed"), "a worker has run no job:\n{log}");
         assert!(!log.contains("lease lost"), "{log}");
         // A log line begins with its time.
         let time = log.split_whitespace().next().expect("the log has a line");
         let time: Timestamp = time.parse().expect("a log line begins with its time");
-        let off = (time.as_second() - began.as_second()) as f64 / 3600.0;
+        let offset_h = (time.as_second() - started_at.as_second()) as f64 / 3600.0;
         assert!(
-            (off - hours).abs() < 0.5,
-            "its clock is not {hours} h off:\n{log}"
+            (offset_h - expected_offset_h).abs() < 0.5,
+            "the worker's clock is not {expected_offset_h} h off:\n{log}"
         );
     }
 }

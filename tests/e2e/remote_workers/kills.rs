@@ -1,12 +1,13 @@
-//! Workers, server, NATS and links are killed or cut at random moments.
+//! Workers, the server and the message broker NATS are killed, and network connections are cut, at random moments of an
+//! evaluation. Its result does not change.
 
 use super::{ReferenceRun, many_shards, resume, server_config, worker_config};
 use crate::kills::draw;
 use faceoff_tests::{nats::Nats, relay::Relay, server::Server, worker::Worker};
 use std::time::Duration;
 
-/// Committed shards between two faults: few enough that all faults fit into the evaluation.
-const SHARDS_BETWEEN: u64 = 3;
+/// Committed shards (jobs of one episode each) between two faults: few enough that all faults fit into the evaluation.
+const SHARDS_BETWEEN_FAULTS: u64 = 3;
 
 /// What is killed or cut.
 #[derive(Debug, Clone, Copy)]
@@ -18,12 +19,13 @@ enum Fault {
     NatsAndStreams,
     /// NATS keeps its streams and loses their messages.
     NatsAndMessages,
-    Link,
+    /// The connection of a worker to NATS.
+    WorkerConnection,
 }
 
 #[test]
 #[expect(clippy::print_stdout, reason = "the seed repeats a failed run")]
-fn random_kills_and_cut_links_lose_and_repeat_no_result() {
+fn random_kills_and_cuts_lose_and_repeat_no_result() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare_many_shards(scratch.path());
     let mut nats = Nats::start(&scratch.path().join("nats"));
@@ -33,9 +35,14 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
     let config = many_shards(&server_config(&nats, file_relay.address()));
     let mut server = Server::start(&reference_run.data_dir, &config);
     file_relay.set_target(server.address().into());
-    let start_killed = || Worker::start(scratch.path(), "killed", &worker_config(nats_address, 1));
-    let mut killed_worker = start_killed();
-    let _other_worker = Worker::start(scratch.path(), "other", &worker_config(nats_relay.address(), 1));
+    let start_killed_worker =
+        || Worker::start(scratch.path(), "killed", &worker_config(nats_address, 1));
+    let mut killed_worker = start_killed_worker();
+    let _other_worker = Worker::start(
+        scratch.path(),
+        "other",
+        &worker_config(nats_relay.address(), 1),
+    );
     resume(&server);
 
     // Order and moments of the faults are drawn: each after some shards, and some time into the next.
@@ -47,6 +54,7 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
         now.expect("the clock is right").as_secs()
     });
     println!("KILL_SEED={seed}");
+    // Numbers in [0, 1).
     let mut draws = (seed << 20..).map(draw);
     let mut next_draw = || draws.next().unwrap_or_default();
     let mut faults = [
@@ -57,7 +65,7 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
         Fault::Nats,
         Fault::NatsAndStreams,
         Fault::NatsAndMessages,
-        Fault::Link,
+        Fault::WorkerConnection,
     ]
     .map(|fault| (next_draw(), fault));
     faults.sort_by(|(a, _), (b, _)| a.total_cmp(b));
@@ -68,14 +76,14 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
             |view| {
                 let done = view["progress"]["episodes_done"].as_u64();
                 // A finished evaluation has no progress.
-                done.is_none_or(|done| done >= SHARDS_BETWEEN * number)
+                done.is_none_or(|done| done >= SHARDS_BETWEEN_FAULTS * number)
             },
         );
         std::thread::sleep(Duration::from_secs_f64(next_draw()));
         match fault {
             Fault::Worker => {
                 drop(killed_worker);
-                killed_worker = start_killed();
+                killed_worker = start_killed_worker();
             }
             // The new server has another port; the relay's address stays the same.
             Fault::Server => {
@@ -86,8 +94,8 @@ fn random_kills_and_cut_links_lose_and_repeat_no_result() {
             Fault::Nats => nats.kill_and_restart(),
             Fault::NatsAndStreams => nats.lose_streams_and_restart(),
             Fault::NatsAndMessages => nats.lose_messages_and_restart(),
-            // The link is cut for some time, and slow afterwards.
-            Fault::Link => {
+            // The connection is cut for some time, and slow afterwards.
+            Fault::WorkerConnection => {
                 nats_relay.disconnect();
                 std::thread::sleep(Duration::from_secs_f64(3.0 * next_draw()));
                 nats_relay.set_target(nats_address);

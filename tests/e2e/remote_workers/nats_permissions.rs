@@ -1,4 +1,5 @@
-//! Permissions of server and workers in the shipped NATS configuration.
+//! Permissions of server and workers in the shipped configuration of NATS, the message broker between them. Messages have
+//! *subjects*, which the permissions name; *streams* store messages.
 
 use super::{server_config, worker_config};
 use crate::Team;
@@ -12,19 +13,19 @@ use faceoff_tests::{
 use std::{fs, path::Path, process::Command, sync::mpsc};
 use tokio::runtime::Runtime;
 
-/// Makes a key pair for NATS: the secret half is in the file, the public half is returned.
-fn make_key(file: &Path) -> String {
-    let made = Command::new(program("faceoff"))
+/// Creates a key pair for NATS. Writes the secret key to the file and returns the public key.
+fn create_key_pair(file: &Path) -> String {
+    let output = Command::new(program("faceoff"))
         .args(["worker", "--make-key"])
         .arg(file)
         .output()
         .expect("the program can be started");
     assert!(
-        made.status.success(),
+        output.status.success(),
         "{}",
-        String::from_utf8_lossy(&made.stderr)
+        String::from_utf8_lossy(&output.stderr)
     );
-    let key = String::from_utf8(made.stdout).expect("a key is text");
+    let key = String::from_utf8(output.stdout).expect("a key is text");
     key.trim().to_owned()
 }
 
@@ -33,14 +34,14 @@ fn shipped_permissions_allow_only_what_workers_need() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let [server_key, worker_key, unknown_key] =
         ["server.nk", "rack-1.nk", "unknown.nk"].map(|name| scratch.path().join(name));
-    let shipped = fs::read_to_string(repository().join("docker/nats/nats-server.conf"))
+    let shipped_config = fs::read_to_string(repository().join("docker/nats/nats-server.conf"))
         .expect("it is shipped");
-    // The test sets port and folder.
-    let config = shipped
+    // The test sets another address and folder, and the public keys.
+    let config = shipped_config
         .replace("listen: \"0.0.0.0:4222\"", "")
         .replace("store_dir: \"/var/lib/nats\"", "")
-        .replace("KEY_OF_THE_SERVER", &make_key(&server_key))
-        .replace("KEY_OF_RACK_1", &make_key(&worker_key));
+        .replace("KEY_OF_THE_SERVER", &create_key_pair(&server_key))
+        .replace("KEY_OF_RACK_1", &create_key_pair(&worker_key));
     let nats = Nats::start_with_config(&scratch.path().join("nats"), &config);
     let file_relay = Relay::start();
     let with_key =
@@ -58,7 +59,7 @@ fn shipped_permissions_allow_only_what_workers_need() {
             &with_key(worker_config(nats.address(), 1), key),
         )
     };
-    let _ = make_key(&unknown_key);
+    let _ = create_key_pair(&unknown_key);
     let unknown = worker("unknown", &unknown_key);
     unknown.wait_for_log("authorization violation", 1);
     let rack = worker("rack-1", &worker_key);
@@ -68,11 +69,11 @@ fn shipped_permissions_allow_only_what_workers_need() {
     assert!(!unknown.log().contains("started job="), "{}", unknown.log());
     drop(rack);
 
-    // The server may read results from the stream; here it is empty.
-    let seed = fs::read_to_string(&server_key).expect("it was written");
+    // The server's key may read results from the stream, which is empty by now.
+    let secret_key = fs::read_to_string(&server_key).expect("it was written");
     let runtime = Runtime::new().expect("a runtime starts");
     runtime.block_on(async {
-        let client = ConnectOptions::with_nkey(seed.trim().to_owned())
+        let client = ConnectOptions::with_nkey(secret_key.trim().to_owned())
             .custom_inbox_prefix("_INBOX.faceoff.server")
             .connect(nats.url())
             .await
@@ -84,11 +85,11 @@ fn shipped_permissions_allow_only_what_workers_need() {
         assert_eq!(kind, RawMessageErrorKind::NoMessageFound);
     });
 
-    // With its own key, a worker may not use subjects of others.
-    let seed = fs::read_to_string(&worker_key).expect("it was written");
+    // A worker's key does not allow the subjects of other workers, of the server, or for the administration of streams.
+    let secret_key = fs::read_to_string(&worker_key).expect("it was written");
     runtime.block_on(async {
         let (sender, errors) = mpsc::channel();
-        let client = ConnectOptions::with_nkey(seed.trim().to_owned())
+        let client = ConnectOptions::with_nkey(secret_key.trim().to_owned())
             .event_callback(move |event| {
                 let sender = sender.clone();
                 async move {
@@ -101,7 +102,7 @@ fn shipped_permissions_allow_only_what_workers_need() {
             .connect(nats.url())
             .await
             .expect("NATS accepts the key");
-        let forbidden = [
+        let forbidden_subjects = [
             "faceoff.asks.rack-2",
             "faceoff.outcomes.rack-2",
             "faceoff.orders",
@@ -109,30 +110,30 @@ fn shipped_permissions_allow_only_what_workers_need() {
             "$JS.API.STREAM.MSG.GET.faceoff-orders",
             "$JS.API.CONSUMER.MSG.NEXT.faceoff-outcomes.server",
         ];
-        for subject in forbidden {
+        for subject in forbidden_subjects {
             client
                 .publish(subject, "".into())
                 .await
                 .expect("it is sent");
             client.flush().await.expect("it is sent");
-            let refused = errors.recv().expect("NATS answers");
+            let refusal = errors.recv().expect("NATS answers");
             assert!(
-                refused
+                refusal
                     .to_lowercase()
                     .contains("permissions violation for publish"),
-                "{refused}"
+                "{refusal}"
             );
-            assert!(refused.contains(subject), "{refused}");
+            assert!(refusal.contains(subject), "{refusal}");
         }
         for subject in [">", "faceoff.>", "_INBOX.>", "faceoff.shows.rack-1"] {
             let _subscribed = client.subscribe(subject).await.expect("it is sent");
             client.flush().await.expect("it is sent");
-            let refused = errors.recv().expect("NATS answers");
+            let refusal = errors.recv().expect("NATS answers");
             assert!(
-                refused
+                refusal
                     .to_lowercase()
                     .contains("permissions violation for subscription"),
-                "{refused}"
+                "{refusal}"
             );
         }
     });

@@ -1,9 +1,9 @@
-//! Problems of NATS: full streams, payload limits, TLS, changed streams, a missing server. Each is reported, and jobs
-//! continue once it is fixed.
+//! Problems of NATS, the message broker between server and remote workers: full streams (stored messages), payload limits, TLS,
+//! changed streams, a missing NATS server. Each is reported, and jobs continue once it is fixed.
 
 use super::{
-    COMMON_CONFIG, ReferenceRun, resume, server_config, start_server, wait_for_workers, with_episodes,
-    worker_config,
+    COMMON_CONFIG, ReferenceRun, resume, server_config, start_server, wait_for_workers,
+    with_episodes, worker_config,
 };
 use crate::Team;
 use async_nats::jetstream::{
@@ -44,13 +44,13 @@ fn wait_for_no_problem(server: &Server) {
     });
 }
 
-/// A client that may change streams.
-struct Administrator {
+/// A NATS client that may change streams.
+struct NatsAdministrator {
     runtime: Runtime,
     jetstream: jetstream::Context,
 }
 
-impl Administrator {
+impl NatsAdministrator {
     fn connect(nats: &Nats) -> Self {
         let runtime = Runtime::new().expect("a runtime starts");
         let jetstream = runtime.block_on(async {
@@ -74,17 +74,17 @@ impl Administrator {
         }
     }
 
-    fn update(&self, stream: &Config) {
-        let changed = self.runtime.block_on(self.jetstream.update_stream(stream));
-        let _ = changed.expect("NATS updates the stream");
+    fn update_stream(&self, stream: &Config) {
+        let updated = self.runtime.block_on(self.jetstream.update_stream(stream));
+        let _ = updated.expect("NATS updates the stream");
     }
 
-    fn create(&self, stream: Config) {
+    fn create_stream(&self, stream: Config) {
         let created = self.runtime.block_on(self.jetstream.create_stream(stream));
         let _ = created.expect("NATS creates the stream");
     }
 
-    fn delete(&self, name: &str) {
+    fn delete_stream(&self, name: &str) {
         let deleted = self.runtime.block_on(self.jetstream.delete_stream(name));
         let _ = deleted.expect("NATS deletes the stream");
     }
@@ -100,17 +100,17 @@ fn result_waits_while_stream_is_full() {
     let server = start_server(&reference_run, &config, &file_relay);
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
     wait_for_workers(&server, 1);
-    let administrator = Administrator::connect(&nats);
-    let original = administrator.stream_config("faceoff-outcomes");
-    administrator.update(&Config {
+    let administrator = NatsAdministrator::connect(&nats);
+    let original_config = administrator.stream_config("faceoff-outcomes");
+    administrator.update_stream(&Config {
         max_bytes: 1,
-        ..original.clone()
+        ..original_config.clone()
     });
     resume(&server);
     let message = "the result is not stored by NATS yet; trying again";
     worker.wait_for_log(message, 1);
     assert!(worker.log().contains("maximum bytes"), "{}", worker.log());
-    // The page of workers and the health endpoints report it, too.
+    // The page of workers and the health endpoints report the problem, too.
     wait_for_problem(&server, "maximum bytes");
     for path in ["/api/v1/health", "/readyz"] {
         let _ = server.poll(path, &server.admin_token, |view| {
@@ -118,36 +118,38 @@ fn result_waits_while_stream_is_full() {
             detail.is_some_and(|detail| detail.contains("maximum bytes"))
         });
     }
-    // Waits longer than a lease, which the worker renews.
+    // A lease (the worker's right to run the job) lasts 10 s. The worker must renew it during this pause.
     thread::sleep(Duration::from_secs(12));
     assert!(!worker.log().contains("committed"), "{}", worker.log());
-    administrator.update(&original);
+    administrator.update_stream(&original_config);
     reference_run.assert_equal_result(&server);
     let log = worker.log();
     let count = |word: &str| log.matches(word).count();
     assert!(count("platform fault") == 0, "{log}");
     // On a slow machine the worker may lose the lease, which the log reports.
-    let lost = count("lease lost");
+    let lost_leases = count("lease lost");
     assert!(
-        count(message) <= 1 + lost,
-        "it is logged once for each job:\n{log}"
+        count(message) <= 1 + lost_leases,
+        "the worker logs it once for each job:\n{log}"
     );
     assert_eq!(
         count("slot: started"),
-        count("slot: committed") + lost,
+        count("slot: committed") + lost_leases,
         "{log}"
     );
 }
 
-/// Many episodes in one shard, so that its result is the only message over the limit. All may end with an agent fault.
-fn with_large_result(config: &str) -> String {
+/// The configuration with all 60 episodes in one shard (job), so that its result is the only message over the payload limit.
+/// All episodes may end with an agent fault.
+fn with_one_shard(config: &str) -> String {
     with_episodes(config, 60, 60).replace(
         "[evaluation]",
         "[evaluation]\ntasks = [\"hit\"]\nmax_faults = 60",
     )
 }
 
-/// An agent that passes the validation. Later it ends each episode at once, with an agent fault.
+/// An agent that passes the validation run, which has at most 1500 control steps. Later it ends each episode at once, with
+/// an agent fault.
 fn failing_agent(scratch: &Path) -> PathBuf {
     let source = bundle::python_agent(
         "seen = globals().setdefault('seen', [0])\nseen[0] += 1\nsay(hold if seen[0] <= 1500 else {})",
@@ -160,7 +162,7 @@ fn oversized_result_is_platform_fault_and_evaluation_is_rerun() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let mut nats = Nats::start_with_config(&scratch.path().join("nats"), "max_payload: 8192\n");
     let file_relay = Relay::start();
-    let config = with_large_result(&server_config(&nats, file_relay.address()));
+    let config = with_one_shard(&server_config(&nats, file_relay.address()));
     let server = Server::start(&scratch.path().join("data"), &config);
     file_relay.set_target(server.address().into());
     let team = Team::create(&server, "Alpha");
@@ -193,7 +195,7 @@ fn oversized_result_waits_until_limit_is_raised() {
     let mut nats = Nats::start_with_config(&scratch.path().join("nats"), "max_payload: 8192\n");
     let file_relay = Relay::start();
     // The lease is long enough for slow machines.
-    let config = with_large_result(&server_config(&nats, file_relay.address()))
+    let config = with_one_shard(&server_config(&nats, file_relay.address()))
         .replace("lease_s = 10", "lease_s = 3600");
     let server = Server::start(&scratch.path().join("data"), &config);
     file_relay.set_target(server.address().into());
@@ -220,7 +222,7 @@ fn oversized_result_waits_until_limit_is_raised() {
 }
 
 /// A certificate authority with this name.
-fn authority(name: &str) -> CertifiedIssuer<'static, KeyPair> {
+fn certificate_authority(name: &str) -> CertifiedIssuer<'static, KeyPair> {
     let mut params = CertificateParams::default();
     params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
     params.distinguished_name.push(DnType::CommonName, name);
@@ -232,48 +234,62 @@ fn authority(name: &str) -> CertifiedIssuer<'static, KeyPair> {
 fn nats_certificate_is_verified_with_configured_authority() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let reference_run = ReferenceRun::prepare(scratch.path());
-    let file = |name: &str, text: &str| {
+    let write_file = |name: &str, text: &str| {
         let file = scratch.path().join(name);
         fs::write(&file, text).expect("a scratch file can be written");
         file
     };
-    let (trusted, untrusted) = (authority("trusted"), authority("untrusted"));
+    let (trusted, untrusted) = (
+        certificate_authority("trusted"),
+        certificate_authority("untrusted"),
+    );
     let key = KeyPair::generate().expect("a key can be made");
     let certificate = CertificateParams::new(["127.0.0.1".to_owned()])
         .and_then(|params| params.signed_by(&key, &trusted))
         .expect("a certificate can be made");
-    let [right, wrong] = [("trusted.pem", &trusted), ("untrusted.pem", &untrusted)]
-        .map(|(name, authority)| file(name, &authority.pem()));
-    let nats = format!(
+    let [trusted_file, untrusted_file] = [("trusted.pem", &trusted), ("untrusted.pem", &untrusted)]
+        .map(|(name, authority)| write_file(name, &authority.pem()));
+    let nats_config = format!(
         "tls {{\n  cert_file: {:?}\n  key_file: {:?}\n}}\n",
-        file("nats.pem", &certificate.pem()),
-        file("nats.key", &key.serialize_pem())
+        write_file("nats.pem", &certificate.pem()),
+        write_file("nats.key", &key.serialize_pem())
     );
-    let nats = Nats::start_with_config(&scratch.path().join("nats"), &nats);
+    let nats = Nats::start_with_config(&scratch.path().join("nats"), &nats_config);
     let file_relay = Relay::start();
     let with_authority = |config: String, authority: &Path| {
         let config = config.replace("nats://", "tls://");
         format!("{config}ca_file = {authority:?}\n")
     };
-    let refused = "NATS cannot be reached: its certificate is not trusted";
+    let refusal = "NATS cannot be reached: its certificate is not trusted";
     let server_config_with =
         |authority: &Path| with_authority(server_config(&nats, file_relay.address()), authority);
     let worker_config_with =
         |authority: &Path| with_authority(worker_config(nats.address(), 1), authority);
 
-    let server = Server::start(&scratch.path().join("other"), &server_config_with(&wrong));
-    server.wait_for_log(refused, 1);
+    let server = Server::start(
+        &scratch.path().join("other"),
+        &server_config_with(&untrusted_file),
+    );
+    server.wait_for_log(refusal, 1);
     drop(server);
-    let worker = Worker::start(scratch.path(), "misconfigured", &worker_config_with(&wrong));
-    worker.wait_for_log(refused, 1);
+    let worker = Worker::start(
+        scratch.path(),
+        "misconfigured",
+        &worker_config_with(&untrusted_file),
+    );
+    worker.wait_for_log(refusal, 1);
     // The worker still stops when it is asked to.
     worker.stop();
 
-    let server = start_server(&reference_run, &server_config_with(&right), &file_relay);
-    let worker = Worker::start(scratch.path(), "worker", &worker_config_with(&right));
+    let server = start_server(
+        &reference_run,
+        &server_config_with(&trusted_file),
+        &file_relay,
+    );
+    let worker = Worker::start(scratch.path(), "worker", &worker_config_with(&trusted_file));
     resume(&server);
     reference_run.assert_equal_result(&server);
-    assert!(!worker.log().contains(refused), "{}", worker.log());
+    assert!(!worker.log().contains(refusal), "{}", worker.log());
 }
 
 #[test]
@@ -284,13 +300,13 @@ fn stream_with_other_settings_is_reported_then_recreated() {
     let file_relay = Relay::start();
     let config = server_config(&nats, file_relay.address());
     let server = start_server(&reference_run, &config, &file_relay);
-    let administrator = Administrator::connect(&nats);
+    let administrator = NatsAdministrator::connect(&nats);
     let streams = ["faceoff-orders", "faceoff-outcomes"]
         .map(|name| (name, administrator.stream_config(name)));
     server.kill();
     for (name, stream) in streams {
-        administrator.delete(name);
-        administrator.create(Config {
+        administrator.delete_stream(name);
+        administrator.create_stream(Config {
             retention: RetentionPolicy::Limits,
             ..stream
         });
@@ -307,12 +323,12 @@ fn stream_with_other_settings_is_reported_then_recreated() {
         assert_eq!(
             log.matches(&message).count(),
             1,
-            "it is logged once:\n{log}"
+            "the server logs it once:\n{log}"
         );
     }
     assert!(!worker.log().contains("started job="), "{}", worker.log());
     for name in ["faceoff-orders", "faceoff-outcomes"] {
-        administrator.delete(name);
+        administrator.delete_stream(name);
     }
     wait_for_no_problem(&server);
     reference_run.assert_equal_result(&server);
@@ -330,8 +346,8 @@ fn server_without_nats_starts_and_continues_once_connected() {
     let server = Server::start(&scratch.path().join("data"), &config);
     file_relay.set_target(server.address().into());
     server.wait_for_log("NATS cannot be reached", 1);
-    // The health endpoint reports it, since no job would run.
-    let not_ready = |word: &str| {
+    // The health endpoint reports the problem, since no job would run.
+    let wait_for_unhealthy = |word: &str| {
         let health = server.poll("/api/v1/health", &server.admin_token, |view| {
             view["detail"]
                 .as_str()
@@ -339,8 +355,12 @@ fn server_without_nats_starts_and_continues_once_connected() {
         });
         assert_eq!(health["status"], 503, "{health:#}");
     };
-    not_ready("The server cannot reach NATS: nats://");
-    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats_relay.address(), 1));
+    wait_for_unhealthy("The server cannot reach NATS: nats://");
+    let worker = Worker::start(
+        scratch.path(),
+        "worker",
+        &worker_config(nats_relay.address(), 1),
+    );
     worker.wait_for_log("NATS cannot be reached", 1);
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));

@@ -12,7 +12,7 @@ use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchR
 pub(super) struct GameTable {
     name: &'static str,
     reader: ParquetRecordBatchReader,
-    /// Rows that were read but not taken yet; not empty after [`Self::fill`] has found a row.
+    /// Rows that were read but not used yet; not empty after [`Self::fill`] has found a row.
     buffered: Option<RecordBatch>,
 }
 

@@ -36,20 +36,20 @@ pub(crate) enum LimitHit {
     Pids { refused: u64 },
 }
 
-/// The cgroup of one agent. [`AgentCgroup::remove`] or drop kills its processes and removes it.
+/// The cgroup of one agent. [`AgentCgroup::remove`] or drop kills the processes in the cgroup and removes the cgroup.
 #[derive(Debug)]
 pub(crate) struct AgentCgroup {
-    /// All folders.
+    /// All leaves, one per hierarchy.
     leaves: Vec<PathBuf>,
-    /// The folder with the memory limit.
+    /// The leaf with the memory limit.
     memory: Option<(Version, PathBuf)>,
-    /// The folder with the limit of processes.
+    /// The leaf with the limit of processes.
     pids: Option<PathBuf>,
-    /// The folder with the CPU quota.
+    /// The leaf with the CPU quota.
     cpu: Option<(Version, PathBuf)>,
     /// The counter of the tree's CPU time.
     cpu_usage: Option<(Version, File)>,
-    /// Accounting of other run time on its CPUs; `None` if the host has no such counters.
+    /// Accounting of the run time of other processes on the agent's CPUs; `None` if the host has no such counters.
     pub(crate) cpu_accounting: Option<CpuAccounting>,
     /// Does a cpuset confine the tree to its CPUs, whatever affinity it requests?
     pub(crate) confines_cpus: bool,
@@ -108,7 +108,7 @@ impl AgentCgroup {
                 vec![controller]
             };
             let leaf = group
-                .leaf(&hierarchy, &shared_controllers, &name)
+                .create_leaf(&hierarchy, &shared_controllers, &name)
                 .map_err(|error| {
                     unavailable(format!(
                         "cannot make a cgroup in {}: {error}",
@@ -133,7 +133,7 @@ impl AgentCgroup {
             Version::V1 => &["freezer"],
             Version::V2 => &[],
         };
-        let leaf = self.leaf(&hierarchy, controllers, name).ok()?;
+        let leaf = self.create_leaf(&hierarchy, controllers, name).ok()?;
         let cpu = self
             .cpu
             .as_ref()
@@ -146,8 +146,8 @@ impl AgentCgroup {
         self.freezer.as_ref()
     }
 
-    /// The agent's folder in a hierarchy, created if missing.
-    fn leaf(
+    /// Creates the agent's leaf in a hierarchy if it is missing.
+    fn create_leaf(
         &mut self,
         hierarchy: &Hierarchy,
         controllers: &[&str],
@@ -235,7 +235,7 @@ impl AgentCgroup {
             Version::V1 => (&["cpuacct"], "cpuacct.usage"),
             Version::V2 => (&[], "cpu.stat"),
         };
-        let Ok(leaf) = self.leaf(&hierarchy, controllers, name) else {
+        let Ok(leaf) = self.create_leaf(&hierarchy, controllers, name) else {
             return;
         };
         let open = |path: PathBuf| File::open(path).ok();
@@ -279,7 +279,7 @@ impl AgentCgroup {
 
     fn set_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> Option<()> {
         let hierarchy = hierarchies.find("cpuset")?;
-        let leaf = self.leaf(&hierarchy, &["cpuset"], name).ok()?;
+        let leaf = self.create_leaf(&hierarchy, &["cpuset"], name).ok()?;
         if hierarchy.version == Version::V1 {
             let memory_nodes = files::read(&leaf.parent()?.join("cpuset.mems")).ok()?;
             files::write(&leaf.join("cpuset.mems"), memory_nodes.trim()).ok()?;
@@ -302,7 +302,7 @@ impl AgentCgroup {
             .collect()
     }
 
-    /// CPU time of all processes that ever ran in it, in seconds.
+    /// CPU time of all processes that ever ran in the cgroup, in seconds.
     pub(crate) fn cpu_time_s(&self) -> Option<f64> {
         let (version, file) = self.cpu_usage.as_ref()?;
         let mut text = [0; 256];
@@ -332,7 +332,7 @@ impl AgentCgroup {
     /// fault, so its own limit must have been reached as well.
     pub(crate) fn limit_hit(&self) -> Option<LimitHit> {
         if let Some((version, leaf)) = &self.memory {
-            let killed_and_full = match version {
+            let was_killed_at_limit = match version {
                 Version::V1 => {
                     let killed = files::read_keyed(&leaf.join("memory.oom_control"), "oom_kill");
                     // Recent kernels leave `failcnt` at zero, but all report the peak.
@@ -347,7 +347,7 @@ impl AgentCgroup {
                     count("oom_kill") > 0 && count("oom") > 0
                 }
             };
-            if killed_and_full {
+            if was_killed_at_limit {
                 return Some(LimitHit::Memory {
                     peak_bytes: self.peak_memory_bytes(),
                 });
@@ -357,7 +357,7 @@ impl AgentCgroup {
         (refused > 0).then_some(LimitHit::Pids { refused })
     }
 
-    /// All its processes, including bubblewrap's own.
+    /// All processes in the cgroup, including bubblewrap's own.
     pub(crate) fn processes(&self) -> Vec<Pid> {
         let pids = self
             .leaves
@@ -367,12 +367,12 @@ impl AgentCgroup {
         pids.into_iter().filter_map(Pid::from_raw).collect()
     }
 
-    /// Its folders, one per hierarchy.
+    /// The agent's leaves, one per hierarchy.
     pub(crate) fn leaves(&self) -> &[PathBuf] {
         &self.leaves
     }
 
-    /// Kills its remaining processes and removes it.
+    /// Kills the remaining processes in the cgroup and removes the cgroup.
     pub(crate) fn remove(&mut self) {
         (self.cpu_usage, self.cpu_accounting) = (None, None);
         self.freezer = None;

@@ -54,7 +54,7 @@ impl Hierarchy {
                 && mount.options.split(',').any(|option| option == controller)
         });
         if let Some(mount) = v1 {
-            let own = own_cgroups.lines().find_map(|line| {
+            let own_cgroup = own_cgroups.lines().find_map(|line| {
                 let mut parts = line.splitn(3, ':');
                 let names = parts.nth(1)?;
                 names
@@ -66,24 +66,24 @@ impl Hierarchy {
             return Some(Self {
                 version: Version::V1,
                 mount_point: mount.point.into(),
-                service_dir: mount.resolve(own),
+                service_dir: mount.resolve(own_cgroup),
             });
         }
         let mount = mountinfo
             .lines()
             .filter_map(Mount::parse)
             .find(|mount| mount.filesystem == "cgroup2")?;
-        let own = own_cgroups
+        let own_cgroup = own_cgroups
             .lines()
             .find_map(|line| line.strip_prefix("0::"))?;
-        let mut own = mount.resolve(own);
-        if own.ends_with(SERVICE_LEAF) {
-            own.pop();
+        let mut service_dir = mount.resolve(own_cgroup);
+        if service_dir.ends_with(SERVICE_LEAF) {
+            service_dir.pop();
         }
         Some(Self {
             version: Version::V2,
             mount_point: mount.point.into(),
-            service_dir: own,
+            service_dir,
         })
     }
 

@@ -36,15 +36,15 @@ impl InterferenceEstimator<'_> {
         let (mut busy, mut idle, mut stolen) = (0, 0, 0);
         for (earlier, later) in earlier.ticks.iter().zip(&later.ticks) {
             // A counter that advanced by n ticks has counted more than n - 1 and less than n + 1.
-            let at_least =
+            let min_advance =
                 |earlier: u64, later: u64| later.saturating_sub(earlier).saturating_sub(1);
             busy += std::iter::zip(earlier.busy, later.busy)
-                .map(|(earlier, later)| at_least(earlier, later))
+                .map(|(earlier, later)| min_advance(earlier, later))
                 .sum::<u64>();
             idle += std::iter::zip(earlier.idle, later.idle)
                 .map(|(earlier, later)| later.saturating_sub(earlier) + 1)
                 .sum::<u64>();
-            stolen += at_least(earlier.stolen, later.stolen);
+            stolen += min_advance(earlier.stolen, later.stolen);
         }
         // A sleeping thread is not delayed, even by steal time. Only time in which a thread ran, seemed to run, or
         // waited to run can count.

@@ -23,20 +23,20 @@ pub struct CpuReading {
 }
 
 impl CpuReading {
-    /// Time since `before` in which none of the agent's threads ran, without the time in which its own quota throttled
+    /// Time since `earlier` in which none of the agent's threads ran, without the time in which its own quota throttled
     /// it.
-    pub(super) fn idle_since(&self, before: &Self) -> Duration {
+    pub(super) fn idle_since(&self, earlier: &Self) -> Duration {
         self.read_at
-            .saturating_duration_since(before.read_at)
-            .saturating_sub(self.ran_since(before))
-            .saturating_sub(self.throttled.saturating_sub(before.throttled))
+            .saturating_duration_since(earlier.read_at)
+            .saturating_sub(self.ran_since(earlier))
+            .saturating_sub(self.throttled.saturating_sub(earlier.throttled))
     }
 
-    /// Run time of the agent since `before`: the maximum of both counters.
-    fn ran_since(&self, before: &Self) -> Duration {
+    /// Run time of the agent since `earlier`: the maximum of both counters.
+    fn ran_since(&self, earlier: &Self) -> Duration {
         let by_clocks = self
             .agent_clock_time
-            .saturating_sub(before.agent_clock_time);
-        by_clocks.max(self.agent_run_time.saturating_sub(before.agent_run_time))
+            .saturating_sub(earlier.agent_clock_time);
+        by_clocks.max(self.agent_run_time.saturating_sub(earlier.agent_run_time))
     }
 }

@@ -25,10 +25,10 @@ fn agent_finds_its_cpus_by_every_interface() {
         let report = report(cpus, quota);
         assert_eq!(report["count"], cpus.len(), "{report}");
         assert_eq!(report["configured"], cpus.len(), "{report}");
-        for way in [
+        for interface in [
             "affinity", "online", "possible", "present", "cpuinfo", "stat",
         ] {
-            assert_eq!(report[way], json!(cpus), "{way}: {report}");
+            assert_eq!(report[interface], json!(cpus), "{interface}: {report}");
         }
         assert_eq!(report["threads"], json!([threads.to_string()]), "{report}");
         assert_eq!(report["system"], json!(["online", "possible", "present"]));

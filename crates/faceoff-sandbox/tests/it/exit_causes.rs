@@ -158,7 +158,7 @@ fn command_that_cannot_be_executed_is_an_agent_fault() {
 }
 
 #[test]
-fn unpassable_variables_are_an_agent_fault() {
+fn invalid_variables_are_an_agent_fault() {
     for (name, value) in [
         ("A\0B", "x"),
         ("A", "x\0y"),

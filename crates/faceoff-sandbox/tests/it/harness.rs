@@ -27,12 +27,12 @@ pub struct SerialGuard(());
 static LOCK: Mutex<()> = Mutex::new(());
 thread_local! {
     /// Number of guards of this thread, and the lock: a test may have several subjects.
-    static HELD: RefCell<(usize, Option<MutexGuard<'static, ()>>)> = const { RefCell::new((0, None)) };
+    static HELD_GUARDS: RefCell<(usize, Option<MutexGuard<'static, ()>>)> = const { RefCell::new((0, None)) };
 }
 
 impl SerialGuard {
     pub fn lock() -> Self {
-        HELD.with_borrow_mut(|(count, guard)| {
+        HELD_GUARDS.with_borrow_mut(|(count, guard)| {
             if *count == 0 {
                 // After a failed test the lock is poisoned; the other tests continue.
                 *guard = Some(LOCK.lock().unwrap_or_else(PoisonError::into_inner));
@@ -45,7 +45,7 @@ impl SerialGuard {
 
 impl Drop for SerialGuard {
     fn drop(&mut self) {
-        HELD.with_borrow_mut(|(count, guard)| {
+        HELD_GUARDS.with_borrow_mut(|(count, guard)| {
             *count -= 1;
             if *count == 0 {
                 *guard = None;

@@ -112,7 +112,7 @@ impl Stage {
             DayDeadline::Hours(hours) => cutoff_at
                 .checked_add(SignedDuration::from_hours(hours.into()))
                 .ok(),
-            DayDeadline::NextCut => {
+            DayDeadline::NextCutoff => {
                 let schedule = self.settings.schedule.as_ref()?;
                 let next_date = date.tomorrow().ok()?;
                 // A missed day may start at the same time at which another day is due.

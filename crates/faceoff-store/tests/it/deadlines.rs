@@ -126,7 +126,7 @@ async fn unfinished_day_runs_before_the_next_one() {
 async fn deadline_ends_open_evaluations_and_releases_the_day() {
     let mut f = TestStore::new().await;
     let alpha = f.valid_submission_of("Alpha").await;
-    let stage = configure_daily_stage(&f, DayDeadline::NextCut).await;
+    let stage = configure_daily_stage(&f, DayDeadline::NextCutoff).await;
     let first_day = start_day(&f, stage).await[0].stage_day;
     f.run_all_with_score(1.0).await;
     f.advance_clock_s(24 * 3600);
@@ -282,7 +282,7 @@ async fn overdue_day_without_scoring_is_released_at_once() {
 async fn closed_stage_continues_its_day_until_the_deadline() {
     let mut f = TestStore::new().await;
     f.valid_submission_of("Alpha").await;
-    let stage = configure_daily_stage(&f, DayDeadline::NextCut).await;
+    let stage = configure_daily_stage(&f, DayDeadline::NextCutoff).await;
     let closing = StageChange {
         closes_at: Some(Some(time("2026-03-01T12:00:00Z"))),
         ..StageChange::default()
@@ -307,7 +307,7 @@ async fn closed_stage_continues_its_day_until_the_deadline() {
 async fn deadline_follows_settings_but_never_into_the_past() {
     let mut f = TestStore::new().await;
     f.valid_submission_of("Alpha").await;
-    let stage = configure_daily_stage(&f, DayDeadline::NextCut).await;
+    let stage = configure_daily_stage(&f, DayDeadline::NextCutoff).await;
     start_day(&f, stage).await;
     let change_deadline = async |f: &TestStore, day_deadline| {
         let settings = f.store.stage(stage).await.unwrap().settings;

@@ -859,8 +859,8 @@ fn old_id(number: u32) -> String {
     format!("01890000-0000-7000-8000-{number:012}")
 }
 
-/// Creates a data folder of a version before retentions. Team 1 was retired by an organiser, team 2 by itself. Each team has the
-/// valid submission of its number, and an invalid one of its number × 10, whose bundle was removed.
+/// Creates a data folder of a version before retentions. Team 1 was retired by an organiser, team 2 by its own decision. Each
+/// team has the valid submission of its number, and an invalid one of its number × 10, whose bundle was removed.
 async fn create_old_folder(folder: &std::path::Path) {
     let migrations = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../migrations");
     let old_migrations = tempfile::tempdir().unwrap();
