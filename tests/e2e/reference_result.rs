@@ -56,6 +56,7 @@ pub fn assert_undisturbed(
             "evaluation",
         ])
         .args(["--seed", seed("seed")])
+        // Seed of the model mismatch: how the simulated robot deviates from the model that agents know.
         .args(["--mismatch-seed", seed("mismatch_seed")])
         .args(["--workers", "1"])
         .arg("--config")
@@ -68,7 +69,7 @@ pub fn assert_undisturbed(
     assert!(local.status.success(), "{errors}");
     let local = fs::read(out.join("results.json")).expect("the evaluator writes its result");
     let local: Value = serde_json::from_slice(&local).expect("a result is JSON");
-    // The download has released the day, so the result is visible from now on.
+    // A dataset can be downloaded only once its day is released, so now the whole result is visible.
     let finished = team.wait_until_finished(server, evaluation);
     let retries = &finished["result"]["timing"]["platform_retries"];
     assert!(retries.is_null() || *retries == 0, "{finished:#}");

@@ -40,8 +40,8 @@ impl ArchiveWriter {
         name: &str,
         write: impl FnOnce(&mut Entry<'_>) -> Result<(), RecordingError>,
     ) -> Result<(), RecordingError> {
-        // Parquet is already compressed and is read in place. No time is stored, so that the same shards give
-        // the same bytes.
+        // Parquet is already compressed and is read in place. No time is stored, so that the same contents
+        // give the same bytes.
         let method = if name.ends_with(".parquet") {
             CompressionMethod::Stored
         } else {

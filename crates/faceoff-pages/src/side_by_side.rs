@@ -1,4 +1,5 @@
-//! Two synchronised replays beside each other, of two teams or with two sets of perturbations.
+//! Two synchronised replays beside each other, of two teams or with two sets of perturbations. A *clip* is a file from
+//! which the browser draws an episode.
 
 use super::{episode_text::describe_violation, replay_section::ReplaySection};
 use faceoff_replay::model::CONTROL_STEP_S;
@@ -24,15 +25,15 @@ impl Side {
         api: &str,
         name: String,
     ) -> Self {
-        let line = &episode.line;
-        let label = format!("{}, episode {}, {name}", line.task, line.episode);
-        let title = format!("{name}, {} {}", line.task, line.episode);
+        let outcome = &episode.line;
+        let label = format!("{}, episode {}, {name}", outcome.task, outcome.episode);
+        let title = format!("{name}, {} {}", outcome.task, outcome.episode);
         Self {
             name,
             path: None,
-            success: line.success,
-            duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
-            violations: line.broken.iter().map(describe_violation).collect(),
+            success: outcome.success,
+            duration_s: format!("{:.2}", f64::from(outcome.steps) * CONTROL_STEP_S),
+            violations: outcome.broken.iter().map(describe_violation).collect(),
             replay: ReplaySection {
                 id: element_id,
                 sync_group: Some("both"),

@@ -170,10 +170,10 @@ impl Worlds {
                     None => step(setup, autoreset, worlds, actions, &mut outputs),
                     Some(pool) => {
                         let chunk_size = worlds_per_chunk(worlds.len(), pool.current_num_threads());
-                        let len = setup.interpolation.len();
+                        let action_len = setup.action_format().len();
                         pool.install(|| {
                             chunks_with_worlds(worlds, outputs, chunk_size)
-                                .zip(actions.par_chunks(chunk_size * len))
+                                .zip(actions.par_chunks(chunk_size * action_len))
                                 .for_each(|((worlds, mut outputs), actions)| {
                                     step(setup, autoreset, worlds, actions, &mut outputs);
                                 });
@@ -189,7 +189,7 @@ impl Worlds {
         stepped
     }
 
-    /// Begins a step in the background; [`Self::recv`] waits for it.
+    /// Begins a step in the background; [`Self::recv`] waits for it. `states`: also return the true states of the worlds.
     fn send(
         slf: &Bound<'_, Self>,
         actions: PyReadonlyArray2<'_, f64>,
@@ -205,9 +205,9 @@ impl Worlds {
         pool.spawn(move || {
             let work = || {
                 let mut owned = OwnedRows::new(&setup, worlds.len(), states);
-                let len = setup.interpolation.len();
+                let action_len = setup.action_format().len();
                 chunks_with_worlds(&mut worlds, owned.rows(), chunk_size)
-                    .zip(actions.par_chunks(chunk_size * len))
+                    .zip(actions.par_chunks(chunk_size * action_len))
                     .for_each(|((worlds, mut outputs), actions)| {
                         step(&setup, autoreset, worlds, actions, &mut outputs);
                     });

@@ -16,6 +16,7 @@ from faceoff import _native
 from faceoff.game import AirHockeyGame, SelfPlayEnv
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
 
+# Interpolation codes: 1 to 5: polynomials; -1: position and velocity, each linear; None: a point per millisecond.
 ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"task": "score"}, "task: expected one of hit, defend, prepare, got 'score'"),
     ({"task": 3}, "task: expected"),

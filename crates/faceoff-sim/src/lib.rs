@@ -19,16 +19,19 @@
 )]
 
 pub mod batch;
+// Observations and commands between agent and robot, with the perturbations (noise, delays, a lost puck).
 pub mod channel;
 pub mod dynamics;
 pub mod episode;
 mod episode_step;
+// The robot model in formats of other simulators.
 pub mod export;
 pub mod game;
 pub mod golden;
 pub mod model;
 pub mod perturbation;
 pub mod robot;
+// Random numbers.
 pub mod stream;
 pub mod table;
 pub mod world;
@@ -45,4 +48,5 @@ pub use episode_step::{step_episodes, step_episodes_on};
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
 pub use robot::plant::Plant;
+// `Runaway`: the part of a world that left its bounds, so that the world stopped (*diverged*).
 pub use world::{Bounds, ContactBody, Divergence, Impact, Impacts, MalletState, Runaway, World};

@@ -16,7 +16,7 @@ pub struct Store {
     pub(crate) signals: Arc<Signals>,
     pub(crate) artifacts: Artifacts,
     pub(crate) free_space: Arc<FreeSpace>,
-    /// Last signs of health.
+    /// The latest poll of a worker and the latest test write of the database, for the health report.
     pub(crate) probes: Arc<HealthProbes>,
     /// Games that are being played.
     pub(crate) live: LiveGames,

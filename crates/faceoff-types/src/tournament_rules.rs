@@ -7,7 +7,8 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 
-/// The longest game, in control steps: ten times that of the original challenge.
+/// The longest game, in control steps: ten times that of the original challenge. A game is divided into *windows* of 500 steps, and
+/// penalty points are counted for each.
 pub const MAX_GAME_STEPS: u32 = 10 * GAME_WINDOWS * WINDOW_STEPS;
 /// Maximum number of test games and friendly games per team and day.
 pub const MAX_FREE_GAMES: u32 = 1000;
@@ -22,7 +23,7 @@ pub struct TournamentRules {
     pub ruleset: Ruleset,
     /// Format, which decides the pairings.
     pub format: TournamentFormat,
-    /// Control steps per game; the last window of 500 may be shorter.
+    /// Control steps per game; its last window (penalty points are counted per window of 500 steps) may be shorter.
     pub steps: u32,
     /// Perturbation profile.
     pub profile: Profile,
@@ -114,6 +115,7 @@ impl TournamentRules {
             }
         }
         let GameLimits {
+            // Longest time of an answer that still takes effect.
             in_time_s,
             total_s,
             restart_s,

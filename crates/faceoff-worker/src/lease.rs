@@ -114,7 +114,9 @@ fn keep_lease(
     let mut renewed_at = Instant::now();
     let mut failing = false;
     loop {
-        server.wait(job_done, interval.min(PROGRESS_TICK), None);
+        // Without a queue version, new jobs do not end the wait.
+        let queue_version = None;
+        server.wait(job_done, interval.min(PROGRESS_TICK), queue_version);
         if shutdown.is_cancelled() {
             progress.stop.cancel();
             if let Err(error) = server.release(lease, ReleaseReason::Shutdown) {

@@ -338,6 +338,7 @@ fn stream_with_other_settings_is_reported_then_recreated() {
 fn server_without_nats_starts_and_continues_once_connected() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let (file_relay, nats_relay) = (Relay::start(), Relay::start());
+    // With `play = false` the server's own slot only validates submissions and computes scores; the remote worker runs the episodes.
     let config = format!(
         "{COMMON_CONFIG}[workers]\nslots = 1\nplay = false\n[nats]\nurl = \"nats://{}\"\nfiles_url = \"http://{}\"\n",
         nats_relay.address(),

@@ -22,6 +22,7 @@ function motionOfPuck(
   });
   return decodeMotion(
     encode({ samples, ...header }, [
+      // The arm's columns alone: the first two are the puck's, which follow below.
       ...stillArmColumns(samples, () => 0, () => 0).slice(2), // prettier-ignore
       column("puck_x", (t) => position(t)[0]),
       column("puck_y", (t) => position(t)[1]),
@@ -111,6 +112,7 @@ describe("interpolation", () => {
     const pose = newPose();
     new Interpolation(motionOfPuck(2, () => [0, 0], () => [0, 0])).poseAt(0.5, pose); // prettier-ignore
     expect(pose.arms[0].universal[0]).toBeNaN();
+    // In a recording of a still arm, the joint with index i is at 0.1 i rad.
     expect(pose.arms[0].q[3]).toBeCloseTo(0.3, 6);
   });
 });

@@ -177,7 +177,7 @@ pub struct GameResultView {
     pub windows: u32,
     /// Rallies started.
     pub rallies: u32,
-    /// The recording; null for replays of the schedule.
+    /// The recording; null for games of a repetition of the schedule.
     pub recording: Option<RecordingView>,
 }
 

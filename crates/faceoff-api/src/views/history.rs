@@ -1,4 +1,5 @@
-//! Board history: results and ranks of all teams of a stage, day by day. A *baseline* is a reference agent of the organisers.
+//! Board history: results and ranks of all teams of a stage, day by day. A *baseline* is a reference agent of the organisers. A *tier*
+//! says, by the penalty points, how safe an agent is for the real robot.
 
 use crate::views::{ruling::RulingView, task::TaskView};
 use faceoff_types::{
@@ -18,7 +19,8 @@ pub struct HistoryView {
     pub stage_name: StageName,
     /// Revision of the stage's rules.
     pub revision: u32,
-    /// Which of a team's evaluations count for boards of the stage. Ranks before a final day use the newest ones.
+    /// Which of a team's evaluations count for boards of the stage. A stage may be decided by a
+    /// final day, the evaluation day after its close; ranks before it use the newest evaluations.
     pub standings: CountingResult,
     /// Which of a team's evaluations rank it, if the query asks for others than `standings`; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -32,7 +32,8 @@ pub async fn run_evaluation_slowly(site: &Site, job_s: i64) {
                 assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
             }
             Job::Scoring { .. } => {
-                let result = crate::site::result([0.5, 0.5, 0.5], 10.0);
+                let penalty_points = 10.0;
+                let result = crate::site::result([0.5, 0.5, 0.5], penalty_points);
                 let key = "datasets/never-read.zip";
                 let hash = blake3::hash(b"never read").to_string();
                 let finished =
@@ -180,6 +181,7 @@ async fn pending_jobs_show_position_time_and_next_step() {
         .get(&new_submission, Some(&alpha.token))
         .await
         .json(200);
+    // `place` and `of` are the former names of `position` and `total`.
     assert_eq!(
         waiting["queue"],
         json!({ "position": 1, "place": 1, "total": 1, "of": 1, "expected_at": null })

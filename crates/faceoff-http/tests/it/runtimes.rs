@@ -127,7 +127,7 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
     let me = site.get("/api/v1/me", Some(&beta.token)).await.json(200);
     assert_eq!(me.get("excluded_by"), None);
 
-    // A trial of all active submissions skips the submission. A trial of it alone is refused.
+    // A trial (an evaluation that does not count) of all active submissions skips the submission. A trial of it alone is refused.
     let trial = format!("/api/v1/stages/{stage}/trial");
     let id = native.rsplit('/').next().unwrap();
     let request = json!({ "reason": "?", "submission": id });
@@ -175,7 +175,9 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
     site.post(&extra, Some(ADMIN), &request)
         .await
         .problem(409, "conflict", &[reason]);
-    site.finish_evaluation(&result([0.5; 3], 10.0)).await;
+    let penalty_points = 10.0;
+    site.finish_evaluation(&result([0.5; 3], penalty_points))
+        .await;
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(
         me["today"]["evaluation"],
@@ -272,6 +274,7 @@ async fn agent_environment_is_public() {
     assert_eq!(view["runtimes"][1]["version"], "3.11.2");
     assert_eq!(view["runtimes"][1]["packages"]["numpy"], "2.4.6");
     assert_eq!(view["runtimes"][2]["kind"], "broken");
+    // The reason why the third runtime is broken contains a path of the server, `/secret/folder`.
     assert!(!view.to_string().contains("secret"), "{view}");
     assert_eq!(view["limits"]["resources"]["memory_bytes"], 2_u64 << 30);
     assert_eq!(view["stages"][0]["limits"], view["limits"]);
@@ -319,6 +322,7 @@ async fn agent_environment_is_public() {
     ] {
         assert!(page.body.contains(words), "{words}: {}", page.body);
     }
+    // A package is named `<b>odd</b>`, which the page must escape.
     assert!(!page.body.contains("<b>odd") && !page.body.contains("secret"));
     let board = site.get("/", None).await.body;
     assert!(board.contains("href=\"/help\""));

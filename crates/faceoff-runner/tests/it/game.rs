@@ -131,7 +131,8 @@ fn game_verifies_and_is_reproducible() {
     assert_eq!(outcomes[0], outcomes[1]);
     let outcome = &outcomes[0];
     assert_eq!((outcome.steps, &outcome.end), (1700, &GameEnd::Played));
-    // Fouls alternate between the sides, each after 752 steps.
+    // Fouls alternate between the sides, each after 752 steps: a puck that is on one side for more than 750 steps (15 s) is a foul,
+    // and its first step there counts as 0.
     assert!(outcome.rallies >= 2, "{outcome:?}");
     for side in &outcome.sides {
         let steps: Vec<u32> = side.windows.iter().map(|window| window.steps).collect();
@@ -146,6 +147,7 @@ fn game_verifies_and_is_reproducible() {
         recording.manifest().files["motion.parquet"].clone()
     });
     assert_eq!(motion[0], motion[1]);
+    // The delay that the host adds was measured before and during the game, with a test agent that answers immediately.
     let [calibrated, _] = reports[0].calibration.sides;
     assert!(calibrated.before_s.count > 0 && calibrated.during_s.count > 0);
 }

@@ -18,7 +18,8 @@ pub(super) struct InterferenceEstimator<'a> {
 }
 
 impl InterferenceEstimator<'_> {
-    /// The longest countable wait of one of the agent's threads; `None` if the kernel has no such counters.
+    /// The longest countable wait (for a CPU, while ready to run) of one of the agent's threads: one that may have delayed the answer.
+    /// `None` if the kernel has no such counters.
     fn longest_wait(
         &self,
         earlier: &CpuReading,
@@ -87,9 +88,9 @@ impl InterferenceEstimator<'_> {
             .min(wall)
     }
 
-    /// Run delay by counters that do not lag. On a single CPU: the wait of one of the agent's threads, less the run
-    /// time of all its threads. In any case: the steal time while a thread ran, seemed to run, or waited to run. An
-    /// agent can cause neither, and a sleeping agent has no run delay.
+    /// Run delay without the run time of other processes, which the kernel charges only at its next tick. On a single CPU: the wait of
+    /// one of the agent's threads, less the run time of all its threads. In any case: the steal time while a thread ran, seemed to run,
+    /// or waited to run. An agent can cause neither, and a sleeping agent has no run delay.
     pub fn run_delay(&self, earlier: &CpuReading, later: &CpuReading) -> Duration {
         if !self.is_precise {
             return Duration::ZERO;
@@ -156,7 +157,8 @@ mod tests {
         }
     }
 
-    /// A reading with the run times of the agent and of all processes, in milliseconds.
+    /// A reading with the run times of the agent and of all processes, in milliseconds. The agent's time by its cgroup
+    /// (`agent_run_time`) and that by the clocks of its processes (`agent_clock_time`) are equal.
     fn reading(read_at: Instant, agent: u64, all: u64, ticks: &[Ticks]) -> CpuReading {
         CpuReading {
             read_at,
@@ -333,6 +335,7 @@ mod tests {
             MS(1),
             "without the throttling by its own quota"
         );
+        // The clocks of processes miss a process that has ended; the cgroup's counter does not.
         let mut ended = reading_at(15, 3, 7, 5, true);
         (ended.agent_clock_time, ended.agent_run_time) = (MS(0), MS(7));
         assert_eq!(
@@ -341,7 +344,7 @@ mod tests {
             "a process that ended ran, too"
         );
 
-        // A baseline does not contain the states of threads.
+        // A baseline, a quick reading before the question, does not contain the states of threads.
         let baseline = reading_at(0, 3, 7, 4, false);
         let stolen = |now: &CpuReading| {
             let samples = CpuSamples::begin(now.clone(), Some(&baseline), start + MS(2));

@@ -49,6 +49,7 @@ fn impossible_numbers_are_refused_with_their_path() {
         &score("0.5", "-1"),
         &["Alpha.defend", "penalty_points", "got -1"],
     );
+    // All violations of an episode cost 11 points; a task has 1000 episodes.
     assert_refused(
         &score("0.5", "11000.5"),
         &["Alpha.defend", "penalty_points", "11000", "11000.5"],
@@ -160,6 +161,8 @@ fn game(changes: Value) -> String {
 
 #[test]
 fn final_score_follows_from_fouls() {
+    // The score is the goals plus a point for every third foul of the opponent: 3 + 2 and 2 + 1. `winner_led`: the winner had the higher
+    // score, whether or not it decided.
     let scored = score_tournament(&read::<Vec<PlayedGame>>(&game(json!({}))).unwrap());
     assert_eq!(
         serde_json::to_value(&scored.games[0]).unwrap(),
@@ -175,7 +178,8 @@ fn final_score_follows_from_fouls() {
     );
     // Both may be given if they agree.
     read::<Vec<PlayedGame>>(&game(json!({"score": [5, 3]}))).unwrap();
-    // A shorter game has lower bounds: 100.5 over 60 windows is non-deployable.
+    // Penalty points are counted per window of 500 steps, 90 in a normal game. More than 1.5 points per window make a side non-deployable
+    // (unsafe for the real robot), so that it loses: here 100.5 points in 60 windows.
     let short = read::<Vec<PlayedGame>>(&game(json!({"windows": 60, "goals": [0, 9]}))).unwrap();
     assert_eq!(
         score_tournament(&short).games[0].winner,
@@ -210,6 +214,7 @@ fn impossible_games_are_refused() {
             json!({"fouls": null, "score": [2, 2]}),
             ["at least the goals [3, 2]", "got [2, 2]"],
         ),
+        // At most 11 points in each of 90 windows.
         (
             json!({"penalty_points": [0, 990.5]}),
             ["penalty_points", "990.5"],

@@ -1,5 +1,5 @@
 //! Episodes that are stepped at once, with SIMD instructions, have the same bits as those that are stepped alone, with every instruction
-//! set.
+//! set. `Factors` are the perturbations of an episode, such as noise. The *universal joint* is the two hinges on which the mallet hangs.
 
 use faceoff_sim::{
     Bounds, Episode, Interpolation, JOINTS, PerturbationSettings, Plant, SimdLevel, StepOutcome,
@@ -103,6 +103,7 @@ fn snapshot(episode: &Episode) -> (Vec<u64>, String) {
         numbers.extend(world.torques(robot));
         numbers.extend(world.universal(robot));
         numbers.extend(world.joint_velocities(robot));
+        // The position before the last substep (1 ms of physics), which the opponent observes.
         numbers.extend(world.end_effector_before(robot));
     }
     let rest = format!("{:?} {:?}", episode.divergence(), episode.violations());

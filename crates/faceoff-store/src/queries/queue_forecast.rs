@@ -73,7 +73,8 @@ pub struct EvaluationBacklog {
 /// An open job with its purpose.
 struct OpenJob {
     account: i64,
-    /// Within an account, jobs of a smaller batch come first; within a batch, those with a smaller `queue_no`.
+    /// Time of the cutoff or request for which the job was queued, in milliseconds, or 0. Within an account, jobs of a smaller batch
+    /// come first; within a batch, those with a smaller `queue_no`.
     batch: i64,
     queue_no: i64,
     is_leased: bool,
@@ -115,7 +116,8 @@ async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
     .await?)
 }
 
-/// All accounts by number, without their jobs.
+/// All accounts by number, without their jobs. Lanes with a smaller urgency are always served first; of two equally served lanes of one
+/// urgency, the one with the smaller rank.
 async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, AccountQueue>> {
     let rows = sqlx::query!(
         "SELECT a.account_no, a.lane, l.urgency, l.rank, l.served_ms AS of_lane, a.served_ms
@@ -151,7 +153,7 @@ enum GroupTarget {
     Submission(SubmissionId),
     Evaluation(EvaluationId),
     Game(GameId),
-    /// Jobs that get no position, such as those of an ablation or a proposal: they only occupy slots.
+    /// Jobs that get no position, such as those of an ablation or of a proposed re-evaluation: they only occupy slots.
     WithoutPosition,
 }
 

@@ -313,6 +313,7 @@ pub fn rules_and_settings(plan: &RunPlan) -> (StageRules, StageSettings) {
         tasks: plan.tasks.clone(),
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
+        // No deviations from the ruleset's weights, tiers and perturbations.
         variation: Default::default(),
         limits: Default::default(),
     };

@@ -120,6 +120,7 @@ fn token_line(token: &TokenView, now: Timestamp) -> String {
     let owner = match (token.team, token.person) {
         (Some(id), _) => format!("team:{id}"),
         (None, Some(id)) => format!("person:{id}"),
+        // Of the operator with access to the server's data folder.
         (None, None) => "host".to_owned(),
     };
     let last_use = token.last_used_at.map_or_else(

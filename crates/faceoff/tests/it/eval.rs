@@ -205,6 +205,7 @@ fn bundle_can_be_evaluated_repeatedly_in_its_own_folder() {
     }
     let packed = run_in_folder(&["submit", ".", "--dry-run", "--json"]);
     let packed: serde_json::Value = serde_json::from_str(&packed).unwrap();
+    // Of the files that `submit` does not pack, the answer lists those that a rule leaves out: here the default folder of `eval`.
     assert_eq!(packed["left_out"], serde_json::json!(["faceoff-eval"]));
 }
 

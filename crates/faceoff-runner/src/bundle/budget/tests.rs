@@ -41,6 +41,7 @@ fn timeout_is_a_platform_fault_and_cancellation_is_none() {
 fn links_with_short_names_are_counted() {
     let (now, never) = (Instant::now, || false);
     let budget = Budget::new(&LIMITS, &now, &never);
+    // Each name counts as LOOKUP_BYTES_PER_NAME more bytes, so after this name exactly one empty name fits.
     let bytes_before_limit = usize::try_from(MAX_LINK_BYTES - 2 * LOOKUP_BYTES_PER_NAME).unwrap();
     budget.count_link_bytes(bytes_before_limit).unwrap();
     budget.count_link_bytes(0).unwrap();
@@ -58,6 +59,7 @@ fn links_with_short_names_are_counted() {
 fn overhead_is_counted_for_any_reader() {
     let (now, never) = (Instant::now, || false);
     let budget = Budget::new(&LIMITS, &now, &never);
+    // No file explains these bytes, so all of them are overhead, such as headers and padding.
     let mut reader = MeteredReader::new(io::repeat(0), &budget);
     let read_error = io::copy(&mut reader, &mut io::sink()).unwrap_err();
     let result = budget.prefer_own_failure(Err::<(), _>(BundleError::from_archive_read_error(
