@@ -54,6 +54,8 @@ impl FromStr for Actor {
     }
 }
 
+faceoff_types::sqlite_text!(Actor);
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,5 +77,3 @@ mod tests {
         assert!("team:none".parse::<Actor>().is_err());
     }
 }
-
-faceoff_types::sqlite_text!(Actor);

@@ -96,16 +96,10 @@ macro_rules! select_board {
     ($name:literal, $tail:literal, $($argument:expr),* $(,)?) => {
         sqlx::query_as!(
             crate::queries::board::BoardRow,
-            $name + r#"SELECT t.id AS team, t.name,
-                      t.created_at AS invited_at, t.affiliation, t.link,
-                      t.division, t.retired_at,
-                      t.is_baseline,
-                      s.id AS submission,
-                      s.created_at AS submitted_at, s.agent_name,
-                      e.id AS evaluation, e.run_id AS run,
-                      e.day, d.released_at,
-                      e.extra_for, e.finished_at AS "finished_at!",
-                      e.result AS "result!" "# + $tail,
+            $name + r#"SELECT t.id AS team, t.name, t.created_at AS invited_at, t.affiliation, t.link, t.division,
+                      t.retired_at, t.is_baseline, s.id AS submission, s.created_at AS submitted_at, s.agent_name,
+                      e.id AS evaluation, e.run_id AS run, e.day, d.released_at, e.extra_for,
+                      e.finished_at AS "finished_at!", e.result AS "result!" "# + $tail,
             $($argument),*
         )
     };
@@ -161,9 +155,9 @@ impl Store {
         let last_day = scope.last_day.map(Text);
         let days = sqlx::query_scalar!(
             "SELECT DISTINCT day FROM evaluations
-               WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
-                 AND (?3 IS NULL OR finished_at <= ?3) AND (?4 IS NULL OR day <= ?4)
-               ORDER BY day",
+             WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
+               AND (?3 IS NULL OR finished_at <= ?3) AND (?4 IS NULL OR day <= ?4)
+             ORDER BY day",
             stage,
             revision,
             finished_until,
@@ -196,20 +190,20 @@ impl Store {
         let rows = select_board!(
             "/* board */ ",
             "FROM teams t
-               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
-                                                WHERE n.team_id = t.id AND n.stage_id = ?1
-                                                  AND n.revision = ?2 AND n.state = 'finished'
-                                                  AND n.voided_at IS NULL
-                                                  AND (?3 IS NULL OR n.finished_at <= ?3)
-                                                  AND (?5 IS NULL OR n.day <= ?5)
-                                                  AND n.id NOT IN (SELECT value FROM json_each(?4))
-                                                ORDER BY n.day DESC LIMIT 1)
-               JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
-               JOIN submissions s ON s.id = e.submission_id
-               JOIN stages g ON g.id = e.stage_id
-               WHERE CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
-                          ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
-               ORDER BY t.name",
+             JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
+                                              WHERE n.team_id = t.id AND n.stage_id = ?1
+                                                AND n.revision = ?2 AND n.state = 'finished'
+                                                AND n.voided_at IS NULL
+                                                AND (?3 IS NULL OR n.finished_at <= ?3)
+                                                AND (?5 IS NULL OR n.day <= ?5)
+                                                AND n.id NOT IN (SELECT value FROM json_each(?4))
+                                              ORDER BY n.day DESC LIMIT 1)
+             JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+             JOIN submissions s ON s.id = e.submission_id
+             JOIN stages g ON g.id = e.stage_id
+             WHERE CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
+                        ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
+             ORDER BY t.name",
             stage,
             revision,
             finished_until,

@@ -49,20 +49,20 @@ impl Store {
         let rows = select_board!(
             "/* board of days */ ",
             "FROM (SELECT n.rowid AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
-                     FROM evaluations n
-                     WHERE n.stage_id = ?1 AND n.revision = ?2 AND n.state = 'finished'
-                       AND n.voided_at IS NULL AND (?5 IS NULL OR n.finished_at <= ?5)
-                       AND (?7 IS NULL OR n.day <= ?7)
-                       AND n.id NOT IN (SELECT value FROM json_each(?6))) a
-               JOIN evaluations e ON e.rowid = a.row
-               JOIN teams t ON t.id = e.team_id
-               JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
-               JOIN submissions s ON s.id = e.submission_id
-               JOIN stages g ON g.id = e.stage_id
-               WHERE a.age <= ?3 AND (NOT ?4 OR d.is_final = 1)
-                 AND CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
-                          ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
-               ORDER BY t.name, e.day",
+                   FROM evaluations n
+                   WHERE n.stage_id = ?1 AND n.revision = ?2 AND n.state = 'finished'
+                     AND n.voided_at IS NULL AND (?5 IS NULL OR n.finished_at <= ?5)
+                     AND (?7 IS NULL OR n.day <= ?7)
+                     AND n.id NOT IN (SELECT value FROM json_each(?6))) a
+             JOIN evaluations e ON e.rowid = a.row
+             JOIN teams t ON t.id = e.team_id
+             JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+             JOIN submissions s ON s.id = e.submission_id
+             JOIN stages g ON g.id = e.stage_id
+             WHERE a.age <= ?3 AND (NOT ?4 OR d.is_final = 1)
+               AND CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
+                        ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
+             ORDER BY t.name, e.day",
             stage,
             revision,
             max_days,

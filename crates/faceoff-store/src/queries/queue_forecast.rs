@@ -121,7 +121,7 @@ async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
 async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, AccountQueue>> {
     let rows = sqlx::query!(
         "SELECT a.account_no, a.lane, l.urgency, l.rank, l.served_ms AS of_lane, a.served_ms
-           FROM accounts a JOIN lanes l ON l.lane = a.lane"
+         FROM accounts a JOIN lanes l ON l.lane = a.lane"
     )
     .fetch_all(connection)
     .await?;

@@ -104,7 +104,7 @@ async fn ablation_context(
 ) -> Result<SubjectContext> {
     let row = sqlx::query!(
         "SELECT s.id AS submission, s.team_id AS team
-           FROM ablations a JOIN submissions s ON s.id = a.submission_id WHERE a.id = ?",
+         FROM ablations a JOIN submissions s ON s.id = a.submission_id WHERE a.id = ?",
         id
     )
     .fetch_optional(connection)

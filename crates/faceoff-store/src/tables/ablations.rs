@@ -63,7 +63,7 @@ pub(crate) async fn newest(
     Ok(sqlx::query_as!(
         AblationRow,
         "SELECT id, submission_id, created_at, finished_at, reason
-           FROM ablations WHERE submission_id = ? ORDER BY created_at DESC, id DESC LIMIT 1",
+         FROM ablations WHERE submission_id = ? ORDER BY created_at DESC, id DESC LIMIT 1",
         submission
     )
     .fetch_optional(connection)
@@ -74,7 +74,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: AblationId) -> R
     sqlx::query_as!(
         AblationRow,
         "SELECT id, submission_id, created_at, finished_at, reason
-           FROM ablations WHERE id = ?",
+         FROM ablations WHERE id = ?",
         id
     )
     .fetch_optional(connection)

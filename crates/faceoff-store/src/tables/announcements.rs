@@ -22,7 +22,7 @@ pub(crate) async fn newest(
 ) -> Result<Vec<Announcement>> {
     let rows = sqlx::query!(
         "SELECT id, at, title, text
-           FROM announcements ORDER BY at DESC, id DESC LIMIT ?",
+         FROM announcements ORDER BY at DESC, id DESC LIMIT ?",
         limit
     )
     .fetch_all(connection)

@@ -64,7 +64,7 @@ pub struct ArchivedSeason {
 pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Option<ArchivedSeason>> {
     let row = sqlx::query!(
         "SELECT edition, made_at, program, commitment, imported_at
-           FROM archived"
+         FROM archived"
     )
     .fetch_optional(connection)
     .await?;
@@ -102,7 +102,7 @@ pub(crate) async fn put(
 pub(crate) async fn seeds(connection: &mut SqliteConnection) -> Result<BTreeMap<StageDay, Seed>> {
     let rows = sqlx::query!(
         "SELECT stage_id AS stage, day, seed
-           FROM archived_seeds"
+         FROM archived_seeds"
     )
     .fetch_all(connection)
     .await?;
@@ -158,10 +158,10 @@ pub enum ArtifactOwner {
 pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<ArchivedArtifact>> {
     let bundles = sqlx::query!(
         "SELECT id, bundle_key, bundle_blake3 FROM submissions
-           WHERE bundle_removed_at IS NULL
-             AND (state = 'valid'
-                  OR team_id IN (SELECT id FROM teams WHERE disqualified_at IS NOT NULL OR retired_by_organiser = 1))
-           ORDER BY created_at, id"
+         WHERE bundle_removed_at IS NULL
+           AND (state = 'valid'
+                OR team_id IN (SELECT id FROM teams WHERE disqualified_at IS NOT NULL OR retired_by_organiser = 1))
+         ORDER BY created_at, id"
     )
     .fetch_all(&mut *connection)
     .await?;

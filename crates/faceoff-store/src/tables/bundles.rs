@@ -109,14 +109,14 @@ pub(crate) async fn refused(
     let uploaded_until = Instant(uploaded_until);
     let rows = sqlx::query!(
         "SELECT s.id, s.bundle_key FROM submissions s
-           WHERE s.bundle_removed_at IS NULL AND s.state IN ('invalid', 'validation_error')
-             AND (s.state = 'invalid' OR s.created_at <= ?)
-             AND NOT EXISTS (SELECT 1 FROM contestants c WHERE c.submission_id = s.id)
-             AND NOT EXISTS (SELECT 1 FROM teams t
-                             WHERE t.id = s.team_id AND (t.disqualified_at IS NOT NULL OR t.retired_by_organiser = 1))
-             AND NOT EXISTS (SELECT 1 FROM submissions o
-                             WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
-                               AND o.state IN ('validating', 'valid'))",
+         WHERE s.bundle_removed_at IS NULL AND s.state IN ('invalid', 'validation_error')
+           AND (s.state = 'invalid' OR s.created_at <= ?)
+           AND NOT EXISTS (SELECT 1 FROM contestants c WHERE c.submission_id = s.id)
+           AND NOT EXISTS (SELECT 1 FROM teams t
+                           WHERE t.id = s.team_id AND (t.disqualified_at IS NOT NULL OR t.retired_by_organiser = 1))
+           AND NOT EXISTS (SELECT 1 FROM submissions o
+                           WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
+                             AND o.state IN ('validating', 'valid'))",
         uploaded_until,
     )
     .fetch_all(connection)
@@ -199,12 +199,12 @@ pub(crate) async fn deletable(
     let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
         "SELECT s.id, s.bundle_key FROM submissions s
-           JOIN teams t ON t.id = s.team_id
-           WHERE s.bundle_removed_at IS NOT NULL AND s.bundle_removed_at <= ? AND s.bundle_gone = 0
-             AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
-             AND NOT EXISTS (SELECT 1 FROM submissions o
-                             WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
-                               AND o.bundle_removed_at IS NULL)",
+         JOIN teams t ON t.id = s.team_id
+         WHERE s.bundle_removed_at IS NOT NULL AND s.bundle_removed_at <= ? AND s.bundle_gone = 0
+           AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
+           AND NOT EXISTS (SELECT 1 FROM submissions o
+                           WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
+                             AND o.bundle_removed_at IS NULL)",
         removed_until
     )
     .fetch_all(connection)

@@ -91,9 +91,9 @@ pub(crate) async fn incomplete_of_day(
     let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let rows = sqlx::query!(
         "SELECT e.id, e.run_id AS run
-           FROM evaluations e JOIN runs r ON r.id = e.run_id
-           WHERE e.stage_id = ? AND e.day = ? AND e.state = 'open' AND r.state <> 'played'
-           ORDER BY e.created_at, e.id",
+         FROM evaluations e JOIN runs r ON r.id = e.run_id
+         WHERE e.stage_id = ? AND e.day = ? AND e.state = 'open' AND r.state <> 'played'
+         ORDER BY e.created_at, e.id",
         stage,
         day
     )
@@ -109,7 +109,7 @@ pub(crate) async fn open_of_team(
 ) -> Result<Vec<(EvaluationId, RunId)>> {
     let rows = sqlx::query!(
         "SELECT id, run_id AS run
-           FROM evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id",
+         FROM evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id",
         team
     )
     .fetch_all(connection)

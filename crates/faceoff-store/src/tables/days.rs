@@ -73,7 +73,7 @@ pub(crate) async fn newest(
 ) -> Result<Option<Day>> {
     let row = sqlx::query!(
         "SELECT day, cutoff_at, deadline_at, released_at
-           FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1",
+         FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1",
         stage
     )
     .fetch_optional(connection)
@@ -94,7 +94,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay)
     let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let row = sqlx::query!(
         "SELECT cutoff_at, deadline_at, released_at
-           FROM days WHERE stage_id = ? AND day = ?",
+         FROM days WHERE stage_id = ? AND day = ?",
         stage,
         day
     )
@@ -116,7 +116,7 @@ pub(crate) async fn unreleased(
 ) -> Result<Vec<Day>> {
     let rows = sqlx::query!(
         "SELECT day, cutoff_at, deadline_at
-           FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day",
+         FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day",
         stage
     )
     .fetch_all(connection)
@@ -143,11 +143,11 @@ pub(crate) async fn overdue(
     let now = Instant(now);
     let rows = sqlx::query!(
         "SELECT d.stage_id AS stage, d.day FROM days d
-           WHERE d.released_at IS NULL AND d.deadline_at <= ?
-             AND EXISTS (SELECT 1 FROM evaluations e JOIN runs r ON r.id = e.run_id
-                         WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'open'
-                           AND r.state <> 'played')
-           ORDER BY d.cutoff_at",
+         WHERE d.released_at IS NULL AND d.deadline_at <= ?
+           AND EXISTS (SELECT 1 FROM evaluations e JOIN runs r ON r.id = e.run_id
+                       WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'open'
+                         AND r.state <> 'played')
+         ORDER BY d.cutoff_at",
         now
     )
     .fetch_all(connection)

@@ -202,7 +202,7 @@ pub(crate) async fn set_attempt(
     };
     sqlx::query!(
         "UPDATE webhook_deliveries SET attempts = attempts + 1, last_at = ?, last_status = ?, last_error = ?, state = ?,
-           next_at = ?, settled_at = ? WHERE id = ?",
+         next_at = ?, settled_at = ? WHERE id = ?",
         at,
         attempt.status,
         attempt.error,

@@ -46,7 +46,7 @@ pub(crate) async fn all(
 ) -> Result<Vec<Entrant>> {
     let rows = sqlx::query!(
         "SELECT e.team_id AS team, t.name, e.entered_at, e.left_as, e.from_round, e.left_at, e.left_for
-           FROM entrants e JOIN teams t ON t.id = e.team_id WHERE e.tournament_id = ? ORDER BY t.name",
+         FROM entrants e JOIN teams t ON t.id = e.team_id WHERE e.tournament_id = ? ORDER BY t.name",
         tournament
     )
     .fetch_all(connection)

@@ -26,8 +26,8 @@ pub(crate) struct Entry {
 pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<Entry> {
     let row = sqlx::query!(
         "SELECT submission_id AS submission, team_id AS team, stage_id AS stage, day, revision, run_id AS run,
-                  rerun_of
-           FROM evaluations WHERE id = ?",
+                rerun_of
+         FROM evaluations WHERE id = ?",
         id
     )
     .fetch_optional(connection)

@@ -18,7 +18,7 @@ pub(crate) async fn of_runs(
     let runs = Json(runs);
     let rows = sqlx::query!(
         "SELECT run_id AS run, summary FROM episode_summaries
-           WHERE version = ? AND run_id IN (SELECT value FROM json_each(?))",
+         WHERE version = ? AND run_id IN (SELECT value FROM json_each(?))",
         version,
         runs,
     )

@@ -237,12 +237,12 @@ macro_rules! select_evaluations {
         sqlx::query_as!(
             EvaluationRow,
             "SELECT e.id, e.submission_id, e.team_id, e.stage_id, e.day, e.revision, d.released_at, d.deadline_at,
-                      e.rerun_of, e.run_id, r.profile, r.tasks, r.episodes_per_task, r.episodes_per_shard, r.max_faults,
-                      r.variation, r.limits, r.state AS run_state, e.created_at, e.state, e.finished_at, e.result,
-                      e.dataset, e.dataset_blake3, e.reason, e.unplayed, e.extra_for, e.voided_at, e.voided_for,
-                      e.published_at, e.dataset_removed_at, e.dataset_removed_for
-               FROM evaluations e JOIN runs r ON r.id = e.run_id 
-               LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day " + $tail
+                    e.rerun_of, e.run_id, r.profile, r.tasks, r.episodes_per_task, r.episodes_per_shard, r.max_faults,
+                    r.variation, r.limits, r.state AS run_state, e.created_at, e.state, e.finished_at, e.result,
+                    e.dataset, e.dataset_blake3, e.reason, e.unplayed, e.extra_for, e.voided_at, e.voided_for,
+                    e.published_at, e.dataset_removed_at, e.dataset_removed_for
+             FROM evaluations e JOIN runs r ON r.id = e.run_id 
+             LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day " + $tail
             $(, $argument)*
         )
     };

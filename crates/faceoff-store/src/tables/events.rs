@@ -62,7 +62,7 @@ pub(crate) async fn after(
     let rows = sqlx::query_as!(
         EventRow,
         "SELECT id, at, actor, subject_kind, subject_id, kind, payload
-           FROM events WHERE id > ? ORDER BY id LIMIT ?",
+         FROM events WHERE id > ? ORDER BY id LIMIT ?",
         after,
         limit,
     )
@@ -126,11 +126,11 @@ pub(crate) async fn newest(
             sqlx::query_as!(
                 EventRow,
                 "SELECT id, at, actor, subject_kind, subject_id, kind, payload
-                   FROM events
-                   WHERE subject_kind = ?1 AND subject_id = ?2 AND id < ?3
-                     AND (?4 IS NULL OR actor = ?4 OR substr(actor, 1, length(?4) + 1) = ?4 || ':')
-                     AND (?5 IS NULL OR kind = ?5)
-                   ORDER BY id DESC LIMIT ?6",
+                 FROM events
+                 WHERE subject_kind = ?1 AND subject_id = ?2 AND id < ?3
+                   AND (?4 IS NULL OR actor = ?4 OR substr(actor, 1, length(?4) + 1) = ?4 || ':')
+                   AND (?5 IS NULL OR kind = ?5)
+                 ORDER BY id DESC LIMIT ?6",
                 subject_kind,
                 subject_id,
                 before,
@@ -145,11 +145,11 @@ pub(crate) async fn newest(
             sqlx::query_as!(
                 EventRow,
                 "SELECT id, at, actor, subject_kind, subject_id, kind, payload
-                   FROM events
-                   WHERE id < ?1
-                     AND (?2 IS NULL OR actor = ?2 OR substr(actor, 1, length(?2) + 1) = ?2 || ':')
-                     AND (?3 IS NULL OR kind = ?3)
-                   ORDER BY id DESC LIMIT ?4",
+                 FROM events
+                 WHERE id < ?1
+                   AND (?2 IS NULL OR actor = ?2 OR substr(actor, 1, length(?2) + 1) = ?2 || ':')
+                   AND (?3 IS NULL OR kind = ?3)
+                 ORDER BY id DESC LIMIT ?4",
                 before,
                 actor,
                 kind,

@@ -56,7 +56,7 @@ pub(crate) async fn all(
 ) -> Result<Vec<GameAttempt>> {
     let rows = sqlx::query!(
         "SELECT number, worker, begun_at, ended_at, outcome, reason
-           FROM game_attempts WHERE game_id = ? ORDER BY number",
+         FROM game_attempts WHERE game_id = ? ORDER BY number",
         game
     )
     .fetch_all(connection)

@@ -108,7 +108,7 @@ macro_rules! select_invitations {
         sqlx::query_as!(
             InvitationRow,
             "SELECT id, role, team_id, person_id, note, created_at, expires_at, accepted_at, accepted_by, revoked_at
-               FROM invitations " + $tail
+             FROM invitations " + $tail
             $(, $argument)*
         )
     };

@@ -118,7 +118,7 @@ macro_rules! select_proposals {
         sqlx::query_as!(
             ProposalRow,
             "SELECT id, stage_id AS stage, revision, kind, day, reason, created_at, settled_at, outcome
-               FROM proposals " + $tail
+             FROM proposals " + $tail
             $(, $argument)*
         )
     };

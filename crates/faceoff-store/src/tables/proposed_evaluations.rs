@@ -142,7 +142,7 @@ pub(crate) async fn of_run(
 ) -> Result<Option<(EvaluationId, ProposalId)>> {
     let found = sqlx::query!(
         "SELECT id, proposal_id AS proposal
-           FROM proposed_evaluations WHERE run_id = ?",
+         FROM proposed_evaluations WHERE run_id = ?",
         run
     )
     .fetch_optional(connection)
@@ -158,8 +158,8 @@ pub(crate) async fn of_job(
     let job = Text(job);
     let found = sqlx::query!(
         "SELECT d.id, d.run_id AS run, d.proposal_id AS proposal
-           FROM proposed_evaluation_scorings s JOIN proposed_evaluations d ON d.id = s.proposed_evaluation_id
-           WHERE s.job_id = ?",
+         FROM proposed_evaluation_scorings s JOIN proposed_evaluations d ON d.id = s.proposed_evaluation_id
+         WHERE s.job_id = ?",
         job
     )
     .fetch_optional(connection)

@@ -63,7 +63,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Questio
     let rows = sqlx::query_as!(
         QuestionRow,
         "SELECT id, team_id, asked_at, text, answer, answered_at, public
-           FROM questions ORDER BY asked_at DESC, id DESC"
+         FROM questions ORDER BY asked_at DESC, id DESC"
     )
     .fetch_all(connection)
     .await?;

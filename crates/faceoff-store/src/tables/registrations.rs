@@ -87,8 +87,8 @@ macro_rules! select_registrations {
         sqlx::query_as!(
             RegistrationRow,
             "SELECT id, team_name, affiliation, link, division, contact, accepted_terms, created_at, decided_at,
-                      reason, team_id
-               FROM registrations " + $tail
+                    reason, team_id
+             FROM registrations " + $tail
             $(, $argument)*
         )
     };

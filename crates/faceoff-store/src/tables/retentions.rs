@@ -149,27 +149,27 @@ pub(crate) async fn idle_bundles(
     let removable = Json(removable);
     let rows = sqlx::query!(
         "SELECT s.id, s.bundle_bytes AS bytes
-           FROM submissions s JOIN teams t ON t.id = s.team_id
-           WHERE s.state = 'valid' AND s.bundle_removed_at IS NULL
-             AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
-             AND s.id IN (SELECT e.submission_id FROM evaluations e WHERE e.stage_id = ?1 AND e.state = 'finished')
-             AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.submission_id = s.id)
-             AND NOT EXISTS (SELECT 1 FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
-                             WHERE e.submission_id = s.id
-                               AND (e.state = 'open' OR d.released_at IS NULL
-                                    OR e.state = 'finished' AND e.dataset_removed_at IS NULL
-                                       AND e.id NOT IN (SELECT value FROM json_each(?2))))
-             AND ((SELECT closed_at FROM season) IS NOT NULL
-                  OR NOT EXISTS (SELECT 1 FROM evaluations e JOIN stages st ON st.id = e.stage_id
-                                 WHERE e.submission_id = s.id AND st.finalised_at IS NULL))
-             AND NOT EXISTS (SELECT 1 FROM proposed_evaluations d JOIN proposals p ON p.id = d.proposal_id
-                             WHERE d.submission_id = s.id AND p.outcome IS NULL)
-             AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)
-             AND NOT EXISTS (SELECT 1 FROM round_submissions r JOIN tournaments o ON o.id = r.tournament_id
-                             WHERE r.submission_id = s.id AND o.closed_at IS NULL)
-             AND NOT EXISTS (SELECT 1 FROM tournaments o WHERE o.baseline_id = s.id AND o.closed_at IS NULL)
-             AND NOT EXISTS (SELECT 1 FROM games g WHERE g.home_submission_id = s.id AND g.state IN ('queued', 'running'))
-             AND NOT EXISTS (SELECT 1 FROM games g WHERE g.away_submission_id = s.id AND g.state IN ('queued', 'running'))",
+         FROM submissions s JOIN teams t ON t.id = s.team_id
+         WHERE s.state = 'valid' AND s.bundle_removed_at IS NULL
+           AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
+           AND s.id IN (SELECT e.submission_id FROM evaluations e WHERE e.stage_id = ?1 AND e.state = 'finished')
+           AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.submission_id = s.id)
+           AND NOT EXISTS (SELECT 1 FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+                           WHERE e.submission_id = s.id
+                             AND (e.state = 'open' OR d.released_at IS NULL
+                                  OR e.state = 'finished' AND e.dataset_removed_at IS NULL
+                                     AND e.id NOT IN (SELECT value FROM json_each(?2))))
+           AND ((SELECT closed_at FROM season) IS NOT NULL
+                OR NOT EXISTS (SELECT 1 FROM evaluations e JOIN stages st ON st.id = e.stage_id
+                               WHERE e.submission_id = s.id AND st.finalised_at IS NULL))
+           AND NOT EXISTS (SELECT 1 FROM proposed_evaluations d JOIN proposals p ON p.id = d.proposal_id
+                           WHERE d.submission_id = s.id AND p.outcome IS NULL)
+           AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)
+           AND NOT EXISTS (SELECT 1 FROM round_submissions r JOIN tournaments o ON o.id = r.tournament_id
+                           WHERE r.submission_id = s.id AND o.closed_at IS NULL)
+           AND NOT EXISTS (SELECT 1 FROM tournaments o WHERE o.baseline_id = s.id AND o.closed_at IS NULL)
+           AND NOT EXISTS (SELECT 1 FROM games g WHERE g.home_submission_id = s.id AND g.state IN ('queued', 'running'))
+           AND NOT EXISTS (SELECT 1 FROM games g WHERE g.away_submission_id = s.id AND g.state IN ('queued', 'running'))",
         stage,
         removable,
     )

@@ -61,7 +61,7 @@ pub(crate) async fn all(
     let mut submissions = BTreeMap::<u32, Vec<(TeamId, SubmissionId)>>::new();
     let rows = sqlx::query!(
         "SELECT round, team_id AS team, submission_id AS submission
-           FROM round_submissions WHERE tournament_id = ? ORDER BY round, team_id",
+         FROM round_submissions WHERE tournament_id = ? ORDER BY round, team_id",
         tournament
     )
     .fetch_all(&mut *connection)
@@ -72,7 +72,7 @@ pub(crate) async fn all(
     }
     let rows = sqlx::query!(
         "SELECT number, started_at, over_at, groups, byes
-           FROM rounds WHERE tournament_id = ? ORDER BY number",
+         FROM rounds WHERE tournament_id = ? ORDER BY number",
         tournament
     )
     .fetch_all(connection)

@@ -90,8 +90,8 @@ pub(crate) async fn insert(
 pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result<Run> {
     let row = sqlx::query!(
         "SELECT profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults, keeps_recordings, ruleset,
-                  variation, limits
-           FROM runs WHERE id = ?",
+                variation, limits
+         FROM runs WHERE id = ?",
         id,
     )
     .fetch_optional(connection)
@@ -124,7 +124,7 @@ pub(crate) async fn contestants(
 ) -> Result<Vec<SubmissionId>> {
     let rows = sqlx::query_scalar!(
         "SELECT submission_id AS id FROM contestants
-           WHERE run_id = ? ORDER BY side",
+         WHERE run_id = ? ORDER BY side",
         id,
     )
     .fetch_all(connection)
@@ -170,9 +170,9 @@ pub(crate) async fn with_old_recordings(
     let ended_until = Instant(ended_until);
     let runs = sqlx::query_scalar!(
         "SELECT r.id
-           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
-           WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL
-             AND COALESCE(e.finished_at, d.finished_at) <= ?",
+         FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
+         WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL
+           AND COALESCE(e.finished_at, d.finished_at) <= ?",
         ended_until,
     )
     .fetch_all(connection)

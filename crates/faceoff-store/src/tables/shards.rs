@@ -111,7 +111,7 @@ macro_rules! select_shards {
         sqlx::query_as!(
             ShardRow,
             "SELECT id, run_id AS run, task, first_episode, end_episode, recording
-               FROM shards " + $tail
+             FROM shards " + $tail
             $(, $argument)*
         )
     };
@@ -144,11 +144,11 @@ pub(crate) async fn committed_by_worker(
 ) -> Result<Vec<CommittedShard>> {
     let rows = sqlx::query!(
         "SELECT s.id, s.job_id AS job, s.recording
-           FROM jobs j JOIN shards s ON s.job_id = j.id JOIN runs r ON r.id = s.run_id
-           -- 0 is what follows / among characters
-           WHERE j.state = 'done' AND j.worker >= 'remote/' AND j.worker < 'remote0'
-             AND j.worker >= ?1 || '/' AND j.worker < ?1 || '0'
-             AND r.state = 'running' AND s.committed_at IS NOT NULL",
+         FROM jobs j JOIN shards s ON s.job_id = j.id JOIN runs r ON r.id = s.run_id
+         -- 0 is what follows / among characters
+         WHERE j.state = 'done' AND j.worker >= 'remote/' AND j.worker < 'remote0'
+           AND j.worker >= ?1 || '/' AND j.worker < ?1 || '0'
+           AND r.state = 'running' AND s.committed_at IS NOT NULL",
         holder,
     )
     .fetch_all(connection)
@@ -310,7 +310,7 @@ pub(crate) async fn delete_without_faults(
 ) -> Result<()> {
     let jobs = sqlx::query_scalar!(
         "DELETE FROM shards WHERE run_id = ? AND COALESCE(agent_faults, 0) = 0
-           RETURNING job_id AS job",
+         RETURNING job_id AS job",
         run,
     )
     .fetch_all(&mut *connection)

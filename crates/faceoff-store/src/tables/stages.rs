@@ -200,10 +200,10 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>>
     let rows = sqlx::query_as!(
         StageRow,
         "SELECT s.id, s.name, s.opens_at, s.closes_at, s.zone, s.settings, s.names_seeds, s.configured,
-                  s.finalised_at, s.finalised_by, s.finalised_without, r.revision, r.since, r.rules
-           FROM stages s JOIN stage_revisions r ON r.stage_id = s.id
-           WHERE r.revision = (SELECT MAX(n.revision) FROM stage_revisions n WHERE n.stage_id = s.id)
-           ORDER BY s.opens_at, s.id"
+                s.finalised_at, s.finalised_by, s.finalised_without, r.revision, r.since, r.rules
+         FROM stages s JOIN stage_revisions r ON r.stage_id = s.id
+         WHERE r.revision = (SELECT MAX(n.revision) FROM stage_revisions n WHERE n.stage_id = s.id)
+         ORDER BY s.opens_at, s.id"
     )
     .fetch_all(connection)
     .await?;
@@ -234,7 +234,7 @@ pub(crate) async fn revisions(
 ) -> Result<Vec<Revision>> {
     let rows = sqlx::query!(
         "SELECT revision, since, rules
-           FROM stage_revisions WHERE stage_id = ? ORDER BY revision",
+         FROM stage_revisions WHERE stage_id = ? ORDER BY revision",
         stage
     )
     .fetch_all(connection)

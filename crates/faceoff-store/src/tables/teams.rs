@@ -72,8 +72,8 @@ macro_rules! select_teams {
         sqlx::query_as!(
             TeamRow,
             "SELECT id, name, created_at, disqualified_at, disqualified_for, affiliation, link, division, retired_at,
-                      is_baseline
-               FROM teams " + $tail
+                    is_baseline
+             FROM teams " + $tail
             $(, $argument)*
         )
     };
@@ -212,7 +212,7 @@ pub(crate) async fn evidence(
 ) -> Result<Option<Evidence>> {
     let row = sqlx::query!(
         "SELECT disqualified_at, disqualified_for, retired_at, retired_by_organiser AS by_organiser
-           FROM teams WHERE id = ?",
+         FROM teams WHERE id = ?",
         id
     )
     .fetch_optional(connection)

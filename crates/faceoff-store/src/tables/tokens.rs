@@ -183,8 +183,8 @@ pub(crate) async fn count_valid(
     let (kind, team, user, now) = (owner.kind(), owner.team(), owner.user(), Instant(now));
     Ok(sqlx::query_scalar!(
         "SELECT COUNT(*) FROM tokens
-           WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL
-             AND (expires_at IS NULL OR expires_at > ?)",
+         WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL
+           AND (expires_at IS NULL OR expires_at > ?)",
         kind,
         team,
         user,

@@ -72,8 +72,8 @@ macro_rules! select_tournaments {
         sqlx::query_as!(
             TournamentRow,
             "SELECT id, number, name, created_at, stage_id AS stage, rules, settings, baseline_id AS baseline,
-                      paused_at, paused_for, closed_at
-               FROM tournaments " + $tail
+                    paused_at, paused_for, closed_at
+             FROM tournaments " + $tail
             $(, $argument)*
         )
     };

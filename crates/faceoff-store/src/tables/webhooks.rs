@@ -91,8 +91,8 @@ macro_rules! select_webhooks {
         sqlx::query_as!(
             WebhookRow,
             "SELECT id, team_id, name, url, about, created_at, seen, failing_since, dead_at, dead_for,
-                      old_secret_until
-               FROM webhooks " + $tail
+                    old_secret_until
+             FROM webhooks " + $tail
             $(, $argument)*
         )
     };
@@ -229,7 +229,7 @@ pub(crate) async fn secrets(
 ) -> Result<WebhookSecrets> {
     let row = sqlx::query!(
         "SELECT secret, old_secret, old_secret_until AS until
-           FROM webhooks WHERE id = ?",
+         FROM webhooks WHERE id = ?",
         id
     )
     .fetch_optional(connection)
