@@ -102,7 +102,7 @@ async fn revalidate(mut request: Request, next: Next) -> Response {
 async fn serve_cached(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
     let second = app.config.clock.now().as_second();
     match answer_cache::cache_key(&request, &app.store, second) {
-        Some(key) => app.answer_cache.get(key, next.run(request)).await,
+        Some(key) => answer_cache::get(&app.answer_cache, key, next.run(request)).await,
         None => next.run(request).await,
     }
 }

@@ -1,20 +1,12 @@
-//! Board rows aggregated from several evaluations, and a cache of them. A board ranks the teams of a stage, with one row per
-//! team. Depending on the stage, a row shows one evaluation of the team or the mean of several. Selecting each team's best
-//! evaluation means reading thousands of results, which change only a few times a day.
+//! Board rows aggregated from several evaluations. A board ranks the teams of a stage, with one row per team. Depending on the
+//! stage, a row shows one evaluation of the team or the mean of several. Selecting each team's best evaluation means reading
+//! thousands of results, which change only a few times a day, so rows are cached.
 
 use crate::problem::Problem;
 use faceoff_scoring::mean_result;
-use faceoff_store::{BoardRecord, Store};
+use faceoff_store::BoardRecord;
 use faceoff_types::{CountingResult, EvaluationId, RunId, StageId, Task};
 use jiff::{Timestamp, civil::Date};
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard},
-};
-
-/// Boards in the cache. A season has some stages, each with a few revisions of its rules, and each revision has four boards:
-/// one for all tasks together and one per task.
-const MAX_BOARDS: usize = 100;
 
 /// A team's row, aggregated from the evaluations that count on the board.
 #[derive(Debug, Clone)]
@@ -63,6 +55,8 @@ impl AggregatedRow {
 /// Everything that determines the rows of a board.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RowsKey {
+    /// The newest change of the season that the rows include.
+    pub change: i64,
     pub stage: StageId,
     /// Number of the revision of the stage's rules.
     pub revision: u32,
@@ -73,51 +67,4 @@ pub struct RowsKey {
     pub finished_until: Option<Timestamp>,
     /// Only results of days up to this one.
     pub(crate) last_day: Option<Date>,
-}
-
-/// The rows of each board, with the id of the newest change of the season that they include.
-type Boards = HashMap<RowsKey, (i64, Arc<[AggregatedRow]>)>;
-
-/// Cache of board rows. Each change of the season may change them.
-#[derive(Debug)]
-pub struct RowCache {
-    store: Store,
-    boards: Mutex<Boards>,
-}
-
-impl RowCache {
-    pub fn new(store: Store) -> Self {
-        Self {
-            store,
-            boards: Mutex::default(),
-        }
-    }
-
-    /// The cached rows, if they include the newest change; otherwise calls `compute` and caches its rows.
-    pub async fn get(
-        &self,
-        key: RowsKey,
-        compute: impl AsyncFnOnce() -> Result<Vec<AggregatedRow>, Problem>,
-    ) -> Result<Vec<AggregatedRow>, Problem> {
-        // Read before the rows: a change in between invalidates the entry, though the rows may already include it.
-        let change = self.store.newest_change().await?;
-        let cached = self.lock().get(&key).cloned();
-        if let Some((_, rows)) = cached.filter(|(cached_change, _)| *cached_change == change) {
-            return Ok(rows.to_vec());
-        }
-        let rows = compute().await?;
-        let mut boards = self.lock();
-        if boards.len() >= MAX_BOARDS && !boards.contains_key(&key) {
-            boards.clear();
-        }
-        boards.insert(key, (change, rows.clone().into()));
-        Ok(rows)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Boards> {
-        // A panic cannot leave an incomplete entry behind.
-        self.boards
-            .lock()
-            .unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
 }

@@ -1,7 +1,7 @@
-//! Cache of public responses, valid until the season changes and for one second at most. Without it, many visitors of a board
+//! Cached public responses, valid until the season changes and for one second at most. Without it, many visitors of a board
 //! would take CPU time from the agents that run on the same machine.
 
-use crate::problem::Problem;
+use crate::{problem::Problem, shared_cache::SharedCache};
 use axum::{
     body::{self, Body, Bytes},
     extract::Request,
@@ -10,15 +10,12 @@ use axum::{
 };
 use faceoff_api::paths::API_BASE;
 use faceoff_store::Store;
-use moka::future::Cache;
-use std::time::Duration;
+use std::sync::Arc;
 
 /// Size of the cache in bytes; a board of a hundred teams has some ten kilobytes.
 const MAX_BYTES: u64 = 32 << 20;
 /// Longer keys are not cached: visitors could fill the memory with them.
 const MAX_KEY_BYTES: usize = 1024;
-/// Lifetime of an entry. The key contains the current second, so an entry is used for one second at most.
-const TIME_TO_LIVE: Duration = Duration::from_secs(2);
 /// Largest response; every page and board is smaller.
 const MAX_RESPONSE_BYTES: usize = 64 << 20;
 
@@ -68,7 +65,7 @@ impl AnswerKey {
 
 /// A response in memory.
 #[derive(Debug, Clone)]
-struct CachedResponse {
+pub struct CachedResponse {
     status: StatusCode,
     headers: HeaderMap,
     body: Bytes,
@@ -95,9 +92,9 @@ impl CachedResponse {
         }
     }
 
-    fn bytes(&self) -> u32 {
+    fn bytes(&self) -> usize {
         // The second summand is an allowance for headers and key.
-        u32::try_from(self.body.len() + 4 * MAX_KEY_BYTES).unwrap_or(u32::MAX)
+        self.body.len() + 4 * MAX_KEY_BYTES
     }
 }
 
@@ -111,35 +108,28 @@ impl IntoResponse for CachedResponse {
 }
 
 /// Cache of public responses.
-#[derive(Debug)]
-pub struct AnswerCache(Cache<AnswerKey, CachedResponse>);
+pub type AnswerCache = SharedCache<AnswerKey, CachedResponse>;
 
-impl AnswerCache {
-    /// The cached response, or the result of `compute`. Concurrent requests share one computation. Only responses
-    /// with status 200 are cached.
-    pub async fn get(&self, key: AnswerKey, compute: impl Future<Output = Response>) -> Response {
-        let cached = self.0.try_get_with(key, async {
-            let response = CachedResponse::read(compute.await).await;
-            match response.status {
-                StatusCode::OK => Ok(response),
-                _ => Err(response),
-            }
-        });
-        match cached.await {
-            Ok(response) => response.into_response(),
-            Err(uncached) => CachedResponse::clone(&uncached).into_response(),
-        }
-    }
+pub(crate) fn new() -> AnswerCache {
+    SharedCache::with_bytes(MAX_BYTES, CachedResponse::bytes)
 }
 
-impl Default for AnswerCache {
-    fn default() -> Self {
-        let cache = Cache::builder()
-            .max_capacity(MAX_BYTES)
-            .time_to_live(TIME_TO_LIVE)
-            .weigher(|_, response: &CachedResponse| response.bytes());
-        Self(cache.build())
-    }
+/// The cached response, or the result of `compute`. Concurrent requests share one computation. Only responses with status 200
+/// are cached.
+pub async fn get(
+    cache: &AnswerCache,
+    key: AnswerKey,
+    compute: impl Future<Output = Response>,
+) -> Response {
+    let computed = async {
+        let response = Arc::new(CachedResponse::read(compute.await).await);
+        match response.status {
+            StatusCode::OK => Ok(response),
+            _ => Err(response),
+        }
+    };
+    let (Ok(response) | Err(response)) = cache.get(key, computed).await;
+    CachedResponse::clone(&response).into_response()
 }
 
 /// The key of a request's response; `None` if the response depends on the caller. `second` is the current time as a Unix

@@ -1,15 +1,22 @@
 //! The state that all request handlers share: database, configuration, caches and limits.
 
 use crate::{
-    aggregated_rows::RowCache, analysis_cache::AnalysisCache, answer_cache::AnswerCache,
-    config::HttpConfig, passwords::Passwords, problem::Problem, rate_limits::RequestLimiter,
-    summaries::Summaries, tournament_cache::TournamentCache, upload_slots::UploadSlots,
+    aggregated_rows::{AggregatedRow, RowsKey},
+    answer_cache::{self, AnswerCache},
+    config::HttpConfig,
+    passwords::Passwords,
+    problem::Problem,
+    rate_limits::RequestLimiter,
+    shared_cache::SharedCache,
+    summaries::Summaries,
+    upload_slots::UploadSlots,
 };
 use faceoff_api::views::champion_shares::ChampionSharesView;
 use faceoff_notify::Feed;
+use faceoff_replay::GameAnalysis;
 use faceoff_scoring::tournament::rating::Ratings;
 use faceoff_store::Store;
-use faceoff_types::TokenId;
+use faceoff_types::{TokenId, TournamentId};
 use std::sync::{Arc, atomic::AtomicBool};
 use tokio::sync::Semaphore;
 use uuid::Uuid;
@@ -30,15 +37,18 @@ pub struct AppState {
     /// Episode summaries of runs, from which boards compute their statistics.
     pub summaries: Summaries,
     /// Rows of boards that are aggregated over many days.
-    pub row_cache: RowCache,
+    pub(crate) board_rows: SharedCache<RowsKey, [AggregatedRow]>,
     /// Responses that are the same for all visitors.
     pub answer_cache: AnswerCache,
     /// Ratings of the submissions of a tournament.
-    pub rating_cache: TournamentCache<Ratings>,
-    /// Analyses of games.
-    pub(crate) analysis_cache: AnalysisCache,
+    pub(crate) ratings: TournamentAnswers<Ratings>,
+    /// Analyses of games by the artifact key of the game's clips, which never change.
+    pub(crate) game_analyses: SharedCache<String, GameAnalysis>,
     /// How often each team wins when a tournament is replayed with other seeds.
-    pub(crate) champion_share_cache: TournamentCache<ChampionSharesView>,
+    pub(crate) champion_shares: TournamentAnswers<ChampionSharesView>,
+    /// One permit: only one answer about a tournament is computed at a time, because the slots that run evaluations and games
+    /// need the CPUs.
+    tournament_computation: Semaphore,
     /// Whether the season has a tournament; false until this process has seen one. Tournaments are never removed.
     pub has_tournaments: AtomicBool,
     /// One permit per reader of a live game.
@@ -58,6 +68,20 @@ pub struct AppState {
 /// More copies at once do not make the disk faster, and each keeps files open.
 const MAX_ARTIFACT_WRITES: usize = 4;
 
+/// Boards in memory. A season has some stages, each with a few revisions of its rules, and each revision has four boards: one
+/// for all tasks together and one per task.
+const MAX_BOARDS: u64 = 100;
+
+/// Tournaments with answers in memory; a season has a few.
+const MAX_TOURNAMENTS: u64 = 20;
+
+/// Size of the analyses in memory. Most have some ten kilobytes; those of a robot that violates a limit again and again have
+/// some hundred.
+const MAX_ANALYSIS_BYTES: u64 = 16 << 20;
+
+/// Answers about a tournament by the newest change of the season that they include.
+type TournamentAnswers<T> = SharedCache<(i64, TournamentId), T>;
+
 /// The state as handlers receive it.
 pub type App = Arc<AppState>;
 
@@ -68,12 +92,13 @@ impl AppState {
             upload_slots: Arc::new(UploadSlots::new(config.limits.team_uploads)),
             artifact_writes: Semaphore::new(MAX_ARTIFACT_WRITES),
             archive_permit: Arc::new(Semaphore::new(1)),
-            summaries: Summaries::new(store.clone(), config.clock.clone()),
-            row_cache: RowCache::new(store.clone()),
-            answer_cache: AnswerCache::default(),
-            rating_cache: TournamentCache::default(),
-            analysis_cache: AnalysisCache::default(),
-            champion_share_cache: TournamentCache::default(),
+            summaries: Summaries::new(store.clone()),
+            board_rows: SharedCache::with_entries(MAX_BOARDS),
+            answer_cache: answer_cache::new(),
+            ratings: SharedCache::with_entries(MAX_TOURNAMENTS),
+            game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, analysis_bytes),
+            champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
+            tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),
             live_reader_permits: Arc::new(Semaphore::new(config.limits.live_readers)),
             event_reader_permits: Arc::new(Semaphore::new(config.limits.event_readers)),
@@ -84,6 +109,22 @@ impl AppState {
             store,
             config,
         }
+    }
+
+    /// The answer about a tournament that includes the newest change; `compute` computes it.
+    pub(crate) async fn tournament_answer<T: Send + Sync + 'static>(
+        &self,
+        answers: &TournamentAnswers<T>,
+        tournament: TournamentId,
+        compute: impl Future<Output = Result<T, Problem>>,
+    ) -> Result<Arc<T>, Problem> {
+        // Read before the computation, which may then include a later change, too.
+        let key = (self.store.newest_change().await?, tournament);
+        let compute = async {
+            let _permit = self.tournament_computation.acquire().await;
+            compute.await.map(Arc::new)
+        };
+        answers.get(key, compute).await
     }
 
     /// Counts a request with a token.
@@ -97,4 +138,14 @@ impl AppState {
         }
         checked
     }
+}
+
+fn analysis_bytes(analysis: &GameAnalysis) -> usize {
+    let positions: usize = analysis.goals.iter().map(|goal| goal.positions.len()).sum();
+    size_of::<GameAnalysis>()
+        + size_of_val(analysis.rally_ends.as_slice())
+        + size_of_val(analysis.goals.as_slice())
+        + positions * size_of::<[f64; 2]>()
+        + size_of_val(analysis.shots.as_slice())
+        + size_of_val(analysis.violations.as_slice())
 }

@@ -6,7 +6,6 @@
 
 pub mod agent_resources;
 mod aggregated_rows;
-mod analysis_cache;
 pub mod answer_cache;
 pub mod app;
 pub mod archive_contents;
@@ -26,11 +25,11 @@ pub mod release;
 pub mod request_log;
 pub mod services;
 pub mod session;
+mod shared_cache;
 pub mod shutdown;
 mod summaries;
 pub mod text;
 pub mod timeouts;
-mod tournament_cache;
 pub mod transfer_rate;
 mod upload_slots;
 pub mod viewer;

@@ -125,7 +125,7 @@ pub use tables::{
     required_artifacts::RequiredArtifact,
     rounds::{DrawnMatchday, DrawnRound, RoundBye, TournamentRound},
     rulings::Ruling,
-    runs::{ClearableRun, Run},
+    runs::Run,
     season::Season,
     shards::{Shard, ShardCommit},
     sign_offs::SignOff,

@@ -1,8 +1,8 @@
 //! Periodic removal of data that is no longer needed.
 
-use crate::{ablation_clips, boxed};
+use crate::{ablation_clips, boxed, episode_summaries};
 use faceoff_scoring::EpisodeSummary;
-use faceoff_store::{ClearableRun, Store};
+use faceoff_store::{Store, StoreError};
 use jiff::{SignedDuration, Timestamp};
 
 /// Upper bound of the time that writing an artifact takes.
@@ -15,11 +15,9 @@ pub async fn clean_up(store: &Store, now: Timestamp) {
     if let Err(error) = store.remove_old_recordings(now).await {
         tracing::warn!(%error, "old recordings could not be removed");
     }
+    episode_summaries::store_missing(store, now).await;
     if let Err(error) = clear_runs(store, now).await {
-        tracing::warn!(
-            error = format!("{error:#}"),
-            "finished runs could not be cleared"
-        );
+        tracing::warn!(%error, "finished runs could not be cleared");
     }
     if let Err(error) = store.remove_dropped_datasets(now).await {
         tracing::warn!(%error, "datasets of dropped proposals could not be removed");
@@ -72,28 +70,11 @@ pub(crate) async fn remove_invalid_bundles(store: &Store, now: Timestamp) {
 
 /// Clears finished runs: removes their shards from the database. Each is cleared in its own transaction, so that a failure
 /// does not affect the others. A *run* is the episodes of a submission under one plan, divided into shards.
-async fn clear_runs(store: &Store, now: Timestamp) -> anyhow::Result<()> {
-    for clearable in store.clearable_runs(EpisodeSummary::VERSION, now).await? {
-        let run = clearable.run;
-        if let Err(error) = clear_run(store, clearable, now).await {
-            tracing::warn!(%run, error = format!("{error:#}"), "a finished run could not be cleared");
+async fn clear_runs(store: &Store, now: Timestamp) -> Result<(), StoreError> {
+    for run in store.clearable_runs(EpisodeSummary::VERSION, now).await? {
+        if let Err(error) = store.clear_run(run, now).await {
+            tracing::warn!(%run, %error, "a finished run could not be cleared");
         }
     }
     Ok(())
-}
-
-/// Clears a run after storing a summary of its episodes, if it has none.
-async fn clear_run(store: &Store, clearable: ClearableRun, now: Timestamp) -> anyhow::Result<()> {
-    let ClearableRun { run, needs_summary } = clearable;
-    if needs_summary {
-        let outcomes = store.outcomes(run).await?;
-        let bounds = store.run_variation(run).await?.tier_bounds;
-        let summary =
-            tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds));
-        let json = serde_json::to_string(&summary.await??)?;
-        store
-            .store_episode_summary(run, EpisodeSummary::VERSION, &json, now)
-            .await?;
-    }
-    Ok(store.clear_run(run, now).await?)
 }

@@ -14,6 +14,7 @@ mod ablation_clips;
 mod bundle_cache;
 mod cleanup;
 mod cpus;
+mod episode_summaries;
 mod evaluator;
 mod executor;
 mod full_disk;

@@ -1,7 +1,7 @@
 //! The job server for slots of the same process: the only place of this crate that uses the store's queue.
 
 use crate::{
-    cleanup,
+    cleanup, episode_summaries,
     full_disk::{self, ClaimPause},
     server::{ClaimResult, GameUpdate, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
@@ -173,9 +173,12 @@ impl LocalServer {
         claim: &JobClaim,
         commit: ShardCommit,
     ) -> anyhow::Result<LeaseStatus> {
-        let recording = commit.recording.clone();
-        let committed = self.store.commit_shard(claim, commit, self.clock.now());
-        let status = lease_status(committed.await?);
+        let (recording, now) = (commit.recording.clone(), self.clock.now());
+        let status = lease_status(self.store.commit_shard(claim, commit, now).await?);
+        // Runs with recordings are scored; the others end with their last shard.
+        if recording.is_none() {
+            episode_summaries::store_missing(&self.store, now).await;
+        }
         if status == LeaseStatus::Lost
             && let Some(recording) = recording
             && let Err(error) = self.store.artifacts().delete_folder(&recording).await
@@ -224,10 +227,12 @@ impl LocalServer {
         blake3: &str,
         result: &EvaluationResult,
     ) -> anyhow::Result<LeaseStatus> {
-        let finished =
-            self.store
-                .finish_evaluation(claim, result, dataset, blake3, self.clock.now());
+        let now = self.clock.now();
+        let finished = self
+            .store
+            .finish_evaluation(claim, result, dataset, blake3, now);
         let status = lease_status(finished.await?);
+        episode_summaries::store_missing(&self.store, now).await;
         let artifacts = self.store.artifacts();
         let cleaned = match (status, dataset.rsplit_once('/')) {
             // Removes datasets of scorings that were killed between upload and commit.

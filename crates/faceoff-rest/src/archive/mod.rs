@@ -3,7 +3,6 @@
 //! datasets. Artifacts are read only while the archive is sent.
 
 use faceoff_archive::{Edition, FORMAT, Manifest};
-use faceoff_scoring::EpisodeSummary;
 use faceoff_service::{
     app::{App, AppState},
     config::HttpConfig,
@@ -72,9 +71,6 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
         .tempdir_in(&app.config.upload_dir)
         .map_err(free_space::write_problem)?;
     let now = app.config.clock.now();
-    if edition == Edition::Public {
-        store_summaries(app).await?;
-    }
     let snapshot = app
         .store
         .snapshot(folder.path(), store_edition(edition), PROGRAM, now)
@@ -146,14 +142,6 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
         local_paths,
         _folder: folder,
     })
-}
-
-/// Stores the episode summaries of all results: the public edition contains no other data about episodes.
-async fn store_summaries(app: &App) -> Result<(), Problem> {
-    for run in app.store.unsummarised_runs(EpisodeSummary::VERSION).await? {
-        app.summaries.load_run(run).await?;
-    }
-    Ok(())
 }
 
 /// An application state that shows the snapshot at its time, as a server with the imported archive does.

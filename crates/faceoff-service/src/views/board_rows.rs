@@ -10,6 +10,7 @@ use faceoff_scoring::{BoardEntry, RankedEntry, overall_board, task_board};
 use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
 use faceoff_types::{CountingResult, Task};
 use jiff::civil::Date;
+use std::sync::Arc;
 
 /// Which evaluations the rows show within a scope (which selects results by time and day). A stage whose final day counts shows
 /// the newest evaluations until the cutoff of that day.
@@ -54,6 +55,8 @@ pub(super) async fn rows(
         return compute().await;
     }
     let key = RowsKey {
+        // Read before the rows, which may then include a later change, too.
+        change: app.store.newest_change().await?,
         stage: stage.id,
         revision,
         counting_result,
@@ -61,7 +64,10 @@ pub(super) async fn rows(
         finished_until: scope.finished_until,
         last_day: scope.last_day,
     };
-    app.row_cache.get(key, compute).await
+    let rows = app
+        .board_rows
+        .get(key, async { compute().await.map(Arc::from) });
+    Ok(rows.await?.to_vec())
 }
 
 async fn load(

@@ -83,7 +83,8 @@ impl GameClips {
     #[boxed]
     pub async fn analysis(&self, app: &App, steps: u32) -> Result<Arc<GameAnalysis>, Problem> {
         let key = self.file.key.clone();
-        app.analysis_cache.get(key, self.analyse(steps)).await
+        let compute = async { self.analyse(steps).await.map(Arc::new) };
+        app.game_analyses.get(key, compute).await
     }
 
     async fn analyse(&self, steps: u32) -> Result<GameAnalysis, Problem> {

@@ -19,8 +19,8 @@ use std::sync::Arc;
 pub async fn ratings(app: &App, id: TournamentId) -> Result<Arc<Ratings>, Problem> {
     let app = Arc::clone(app);
     let task = tokio::spawn(async move {
-        let compute = async || compute_ratings(&app, id).await;
-        app.rating_cache.get(&app.store, id, compute).await
+        let compute = compute_ratings(&app, id);
+        app.tournament_answer(&app.ratings, id, compute).await
     });
     task.await.map_err(Problem::internal)?
 }

@@ -22,9 +22,8 @@ pub async fn champion_shares(
 ) -> Result<Arc<ChampionSharesView>, Problem> {
     let app = Arc::clone(app);
     let task = tokio::spawn(async move {
-        let compute_shares = async || compute(&app, id).await;
-        app.champion_share_cache
-            .get(&app.store, id, compute_shares)
+        let compute = compute(&app, id);
+        app.tournament_answer(&app.champion_shares, id, compute)
             .await
     });
     task.await.map_err(Problem::internal)?

@@ -7,37 +7,21 @@ use crate::{
     event::Actor,
     operations::{cleanup::RECORDINGS_KEPT_FOR, runs as run_owners},
     store::Store,
-    tables::{
-        events,
-        runs::{self, ClearableRun},
-        shards,
-    },
+    tables::{events, runs, shards},
 };
 use faceoff_types::RunId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Runs that ended at least [`RECORDINGS_KEPT_FOR`] ago and still have their shards, the oldest first.
+    /// Runs that ended at least [`RECORDINGS_KEPT_FOR`] ago and still have their shards, the oldest first. Completed runs without
+    /// an episode summary of this format version are left out: the summary is made from the shards.
     #[boxed]
-    pub async fn clearable_runs(
-        &self,
-        summary_version: u32,
-        now: Timestamp,
-    ) -> Result<Vec<ClearableRun>> {
+    pub async fn clearable_runs(&self, summary_version: u32, now: Timestamp) -> Result<Vec<RunId>> {
         let ended_before = now
             .saturating_sub(RECORDINGS_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
         runs::clearable(&mut connection, summary_version, ended_before).await
-    }
-
-    /// Runs that are over and have no episode summary yet, the oldest first.
-    #[boxed]
-    pub async fn unsummarised_runs(&self, summary_version: u32) -> Result<Vec<RunId>> {
-        let mut connection = self.database.read.acquire().await?;
-        let over = runs::clearable(&mut connection, summary_version, Timestamp::MAX).await?;
-        let unsummarised = over.into_iter().filter(|run| run.needs_summary);
-        Ok(unsummarised.map(|run| run.run).collect())
     }
 
     /// Removes the shards of a run that have no agent faults, with their jobs and their progress events. Shards with

@@ -15,7 +15,7 @@ impl Store {
         summary: &str,
         now: Timestamp,
     ) -> Result<()> {
-        self.write_even_archived(Actor::Server, now, async |tx| {
+        self.write(Actor::Server, now, async |tx| {
             episode_summaries::put(tx, run, version, summary).await
         })
         .await

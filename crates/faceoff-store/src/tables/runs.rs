@@ -9,15 +9,6 @@ use faceoff_types::{Ruleset, RunId, SeedLabel, SubmissionId};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
-/// A finished run whose shards (with the outcomes of their episodes) can be deleted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ClearableRun {
-    pub run: RunId,
-    /// Is the run complete, without an episode summary of the requested version? Then the summary must be computed from
-    /// the outcomes before they are deleted.
-    pub needs_summary: bool,
-}
-
 /// A run: episodes of one or more submissions under one plan, divided into shards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
@@ -196,34 +187,46 @@ pub(crate) async fn set_recordings_removed(
     Ok(())
 }
 
-/// The runs whose shards are stored although their owner ended at `ended_until` or earlier, the oldest first.
+/// The runs whose shards are stored although their owner ended at `ended_until` or earlier, the oldest first, without the
+/// completed ones that have no summary.
 pub(crate) async fn clearable(
     connection: &mut SqliteConnection,
     summary_version: u32,
     ended_until: Timestamp,
-) -> Result<Vec<ClearableRun>> {
+) -> Result<Vec<RunId>> {
     let ended_until = Instant(ended_until);
-    let rows = sqlx::query!(
-        r#"SELECT r.id AS "run!",
-                  r.state = 'played'
-                      AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
-                      AS "wants_summary!: bool"
+    Ok(sqlx::query_scalar!(
+        r#"SELECT r.id AS "run!"
            FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
            LEFT JOIN ablation_runs p ON p.run_id = r.id LEFT JOIN ablations a ON a.id = p.ablation_id
            WHERE r.cleared_at IS NULL AND COALESCE(e.finished_at, d.finished_at, a.finished_at) <= ?
+             AND (r.state <> 'played'
+                  OR EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?))
            ORDER BY COALESCE(e.finished_at, d.finished_at, a.finished_at), r.id"#,
-        summary_version,
         ended_until,
+        summary_version,
     )
     .fetch_all(connection)
-    .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| ClearableRun {
-            run: row.run,
-            needs_summary: row.wants_summary,
-        })
-        .collect())
+    .await?)
+}
+
+/// The completed runs that have ended and still have their shards, but no summary of this version, the oldest first.
+pub(crate) async fn unsummarised(
+    connection: &mut SqliteConnection,
+    summary_version: u32,
+) -> Result<Vec<RunId>> {
+    Ok(sqlx::query_scalar!(
+        r#"SELECT r.id AS "run!"
+           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
+           LEFT JOIN ablation_runs p ON p.run_id = r.id LEFT JOIN ablations a ON a.id = p.ablation_id
+           WHERE r.cleared_at IS NULL AND r.state = 'played'
+             AND COALESCE(e.finished_at, d.finished_at, a.finished_at) IS NOT NULL
+             AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
+           ORDER BY COALESCE(e.finished_at, d.finished_at, a.finished_at), r.id"#,
+        summary_version,
+    )
+    .fetch_all(connection)
+    .await?)
 }
 
 pub(crate) async fn set_cleared(

@@ -3,16 +3,20 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::EpisodeOutcome;
+use faceoff_types::{EpisodeOutcome, RunId};
 
 /// Version of the summary's format.
 const SUMMARY_VERSION: u32 = 7;
 
-async fn clearable_runs(f: &TestStore) -> Vec<ClearableRun> {
+async fn clearable_runs(f: &TestStore) -> Vec<RunId> {
     f.store
         .clearable_runs(SUMMARY_VERSION, f.now)
         .await
         .unwrap()
+}
+
+async fn unsummarised_runs(f: &TestStore) -> Vec<RunId> {
+    f.store.unsummarised_runs(SUMMARY_VERSION).await.unwrap()
 }
 
 async fn count_rows(f: &TestStore, table: &str) -> i64 {
@@ -49,21 +53,23 @@ async fn cleared_run_keeps_summary_and_loses_shards() {
     f.advance_clock_s(RECORDINGS_KEPT_FOR.as_secs() - 1);
     assert_eq!(clearable_runs(&f).await, []);
     f.advance_clock_s(1);
-    let clearable_run = |needs_summary| ClearableRun {
-        run: evaluation.run,
-        needs_summary,
-    };
-    assert_eq!(clearable_runs(&f).await, [clearable_run(true)]);
-    for (version, needs_summary) in [(SUMMARY_VERSION - 1, true), (SUMMARY_VERSION, false)] {
+    let run = evaluation.run;
+    assert_eq!(unsummarised_runs(&f).await, [run]);
+    assert_eq!(clearable_runs(&f).await, []);
+    for (version, unsummarised, clearable) in [
+        (SUMMARY_VERSION - 1, vec![run], vec![]),
+        (SUMMARY_VERSION, vec![], vec![run]),
+    ] {
         let stored = f
             .store
             .store_episode_summary(evaluation.run, version, "{}", f.now);
         stored.await.unwrap();
         assert_eq!(
-            clearable_runs(&f).await,
-            [clearable_run(needs_summary)],
+            unsummarised_runs(&f).await,
+            unsummarised,
             "version {version}"
         );
+        assert_eq!(clearable_runs(&f).await, clearable, "version {version}");
     }
     assert!(
         event_kinds(&f)
@@ -126,12 +132,10 @@ async fn cleared_run_keeps_agent_faults() {
     f.advance_clock_s(RECORDINGS_KEPT_FOR.as_secs());
     assert_eq!(
         clearable_runs(&f).await,
-        [ClearableRun {
-            run: evaluation.run,
-            needs_summary: false
-        }],
+        [evaluation.run],
         "the run has no score, so no board needs a summary"
     );
+    assert_eq!(unsummarised_runs(&f).await, []);
     let shards_before = count_rows(&f, "shards").await;
     f.store.clear_run(evaluation.run, f.now).await.unwrap();
     let shards_left = count_rows(&f, "shards").await;
@@ -154,5 +158,6 @@ async fn open_run_is_not_clearable() {
     f.commit_shard(&claim, &shard, 0).await;
     f.advance_clock_s(30 * RECORDINGS_KEPT_FOR.as_secs());
     assert_eq!(clearable_runs(&f).await, []);
+    assert_eq!(unsummarised_runs(&f).await, []);
     assert!(!outcomes(&f, &evaluation).await.unwrap().is_empty());
 }

@@ -4,6 +4,7 @@ use super::fixture::*;
 use crate::{cleanup, slot::Backoff};
 use faceoff_replay::{ClipKey, Pack};
 use faceoff_runner::PlatformFault;
+use faceoff_scoring::EpisodeSummary;
 use faceoff_store::*;
 use faceoff_types::*;
 use std::{
@@ -374,6 +375,16 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
         }
     };
     running.stop().await;
+    let runs: Vec<_> = ablation.runs.values().copied().collect();
+    let version = EpisodeSummary::VERSION;
+    let summaries = server
+        .store
+        .episode_summaries(&runs, version)
+        .await
+        .unwrap();
+    assert_eq!(summaries.len(), runs.len(), "stored with the last shards");
+    let unsummarised = server.store.unsummarised_runs(version).await.unwrap();
+    assert_eq!(unsummarised, [], "nor does a scored evaluation lack one");
     let secret = server.store.season().await.unwrap().secret;
     let specs = std::mem::take(&mut *specs.lock().unwrap());
     let ablation_specs: Vec<_> = specs
