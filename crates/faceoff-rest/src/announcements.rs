@@ -39,10 +39,10 @@ pub(crate) async fn list_announcements(
 pub(crate) async fn announce(
     organiser: Organiser,
     State(app): State<App>,
-    Body(announcement): Body<NewAnnouncement>,
+    Body(new): Body<NewAnnouncement>,
 ) -> Result<(StatusCode, Json<AnnouncementView>), Problem> {
-    let view = announcements::announce(&app, organiser.actor(), &announcement).await?;
-    Ok((StatusCode::CREATED, Json(view)))
+    let published = announcements::announce(&app, organiser.actor(), &new).await?;
+    Ok((StatusCode::CREATED, Json(announcement::view(published))))
 }
 
 /// Lists questions, newest first. Visitors see those with a public answer, teams also their own, organisers all.
@@ -74,7 +74,8 @@ pub(crate) async fn ask(
     State(app): State<App>,
     Body(question): Body<NewQuestion>,
 ) -> Result<(StatusCode, Json<QuestionView>), Problem> {
-    let view = announcements::ask(&app, &caller, &question).await?;
+    let asked = announcements::ask(&app, &caller, &question).await?;
+    let view = announcement::question(asked, true);
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -90,6 +91,6 @@ pub(crate) async fn answer(
     PathParam(id): PathParam<QuestionId>,
     Body(new_answer): Body<NewAnswer>,
 ) -> Result<Json<QuestionView>, Problem> {
-    let answered = announcements::answer(&app, organiser.actor(), id, &new_answer);
-    answered.await.map(Json)
+    let answered = announcements::answer(&app, organiser.actor(), id, &new_answer).await?;
+    Ok(Json(announcement::question(answered, true)))
 }

@@ -8,6 +8,7 @@ use faceoff_service::{
     extract::{Json as Body, PathParam},
     problem::Problem,
     services::stage_results,
+    views::stage,
 };
 use faceoff_types::StageId;
 
@@ -30,8 +31,8 @@ pub(crate) async fn freeze_boards(
     PathParam(id): PathParam<StageId>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<Json<StageView>, Problem> {
-    let frozen = stage_results::freeze_boards(&app, organiser.actor(), id, &reason);
-    frozen.await.map(Json)
+    stage_results::freeze_boards(&app, organiser.actor(), id, &reason).await?;
+    stage::find(&app, id).await.map(Json)
 }
 
 /// Unfreezes the boards of a stage: all results appear at once.
@@ -49,6 +50,6 @@ pub(crate) async fn unfreeze_boards(
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<StageView>, Problem> {
-    let open = stage_results::unfreeze_boards(&app, organiser.actor(), id);
-    open.await.map(Json)
+    stage_results::unfreeze_boards(&app, organiser.actor(), id).await?;
+    stage::find(&app, id).await.map(Json)
 }

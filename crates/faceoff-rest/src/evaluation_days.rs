@@ -5,6 +5,7 @@ use axum::{Json, extract::State};
 use faceoff_api::{requests::StartDay, views::day::DayView};
 use faceoff_service::{
     app::App, auth::Organiser, extract::OptionalJson, problem::Problem, services::evaluations,
+    views::day,
 };
 
 /// Starts a stage's evaluation day: the cutoff is now, and each team's active submission is evaluated.
@@ -25,6 +26,6 @@ pub(crate) async fn start_day(
     State(app): State<App>,
     OptionalJson(request): OptionalJson<StartDay>,
 ) -> Result<Json<DayView>, Problem> {
-    let started = evaluations::start_day(&app, organiser.actor(), request.stage);
-    started.await.map(Json)
+    let day = evaluations::start_day(&app, organiser.actor(), request.stage).await?;
+    day::build(&app, day).await.map(Json)
 }

@@ -101,8 +101,8 @@ pub(crate) async fn cancel_evaluation(
     PathParam(id): PathParam<EvaluationId>,
     Body(Cancellation { reason }): Body<Cancellation>,
 ) -> Result<Json<EvaluationView>, Problem> {
-    let cancelled = evaluations::cancel_evaluation(&app, organiser.actor(), id, &reason);
-    cancelled.await.map(Json)
+    let cancelled = evaluations::cancel_evaluation(&app, organiser.actor(), id, &reason).await?;
+    evaluation::for_organiser(&app, cancelled).await.map(Json)
 }
 
 /// Reruns an evaluation that was cancelled, voided or failed by a platform fault, with the submission of the day's
@@ -121,7 +121,8 @@ pub(crate) async fn rerun_evaluation(
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<impl IntoResponse, Problem> {
-    let view = evaluations::rerun_evaluation(&app, organiser.actor(), id).await?;
+    let rerun = evaluations::rerun_evaluation(&app, organiser.actor(), id).await?;
+    let view = evaluation::for_organiser(&app, rerun).await?;
     let location = [(header::LOCATION, paths::evaluation(view.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

@@ -15,9 +15,10 @@ use faceoff_api::{
 use faceoff_service::{
     app::App,
     auth::Organiser,
-    extract::{Json as Body, PathParam, PathParams},
+    extract::{Json as Body, PathParam, StageDayPath},
     problem::Problem,
     services::evaluations,
+    views::{day, evaluation},
 };
 use faceoff_types::{StageDay, StageId};
 
@@ -43,8 +44,8 @@ pub(crate) async fn start_missed_day(
         stage: id,
         date: day,
     };
-    let started = evaluations::start_missed_day(&app, organiser.actor(), stage_day, &reason);
-    started.await.map(Json)
+    evaluations::start_missed_day(&app, organiser.actor(), stage_day, &reason).await?;
+    day::build(&app, stage_day).await.map(Json)
 }
 
 /// Grants a team one more evaluation for a day whose cutoff has passed, with its currently active submission.
@@ -65,15 +66,12 @@ pub(crate) async fn start_missed_day(
 pub(crate) async fn grant_extra_evaluation(
     organiser: Organiser,
     State(app): State<App>,
-    path: PathParams<String, 2>,
+    StageDayPath(stage_day): StageDayPath,
     Body(request): Body<NewExtraEvaluation>,
 ) -> Result<impl IntoResponse, Problem> {
-    let PathParams([stage, day]) = path;
-    let stage_day: StageDay = format!("{stage}/{day}")
-        .parse()
-        .map_err(|_| Problem::not_found("day"))?;
-    let view =
+    let extra =
         evaluations::grant_extra_evaluation(&app, organiser.actor(), stage_day, &request).await?;
+    let view = evaluation::for_organiser(&app, extra).await?;
     let location = [(header::LOCATION, paths::evaluation(view.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

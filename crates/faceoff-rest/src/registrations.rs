@@ -65,8 +65,8 @@ pub(crate) async fn approve_registration(
     State(app): State<App>,
     PathParam(id): PathParam<RegistrationId>,
 ) -> Result<Json<RegistrationView>, Problem> {
-    let approved = registrations::approve_registration(&app, organiser.actor(), id);
-    approved.await.map(Json)
+    let approved = registrations::approve_registration(&app, organiser.actor(), id).await?;
+    Ok(Json(invitation::registration(approved)))
 }
 
 /// Refuses a registration.
@@ -84,6 +84,7 @@ pub(crate) async fn refuse_registration(
     PathParam(id): PathParam<RegistrationId>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<Json<RegistrationView>, Problem> {
-    let refused = registrations::refuse_registration(&app, organiser.actor(), id, &reason);
-    refused.await.map(Json)
+    let actor = organiser.actor();
+    let refused = registrations::refuse_registration(&app, actor, id, &reason).await?;
+    Ok(Json(invitation::registration(refused)))
 }

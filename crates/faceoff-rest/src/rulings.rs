@@ -9,11 +9,12 @@ use faceoff_api::{
 use faceoff_service::{
     app::App,
     auth::Organiser,
-    extract::{Json as Body, PathParam, PathParams},
+    extract::{Json as Body, PathParam, StageDayPath},
     problem::Problem,
     services::rulings,
+    views::{day, evaluation, team},
 };
-use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
+use faceoff_types::{EvaluationId, StageId, TeamId};
 
 /// Voids a finished evaluation or an agent failure: it disappears from the boards and does not count. It stays readable
 /// and can be rerun.
@@ -33,8 +34,8 @@ pub(crate) async fn void_evaluation(
     PathParam(id): PathParam<EvaluationId>,
     Body(decision): Body<Decision>,
 ) -> Result<Json<EvaluationView>, Problem> {
-    let voided = rulings::void_evaluation(&app, organiser.actor(), id, &decision);
-    voided.await.map(Json)
+    let voided = rulings::void_evaluation(&app, organiser.actor(), id, &decision).await?;
+    evaluation::for_organiser(&app, voided).await.map(Json)
 }
 
 /// Voids a whole day: its evaluations disappear from the boards, unfinished ones are cancelled, and the day is
@@ -52,15 +53,11 @@ pub(crate) async fn void_evaluation(
 pub(crate) async fn void_day(
     organiser: Organiser,
     State(app): State<App>,
-    path: PathParams<String, 2>,
+    StageDayPath(stage_day): StageDayPath,
     Body(decision): Body<Decision>,
 ) -> Result<Json<DayView>, Problem> {
-    let PathParams([stage, day]) = path;
-    let stage_day: StageDay = format!("{stage}/{day}")
-        .parse()
-        .map_err(|_| Problem::not_found("day"))?;
-    let voided = rulings::void_day(&app, organiser.actor(), stage_day, &decision);
-    voided.await.map(Json)
+    rulings::void_day(&app, organiser.actor(), stage_day, &decision).await?;
+    day::build(&app, stage_day).await.map(Json)
 }
 
 /// Pauses the queue: no job starts, running jobs continue. Evaluation days still start, but their jobs wait. `GET /season`
@@ -109,8 +106,8 @@ pub(crate) async fn disqualify_team(
     PathParam(id): PathParam<TeamId>,
     Body(decision): Body<Decision>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = rulings::disqualify_team(&app, organiser.actor(), id, &decision);
-    team.await.map(Json)
+    let team = rulings::disqualify_team(&app, organiser.actor(), id, &decision).await?;
+    Ok(Json(team::view(team)))
 }
 
 /// Lifts a team's disqualification. Its cancelled evaluations can be rerun.
@@ -130,6 +127,6 @@ pub(crate) async fn reinstate_team(
     PathParam(id): PathParam<TeamId>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = rulings::reinstate_team(&app, organiser.actor(), id, &reason);
-    team.await.map(Json)
+    let team = rulings::reinstate_team(&app, organiser.actor(), id, &reason).await?;
+    Ok(Json(team::view(team)))
 }

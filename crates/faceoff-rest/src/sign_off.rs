@@ -12,6 +12,7 @@ use faceoff_service::{
     extract::{OptionalJson, PathParam},
     problem::Problem,
     services::stage_results,
+    views::{day, stage},
 };
 use faceoff_types::StageId;
 
@@ -32,8 +33,8 @@ pub(crate) async fn start_final_day(
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<DayView>, Problem> {
-    let started = stage_results::start_final_day(&app, organiser.actor(), id);
-    started.await.map(Json)
+    let day = stage_results::start_final_day(&app, organiser.actor(), id).await?;
+    day::build(&app, day).await.map(Json)
 }
 
 /// Signs off the result of a closed stage, which was provisional. The stage cannot be changed afterwards.
@@ -54,6 +55,7 @@ pub(crate) async fn finalise_stage(
     PathParam(id): PathParam<StageId>,
     OptionalJson(Confirmation { confirm }): OptionalJson<Confirmation>,
 ) -> Result<Json<StageView>, Problem> {
-    let signed_off = stage_results::finalise_stage(&app, organiser.actor(), id, confirm.as_deref());
-    signed_off.await.map(Json)
+    let actor = organiser.actor();
+    let signed_off = stage_results::finalise_stage(&app, actor, id, confirm.as_deref()).await?;
+    stage::build(&app, signed_off).await.map(Json)
 }

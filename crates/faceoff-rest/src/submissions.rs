@@ -67,8 +67,8 @@ pub(crate) async fn activate_submission(
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let active = submissions::activate_submission(&app, &caller, id);
-    active.await.map(Json)
+    let active = submissions::activate_submission(&app, &caller, id).await?;
+    submission::build(&app, active).await.map(Json)
 }
 
 /// Withdraws a submission: it is not evaluated any more, unless it is activated again.
@@ -88,8 +88,8 @@ pub(crate) async fn withdraw_submission(
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let withdrawn = submissions::withdraw_submission(&app, &caller, id);
-    withdrawn.await.map(Json)
+    let withdrawn = submissions::withdraw_submission(&app, &caller, id).await?;
+    submission::build(&app, withdrawn).await.map(Json)
 }
 
 /// Changes label and note of a submission. Only its team and organisers see them.
@@ -104,8 +104,8 @@ pub(crate) async fn describe_submission(
     PathParam(id): PathParam<SubmissionId>,
     Body(change): Body<SubmissionChange>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let described = submissions::describe_submission(&app, &caller, id, &change);
-    described.await.map(Json)
+    let described = submissions::describe_submission(&app, &caller, id, &change).await?;
+    submission::build(&app, described).await.map(Json)
 }
 
 /// Gone: single submissions cannot be evaluated on demand.

@@ -104,8 +104,8 @@ pub(crate) async fn change_team(
     PathParam(id): PathParam<TeamId>,
     Body(change): Body<requests::TeamChange>,
 ) -> Result<Json<TeamView>, Problem> {
-    let changed = teams::change_team(&app, &caller, id, change);
-    changed.await.map(Json)
+    teams::change_team(&app, &caller, id, change).await?;
+    team::find(&app, id).await.map(Json)
 }
 
 /// Retires a team at its own request: it can neither upload nor be evaluated; its results stay.

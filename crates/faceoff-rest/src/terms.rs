@@ -33,7 +33,7 @@ pub(crate) async fn publish_terms(
     Body(new_terms): Body<NewTerms>,
 ) -> Result<(StatusCode, Json<TermsView>), Problem> {
     let terms = announcements::publish_terms(&app, organiser.actor(), &new_terms).await?;
-    Ok((StatusCode::CREATED, Json(terms)))
+    Ok((StatusCode::CREATED, Json(announcement::terms(terms))))
 }
 
 /// Accepts the terms for the calling user.

@@ -15,6 +15,7 @@ use axum::{
     http::{StatusCode, header, request::Parts},
 };
 use faceoff_api::objects_only;
+use faceoff_types::StageDay;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::{fmt::Display, str::FromStr};
@@ -208,6 +209,23 @@ where
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let PathParams([param]) = PathParams::from_request_parts(parts, state).await?;
         Ok(Self(param))
+    }
+}
+
+/// The path parameters of an evaluation day: a stage's id and a date.
+#[derive(Debug)]
+pub struct StageDayPath(pub StageDay);
+
+impl<S: Send + Sync> FromRequestParts<S> for StageDayPath {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let PathParams([stage, date]) =
+            PathParams::<String, 2>::from_request_parts(parts, state).await?;
+        match (stage.parse(), date.parse()) {
+            (Ok(stage), Ok(date)) => Ok(Self(StageDay { stage, date })),
+            _ => Err(Problem::not_found("day")),
+        }
     }
 }
 

@@ -337,6 +337,22 @@ async fn create_token(
     }
 }
 
+/// After a change the page with a notice (its key), after a refusal the page with the problem.
+async fn after_change<T>(
+    app: &App,
+    caller: &Caller,
+    changed: Result<T, Problem>,
+    key: &'static str,
+) -> Result<Response, PageProblem> {
+    match changed {
+        Ok(_) => Ok(redirect_done(access_path(caller), key)),
+        Err(problem) => {
+            let state = PageState::default();
+            page_with(app, caller, Notice::Refused(&problem), state).await
+        }
+    }
+}
+
 #[derive(Deserialize)]
 struct EmptyForm {}
 
@@ -347,13 +363,8 @@ async fn revoke_token(
     form: Result<PageForm<EmptyForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
-    match tokens::revoke_token(&app, &caller, id).await {
-        Ok(_) => Ok(redirect_done(access_path(&caller), "revoked")),
-        Err(problem) => {
-            let state = PageState::default();
-            page_with(&app, &caller, Notice::Refused(&problem), state).await
-        }
-    }
+    let changed = tokens::revoke_token(&app, &caller, id).await;
+    after_change(&app, &caller, changed, "revoked").await
 }
 
 #[derive(Deserialize)]
@@ -436,13 +447,8 @@ async fn revoke_invitation(
     form: Result<PageForm<EmptyForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
-    match invitations::revoke_invitation(&app, &caller, id).await {
-        Ok(_) => Ok(redirect_done(access_path(&caller), "uninvited")),
-        Err(problem) => {
-            let state = PageState::default();
-            page_with(&app, &caller, Notice::Refused(&problem), state).await
-        }
-    }
+    let changed = invitations::revoke_invitation(&app, &caller, id).await;
+    after_change(&app, &caller, changed, "uninvited").await
 }
 
 #[derive(Deserialize)]
@@ -459,11 +465,6 @@ async fn remove_user(
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let confirm = Some(form.confirm.trim());
-    match users::remove_user(&app, &caller, id, confirm).await {
-        Ok(_) => Ok(redirect_done(access_path(&caller), "removed")),
-        Err(problem) => {
-            let state = PageState::default();
-            page_with(&app, &caller, Notice::Refused(&problem), state).await
-        }
-    }
+    let changed = users::remove_user(&app, &caller, id, confirm).await;
+    after_change(&app, &caller, changed, "removed").await
 }

@@ -14,6 +14,7 @@ use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem};
 use faceoff_store::Actor;
 pub(super) use preview::DecisionPreview;
+use preview::Done;
 use queue::QueueDecision;
 use stage::StageDecision;
 use std::{fmt, str::FromStr};
@@ -44,16 +45,40 @@ impl FromStr for Decision {
     type Err = UnknownDecision;
 
     fn from_str(path: &str) -> Result<Self, UnknownDecision> {
-        let (kind, subject) = path.split_once('/').unwrap_or((path, ""));
-        let found = DayDecision::from_path(kind, subject).map(Self::Day);
-        found
-            .or_else(|| QueueDecision::from_path(kind, subject).map(Self::Queue))
-            .or_else(|| EvaluationDecision::from_path(kind, subject).map(Self::Evaluation))
-            .or_else(|| TeamDecision::from_path(kind, subject).map(Self::Team))
-            .or_else(|| StageDecision::from_path(kind, subject).map(Self::Stage))
-            .or_else(|| WorkerDecision::from_path(kind, subject).map(Self::Worker))
-            .ok_or(UnknownDecision)
+        let (name, subject) = path.split_once('/').unwrap_or((path, ""));
+        find(name, subject).ok_or(UnknownDecision)
     }
+}
+
+/// The decision with this name about this subject (the rest of the path).
+fn find(name: &str, subject: &str) -> Option<Decision> {
+    Some(match name {
+        "start-day" => Decision::Day(DayDecision::Start(subject.parse().ok()?)),
+        "missed-day" => Decision::Day(DayDecision::Missed(subject.parse().ok()?)),
+        "void-day" => Decision::Day(DayDecision::Void(subject.parse().ok()?)),
+        "pause" if subject.is_empty() => Decision::Queue(QueueDecision::Pause),
+        "resume" if subject.is_empty() => Decision::Queue(QueueDecision::Resume),
+        "void" => Decision::Evaluation(EvaluationDecision::Void(subject.parse().ok()?)),
+        "cancel" => Decision::Evaluation(EvaluationDecision::Cancel(subject.parse().ok()?)),
+        "rerun" => Decision::Evaluation(EvaluationDecision::Rerun(subject.parse().ok()?)),
+        // `extra-turn` is the path in older versions.
+        "extra-evaluation" | "extra-turn" => {
+            let (day, team) = subject.rsplit_once('/')?;
+            let (day, team) = (day.parse().ok()?, team.parse().ok()?);
+            Decision::Evaluation(EvaluationDecision::Extra(day, team))
+        }
+        "disqualify" => Decision::Team(TeamDecision::Disqualify(subject.parse().ok()?)),
+        "reinstate" => Decision::Team(TeamDecision::Reinstate(subject.parse().ok()?)),
+        "approve" => Decision::Team(TeamDecision::Approve(subject.parse().ok()?)),
+        "refuse" => Decision::Team(TeamDecision::Refuse(subject.parse().ok()?)),
+        "freeze" => Decision::Stage(StageDecision::Freeze(subject.parse().ok()?)),
+        "unfreeze" => Decision::Stage(StageDecision::Unfreeze(subject.parse().ok()?)),
+        "final-day" => Decision::Stage(StageDecision::FinalDay(subject.parse().ok()?)),
+        "sign-off" => Decision::Stage(StageDecision::SignOff(subject.parse().ok()?)),
+        "ban" => Decision::Worker(WorkerDecision::Ban(subject.parse().ok()?)),
+        "readmit" => Decision::Worker(WorkerDecision::Readmit(subject.parse().ok()?)),
+        _ => return None,
+    })
 }
 
 impl Decision {
@@ -68,13 +93,13 @@ impl Decision {
         }
     }
 
-    /// Executes the decision like the API. Returns the key of the notice.
+    /// Executes the decision like the API.
     pub(super) async fn carry_out(
         &self,
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<&'static str, Problem> {
+    ) -> Result<Done, Problem> {
         match self {
             Self::Day(decision) => decision.carry_out(app, actor, request).await,
             Self::Queue(decision) => decision.carry_out(app, actor, request).await,

@@ -69,15 +69,13 @@ pub(super) async fn submit(
     form: Result<PageForm<Form>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(decision), PageForm(form)) = (decision?, form?);
-    // Read before the execution, which may change the subject.
-    let return_path = decision.preview(&app).await?.return_path;
     let request = requests::Decision {
         reason: form.reason.clone(),
         confirm: Some(form.confirm).filter(|confirm| !confirm.is_empty()),
     };
     let actor = user.organiser.actor();
     match decision.carry_out(&app, actor, request).await {
-        Ok(key) => Ok(redirect_done(&return_path, key)),
+        Ok(done) => Ok(redirect_done(&done.return_path, done.notice)),
         Err(problem) => {
             page_with(
                 &app,

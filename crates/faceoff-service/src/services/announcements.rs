@@ -10,9 +10,9 @@ use crate::{
 };
 use faceoff_api::{
     requests::{NewAnnouncement, NewAnswer, NewQuestion, NewTerms},
-    views::announcement::{AnnouncementView, QuestionView, TermsView},
+    views::announcement::QuestionView,
 };
-use faceoff_store::Actor;
+use faceoff_store::{Actor, Announcement, Question, Terms};
 use faceoff_types::QuestionId;
 
 /// Longest title of an announcement.
@@ -28,13 +28,13 @@ pub async fn announce(
     app: &AppState,
     actor: Actor,
     new: &NewAnnouncement,
-) -> Result<AnnouncementView, Problem> {
+) -> Result<Announcement, Problem> {
     let title = text::single_line("title", &new.title, MAX_TITLE_CHARS)?;
     let body = text::multi_line("text", &new.text, MAX_TEXT_CHARS)?;
     let now = app.config.clock.now();
     let announcement = app.store.announce(actor, &title, &body, now).await?;
     tracing::info!(announcement = %announcement.id, "announcement published");
-    Ok(announcement::view(announcement))
+    Ok(announcement)
 }
 
 /// Questions, newest first. Visitors see those with a public answer, teams also their own, organisers all.
@@ -63,13 +63,13 @@ pub async fn ask(
     app: &AppState,
     caller: &TeamCaller,
     new: &NewQuestion,
-) -> Result<QuestionView, Problem> {
+) -> Result<Question, Problem> {
     let text = text::multi_line("text", &new.text, MAX_QUESTION_CHARS)?;
     let now = app.config.clock.now();
     let team = &caller.team;
     let question = app.store.ask(caller.actor(), team.id, &text, now).await?;
     tracing::info!(question = %question.id, team = %team.name, "asked");
-    Ok(announcement::question(question, true))
+    Ok(question)
 }
 
 /// Answers a question, or replaces its answer.
@@ -79,24 +79,20 @@ pub async fn answer(
     actor: Actor,
     id: QuestionId,
     new: &NewAnswer,
-) -> Result<QuestionView, Problem> {
+) -> Result<Question, Problem> {
     let text = text::multi_line("text", &new.text, MAX_TEXT_CHARS)?;
     let now = app.config.clock.now();
     let question = app.store.answer(actor, id, &text, new.public, now).await?;
     tracing::info!(question = %id, public = new.public, "answered");
-    Ok(announcement::question(question, true))
+    Ok(question)
 }
 
 /// Publishes a new version of the terms. Teams can upload and activate submissions again once a member has accepted it.
 #[boxed]
-pub async fn publish_terms(
-    app: &AppState,
-    actor: Actor,
-    new: &NewTerms,
-) -> Result<TermsView, Problem> {
+pub async fn publish_terms(app: &AppState, actor: Actor, new: &NewTerms) -> Result<Terms, Problem> {
     let text = text::multi_line("text", &new.text, MAX_TERMS_CHARS)?;
     let now = app.config.clock.now();
     let terms = app.store.publish_terms(actor, &text, now).await?;
     tracing::info!(version = terms.version, "terms published");
-    Ok(announcement::terms(terms))
+    Ok(terms)
 }

@@ -6,23 +6,20 @@ use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
-    views::{day, evaluation, stage, visibility::Visibility},
+    views::{day, stage},
 };
-use faceoff_api::{
-    requests::NewExtraEvaluation,
-    views::{day::DayView, evaluation::EvaluationView},
-};
-use faceoff_store::{Actor, EvaluationState, Stage, StagePhase, StoreError};
+use faceoff_api::requests::NewExtraEvaluation;
+use faceoff_store::{Actor, Evaluation, EvaluationState, Stage, StagePhase, StoreError};
 use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
 use jiff::{Timestamp, civil::Date};
 
-/// Starts the evaluation day of a stage; `None`: of the open stage.
+/// Starts the evaluation day of a stage, and returns it. `None`: of the open stage.
 #[boxed]
 pub async fn start_day(
     app: &AppState,
     actor: Actor,
     stage: Option<StageId>,
-) -> Result<DayView, Problem> {
+) -> Result<StageDay, Problem> {
     let now = app.config.clock.now();
     let stage = match stage {
         Some(id) => app.store.stage(id).await?,
@@ -37,7 +34,7 @@ pub async fn start_day(
         }
         Err(error) => return Err(error.into()),
     }
-    day::build(app, stage.day(now)).await
+    Ok(stage.day(now))
 }
 
 /// The open stage. If none is open, the nearest one in time: the store then refuses to start its day and says when it is open.
@@ -90,7 +87,7 @@ pub async fn start_missed_day(
     actor: Actor,
     stage_day: StageDay,
     reason: &str,
-) -> Result<DayView, Problem> {
+) -> Result<(), Problem> {
     let reason = checked_reason(reason)?;
     let now = app.config.clock.now();
     let stage = app.store.stage(stage_day.stage).await?;
@@ -108,7 +105,7 @@ pub async fn start_missed_day(
         }
         Err(error) => return Err(error.into()),
     }
-    day::build(app, stage_day).await
+    Ok(())
 }
 
 /// Preview of an extra evaluation, which the organisers grant to one team for a day; `None` if it replaces no result that counts.
@@ -152,7 +149,7 @@ pub async fn grant_extra_evaluation(
     actor: Actor,
     stage_day: StageDay,
     new: &NewExtraEvaluation,
-) -> Result<EvaluationView, Problem> {
+) -> Result<Evaluation, Problem> {
     let reason = checked_reason(&new.reason)?;
     let team = new.team;
     let preview = preview_extra_evaluation(app, stage_day, team, Some(reason)).await?;
@@ -165,7 +162,7 @@ pub async fn grant_extra_evaluation(
         .add_extra_evaluation(actor, stage_day, team, reason, preview.is_some(), now)
         .await?;
     tracing::info!(%team, day = %stage_day.date, evaluation = %extra.id, reason, "extra evaluation granted");
-    evaluation::build(app, &Visibility::for_organiser(app).await?, extra).await
+    Ok(extra)
 }
 
 /// Cancels an evaluation that has not ended.
@@ -175,13 +172,12 @@ pub async fn cancel_evaluation(
     actor: Actor,
     id: EvaluationId,
     reason: &str,
-) -> Result<EvaluationView, Problem> {
+) -> Result<Evaluation, Problem> {
     let reason = checked_reason(reason)?;
     let now = app.config.clock.now();
     app.store.cancel_evaluation(actor, id, reason, now).await?;
     tracing::info!(evaluation = %id, reason, "evaluation cancelled");
-    let visibility = Visibility::for_organiser(app).await?;
-    evaluation::find(app, &visibility, id).await
+    Ok(app.store.evaluation(id).await?)
 }
 
 /// Reruns an evaluation; returns the new one.
@@ -190,10 +186,9 @@ pub async fn rerun_evaluation(
     app: &AppState,
     actor: Actor,
     id: EvaluationId,
-) -> Result<EvaluationView, Problem> {
+) -> Result<Evaluation, Problem> {
     let now = app.config.clock.now();
     let rerun = app.store.rerun_evaluation(actor, id, now).await?;
     tracing::info!(evaluation = %id, rerun = %rerun.id, "evaluation is rerun");
-    let visibility = Visibility::for_organiser(app).await?;
-    evaluation::build(app, &visibility, rerun).await
+    Ok(rerun)
 }

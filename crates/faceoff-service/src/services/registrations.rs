@@ -8,9 +8,9 @@ use crate::{app::AppState, boxed, problem::Problem, text, views::invitation};
 use faceoff_api::{
     requests::RegistrationRequest,
     token::{Secret, SecretKind},
-    views::invitation::{NewRegistrationView, RegistrationView},
+    views::invitation::NewRegistrationView,
 };
-use faceoff_store::{Actor, NewRegistration};
+use faceoff_store::{Actor, NewRegistration, Registration};
 use faceoff_types::RegistrationId;
 
 /// Longest contact of a team.
@@ -48,14 +48,14 @@ pub async fn approve_registration(
     app: &AppState,
     actor: Actor,
     id: RegistrationId,
-) -> Result<RegistrationView, Problem> {
+) -> Result<Registration, Problem> {
     let now = app.config.clock.now();
     let (registration, team) = app
         .store
         .approve_registration(actor, id, default_expiry(now), now)
         .await?;
     tracing::info!(registration = %id, team = %team.name, "registration approved");
-    Ok(invitation::registration(registration))
+    Ok(registration)
 }
 
 /// Refuses a registration, with a reason that the team reads.
@@ -65,7 +65,7 @@ pub async fn refuse_registration(
     actor: Actor,
     id: RegistrationId,
     reason: &str,
-) -> Result<RegistrationView, Problem> {
+) -> Result<Registration, Problem> {
     let reason = checked_reason(reason)?;
     let now = app.config.clock.now();
     let registration = app
@@ -73,5 +73,5 @@ pub async fn refuse_registration(
         .refuse_registration(actor, id, reason, now)
         .await?;
     tracing::info!(registration = %id, reason, "registration refused");
-    Ok(invitation::registration(registration))
+    Ok(registration)
 }

@@ -6,13 +6,10 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{day, evaluation, team, visibility::Visibility},
+    views::{evaluation, visibility::Visibility},
 };
-use faceoff_api::{
-    requests::Decision,
-    views::{day::DayView, evaluation::EvaluationView, team::TeamView},
-};
-use faceoff_store::{Actor, EvaluationState};
+use faceoff_api::requests::Decision;
+use faceoff_store::{Actor, Evaluation, EvaluationState, Team};
 use faceoff_types::{EvaluationId, StageDay, TeamId};
 
 /// Preview of voiding an evaluation.
@@ -41,15 +38,14 @@ pub async fn void_evaluation(
     actor: Actor,
     id: EvaluationId,
     decision: &Decision,
-) -> Result<EvaluationView, Problem> {
+) -> Result<Evaluation, Problem> {
     let reason = checked_reason(&decision.reason)?;
     let preview = preview_void_evaluation(app, id, Some(reason)).await?;
     preview.check_confirmed(decision.confirm.as_deref())?;
     let now = app.config.clock.now();
     let voided = app.store.void_evaluation(actor, id, reason, now).await?;
     tracing::info!(evaluation = %id, reason, "evaluation voided");
-    let visibility = Visibility::for_organiser(app).await?;
-    evaluation::build(app, &visibility, voided).await
+    Ok(voided)
 }
 
 /// Preview of voiding a day.
@@ -84,14 +80,14 @@ pub async fn void_day(
     actor: Actor,
     stage_day: StageDay,
     decision: &Decision,
-) -> Result<DayView, Problem> {
+) -> Result<(), Problem> {
     let reason = checked_reason(&decision.reason)?;
     let preview = preview_void_day(app, stage_day, Some(reason)).await?;
     preview.check_confirmed(decision.confirm.as_deref())?;
     let now = app.config.clock.now();
     let voided = app.store.void_day(actor, stage_day, reason, now).await?;
     tracing::info!(day = %stage_day, voided, reason, "day voided");
-    day::build(app, stage_day).await
+    Ok(())
 }
 
 /// Pauses the queue: no job starts.
@@ -143,14 +139,14 @@ pub async fn disqualify_team(
     actor: Actor,
     id: TeamId,
     decision: &Decision,
-) -> Result<TeamView, Problem> {
+) -> Result<Team, Problem> {
     let reason = checked_reason(&decision.reason)?;
     let preview = preview_disqualification(app, id, Some(reason)).await?;
     preview.check_confirmed(decision.confirm.as_deref())?;
     let now = app.config.clock.now();
     let team = app.store.disqualify_team(actor, id, reason, now).await?;
     tracing::info!(team = %team.name, %id, reason, "team disqualified");
-    Ok(team::view(team))
+    Ok(team)
 }
 
 /// Lifts a team's disqualification.
@@ -160,10 +156,10 @@ pub async fn reinstate_team(
     actor: Actor,
     id: TeamId,
     reason: &str,
-) -> Result<TeamView, Problem> {
+) -> Result<Team, Problem> {
     let reason = checked_reason(reason)?;
     let now = app.config.clock.now();
     let team = app.store.reinstate_team(actor, id, reason, now).await?;
     tracing::info!(team = %team.name, %id, reason, "team reinstated");
-    Ok(team::view(team))
+    Ok(team)
 }

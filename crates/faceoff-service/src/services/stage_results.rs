@@ -6,11 +6,9 @@ use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
-    views::{day, stage},
 };
-use faceoff_api::views::{day::DayView, stage::StageView};
-use faceoff_store::{Actor, StoreError};
-use faceoff_types::StageId;
+use faceoff_store::{Actor, Stage, StoreError};
+use faceoff_types::{StageDay, StageId};
 
 /// Freezes a stage's boards: later results do not appear on them.
 #[boxed]
@@ -19,34 +17,30 @@ pub async fn freeze_boards(
     actor: Actor,
     id: StageId,
     reason: &str,
-) -> Result<StageView, Problem> {
+) -> Result<(), Problem> {
     let reason = checked_reason(reason)?;
     let now = app.config.clock.now();
     app.store.freeze_boards(actor, id, reason, now).await?;
     tracing::info!(stage = %id, reason, "boards frozen");
-    stage::find(app, id).await
+    Ok(())
 }
 
 /// Unfreezes a stage's boards.
 #[boxed]
-pub async fn unfreeze_boards(
-    app: &AppState,
-    actor: Actor,
-    id: StageId,
-) -> Result<StageView, Problem> {
+pub async fn unfreeze_boards(app: &AppState, actor: Actor, id: StageId) -> Result<(), Problem> {
     let now = app.config.clock.now();
     app.store.unfreeze_boards(actor, id, now).await?;
     tracing::info!(stage = %id, "boards unfrozen");
-    stage::find(app, id).await
+    Ok(())
 }
 
-/// Starts a stage's final day. This is possible once, after the stage has closed.
+/// Starts a stage's final day, and returns it. This is possible once, after the stage has closed.
 #[boxed]
 pub async fn start_final_day(
     app: &AppState,
     actor: Actor,
     id: StageId,
-) -> Result<DayView, Problem> {
+) -> Result<StageDay, Problem> {
     let now = app.config.clock.now();
     let stage = app.store.stage(id).await?;
     let result = app.store.start_final_day(actor, id, now).await;
@@ -65,7 +59,7 @@ pub async fn start_final_day(
         error => error.into(),
     })?;
     tracing::info!(stage = %stage.name, evaluations = created.len(), "the final day was started");
-    day::build(app, stage.day(now)).await
+    Ok(stage.day(now))
 }
 
 /// Preview of signing a stage off, if that is possible now.
@@ -88,10 +82,10 @@ pub async fn finalise_stage(
     actor: Actor,
     id: StageId,
     confirm: Option<&str>,
-) -> Result<StageView, Problem> {
+) -> Result<Stage, Problem> {
     preview_sign_off(app, id).await?.check_confirmed(confirm)?;
     let now = app.config.clock.now();
     let signed_off = app.store.sign_off_stage(actor, id, now).await?;
     tracing::info!(stage = %signed_off.name, %id, "stage signed off");
-    stage::build(app, signed_off).await
+    Ok(signed_off)
 }

@@ -6,10 +6,9 @@ use crate::{
     auth::TeamCaller,
     boxed,
     problem::{Problem, ProblemKind},
-    views::submission,
 };
-use faceoff_api::{requests::SubmissionChange, views::submission::SubmissionView};
-use faceoff_store::SubmissionDescription;
+use faceoff_api::requests::SubmissionChange;
+use faceoff_store::{Submission, SubmissionDescription};
 use faceoff_types::SubmissionId;
 
 /// Longest label of a submission.
@@ -31,13 +30,13 @@ pub async fn activate_submission(
     app: &AppState,
     caller: &TeamCaller,
     id: SubmissionId,
-) -> Result<SubmissionView, Problem> {
+) -> Result<Submission, Problem> {
     let (actor, name) = (caller.actor(), &caller.team.name);
     check_own(app, caller, id).await?;
     let now = app.config.clock.now();
     let submission = app.store.activate_submission(actor, id, now).await?;
     tracing::info!(team = %name, submission = %id, "submission activated");
-    submission::build(app, submission).await
+    Ok(submission)
 }
 
 /// Withdraws a submission from further evaluations.
@@ -46,13 +45,13 @@ pub async fn withdraw_submission(
     app: &AppState,
     caller: &TeamCaller,
     id: SubmissionId,
-) -> Result<SubmissionView, Problem> {
+) -> Result<Submission, Problem> {
     let (actor, name) = (caller.actor(), &caller.team.name);
     check_own(app, caller, id).await?;
     let now = app.config.clock.now();
     let submission = app.store.withdraw_submission(actor, id, now).await?;
     tracing::info!(team = %name, submission = %id, "submission withdrawn");
-    submission::build(app, submission).await
+    Ok(submission)
 }
 
 /// Changes label and note of a submission.
@@ -62,7 +61,7 @@ pub async fn describe_submission(
     caller: &TeamCaller,
     id: SubmissionId,
     change: &SubmissionChange,
-) -> Result<SubmissionView, Problem> {
+) -> Result<Submission, Problem> {
     check_own(app, caller, id).await?;
     let description = SubmissionDescription {
         label: checked_text("label", &change.label, MAX_LABEL_CHARS)?,
@@ -73,11 +72,8 @@ pub async fn describe_submission(
         return Err(Problem::new(ProblemKind::InvalidContent, detail));
     }
     let (actor, now) = (caller.actor(), app.config.clock.now());
-    let submission = app
-        .store
-        .describe_submission(actor, id, description, now)
-        .await?;
-    submission::build(app, submission).await
+    let described = app.store.describe_submission(actor, id, description, now);
+    Ok(described.await?)
 }
 
 /// The trimmed text of a field, if it is not too long. `None`: the field is left out; `Some(None)`: it is null.

@@ -7,12 +7,8 @@ use crate::{
     auth::Caller,
     boxed,
     problem::{Problem, ProblemKind},
-    views::team,
 };
-use faceoff_api::{
-    requests::{self, SeasonChange},
-    views::team::TeamView,
-};
+use faceoff_api::requests::{self, SeasonChange};
 use faceoff_store::{Actor, Team, TeamChange, TeamProfile};
 use faceoff_types::TeamId;
 
@@ -38,7 +34,7 @@ pub async fn change_team(
     caller: &Caller,
     id: TeamId,
     change: requests::TeamChange,
-) -> Result<TeamView, Problem> {
+) -> Result<Team, Problem> {
     let team = find_own(app, caller, id).await?;
     if change.division.is_some() && !caller.is_organiser() {
         return Err(Problem::new(
@@ -76,7 +72,7 @@ pub async fn change_team(
             .await?;
     }
     tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team changed");
-    team::find(app, id).await
+    Ok(team)
 }
 
 /// Changes whether teams can register, and the divisions.

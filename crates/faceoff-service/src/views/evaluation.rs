@@ -31,6 +31,15 @@ pub async fn find(
     build(app, visibility, app.store.evaluation(id).await?).await
 }
 
+/// The evaluation as organisers see it.
+#[boxed]
+pub async fn for_organiser(
+    app: &AppState,
+    evaluation: Evaluation,
+) -> Result<EvaluationView, Problem> {
+    build(app, &Visibility::for_organiser(app).await?, evaluation).await
+}
+
 /// An evaluation with its position in the queue. If it failed by agent faults and its day is released, its team and the organisers
 /// also see the faults and the log.
 #[boxed]

@@ -1,6 +1,6 @@
 //! Decisions about an evaluation day: start today's, make up for a missed one, or void one.
 
-use super::preview::{DecisionPreview, PUBLIC_REASON, day_page, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page, sentence};
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
@@ -19,15 +19,6 @@ pub(in crate::organiser) enum DayDecision {
 }
 
 impl DayDecision {
-    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
-        Some(match kind {
-            "start-day" => Self::Start(subject.parse().ok()?),
-            "missed-day" => Self::Missed(subject.parse().ok()?),
-            "void-day" => Self::Void(subject.parse().ok()?),
-            _ => return None,
-        })
-    }
-
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         match self {
             Self::Void(day) => {
@@ -89,21 +80,22 @@ impl DayDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<&'static str, Problem> {
+    ) -> Result<Done, Problem> {
         let reason = request.reason.as_str();
-        match self {
-            Self::Start(id) => {
-                evaluations::start_day(app, actor, Some(id)).await?;
-                Ok("started")
-            }
+        let (notice, day) = match self {
+            Self::Start(id) => (
+                "started",
+                evaluations::start_day(app, actor, Some(id)).await?,
+            ),
             Self::Missed(day) => {
                 evaluations::start_missed_day(app, actor, day, reason).await?;
-                Ok("missed")
+                ("missed", day)
             }
             Self::Void(day) => {
                 rulings::void_day(app, actor, day, &request).await?;
-                Ok("day-voided")
+                ("day-voided", day)
             }
-        }
+        };
+        Ok(Done::new(notice, day_page(day)))
     }
 }

@@ -1,6 +1,6 @@
 //! Decisions about an evaluation: void, cancel or repeat it, or grant an extra one.
 
-use super::preview::{DecisionPreview, PUBLIC_REASON, day_page, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page, sentence};
 use faceoff_api::{
     requests::{self, NewExtraEvaluation},
     views::evaluation::EvaluationView,
@@ -37,20 +37,6 @@ const fn day_of(view: &EvaluationView) -> StageDay {
 }
 
 impl EvaluationDecision {
-    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
-        Some(match kind {
-            "void" => Self::Void(subject.parse().ok()?),
-            "cancel" => Self::Cancel(subject.parse().ok()?),
-            "rerun" => Self::Rerun(subject.parse().ok()?),
-            // `extra-turn` is the path in older versions.
-            "extra-evaluation" | "extra-turn" => {
-                let (day, team) = subject.rsplit_once('/')?;
-                Self::Extra(day.parse().ok()?, team.parse().ok()?)
-            }
-            _ => return None,
-        })
-    }
-
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         match self {
             Self::Void(id) => {
@@ -128,21 +114,21 @@ impl EvaluationDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<&'static str, Problem> {
+    ) -> Result<Done, Problem> {
         let reason = request.reason.as_str();
-        match self {
-            Self::Void(id) => {
-                rulings::void_evaluation(app, actor, id, &request).await?;
-                Ok("voided")
-            }
-            Self::Cancel(id) => {
-                evaluations::cancel_evaluation(app, actor, id, reason).await?;
-                Ok("cancelled")
-            }
-            Self::Rerun(id) => {
-                evaluations::rerun_evaluation(app, actor, id).await?;
-                Ok("rerun")
-            }
+        let (notice, evaluation) = match self {
+            Self::Void(id) => (
+                "voided",
+                rulings::void_evaluation(app, actor, id, &request).await?,
+            ),
+            Self::Cancel(id) => (
+                "cancelled",
+                evaluations::cancel_evaluation(app, actor, id, reason).await?,
+            ),
+            Self::Rerun(id) => (
+                "rerun",
+                evaluations::rerun_evaluation(app, actor, id).await?,
+            ),
             Self::Extra(day, team) => {
                 let requests::Decision { reason, confirm } = request;
                 let new = NewExtraEvaluation {
@@ -150,9 +136,10 @@ impl EvaluationDecision {
                     reason,
                     confirm,
                 };
-                evaluations::grant_extra_evaluation(app, actor, day, &new).await?;
-                Ok("extra-evaluation")
+                let extra = evaluations::grant_extra_evaluation(app, actor, day, &new).await?;
+                ("extra-evaluation", extra)
             }
-        }
+        };
+        Ok(Done::new(notice, day_page(evaluation.stage_day)))
     }
 }

@@ -18,6 +18,23 @@ pub(in crate::organiser) struct DecisionPreview {
     pub(in crate::organiser) return_path: String,
 }
 
+/// A decision that was carried out.
+pub(in crate::organiser) struct Done {
+    /// Key of the notice that says so.
+    pub(in crate::organiser) notice: &'static str,
+    /// Path of the page to return to.
+    pub(in crate::organiser) return_path: String,
+}
+
+impl Done {
+    pub(super) fn new(notice: &'static str, return_path: impl Into<String>) -> Self {
+        Self {
+            notice,
+            return_path: return_path.into(),
+        }
+    }
+}
+
 /// Readers of a reason that everyone can see.
 pub(super) const PUBLIC_REASON: &str = "public";
 

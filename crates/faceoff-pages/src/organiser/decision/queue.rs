@@ -1,6 +1,6 @@
 //! Decisions about the queue of jobs: pause it or resume it.
 
-use super::preview::{DecisionPreview, PUBLIC_REASON};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
 use crate::figures::utc_minute;
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::rulings, views::ruling};
@@ -12,18 +12,13 @@ pub(in crate::organiser) enum QueueDecision {
     Resume,
 }
 
-impl QueueDecision {
-    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
-        Some(match kind {
-            "pause" if subject.is_empty() => Self::Pause,
-            "resume" if subject.is_empty() => Self::Resume,
-            _ => return None,
-        })
-    }
+/// Page to return to.
+const QUEUE_PATH: &str = "/organiser/day";
 
+impl QueueDecision {
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         let paused = app.store.season().await?.paused.map(ruling::view);
-        let return_path = "/organiser/day".to_owned();
+        let return_path = QUEUE_PATH.to_owned();
         if self == Self::Pause {
             return Ok(DecisionPreview {
                 title: "Pause the queue".to_owned(),
@@ -63,17 +58,18 @@ impl QueueDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<&'static str, Problem> {
+    ) -> Result<Done, Problem> {
         let reason = request.reason.as_str();
-        match self {
+        let notice = match self {
             Self::Pause => {
                 rulings::pause_queue(app, actor, reason).await?;
-                Ok("paused")
+                "paused"
             }
             Self::Resume => {
                 rulings::resume_queue(app, actor).await?;
-                Ok("resumed")
+                "resumed"
             }
-        }
+        };
+        Ok(Done::new(notice, QUEUE_PATH))
     }
 }

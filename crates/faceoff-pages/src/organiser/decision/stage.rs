@@ -1,6 +1,6 @@
 //! Decisions about a stage and its result: freeze or unfreeze its boards, start its final day, or sign it off.
 
-use super::preview::{DecisionPreview, PUBLIC_REASON, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON, sentence};
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::stage_results};
 use faceoff_store::Actor;
@@ -15,18 +15,17 @@ pub(in crate::organiser) enum StageDecision {
 }
 
 impl StageDecision {
-    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
-        Some(match kind {
-            "freeze" => Self::Freeze(subject.parse().ok()?),
-            "unfreeze" => Self::Unfreeze(subject.parse().ok()?),
-            "final-day" => Self::FinalDay(subject.parse().ok()?),
-            "sign-off" => Self::SignOff(subject.parse().ok()?),
-            _ => return None,
-        })
+    const fn stage(self) -> StageId {
+        let (Self::Freeze(id) | Self::Unfreeze(id) | Self::FinalDay(id) | Self::SignOff(id)) = self;
+        id
+    }
+
+    fn return_path(self) -> String {
+        format!("/organiser/stages/{}", self.stage())
     }
 
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
-        let (Self::Freeze(id) | Self::Unfreeze(id) | Self::FinalDay(id) | Self::SignOff(id)) = self;
+        let id = self.stage();
         let name = app.store.stage(id).await?.name;
         let preview = DecisionPreview {
             title: String::new(),
@@ -35,7 +34,7 @@ impl StageDecision {
             confirm_name: None,
             button: "",
             is_grave: false,
-            return_path: format!("/organiser/stages/{id}"),
+            return_path: self.return_path(),
         };
         Ok(match self {
             Self::Freeze(_) => DecisionPreview {
@@ -79,26 +78,27 @@ impl StageDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<&'static str, Problem> {
+    ) -> Result<Done, Problem> {
         let reason = request.reason.as_str();
-        match self {
+        let notice = match self {
             Self::Freeze(id) => {
                 stage_results::freeze_boards(app, actor, id, reason).await?;
-                Ok("frozen")
+                "frozen"
             }
             Self::Unfreeze(id) => {
                 stage_results::unfreeze_boards(app, actor, id).await?;
-                Ok("unfrozen")
+                "unfrozen"
             }
             Self::FinalDay(id) => {
                 stage_results::start_final_day(app, actor, id).await?;
-                Ok("final-day")
+                "final-day"
             }
             Self::SignOff(id) => {
                 let confirm = request.confirm.as_deref();
                 stage_results::finalise_stage(app, actor, id, confirm).await?;
-                Ok("signed-off")
+                "signed-off"
             }
-        }
+        };
+        Ok(Done::new(notice, self.return_path()))
     }
 }

@@ -1,6 +1,6 @@
 //! Decisions about teams and registrations: disqualify or reinstate a team, approve or refuse a registration.
 
-use super::preview::{DecisionPreview, PUBLIC_REASON, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON, sentence};
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
@@ -22,16 +22,6 @@ pub(in crate::organiser) enum TeamDecision {
 const TEAMS_PATH: &str = "/organiser/teams";
 
 impl TeamDecision {
-    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
-        Some(match kind {
-            "disqualify" => Self::Disqualify(subject.parse().ok()?),
-            "reinstate" => Self::Reinstate(subject.parse().ok()?),
-            "approve" => Self::Approve(subject.parse().ok()?),
-            "refuse" => Self::Refuse(subject.parse().ok()?),
-            _ => return None,
-        })
-    }
-
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         match self {
             Self::Disqualify(id) => {
@@ -89,25 +79,26 @@ impl TeamDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<&'static str, Problem> {
+    ) -> Result<Done, Problem> {
         let reason = request.reason.as_str();
-        match self {
+        let notice = match self {
             Self::Disqualify(id) => {
                 rulings::disqualify_team(app, actor, id, &request).await?;
-                Ok("disqualified")
+                "disqualified"
             }
             Self::Reinstate(id) => {
                 rulings::reinstate_team(app, actor, id, reason).await?;
-                Ok("reinstated")
+                "reinstated"
             }
             Self::Approve(id) => {
                 registrations::approve_registration(app, actor, id).await?;
-                Ok("approved")
+                "approved"
             }
             Self::Refuse(id) => {
                 registrations::refuse_registration(app, actor, id, reason).await?;
-                Ok("refused")
+                "refused"
             }
-        }
+        };
+        Ok(Done::new(notice, TEAMS_PATH))
     }
 }

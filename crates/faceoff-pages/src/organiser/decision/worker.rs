@@ -1,6 +1,6 @@
 //! Decisions about remote workers, which run jobs on other machines: ban one or readmit it.
 
-use super::preview::DecisionPreview;
+use super::preview::{DecisionPreview, Done};
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::workers};
 use faceoff_store::{Actor, WorkerName};
@@ -11,17 +11,12 @@ pub(in crate::organiser) enum WorkerDecision {
     Readmit(WorkerName),
 }
 
-impl WorkerDecision {
-    pub(super) fn from_path(kind: &str, subject: &str) -> Option<Self> {
-        Some(match kind {
-            "ban" => Self::Ban(subject.parse().ok()?),
-            "readmit" => Self::Readmit(subject.parse().ok()?),
-            _ => return None,
-        })
-    }
+/// Page to return to.
+const WORKERS_PATH: &str = "/organiser/workers";
 
+impl WorkerDecision {
     pub(super) fn preview(&self) -> DecisionPreview {
-        let return_path = "/organiser/workers".to_owned();
+        let return_path = WORKERS_PATH.to_owned();
         match self {
             Self::Ban(worker) => DecisionPreview {
                 title: format!("Ban the worker {worker}"),
@@ -52,16 +47,17 @@ impl WorkerDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<&'static str, Problem> {
-        match self {
+    ) -> Result<Done, Problem> {
+        let notice = match self {
             Self::Ban(worker) => {
                 workers::ban_worker(app, actor, worker, &request.reason).await?;
-                Ok("worker-banned")
+                "worker-banned"
             }
             Self::Readmit(worker) => {
                 workers::readmit_worker(app, actor, worker).await?;
-                Ok("worker-readmitted")
+                "worker-readmitted"
             }
-        }
+        };
+        Ok(Done::new(notice, WORKERS_PATH))
     }
 }
