@@ -1,9 +1,11 @@
-//! The rules of `ARCHITECTURE.md`: each crate uses only the crates that the table there lists for it, and there are no import
-//! cycles (files that import from each other, directly or through further files).
+//! The rules of `ARCHITECTURE.md`: each crate uses only the crates that the table there lists for it, no module uses one of a
+//! higher level of its crate, and there are no import cycles (files that import from each other, directly or through further
+//! files).
 
 mod crate_table;
 mod import_cycles;
 mod imports;
+mod levels;
 
 use import_cycles::find_cycles;
 use std::{collections::BTreeSet, fs, path::Path};
@@ -65,15 +67,63 @@ fn source_files_have_no_import_cycles() {
     );
 }
 
-/// Writes the files (name and content) of a crate and returns descriptions of its import cycles.
-fn cycles_of(files: &[(&str, &str)]) -> Vec<String> {
+#[test]
+fn modules_use_only_their_own_and_lower_levels() {
+    let table = levels::table();
+    let mut violations = Vec::new();
+    for member in crate_table::members() {
+        if let Some(levels) = table.get(&member.name) {
+            let found = levels::violations(&member.folder.join("src"), levels);
+            let name = &member.name;
+            violations.extend(found.iter().map(|violation| format!("{name}: {violation}")));
+        }
+    }
+    assert!(table.len() >= 6, "the table of levels is found: {table:?}");
+    assert!(
+        violations.is_empty(),
+        "not allowed by the levels of ARCHITECTURE.md: {violations:#?}"
+    );
+}
+
+#[test]
+fn import_of_a_higher_level_is_found() {
+    let files = [
+        ("lib.rs", "mod rows; mod pages; mod views;"),
+        ("rows.rs", "use crate::views::View; pub struct Row(View);"),
+        ("views/mod.rs", "mod clips; pub struct View;"),
+        (
+            "views/clips.rs",
+            "use crate::rows::Row; pub struct Clip(Row);",
+        ),
+        (
+            "pages.rs",
+            "use crate::views::View; pub fn page(_: View) {}",
+        ),
+    ];
+    let scratch = write_crate(&files);
+    let violations = |levels| levels::violations(scratch.path(), &levels::parse(levels));
+    let upward = ["rows.rs of rows uses crate::views::View of views"];
+    assert_eq!(violations("`rows` → `views` → `pages`"), upward);
+    assert_eq!(violations("`rows`, `views` → `pages`"), [""; 0]);
+    let unlisted = violations("`rows`, `views`, `boards`");
+    assert_eq!(unlisted.len(), 2, "{unlisted:?}");
+    assert_eq!(violations("`rows` → *"), upward);
+}
+
+/// Writes the files (name and content) of a crate.
+fn write_crate(files: &[(&str, &str)]) -> tempfile::TempDir {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     for (name, text) in files {
         let path = scratch.path().join(name);
         fs::create_dir_all(path.parent().unwrap_or(Path::new(""))).expect("a scratch folder");
         fs::write(path, text).expect("a scratch file");
     }
-    find_cycles(scratch.path())
+    scratch
+}
+
+/// Descriptions of the import cycles of a crate with these files.
+fn cycles_of(files: &[(&str, &str)]) -> Vec<String> {
+    find_cycles(write_crate(files).path())
 }
 
 #[test]

@@ -8,7 +8,7 @@ use axum::{
     Router,
     body::Body,
     extract::{Request, State},
-    http::{Extensions, HeaderMap, HeaderName, HeaderValue, StatusCode, Version, header},
+    http::{Extensions, HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Version, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
@@ -104,6 +104,19 @@ async fn serve_cached(State(app): State<Arc<AppState>>, request: Request, next: 
     match answer_cache::cache_key(&request, &app.store, second) {
         Some(key) => answer_cache::get(&app.answer_cache, key, next.run(request)).await,
         None => next.run(request).await,
+    }
+}
+
+/// Lets a page show one state of the season: all reads of its handler see the same one. A form may read what it has changed, so
+/// its reads are separate.
+pub(crate) async fn read_consistently(
+    State(app): State<Arc<AppState>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    match *request.method() {
+        Method::GET | Method::HEAD => app.store.read_consistently(next.run(request)).await,
+        _ => next.run(request).await,
     }
 }
 

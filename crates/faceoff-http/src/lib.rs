@@ -41,7 +41,12 @@ pub fn router(store: Store, config: HttpConfig) -> Router {
     let (api, document) = faceoff_rest::router(timeout);
     let site = Router::new()
         .merge(api)
-        .merge(faceoff_pages::router(timeout, document))
+        .merge(
+            faceoff_pages::router(timeout, document).layer(middleware::from_fn_with_state(
+                Arc::clone(&app),
+                layers::read_consistently,
+            )),
+        )
         .merge(probes::router(timeout))
         .merge(worker_files::router())
         .fallback(faceoff_pages::path_not_found)

@@ -6,11 +6,10 @@
 //! certain size this process blocks its new readers once, to empty the log.
 
 use crate::{
-    database::{BUSY_TIMEOUT, Database, READERS},
+    database::{BUSY_TIMEOUT, Database},
     error::Result,
     write_ahead_log::MAX_LOG_BYTES,
 };
-use sqlx::{Sqlite, pool::PoolConnection};
 use std::{
     sync::atomic::{AtomicBool, Ordering},
     time::Duration,
@@ -90,7 +89,7 @@ impl Database {
     async fn truncate_log(&self) -> Result<bool> {
         let mut writer = self.write.acquire().await?;
         // While this function holds all of this process's read connections, no reader of this process is active.
-        let _readers = tokio::time::timeout(READER_TIMEOUT, self.all_readers()).await;
+        let _readers = tokio::time::timeout(READER_TIMEOUT, self.read.all()).await;
         // Writers are blocked meanwhile, so the wait for another process's reader must be short.
         sqlx::query(sqlx::AssertSqlSafe(busy_timeout(READER_TIMEOUT)))
             .execute(&mut *writer)
@@ -102,14 +101,6 @@ impl Database {
             .execute(&mut *writer)
             .await?;
         Ok(busy? == 0)
-    }
-
-    async fn all_readers(&self) -> Result<Vec<PoolConnection<Sqlite>>> {
-        let mut readers = Vec::with_capacity(READERS as usize);
-        for _ in 0..READERS {
-            readers.push(self.read.acquire().await?);
-        }
-        Ok(readers)
     }
 }
 

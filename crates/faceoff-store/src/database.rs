@@ -2,6 +2,7 @@
 
 use crate::{
     error::{Result, StoreError},
+    readers::Readers,
     schema::{self, MIGRATIONS, Upgrade},
     write_ahead_log::{MAX_LOG_BYTES, WriteAheadLog},
 };
@@ -15,9 +16,6 @@ use std::{path::Path, sync::Arc, time::Duration};
 
 /// How long a writer waits for the writer of another process.
 pub(crate) const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
-
-/// Number of read connections. Few are enough: a query takes well under a millisecond.
-pub(crate) const READERS: u32 = 4;
 
 /// May a released connection be used again? SQLite rolls back automatically when the disk is full. The rollback
 /// of the library sqlx then fails: on that connection sqlx believes forever that the transaction is open, so that no
@@ -37,7 +35,7 @@ fn is_reusable(
 #[derive(Debug, Clone)]
 pub(crate) struct Database {
     /// Connections that can only read.
-    pub(crate) read: SqlitePool,
+    pub(crate) read: Readers,
     /// The only connection that can write.
     pub(crate) write: SqlitePool,
     pub(crate) file: Arc<Path>,
@@ -76,17 +74,20 @@ impl Database {
             .await
             .map_err(|error| StoreError::Database(error.into()))?;
         let upgrade = schema::record_program(&mut *write.acquire().await?, schema_before).await?;
-        let read = SqlitePoolOptions::new()
-            .max_connections(READERS)
-            .after_release(is_reusable)
-            .connect_with(options.create_if_missing(false).pragma("query_only", "ON"))
-            .await?;
+        let read_options = options.create_if_missing(false).pragma("query_only", "ON");
+        let pool = |connections| {
+            SqlitePoolOptions::new()
+                .max_connections(connections)
+                .after_release(is_reusable)
+        };
+        let file: Arc<Path> = file.into();
+        let read = Readers::connect(Arc::clone(&file), pool, read_options).await?;
         let mut log_file = file.as_os_str().to_owned();
         log_file.push("-wal");
         Ok(Self {
             read,
             write,
-            file: file.into(),
+            file,
             log: Arc::new(WriteAheadLog::new(log_file.into())),
             upgrade,
         })

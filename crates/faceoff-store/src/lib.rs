@@ -33,6 +33,7 @@ mod operations;
 mod program;
 mod queries;
 mod queue;
+mod readers;
 mod schema;
 mod signals;
 mod store;

@@ -62,6 +62,12 @@ impl Store {
         self.database.checkpoint().await
     }
 
+    /// Runs a future, for example the handler of a page, all of whose reads see the same state of the database. Its writes, and
+    /// reads in tasks that it spawns, are not included. It must not read what it has written itself.
+    pub async fn read_consistently<T>(&self, reads: impl Future<Output = T>) -> T {
+        self.database.read.consistent(reads).await
+    }
+
     /// The object store of bundles, recordings and datasets.
     #[must_use]
     pub const fn artifacts(&self) -> &Artifacts {

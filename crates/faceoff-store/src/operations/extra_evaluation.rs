@@ -71,7 +71,7 @@ impl Store {
             stage
                 .check_accepts(&active)
                 .map_err(|refusal| stage_runtimes::conflict(&refusal))?;
-            for evaluation in counting_evaluations::of_day_and_team(tx, stage_day, team).await? {
+            for evaluation in counting_evaluations::of_day(tx, stage_day, Some(team)).await? {
                 if evaluation.is_open {
                     return Err(StoreError::Conflict(
                         "an evaluation of the team on that day is queued or running: cancel it, or wait for its end".into(),

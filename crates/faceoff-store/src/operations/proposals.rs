@@ -235,7 +235,7 @@ impl Store {
                     stage_day.date
                 ));
             }
-            let counting = counting_evaluations::of_day(tx, stage_day).await?;
+            let counting = counting_evaluations::of_day(tx, stage_day, None).await?;
             let counting: Vec<EvaluationId> = counting
                 .into_iter()
                 .filter(|evaluation| evaluation.counts)
@@ -376,8 +376,7 @@ async fn apply_evaluation(
         evaluation.replaces,
         matches!(proposal.kind, ProposalKind::Rules(_)),
     ) {
-        let counting =
-            counting_evaluations::of_day_and_team(tx, stage_day, evaluation.team).await?;
+        let counting = counting_evaluations::of_day(tx, stage_day, Some(evaluation.team)).await?;
         if !counting
             .iter()
             .any(|evaluation| evaluation.id == replaced && evaluation.counts)

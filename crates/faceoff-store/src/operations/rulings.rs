@@ -70,7 +70,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             let stage_day = entries::find(tx, id).await?.stage_day;
             sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
-            let counting = counting_evaluations::of_day(tx, stage_day).await?;
+            let counting = counting_evaluations::of_day(tx, stage_day, None).await?;
             if !counting.iter().any(|evaluation| evaluation.id == id && evaluation.counts) {
                 return Err(StoreError::Conflict(
                     "only a counting evaluation that is finished, or that its agent failed, can be voided; \
@@ -101,7 +101,7 @@ impl Store {
             }
             sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
             let mut count = 0;
-            for evaluation in counting_evaluations::of_day(tx, stage_day).await? {
+            for evaluation in counting_evaluations::of_day(tx, stage_day, None).await? {
                 if evaluation.is_open {
                     let cancelled = Failure::Cancelled(reason);
                     completion::fail_evaluation(tx, evaluation.id, evaluation.run, cancelled)

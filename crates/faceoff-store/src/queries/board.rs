@@ -138,7 +138,9 @@ impl Store {
             finished_until,
             last_day,
         );
-        let newest = newest.fetch_one(&self.database.read).await?;
+        let newest = newest
+            .fetch_one(&mut *self.database.read.acquire().await?)
+            .await?;
         Ok(newest.unwrap_or(stage.rules.number))
     }
 
@@ -163,7 +165,9 @@ impl Store {
             finished_until,
             last_day,
         );
-        let days = days.fetch_all(&self.database.read).await?;
+        let days = days
+            .fetch_all(&mut *self.database.read.acquire().await?)
+            .await?;
         Ok(days.into_iter().map(|day| day.0).collect())
     }
 
@@ -210,7 +214,9 @@ impl Store {
             excluded,
             last_day,
         );
-        let rows = rows.fetch_all(&self.database.read).await?;
+        let rows = rows
+            .fetch_all(&mut *self.database.read.acquire().await?)
+            .await?;
         Ok(rows.into_iter().map(BoardRecord::from).collect())
     }
 }

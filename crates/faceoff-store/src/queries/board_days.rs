@@ -71,7 +71,9 @@ impl Store {
             excluded,
             last_day,
         );
-        let rows = rows.fetch_all(&self.database.read).await?;
+        let rows = rows
+            .fetch_all(&mut *self.database.read.acquire().await?)
+            .await?;
         Ok(rows.into_iter().map(BoardRecord::from).collect())
     }
 }

@@ -97,7 +97,7 @@ impl Store {
             team,
             all,
         )
-        .fetch_all(&self.database.read)
+        .fetch_all(&mut *self.database.read.acquire().await?)
         .await?;
         rows.into_iter().map(TeamStorage::try_from).collect()
     }

@@ -1,6 +1,6 @@
 //! The context of an event's subject: the ids that decide who may see the event.
 
-use crate::{boxed, error::Result, event::Subject, store::Store};
+use crate::{boxed, error::Result, event::Subject, readers::ReadConnection, store::Store};
 use faceoff_types::{
     AblationId, EvaluationId, GameId, QuestionId, StageId, SubmissionId, TeamId, TournamentId,
     UserId,
@@ -183,7 +183,7 @@ impl Store {
         })
     }
 
-    async fn connection(&self) -> Result<sqlx::pool::PoolConnection<sqlx::Sqlite>> {
+    async fn connection(&self) -> Result<ReadConnection> {
         Ok(self.database.read.acquire().await?)
     }
 }

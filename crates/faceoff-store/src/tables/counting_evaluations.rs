@@ -16,56 +16,24 @@ pub(crate) struct EvaluationStatus {
     pub(crate) counts: bool,
 }
 
+/// The evaluations of a day, or only those of one team.
 pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
+    team: Option<TeamId>,
 ) -> Result<Vec<EvaluationStatus>> {
     let (stage, day) = (stage_day.stage, Text(stage_day.date));
-    let rows = sqlx::query!(
+    Ok(sqlx::query_as!(
+        EvaluationStatus,
         r#"SELECT id, run_id AS run, state = 'open' AS "is_open!: bool",
                   state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
-           FROM evaluations WHERE stage_id = ? AND day = ? ORDER BY created_at, id"#,
-        stage,
-        day
-    )
-    .fetch_all(connection)
-    .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| EvaluationStatus {
-            id: row.id,
-            run: row.run,
-            is_open: row.is_open,
-            counts: row.counts,
-        })
-        .collect())
-}
-
-pub(crate) async fn of_day_and_team(
-    connection: &mut SqliteConnection,
-    stage_day: StageDay,
-    team: TeamId,
-) -> Result<Vec<EvaluationStatus>> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
-    let rows = sqlx::query!(
-        r#"SELECT id, run_id AS run, state = 'open' AS "is_open!: bool",
-                  state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
-           FROM evaluations WHERE stage_id = ? AND day = ? AND team_id = ? ORDER BY created_at, id"#,
+           FROM evaluations WHERE stage_id = ?1 AND day = ?2 AND (?3 IS NULL OR team_id = ?3) ORDER BY created_at, id"#,
         stage,
         day,
         team
     )
     .fetch_all(connection)
-    .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| EvaluationStatus {
-            id: row.id,
-            run: row.run,
-            is_open: row.is_open,
-            counts: row.counts,
-        })
-        .collect())
+    .await?)
 }
 
 /// The newest revision of its stage's rules with an evaluation on this day; `None` if there is no evaluation.

@@ -7,6 +7,7 @@ mod artifacts;
 mod bundles;
 mod cleared_runs;
 mod competition;
+mod consistent_reads;
 mod day_operations;
 mod days;
 mod deadlines;
