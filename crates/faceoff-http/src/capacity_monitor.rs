@@ -2,6 +2,7 @@
 //! of one *cutoff*, the moment at which each team's active submission is fixed.
 
 use faceoff_api::views::capacity::{DayLoad, Fit};
+use faceoff_live::Workers;
 use faceoff_service::{config::Capacity, views::capacity};
 use faceoff_store::{Change, Event, Store, StoreError};
 use faceoff_types::{Clock, StageDay, StageName};
@@ -23,6 +24,7 @@ pub struct CapacityWarning {
 #[derive(Debug)]
 pub struct CapacityMonitor {
     store: Store,
+    workers: Workers,
     clock: Clock,
     capacity: Capacity,
     /// Days that did not fit at the last check, with whether their cutoff had passed.
@@ -32,9 +34,10 @@ pub struct CapacityMonitor {
 impl CapacityMonitor {
     /// A monitor that has not checked anything yet.
     #[must_use]
-    pub const fn new(store: Store, clock: Clock, capacity: Capacity) -> Self {
+    pub const fn new(store: Store, workers: Workers, clock: Clock, capacity: Capacity) -> Self {
         Self {
             store,
+            workers,
             clock,
             capacity,
             overfull: BTreeSet::new(),
@@ -50,7 +53,8 @@ impl CapacityMonitor {
         let now = self.clock.now();
         let (mut warnings, mut overfull) = (Vec::new(), BTreeSet::new());
         for stage in self.store.stages().await? {
-            let forecast = capacity::forecast(&self.store, &self.capacity, stage.id, now);
+            let forecast =
+                capacity::forecast(&self.store, &self.workers, &self.capacity, stage.id, now);
             let overfull_days = forecast.await?.days.into_iter();
             for load in overfull_days.filter(|load| load.fit == Fit::Not) {
                 let day = StageDay {

@@ -27,6 +27,7 @@ pub use faceoff_service::{
 pub use serve::{ConnectionLimits, serve};
 
 use axum::middleware;
+use faceoff_live::LiveState;
 use faceoff_service::app::AppState;
 use faceoff_store::Store;
 use std::sync::Arc;
@@ -35,9 +36,9 @@ use std::sync::Arc;
 ///
 /// Every error is a problem document (RFC 9457), also for unknown paths, wrong methods and panics. Browsers get it as a
 /// page.
-pub fn router(store: Store, config: HttpConfig) -> Router {
+pub fn router(store: Store, live: LiveState, config: HttpConfig) -> Router {
     let timeout = config.limits.request_timeout;
-    let app = Arc::new(AppState::new(store, config));
+    let app = Arc::new(AppState::new(store, live, config));
     let (api, document) = faceoff_rest::router(timeout);
     let site = Router::new()
         .merge(api)
@@ -60,10 +61,10 @@ pub fn router(store: Store, config: HttpConfig) -> Router {
 }
 
 /// Metrics, liveness and readiness without a token. For a separate address that only the operators reach, beside
-/// [`router`] on the same store.
-pub fn monitoring_router(store: Store, config: HttpConfig) -> Router {
+/// [`router`] on the same store and live state.
+pub fn monitoring_router(store: Store, live: LiveState, config: HttpConfig) -> Router {
     let timeout = config.limits.request_timeout;
-    let app = Arc::new(AppState::new(store, config));
+    let app = Arc::new(AppState::new(store, live, config));
     let site = probes::unauthenticated_router(timeout).with_state(Arc::clone(&app));
     layers::wrap(site, &app)
 }

@@ -77,10 +77,10 @@ async fn gauges(app: &AppState) -> Result<GaugeValues, Problem> {
         },
         open_evaluations: gauges.open_evaluations,
         slots: app.config.capacity.slots,
-        remote_slots: app.store.workers().available_slots(now),
+        remote_slots: app.live.workers.available_slots(now),
         remote_workers: app
-            .store
-            .workers()
+            .live
+            .workers
             .all()
             .iter()
             .filter(|worker| worker.is_online(now))

@@ -18,7 +18,8 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     services::bundle_stream,
 };
-use faceoff_store::{Store, WorkerName};
+use faceoff_store::Store;
+use faceoff_types::WorkerName;
 use faceoff_wire::grant::Grant;
 
 /// The largest file of a recording, in bytes: far more than any shard writes.
@@ -60,7 +61,7 @@ async fn check_holder(store: &Store, grant: &Grant) -> Result<(), Problem> {
     };
     match WorkerName::from_holder(&holder) {
         None => forbidden("no worker has started the job"),
-        Some(worker) if store.workers().ban_reason(worker.as_str()).is_some() => {
+        Some(worker) if store.ban_reason(&worker).await?.is_some() => {
             forbidden("this worker is banned")
         }
         Some(_) => Ok(()),
@@ -97,7 +98,7 @@ async fn store_file(
     // A body takes time to arrive. So the lease, and whether files may still change, are checked when it is complete. From
     // then on the storing is a task of its own, which a closed connection does not interrupt.
     let stored = tokio::spawn(async move {
-        let upload_guard = app.store.workers().begin_upload(grant.nonce);
+        let upload_guard = app.live.workers.begin_upload(grant.nonce);
         let _upload_guard = upload_guard.ok_or_else(|| {
             Problem::new(
                 ProblemKind::Forbidden,

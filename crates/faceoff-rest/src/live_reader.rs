@@ -3,12 +3,13 @@
 
 use axum::response::sse::Event;
 use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
+use faceoff_live::{LiveCursor, LiveSubscription, LiveUpdate};
 use faceoff_service::{
     app::App,
     problem::{Problem, ProblemKind},
     shutdown::Shutdown,
 };
-use faceoff_store::{GameState, LiveCursor, LiveSubscription, LiveUpdate, StoreError};
+use faceoff_store::{GameState, StoreError};
 use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame};
 use serde::Serialize;
 use std::time::Duration;
@@ -107,7 +108,7 @@ impl LiveReader {
         sleep_until(self.next_batch_at).await;
         loop {
             if self.subscription.is_none() {
-                self.subscription = self.app.store.live_games().subscribe(self.game);
+                self.subscription = self.app.live.games.subscribe(self.game);
             }
             let (events, is_live) = match &mut self.subscription {
                 Some(subscription) => {

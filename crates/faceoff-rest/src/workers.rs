@@ -10,7 +10,7 @@ use faceoff_service::{
     services::workers,
     views,
 };
-use faceoff_store::WorkerName;
+use faceoff_types::WorkerName;
 
 /// Returns the remote workers with the state of their slots, their problems, and the bans.
 #[utoipa::path(

@@ -12,6 +12,7 @@ use crate::{
     upload_slots::UploadSlots,
 };
 use faceoff_api::views::champion_shares::ChampionSharesView;
+use faceoff_live::LiveState;
 use faceoff_notify::Feed;
 use faceoff_replay::GameAnalysis;
 use faceoff_scoring::tournament::rating::Ratings;
@@ -26,6 +27,8 @@ use uuid::Uuid;
 pub struct AppState {
     /// The database and the artifacts, which are its large files: bundles, datasets and recordings.
     pub store: Store,
+    /// Running games and remote workers.
+    pub live: LiveState,
     /// The server's configuration.
     pub config: HttpConfig,
     /// Limits the concurrent uploads of each team.
@@ -87,7 +90,7 @@ pub type App = Arc<AppState>;
 
 impl AppState {
     /// State with empty caches.
-    pub fn new(store: Store, config: HttpConfig) -> Self {
+    pub fn new(store: Store, live: LiveState, config: HttpConfig) -> Self {
         Self {
             upload_slots: Arc::new(UploadSlots::new(config.limits.team_uploads)),
             artifact_writes: Semaphore::new(MAX_ARTIFACT_WRITES),
@@ -107,6 +110,7 @@ impl AppState {
             request_limiter: RequestLimiter::new(config.rate_limits),
             process_id: Uuid::now_v7(),
             store,
+            live,
             config,
         }
     }

@@ -28,7 +28,6 @@ mod event;
 mod free_space;
 mod health;
 mod health_probes;
-mod live;
 mod operations;
 mod program;
 mod queries;
@@ -38,7 +37,6 @@ mod schema;
 mod signals;
 mod store;
 mod tables;
-mod workers;
 mod write;
 mod write_ahead_log;
 
@@ -51,7 +49,6 @@ pub use error::StoreError;
 pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
 pub use free_space::{DiskSpace, FreeSpace};
 pub use health::{Health, QueueHealth};
-pub use live::{LiveCursor, LiveGames, LiveSubscription, LiveUpdate, MAX_FINISHED_LIVE_GAMES};
 pub use operations::{
     announcements::MAX_OPEN_QUESTIONS,
     backup::CheckedDatabase,
@@ -139,9 +136,5 @@ pub use tables::{
     users::User,
     webhooks::{DisabledWebhook, Webhook, WebhookSecrets},
     worker_bans::WorkerBan,
-};
-pub use workers::{
-    ParseWorkerNameError, SlotReport, SlotStatus, UploadGuard, WORKER_TIMEOUT, WorkerInfo,
-    WorkerName, WorkerStatus, Workers,
 };
 pub use write_ahead_log::MAX_LOG_BYTES;

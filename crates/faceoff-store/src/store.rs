@@ -2,8 +2,8 @@
 
 use crate::{
     artifacts::Artifacts, boxed, database::Database, error::Result, event::Change,
-    free_space::FreeSpace, health_probes::HealthProbes, live::LiveGames, schema::Upgrade,
-    signals::Signals, tables::archive::ArchivedSeason, workers::Workers,
+    free_space::FreeSpace, health_probes::HealthProbes, schema::Upgrade, signals::Signals,
+    tables::archive::ArchivedSeason,
 };
 use std::sync::Arc;
 use tokio::sync::{broadcast, watch};
@@ -18,10 +18,6 @@ pub struct Store {
     pub(crate) free_space: Arc<FreeSpace>,
     /// The latest poll of a worker and the latest test write of the database, for the health report.
     pub(crate) probes: Arc<HealthProbes>,
-    /// Games that are being played.
-    pub(crate) live: LiveGames,
-    /// Remote workers.
-    pub(crate) workers: Workers,
     /// Set if the season was imported from an archive.
     pub(crate) archive: Option<Arc<ArchivedSeason>>,
 }
@@ -72,18 +68,6 @@ impl Store {
     #[must_use]
     pub const fn artifacts(&self) -> &Artifacts {
         &self.artifacts
-    }
-
-    /// Live state of the games that this process's slots play.
-    #[must_use]
-    pub const fn live_games(&self) -> &LiveGames {
-        &self.live
-    }
-
-    /// Remote workers that have contacted this process.
-    #[must_use]
-    pub const fn workers(&self) -> &Workers {
-        &self.workers
     }
 
     /// Changes that this process makes from now on, sent after the commit. A receiver that falls

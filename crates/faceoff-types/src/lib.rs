@@ -50,6 +50,7 @@ mod tournament_format;
 mod tournament_rules;
 mod validation_outcome;
 mod variation;
+mod worker_name;
 mod zone;
 
 pub use agent_task::{AgentTask, Side};
@@ -107,4 +108,5 @@ pub use tournament_rules::{
 };
 pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use variation::{InvalidVariation, TaskWeights, TierBounds, Variation};
+pub use worker_name::{ParseWorkerNameError, WorkerName};
 pub use zone::{UnknownZone, Zone};

@@ -1,6 +1,6 @@
 //! The cache of a slot's unpacked bundles. A *bundle* is what a team submits: an archive or container image with its agent.
 
-use crate::{evaluator::Evaluator, lease::Progress, server::JobServer};
+use crate::{evaluator::Evaluator, files::FileStore, lease::Progress};
 use anyhow::Context as _;
 use faceoff_runner::{
     PlatformFault,
@@ -52,7 +52,7 @@ impl BundleCache {
         agent: &AgentSpec,
         opponent: Option<&AgentSpec>,
         evaluator: &dyn Evaluator,
-        server: &dyn JobServer,
+        files: &dyn FileStore,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         let mut found = None;
@@ -68,7 +68,7 @@ impl BundleCache {
         }
         match (found, free) {
             (Some(bundle), _) => Ok(Unpacked::Bundle(bundle)),
-            (None, Some(entry)) => entry.fill(agent, evaluator, server, progress),
+            (None, Some(entry)) => entry.fill(agent, evaluator, files, progress),
             (None, None) => anyhow::bail!("both cache entries of a slot hold the same bundle"),
         }
     }
@@ -94,10 +94,10 @@ impl Entry {
         &mut self,
         agent: &AgentSpec,
         evaluator: &dyn Evaluator,
-        server: &dyn JobServer,
+        files: &dyn FileStore,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
-        let fetched = self.fetch(agent, evaluator, server, progress);
+        let fetched = self.fetch(agent, evaluator, files, progress);
         // An invalid or partial bundle must not take space that the next one needs.
         if !matches!(fetched, Ok(Unpacked::Bundle(_)))
             && self.folder.exists()
@@ -116,13 +116,13 @@ impl Entry {
         &self,
         agent: &AgentSpec,
         evaluator: &dyn Evaluator,
-        server: &dyn JobServer,
+        files: &dyn FileStore,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         let unpacked = self.folder.join("unpacked");
         fs::create_dir_all(&unpacked)?;
         let archive = self.folder.join("archive");
-        server
+        files
             .fetch_bundle(&agent.bundle, &archive)
             .context("fetching the bundle")?;
         anyhow::ensure!(

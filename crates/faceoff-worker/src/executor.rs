@@ -4,8 +4,10 @@ use crate::{
     bundle_cache::{BundleCache, Unpacked},
     cpus::SlotCpus,
     evaluator::Evaluator,
+    files::FileStore,
     game_broadcast::GameBroadcast,
     lease::Progress,
+    scorer::Scorer,
     server::JobServer,
 };
 use anyhow::Context as _;
@@ -13,21 +15,21 @@ use faceoff_runner::{AgentEnvironment, CLIPS_FILE, GameSpec, Supervision, bundle
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentLimits, GameId, SlotTiming, StageRuntimes, ValidationOutcome};
 use faceoff_wire::job::{
-    AgentSpec, EvaluationMeta, GameFiles, JobPayload, JobReport, JobSpec, Lease, OutputFiles,
-    ShardSpec, ValidationSpec,
+    AgentSpec, GameFiles, JobPayload, JobReport, JobSpec, Lease, OutputFiles, ShardSpec,
+    ValidationSpec,
 };
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 /// Runs the jobs of a slot. All errors are platform faults, with one exception: a job also ends with an error soon after
 /// [`Progress::stopped`] becomes true.
 pub(crate) struct Executor {
     /// Timing quality of the slot in the last shard.
     pub(crate) timing: Option<SlotTiming>,
+    /// Receives the live updates of games.
     pub(crate) server: Arc<dyn JobServer>,
+    pub(crate) files: Arc<dyn FileStore>,
+    /// Only slots of the server's own process have one: the server sends no scoring to a remote worker.
+    pub(crate) scorer: Option<Scorer>,
     pub(crate) evaluator: Arc<dyn Evaluator>,
     pub(crate) host: AgentHost,
     /// Folder for temporary files of the current job.
@@ -103,7 +105,13 @@ impl Executor {
                 recordings,
                 dataset,
                 ..
-            } => self.score(meta, recordings, dataset),
+            } => {
+                let scorer = self.scorer.as_ref().with_context(|| {
+                    format!("expected a job that runs agents, got the {}", job.payload)
+                })?;
+                let folder = self.folder("dataset")?;
+                scorer.score(&*self.evaluator, folder.path(), meta, recordings, dataset)
+            }
         }
     }
 
@@ -114,7 +122,7 @@ impl Executor {
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         self.bundles
-            .get(agent, opponent, &*self.evaluator, &*self.server, progress)
+            .get(agent, opponent, &*self.evaluator, &*self.files, progress)
     }
 
     /// The bundle of a valid submission. It passed validation, so an invalid archive is a platform fault.
@@ -209,13 +217,13 @@ impl Executor {
         let recording = match output {
             OutputFiles::None => None,
             OutputFiles::Clips(key) => {
-                self.server
+                self.files
                     .store_clips(key, &out.path().join(CLIPS_FILE))
                     .context("storing the clips")?;
                 None
             }
             OutputFiles::Recording(key) => {
-                self.server
+                self.files
                     .store_recording(key, out.path())
                     .context("storing the recording")?;
                 Some(key.clone())
@@ -275,7 +283,7 @@ impl Executor {
             &mut broadcast,
         )?;
         if let Some(key) = recording {
-            self.server
+            self.files
                 .store_recording(key, out.path())
                 .context("storing the game's recording")?;
         }
@@ -289,43 +297,5 @@ impl Executor {
             }),
             logs: played.logs,
         })
-    }
-
-    /// Merges the shards' recordings into the dataset, scores them and stores the dataset.
-    fn score(
-        &self,
-        meta: &EvaluationMeta,
-        recordings: &[String],
-        dataset: &str,
-    ) -> anyhow::Result<JobReport> {
-        let folder = self.folder("dataset")?;
-        let recordings = self.fetch_recordings(recordings, folder.path())?;
-        let archive = folder.path().join("dataset.zip");
-        let clips = folder.path().join("clips");
-        let assembled = self
-            .evaluator
-            .assemble(meta, &recordings, &archive, &clips)?;
-        self.server
-            .store_dataset(dataset, &archive, assembled.clips.then_some(&*clips))
-            .context("storing the dataset")?;
-        Ok(JobReport::Scoring {
-            dataset: dataset.to_owned(),
-            blake3: assembled.archive.blake3,
-            result: Box::new(assembled.result),
-        })
-    }
-
-    /// Copies each recording into its own folder.
-    fn fetch_recordings(&self, keys: &[String], into: &Path) -> anyhow::Result<Vec<PathBuf>> {
-        let mut folders = Vec::with_capacity(keys.len());
-        for (position, key) in keys.iter().enumerate() {
-            let folder = into.join(format!("shard-{position:05}"));
-            fs_err::create_dir(&folder)?;
-            self.server
-                .fetch_recording(key, &folder)
-                .with_context(|| format!("fetching the recording {key}"))?;
-            folders.push(folder);
-        }
-        Ok(folders)
     }
 }

@@ -1,12 +1,10 @@
 //! Live updates of a running game: a slot sends them to the server, which shows them to viewers.
 
-use crate::{
-    lease::Progress,
-    server::{GameUpdate, JobServer},
-};
+use crate::{lease::Progress, server::JobServer};
+use faceoff_live::LiveGames;
 use faceoff_runner::LiveFeedSink;
 use faceoff_types::{GameId, LiveEvent, LivePosition};
-use faceoff_wire::job::Lease;
+use faceoff_wire::{job::Lease, remote::LiveGameUpdate};
 use std::sync::Arc;
 
 /// Publishes live updates of a running game, and reports its progress to the lease keeper, until it is dropped.
@@ -33,7 +31,7 @@ impl GameBroadcast {
             attempt,
             progress,
         };
-        broadcast.publish(GameUpdate::Started { steps });
+        broadcast.publish(LiveGameUpdate::Started { steps });
         broadcast
     }
 
@@ -41,7 +39,7 @@ impl GameBroadcast {
         &self.progress
     }
 
-    fn publish(&self, update: GameUpdate) {
+    fn publish(&self, update: LiveGameUpdate) {
         self.server
             .publish_game(&self.lease, (self.game, self.attempt), update);
     }
@@ -50,7 +48,7 @@ impl GameBroadcast {
 impl LiveFeedSink for GameBroadcast {
     fn receive(&mut self, events: Vec<LiveEvent>, position: LivePosition) {
         self.progress.game_stepped(position.step);
-        self.publish(GameUpdate::Progress { events, position });
+        self.publish(LiveGameUpdate::Progress { events, position });
     }
 
     fn cancelled(&self) -> bool {
@@ -61,6 +59,21 @@ impl LiveFeedSink for GameBroadcast {
 /// Ends the broadcast, even if a panic ends the game.
 impl Drop for GameBroadcast {
     fn drop(&mut self) {
-        self.publish(GameUpdate::Ended);
+        self.publish(LiveGameUpdate::Ended);
+    }
+}
+
+/// Shows an update of an attempt (its number) at a game to the viewers.
+pub(crate) fn show_update(
+    games: &LiveGames,
+    (game, attempt): (GameId, u32),
+    update: LiveGameUpdate,
+) {
+    match update {
+        LiveGameUpdate::Started { steps } => games.begin(game, attempt, steps),
+        LiveGameUpdate::Progress { events, position } => {
+            games.advance(game, attempt, events, Some(position));
+        }
+        LiveGameUpdate::Ended => games.end_attempt(game, attempt),
     }
 }

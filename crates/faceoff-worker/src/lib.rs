@@ -1,7 +1,7 @@
 //! Workers and the daily schedule. A *worker* is a process that runs jobs (validation runs, shards of evaluations, games,
 //! scorings). It has *slots*, each of which runs one job at a time: the slot leases a job, runs its agents through
-//! `faceoff-runner` and commits the result. A slot gets its jobs (`faceoff-wire`) through the trait `JobServer`; the
-//! implementation for the server's own process uses the store.
+//! `faceoff-runner` and commits the result. A slot gets its jobs (`faceoff-wire`) through the trait `JobServer`, and
+//! their files through the trait `FileStore`; the implementations for the server's own process use the store.
 //!
 //! A slot is a named operating-system thread: physics and the agent's pipes block, so they must not share a thread with
 //! the server's async tasks. A job is leased for seconds and the lease is renewed while the job runs, so another slot
@@ -17,12 +17,15 @@ mod cpus;
 mod episode_summaries;
 mod evaluator;
 mod executor;
+mod files;
 mod full_disk;
 mod game_broadcast;
 mod lease;
 mod local;
+mod local_files;
 mod remote;
 mod schedule;
+mod scorer;
 mod scratch;
 mod server;
 mod service;

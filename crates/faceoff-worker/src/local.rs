@@ -3,8 +3,11 @@
 use crate::{
     cleanup, episode_summaries,
     full_disk::{self, ClaimPause},
-    server::{ClaimResult, GameUpdate, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
+    game_broadcast::show_update,
+    local_files::LocalFiles,
+    server::{ClaimResult, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
+use faceoff_live::LiveState;
 use faceoff_store::{
     Artifacts, ClaimedJob, CommitOutcome, GameCommit, GameRecording, Job, JobClaim, JobFilter,
     RunOwner, ShardCommit, Store, StoreError,
@@ -16,8 +19,9 @@ use faceoff_wire::{
         AgentSpec, EvaluationMeta, GameFiles, JobPayload, JobReport, JobSpec, Lease, OutputFiles,
         ShardSpec, ValidationSpec,
     },
+    remote::LiveGameUpdate,
 };
-use std::{path::Path, time::Duration};
+use std::time::Duration;
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
@@ -25,6 +29,8 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug, Clone)]
 pub(crate) struct LocalServer {
     pub(crate) store: Store,
+    /// Viewers of games and organisers see it.
+    pub(crate) live: LiveState,
     pub(crate) runtime: Handle,
     pub(crate) clock: Clock,
     /// Duration of a lease without renewal, seconds.
@@ -46,6 +52,13 @@ impl LocalServer {
     pub(crate) fn is_held(&self, lease: &Lease) -> anyhow::Result<bool> {
         let held = self.store.is_leased(lease.job_id, lease.nonce);
         Ok(self.runtime.block_on(held)?)
+    }
+
+    pub(crate) fn files(&self) -> LocalFiles {
+        LocalFiles {
+            artifacts: self.store.artifacts().clone(),
+            runtime: self.runtime.clone(),
+        }
     }
 
     fn job_spec(&self, claimed: ClaimedJob) -> JobSpec {
@@ -275,7 +288,7 @@ impl JobServer for LocalServer {
     }
 
     fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<LeaseStatus> {
-        let claim = claim(lease);
+        let claim = claim(lease, &lease.slot);
         let renewed = self
             .store
             .heartbeat(&claim, episodes_done, self.lease_s, self.clock.now());
@@ -286,19 +299,12 @@ impl JobServer for LocalServer {
         })
     }
 
-    fn publish_game(&self, _: &Lease, (game, attempt): (GameId, u32), update: GameUpdate) {
-        let live = self.store.live_games();
-        match update {
-            GameUpdate::Started { steps } => live.begin(game, attempt, steps),
-            GameUpdate::Progress { events, position } => {
-                live.advance(game, attempt, events, Some(position))
-            }
-            GameUpdate::Ended => live.end_attempt(game, attempt),
-        }
+    fn publish_game(&self, _: &Lease, attempt: (GameId, u32), update: LiveGameUpdate) {
+        show_update(&self.live.games, attempt, update);
     }
 
     fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus> {
-        let (claim, now) = (claim(lease), self.clock.now());
+        let (claim, now) = (claim(lease, &lease.slot), self.clock.now());
         self.runtime.block_on(async {
             match report {
                 JobReport::Validation(outcome) => {
@@ -344,7 +350,7 @@ impl JobServer for LocalServer {
     }
 
     fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
-        let (claim, now) = (claim(lease), self.clock.now());
+        let (claim, now) = (claim(lease, &lease.slot), self.clock.now());
         Ok(self.runtime.block_on(async {
             match reason {
                 ReleaseReason::Shutdown => self.store.release(&claim, now).await,
@@ -384,40 +390,6 @@ impl JobServer for LocalServer {
             }
         });
     }
-
-    fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
-        let fetched = self.store.artifacts().get_to_file(&bundle.key, archive);
-        Ok(self.runtime.block_on(fetched)?)
-    }
-
-    fn fetch_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
-        let fetched = self.store.artifacts().get_folder(key, folder);
-        Ok(self.runtime.block_on(fetched)?)
-    }
-
-    fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
-        let artifacts = self.store.artifacts();
-        self.runtime.block_on(async {
-            let stored = artifacts.put_folder(key, folder).await;
-            // A partial recording is useless and takes disk space.
-            if stored.is_err()
-                && let Err(error) = artifacts.delete_folder(key).await
-            {
-                tracing::warn!(key, %error, "a partial recording could not be removed");
-            }
-            Ok(stored?)
-        })
-    }
-
-    fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()> {
-        let stored = self.store.artifacts().put_file(key, clips);
-        Ok(self.runtime.block_on(stored)?)
-    }
-
-    fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()> {
-        let stored = self.store.artifacts().put_dataset(key, archive, clips);
-        Ok(self.runtime.block_on(stored)?)
-    }
 }
 
 /// Artifact key prefix of a game's recording; each lease has its own, as with shards.
@@ -438,11 +410,12 @@ fn game_recording(files: GameFiles) -> GameRecording {
     }
 }
 
-fn claim(lease: &Lease) -> JobClaim {
+/// The store's form of a lease, in the name of `holder`.
+pub(crate) fn claim(lease: &Lease, holder: &str) -> JobClaim {
     JobClaim {
         job: lease.job_id,
         nonce: lease.nonce,
-        worker: lease.slot.clone(),
+        worker: holder.to_owned(),
         lease_until: lease.expires_at,
     }
 }

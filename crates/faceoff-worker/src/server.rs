@@ -1,11 +1,14 @@
-//! The interface between a slot, which runs jobs, and the server, which owns the queue of jobs and their files.
+//! The interface between a slot, which runs jobs, and the server, which owns the queue of jobs.
 
-use faceoff_types::{BundleRef, GameId, LiveEvent, LivePosition};
-use faceoff_wire::job::{JobReport, JobSpec, Lease};
-use std::{path::Path, time::Duration};
+use faceoff_types::GameId;
+use faceoff_wire::{
+    job::{JobReport, JobSpec, Lease},
+    remote::LiveGameUpdate,
+};
+use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
-/// The server as a slot sees it: the owner of queue and artifacts, in this process or on another machine. A slot has its
+/// The server as a slot sees it: the owner of the queue, in this process or on another machine. A slot has its
 /// own thread, so all calls block. The server sets all timestamps, at the time of the call.
 ///
 /// After an error the outcome is unknown: the request may have been carried out.
@@ -22,7 +25,7 @@ pub(crate) trait JobServer: Send + Sync {
     }
 
     /// Publishes a live update of an attempt (its number) at a game. Over a slow or broken connection, updates may get lost.
-    fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: GameUpdate);
+    fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: LiveGameUpdate);
 
     /// Stores the result of a job; a repetition under the same lease has no effect. Files that were uploaded under a lost
     /// lease are removed.
@@ -41,21 +44,6 @@ pub(crate) trait JobServer: Send + Sync {
         timeout: Duration,
         queue_version: Option<QueueVersion>,
     );
-
-    /// Copies an uploaded bundle to a new file.
-    fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()>;
-
-    /// Copies the files of a committed recording into an empty folder.
-    fn fetch_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()>;
-
-    /// Stores the files of a folder as a recording (of a shard or a game).
-    fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()>;
-
-    /// Stores the clips (motions for replays) of a shard's episodes, replacing earlier ones.
-    fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()>;
-
-    /// Stores a dataset, with the clips for replays. It becomes visible with the commit that names it.
-    fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()>;
 }
 
 /// The result of a claim.
@@ -80,20 +68,6 @@ pub(crate) enum LeaseStatus {
     Held,
     /// The lease has expired, or the job was cancelled or given to another slot.
     Lost,
-}
-
-/// A live update of a game that a slot plays. It has no influence on the result.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum GameUpdate {
-    /// The game has started; `steps` are the control steps of the whole game.
-    Started { steps: u32 },
-    /// Events since the last update, and the current positions.
-    Progress {
-        events: Vec<LiveEvent>,
-        position: LivePosition,
-    },
-    /// The attempt is over; no further update follows.
-    Ended,
 }
 
 /// Why a job goes back to the queue.

@@ -7,14 +7,17 @@ use crate::{
     cpus::{self, CpuLayout},
     evaluator::{Evaluator, Runner},
     executor::{AgentHost, Executor},
+    files::FileStore,
     full_disk::ClaimPause,
     local::LocalServer,
+    scorer::Scorer,
     scratch::Scratch,
     server::JobServer,
     slot::{Backoff, Slot},
     slot_threads::SlotThreads,
 };
 use anyhow::Context as _;
+use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::{JobFilter, Store, StoreError};
@@ -84,11 +87,12 @@ pub struct SlotsConfig {
 #[boxed]
 pub async fn run(
     store: Store,
+    live: LiveState,
     clock: Clock,
     config: WorkerConfig,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    let server = config.local_server(store, clock);
+    let server = config.local_server(store, live, clock);
     let slots_server = Arc::new(server.clone());
     let evaluator = Arc::new(Runner);
     run_with(
@@ -104,9 +108,10 @@ pub async fn run(
 
 impl WorkerConfig {
     /// The job server with this configuration.
-    pub(crate) fn local_server(&self, store: Store, clock: Clock) -> LocalServer {
+    pub(crate) fn local_server(&self, store: Store, live: LiveState, clock: Clock) -> LocalServer {
         LocalServer {
             store,
+            live,
             runtime: Handle::current(),
             clock,
             lease_s: self.lease_s,
@@ -147,10 +152,15 @@ pub(crate) async fn run_with(
         Err(error) => return Err(error.into()),
     }
 
+    let files = server.files();
     let cleanup = tokio::spawn(run_cleanup(server, intervals.cleanup, shutdown.clone()));
     let servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
         slot: format!("{}/slot-{index}", scratch.worker()),
         server: Arc::clone(&slots_server),
+        files: Arc::new(files.clone()),
+        scorer: Some(Scorer {
+            files: files.clone(),
+        }),
     });
     let servers = servers.collect();
     let result = run_slots(
@@ -166,10 +176,13 @@ pub(crate) async fn run_with(
     result
 }
 
-/// The name of a slot, and the server from which it gets jobs.
+/// The name of a slot, the server from which it gets jobs, and their files.
 pub(crate) struct SlotServer {
     pub(crate) slot: String,
     pub(crate) server: Arc<dyn JobServer>,
+    pub(crate) files: Arc<dyn FileStore>,
+    /// See [`Executor::scorer`].
+    pub(crate) scorer: Option<Scorer>,
 }
 
 /// Runs one slot per entry of `servers` until `shutdown` is cancelled.
@@ -191,7 +204,13 @@ pub(crate) async fn run_slots(
     tokio::spawn(report_stalled_slots(config.metrics.clone(), stop.clone()));
     let mut slots = JoinSet::new();
     let cpus_and_servers = config.cpus.slots.into_iter().zip(servers);
-    for (index, (cpus, SlotServer { slot: name, server })) in cpus_and_servers.enumerate() {
+    for (index, (cpus, slot_server)) in cpus_and_servers.enumerate() {
+        let SlotServer {
+            slot: name,
+            server,
+            files,
+            scorer,
+        } = slot_server;
         let folder = scratch.slot(index)?;
         let slot = Slot {
             name,
@@ -202,6 +221,8 @@ pub(crate) async fn run_slots(
             executor: Executor {
                 timing: None,
                 server: Arc::clone(&server),
+                files,
+                scorer,
                 evaluator: Arc::clone(&evaluator),
                 host: AgentHost {
                     isolation: config.agent.isolation.clone(),

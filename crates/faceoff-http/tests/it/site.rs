@@ -6,6 +6,7 @@ use faceoff_http::{
     AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, LinkKey,
     MinTransferRate, RateLimits, router,
 };
+use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
 use faceoff_store::*;
@@ -50,6 +51,7 @@ pub fn no_tls() -> rustls::ClientConfig {
 pub struct Site {
     pub url: String,
     pub store: Store,
+    pub live: LiveState,
     /// The server's data folder.
     pub folder: tempfile::TempDir,
     config: HttpConfig,
@@ -248,11 +250,13 @@ impl Site {
                 allow_private: vec!["127.0.0.0/8".parse().unwrap()],
             },
         };
-        let (url, server, shutdown) = serve(&store, &config).await;
+        let live = LiveState::default();
+        let (url, server, shutdown) = serve(&store, &live, &config).await;
         let http = client_builder().build().unwrap();
         Self {
             url,
             store,
+            live,
             folder,
             config,
             now,
@@ -292,10 +296,12 @@ impl Site {
             process: Process::default,
             webhooks: WebhookRules::default(),
         };
-        let (url, server, shutdown) = serve(&store, &config).await;
+        let live = LiveState::default();
+        let (url, server, shutdown) = serve(&store, &live, &config).await;
         Self {
             url,
             store,
+            live,
             folder,
             config,
             now: Arc::new(Mutex::new(made_at)),
@@ -313,7 +319,7 @@ impl Site {
     /// Replaces the server by a new one on the same folder, with empty caches.
     pub async fn restart(&mut self) {
         self.server.abort();
-        let (url, server, shutdown) = serve(&self.store, &self.config).await;
+        let (url, server, shutdown) = serve(&self.store, &self.live, &self.config).await;
         (self.url, self.server, self.shutdown) = (url, server, Some(shutdown));
     }
 
@@ -333,7 +339,12 @@ impl Site {
         let HttpConfig {
             clock, capacity, ..
         } = self.config.clone();
-        CapacityMonitor::new(self.store.clone(), clock, capacity)
+        CapacityMonitor::new(
+            self.store.clone(),
+            self.live.workers.clone(),
+            clock,
+            capacity,
+        )
     }
 
     pub fn clock(&self) -> Clock {
@@ -688,11 +699,12 @@ fn connection_limits() -> ConnectionLimits {
 /// Starts a server. Returns its URL, its task, and the sender that shuts it down.
 async fn serve(
     store: &Store,
+    live: &LiveState,
     config: &HttpConfig,
 ) -> (String, JoinHandle<()>, oneshot::Sender<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
-    let site = router(store.clone(), config.clone());
+    let site = router(store.clone(), live.clone(), config.clone());
     let (shutdown_sender, shutdown_receiver) = oneshot::channel();
     let server = tokio::spawn(async move {
         let shutdown_signal = async move {

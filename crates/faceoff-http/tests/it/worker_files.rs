@@ -2,7 +2,7 @@
 //! the job's files while the worker holds the lease, the right to run the job for a time.
 
 use crate::site::{Answer, GZIP, Site};
-use faceoff_store::{ClaimedJob, Job};
+use faceoff_store::{Actor, ClaimedJob, Job};
 use faceoff_types::{BundleRef, PerturbationSettings};
 use faceoff_wire::{
     game::GameSpec,
@@ -166,7 +166,7 @@ async fn late_upload_does_not_replace_a_checked_file() {
     };
     let (rest, answer) = start_upload("game.zip").await;
     assert!(
-        site.store.workers().close_files(claim.nonce),
+        site.live.workers.close_files(claim.nonce),
         "nothing is being stored"
     );
     rest.send(Ok(b"rows")).await.unwrap();
@@ -176,7 +176,7 @@ async fn late_upload_does_not_replace_a_checked_file() {
     assert_eq!(stored_bytes("game.zip").await, None);
 
     // The same is so after the check has ended, when the lease is over.
-    site.store.workers().forget_files(claim.nonce);
+    site.live.workers.forget_files(claim.nonce);
     let (rest, answer) = start_upload("game.zip").await;
     site.store.release(&claim, site.now()).await.unwrap();
     rest.send(Ok(b"rows")).await.unwrap();
@@ -192,31 +192,46 @@ async fn banned_worker_loses_access() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "hold").await;
     site.evaluate(&team, &submission).await;
-    let ClaimedJob { claim, job } = site.claim().await;
-    let Job::Shard { bundle, .. } = job else {
-        panic!("expected a shard");
+    let slot = "remote/rack-1/slot-0";
+    // Claims and starts a job. Returns the path of its bundle, and its grant.
+    let start_job = async || {
+        let ClaimedJob { claim, job } = site.claim().await;
+        let Job::Shard { bundle, .. } = job else {
+            panic!("expected a shard");
+        };
+        let transferred = site
+            .store
+            .transfer_lease(&claim, slot, WORKER_LEASE_S, site.now());
+        assert!(transferred.await.unwrap());
+        let path = format!("/work/bundles/{}", bundle.blake3);
+        let grant = Grant {
+            job_id: claim.job,
+            nonce: claim.nonce,
+            bundles: vec![bundle],
+            write_scope: WriteScope::None,
+            expected_recording: ExpectedRecording::None,
+            program: String::new(),
+        };
+        (path, grant.seal(&site.grant_key()).unwrap())
     };
-    let grant = Grant {
-        job_id: claim.job,
-        nonce: claim.nonce,
-        bundles: vec![bundle.clone()],
-        write_scope: WriteScope::None,
-        expected_recording: ExpectedRecording::None,
-        program: String::new(),
-    };
-    let sealed = grant.seal(&site.grant_key()).unwrap();
-    let path = format!("/work/bundles/{}", bundle.blake3);
-    let transferred =
-        site.store
-            .transfer_lease(&claim, "remote/rack-1/slot-0", WORKER_LEASE_S, site.now());
-    assert!(transferred.await.unwrap());
+    let (path, grant) = start_job().await;
     assert_eq!(
-        send(&site, Method::GET, &path, &sealed, b"").await.status,
+        send(&site, Method::GET, &path, &grant, b"").await.status,
         200
     );
-    let bans = [("rack-1".to_owned(), "it lies".to_owned())];
-    site.store.workers().set_banned(bans);
-    send(&site, Method::GET, &path, &sealed, b"").await.problem(
+    let worker = "rack-1".parse().unwrap();
+    let ban = site
+        .store
+        .ban_worker(Actor::Organiser, &worker, "it lies", site.now());
+    ban.await.unwrap();
+    send(&site, Method::GET, &path, &grant, b"").await.problem(
+        403,
+        "forbidden",
+        &["no longer holds the lease"],
+    );
+    // A job that the worker starts at the moment of the ban.
+    let (path, grant) = start_job().await;
+    send(&site, Method::GET, &path, &grant, b"").await.problem(
         403,
         "forbidden",
         &["this worker is banned"],

@@ -6,7 +6,7 @@ use crate::{
     site::{ADMIN, Site},
     team_dashboard::{dashboard_page, links, redirect_target},
 };
-use faceoff_store::{SlotReport, WorkerInfo};
+use faceoff_live::{SlotReport, WorkerInfo};
 use serde_json::{Value, json};
 use uuid::Uuid;
 
@@ -35,7 +35,7 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     let html = dashboard_page(&grace.open("/organiser/workers").await, 200);
     assert!(texts(&html, "main")[0].contains("Remote workers are turned off"));
 
-    let (workers, job) = (site.store.workers().clone(), Uuid::from_u128(7));
+    let (workers, job) = (site.live.workers.clone(), Uuid::from_u128(7));
     workers.enable();
     workers.record_poll("rack-1", worker_info("1.0", 4), None, site.now());
     workers.record_poll(
@@ -148,9 +148,20 @@ async fn worker_is_banned_and_readmitted_on_page_and_in_the_api() {
     let site = Site::start().await;
     let role = json!({ "role": "organiser", "note": "Grace" });
     let mut grace = Browser::join(&site, "Grace", role).await;
-    let workers = site.store.workers().clone();
+    let workers = site.live.workers.clone();
     workers.enable();
     workers.record_poll("rack-1", worker_info("1.0", 4), None, site.now());
+    workers.record_job(
+        "rack-1",
+        "slot-2",
+        Uuid::from_u128(7),
+        SlotReport::default(),
+        site.now(),
+    );
+    let ban_reason = async |name: &str| {
+        let name = name.parse().unwrap();
+        site.store.ban_reason(&name).await.unwrap()
+    };
     let html = dashboard_page(&grace.open("/organiser/workers").await, 200);
     assert_eq!(
         links(&html, "a[href='/organiser/decide/ban/rack-1']").len(),
@@ -173,10 +184,15 @@ async fn worker_is_banned_and_readmitted_on_page_and_in_the_api() {
         main.contains("The worker is banned") && main.contains(reason),
         "{main}"
     );
-    assert_eq!(workers.ban_reason("rack-1").as_deref(), Some(reason));
+    assert_eq!(ban_reason("rack-1").await.as_deref(), Some(reason));
     let attention = dashboard_page(&grace.open("/organiser").await, 200);
     assert!(texts(&attention, "main")[0].contains("The worker rack-1 is banned"));
     let worker_list = site.get("/api/v1/workers", Some(ADMIN)).await.json(200);
+    assert_eq!(
+        worker_list["workers"][0]["busy"],
+        json!([]),
+        "its job is queued again"
+    );
     let bans = &worker_list["bans"];
     assert_eq!(
         (
@@ -194,7 +210,7 @@ async fn worker_is_banned_and_readmitted_on_page_and_in_the_api() {
     let again = post("rack-1/ban", json!({ "reason": "once more" })).await;
     again.problem(409, "conflict", &["banned already"]);
     assert_eq!(post("rack-1/readmit", json!({})).await.status, 204);
-    assert_eq!(workers.ban_reason("rack-1"), None);
+    assert_eq!(ban_reason("rack-1").await, None);
     post("rack-1/readmit", json!({}))
         .await
         .problem(409, "conflict", &["is not banned"]);
@@ -208,5 +224,5 @@ async fn worker_is_banned_and_readmitted_on_page_and_in_the_api() {
     let readmit = grace.submit("/organiser/decide/readmit/rack-2", &[]).await;
     let html = dashboard_page(&grace.open(&redirect_target(&readmit)).await, 200);
     assert!(texts(&html, "main")[0].contains("readmitted"));
-    assert_eq!(workers.ban_reason("rack-2"), None);
+    assert_eq!(ban_reason("rack-2").await, None);
 }

@@ -3,6 +3,7 @@
 //! datasets. Artifacts are read only while the archive is sent.
 
 use faceoff_archive::{Edition, FORMAT, Manifest};
+use faceoff_live::LiveState;
 use faceoff_service::{
     app::{App, AppState},
     config::HttpConfig,
@@ -150,7 +151,8 @@ fn snapshot_app(app: &App, snapshot: &Snapshot, made_at: Timestamp) -> App {
         clock: Clock::new(move || made_at),
         ..app.config.clone()
     };
-    Arc::new(AppState::new(snapshot.store().clone(), config))
+    let live = LiveState::default();
+    Arc::new(AppState::new(snapshot.store().clone(), live, config))
 }
 
 fn readme(season: &str, edition: Edition, made_at: Timestamp) -> String {

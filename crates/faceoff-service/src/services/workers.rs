@@ -2,7 +2,8 @@
 
 use super::decisions::checked_reason;
 use crate::{app::AppState, boxed, problem::Problem};
-use faceoff_store::{Actor, WorkerName};
+use faceoff_store::Actor;
+use faceoff_types::WorkerName;
 
 /// Bans a worker: its results are rejected from now on. Returns the number of its shards (parts of
 /// unfinished evaluations) that are queued again.
@@ -16,6 +17,7 @@ pub async fn ban_worker(
     let reason = checked_reason(reason)?;
     let now = app.config.clock.now();
     let requeued = app.store.ban_worker(actor, worker, reason, now).await?;
+    app.live.workers.end_jobs_of(worker.as_str());
     tracing::info!(%worker, reason, requeued, "worker banned");
     Ok(requeued)
 }

@@ -3,6 +3,7 @@
 
 use crate::{app::AppState, boxed, config::Capacity, problem::Problem};
 use faceoff_api::views::capacity::{CapacityView, DayLoad, Fit};
+use faceoff_live::Workers;
 use faceoff_store::{EvaluationBacklog, JobDurations, Stage, Store, StoreError};
 use faceoff_types::{StageId, TeamId};
 use jiff::{Timestamp, civil::Date};
@@ -169,7 +170,7 @@ fn open_load(
 #[boxed]
 pub async fn build(app: &AppState, id: StageId) -> Result<CapacityView, Problem> {
     let now = app.config.clock.now();
-    let forecast = forecast(&app.store, &app.config.capacity, id, now);
+    let forecast = forecast(&app.store, &app.live.workers, &app.config.capacity, id, now);
     Ok(forecast.await?)
 }
 
@@ -177,6 +178,7 @@ pub async fn build(app: &AppState, id: StageId) -> Result<CapacityView, Problem>
 #[boxed]
 pub async fn forecast(
     store: &Store,
+    workers: &Workers,
     capacity: &Capacity,
     id: StageId,
     now: Timestamp,
@@ -200,7 +202,7 @@ pub async fn forecast(
             &stage, day, cutoff_at, &teams, &durations, capacity,
         ));
     }
-    let slots = capacity.slots + store.workers().available_slots(now);
+    let slots = capacity.slots + workers.available_slots(now);
     let to_day_load = |load: &Load| day_load(load, slots);
     Ok(CapacityView {
         stage: stage.id,

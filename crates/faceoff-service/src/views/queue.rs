@@ -14,7 +14,7 @@ pub fn view(position: QueuePosition) -> QueueView {
 
 /// Number of slots that run jobs now: the server's own and those of remote workers.
 pub fn slots(app: &AppState) -> u32 {
-    let remote = app.store.workers().available_slots(app.config.clock.now());
+    let remote = app.live.workers.available_slots(app.config.clock.now());
     app.config.capacity.slots + remote
 }
 

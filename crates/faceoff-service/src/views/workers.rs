@@ -4,7 +4,7 @@ use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::workers::{
     BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView,
 };
-use faceoff_store::{SlotStatus, WorkerStatus};
+use faceoff_live::{SlotStatus, WorkerStatus};
 use jiff::{SignedDuration, Timestamp};
 
 /// A job that runs longer than this is reported as an alarm.
@@ -36,7 +36,7 @@ pub async fn with_bans(app: &AppState) -> Result<WorkersView, Problem> {
 
 /// All workers, without the bans, which need a database read.
 pub fn current(app: &AppState) -> WorkersView {
-    let (workers, now) = (app.store.workers(), app.config.clock.now());
+    let (workers, now) = (&app.live.workers, app.config.clock.now());
     let problems = workers.problems().into_iter();
     let problems =
         problems.map(|(activity, error)| format!("The server cannot {activity}: {error}"));

@@ -7,11 +7,9 @@ use crate::{
     error::{Result, StoreError},
     free_space::FreeSpace,
     health_probes::HealthProbes,
-    live::LiveGames,
     signals::Signals,
     store::Store,
     tables::{archive, season},
-    workers::Workers,
 };
 use std::{fs::File, path::Path, sync::Arc};
 
@@ -35,8 +33,6 @@ impl Store {
             artifacts,
             free_space: Arc::new(FreeSpace::new(vec![data_dir.to_owned()], 0)),
             probes: Arc::new(HealthProbes::new()),
-            live: LiveGames::default(),
-            workers: Workers::default(),
             archive: archived.map(Arc::new),
         })
     }

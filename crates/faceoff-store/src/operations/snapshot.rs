@@ -6,7 +6,6 @@ use crate::{
     error::{Result, StoreError},
     free_space::FreeSpace,
     health_probes::HealthProbes,
-    live::LiveGames,
     operations::scrub::scrub,
     signals::Signals,
     store::Store,
@@ -14,7 +13,6 @@ use crate::{
         archive::{self, ArchivedArtifact, ArchivedSeason, Edition},
         days, evaluations, proposed_evaluations, season, stages,
     },
-    workers::Workers,
 };
 use jiff::Timestamp;
 use sqlx::{
@@ -84,8 +82,6 @@ impl Store {
             artifacts: self.artifacts.clone(),
             free_space: Arc::new(FreeSpace::new(vec![folder.to_owned()], 0)),
             probes: Arc::new(HealthProbes::new()),
-            live: LiveGames::default(),
-            workers: Workers::default(),
             archive: archived.map(Arc::new),
         };
         Ok(Snapshot {

@@ -11,8 +11,8 @@ use crate::{
         shards,
         worker_bans::{self, WorkerBan},
     },
-    workers::WorkerName,
 };
+use faceoff_types::WorkerName;
 use jiff::Timestamp;
 
 impl Store {
@@ -58,7 +58,6 @@ impl Store {
                 Ok(discarded)
             })
             .await?;
-        self.workers().ban(worker.as_str(), reason);
         let count = u32::try_from(discarded.len()).unwrap_or(u32::MAX);
         for key in discarded.into_iter().filter_map(|shard| shard.recording) {
             if let Err(error) = self.artifacts().delete_folder(&key).await {
@@ -87,8 +86,6 @@ impl Store {
             tx.record(Subject::Season, Event::WorkerReadmitted { worker });
             Ok(())
         })
-        .await?;
-        self.workers().readmit(worker.as_str());
-        Ok(())
+        .await
     }
 }

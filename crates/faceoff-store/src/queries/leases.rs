@@ -1,6 +1,7 @@
 //! Queries of leases: the right of a worker to run a job for a time. The nonce is unique to each lease.
 
-use crate::{boxed, error::Result, queue, store::Store, workers::WorkerName};
+use crate::{boxed, error::Result, queue, store::Store};
+use faceoff_types::WorkerName;
 use uuid::Uuid;
 
 impl Store {
@@ -21,7 +22,7 @@ impl Store {
     #[boxed]
     pub async fn is_leased_by(&self, worker: &WorkerName, job: Uuid, nonce: Uuid) -> Result<bool> {
         let holder = self.lease_holder(job, nonce).await?;
-        let slots = format!("{}/", worker.holder());
+        let slots = worker.slot_holder("");
         Ok(holder.is_some_and(|holder| holder.starts_with(&slots)))
     }
 }

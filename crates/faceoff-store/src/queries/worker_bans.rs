@@ -5,9 +5,8 @@ use crate::{
     error::Result,
     store::Store,
     tables::worker_bans::{self, WorkerBan},
-    workers::WorkerName,
 };
-use faceoff_types::{EvaluationId, GameId};
+use faceoff_types::{EvaluationId, GameId, WorkerName};
 
 /// Finished results to which a worker has contributed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -23,6 +22,12 @@ impl Store {
     #[boxed]
     pub async fn worker_bans(&self) -> Result<Vec<WorkerBan>> {
         worker_bans::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// Why the worker is banned; `None` if it is not.
+    #[boxed]
+    pub async fn ban_reason(&self, worker: &WorkerName) -> Result<Option<String>> {
+        worker_bans::reason(&mut *self.database.read.acquire().await?, worker.as_str()).await
     }
 
     /// The counting results to which a remote worker has contributed, at most `limit` of each kind.

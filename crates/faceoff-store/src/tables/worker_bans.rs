@@ -53,6 +53,17 @@ pub(crate) async fn delete(connection: &mut SqliteConnection, worker: &str) -> R
     Ok(deleted.rows_affected() == 1)
 }
 
+/// The reason of a worker's ban; `None` if it is not banned.
+pub(crate) async fn reason(
+    connection: &mut SqliteConnection,
+    worker: &str,
+) -> Result<Option<String>> {
+    let reason = sqlx::query_scalar!("SELECT reason FROM worker_bans WHERE worker = ?", worker)
+        .fetch_optional(connection)
+        .await?;
+    Ok(reason)
+}
+
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<WorkerBan>> {
     let rows = sqlx::query_as!(
         BanRow,

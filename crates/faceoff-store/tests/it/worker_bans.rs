@@ -3,6 +3,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
+use faceoff_types::WorkerName;
 
 const REASON: &str = "its numbers are not the simulator's";
 
@@ -48,12 +49,9 @@ async fn ban_requeues_shards_of_open_runs() {
     assert_eq!(ban.await.unwrap(), 1, "one shard is run again");
     let bans = f.store.worker_bans().await.unwrap();
     assert_eq!((&*bans[0].worker, &*bans[0].reason), ("rack-1", REASON));
-    assert_eq!(
-        f.store.workers().ban_reason("rack-1").as_deref(),
-        Some(REASON),
-        "the ban is cached"
-    );
-    assert_eq!(f.store.workers().ban_reason("rack-10"), None);
+    let ban_reason = async |name: &str| f.store.ban_reason(&worker(name)).await.unwrap();
+    assert_eq!(ban_reason("rack-1").await.as_deref(), Some(REASON));
+    assert_eq!(ban_reason("rack-10").await, None);
     let repeated = f.store.ban_worker(Actor::Organiser, &rack, REASON, f.now);
     assert!(matches!(repeated.await, Err(StoreError::Conflict(_))));
 
@@ -105,7 +103,7 @@ async fn ban_requeues_shards_of_open_runs() {
             .await
     };
     readmit().await.unwrap();
-    assert_eq!(f.store.workers().ban_reason("rack-1"), None);
+    assert_eq!(ban_reason("rack-1").await, None);
     assert!(matches!(readmit().await, Err(StoreError::Conflict(_))));
     assert!(other.worker_bans().await.unwrap().is_empty());
 }
@@ -150,13 +148,4 @@ async fn remote_leases_survive_a_server_restart() {
             .unwrap()
     };
     assert!(!is_leased_by("rack-1").await, "the job is done");
-}
-
-#[test]
-fn worker_names_are_valid_subject_tokens() {
-    for name in ["", "a.b", "a b", "*", ">", "a/b", &"x".repeat(65)] {
-        let error = name.parse::<WorkerName>().unwrap_err();
-        assert!(error.to_string().contains("1 to 64"), "{name:?}");
-    }
-    assert_eq!(worker("rack-1_b").holder(), "remote/rack-1_b");
 }

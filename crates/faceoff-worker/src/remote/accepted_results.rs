@@ -10,7 +10,8 @@ use super::{
 use crate::server::{JobServer, LeaseStatus, ReleaseReason};
 use anyhow::Context as _;
 use async_nats::jetstream::{self, AckKind};
-use faceoff_store::{Actor, StoreError, WorkerName};
+use faceoff_store::{Actor, StoreError};
+use faceoff_types::WorkerName;
 use faceoff_types::escape_unprintable;
 use faceoff_wire::{
     grant::Grant,
@@ -159,18 +160,21 @@ impl Dispatcher {
             tracing::error!(job = %id, %worker, "a worker sent a result without a valid grant; ignored");
             return AckKind::Ack;
         };
-        if !result
-            .lease
-            .slot
-            .starts_with(&names::slot_holder(&worker, ""))
-        {
+        if !result.lease.slot.starts_with(&worker.slot_holder("")) {
             // The subject of the message names the worker; its slot is unknown.
-            result.lease.slot = names::slot_holder(&worker, "?");
+            result.lease.slot = worker.slot_holder("?");
         }
-        let (workers, now) = (self.server.store.workers(), self.server.clock.now());
-        if workers.ban_reason(worker.as_str()).is_some() {
-            tracing::warn!(job = %id, %worker, "the worker is banned; result ignored");
-            return AckKind::Ack;
+        let (workers, now) = (&self.server.live.workers, self.server.clock.now());
+        match self.server.store.ban_reason(&worker).await {
+            Ok(None) => {}
+            Ok(Some(_)) => {
+                tracing::warn!(job = %id, %worker, "the worker is banned; result ignored");
+                return AckKind::Ack;
+            }
+            Err(error) => {
+                tracing::error!(job = %id, %worker, %error, "the bans could not be read for a result; trying again");
+                return AckKind::Nak(Some(RETRY_AFTER));
+            }
         }
         let nonce = result.lease.nonce;
         // Only the worker that started the job may send its result.
@@ -303,6 +307,7 @@ impl Dispatcher {
         let (store, now) = (&self.server.store, self.server.clock.now());
         match store.ban_worker(Actor::Server, worker, &reason, now).await {
             Ok(requeued) => {
+                self.server.live.workers.end_jobs_of(worker.as_str());
                 tracing::error!(
                     %worker,
                     difference,

@@ -5,16 +5,16 @@ use super::{
     bucket::{Bucket, BucketConfig},
     connection::NatsConfig,
     grants::grant_for,
-    names::{self, ALL, Names, SERVER, UNCLAIMED},
+    names::{ALL, Names, SERVER, UNCLAIMED},
     pending_results::PendingResults,
     published_jobs::{PublishedJob, PublishedJobs},
-    requests::{RequestHandler, claim},
+    requests::RequestHandler,
     result_checks::ResultChecks,
     streams::{MESSAGES_LOST, Streams, is_ahead},
 };
 use crate::{
     boxed,
-    local::LocalServer,
+    local::{LocalServer, claim},
     server::{ClaimResult, JobServer},
     service::WorkerConfig,
 };
@@ -23,8 +23,9 @@ use async_nats::{
     Client,
     jetstream::{self, stream::Stream},
 };
-use faceoff_store::{JobFilter, Store, StoreError, Workers};
-use faceoff_types::Clock;
+use faceoff_live::{LiveState, Workers};
+use faceoff_store::{JobFilter, Store, StoreError};
+use faceoff_types::{Clock, WorkerName};
 use faceoff_wire::{
     grant::GrantKey,
     job::{JobSpec, Lease},
@@ -83,6 +84,7 @@ impl RemoteConfig {
 #[boxed]
 pub async fn dispatch(
     store: Store,
+    live: LiveState,
     clock: Clock,
     config: WorkerConfig,
     remote: RemoteConfig,
@@ -91,12 +93,11 @@ pub async fn dispatch(
     let names = Names::new(&remote.nats.name)?;
     let server = LocalServer {
         job_filter: JobFilter::ShardsAndGames,
-        ..config.local_server(store, clock)
+        ..config.local_server(store, live.clone(), clock)
     };
     resume_leases(&server).await?;
     let season_commitment = server.store.season().await?.commitment;
-    let store = server.store.clone();
-    let workers = store.workers();
+    let workers = &live.workers;
     workers.enable();
     let problems = workers.clone();
     let client = remote
@@ -128,6 +129,7 @@ pub async fn dispatch(
         client: dispatcher.client.clone(),
         names: dispatcher.names.clone(),
         store: dispatcher.server.store.clone(),
+        live: live.clone(),
         clock: dispatcher.server.clock.clone(),
         lease_s: dispatcher.server.lease_s,
         required: dispatcher.remote.required.clone(),
@@ -135,8 +137,6 @@ pub async fn dispatch(
         pending_results: Arc::clone(&dispatcher.pending_results),
         streams: Arc::clone(&dispatcher.streams),
     };
-    let banned = dispatcher.server.store.worker_bans().await?;
-    workers.set_banned(banned.into_iter().map(|ban| (ban.worker, ban.reason)));
     let supervisor = Supervisor {
         workers,
         shutdown: &shutdown,
@@ -163,7 +163,9 @@ async fn resume_leases(server: &LocalServer) -> anyhow::Result<()> {
     let resumed = async {
         store.release_leases_of(UNCLAIMED, now).await?;
         let lease_s = server.lease_s.max(MIN_LEASE_AT_START_S);
-        store.renew_leases_of(names::REMOTE, lease_s, now).await
+        store
+            .renew_leases_of(WorkerName::REMOTE, lease_s, now)
+            .await
     };
     match resumed.await {
         Ok(0) => Ok(()),

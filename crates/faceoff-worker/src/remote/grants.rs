@@ -126,7 +126,7 @@ fn store_report(
     }
     // If the lease is over, the result is already stored or will be refused. It is not checked, since its files may be gone.
     if server.is_held(lease)? {
-        if !server.store.workers().close_files(lease.nonce) {
+        if !server.live.workers.close_files(lease.nonce) {
             return Ok(Acceptance::FilesPending);
         }
         if let Some(difference) =

@@ -2,7 +2,7 @@
 //! several servers can share one NATS. The words in them (`orders`, `asks` …) are fixed: workers, NATS permissions and stored
 //! streams use them.
 
-use faceoff_store::WorkerName;
+use faceoff_types::WorkerName;
 
 /// The names of one server's streams and subjects.
 #[derive(Debug, Clone)]
@@ -85,14 +85,6 @@ pub(super) const RESULTS_CONSUMER: &str = "server";
 pub(super) const ALL: &str = "*";
 /// Lease holder of published jobs that no worker has started. No slot has this name, which the database contains.
 pub(super) const UNCLAIMED: &str = "given out";
-
-/// Prefix of the lease holders of all remote slots.
-pub(super) const REMOTE: &str = "remote";
-
-/// Name of a remote slot as a lease holder; with an empty `slot`, the prefix of all slots of the worker.
-pub(super) fn slot_holder(worker: &WorkerName, slot: &str) -> String {
-    format!("{}/{slot}", worker.holder())
-}
 
 /// Is the text valid as a token of a subject and as a part of a stream's name?
 pub(super) fn is_subject_token(text: &str) -> bool {

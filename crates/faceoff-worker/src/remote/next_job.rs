@@ -2,9 +2,7 @@
 //! for the permission to start it.
 
 use super::{
-    connection::REQUEST_TIMEOUT,
-    names::{self, JOBS_CONSUMER},
-    server_client::ServerClient,
+    connection::REQUEST_TIMEOUT, names::JOBS_CONSUMER, server_client::ServerClient,
     worker_link::with_timeout,
 };
 use anyhow::Context as _;
@@ -107,7 +105,7 @@ impl ServerClient {
         let Some(mut job) = self.read_job(&message) else {
             return Ok(None);
         };
-        job.job.lease.slot = names::slot_holder(&link.worker, slot);
+        job.job.lease.slot = link.worker.slot_holder(slot);
         Ok(self.start_job(&job, slot).await.then_some(job))
     }
 

@@ -7,12 +7,14 @@ use super::{
     published_jobs::PublishedJobs,
     streams::Streams,
 };
+use crate::{game_broadcast::show_update, local::claim};
 use async_nats::{Client, Message};
-use faceoff_store::{JobClaim, SlotReport, Store, StoreError, WorkerInfo, WorkerName};
-use faceoff_types::{Clock, escape_unprintable};
+use faceoff_live::{LiveState, SlotReport, WorkerInfo};
+use faceoff_store::{Store, StoreError};
+use faceoff_types::{Clock, WorkerName, escape_unprintable};
 use faceoff_wire::{
     job::Lease,
-    remote::{LiveGameMessage, LiveGameUpdate, WorkerCapabilities, WorkerRequest, WorkerResponse},
+    remote::{LiveGameMessage, WorkerCapabilities, WorkerRequest, WorkerResponse},
 };
 use futures::StreamExt as _;
 use std::{
@@ -28,6 +30,7 @@ pub(super) struct RequestHandler {
     pub(super) client: Client,
     pub(super) names: Names,
     pub(super) store: Store,
+    pub(super) live: LiveState,
     pub(super) clock: Clock,
     pub(super) lease_s: u32,
     /// Program and runtimes that workers must have.
@@ -125,7 +128,10 @@ impl RequestHandler {
                 return refused(&format!("the server does not know this request: {error}"));
             }
         };
-        let ban = self.store.workers().ban_reason(worker.as_str());
+        let ban = match self.store.ban_reason(&worker).await {
+            Ok(ban) => ban,
+            Err(error) => return unknown(&worker, &error),
+        };
         let ban =
             ban.map(|reason| format!("the server accepts no results of this worker: {reason}"));
         if let (
@@ -138,14 +144,14 @@ impl RequestHandler {
             return refused(reason);
         }
         let now = self.clock.now();
-        let backoff = || self.store.workers().backoff_reason(worker.as_str(), now);
+        let backoff = || self.live.workers.backoff_reason(worker.as_str(), now);
         let result = match request {
             WorkerRequest::Register(capabilities) => {
                 let reason = ban
                     .or_else(|| incompatibility(&capabilities, &self.required))
                     .or_else(backoff);
                 let info = worker_info(&capabilities);
-                let workers = self.store.workers();
+                let workers = &self.live.workers;
                 workers.record_poll(worker.as_str(), info, reason.as_deref(), now);
                 return response_for(reason);
             }
@@ -196,10 +202,7 @@ impl RequestHandler {
         match result {
             Ok(true) => WorkerResponse::Accepted,
             Ok(false) => refused("this worker does not have the lease"),
-            Err(error) => {
-                tracing::warn!(%worker, %error, "the queue could not be read for a worker's request");
-                WorkerResponse::Unknown
-            }
+            Err(error) => unknown(&worker, &error),
         }
     }
 
@@ -212,7 +215,7 @@ impl RequestHandler {
     ) -> Result<bool, StoreError> {
         let claim = claim(lease, UNCLAIMED);
         let now = self.clock.now();
-        let holder = names::slot_holder(worker, slot);
+        let holder = worker.slot_holder(slot);
         let is_started = self
             .store
             .transfer_lease(&claim, &holder, self.lease_s, now)
@@ -224,7 +227,7 @@ impl RequestHandler {
                 description: description.as_deref(),
                 problem: None,
             };
-            let workers = self.store.workers();
+            let workers = &self.live.workers;
             workers.record_job(worker.as_str(), slot, lease.job_id, report, now);
         }
         Ok(is_started)
@@ -250,7 +253,7 @@ impl RequestHandler {
             return Ok(true);
         }
         // A lease that does not name a slot of this worker is renewed in the name of the worker.
-        let is_own_slot = lease.slot.starts_with(&names::slot_holder(worker, ""));
+        let is_own_slot = lease.slot.starts_with(&worker.slot_holder(""));
         let claim = claim(
             lease,
             if is_own_slot {
@@ -278,11 +281,8 @@ impl RequestHandler {
         held: Result<bool, StoreError>,
         trouble: Option<&str>,
     ) -> Result<bool, StoreError> {
-        let workers = self.store.workers();
-        match (
-            &held,
-            lease.slot.strip_prefix(&names::slot_holder(worker, "")),
-        ) {
+        let workers = &self.live.workers;
+        match (&held, lease.slot.strip_prefix(&worker.slot_holder(""))) {
             (Ok(true), Some(slot)) => {
                 let report = SlotReport {
                     description: None,
@@ -326,29 +326,17 @@ impl RequestHandler {
             let (job_id, nonce) = (update.lease.job_id, update.lease.nonce);
             let has_lease = self.store.is_leased_by(&worker, job_id, nonce).await;
             if self.streams.are_owned() && has_lease.unwrap_or_default() {
-                let live = self.store.live_games();
-                match update.update {
-                    LiveGameUpdate::Started { steps } => {
-                        live.begin(update.game, update.attempt, steps)
-                    }
-                    LiveGameUpdate::Progress { events, position } => {
-                        live.advance(update.game, update.attempt, events, Some(position))
-                    }
-                    LiveGameUpdate::Ended => live.end_attempt(update.game, update.attempt),
-                }
+                let attempt = (update.game, update.attempt);
+                show_update(&self.live.games, attempt, update.update);
             }
         }
     }
 }
 
-/// The store's form of a lease, in the name of `holder`.
-pub(super) fn claim(lease: &Lease, holder: &str) -> JobClaim {
-    JobClaim {
-        job: lease.job_id,
-        nonce: lease.nonce,
-        worker: holder.to_owned(),
-        lease_until: lease.expires_at,
-    }
+/// The response if the database cannot be read.
+fn unknown(worker: &WorkerName, error: &StoreError) -> WorkerResponse {
+    tracing::warn!(%worker, %error, "the queue could not be read for a worker's request");
+    WorkerResponse::Unknown
 }
 
 fn response_for(reason: Option<String>) -> WorkerResponse {

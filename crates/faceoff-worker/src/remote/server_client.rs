@@ -2,8 +2,9 @@
 
 use super::{connection::REQUEST_TIMEOUT, job_files::JobFiles, worker_link::WorkerLink};
 use crate::{
+    files::FileStore,
     full_disk,
-    server::{ClaimResult, GameUpdate, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
+    server::{ClaimResult, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
 use anyhow::Context as _;
 use async_nats::jetstream::{self, consumer::PullConsumer};
@@ -194,14 +195,7 @@ impl JobServer for ServerClient {
         Duration::from_millis(500)
     }
 
-    fn publish_game(&self, lease: &Lease, (game, attempt): (GameId, u32), update: GameUpdate) {
-        let update = match update {
-            GameUpdate::Started { steps } => LiveGameUpdate::Started { steps },
-            GameUpdate::Progress { events, position } => {
-                LiveGameUpdate::Progress { events, position }
-            }
-            GameUpdate::Ended => LiveGameUpdate::Ended,
-        };
+    fn publish_game(&self, lease: &Lease, (game, attempt): (GameId, u32), update: LiveGameUpdate) {
         let message = LiveGameMessage {
             lease: lease.clone(),
             game,
@@ -279,15 +273,13 @@ impl JobServer for ServerClient {
             }
         });
     }
+}
 
+impl FileStore for ServerClient {
     fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
         let (files, transfer) = (self.files(), &self.link.file_transfer);
         let fetched = files.fetch_bundle(transfer, bundle, archive, || self.has_ended());
         self.link.runtime.block_on(fetched)
-    }
-
-    fn fetch_recording(&self, key: &str, _: &Path) -> anyhow::Result<()> {
-        anyhow::bail!("no remote job fetches a recording, got {key}")
     }
 
     fn store_recording(&self, _: &str, folder: &Path) -> anyhow::Result<()> {
@@ -306,9 +298,5 @@ impl JobServer for ServerClient {
         self.link
             .runtime
             .block_on(self.store_file(CLIPS_FILE, clips))
-    }
-
-    fn store_dataset(&self, key: &str, _: &Path, _: Option<&Path>) -> anyhow::Result<()> {
-        anyhow::bail!("no remote job stores a dataset, got {key}")
     }
 }

@@ -12,10 +12,11 @@ use crate::{
     boxed,
     evaluator::Runner,
     scratch::Scratch,
+    server::JobServer,
     service::{Intervals, SlotServer, SlotsConfig, run_slots},
 };
 use anyhow::Context as _;
-use faceoff_store::WorkerName;
+use faceoff_types::WorkerName;
 use faceoff_wire::remote::WorkerCapabilities;
 use std::{
     sync::{Arc, Mutex},
@@ -89,9 +90,14 @@ pub async fn run_remote_worker(
             shutdown.cancel();
         });
     }
-    let servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
-        slot: format!("slot-{index}"),
-        server: Arc::new(ServerClient::new(Arc::clone(&link))),
+    let servers = (0..config.slots.cpus.slots.len()).map(|index| {
+        let client = Arc::new(ServerClient::new(Arc::clone(&link)));
+        SlotServer {
+            slot: format!("slot-{index}"),
+            server: Arc::clone(&client) as Arc<dyn JobServer>,
+            files: client,
+            scorer: None,
+        }
     });
     let servers = servers.collect();
     let running = run_slots(

@@ -3,7 +3,7 @@
 use super::{connection::REQUEST_TIMEOUT, names::Names, transfer::FileTransfer};
 use anyhow::Context as _;
 use async_nats::{Client, connection::State};
-use faceoff_store::WorkerName;
+use faceoff_types::WorkerName;
 use faceoff_wire::remote::{LiveGameMessage, WorkerCapabilities, WorkerRequest, WorkerResponse};
 use std::{
     sync::{Mutex, PoisonError},

@@ -10,6 +10,7 @@ use crate::{
     slot::Backoff,
     slot_threads::SlotThreads,
 };
+use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, PackWriter};
 use faceoff_runner::{
@@ -282,6 +283,7 @@ pub(super) async fn blocking<T: Send + 'static>(call: impl FnOnce() -> T + Send 
 /// A store, and a clock that only the tests advance, so that no lease expires because the machine is slow.
 pub(super) struct Server {
     pub(super) store: Store,
+    pub(super) live: LiveState,
     pub(super) folder: tempfile::TempDir,
     /// Start of the clock: about the real time, which file timestamps have.
     started_at: Timestamp,
@@ -299,6 +301,7 @@ impl Server {
         let store = faceoff_testkit::new_store(folder.path()).await;
         Self {
             store,
+            live: LiveState::default(),
             folder,
             started_at: Timestamp::now(),
             clock_ahead_s: Arc::default(),
@@ -328,7 +331,11 @@ impl Server {
     /// Restarts the server on the same folder.
     pub(super) async fn reopen(self) -> Self {
         let store = Store::open(self.folder.path()).await.unwrap();
-        Self { store, ..self }
+        Self {
+            store,
+            live: LiveState::default(),
+            ..self
+        }
     }
 
     /// Advances the clock.
@@ -418,7 +425,7 @@ impl Server {
     /// The job server for slots of this process.
     pub(super) fn local(&self) -> LocalServer {
         self.config(1)
-            .local_server(self.store.clone(), self.clock())
+            .local_server(self.store.clone(), self.live.clone(), self.clock())
     }
 
     pub(super) fn start_slots(&self, slots: usize, evaluator: &Arc<Scripted>) -> RunningSlots {
@@ -433,7 +440,7 @@ impl Server {
         intercept: impl FnOnce(LocalServer) -> Arc<dyn JobServer>,
     ) -> RunningSlots {
         let config = self.config(slots);
-        let server = config.local_server(self.store.clone(), self.clock());
+        let server = config.local_server(self.store.clone(), self.live.clone(), self.clock());
         let shutdown = CancellationToken::new();
         let task = tokio::spawn(run_with(
             server.clone(),

@@ -351,7 +351,7 @@ async fn live_updates_cover_each_attempt() {
     });
     let running = server.start_slots(1, &evaluator);
     starts.recv().await.unwrap();
-    let mut viewer = server.store.live_games().subscribe(game).unwrap();
+    let mut viewer = server.live.games.subscribe(game).unwrap();
     let updates = viewer.read_since(None);
     assert_eq!(updates.events, [event]);
     assert_eq!((updates.state.attempt, updates.state.steps), (1, 500));

@@ -2,11 +2,14 @@
 
 use crate::{
     local::LocalServer,
-    server::{ClaimResult, GameUpdate, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
+    server::{ClaimResult, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
-use faceoff_types::{BundleRef, GameId};
-use faceoff_wire::job::{JobReport, Lease};
-use std::{path::Path, sync::Arc, time::Duration};
+use faceoff_types::GameId;
+use faceoff_wire::{
+    job::{JobReport, Lease},
+    remote::LiveGameUpdate,
+};
+use std::{sync::Arc, time::Duration};
 use tokio_util::sync::CancellationToken;
 
 /// A call that a test can observe, and fail with an error.
@@ -45,7 +48,7 @@ impl JobServer for InterceptedServer {
         self.server.renew(lease, episodes_done)
     }
 
-    fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: GameUpdate) {
+    fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: LiveGameUpdate) {
         self.server.publish_game(lease, attempt, update);
     }
 
@@ -71,25 +74,5 @@ impl JobServer for InterceptedServer {
         queue_version: Option<QueueVersion>,
     ) {
         self.server.wait(stop, timeout, queue_version);
-    }
-
-    fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
-        self.server.fetch_bundle(bundle, archive)
-    }
-
-    fn fetch_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
-        self.server.fetch_recording(key, folder)
-    }
-
-    fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
-        self.server.store_recording(key, folder)
-    }
-
-    fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()> {
-        self.server.store_clips(key, clips)
-    }
-
-    fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()> {
-        self.server.store_dataset(key, archive, clips)
     }
 }

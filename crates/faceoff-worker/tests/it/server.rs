@@ -1,5 +1,6 @@
 //! A server for tests: a store, a worker with slots that run jobs, and teams with the agent `agent.py`.
 
+use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
@@ -98,7 +99,13 @@ impl Server {
         };
         let shutdown = CancellationToken::new();
         let clock = Clock::new(Timestamp::now);
-        let run = faceoff_worker::run(self.store.clone(), clock, config, shutdown.clone());
+        let run = faceoff_worker::run(
+            self.store.clone(),
+            LiveState::default(),
+            clock,
+            config,
+            shutdown.clone(),
+        );
         Worker {
             shutdown,
             task: tokio::spawn(run),

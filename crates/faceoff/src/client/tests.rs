@@ -9,6 +9,7 @@ use faceoff_api::{
 use faceoff_http::{
     AgentResources, Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, RateLimits,
 };
+use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
 use faceoff_store::{ClaimedJob, Job, Store};
 use faceoff_types::{
@@ -88,7 +89,7 @@ async fn start_site(max_bundle_bytes: u64) -> Site {
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}/", listener.local_addr().unwrap());
-    let router = faceoff_http::router(store.clone(), config);
+    let router = faceoff_http::router(store.clone(), LiveState::default(), config);
     tokio::spawn(faceoff_http::serve(
         listener,
         router,

@@ -2,7 +2,7 @@
 
 use super::Client;
 use faceoff_api::{requests::Reason, views::workers::WorkersView};
-use faceoff_store::WorkerName;
+use faceoff_types::WorkerName;
 use reqwest::Method;
 
 impl Client {

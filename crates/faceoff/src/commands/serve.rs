@@ -17,6 +17,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use data_folder::{empty_folder, load_or_create_link_key, set_admin_token};
 use faceoff_http::{AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig};
+use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_notify::Deliverer;
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
@@ -221,7 +222,13 @@ async fn serve(
         time: config.time.clone(),
         runtimes: agent.runtime_names(),
     };
-    let capacity_monitor = CapacityMonitor::new(store.clone(), clock.clone(), capacity.clone());
+    let live = LiveState::default();
+    let capacity_monitor = CapacityMonitor::new(
+        store.clone(),
+        live.workers.clone(),
+        clock.clone(),
+        capacity.clone(),
+    );
     let metrics = Metrics::new(env!("CARGO_PKG_VERSION"));
     let link_key = load_or_create_link_key(&data_dir)?;
     let remote = remote::remote_config(&config, address, &link_key, &agent)?;
@@ -243,7 +250,7 @@ async fn serve(
         Some(address) => Some(monitoring::listen(address).await?),
         None => None,
     };
-    let router = faceoff_http::router(store.clone(), http_config.clone());
+    let router = faceoff_http::router(store.clone(), live.clone(), http_config.clone());
     let tls = client::tls_client_config(None).unwrap_or_else(|error| {
         // Evaluations do not depend on webhooks, and pending deliveries are retried after the restart.
         tracing::error!(%error, "deliveries to webhooks with TLS fail: install the package ca-certificates and restart");
@@ -284,6 +291,7 @@ async fn serve(
     if let Some(remote) = remote {
         parts.spawn(faceoff_worker::dispatch(
             store.clone(),
+            live.clone(),
             clock.clone(),
             workers.clone(),
             remote,
@@ -292,6 +300,7 @@ async fn serve(
     }
     parts.spawn(faceoff_worker::run(
         store.clone(),
+        live.clone(),
         clock.clone(),
         workers,
         shutdown.clone(),
@@ -318,6 +327,7 @@ async fn serve(
         parts.spawn(monitoring::serve_metrics(
             listener,
             store,
+            live,
             http_config,
             shutdown.clone(),
         ));

@@ -75,7 +75,7 @@ async fn running_game() -> (
 #[tokio::test]
 async fn live_stream_is_resumed_without_a_gap() {
     let (cup, claim, game, seed) = running_game().await;
-    let live = cup.site.store.live_games();
+    let live = &cup.site.live.games;
     live.begin(game.id, 1, GAME_STEPS);
     let mut stream = open(&cup, game.id, None).await;
     let first = stream.next().await.unwrap();
@@ -159,7 +159,7 @@ async fn live_stream_is_resumed_without_a_gap() {
 #[tokio::test]
 async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
     let (cup, claim, game, _) = running_game().await;
-    let live = cup.site.store.live_games();
+    let live = &cup.site.live.games;
     let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "waiting");
     live.begin(game.id, 1, GAME_STEPS);
@@ -247,7 +247,7 @@ async fn number_of_live_readers_is_limited() {
 #[tokio::test]
 async fn shutdown_does_not_wait_for_the_end_of_games() {
     let (mut cup, _, game, _) = running_game().await;
-    cup.site.store.live_games().begin(game.id, 1, GAME_STEPS);
+    cup.site.live.games.begin(game.id, 1, GAME_STEPS);
     let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
     cup.site.shut_down().await;

@@ -411,7 +411,7 @@ async fn running_game_page_shows_score_and_live_stream() {
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
     let [home, _] = cup.names(&game).await;
-    let live = cup.site.store.live_games();
+    let live = &cup.site.live.games;
     // A game has 45,000 control steps: 15 minutes.
     live.begin(game.id, 1, 45_000);
     let goal = LiveEvent {

@@ -3,7 +3,8 @@
 use super::preview::{DecisionPreview, Done};
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::workers};
-use faceoff_store::{Actor, WorkerName};
+use faceoff_store::Actor;
+use faceoff_types::WorkerName;
 
 #[derive(Debug, Clone)]
 pub(in crate::organiser) enum WorkerDecision {

@@ -8,7 +8,7 @@ use clap::Subcommand;
 use faceoff_api::views::workers::{
     BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView,
 };
-use faceoff_store::WorkerName;
+use faceoff_types::WorkerName;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum WorkerAction {

@@ -7,6 +7,7 @@ use super::{
 use crate::{config::Config, machine};
 use anyhow::Context;
 use faceoff_http::{AgentResources, Capacity, ConnectionLimits, HttpConfig};
+use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_store::{ArchivedSeason, FreeSpace, Store};
 use faceoff_types::Clock;
@@ -49,6 +50,7 @@ pub async fn serve(
     let made_at = archived.made_at;
     let router = faceoff_http::router(
         store.clone(),
+        LiveState::default(),
         HttpConfig {
             max_bundle_bytes: config.bundle.packed_bytes,
             public_url: config.server.public_url.clone(),

@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use faceoff_http::{ConnectionLimits, HttpConfig};
+use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_store::{Change, Store};
 use std::net::SocketAddr;
@@ -23,10 +24,11 @@ pub async fn listen(address: SocketAddr) -> anyhow::Result<TcpListener> {
 pub async fn serve_metrics(
     listener: TcpListener,
     store: Store,
+    live: LiveState,
     config: HttpConfig,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    let router = faceoff_http::monitoring_router(store, config);
+    let router = faceoff_http::monitoring_router(store, live, config);
     let shutdown = shutdown.cancelled_owned();
     faceoff_http::serve(listener, router, ConnectionLimits::default(), shutdown).await;
     Ok(())

@@ -1,11 +1,8 @@
-//! Remote workers (on other machines) that have contacted this process: their state, failures, bans and uploads. The data is
-//! in memory only; the leases of their jobs are in the queue.
+//! Remote workers (on other machines) that have contacted this process: their state, failures and uploads.
 
 use jiff::{SignedDuration, Timestamp};
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
-    fmt,
-    str::FromStr,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use uuid::Uuid;
@@ -17,59 +14,6 @@ const FORGET_AFTER: SignedDuration = SignedDuration::from_hours(24);
 /// Maximum number of workers in memory.
 const MAX_WORKERS: usize = 10_000;
 
-/// Prefix of the lease holders that are remote workers.
-const REMOTE_PREFIX: &str = "remote/";
-
-/// Maximum length of a worker's name.
-const MAX_NAME_LEN: usize = 64;
-
-/// Name of a remote worker: 1 to 64 of a-z, A-Z, 0-9, - and _, so that it can be a token of a NATS subject.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct WorkerName(String);
-
-/// A text that is not a [`WorkerName`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("expected a worker's name: 1 to {MAX_NAME_LEN} of a-z, A-Z, 0-9, - and _")]
-pub struct ParseWorkerNameError;
-
-impl WorkerName {
-    #[must_use]
-    pub fn as_str(&self) -> &str {
-        &self.0
-    }
-
-    /// The remote worker of a lease holder; `None` if the holder is not the slot of a remote worker.
-    #[must_use]
-    pub fn from_holder(holder: &str) -> Option<Self> {
-        let (worker, _) = holder.strip_prefix(REMOTE_PREFIX)?.split_once('/')?;
-        worker.parse().ok()
-    }
-
-    /// The name of the worker as a lease holder. Its slots are named `HOLDER/SLOT`.
-    #[must_use]
-    pub fn holder(&self) -> String {
-        format!("{REMOTE_PREFIX}{}", self.0)
-    }
-}
-
-impl fmt::Display for WorkerName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl FromStr for WorkerName {
-    type Err = ParseWorkerNameError;
-
-    fn from_str(text: &str) -> Result<Self, ParseWorkerNameError> {
-        let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
-        let is_name = (1..=MAX_NAME_LEN).contains(&text.len()) && text.chars().all(allowed);
-        is_name
-            .then(|| Self(text.to_owned()))
-            .ok_or(ParseWorkerNameError)
-    }
-}
-
 /// The remote workers that this process knows. Cloning is cheap.
 #[derive(Debug, Clone, Default)]
 pub struct Workers(Arc<Mutex<WorkersState>>);
@@ -79,8 +23,6 @@ struct WorkersState {
     workers: BTreeMap<String, WorkerStatus>,
     /// Tasks that the server cannot do for remote workers, with the causes.
     problems: BTreeMap<String, String>,
-    /// Reasons of bans, by worker.
-    banned: BTreeMap<String, String>,
     /// Files of leased jobs that are being uploaded or are closed, by the nonce (unique number) of the lease.
     files: HashMap<Uuid, JobFiles>,
     /// Failures in a row, by worker.
@@ -320,6 +262,13 @@ impl Workers {
         }
     }
 
+    /// Records that no slot of this worker runs a job any more.
+    pub fn end_jobs_of(&self, worker: &str) {
+        if let Some(worker) = self.lock().workers.get_mut(worker) {
+            worker.busy_slots.clear();
+        }
+    }
+
     /// All known workers, by name.
     #[must_use]
     pub fn all(&self) -> Vec<WorkerStatus> {
@@ -360,29 +309,6 @@ impl Workers {
         problems
             .map(|(task, cause)| (task.clone(), cause.clone()))
             .collect()
-    }
-
-    /// Sets all bans: names of workers, with the reasons.
-    pub fn set_banned(&self, banned: impl IntoIterator<Item = (String, String)>) {
-        self.lock().banned = banned.into_iter().collect();
-    }
-
-    pub(crate) fn ban(&self, worker: &str, reason: &str) {
-        let mut state = self.lock();
-        state.banned.insert(worker.to_owned(), reason.to_owned());
-        if let Some(worker) = state.workers.get_mut(worker) {
-            worker.busy_slots.clear();
-        }
-    }
-
-    pub(crate) fn readmit(&self, worker: &str) {
-        self.lock().banned.remove(worker);
-    }
-
-    /// Why the worker is banned; `None` if it is not.
-    #[must_use]
-    pub fn ban_reason(&self, worker: &str) -> Option<String> {
-        self.lock().banned.get(worker).cloned()
     }
 
     /// Begins the upload of a file of the job leased under this nonce; `None` if the job's files are closed.

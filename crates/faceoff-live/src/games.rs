@@ -1,7 +1,5 @@
-//! Live state of games that are being played, for viewers in the browser. It is in memory only: the database gets a
-//! game's result when the game ends.
+//! Live state of games that are being played, for viewers in the browser. The database gets a game's result when the game ends.
 
-use crate::boxed;
 use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame, LivePosition};
 use std::{
     collections::VecDeque,
@@ -10,7 +8,7 @@ use std::{
 use tokio::sync::watch;
 
 /// Number of finished games that are kept, so that late viewers still see their end.
-pub const MAX_FINISHED_LIVE_GAMES: usize = 32;
+const MAX_FINISHED_LIVE_GAMES: usize = 32;
 
 /// The games that this process's slots play, and the last finished ones. Cloning is cheap. Updating a game never waits for
 /// its viewers.
@@ -204,7 +202,6 @@ impl LiveSubscription {
 
     /// Waits for an update since the last [`read_since`](Self::read_since). Returns false if the game was forgotten, so
     /// that there will be no update. After the end of an attempt another one may start.
-    #[boxed]
     pub async fn changed(&mut self) -> bool {
         self.attempt.changed().await.is_ok()
     }
