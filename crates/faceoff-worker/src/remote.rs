@@ -47,5 +47,4 @@ pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
 pub use connection_check::{ConnectionCheck, check_connection};
 pub use dispatch::{RemoteConfig, dispatch};
-pub(crate) use result_sender::TooLarge;
 pub use worker::{RemoteWorker, run_remote_worker};

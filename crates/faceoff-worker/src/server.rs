@@ -80,3 +80,13 @@ pub(crate) enum ReleaseReason<'a> {
     /// A platform fault, with a description for the team. After several attempts the job fails.
     PlatformFault(&'a str),
 }
+
+/// The result of a remote slot exceeds the maximum message size of NATS.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the result has {bytes} bytes, but NATS accepts messages of at most {max_payload}: raise its max_payload"
+)]
+pub(crate) struct TooLarge {
+    pub(crate) bytes: usize,
+    pub(crate) max_payload: usize,
+}

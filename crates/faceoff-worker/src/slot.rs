@@ -4,8 +4,7 @@
 use crate::{
     executor::Executor,
     lease::{LeaseKeeper, Progress},
-    remote::TooLarge,
-    server::{ClaimResult, JobServer, LeaseStatus, ReleaseReason},
+    server::{ClaimResult, JobServer, LeaseStatus, ReleaseReason, TooLarge},
 };
 use faceoff_metrics::{JobEnd, Metrics};
 use faceoff_runner::PlatformFault;

@@ -1,6 +1,7 @@
 //! Sending results of jobs to the server.
 
 use super::server_client::{RETRY_INTERVAL, ServerClient};
+use crate::server::TooLarge;
 use anyhow::Context as _;
 use async_nats::HeaderMap;
 use faceoff_wire::{
@@ -81,14 +82,4 @@ impl ServerClient {
             }
         }
     }
-}
-
-/// The result exceeds the maximum message size of NATS.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "the result has {bytes} bytes, but NATS accepts messages of at most {max_payload}: raise its max_payload"
-)]
-pub(crate) struct TooLarge {
-    bytes: usize,
-    max_payload: usize,
 }
