@@ -1,12 +1,13 @@
 //! Gauges: the state of the server at the moment at which Prometheus reads its metrics. A *slot* is a place in a worker that
 //! runs one job at a time.
 
-use crate::float_gauge::FloatGauge;
+use Reading::{Count, CountBy, Seconds};
 use prometheus_client::{
-    encoding::EncodeLabelSet,
-    metrics::{family::Family, gauge::Gauge},
+    encoding::{EncodeMetric, MetricEncoder},
+    metrics::MetricType,
     registry::{Registry, Unit},
 };
+use std::fmt;
 
 /// State of the server when the metrics are read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -66,162 +67,163 @@ pub struct Process {
     pub max_fds: u64,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct StateLabels {
-    state: &'static str,
+/// A published gauge. A unit becomes the last part of its name.
+struct Gauge {
+    name: &'static str,
+    help: &'static str,
+    unit: Option<Unit>,
+    read: fn(&GaugeValues) -> Reading,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct DiskLabels {
-    disk: &'static str,
+/// The value of a gauge.
+#[derive(Debug)]
+enum Reading {
+    Count(u64),
+    Seconds(f64),
+    /// The name of a label, and a count for each of its values.
+    CountBy(&'static str, Vec<(&'static str, u64)>),
 }
 
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Gauges {
-    database_writable: Gauge,
-    jobs: Family<StateLabels, Gauge>,
-    paused: Gauge,
-    oldest_wait: FloatGauge,
-    expected_time: FloatGauge,
-    open_evaluations: Gauge,
-    slots: Gauge,
-    remote_slots: Gauge,
-    remote_workers: Gauge,
-    long_remote_jobs: Gauge,
-    disk_free: Family<DiskLabels, Gauge>,
-    disk_size: Family<DiskLabels, Gauge>,
-    resident_memory: Gauge,
-    open_fds: Gauge,
-    max_fds: Gauge,
+/// All gauges. Their names, and the names and values of labels, are part of the published metrics.
+const GAUGES: [Gauge; 15] = [
+    Gauge {
+        name: "database_writable",
+        help: "1 if the latest write test of the database succeeded",
+        unit: None,
+        read: |values| Count(values.database_writable.into()),
+    },
+    Gauge {
+        name: "queue_units",
+        help: "Jobs: running, waiting, or waiting for disk space",
+        unit: None,
+        read: |values| jobs(&values.queue),
+    },
+    Gauge {
+        name: "queue_paused",
+        help: "1 if no job is started: paused by an organiser, or for lack of disk space",
+        unit: None,
+        read: |values| Count(values.queue.paused.into()),
+    },
+    Gauge {
+        name: "queue_oldest_wait",
+        help: "Waiting time of the oldest waiting job",
+        unit: Some(Unit::Seconds),
+        read: |values| Seconds(values.queue.oldest_wait_s),
+    },
+    Gauge {
+        name: "queue_expected",
+        help: "Expected time until everything that counts is done with the current slots; NaN if it was never measured, or the queue is paused",
+        unit: Some(Unit::Seconds),
+        read: |values| Seconds(values.queue.expected_s),
+    },
+    Gauge {
+        name: "evaluations_open",
+        help: "Evaluations that are queued or running",
+        unit: None,
+        read: |values| Count(values.open_evaluations.into()),
+    },
+    Gauge {
+        name: "slots",
+        help: "Slots of this process",
+        unit: None,
+        read: |values| Count(values.slots.into()),
+    },
+    Gauge {
+        name: "remote_slots",
+        help: "Slots of remote workers that accept jobs",
+        unit: None,
+        read: |values| Count(values.remote_slots.into()),
+    },
+    Gauge {
+        name: "remote_workers",
+        help: "Remote workers that have polled in the last half minute",
+        unit: None,
+        read: |values| Count(values.remote_workers as u64),
+    },
+    Gauge {
+        name: "remote_long_units",
+        help: "Jobs that a remote worker has been running for more than an hour",
+        unit: None,
+        read: |values| Count(values.long_remote_jobs as u64),
+    },
+    Gauge {
+        name: "disk_free",
+        help: "Free space on the disks that the server writes to",
+        unit: Some(Unit::Bytes),
+        read: |values| disks(values, |disk| disk.free_bytes),
+    },
+    Gauge {
+        name: "disk_size",
+        help: "Size of these disks",
+        unit: Some(Unit::Bytes),
+        read: |values| disks(values, |disk| disk.size_bytes),
+    },
+    Gauge {
+        name: "process_resident_memory",
+        help: "Memory of the server itself, without agents",
+        unit: Some(Unit::Bytes),
+        read: |values| Count(values.process.resident_bytes),
+    },
+    Gauge {
+        name: "process_open_fds",
+        help: "Open file descriptors of the server",
+        unit: None,
+        read: |values| Count(values.process.open_fds),
+    },
+    Gauge {
+        name: "process_max_fds",
+        help: "Limit of open file descriptors",
+        unit: None,
+        read: |values| Count(values.process.max_fds),
+    },
+];
+
+fn jobs(queue: &Queue) -> Reading {
+    let jobs = [
+        ("running", queue.running.into()),
+        ("waiting", queue.waiting.into()),
+        ("without_room", queue.out_of_space.into()),
+    ];
+    CountBy("state", jobs.to_vec())
 }
 
-impl Gauges {
-    pub(crate) fn new(registry: &mut Registry) -> Self {
-        let gauges = Self::default();
-        registry.register(
-            "database_writable",
-            "1 if the latest write test of the database succeeded",
-            gauges.database_writable.clone(),
-        );
-        registry.register(
-            "queue_units",
-            "Jobs: running, waiting, or waiting for disk space",
-            gauges.jobs.clone(),
-        );
-        registry.register(
-            "queue_paused",
-            "1 if no job is started: paused by an organiser, or for lack of disk space",
-            gauges.paused.clone(),
-        );
-        registry.register_with_unit(
-            "queue_oldest_wait",
-            "Waiting time of the oldest waiting job",
-            Unit::Seconds,
-            gauges.oldest_wait.clone(),
-        );
-        registry.register_with_unit(
-            "queue_expected",
-            "Expected time until everything that counts is done with the current slots; NaN if it was never measured, or the queue is paused",
-            Unit::Seconds,
-            gauges.expected_time.clone(),
-        );
-        registry.register(
-            "evaluations_open",
-            "Evaluations that are queued or running",
-            gauges.open_evaluations.clone(),
-        );
-        registry.register("slots", "Slots of this process", gauges.slots.clone());
-        registry.register(
-            "remote_slots",
-            "Slots of remote workers that accept jobs",
-            gauges.remote_slots.clone(),
-        );
-        registry.register(
-            "remote_workers",
-            "Remote workers that have polled in the last half minute",
-            gauges.remote_workers.clone(),
-        );
-        registry.register(
-            "remote_long_units",
-            "Jobs that a remote worker has been running for more than an hour",
-            gauges.long_remote_jobs.clone(),
-        );
-        registry.register_with_unit(
-            "disk_free",
-            "Free space on the disks that the server writes to",
-            Unit::Bytes,
-            gauges.disk_free.clone(),
-        );
-        registry.register_with_unit(
-            "disk_size",
-            "Size of these disks",
-            Unit::Bytes,
-            gauges.disk_size.clone(),
-        );
-        registry.register_with_unit(
-            "process_resident_memory",
-            "Memory of the server itself, without agents",
-            Unit::Bytes,
-            gauges.resident_memory.clone(),
-        );
-        registry.register(
-            "process_open_fds",
-            "Open file descriptors of the server",
-            gauges.open_fds.clone(),
-        );
-        registry.register(
-            "process_max_fds",
-            "Limit of open file descriptors",
-            gauges.max_fds.clone(),
-        );
-        gauges
+fn disks(values: &GaugeValues, bytes: fn(&Disk) -> u64) -> Reading {
+    let disks = values.disks.iter();
+    CountBy("disk", disks.map(|disk| (disk.name, bytes(disk))).collect())
+}
+
+/// A registry of all gauges with these values.
+pub(crate) fn registry(prefix: &str, values: &GaugeValues) -> Registry {
+    let mut registry = Registry::with_prefix(prefix);
+    for gauge in GAUGES {
+        let reading = (gauge.read)(values);
+        match gauge.unit {
+            Some(unit) => registry.register_with_unit(gauge.name, gauge.help, unit, reading),
+            None => registry.register(gauge.name, gauge.help, reading),
+        }
+    }
+    registry
+}
+
+impl EncodeMetric for Reading {
+    fn encode(&self, mut encoder: MetricEncoder<'_>) -> fmt::Result {
+        match self {
+            Self::Count(count) => encoder.encode_gauge(&clamp_to_i64(*count)),
+            Self::Seconds(seconds) => encoder.encode_gauge(seconds),
+            Self::CountBy(label, counts) => counts.iter().try_for_each(|(value, count)| {
+                encoder
+                    .encode_family(&[(*label, *value)])?
+                    .encode_gauge(&clamp_to_i64(*count))
+            }),
+        }
     }
 
-    pub(crate) fn set(&self, values: &GaugeValues) {
-        let GaugeValues {
-            database_writable,
-            queue,
-            open_evaluations,
-            slots,
-            remote_slots,
-            remote_workers,
-            long_remote_jobs,
-            disks,
-            process,
-        } = values;
-        self.database_writable.set((*database_writable).into());
-        for (state, count) in [
-            ("running", queue.running),
-            ("waiting", queue.waiting),
-            ("without_room", queue.out_of_space),
-        ] {
-            self.jobs
-                .get_or_create(&StateLabels { state })
-                .set(count.into());
-        }
-        self.paused.set(queue.paused.into());
-        self.oldest_wait.set(queue.oldest_wait_s);
-        self.expected_time.set(queue.expected_s);
-        self.open_evaluations.set((*open_evaluations).into());
-        self.slots.set((*slots).into());
-        self.remote_slots.set((*remote_slots).into());
-        self.remote_workers
-            .set(i64::try_from(*remote_workers).unwrap_or(i64::MAX));
-        self.long_remote_jobs
-            .set(i64::try_from(*long_remote_jobs).unwrap_or(i64::MAX));
-        for disk in disks {
-            let labels = DiskLabels { disk: disk.name };
-            self.disk_free
-                .get_or_create(&labels)
-                .set(clamp_to_i64(disk.free_bytes));
-            self.disk_size
-                .get_or_create(&labels)
-                .set(clamp_to_i64(disk.size_bytes));
-        }
-        self.resident_memory
-            .set(clamp_to_i64(process.resident_bytes));
-        self.open_fds.set(clamp_to_i64(process.open_fds));
-        self.max_fds.set(clamp_to_i64(process.max_fds));
+    fn metric_type(&self) -> MetricType {
+        MetricType::Gauge
+    }
+
+    fn is_empty(&self) -> bool {
+        matches!(self, Self::CountBy(_, counts) if counts.is_empty())
     }
 }
 

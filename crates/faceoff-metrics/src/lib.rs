@@ -5,7 +5,7 @@
 //! No metric names a team, a user or a score, so that operators learn nothing about teams from them. No clock is read
 //! and nothing is stored; counters start at 0 with the process, as Prometheus expects.
 
-mod float_gauge;
+mod declaration;
 mod gauges;
 mod request_metrics;
 mod slot_metrics;
@@ -14,7 +14,7 @@ pub use gauges::{Disk, GaugeValues, Process, Queue};
 pub use request_metrics::RequestMetrics;
 pub use slot_metrics::{BusySlot, JobEnd, SlotMetrics};
 
-use gauges::Gauges;
+use declaration::Declare;
 use prometheus_client::{
     encoding::{EncodeLabelSet, text},
     metrics::{counter::Counter, family::Family, info::Info},
@@ -25,6 +25,9 @@ use std::{fmt, sync::Arc};
 /// The media type of [`Metrics::text`].
 pub const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
+/// Begins the name of every metric.
+const PREFIX: &str = "faceoff";
+
 /// All metrics of a server; clones share them.
 #[derive(Clone)]
 pub struct Metrics {
@@ -32,7 +35,6 @@ pub struct Metrics {
     web: RequestMetrics,
     slots: SlotMetrics,
     events: Family<EventLabels, Counter>,
-    gauges: Gauges,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -44,27 +46,23 @@ impl Metrics {
     /// Metrics of a server of this version; counters start at 0.
     #[must_use]
     pub fn new(version: &str) -> Self {
-        let mut registry = Registry::with_prefix("faceoff");
+        let mut registry = Registry::with_prefix(PREFIX);
         registry.register(
             "build",
             "Version of the server",
             Info::new([("version", version.to_owned())]),
         );
-        let events = Family::default();
-        registry.register(
+        let events = registry.declare(
             "events",
             "Changes of the season that this process stored, by what happened",
-            Family::clone(&events),
         );
         let web = RequestMetrics::new(registry.sub_registry_with_prefix("http"));
         let slots = SlotMetrics::new(&mut registry);
-        let gauges = Gauges::new(&mut registry);
         Self {
             registry: Arc::new(registry),
             web,
             slots,
             events,
-            gauges,
         }
     }
 
@@ -100,9 +98,10 @@ impl Metrics {
     /// # Errors
     /// If the library cannot format one of them.
     pub fn text(&self, gauge_values: &GaugeValues) -> Result<String, fmt::Error> {
-        self.gauges.set(gauge_values);
         let mut text = String::new();
-        text::encode(&mut text, &self.registry)?;
+        text::encode_registry(&mut text, &self.registry)?;
+        text::encode_registry(&mut text, &gauges::registry(PREFIX, gauge_values))?;
+        text::encode_eof(&mut text)?;
         Ok(text)
     }
 }
@@ -140,5 +139,52 @@ mod tests {
             assert!(text.lines().any(|other| other == line), "{line} in\n{text}");
         }
         assert!(text.ends_with("# EOF\n"));
+    }
+
+    #[test]
+    fn metrics_text_has_the_current_gauge_values() {
+        let metrics = Metrics::new("1.2.3");
+        let without_disks = metrics.text(&GaugeValues::default()).unwrap();
+        assert!(!without_disks.contains("disk_free"), "{without_disks}");
+        let values = GaugeValues {
+            database_writable: true,
+            queue: Queue {
+                running: 1,
+                waiting: 2,
+                out_of_space: 3,
+                paused: true,
+                oldest_wait_s: 1.5,
+                expected_s: f64::NAN,
+            },
+            disks: vec![Disk {
+                name: "data",
+                free_bytes: 4,
+                size_bytes: 5,
+            }],
+            process: Process {
+                resident_bytes: 6,
+                open_fds: 7,
+                max_fds: u64::MAX,
+            },
+            ..GaugeValues::default()
+        };
+        let text = metrics.text(&values).unwrap();
+        for line in [
+            "# HELP faceoff_queue_units Jobs: running, waiting, or waiting for disk space.",
+            "# TYPE faceoff_queue_units gauge",
+            "faceoff_queue_units{state=\"running\"} 1",
+            "faceoff_queue_units{state=\"waiting\"} 2",
+            "faceoff_queue_units{state=\"without_room\"} 3",
+            "faceoff_queue_paused 1",
+            "# UNIT faceoff_queue_oldest_wait_seconds seconds",
+            "faceoff_queue_oldest_wait_seconds 1.5",
+            "faceoff_queue_expected_seconds NaN",
+            "faceoff_disk_free_bytes{disk=\"data\"} 4",
+            "faceoff_disk_size_bytes{disk=\"data\"} 5",
+            "faceoff_process_resident_memory_bytes 6",
+            "faceoff_process_max_fds 9223372036854775807",
+        ] {
+            assert!(text.lines().any(|other| other == line), "{line} in\n{text}");
+        }
     }
 }

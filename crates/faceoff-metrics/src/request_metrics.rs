@@ -1,5 +1,6 @@
 //! Metrics of HTTP requests.
 
+use crate::declaration::Declare;
 use prometheus_client::{
     encoding::EncodeLabelSet,
     metrics::{counter::Counter, family::Family, histogram::Histogram},
@@ -41,24 +42,19 @@ struct RefusalLabels {
 
 impl RequestMetrics {
     pub(crate) fn new(registry: &mut Registry) -> Self {
-        let metrics = Self {
-            requests: Family::default(),
-            durations: Family::new_with_constructor(|| Histogram::new(DURATION_BUCKETS_S)),
-            refused: Family::default(),
-        };
-        registry.register("requests", "Requests answered", metrics.requests.clone());
-        registry.register_with_unit(
-            "request_duration",
-            "From the head of a request to the head of its response",
-            Unit::Seconds,
-            metrics.durations.clone(),
-        );
-        registry.register(
-            "refused",
-            "Requests that were refused before their handlers: by the rate limit, or too many at once",
-            metrics.refused.clone(),
-        );
-        metrics
+        Self {
+            requests: registry.declare("requests", "Requests answered"),
+            durations: registry.declare_with_unit(
+                "request_duration",
+                "From the head of a request to the head of its response",
+                Unit::Seconds,
+                Family::new_with_constructor(|| Histogram::new(DURATION_BUCKETS_S)),
+            ),
+            refused: registry.declare(
+                "refused",
+                "Requests that were refused before their handlers: by the rate limit, or too many at once",
+            ),
+        }
     }
 
     /// Records a response. `route` is the pattern of the request's path; `None` if there is no such path. All methods

@@ -1,7 +1,7 @@
 //! Metrics of slots. A *slot* is a place in a worker that runs one job at a time: a validation run (the check of an upload),
 //! a shard (some episodes of an evaluation) or a game.
 
-use crate::float_gauge::FloatGauge;
+use crate::declaration::Declare;
 use faceoff_types::{EpisodeOutcome, RoundTrips, SlotTiming};
 use prometheus_client::{
     encoding::EncodeLabelSet,
@@ -10,7 +10,7 @@ use prometheus_client::{
 };
 use std::{
     fmt,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError, atomic::AtomicU64},
     time::Duration,
 };
 
@@ -22,6 +22,9 @@ const ANSWER_TIME_BUCKETS_S: [f64; 11] = [
     0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.2, 1.0,
 ];
 
+/// A gauge in seconds.
+type SecondsGauge = Gauge<f64, AtomicU64>;
+
 /// Metrics of slots: jobs, durations, episodes and timing.
 #[derive(Clone)]
 pub struct SlotMetrics {
@@ -31,8 +34,8 @@ pub struct SlotMetrics {
     episodes: Family<TaskLabels, Counter>,
     faults: Family<TaskLabels, Counter>,
     answer_times: Family<TaskLabels, Histogram, fn() -> Histogram>,
-    round_trips: Family<RoundTripLabels, FloatGauge>,
-    longest_stall: Family<SlotLabels, FloatGauge>,
+    round_trips: Family<RoundTripLabels, SecondsGauge>,
+    longest_stall: Family<SlotLabels, SecondsGauge>,
     reruns: Counter,
     stuck_count: Gauge,
     /// Names of the stuck slots' threads.
@@ -97,70 +100,48 @@ struct RoundTripLabels {
 
 impl SlotMetrics {
     pub(crate) fn new(registry: &mut Registry) -> Self {
-        let metrics = Self {
-            busy: Gauge::default(),
-            jobs: Family::default(),
-            durations: Family::new_with_constructor(|| Histogram::new(JOB_DURATION_BUCKETS_S)),
-            episodes: Family::default(),
-            faults: Family::default(),
-            answer_times: Family::new_with_constructor(|| Histogram::new(ANSWER_TIME_BUCKETS_S)),
-            round_trips: Family::default(),
-            longest_stall: Family::default(),
-            reruns: Counter::default(),
-            stuck_count: Gauge::default(),
+        Self {
+            busy: registry.declare("slots_busy", "Slots that run a job"),
+            stuck_count: registry.declare(
+                "slots_standing_still",
+                "Slots that are stuck although their agent was ended",
+            ),
+            jobs: registry.declare("units", "Jobs that slots have ended, by kind and outcome"),
+            durations: registry.declare_with_unit(
+                "unit_duration",
+                "Duration of jobs",
+                Unit::Seconds,
+                Family::new_with_constructor(|| Histogram::new(JOB_DURATION_BUCKETS_S)),
+            ),
+            episodes: registry.declare("episodes", "Episodes that were run and committed"),
+            faults: registry.declare(
+                "agent_faults",
+                "Episodes that an agent ended by breaking the protocol or a limit",
+            ),
+            answer_times: registry.declare_with_unit(
+                "agent_answer",
+                "Mean time of an agent's answers, of each episode",
+                Unit::Seconds,
+                Family::new_with_constructor(|| Histogram::new(ANSWER_TIME_BUCKETS_S)),
+            ),
+            round_trips: registry.declare_with_unit(
+                "round_trip",
+                "Round trips to an agent that answers at once, of the slot's last shard: the time that the host adds to every answer",
+                Unit::Seconds,
+                Family::default(),
+            ),
+            longest_stall: registry.declare_with_unit(
+                "host_stall",
+                "Longest delay of one answer by the host, of the slot's last shard",
+                Unit::Seconds,
+                Family::default(),
+            ),
+            reruns: registry.declare(
+                "host_noise_reruns",
+                "Episodes that were repeated because the host kept an agent from answering",
+            ),
             stuck_names: Arc::default(),
-        };
-        registry.register("slots_busy", "Slots that run a job", metrics.busy.clone());
-        registry.register(
-            "slots_standing_still",
-            "Slots that are stuck although their agent was ended",
-            metrics.stuck_count.clone(),
-        );
-        registry.register(
-            "units",
-            "Jobs that slots have ended, by kind and outcome",
-            metrics.jobs.clone(),
-        );
-        registry.register_with_unit(
-            "unit_duration",
-            "Duration of jobs",
-            Unit::Seconds,
-            metrics.durations.clone(),
-        );
-        registry.register(
-            "episodes",
-            "Episodes that were run and committed",
-            metrics.episodes.clone(),
-        );
-        registry.register(
-            "agent_faults",
-            "Episodes that an agent ended by breaking the protocol or a limit",
-            metrics.faults.clone(),
-        );
-        registry.register_with_unit(
-            "agent_answer",
-            "Mean time of an agent's answers, of each episode",
-            Unit::Seconds,
-            metrics.answer_times.clone(),
-        );
-        registry.register_with_unit(
-            "round_trip",
-            "Round trips to an agent that answers at once, of the slot's last shard: the time that the host adds to every answer",
-            Unit::Seconds,
-            metrics.round_trips.clone(),
-        );
-        registry.register_with_unit(
-            "host_stall",
-            "Longest delay of one answer by the host, of the slot's last shard",
-            Unit::Seconds,
-            metrics.longest_stall.clone(),
-        );
-        registry.register(
-            "host_noise_reruns",
-            "Episodes that were repeated because the host kept an agent from answering",
-            metrics.reruns.clone(),
-        );
-        metrics
+        }
     }
 
     /// Records that a slot starts a job. The slot is busy until the guard is dropped.
