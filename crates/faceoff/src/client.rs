@@ -133,8 +133,7 @@ impl Client {
             ..query.clone()
         };
         let request = self.request(Method::GET, &board_path(task)).query(&query);
-        let text = self.send(request).await?.text().await;
-        text.context("reading the server's answer")
+        read_text(self.send(request).await?).await
     }
 
     /// Compares two finished evaluations on the same episodes.
@@ -154,21 +153,19 @@ impl Client {
     }
 
     /// Organiser: closes the season permanently; `confirm` is its name.
-    pub async fn close_season(&self, confirm: &str) -> anyhow::Result<SeasonView> {
-        let request = self
-            .request(Method::POST, "/season/close")
-            .json(&CloseSeason {
-                confirm: confirm.to_owned(),
-            });
-        read_json(self.send(request).await?).await
+    pub async fn close_season(&self, confirm: String) -> anyhow::Result<SeasonView> {
+        self.post("/season/close", &CloseSeason { confirm }).await
     }
 
     /// Organiser: creates a team. Only this response has its token.
     pub async fn create_team(&self, name: &str) -> anyhow::Result<TeamWithToken> {
-        let request = self.request(Method::POST, "/teams").json(&NewTeam {
-            name: name.to_owned(),
-        });
-        read_json(self.send(request).await?).await
+        self.post(
+            "/teams",
+            &NewTeam {
+                name: name.to_owned(),
+            },
+        )
+        .await
     }
 
     /// Organiser: all teams.
@@ -178,16 +175,12 @@ impl Client {
 
     /// Organiser: issues a new token for a team and revokes the old one.
     pub async fn replace_token(&self, team: TeamId) -> anyhow::Result<TeamWithToken> {
-        let request = self.request(Method::POST, &format!("/teams/{team}/token"));
-        read_json(self.send(request).await?).await
+        self.post_empty(&format!("/teams/{team}/token")).await
     }
 
     /// Organiser: starts the evaluation day of a stage, by default of the open one.
     pub async fn start_day(&self, stage: Option<StageId>) -> anyhow::Result<DayView> {
-        let request = self
-            .request(Method::POST, "/days")
-            .json(&StartDay { stage });
-        read_json(self.send(request).await?).await
+        self.post("/days", &StartDay { stage }).await
     }
 
     /// All stages, by opening time.
@@ -220,16 +213,14 @@ impl Client {
     }
 
     /// Organiser: freezes the boards of a stage.
-    pub async fn freeze(&self, id: StageId, reason: &str) -> anyhow::Result<StageView> {
-        let request = self.request(Method::POST, &format!("/stages/{id}/freeze"));
-        let reason = reason.to_owned();
-        read_json(self.send(request.json(&Reason { reason })).await?).await
+    pub async fn freeze(&self, id: StageId, reason: String) -> anyhow::Result<StageView> {
+        self.post(&format!("/stages/{id}/freeze"), &Reason { reason })
+            .await
     }
 
     /// Organiser: unfreezes the boards of a stage.
     pub async fn unfreeze(&self, id: StageId) -> anyhow::Result<StageView> {
-        let request = self.request(Method::POST, &format!("/stages/{id}/unfreeze"));
-        read_json(self.send(request).await?).await
+        self.post_empty(&format!("/stages/{id}/unfreeze")).await
     }
 
     /// Organiser: starts an evaluation day for a past date that had no cutoff.
@@ -238,8 +229,7 @@ impl Client {
         id: StageId,
         missed: &MissedDay,
     ) -> anyhow::Result<DayView> {
-        let request = self.request(Method::POST, &format!("/stages/{id}/days"));
-        read_json(self.send(request.json(missed)).await?).await
+        self.post(&format!("/stages/{id}/days"), missed).await
     }
 
     /// Organiser: adds one evaluation of a team to an evaluation day.
@@ -249,14 +239,12 @@ impl Client {
         extra: &NewExtraEvaluation,
     ) -> anyhow::Result<EvaluationView> {
         let path = format!("/stages/{}/days/{}/extra-evaluation", day.stage, day.date);
-        let request = self.request(Method::POST, &path);
-        read_json(self.send(request.json(extra)).await?).await
+        self.post(&path, extra).await
     }
 
     /// Organiser: creates a stage.
     pub async fn create_stage(&self, new: &NewStage) -> anyhow::Result<StageView> {
-        let request = self.request(Method::POST, "/stages").json(new);
-        read_json(self.send(request).await?).await
+        self.post("/stages", new).await
     }
 
     /// Organiser: changes a stage.
@@ -265,14 +253,13 @@ impl Client {
         id: StageId,
         change: &StageChange,
     ) -> anyhow::Result<StageView> {
-        let request = self.request(Method::PATCH, &format!("/stages/{id}"));
-        read_json(self.send(request.json(change)).await?).await
+        self.call_with_body(Method::PATCH, &format!("/stages/{id}"), change)
+            .await
     }
 
     /// Organiser: starts a stage's final day, the evaluation day after its close whose results decide it.
     pub async fn start_final_day(&self, id: StageId) -> anyhow::Result<DayView> {
-        let request = self.request(Method::POST, &format!("/stages/{id}/final"));
-        read_json(self.send(request).await?).await
+        self.post_empty(&format!("/stages/{id}/final")).await
     }
 
     /// Organiser: signs off a stage's result; `confirm` is the stage's name.
@@ -281,30 +268,27 @@ impl Client {
         id: StageId,
         confirm: Option<String>,
     ) -> anyhow::Result<StageView> {
-        let request = self.request(Method::POST, &format!("/stages/{id}/finalise"));
-        read_json(self.send(request.json(&Confirmation { confirm })).await?).await
+        self.post(&format!("/stages/{id}/finalise"), &Confirmation { confirm })
+            .await
     }
 
     /// Team: publishes one of its own evaluations.
     pub async fn publish(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
-        let request = self.request(Method::POST, &format!("/evaluations/{id}/publish"));
-        read_json(self.send(request).await?).await
+        self.post_empty(&format!("/evaluations/{id}/publish")).await
     }
 
     /// Organiser: repeats an evaluation that was cancelled or failed by a platform fault.
     pub async fn rerun(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
-        let request = self.request(Method::POST, &format!("/evaluations/{id}/rerun"));
-        read_json(self.send(request).await?).await
+        self.post_empty(&format!("/evaluations/{id}/rerun")).await
     }
 
     /// Organiser: stops an evaluation.
-    pub async fn cancel(&self, id: EvaluationId, reason: &str) -> anyhow::Result<EvaluationView> {
-        let request = self
-            .request(Method::POST, &format!("/evaluations/{id}/cancel"))
-            .json(&Cancellation {
-                reason: reason.to_owned(),
-            });
-        read_json(self.send(request).await?).await
+    pub async fn cancel(&self, id: EvaluationId, reason: String) -> anyhow::Result<EvaluationView> {
+        self.post(
+            &format!("/evaluations/{id}/cancel"),
+            &Cancellation { reason },
+        )
+        .await
     }
 
     /// Organiser: voids a result, which leaves the boards.
@@ -313,20 +297,18 @@ impl Client {
         id: EvaluationId,
         decision: &Decision,
     ) -> anyhow::Result<EvaluationView> {
-        let request = self.request(Method::POST, &format!("/evaluations/{id}/void"));
-        read_json(self.send(request.json(decision)).await?).await
+        self.post(&format!("/evaluations/{id}/void"), decision)
+            .await
     }
 
     /// Organiser: voids a whole evaluation day.
     pub async fn void_day(&self, day: StageDay, decision: &Decision) -> anyhow::Result<DayView> {
         let path = format!("/stages/{}/days/{}/void", day.stage, day.date);
-        let request = self.request(Method::POST, &path);
-        read_json(self.send(request.json(decision)).await?).await
+        self.post(&path, decision).await
     }
 
     /// Organiser: pauses the queue.
-    pub async fn pause(&self, reason: &str) -> anyhow::Result<()> {
-        let reason = reason.to_owned();
+    pub async fn pause(&self, reason: String) -> anyhow::Result<()> {
         let request = self.request(Method::POST, "/queue/pause");
         self.send(request.json(&Reason { reason })).await.map(drop)
     }
@@ -339,15 +321,14 @@ impl Client {
 
     /// Organiser: disqualifies a team.
     pub async fn disqualify(&self, id: TeamId, decision: &Decision) -> anyhow::Result<TeamView> {
-        let request = self.request(Method::POST, &format!("/teams/{id}/disqualify"));
-        read_json(self.send(request.json(decision)).await?).await
+        self.post(&format!("/teams/{id}/disqualify"), decision)
+            .await
     }
 
     /// Organiser: reinstates a disqualified team.
-    pub async fn reinstate(&self, id: TeamId, reason: &str) -> anyhow::Result<TeamView> {
-        let request = self.request(Method::POST, &format!("/teams/{id}/reinstate"));
-        let reason = reason.to_owned();
-        read_json(self.send(request.json(&Reason { reason })).await?).await
+    pub async fn reinstate(&self, id: TeamId, reason: String) -> anyhow::Result<TeamView> {
+        self.post(&format!("/teams/{id}/reinstate"), &Reason { reason })
+            .await
     }
 
     /// Team: its name and limits, today's evaluations and its active submission.
@@ -396,7 +377,19 @@ impl Client {
     }
 
     async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
-        read_json(self.send(self.request(Method::GET, path)).await?).await
+        self.call(Method::GET, path).await
+    }
+
+    async fn post<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        body: &impl Serialize,
+    ) -> anyhow::Result<T> {
+        self.call_with_body(Method::POST, path, body).await
+    }
+
+    async fn post_empty<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
+        self.call(Method::POST, path).await
     }
 
     async fn call_with_body<T: DeserializeOwned>(
@@ -456,6 +449,10 @@ impl Client {
         }
         .into())
     }
+}
+
+async fn read_text(response: Response) -> anyhow::Result<String> {
+    response.text().await.context("reading the server's answer")
 }
 
 async fn read_json<T: DeserializeOwned>(response: Response) -> anyhow::Result<T> {

@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, MinTransferRate};
 use faceoff_notify::WebhookRules;
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLimits};
-use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
+use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
     CountingResult, DayDeadline, InvalidSchedule, PerturbationSettings, Profile, Publication,
@@ -17,6 +17,7 @@ use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
+    io::ErrorKind,
     net::{IpAddr, SocketAddr},
     path::{Path, PathBuf},
 };
@@ -331,35 +332,23 @@ impl Config {
     /// # Errors
     /// If the file cannot be read, or a field is unknown or has an invalid value; the error names file and field.
     pub fn load(file: Option<&Path>) -> anyhow::Result<Self> {
-        let (file, text) = match file {
-            Some(file) => {
-                let text = std::fs::read_to_string(file)
-                    .with_context(|| format!("reading the configuration {}", file.display()))?;
-                (file, text)
+        let path = file.unwrap_or(Path::new(DEFAULT_FILE));
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if file.is_none() && error.kind() == ErrorKind::NotFound => {
+                return Ok(Self::default());
             }
-            None => {
-                let file = Path::new(DEFAULT_FILE);
-                match std::fs::read_to_string(file) {
-                    Ok(text) => (file, text),
-                    Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                        return Ok(Self::default());
-                    }
-                    Err(error) => {
-                        return Err(error).with_context(|| {
-                            format!("reading the configuration {}", file.display())
-                        });
-                    }
-                }
+            Err(error) => {
+                return Err(error)
+                    .with_context(|| format!("reading the configuration {}", path.display()));
             }
         };
         let read = || -> anyhow::Result<Self> {
             let config = Self::parse(&text)?;
-            config.check_host(
-                &affinity::allowed_cpus().context("reading the CPU affinity of this process")?,
-            )?;
+            config.check_this_host()?;
             Ok(config)
         };
-        read().with_context(|| format!("the configuration {}", file.display()))
+        read().with_context(|| format!("the configuration {}", path.display()))
     }
 
     fn parse(text: &str) -> anyhow::Result<Self> {
@@ -452,9 +441,7 @@ impl Config {
     pub fn override_slots(&mut self, slots: usize) -> anyhow::Result<()> {
         anyhow::ensure!(slots > 0, "--slots: expected at least 1");
         self.workers.slots = Some(slots);
-        self.check_host(
-            &affinity::allowed_cpus().context("reading the CPU affinity of this process")?,
-        )
+        self.check_this_host()
     }
 
     /// Number of worker slots: configured, or one per two CPUs after one is reserved for the server.

@@ -1,6 +1,6 @@
 //! Files on the server: download, deletion and disk usage.
 
-use super::{Client, download::DownloadedFile, read_json};
+use super::{Client, download::DownloadedFile};
 use faceoff_api::{
     requests::DeleteSubmission,
     views::{storage::StorageView, submission::SubmissionView, violations::ViolationsView},
@@ -43,8 +43,8 @@ impl Client {
         id: SubmissionId,
         deletion: &DeleteSubmission,
     ) -> anyhow::Result<SubmissionView> {
-        let request = self.request(Method::DELETE, &format!("/submissions/{id}"));
-        read_json(self.send(request.json(deletion)).await?).await
+        self.call_with_body(Method::DELETE, &format!("/submissions/{id}"), deletion)
+            .await
     }
 
     /// The constraint violations of an evaluation, for everyone who may download its dataset.

@@ -4,6 +4,7 @@
 use super::{
     Client,
     download::DownloadedFile,
+    read_text,
     sse::{self, ServerEvent},
 };
 use anyhow::Context;
@@ -35,12 +36,12 @@ impl Client {
     /// Organiser: voids the result of a game; `confirm` is `HOME - AWAY`, the names of the two teams.
     pub async fn void_game(&self, id: GameId, decision: &Decision) -> anyhow::Result<GameView> {
         let path = format!("/games/{id}/void");
-        self.call_with_body(Method::POST, &path, decision).await
+        self.post(&path, decision).await
     }
 
     /// Organiser: repeats a game.
     pub async fn rerun_game(&self, id: GameId) -> anyhow::Result<GameView> {
-        self.call(Method::POST, &format!("/games/{id}/rerun")).await
+        self.post_empty(&format!("/games/{id}/rerun")).await
     }
 
     /// Downloads the dataset of one side: what its agent observed and did.
@@ -70,7 +71,7 @@ impl Client {
     pub async fn game_log(&self, id: GameId, side: Side) -> anyhow::Result<String> {
         let path = format!("/games/{id}/sides/{}/log", side.number());
         let response = self.send(self.request(Method::GET, &path)).await?;
-        response.text().await.context("reading the server's answer")
+        read_text(response).await
     }
 
     /// The live events of a game after the event `last_event_id`, by default all. The stream ends when the server ends it; a

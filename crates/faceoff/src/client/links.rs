@@ -3,7 +3,6 @@
 use super::Client;
 use faceoff_api::{requests::NewLink, views::link::LinkView};
 use faceoff_types::{EvaluationId, GameId, Side, SubmissionId};
-use reqwest::Method;
 
 /// The file that a link downloads.
 #[derive(Debug, Clone, Copy)]
@@ -27,7 +26,7 @@ impl Client {
             LinkTarget::Side(id, side) => format!("/games/{id}/sides/{}/link", side.number()),
             LinkTarget::Recording(id) => format!("/games/{id}/recording/link"),
         };
-        let mut link: LinkView = self.call_with_body(Method::POST, &path, &new).await?;
+        let mut link: LinkView = self.post(&path, &new).await?;
         if link.url.starts_with('/') {
             link.url.insert_str(0, &self.address.base);
         }

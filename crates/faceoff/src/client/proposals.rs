@@ -1,7 +1,7 @@
 //! Requests about trials and proposed re-evaluations. A *trial* evaluates submissions without effect on the boards; a *proposed
 //! re-evaluation* repeats counting evaluations, and its results count only once an organiser applies it.
 
-use super::{Client, read_json};
+use super::Client;
 use faceoff_api::{
     requests::{Confirmation, NewProposal, Trial},
     views::proposal::ProposalView,
@@ -22,14 +22,12 @@ impl Client {
 
     /// Organiser: starts a trial of the active submissions.
     pub async fn trial(&self, stage: StageId, trial: &Trial) -> anyhow::Result<ProposalView> {
-        let request = self.request(Method::POST, &format!("/stages/{stage}/trial"));
-        read_json(self.send(request.json(trial)).await?).await
+        self.post(&format!("/stages/{stage}/trial"), trial).await
     }
 
     /// Organiser: proposes a re-evaluation of results; the old ones count until it is applied.
     pub async fn propose(&self, stage: StageId, new: &NewProposal) -> anyhow::Result<ProposalView> {
-        let request = self.request(Method::POST, &format!("/stages/{stage}/proposals"));
-        read_json(self.send(request.json(new)).await?).await
+        self.post(&format!("/stages/{stage}/proposals"), new).await
     }
 
     /// Organiser: applies a proposed re-evaluation.
@@ -38,8 +36,8 @@ impl Client {
         id: ProposalId,
         confirm: Option<String>,
     ) -> anyhow::Result<ProposalView> {
-        let request = self.request(Method::POST, &format!("/proposals/{id}/apply"));
-        read_json(self.send(request.json(&Confirmation { confirm })).await?).await
+        self.post(&format!("/proposals/{id}/apply"), &Confirmation { confirm })
+            .await
     }
 
     /// Organiser: drops a proposed re-evaluation.
@@ -48,7 +46,7 @@ impl Client {
         id: ProposalId,
         confirm: Option<String>,
     ) -> anyhow::Result<ProposalView> {
-        let request = self.request(Method::POST, &format!("/proposals/{id}/drop"));
-        read_json(self.send(request.json(&Confirmation { confirm })).await?).await
+        self.post(&format!("/proposals/{id}/drop"), &Confirmation { confirm })
+            .await
     }
 }

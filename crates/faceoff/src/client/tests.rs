@@ -203,7 +203,11 @@ async fn submission_passes_from_upload_to_evaluation() {
         StatusCode::CONFLICT
     );
     assert!(!dataset.exists());
-    let cancelled = site.organiser.cancel(id, "enough").await.unwrap();
+    let cancelled = site
+        .organiser
+        .cancel(id, "enough".to_owned())
+        .await
+        .unwrap();
     assert!(cancelled.status.is_final());
     let refusal = site.organiser.start_day(None).await.unwrap_err();
     assert!(refusal.to_string().contains("2026-03-02"), "{refusal}");
@@ -230,7 +234,10 @@ async fn submission_passes_from_upload_to_evaluation() {
     assert!(refusal.contains("it is active"), "{refusal}");
     let withdrawn = client.withdraw(uploaded.id).await.unwrap();
     assert!(!withdrawn.active);
-    site.organiser.cancel(rerun.id, "enough").await.unwrap();
+    site.organiser
+        .cancel(rerun.id, "enough".to_owned())
+        .await
+        .unwrap();
     let deletion = DeleteSubmission {
         confirm: Some(uploaded.file_name),
         ..DeleteSubmission::default()
@@ -279,10 +286,18 @@ async fn api_error_keeps_status_and_detail() {
 #[tokio::test]
 async fn season_is_closed_only_with_its_name() {
     let site = start_site(SMALL_BUNDLE_BYTES).await;
-    let refused = site.organiser.close_season("Season").await.unwrap_err();
+    let refused = site
+        .organiser
+        .close_season("Season".to_owned())
+        .await
+        .unwrap_err();
     assert!(refused.to_string().contains("Season 1"), "{refused}");
     assert_eq!(site.organiser.season().await.unwrap().secret, None);
-    let closed = site.organiser.close_season("Season 1").await.unwrap();
+    let closed = site
+        .organiser
+        .close_season("Season 1".to_owned())
+        .await
+        .unwrap();
     let secret = site.store.season().await.unwrap().secret;
     assert_eq!(closed.secret, Some(secret));
     assert_eq!(site.organiser.season().await.unwrap(), closed);

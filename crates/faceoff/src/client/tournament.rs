@@ -54,7 +54,7 @@ impl Client {
     }
 
     pub async fn open_tournament(&self, new: &NewTournament) -> anyhow::Result<TournamentView> {
-        self.call_with_body(Method::POST, "/tournaments", new).await
+        self.post("/tournaments", new).await
     }
 
     pub async fn change_tournament(
@@ -73,8 +73,7 @@ impl Client {
         teams: Vec<TeamName>,
     ) -> anyhow::Result<TournamentView> {
         let path = tournament_path(id, "/entrants");
-        self.call_with_body(Method::POST, &path, &NewEntrants { teams })
-            .await
+        self.post(&path, &NewEntrants { teams }).await
     }
 
     /// Organiser: removes a team from a tournament, as withdrawn or disqualified.
@@ -83,7 +82,7 @@ impl Client {
         id: TournamentId,
         departure: &NewDeparture,
     ) -> anyhow::Result<TournamentView> {
-        self.call_with_body(Method::POST, &tournament_path(id, "/departures"), departure)
+        self.post(&tournament_path(id, "/departures"), departure)
             .await
     }
 
@@ -92,14 +91,13 @@ impl Client {
         id: TournamentId,
         decision: &Decision,
     ) -> anyhow::Result<TournamentView> {
-        self.call_with_body(Method::POST, &tournament_path(id, "/withdrawal"), decision)
+        self.post(&tournament_path(id, "/withdrawal"), decision)
             .await
     }
 
     /// Organiser: draws the next round and starts it.
     pub async fn start_round(&self, id: TournamentId) -> anyhow::Result<RoundView> {
-        self.call(Method::POST, &tournament_path(id, "/rounds"))
-            .await
+        self.post_empty(&tournament_path(id, "/rounds")).await
     }
 
     /// Organiser: pauses a tournament: no further game starts.
@@ -108,17 +106,12 @@ impl Client {
         id: TournamentId,
         reason: String,
     ) -> anyhow::Result<TournamentView> {
-        self.call_with_body(
-            Method::POST,
-            &tournament_path(id, "/pause"),
-            &Reason { reason },
-        )
-        .await
+        self.post(&tournament_path(id, "/pause"), &Reason { reason })
+            .await
     }
 
     pub async fn resume_tournament(&self, id: TournamentId) -> anyhow::Result<TournamentView> {
-        self.call(Method::POST, &tournament_path(id, "/resume"))
-            .await
+        self.post_empty(&tournament_path(id, "/resume")).await
     }
 
     /// Organiser: closes a tournament permanently; `confirm` is its name.
@@ -128,8 +121,7 @@ impl Client {
         confirm: Option<String>,
     ) -> anyhow::Result<TournamentView> {
         let path = tournament_path(id, "/close");
-        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
-            .await
+        self.post(&path, &Confirmation { confirm }).await
     }
 
     /// Team: requests a game of its agent against the baseline. Organiser: such games of `teams`, by default of all.
@@ -139,8 +131,7 @@ impl Client {
         teams: Option<Vec<TeamName>>,
     ) -> anyhow::Result<TestGamesView> {
         let path = tournament_path(id, "/test-games");
-        self.call_with_body(Method::POST, &path, &NewTestGames { teams })
-            .await
+        self.post(&path, &NewTestGames { teams }).await
     }
 
     /// Team: requests a friendly game against another team.
@@ -150,8 +141,7 @@ impl Client {
         opponent: TeamName,
     ) -> anyhow::Result<GameView> {
         let path = tournament_path(id, "/friendly-games");
-        self.call_with_body(Method::POST, &path, &NewFriendlyGame { opponent })
-            .await
+        self.post(&path, &NewFriendlyGame { opponent }).await
     }
 
     /// Team: its friendly and test games, which do not count, the newest first. Organiser: those of all teams.
@@ -167,8 +157,7 @@ impl Client {
         times: u32,
     ) -> anyhow::Result<ChampionSharesView> {
         let path = tournament_path(id, "/replays");
-        self.call_with_body(Method::POST, &path, &NewReplays { times })
-            .await
+        self.post(&path, &NewReplays { times }).await
     }
 
     /// Organiser: cancels the unfinished replays.

@@ -73,13 +73,13 @@ impl Client {
         request: &NewAblation,
     ) -> anyhow::Result<AblationView> {
         let path = format!("/submissions/{id}/ablation");
-        self.call_with_body(Method::POST, &path, request).await
+        self.post(&path, request).await
     }
 
     /// Team: makes a submission active for the next cutoff.
     pub async fn activate(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
-        let request = self.request(Method::POST, &format!("/submissions/{id}/activate"));
-        read_json(self.send(request).await?).await
+        self.post_empty(&format!("/submissions/{id}/activate"))
+            .await
     }
 
     /// Team: its submissions, newest first.
@@ -89,8 +89,8 @@ impl Client {
 
     /// Team: withdraws its active submission.
     pub async fn withdraw(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
-        let request = self.request(Method::POST, &format!("/submissions/{id}/withdraw"));
-        read_json(self.send(request).await?).await
+        self.post_empty(&format!("/submissions/{id}/withdraw"))
+            .await
     }
 
     /// Team: changes the description of a submission.
@@ -99,7 +99,7 @@ impl Client {
         id: SubmissionId,
         change: &SubmissionChange,
     ) -> anyhow::Result<SubmissionView> {
-        let request = self.request(Method::PATCH, &format!("/submissions/{id}"));
-        read_json(self.send(request.json(change)).await?).await
+        self.call_with_body(Method::PATCH, &format!("/submissions/{id}"), change)
+            .await
     }
 }

@@ -30,13 +30,12 @@ impl Client {
 
     /// Creates a token; only this response has its text.
     pub async fn create_token(&self, new: &NewToken) -> anyhow::Result<NewTokenView> {
-        self.call_with_body(Method::POST, "/tokens", new).await
+        self.post("/tokens", new).await
     }
 
     /// Replaces the secret of a token; only this response has the new one.
     pub async fn rotate_token(&self, id: TokenId) -> anyhow::Result<NewTokenView> {
-        self.call(Method::POST, &format!("/tokens/{id}/rotate"))
-            .await
+        self.post_empty(&format!("/tokens/{id}/rotate")).await
     }
 
     pub async fn revoke_token(&self, id: TokenId) -> anyhow::Result<TokenView> {
@@ -55,8 +54,7 @@ impl Client {
         confirm: Option<String>,
     ) -> anyhow::Result<UserView> {
         let path = format!("/people/{id}/remove");
-        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
-            .await
+        self.post(&path, &Confirmation { confirm }).await
     }
 
     /// Sets the caller's password and revokes all their other tokens and sessions.
@@ -67,13 +65,12 @@ impl Client {
 
     /// Registers a team; only this response has its link.
     pub async fn register(&self, new: &RegistrationRequest) -> anyhow::Result<NewRegistrationView> {
-        self.call_with_body(Method::POST, "/registrations", new)
-            .await
+        self.post("/registrations", new).await
     }
 
     /// Creates an invitation; only this response has its link.
     pub async fn invite(&self, new: &NewInvitation) -> anyhow::Result<NewInvitationView> {
-        self.call_with_body(Method::POST, "/invitations", new).await
+        self.post("/invitations", new).await
     }
 
     /// The invitations that the caller may manage, the newest first.
@@ -89,8 +86,7 @@ impl Client {
 
     /// Accepts an invitation; only this response has the token.
     pub async fn join(&self, join: &JoinRequest) -> anyhow::Result<NewAccountView> {
-        self.call_with_body(Method::POST, "/invitations/accept", join)
-            .await
+        self.post("/invitations/accept", join).await
     }
 
     pub async fn team(&self, id: TeamId) -> anyhow::Result<TeamView> {
@@ -110,14 +106,12 @@ impl Client {
         confirm: Option<String>,
     ) -> anyhow::Result<TeamView> {
         let path = format!("/teams/{id}/retire");
-        self.call_with_body(Method::POST, &path, &Confirmation { confirm })
-            .await
+        self.post(&path, &Confirmation { confirm }).await
     }
 
     /// Returns a retired team to the competition.
     pub async fn return_team(&self, id: TeamId) -> anyhow::Result<TeamView> {
-        self.call(Method::POST, &format!("/teams/{id}/return"))
-            .await
+        self.post_empty(&format!("/teams/{id}/return")).await
     }
 
     /// All versions of the terms, the newest first.
@@ -127,14 +121,12 @@ impl Client {
 
     /// Organiser: publishes a new version of the terms.
     pub async fn publish_terms(&self, text: String) -> anyhow::Result<TermsView> {
-        self.call_with_body(Method::POST, "/terms", &NewTerms { text })
-            .await
+        self.post("/terms", &NewTerms { text }).await
     }
 
     /// Accepts the terms.
     pub async fn accept_terms(&self, version: u32) -> anyhow::Result<UserView> {
-        self.call(Method::POST, &format!("/terms/{version}/accept"))
-            .await
+        self.post_empty(&format!("/terms/{version}/accept")).await
     }
 
     /// All announcements, the newest first.
@@ -144,8 +136,7 @@ impl Client {
 
     pub async fn announce(&self, title: String, text: String) -> anyhow::Result<AnnouncementView> {
         let new = NewAnnouncement { title, text };
-        self.call_with_body(Method::POST, "/announcements", &new)
-            .await
+        self.post("/announcements", &new).await
     }
 
     /// The questions that the caller may read, the newest first.
@@ -155,8 +146,7 @@ impl Client {
 
     /// Team: asks the organisers.
     pub async fn ask(&self, text: String) -> anyhow::Result<QuestionView> {
-        self.call_with_body(Method::POST, "/questions", &NewQuestion { text })
-            .await
+        self.post("/questions", &NewQuestion { text }).await
     }
 
     /// Organiser: answers a question.
@@ -178,7 +168,7 @@ impl Client {
 
     /// Organiser: approves a registration.
     pub async fn approve(&self, id: RegistrationId) -> anyhow::Result<RegistrationView> {
-        self.call(Method::POST, &format!("/registrations/{id}/approve"))
+        self.post_empty(&format!("/registrations/{id}/approve"))
             .await
     }
 
@@ -189,8 +179,7 @@ impl Client {
         reason: String,
     ) -> anyhow::Result<RegistrationView> {
         let path = format!("/registrations/{id}/refuse");
-        self.call_with_body(Method::POST, &path, &Reason { reason })
-            .await
+        self.post(&path, &Reason { reason }).await
     }
 
     /// Organiser: opens or closes registration, or sets the *divisions*, groups of teams that a board can rank among themselves.

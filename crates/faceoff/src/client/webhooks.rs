@@ -16,7 +16,7 @@ impl Client {
 
     /// Creates a webhook; only this response has its secret.
     pub async fn create_webhook(&self, new: &NewWebhook) -> anyhow::Result<NewWebhookView> {
-        self.call_with_body(Method::POST, "/webhooks", new).await
+        self.post("/webhooks", new).await
     }
 
     pub async fn change_webhook(
@@ -30,14 +30,12 @@ impl Client {
 
     /// Replaces the secret of a webhook; only this response has the new one.
     pub async fn rotate_webhook(&self, id: WebhookId) -> anyhow::Result<NewWebhookView> {
-        self.call(Method::POST, &format!("/webhooks/{id}/rotate"))
-            .await
+        self.post_empty(&format!("/webhooks/{id}/rotate")).await
     }
 
     /// Sends a test delivery.
     pub async fn test_webhook(&self, id: WebhookId) -> anyhow::Result<DeliveryView> {
-        self.call(Method::POST, &format!("/webhooks/{id}/test"))
-            .await
+        self.post_empty(&format!("/webhooks/{id}/test")).await
     }
 
     pub async fn remove_webhook(&self, id: WebhookId) -> anyhow::Result<()> {

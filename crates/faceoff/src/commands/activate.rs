@@ -27,7 +27,7 @@ impl ActivateCommand {
         let client = self.server.client()?;
         let active = client.activate(self.submission).await?;
         let me = client.me().await?;
-        print(self.server.json, &active, || {
+        print(self.server.json, &active, |active| {
             format!(
                 "active: {} ({})\n{}",
                 active.file_name,

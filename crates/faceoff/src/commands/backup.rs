@@ -59,7 +59,7 @@ impl BackupCommand {
             None => Config::load(self.config.as_deref())?.server.data_dir,
         };
         let manifest = back_up(&data_dir, &self.folder, Timestamp::now())?;
-        print(self.json, &manifest.summary(&self.folder), || {
+        print(self.json, &manifest.summary(&self.folder), |_| {
             let mut text = format!(
                 "backed up {:?} to {}: {} files, {}",
                 manifest.season,

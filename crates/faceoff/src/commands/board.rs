@@ -81,7 +81,7 @@ impl BoardCommand {
                 return Ok(());
             }
             let board = client.board(self.task, &query).await?;
-            print(self.server.json, &board, || table::board_text(&board))
+            print(self.server.json, &board, table::board_text)
         })
     }
 }

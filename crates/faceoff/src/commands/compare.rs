@@ -3,7 +3,7 @@
 
 mod table;
 
-use super::{ca_file::CaFile, server::Connection};
+use super::{ca_file::CaFile, output::print_json, server::Connection};
 use anyhow::Context;
 use clap::Args;
 use faceoff_api::requests::ComparisonQuery;
@@ -163,12 +163,4 @@ fn comparison_input(Evaluation { manifest, summary }: &Evaluation) -> ComparedEv
         mismatch_seed: manifest.mismatch_seed,
         summary,
     }
-}
-
-fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
-    println!(
-        "{}",
-        serde_json::to_string_pretty(value).context("writing JSON")?
-    );
-    Ok(())
 }

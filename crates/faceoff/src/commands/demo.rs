@@ -2,7 +2,7 @@
 
 use crate::{
     client::{Client, DownloadedFile},
-    commands::{board::table, output::print, verify},
+    commands::{board::table, output::print_json, verify},
 };
 use anyhow::{Context, bail, ensure};
 use clap::Args;
@@ -196,7 +196,7 @@ impl DemoCommand {
                 board: &board,
                 dataset: &done,
             };
-            print(true, &view, String::new)?;
+            print_json(&view)?;
         }
         if self.no_serve {
             return server.stop().await;

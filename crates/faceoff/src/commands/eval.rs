@@ -186,7 +186,7 @@ impl EvalCommand {
             faults: &outcome.faults,
             result: &outcome.result,
         };
-        print(self.json, &view, || {
+        print(self.json, &view, |view| {
             format!(
                 "{}\n{}\n{}, BLAKE3 {}",
                 table::result_table(view.agent, view.result),

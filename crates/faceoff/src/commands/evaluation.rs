@@ -54,10 +54,10 @@ impl EvaluationCommand {
 pub(super) async fn show(client: &Client, json: bool, args: &EvaluationArgs) -> anyhow::Result<()> {
     if args.violations {
         let violations = client.violations(args.evaluation).await?;
-        return print(json, &violations, || violations_text(&violations));
+        return print(json, &violations, violations_text);
     }
     let evaluation = client.evaluation(args.evaluation).await?;
-    print(json, &evaluation, || evaluation_text(&evaluation))
+    print(json, &evaluation, evaluation_text)
 }
 
 fn evaluation_text(evaluation: &EvaluationView) -> String {

@@ -4,7 +4,7 @@
 mod watch;
 
 use super::{
-    output::{download_bar, download_text, print},
+    output::{print, print_download},
     server::ServerArgs,
     tournament::{games, lookup::find_tournament_or_newest},
 };
@@ -104,9 +104,7 @@ impl GameCommand {
             Action::Test { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let requested = client.request_test_games(id, None).await?;
-                print(self.server.json, &requested, || {
-                    games::requested_text(&requested)
-                })
+                print(self.server.json, &requested, games::requested_text)
             }
             Action::Friendly {
                 opponent,
@@ -114,16 +112,16 @@ impl GameCommand {
             } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let game = client.request_friendly_game(id, opponent).await?;
-                print(self.server.json, &game, || games::game_text(&game))
+                print(self.server.json, &game, games::game_text)
             }
             Action::List { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let games = client.uncounted_games(id).await?;
-                print(self.server.json, &games, || games::games_table(&games))
+                print(self.server.json, games.as_slice(), games::games_table)
             }
             Action::Show { game } => {
                 let game = client.game(game).await?;
-                print(self.server.json, &game, || games::game_text(&game))
+                print(self.server.json, &game, games::game_text)
             }
             Action::Watch { game } => watch::watch(&client, self.server.json, game).await,
             Action::Download {
@@ -132,15 +130,14 @@ impl GameCommand {
                 side,
                 both,
             } => {
-                let bar = download_bar()?;
-                let done = if both {
-                    client.download_recording(game, &file, &bar).await?
-                } else {
+                print_download(self.server.json, async |bar| {
+                    if both {
+                        return client.download_recording(game, &file, bar).await;
+                    }
                     let side = own_side(&client, &client.game(game).await?, side).await?;
-                    client.download_side(game, side, &file, &bar).await?
-                };
-                bar.finish_and_clear();
-                print(self.server.json, &done, || download_text(&done))
+                    client.download_side(game, side, &file, bar).await
+                })
+                .await
             }
             Action::Log { game, side } => {
                 let side = own_side(&client, &client.game(game).await?, side).await?;
@@ -149,7 +146,7 @@ impl GameCommand {
             }
             Action::Cancel { game } => {
                 let game = client.cancel_game(game).await?;
-                print(self.server.json, &game, || games::game_text(&game))
+                print(self.server.json, &game, games::game_text)
             }
         }
     }

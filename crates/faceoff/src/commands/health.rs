@@ -1,6 +1,9 @@
 //! `faceoff health`: checks whether a server is healthy.
 
-use super::{output::print, server::ServerArgs};
+use super::{
+    output::{print, time_text},
+    server::ServerArgs,
+};
 use crate::client::ApiError;
 use anyhow::anyhow;
 use clap::Args;
@@ -27,7 +30,7 @@ impl HealthCommand {
                 .health()
                 .await
                 .map_err(as_unhealthy)?;
-            print(self.server.json, &health, || health_text(&health))
+            print(self.server.json, &health, health_text)
         })
     }
 }
@@ -44,7 +47,7 @@ fn as_unhealthy(error: anyhow::Error) -> anyhow::Error {
 
 fn health_text(health: &HealthView) -> String {
     let pause = health.paused.as_ref().map(|ruling| {
-        let since = ruling.at.strftime("%Y-%m-%d %H:%M UTC");
+        let since = time_text(ruling.at);
         format!("\nthe queue is paused since {since}: {}", ruling.reason)
     });
     format!(

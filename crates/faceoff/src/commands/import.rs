@@ -62,7 +62,7 @@ impl ImportCommand {
             "bytes": manifest.total_bytes(),
             "left_out": manifest.left_out,
         });
-        print(self.json, &summary, || {
+        print(self.json, &summary, |_| {
             let mut lines = vec![format!(
                 "imported the {} archive of {:?} of {}: {} files of {} bytes",
                 manifest.edition,

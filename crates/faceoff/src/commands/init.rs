@@ -40,7 +40,7 @@ impl InitCommand {
         };
         file.write_all(COMMENTED.as_bytes())
             .with_context(|| format!("writing {shown}"))?;
-        print(self.json, &json!({ "file": self.file }), || {
+        print(self.json, &json!({ "file": self.file }), |_| {
             format!(
                 "wrote {shown}\nnext: edit it, then run `faceoff doctor --config {shown}` and \
                 `faceoff serve --config {shown}`"

@@ -138,7 +138,7 @@ impl JoinCommand {
                 let view = SignedIn {
                     caller: &joined.caller,
                 };
-                return print(self.json, &view, || {
+                return print(self.json, &view, |_| {
                     let caller = whoami::whoami_text(&joined.caller);
                     format!(
                         "{caller}\nsigned in to {server}, token stored in {}",
@@ -146,7 +146,7 @@ impl JoinCommand {
                     )
                 });
             }
-            print(self.json, &joined, || {
+            print(self.json, &joined, |joined| {
                 format!(
                     "{}\ntoken {}\nThe token is not shown again. Commands read it from FACEOFF_TOKEN.",
                     whoami::whoami_text(&joined.caller),

@@ -1,6 +1,10 @@
 //! `faceoff link`: creates a link that downloads a file without a token.
 
-use super::{game::own_side, output::print, server::ServerArgs};
+use super::{
+    game::own_side,
+    output::{print, time_text},
+    server::ServerArgs,
+};
 use crate::client::LinkTarget;
 use clap::{Args, Subcommand};
 use faceoff_api::requests::NewLink;
@@ -64,11 +68,11 @@ impl LinkCommand {
                 expires_in_s: Some(self.hours * 3600),
             };
             let link = client.link(target, new).await?;
-            print(self.server.json, &link, || {
+            print(self.server.json, &link, |link| {
                 format!(
                     "{}\nThe link is valid until {} for everyone who has it. It is not shown again.",
                     link.url,
-                    link.expires_at.strftime("%Y-%m-%d %H:%M UTC")
+                    time_text(link.expires_at)
                 )
             })
         })

@@ -55,7 +55,7 @@ impl LogCommand {
         super::block_on(async {
             let client = self.server.client()?;
             let log = self.find(&client).await?;
-            print(self.server.json, &log, || log.text())
+            print(self.server.json, &log, |log| log.text())
         })
     }
 

@@ -137,7 +137,7 @@ impl LoginCommand {
             file: &file,
             caller: &caller,
         };
-        print(self.json, &view, || {
+        print(self.json, &view, |view| {
             let mut text = format!(
                 "{}\nsigned in to {server}, token stored in {}",
                 whoami::whoami_text(&caller),

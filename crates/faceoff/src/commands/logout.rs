@@ -69,7 +69,7 @@ impl LogoutCommand {
         }
         credentials.save(&file)?;
         let summary = json!({ "server": server, "token_revoked": revoked, "default": credentials.default_server() });
-        print(self.json, &summary, || {
+        print(self.json, &summary, |_| {
             let outcome = match (should_revoke, revoked) {
                 (true, true) => "the token is revoked",
                 (true, false) => "the token was already invalid",

@@ -76,7 +76,7 @@ impl NewCommand {
         };
         let summary =
             json!({ "folder": self.folder, "name": name, "task": task, "files": written });
-        print(self.json, &summary, || {
+        print(self.json, &summary, |_| {
             format!(
                 "{folder}: an agent for the task {task}; README.md explains its files. Next:\n\n  cd {folder}\n  {test_command}\n  \
                 faceoff eval {bundle} --task {task} --episodes 20 --out {out_prefix}result\n  \

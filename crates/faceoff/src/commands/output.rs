@@ -1,8 +1,10 @@
-//! Output that several commands share: text or JSON, and the progress of downloads.
+//! Output that several commands share: text or JSON, times, and downloads with their progress.
 
 use crate::client::DownloadedFile;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
+use jiff::Timestamp;
+use serde::Serialize;
 
 /// Joins the lines; `fallback` replaces an empty list.
 pub(super) fn lines_or(lines: Vec<String>, fallback: &str) -> String {
@@ -13,32 +15,59 @@ pub(super) fn lines_or(lines: Vec<String>, fallback: &str) -> String {
     }
 }
 
-/// Prints a value as JSON, or as text.
-pub(super) fn print<T: serde::Serialize>(
+/// Prints a value as JSON, or as the text that `text` makes of it.
+pub(super) fn print<T: Serialize + ?Sized>(
     json: bool,
     value: &T,
-    text: impl FnOnce() -> String,
+    text: impl FnOnce(&T) -> String,
 ) -> anyhow::Result<()> {
     if json {
-        println!(
-            "{}",
-            serde_json::to_string_pretty(value).context("writing JSON")?
-        );
+        print_json(value)
     } else {
-        println!("{}", text());
+        println!("{}", text(value));
+        Ok(())
     }
+}
+
+/// Prints a list as JSON, or as text with one `line` per entry; `fallback` replaces an empty list.
+pub(super) fn print_list<T: Serialize>(
+    json: bool,
+    entries: &[T],
+    line: impl Fn(&T) -> String,
+    fallback: &str,
+) -> anyhow::Result<()> {
+    print(json, entries, |entries| {
+        lines_or(entries.iter().map(line).collect(), fallback)
+    })
+}
+
+/// Prints a value as JSON.
+pub(super) fn print_json(value: &(impl Serialize + ?Sized)) -> anyhow::Result<()> {
+    let json = serde_json::to_string_pretty(value).context("writing JSON")?;
+    println!("{json}");
     Ok(())
 }
 
-/// The progress bar of a download, shown if standard error is a terminal.
-pub(super) fn download_bar() -> anyhow::Result<ProgressBar> {
+/// A time to the minute.
+pub(super) fn time_text(time: Timestamp) -> String {
+    time.strftime("%Y-%m-%d %H:%M UTC").to_string()
+}
+
+/// Downloads a file, shows the progress if standard error is a terminal, and prints where the file is.
+pub(super) async fn print_download(
+    json: bool,
+    download: impl AsyncFnOnce(&ProgressBar) -> anyhow::Result<DownloadedFile>,
+) -> anyhow::Result<()> {
     let style = "downloading {bar:40} {bytes}/{total_bytes}, {bytes_per_sec}, {eta} left";
     let style = ProgressStyle::with_template(style).context("the progress bar's template")?;
-    Ok(ProgressBar::new(0).with_style(style))
+    let bar = ProgressBar::new(0).with_style(style);
+    let done = download(&bar).await?;
+    bar.finish_and_clear();
+    print(json, &done, download_text)
 }
 
 /// One line about a finished download.
-pub(super) fn download_text(done: &DownloadedFile) -> String {
+fn download_text(done: &DownloadedFile) -> String {
     let resumed = match done.resumed_at {
         0 => String::new(),
         bytes => format!(" (resumed after {bytes})"),

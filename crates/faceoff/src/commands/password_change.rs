@@ -32,8 +32,8 @@ impl PasswordCommand {
                 password: new,
             };
             let person = client.set_password(person.id, &change).await?;
-            print(self.server.json, &person, || {
-                format!("password set\n{}", user_line(&person))
+            print(self.server.json, &person, |person| {
+                format!("password set\n{}", user_line(person))
             })
         })
     }

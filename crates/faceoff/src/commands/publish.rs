@@ -26,7 +26,7 @@ impl PublishCommand {
 
     async fn publish(self) -> anyhow::Result<()> {
         let published = self.server.client()?.publish(self.evaluation).await?;
-        print(self.server.json, &published, || {
+        print(self.server.json, &published, |published| {
             let mut text = format!(
                 "published: the evaluation of {} ({})",
                 published.day, published.id

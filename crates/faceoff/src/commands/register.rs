@@ -52,7 +52,7 @@ impl RegisterCommand {
                 .client_or_visitor()?
                 .register(&registration)
                 .await?;
-            print(self.server.json, &created, || {
+            print(self.server.json, &created, |created| {
                 format!(
                     "registered; waiting for the approval of an organiser\n{}\nThe link is not shown again. It shows the state of the \
                     registration; after the approval, the first member joins with it (faceoff join LINK).",

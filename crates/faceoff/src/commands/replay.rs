@@ -75,7 +75,7 @@ impl ReplayCommand {
             "losses": losses,
             "file": self.out,
         });
-        print(self.json, &summary, || {
+        print(self.json, &summary, |_| {
             let head = [recording.headline(), recording.end_reason.clone()];
             let file = self.out.display().to_string();
             let lines: Vec<String> = head

@@ -70,7 +70,7 @@ impl RestoreCommand {
                 self.folder.display(),
                 manifest.missing.len()
             );
-            return print(self.json, &manifest.summary(&self.folder), || {
+            return print(self.json, &manifest.summary(&self.folder), |_| {
                 format!(
                     "{} is intact: {:?} of {}, {} files, {}",
                     self.folder.display(),
@@ -84,7 +84,7 @@ impl RestoreCommand {
         let replaced = restore(&self.folder, &manifest, &data, self.replace)?;
         let mut summary = manifest.summary(&data);
         summary["replaced"] = json!(replaced);
-        print(self.json, &summary, || {
+        print(self.json, &summary, |_| {
             let mut lines = vec![format!(
                 "restored {:?} of {}: {} files, {}",
                 manifest.season,

@@ -21,7 +21,7 @@ impl RuntimesCommand {
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let offered = self.server.client_or_visitor()?.runtimes().await?;
-            print(self.server.json, &offered, || runtimes_text(&offered))
+            print(self.server.json, &offered, runtimes_text)
         })
     }
 }

@@ -1,7 +1,10 @@
 //! `faceoff season`: prints the season. Its *secret* draws the episodes of all evaluations and is published at the end; the
 //! *commitment*, its hash, is public from the start.
 
-use super::{output::print, server::ServerArgs};
+use super::{
+    output::{print, time_text},
+    server::ServerArgs,
+};
 use clap::Args;
 use faceoff_api::views::season::SeasonView;
 
@@ -20,7 +23,7 @@ impl SeasonCommand {
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let season = self.server.client_or_visitor()?.season().await?;
-            print(self.server.json, &season, || season_text(&season))
+            print(self.server.json, &season, season_text)
         })
     }
 }
@@ -29,7 +32,7 @@ impl SeasonCommand {
 pub(super) fn season_text(season: &SeasonView) -> String {
     let state = match (season.closed_at, season.secret) {
         (Some(closed_at), Some(secret)) => {
-            let closed_at = closed_at.strftime("%Y-%m-%d %H:%M UTC");
+            let closed_at = time_text(closed_at);
             format!("closed     {closed_at}\nsecret     {secret}")
         }
         _ if season.archived.is_some() => {
@@ -40,14 +43,14 @@ pub(super) fn season_text(season: &SeasonView) -> String {
     let archived = match &season.archived {
         Some(archived) => format!(
             "\narchived   {}, {} edition, read-only",
-            archived.made_at.strftime("%Y-%m-%d %H:%M UTC"),
+            time_text(archived.made_at),
             archived.edition
         ),
         None => String::new(),
     };
     let queue = match &season.paused {
         Some(ruling) => {
-            let since = ruling.at.strftime("%Y-%m-%d %H:%M UTC");
+            let since = time_text(ruling.at);
             format!("\npaused     since {since}: {}", ruling.reason)
         }
         None => String::new(),

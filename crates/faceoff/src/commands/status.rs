@@ -52,7 +52,7 @@ impl StatusCommand {
                 return self.watch(&client).await;
             }
             let status = self.request_status(&client).await?;
-            print(self.server.json, &status, || status.text())
+            print(self.server.json, &status, |status| status.text())
         })
     }
 

@@ -3,7 +3,7 @@
 use super::{
     ablation_text::ablation_text,
     next_cutoff::next_cutoff_text,
-    output::{download_bar, download_text, lines_or, print},
+    output::{print, print_download, print_list, time_text},
     queue::queue_text,
     server::ServerArgs,
 };
@@ -17,7 +17,7 @@ use faceoff_api::{
     },
 };
 use faceoff_types::SubmissionId;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Lists, labels, withdraws, downloads and deletes the team's submissions.
 #[derive(Debug, Args)]
@@ -94,41 +94,33 @@ impl SubmissionsCommand {
         match self.action {
             Action::List => {
                 let submissions = client.submissions().await?;
-                print(json, &submissions, || {
-                    lines_or(
-                        submissions.iter().map(submission_line).collect(),
-                        "no submissions yet; upload one with faceoff submit BUNDLE",
-                    )
-                })
+                print_list(
+                    json,
+                    &submissions,
+                    submission_line,
+                    "no submissions yet; upload one with faceoff submit BUNDLE",
+                )
             }
             Action::Status => {
                 let me = client.me().await?;
-                print(json, &me, || status_lines(&me).join("\n"))
+                print(json, &me, |me| status_lines(me).join("\n"))
             }
             Action::Label { submission, label } => {
                 let change = SubmissionChange {
                     label: Some(label),
                     ..SubmissionChange::default()
                 };
-                let described = client.describe(submission, &change).await?;
-                print(json, &described, || submission_line(&described))
+                describe(&client, json, submission, &change).await
             }
             Action::Note { submission, note } => {
                 let change = SubmissionChange {
                     note: Some(note),
                     ..SubmissionChange::default()
                 };
-                let described = client.describe(submission, &change).await?;
-                print(json, &described, || submission_line(&described))
+                describe(&client, json, submission, &change).await
             }
             Action::Download { submission, file } => {
-                let bar = download_bar()?;
-                let hash = client.submission(submission).await?.blake3;
-                let done = client
-                    .download_submission(submission, &file, &hash, &bar)
-                    .await?;
-                bar.finish_and_clear();
-                print(json, &done, || download_text(&done))
+                download(&client, json, submission, &file).await
             }
             Action::Delete {
                 submission,
@@ -137,15 +129,40 @@ impl SubmissionsCommand {
             } => {
                 let deletion = DeleteSubmission { confirm, reason };
                 let deleted = client.delete_submission(submission, &deletion).await?;
-                print(json, &deleted, || submission_line(&deleted))
+                print(json, &deleted, submission_line)
             }
             Action::Ablation { submission } => {
                 let newest = client.ablation(submission).await?;
-                print(json, &newest, || ablation_text(&newest))
+                print(json, &newest, ablation_text)
             }
             Action::Withdraw { submission } => withdraw(&client, json, submission).await,
         }
     }
+}
+
+async fn describe(
+    client: &Client,
+    json: bool,
+    submission: SubmissionId,
+    change: &SubmissionChange,
+) -> anyhow::Result<()> {
+    let described = client.describe(submission, change).await?;
+    print(json, &described, submission_line)
+}
+
+/// Downloads the bundle of a submission with the client's token.
+pub(super) async fn download(
+    client: &Client,
+    json: bool,
+    submission: SubmissionId,
+    file: &Path,
+) -> anyhow::Result<()> {
+    print_download(json, async |bar| {
+        let hash = client.submission(submission).await?.blake3;
+        let download = client.download_submission(submission, file, &hash, bar);
+        download.await
+    })
+    .await
 }
 
 /// Withdraws a submission and prints which one will be evaluated instead.
@@ -156,12 +173,12 @@ pub(super) async fn withdraw(
 ) -> anyhow::Result<()> {
     let withdrawn = client.withdraw(submission).await?;
     let me = client.me().await?;
-    print(json, &withdrawn, || {
+    print(json, &withdrawn, |withdrawn| {
         let next = match me.active_submission {
             Some(active) => next_cutoff_text(&me, active),
             None => "the team has no active submission: upload another one, or activate one with faceoff activate ID".to_owned(),
         };
-        format!("{}\n{next}", submission_line(&withdrawn))
+        format!("{}\n{next}", submission_line(withdrawn))
     })
 }
 
@@ -219,7 +236,7 @@ pub(super) fn submission_line(submission: &SubmissionView) -> String {
     let mut line = format!(
         "{}  {}  {}  {state}",
         submission.id,
-        submission.created_at.strftime("%Y-%m-%d %H:%M UTC"),
+        time_text(submission.created_at),
         submission.file_name
     );
     if submission.active {
@@ -231,13 +248,13 @@ pub(super) fn submission_line(submission: &SubmissionView) -> String {
     match (&submission.deleted, &submission.bundle_removed) {
         (Some(deleted), Some(removed)) => line.push_str(&format!(
             ", deleted on {} {}",
-            deleted.at.strftime("%Y-%m-%d %H:%M UTC"),
+            time_text(deleted.at),
             removed.reason
         )),
         (None, Some(removed)) if matches!(submission.status, SubmissionStatus::Valid { .. }) => {
             line.push_str(&format!(
                 ", bundle removed on {} {}",
-                removed.at.strftime("%Y-%m-%d %H:%M UTC"),
+                time_text(removed.at),
                 removed.reason
             ));
         }

@@ -2,7 +2,11 @@
 
 mod bundle_contents;
 
-use super::{next_cutoff::next_cutoff_text, output::print, server::ServerArgs};
+use super::{
+    next_cutoff::next_cutoff_text,
+    output::{print, print_json},
+    server::ServerArgs,
+};
 use crate::{client::Client, packing::BundleFile};
 use anyhow::{Context, bail};
 use clap::Args;
@@ -45,7 +49,7 @@ impl SubmitCommand {
         let bundle = bundle.await.context("packing the bundle")??;
         if self.dry_run {
             let contents = bundle_contents::BundleContents::new(&bundle);
-            return print(json, &contents, || contents.text());
+            return print(json, &contents, |contents| contents.text());
         }
         let client = self.server.client()?;
         if let Some(selection) = bundle.selection() {
@@ -71,7 +75,7 @@ impl SubmitCommand {
 
         let submission = wait_for_validation(&client, submission).await?;
         if json {
-            print(json, &submission, String::new)?;
+            print_json(&submission)?;
         } else {
             print_validation(&client, &submission).await?;
         }

@@ -1,8 +1,8 @@
 //! `faceoff team`: shows and manages the member's own team.
 
 use super::{
-    output::{lines_or, print},
-    people::{invitation_line, invitation_lines, new_invitation_text, user_line},
+    output::{lines_or, print, print_list, time_text},
+    people::{invite, list_invitations, new_invitation, uninvite, user_line},
     server::ServerArgs,
     storage::storage_line,
 };
@@ -10,11 +10,10 @@ use crate::client::Client;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use faceoff_api::{
-    requests::{InvitedRole, NewInvitation, TeamChange},
+    requests::{InvitedRole, TeamChange},
     views::team::TeamView,
 };
 use faceoff_types::{InvitationId, TeamId, TeamName, UserId};
-use jiff::Timestamp;
 
 /// Shows and changes the team, invites members, and asks the organisers.
 #[derive(Debug, Args)]
@@ -117,7 +116,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
     match action {
         Action::Show => {
             let team = client.team(own_team(client).await?).await?;
-            print(json, &team, || team_text(&team))
+            print(json, &team, team_text)
         }
         Action::Change {
             rename,
@@ -135,63 +134,51 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 declines_friendly_games,
             };
             let team = client.change_team(own_team(client).await?, &change).await?;
-            print(json, &team, || team_text(&team))
+            print(json, &team, team_text)
         }
         Action::Storage => {
             let storage = client.team_storage(own_team(client).await?).await?;
-            print(json, &storage, || storage_line(&storage))
+            print(json, &storage, storage_line)
         }
         Action::Members => {
             let people = client.users().await?;
-            print(json, &people, || {
-                let lines = people.iter().map(user_line).collect();
-                lines_or(
-                    lines,
-                    "no members yet; invite one with faceoff team invite NOTE",
-                )
-            })
+            print_list(
+                json,
+                &people,
+                user_line,
+                "no members yet; invite one with faceoff team invite NOTE",
+            )
         }
         Action::Invite { note } => {
-            let new = NewInvitation {
-                role: InvitedRole::Member,
-                team: None,
-                person: None,
-                note,
-                expires_at: None,
-            };
-            let invitation = client.invite(&new).await?;
-            print(json, &invitation, || new_invitation_text(&invitation))
+            let invitation = new_invitation(InvitedRole::Member, note);
+            invite(client, json, invitation).await
         }
-        Action::Invitations => {
-            let invitations = client.invitations().await?;
-            print(json, &invitations, || invitation_lines(&invitations))
-        }
-        Action::Uninvite { invitation } => {
-            let revoked = client.revoke_invitation(invitation).await?;
-            print(json, &revoked, || invitation_line(&revoked))
-        }
+        Action::Invitations => list_invitations(client, json).await,
+        Action::Uninvite { invitation } => uninvite(client, json, invitation).await,
         Action::Leave { confirm } => {
             let id = own_person(client).await?;
             let person = client.remove_user(id, confirm).await?;
-            print(json, &person, || user_line(&person))
+            print(json, &person, user_line)
         }
         Action::Retire { confirm } => {
             let team = own_team(client).await?;
             let team = client.retire_team(team, confirm).await?;
-            print(json, &team, || team_text(&team))
+            print(json, &team, team_text)
         }
         Action::Return => {
             let team = client.return_team(own_team(client).await?).await?;
-            print(json, &team, || team_text(&team))
+            print(json, &team, team_text)
         }
         Action::Ask { text } => {
             let question = client.ask(text).await?;
-            print(json, &question, || format!("asked ({})", question.id))
+            print(json, &question, |question| {
+                format!("asked ({})", question.id)
+            })
         }
         Action::News => news(client, json).await,
         Action::Terms { accept: None } => {
             let terms = client.terms().await?;
-            print(json, &terms, || match terms.first() {
+            print(json, &terms, |terms| match terms.first() {
                 Some(terms) => format!(
                     "version {} since {}\n\n{}",
                     terms.version,
@@ -205,7 +192,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             accept: Some(version),
         } => {
             let person = client.accept_terms(version).await?;
-            print(json, &person, || user_line(&person))
+            print(json, &person, user_line)
         }
     }
 }
@@ -213,7 +200,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
 async fn news(client: &Client, json: bool) -> anyhow::Result<()> {
     let (announcements, questions) = (client.announcements().await?, client.questions().await?);
     let news = serde_json::json!({ "announcements": announcements, "questions": questions });
-    print(json, &news, || {
+    print(json, &news, |_| {
         let announcements = announcements.iter().map(|announcement| {
             format!(
                 "{}  {}\n{}\n",
@@ -235,10 +222,6 @@ async fn news(client: &Client, json: bool) -> anyhow::Result<()> {
             "no announcements or questions yet",
         )
     })
-}
-
-fn time_text(time: Timestamp) -> String {
-    time.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 /// A team's profile as text.

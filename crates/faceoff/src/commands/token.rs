@@ -1,7 +1,7 @@
 //! `faceoff token`: creates, lists, rotates and revokes tokens.
 
 use super::{
-    output::{lines_or, print},
+    output::{print, print_list, time_text},
     server::ServerArgs,
 };
 use crate::client::Client;
@@ -64,14 +64,13 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
     match action {
         TokenAction::List => {
             let tokens = client.tokens().await?;
-            print(json, &tokens, || {
-                let now = Timestamp::now();
-                let lines = tokens.iter().map(|token| token_line(token, now)).collect();
-                lines_or(
-                    lines,
-                    "no tokens yet; create one with faceoff token create NAME",
-                )
-            })
+            let now = Timestamp::now();
+            print_list(
+                json,
+                &tokens,
+                |token| token_line(token, now),
+                "no tokens yet; create one with faceoff token create NAME",
+            )
         }
         TokenAction::Create { name, days, team } => {
             let end = |days: u16| {
@@ -84,7 +83,7 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
                 team,
             };
             let created = client.create_token(&new).await?;
-            print(json, &created, || {
+            print(json, &created, |created| {
                 format!(
                     "token {} ({})\n{}\nThe token is not shown again.",
                     created.token.name, created.token.id, created.secret
@@ -93,7 +92,7 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
         }
         TokenAction::Rotate { token } => {
             let rotated = client.rotate_token(token).await?;
-            print(json, &rotated, || {
+            print(json, &rotated, |rotated| {
                 format!(
                     "token {} ({})\n{}\nThe token is not shown again. The old one is invalid.",
                     rotated.token.name, rotated.token.id, rotated.secret
@@ -102,13 +101,14 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
         }
         TokenAction::Revoke { token } => {
             let revoked = client.revoke_token(token).await?;
-            print(json, &revoked, || token_line(&revoked, Timestamp::now()))
+            print(json, &revoked, |revoked| {
+                token_line(revoked, Timestamp::now())
+            })
         }
     }
 }
 
 fn token_line(token: &TokenView, now: Timestamp) -> String {
-    let time_text = |time: Timestamp| time.strftime("%Y-%m-%d %H:%M UTC").to_string();
     let state = match (token.revoked_at, token.expires_at) {
         (Some(revoked_at), _) => format!("revoked {}", time_text(revoked_at)),
         (None, Some(expires_at)) if expires_at <= now => {

@@ -72,21 +72,21 @@ impl TournamentCommand {
         match self.action {
             Action::List => {
                 let tournaments = client.tournaments().await?;
-                print(self.server.json, &tournaments, || {
-                    text::tournament_list(&tournaments)
-                })
+                print(
+                    self.server.json,
+                    tournaments.as_slice(),
+                    text::tournament_list,
+                )
             }
             Action::Show { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let tournament = client.tournament(id).await?;
-                print(self.server.json, &tournament, || {
-                    text::tournament_text(&tournament)
-                })
+                print(self.server.json, &tournament, text::tournament_text)
             }
             Action::Games { tournament, round } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let games = client.games(id, round).await?;
-                print(self.server.json, &games, || games::games_table(&games))
+                print(self.server.json, games.as_slice(), games::games_table)
             }
             Action::Ratings { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
@@ -94,16 +94,14 @@ impl TournamentCommand {
                     ratings: client.ratings(id).await?,
                     head_to_head: client.head_to_head(id).await?,
                 };
-                print(self.server.json, &view, || {
+                print(self.server.json, &view, |view| {
                     table::ratings_text(&view.ratings, &view.head_to_head)
                 })
             }
             Action::Certainty { tournament } => {
                 let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
                 let shares = client.champion_shares(id).await?;
-                print(self.server.json, &shares, || {
-                    text::champion_shares_text(&shares)
-                })
+                print(self.server.json, &shares, text::champion_shares_text)
             }
             Action::Withdraw {
                 tournament,
@@ -113,9 +111,7 @@ impl TournamentCommand {
                 let id = find_tournament(&client, &tournament).await?;
                 let decision = Decision { reason, confirm };
                 let tournament = client.withdraw_from_tournament(id, &decision).await?;
-                print(self.server.json, &tournament, || {
-                    text::tournament_text(&tournament)
-                })
+                print(self.server.json, &tournament, text::tournament_text)
             }
         }
     }

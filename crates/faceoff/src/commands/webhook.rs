@@ -1,7 +1,7 @@
 //! `faceoff webhook`: manages webhooks, which notify other programs of events.
 
 use super::{
-    output::{lines_or, print},
+    output::{print, print_list, time_text},
     server::ServerArgs,
 };
 use crate::client::Client;
@@ -11,7 +11,6 @@ use faceoff_api::{
     views::webhook::{DeliveryStateView, DeliveryView, NewWebhookView, WebhookState, WebhookView},
 };
 use faceoff_types::WebhookId;
-use jiff::Timestamp;
 use serde_json::json;
 
 /// Manages webhooks: signed requests that notify other programs of events (Standard Webhooks).
@@ -97,19 +96,18 @@ pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> a
     match action {
         WebhookAction::List => {
             let webhooks = client.webhooks().await?;
-            print(json, &webhooks, || {
-                let lines = webhooks.iter().map(webhook_line).collect();
-                lines_or(
-                    lines,
-                    "no webhooks yet; create one with faceoff webhook create NAME URL",
-                )
-            })
+            print_list(
+                json,
+                &webhooks,
+                webhook_line,
+                "no webhooks yet; create one with faceoff webhook create NAME URL",
+            )
         }
         WebhookAction::Create { name, url, about } => {
             let created = client
                 .create_webhook(&NewWebhook { name, url, about })
                 .await?;
-            print(json, &created, || new_webhook_text(&created))
+            print(json, &created, new_webhook_text)
         }
         WebhookAction::Change {
             webhook,
@@ -125,15 +123,15 @@ pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> a
                 state: revive.then_some(WebhookRevival::Alive),
             };
             let changed = client.change_webhook(webhook, &changes).await?;
-            print(json, &changed, || webhook_line(&changed))
+            print(json, &changed, webhook_line)
         }
         WebhookAction::Rotate { webhook } => {
             let rotated = client.rotate_webhook(webhook).await?;
-            print(json, &rotated, || new_webhook_text(&rotated))
+            print(json, &rotated, new_webhook_text)
         }
         WebhookAction::Test { webhook } => {
             let test = client.test_webhook(webhook).await?;
-            print(json, &test, || {
+            print(json, &test, |_| {
                 format!(
                     "test delivery queued; for its result, run faceoff webhook deliveries {webhook}"
                 )
@@ -141,24 +139,15 @@ pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> a
         }
         WebhookAction::Deliveries { webhook } => {
             let deliveries = client.deliveries(webhook).await?;
-            print(json, &deliveries, || {
-                lines_or(
-                    deliveries.iter().map(delivery_line).collect(),
-                    "no deliveries yet",
-                )
-            })
+            print_list(json, &deliveries, delivery_line, "no deliveries yet")
         }
         WebhookAction::Remove { webhook } => {
             client.remove_webhook(webhook).await?;
-            print(json, &json!({ "removed": webhook }), || {
+            print(json, &json!({ "removed": webhook }), |_| {
                 format!("{webhook} is removed")
             })
         }
     }
-}
-
-fn time_text(time: Timestamp) -> String {
-    time.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 fn new_webhook_text(new: &NewWebhookView) -> String {

@@ -40,7 +40,7 @@ impl WhoamiCommand {
                 server_from: connection.server_source,
                 token_from: connection.token_source,
             };
-            print(self.server.json, &view, || {
+            print(self.server.json, &view, |view| {
                 format!(
                     "{}\nserver {} ({}), token from {}",
                     whoami_text(&caller),

@@ -3,6 +3,7 @@
 use super::Config;
 use anyhow::{Context as _, bail, ensure};
 use faceoff_dataset::can_draw_plant;
+use faceoff_sandbox::affinity;
 use faceoff_types::{
     DayDeadline, IMAGE_RUNTIME, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
 };
@@ -12,6 +13,12 @@ use std::collections::BTreeSet;
 const MAX_SLOTS_PER_CPU: usize = 4;
 
 impl Config {
+    /// Refuses settings that are impossible on this host.
+    pub(super) fn check_this_host(&self) -> anyhow::Result<()> {
+        let cpus = affinity::allowed_cpus().context("reading the CPU affinity of this process")?;
+        self.check_host(&cpus)
+    }
+
     /// Refuses settings that are impossible on a host with these CPUs.
     pub(super) fn check_host(&self, cpus: &[usize]) -> anyhow::Result<()> {
         let max_slots = MAX_SLOTS_PER_CPU * cpus.len();
@@ -71,28 +78,48 @@ impl Config {
     /// Checks the conditions that the types do not express.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         self.nats.check()?;
-        if let Some(url) = &self.server.public_url {
-            let rest = url
-                .strip_prefix("https://")
-                .or_else(|| url.strip_prefix("http://"));
-            let is_address = rest.is_some_and(|rest| {
-                !rest.is_empty() && !rest.ends_with('/') && !rest.contains(char::is_whitespace)
-            });
-            ensure!(
-                is_address,
-                "server.public_url: expected an address like https://faceoff.example.org, without a trailing \
-                slash, got {url:?}"
-            );
-        }
+        self.check_public_url()?;
         ensure!(
             !self.runtimes.contains_key(IMAGE_RUNTIME),
             "runtimes.{IMAGE_RUNTIME}: this name is reserved for container images; choose another name"
         );
+        self.check_evaluation()?;
+        self.check_workers()?;
+        self.check_season_name()?;
+        self.check_minimums()?;
+        self.check_durations()?;
+        ensure!(
+            (0.01..=1024.0).contains(&self.limits.cpus),
+            "limits.cpus: expected 0.01 to 1024, got {}",
+            self.limits.cpus
+        );
+        Ok(())
+    }
+
+    fn check_public_url(&self) -> anyhow::Result<()> {
+        let Some(url) = &self.server.public_url else {
+            return Ok(());
+        };
+        let rest = url
+            .strip_prefix("https://")
+            .or_else(|| url.strip_prefix("http://"));
+        let is_address = rest.is_some_and(|rest| {
+            !rest.is_empty() && !rest.ends_with('/') && !rest.contains(char::is_whitespace)
+        });
+        ensure!(
+            is_address,
+            "server.public_url: expected an address like https://faceoff.example.org, without a trailing \
+            slash, got {url:?}"
+        );
+        Ok(())
+    }
+
+    fn check_evaluation(&self) -> anyhow::Result<()> {
         let evaluation = &self.evaluation;
         if evaluation.at.is_some() && evaluation.cron.is_some() {
             bail!("evaluation.cron: evaluation.at is also set; remove one of them");
         }
-        self.settings().context("evaluation.cron")?;
+        let settings = self.settings().context("evaluation.cron")?;
         ensure!(
             (1..=MAX_EPISODES_PER_TASK).contains(&evaluation.episodes_per_task),
             "evaluation.episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {}",
@@ -122,12 +149,15 @@ impl Config {
             .perturbations
             .check()
             .context("evaluation.perturbations")?;
-        let settings = self.settings().context("evaluation.cron")?;
         settings.check().context("evaluation")?;
         let mut unique = BTreeSet::new();
         if let Some(duplicate) = evaluation.tasks.iter().find(|task| !unique.insert(**task)) {
             bail!("evaluation.tasks: {duplicate} is listed twice");
         }
+        Ok(())
+    }
+
+    fn check_workers(&self) -> anyhow::Result<()> {
         ensure!(
             self.workers.slots != Some(0),
             "workers.slots: expected at least 1, got 0"
@@ -137,6 +167,10 @@ impl Config {
             "workers.lease_s: expected 5 to 3600 seconds, got {}",
             self.workers.lease_s
         );
+        Ok(())
+    }
+
+    fn check_season_name(&self) -> anyhow::Result<()> {
         if let Some(name) = &self.season.name {
             let chars = name.chars().count();
             ensure!(
@@ -144,27 +178,33 @@ impl Config {
                 "season.name: expected 1 to 80 characters, got {chars}"
             );
         }
-        for (name, value) in [
-            ("uploads.at_once", self.uploads.at_once as u64),
-            ("uploads.least_bytes_per_s", self.uploads.least_bytes_per_s),
-            ("connections.most", self.connections.most as u64),
+        Ok(())
+    }
+
+    fn check_minimums(&self) -> anyhow::Result<()> {
+        for (name, least, value) in [
+            ("uploads.at_once", 1, self.uploads.at_once as u64),
+            (
+                "uploads.least_bytes_per_s",
+                1,
+                self.uploads.least_bytes_per_s,
+            ),
+            ("connections.most", 1, self.connections.most as u64),
             (
                 "connections.per_address",
+                1,
                 self.connections.per_address as u64,
             ),
             (
                 "connections.least_bytes_per_s",
+                1,
                 self.connections.least_bytes_per_s,
             ),
-            ("bundle.unpack_s", self.bundle.unpack_s.into()),
-            ("bundle.files", self.bundle.files),
-            ("uploads.day_bytes", self.uploads.day_bytes),
-            ("uploads.stored_bytes", self.uploads.stored_bytes),
-        ] {
-            ensure!(value >= 1, "{name}: expected at least 1, got 0");
-        }
-        // With smaller values, no agent starts or no bundle fits.
-        for (name, least, value) in [
+            ("bundle.unpack_s", 1, self.bundle.unpack_s.into()),
+            ("bundle.files", 1, self.bundle.files),
+            ("uploads.day_bytes", 1, self.uploads.day_bytes),
+            ("uploads.stored_bytes", 1, self.uploads.stored_bytes),
+            // With smaller values, no agent starts or no bundle fits.
             ("limits.memory_bytes", 16 << 20, self.limits.memory_bytes),
             ("limits.pids", 2, self.limits.pids.into()),
             ("limits.open_files", 16, self.limits.open_files.into()),
@@ -177,37 +217,32 @@ impl Config {
                 "{name}: expected at least {least}, got {value}"
             );
         }
+        Ok(())
+    }
+
+    fn check_durations(&self) -> anyhow::Result<()> {
         for (name, seconds) in [
             ("uploads.grace_s", self.uploads.grace_s),
             ("connections.head_s", self.connections.head_s),
             ("connections.grace_s", self.connections.grace_s),
+            ("time.startup_s", self.time.startup_s),
+            ("time.reset_s", self.time.reset_s),
+            ("time.step_s", self.time.step_s),
+            ("time.bye_s", self.time.bye_s),
+            ("time.mean_s", self.time.mean_s),
+            (
+                "time.episode_control_times",
+                self.time.episode_control_times,
+            ),
+            ("time.episode_extra_s", self.time.episode_extra_s),
+            ("time.reset_mean_s", self.time.reset_mean_s),
+            ("time.resets_extra_s", self.time.resets_extra_s),
         ] {
             ensure!(
                 seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
                 "{name}: expected more than 0 and at most 3600, got {seconds}"
             );
         }
-        for (name, seconds) in [
-            ("startup_s", self.time.startup_s),
-            ("reset_s", self.time.reset_s),
-            ("step_s", self.time.step_s),
-            ("bye_s", self.time.bye_s),
-            ("mean_s", self.time.mean_s),
-            ("episode_control_times", self.time.episode_control_times),
-            ("episode_extra_s", self.time.episode_extra_s),
-            ("reset_mean_s", self.time.reset_mean_s),
-            ("resets_extra_s", self.time.resets_extra_s),
-        ] {
-            ensure!(
-                seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
-                "time.{name}: expected more than 0 and at most 3600, got {seconds}"
-            );
-        }
-        ensure!(
-            (0.01..=1024.0).contains(&self.limits.cpus),
-            "limits.cpus: expected 0.01 to 1024, got {}",
-            self.limits.cpus
-        );
         Ok(())
     }
 }

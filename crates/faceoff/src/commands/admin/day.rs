@@ -1,18 +1,30 @@
-//! `faceoff admin freeze`, `unfreeze`, `missed-day` and `extra-turn`: changes of boards and evaluation days, i.e. of all
+//! `faceoff admin start-day`, `freeze`, `unfreeze`, `missed-day` and `extra-turn`: changes of boards and evaluation days, i.e. of all
 //! evaluations of one cutoff. `extra-turn` adds one evaluation.
 
-use super::{lines::evaluation_line, team_lookup::find_team};
+use super::{
+    lines::{evaluation_line, evaluation_lines},
+    team_lookup::find_team,
+};
 use crate::{
     client::Client,
     commands::{output::print, stage_lookup::find_stage},
 };
 use clap::Subcommand;
-use faceoff_api::requests::{MissedDay, NewExtraEvaluation};
+use faceoff_api::{
+    requests::{MissedDay, NewExtraEvaluation},
+    views::day::DayView,
+};
 use faceoff_types::StageDay;
 use jiff::civil::Date;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum DayAction {
+    /// Start an evaluation day: the active submission of each team is evaluated. A day starts only once
+    StartDay {
+        /// The stage's name or id [default: the open stage]
+        #[arg(long)]
+        stage: Option<String>,
+    },
     /// Freeze the boards of a stage: they keep their current results and are marked as frozen; evaluation days continue
     Freeze {
         /// The stage's name or id
@@ -54,17 +66,28 @@ pub(super) enum DayAction {
 
 pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyhow::Result<()> {
     match action {
+        DayAction::StartDay { stage } => {
+            let stage = match stage {
+                Some(stage) => Some(find_stage(client, &stage).await?.id),
+                None => None,
+            };
+            let started = client.start_day(stage).await?;
+            print(json, &started, |day| {
+                let lines = [started_lines(day), missing_lines(day)];
+                lines.concat().join("\n")
+            })
+        }
         DayAction::Freeze { stage, reason } => {
             let stage = find_stage(client, &stage).await?;
-            let frozen = client.freeze(stage.id, &reason).await?;
-            print(json, &frozen, || {
+            let frozen = client.freeze(stage.id, reason).await?;
+            print(json, &frozen, |frozen| {
                 format!("the boards of {} are frozen", frozen.name)
             })
         }
         DayAction::Unfreeze { stage } => {
             let stage = find_stage(client, &stage).await?;
             let live = client.unfreeze(stage.id).await?;
-            print(json, &live, || {
+            print(json, &live, |live| {
                 format!("the boards of {} are live again", live.name)
             })
         }
@@ -72,15 +95,7 @@ pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyho
             let stage = find_stage(client, &stage).await?;
             let missed = MissedDay { day, reason };
             let started = client.start_missed_day(stage.id, &missed).await?;
-            print(json, &started, || {
-                let mut lines = vec![format!(
-                    "{}: {} evaluations started",
-                    started.day,
-                    started.created.len()
-                )];
-                lines.extend(started.created.iter().map(evaluation_line));
-                lines.join("\n")
-            })
+            print(json, &started, |day| started_lines(day).join("\n"))
         }
         DayAction::ExtraTurn {
             team,
@@ -99,7 +114,24 @@ pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyho
                 confirm,
             };
             let evaluation = client.add_evaluation(stage_day, &extra).await?;
-            print(json, &evaluation, || evaluation_line(&evaluation))
+            print(json, &evaluation, evaluation_line)
         }
     }
+}
+
+/// The evaluations that a day has started.
+fn started_lines(day: &DayView) -> Vec<String> {
+    let started = format!("{}: {} evaluations started", day.day, day.created.len());
+    [vec![started], evaluation_lines(day)].concat()
+}
+
+/// The teams without an evaluation on that day.
+fn missing_lines(day: &DayView) -> Vec<String> {
+    let without_submission = day.without_submission.iter();
+    let without_submission =
+        without_submission.map(|team| format!("{:<40} no valid submission", team.name));
+    let excluded = day.excluded.iter();
+    without_submission
+        .chain(excluded.map(|excluded| format!("{:<40} {}", excluded.team_name, excluded.reason)))
+        .collect()
 }

@@ -27,7 +27,7 @@ pub(super) async fn export(
         "unpacked_bytes": manifest.total_bytes(),
         "left_out": manifest.left_out,
     });
-    print(as_json, &summary, || {
+    print(as_json, &summary, |_| {
         let mut lines = vec![format!(
             "{}: {bytes} bytes, the {edition} archive of {:?} of {}; {} files of {} bytes",
             file.display(),

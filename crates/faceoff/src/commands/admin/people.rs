@@ -5,8 +5,8 @@ use super::team_lookup::find_team;
 use crate::{
     client::Client,
     commands::{
-        output::{lines_or, print},
-        people::{invitation_line, invitation_lines, new_invitation_text, user_line},
+        output::{print, print_list},
+        people::{invite, list_invitations, new_invitation, uninvite, user_line},
     },
 };
 use anyhow::bail;
@@ -98,21 +98,6 @@ async fn find_user(client: &Client, name_or_id: &str) -> anyhow::Result<UserId> 
     }
 }
 
-async fn invite(client: &Client, json: bool, invitation: NewInvitation) -> anyhow::Result<()> {
-    let created = client.invite(&invitation).await?;
-    print(json, &created, || new_invitation_text(&created))
-}
-
-const fn new_invitation(role: InvitedRole, note: String) -> NewInvitation {
-    NewInvitation {
-        role,
-        team: None,
-        person: None,
-        note,
-        expires_at: None,
-    }
-}
-
 pub(super) async fn people(
     client: &Client,
     json: bool,
@@ -121,13 +106,12 @@ pub(super) async fn people(
     match action {
         PeopleAction::List => {
             let users = client.users().await?;
-            print(json, &users, || {
-                let lines = users.iter().map(user_line).collect();
-                lines_or(
-                    lines,
-                    "no users yet; invite the first with faceoff admin people invite-organiser NOTE",
-                )
-            })
+            print_list(
+                json,
+                &users,
+                user_line,
+                "no users yet; invite the first with faceoff admin people invite-organiser NOTE",
+            )
         }
         PeopleAction::InviteOrganiser { note } => {
             invite(client, json, new_invitation(InvitedRole::Organiser, note)).await
@@ -149,18 +133,12 @@ pub(super) async fn people(
             };
             invite(client, json, invitation).await
         }
-        PeopleAction::Invitations => {
-            let invitations = client.invitations().await?;
-            print(json, &invitations, || invitation_lines(&invitations))
-        }
-        PeopleAction::Uninvite { invitation } => {
-            let revoked = client.revoke_invitation(invitation).await?;
-            print(json, &revoked, || invitation_line(&revoked))
-        }
+        PeopleAction::Invitations => list_invitations(client, json).await,
+        PeopleAction::Uninvite { invitation } => uninvite(client, json, invitation).await,
         PeopleAction::Remove { person, confirm } => {
             let id = find_user(client, &person).await?;
             let removed = client.remove_user(id, confirm).await?;
-            print(json, &removed, || user_line(&removed))
+            print(json, &removed, user_line)
         }
     }
 }
@@ -184,21 +162,23 @@ pub(super) async fn registrations(
     let change = match action {
         RegistrationAction::List => {
             let registrations = client.registrations().await?;
-            return print(json, &registrations, || {
-                let lines = registrations.iter().map(registration_line).collect();
-                lines_or(lines, "no team has registered")
-            });
+            return print_list(
+                json,
+                &registrations,
+                registration_line,
+                "no team has registered",
+            );
         }
         RegistrationAction::Approve { registration } => {
             let approved = client.approve(registration).await?;
-            return print(json, &approved, || registration_line(&approved));
+            return print(json, &approved, registration_line);
         }
         RegistrationAction::Refuse {
             registration,
             reason,
         } => {
             let refused = client.refuse(registration, reason).await?;
-            return print(json, &refused, || registration_line(&refused));
+            return print(json, &refused, registration_line);
         }
         RegistrationAction::Open => SeasonChange {
             takes_registrations: Some(true),
@@ -214,7 +194,7 @@ pub(super) async fn registrations(
         },
     };
     let season = client.change_season(&change).await?;
-    print(json, &season, || {
+    print(json, &season, |season| {
         let divisions: Vec<_> = season.divisions.iter().map(ToString::to_string).collect();
         format!(
             "registration is {}; divisions: {}",

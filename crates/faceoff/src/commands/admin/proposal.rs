@@ -4,7 +4,7 @@
 use crate::{
     client::Client,
     commands::{
-        output::{lines_or, print},
+        output::{print, print_list},
         stage_lookup::find_stage,
     },
 };
@@ -80,12 +80,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
     let proposal_view = match action {
         ProposalAction::List => {
             let all = client.proposals().await?;
-            return print(json, &all, || {
-                lines_or(
-                    all.iter().map(proposal_line).collect(),
-                    "no trials or proposals",
-                )
-            });
+            return print_list(json, &all, proposal_line, "no trials or proposals");
         }
         ProposalAction::Show { proposal } => client.proposal(proposal).await?,
         ProposalAction::Trial {
@@ -130,7 +125,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
             client.drop_proposal(proposal, confirm).await?
         }
     };
-    print(json, &proposal_view, || proposal_text(&proposal_view))
+    print(json, &proposal_view, proposal_text)
 }
 
 fn proposal_line(proposal: &ProposalView) -> String {

@@ -52,11 +52,11 @@ pub(super) async fn act(client: &Client, json: bool, action: ResultAction) -> an
         ResultAction::Evaluation(args) => show(client, json, &args).await,
         ResultAction::Submission { submission } => {
             let submission = client.submission(submission).await?;
-            print(json, &submission, || submission_line(&submission))
+            print(json, &submission, submission_line)
         }
         ResultAction::Ablation { submission } => {
             let newest = client.ablation(submission).await?;
-            print(json, &newest, || ablation_text(&newest))
+            print(json, &newest, ablation_text)
         }
         ResultAction::OrderAblation {
             submission,
@@ -66,7 +66,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ResultAction) -> an
                 episodes_per_task: episodes,
             };
             let requested = client.request_ablation(submission, &request).await?;
-            print(json, &requested, || ablation_text(&requested))
+            print(json, &requested, ablation_text)
         }
         ResultAction::DownloadDataset { evaluation, file } => {
             download(client, json, evaluation, &file).await

@@ -4,7 +4,7 @@
 use crate::{
     client::Client,
     commands::{
-        output::{lines_or, print},
+        output::{print, print_list},
         stage_lookup::find_stage,
     },
 };
@@ -228,14 +228,12 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
     match action {
         StageAction::List => {
             let stages = client.stages().await?;
-            print(json, &stages, || {
-                lines_or(stages.iter().map(stage_text).collect(), "no stages")
-            })
+            print_list(json, &stages, stage_text, "no stages")
         }
         StageAction::Capacity { stage } => {
             let stage = find_stage(client, &stage).await?;
             let capacity = client.capacity(stage.id).await?;
-            print(json, &capacity, || {
+            print(json, &capacity, |capacity| {
                 let mut lines = vec![format!("{}, {} slots", capacity.stage_name, capacity.slots)];
                 lines.extend(capacity.days.iter().map(|day| day.summary.clone()));
                 lines.join("\n")
@@ -275,7 +273,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 retention: options.retention,
             };
             let created = client.create_stage(&new).await?;
-            print(json, &created, || stage_text(&created))
+            print(json, &created, stage_text)
         }
         StageAction::Change {
             stage,
@@ -323,12 +321,12 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 confirm,
             };
             let changed = client.change_stage(stage.id, &change).await?;
-            print(json, &changed, || stage_text(&changed))
+            print(json, &changed, stage_text)
         }
         StageAction::Final { stage } => {
             let stage = find_stage(client, &stage).await?;
             let day = client.start_final_day(stage.id).await?;
-            print(json, &day, || {
+            print(json, &day, |day| {
                 format!(
                     "{}: final day, {} evaluations started",
                     day.day,
@@ -339,7 +337,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
         StageAction::Finalise { stage, confirm } => {
             let stage = find_stage(client, &stage).await?;
             let signed_off = client.finalise(stage.id, confirm).await?;
-            print(json, &signed_off, || stage_text(&signed_off))
+            print(json, &signed_off, stage_text)
         }
     }
 }

@@ -3,8 +3,9 @@
 use crate::{
     client::Client,
     commands::{
-        output::{download_bar, download_text, lines_or, print},
+        output::{print, print_list},
         storage::storage_line,
+        submissions::download,
     },
 };
 use clap::Subcommand;
@@ -39,18 +40,10 @@ pub(super) async fn act(client: &Client, json: bool, action: StorageAction) -> a
     match action {
         StorageAction::Storage => {
             let teams = client.storage().await?;
-            print(json, &teams, || {
-                lines_or(teams.iter().map(storage_line).collect(), "no teams yet")
-            })
+            print_list(json, &teams, storage_line, "no teams yet")
         }
         StorageAction::DownloadSubmission { submission, file } => {
-            let bar = download_bar()?;
-            let hash = client.submission(submission).await?.blake3;
-            let done = client
-                .download_submission(submission, &file, &hash, &bar)
-                .await?;
-            bar.finish_and_clear();
-            print(json, &done, || download_text(&done))
+            download(client, json, submission, &file).await
         }
         StorageAction::DeleteSubmission {
             submission,
@@ -62,7 +55,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StorageAction) -> a
                 reason: Some(reason),
             };
             let deleted = client.delete_submission(submission, &deletion).await?;
-            print(json, &deleted, || {
+            print(json, &deleted, |deleted| {
                 format!("the bundle of {} is deleted", deleted.id)
             })
         }

@@ -5,13 +5,16 @@ use super::team_lookup::find_team;
 use crate::{
     client::Client,
     commands::{
-        output::{lines_or, print},
+        output::{print, print_list},
         team::team_text,
     },
 };
 use anyhow::Context;
 use clap::Subcommand;
-use faceoff_api::requests::{Decision, TeamChange};
+use faceoff_api::{
+    requests::{Decision, TeamChange},
+    views::team::TeamView,
+};
 use faceoff_types::{DivisionName, TeamName};
 
 #[derive(Debug, Subcommand)]
@@ -82,15 +85,15 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
         TeamAction::RetireTeam { team, confirm } => {
             let id = find_team(client, &team).await?;
             let team = client.retire_team(id, confirm).await?;
-            print(json, &team, || team_text(&team))
+            print(json, &team, team_text)
         }
         TeamAction::ReturnTeam { team } => {
             let team = client.return_team(find_team(client, &team).await?).await?;
-            print(json, &team, || team_text(&team))
+            print(json, &team, team_text)
         }
         TeamAction::CreateTeam { name } => {
             let created = client.create_team(&name).await?;
-            print(json, &created, || {
+            print(json, &created, |created| {
                 format!(
                     "team {} ({})\ntoken {}\nThe token is not shown again; give it to the team.",
                     created.team.name, created.team.id, created.token
@@ -117,12 +120,12 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
                 ..TeamChange::default()
             };
             let team = client.change_team(team, &change).await?;
-            print(json, &team, || team_text(&team))
+            print(json, &team, team_text)
         }
         TeamAction::NewToken { team } => {
             let team = find_team(client, &team).await?;
             let replaced = client.replace_token(team).await?;
-            print(json, &replaced, || {
+            print(json, &replaced, |replaced| {
                 format!(
                     "team {} ({})\ntoken {}\nThe old tokens are revoked.",
                     replaced.team.name, replaced.team.id, replaced.token
@@ -137,36 +140,34 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
             let team = find_team(client, &team).await?;
             let decision = Decision { reason, confirm };
             let team = client.disqualify(team, &decision).await?;
-            print(json, &team, || format!("{} is disqualified", team.name))
+            print(json, &team, |team| format!("{} is disqualified", team.name))
         }
         TeamAction::Reinstate { team, reason } => {
             let team = find_team(client, &team).await?;
-            let team = client.reinstate(team, &reason).await?;
-            print(json, &team, || format!("{} is reinstated", team.name))
+            let team = client.reinstate(team, reason).await?;
+            print(json, &team, |team| format!("{} is reinstated", team.name))
         }
         TeamAction::Teams => {
             let teams = client.teams().await?;
-            print(json, &teams, || {
-                let lines: Vec<_> = teams
-                    .iter()
-                    .map(|team| {
-                        let disqualified = match &team.disqualified {
-                            Some(ruling) => format!("  disqualified: {}", ruling.reason),
-                            None => String::new(),
-                        };
-                        format!(
-                            "{:<40} {}  since {}{disqualified}",
-                            team.name,
-                            team.id,
-                            team.created_at.strftime("%Y-%m-%d")
-                        )
-                    })
-                    .collect();
-                lines_or(
-                    lines,
-                    "no teams yet; create one with faceoff admin create-team NAME",
-                )
-            })
+            print_list(
+                json,
+                &teams,
+                team_line,
+                "no teams yet; create one with faceoff admin create-team NAME",
+            )
         }
     }
+}
+
+fn team_line(team: &TeamView) -> String {
+    let disqualified = match &team.disqualified {
+        Some(ruling) => format!("  disqualified: {}", ruling.reason),
+        None => String::new(),
+    };
+    format!(
+        "{:<40} {}  since {}{disqualified}",
+        team.name,
+        team.id,
+        team.created_at.strftime("%Y-%m-%d")
+    )
 }

@@ -170,17 +170,17 @@ pub(super) async fn act(
     let view = match action {
         TournamentAction::List => {
             let tournaments = client.tournaments().await?;
-            return print(json, &tournaments, || text::tournament_list(&tournaments));
+            return print(json, tournaments.as_slice(), text::tournament_list);
         }
         TournamentAction::Test { tournament, teams } => {
             let id = find_tournament(client, &tournament).await?;
             let requested = client.request_test_games(id, teams).await?;
-            return print(json, &requested, || games::requested_text(&requested));
+            return print(json, &requested, games::requested_text);
         }
         TournamentAction::FreeGames { tournament } => {
             let id = find_tournament_or_newest(client, tournament.as_deref()).await?;
             let games = client.uncounted_games(id).await?;
-            return print(json, &games, || games::games_table(&games));
+            return print(json, games.as_slice(), games::games_table);
         }
         TournamentAction::Replay {
             tournament,
@@ -192,14 +192,12 @@ pub(super) async fn act(
                 Some(times) => client.request_replays(id, times).await?,
                 None => client.cancel_replays(id).await?,
             };
-            return print(json, &champion_shares, || {
-                text::champion_shares_text(&champion_shares)
-            });
+            return print(json, &champion_shares, text::champion_shares_text);
         }
         TournamentAction::StartRound { tournament } => {
             let id = find_tournament(client, &tournament).await?;
             let started = client.start_round(id).await?;
-            return print(json, &started, || text::round_text(&started));
+            return print(json, &started, text::round_text);
         }
         TournamentAction::Void {
             game,
@@ -208,19 +206,19 @@ pub(super) async fn act(
         } => {
             let decision = Decision { reason, confirm };
             let voided = client.void_game(game, &decision).await?;
-            return print(json, &voided, || games::game_text(&voided));
+            return print(json, &voided, games::game_text);
         }
         TournamentAction::Rerun { game } => {
             let queued = client.rerun_game(game).await?;
-            return print(json, &queued, || games::game_text(&queued));
+            return print(json, &queued, games::game_text);
         }
         TournamentAction::Attempts { game } => {
             let attempts = client.attempts(game).await?;
-            return print(json, &attempts, || games::attempts_text(&attempts));
+            return print(json, attempts.as_slice(), games::attempts_text);
         }
         TournamentAction::CallOff { game } => {
             let cancelled = client.cancel_game(game).await?;
-            return print(json, &cancelled, || games::game_text(&cancelled));
+            return print(json, &cancelled, games::game_text);
         }
         TournamentAction::Show { tournament } => {
             let id = find_tournament_or_newest(client, tournament.as_deref()).await?;
@@ -312,5 +310,5 @@ pub(super) async fn act(
             client.close_tournament(id, confirm).await?
         }
     };
-    print(json, &view, || text::tournament_text(&view))
+    print(json, &view, text::tournament_text)
 }

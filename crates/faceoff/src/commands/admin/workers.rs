@@ -2,7 +2,7 @@
 
 use crate::{
     client::Client,
-    commands::output::{lines_or, print},
+    commands::output::{lines_or, print, time_text},
 };
 use clap::Subcommand;
 use faceoff_api::views::workers::{
@@ -32,27 +32,23 @@ pub(super) async fn act(client: &Client, json: bool, action: WorkerAction) -> an
     match action {
         WorkerAction::List => {
             let workers = client.workers().await?;
-            print(json, &workers, || workers_text(&workers))
+            print(json, &workers, workers_text)
         }
         WorkerAction::Ban { worker, reason } => {
             client.ban_worker(&worker, reason).await?;
-            print_workers(client, json, || format!("{worker} is banned")).await
+            print_workers(client, json, format!("{worker} is banned")).await
         }
         WorkerAction::Readmit { worker } => {
             client.readmit_worker(&worker).await?;
-            print_workers(client, json, || format!("{worker} is readmitted")).await
+            print_workers(client, json, format!("{worker} is readmitted")).await
         }
     }
 }
 
 /// Prints the workers after a decision: as JSON, or as `text`.
-async fn print_workers(
-    client: &Client,
-    json: bool,
-    text: impl FnOnce() -> String,
-) -> anyhow::Result<()> {
+async fn print_workers(client: &Client, json: bool, text: String) -> anyhow::Result<()> {
     let workers = client.workers().await?;
-    print(json, &workers, text)
+    print(json, &workers, |_| text)
 }
 
 fn workers_text(view: &WorkersView) -> String {
@@ -115,7 +111,7 @@ fn busy_line(busy: &BusySlotView) -> String {
 }
 
 fn ban_lines(ban: &WorkerBanView) -> String {
-    let banned_at = ban.at.strftime("%Y-%m-%d %H:%M UTC");
+    let banned_at = time_text(ban.at);
     let mut lines = vec![format!(
         "{:<24} banned since {banned_at}: {}",
         ban.worker, ban.reason

@@ -1,6 +1,7 @@
 //! Text of a board: rows by *tier*, the class of an agent by its penalty points, with the columns of the qualifying table in the
 //! paper of the Robot Air Hockey Challenge 2023.
 
+use crate::commands::output::time_text;
 use faceoff_api::views::board::{BoardRow, BoardView};
 use faceoff_types::{Task, Tier};
 use std::fmt::Write as _;
@@ -21,7 +22,7 @@ pub(super) fn board_text(board: &BoardView) -> String {
         text.push_str(", provisional");
     }
     if let Some(frozen) = &board.frozen {
-        let frozen_at = frozen.at.strftime("%Y-%m-%d %H:%M UTC");
+        let frozen_at = time_text(frozen.at);
         let _ = write!(text, "\nfrozen since {frozen_at}: {}", frozen.reason);
     }
     text.push('\n');

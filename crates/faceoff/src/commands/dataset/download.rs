@@ -2,11 +2,7 @@
 
 use crate::{
     client::Client,
-    commands::{
-        block_on,
-        output::{download_bar, download_text, print},
-        server::ServerArgs,
-    },
+    commands::{block_on, output::print_download, server::ServerArgs},
 };
 use anyhow::bail;
 use clap::Args;
@@ -53,10 +49,9 @@ pub(in crate::commands) async fn download(
     let EvaluationStatus::Finished { dataset_blake3, .. } = evaluation.status else {
         bail!("the evaluation has no dataset: {}", evaluation.next);
     };
-    let bar = download_bar()?;
-    let done = client
-        .download_dataset(id, file, dataset_blake3.as_deref(), &bar)
-        .await?;
-    bar.finish_and_clear();
-    print(json, &done, || download_text(&done))
+    print_download(json, async |bar| {
+        let published = dataset_blake3.as_deref();
+        client.download_dataset(id, file, published, bar).await
+    })
+    .await
 }

@@ -43,7 +43,7 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
         tasks,
     };
     write_json(&path, &file)?;
-    print(json, &file, || format!("{text}\n{}", path.display()))?;
+    print(json, &file, |_| format!("{text}\n{}", path.display()))?;
     Ok(faults)
 }
 

@@ -1,13 +1,15 @@
 //! Text of tournaments.
 
-use crate::commands::{output::lines_or, score::table};
+use crate::commands::{
+    output::{lines_or, time_text},
+    score::table,
+};
 use faceoff_api::views::{
     champion_shares::ChampionSharesView,
     tournament::{EntrantView, RoundView, TournamentHead, TournamentPhase, TournamentView},
 };
 use faceoff_scoring::tournament::schedule::{Table, TableScope};
 use faceoff_types::{DepartureKind, Publication, RoundNumber, TournamentFormat, TournamentRules};
-use jiff::Timestamp;
 
 pub(in crate::commands) fn tournament_list(tournaments: &[TournamentHead]) -> String {
     let line = |head: &TournamentHead| {
@@ -42,10 +44,6 @@ fn phase_text(head: &TournamentHead) -> String {
         None => String::new(),
     };
     format!("{phase}{paused}{champion}")
-}
-
-fn time_text(time: Timestamp) -> String {
-    time.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 /// A tournament with rules, teams, rounds and standings.

@@ -1,0 +1,94 @@
+//! What serving a season needs, whether it runs or is archived: the opened data folder, the address and the HTTP settings.
+
+use super::data_folder::{empty_folder, load_or_create_link_key, lock, set_admin_token};
+use crate::{config::Config, machine};
+use anyhow::Context;
+use faceoff_http::{AgentResources, Capacity, HttpConfig, LinkKey};
+use faceoff_metrics::Metrics;
+use faceoff_store::{FreeSpace, Store};
+use faceoff_types::Clock;
+use jiff::Timestamp;
+use std::{
+    fs::File,
+    io::Write as _,
+    net::SocketAddr,
+    path::{Path, PathBuf},
+};
+use tokio::net::TcpListener;
+
+pub(super) struct Site {
+    pub(super) store: Store,
+    pub(super) listener: TcpListener,
+    pub(super) address: SocketAddr,
+    pub(super) link_key: LinkKey,
+    upload_dir: PathBuf,
+    /// Held as long as the season is served.
+    _lock: File,
+}
+
+impl Site {
+    /// Locks and opens the existing data folder and binds the address. `disks` are folders on the disks whose free space is
+    /// watched.
+    ///
+    /// # Errors
+    /// If the data folder or the address is unusable.
+    pub(super) async fn open(config: &Config, disks: Vec<PathBuf>) -> anyhow::Result<Self> {
+        let data_dir = &config.server.data_dir;
+        let lock = lock(data_dir)?;
+        let upload_dir = data_dir.join("uploads");
+        // A process that was killed may have left half-uploaded files, which belong to no submission, or an archive that a
+        // visitor was downloading.
+        empty_folder(&upload_dir)?;
+        let store = open_store(data_dir)
+            .await?
+            .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
+        set_admin_token(&store, data_dir, Timestamp::now()).await?;
+        let listen = config.server.listen;
+        let listener = TcpListener::bind(listen).await.with_context(|| {
+            format!("listening on {listen}; choose another address with --listen")
+        })?;
+        Ok(Self {
+            store,
+            address: listener.local_addr().context("reading the bound address")?,
+            listener,
+            link_key: load_or_create_link_key(data_dir)?,
+            upload_dir,
+            _lock: lock,
+        })
+    }
+
+    /// The settings of API and pages.
+    pub(super) fn http_config(
+        &self,
+        config: &Config,
+        clock: Clock,
+        capacity: Capacity,
+        agent_resources: AgentResources,
+    ) -> HttpConfig {
+        HttpConfig {
+            max_bundle_bytes: config.bundle.packed_bytes,
+            public_url: config.server.public_url.clone(),
+            upload_dir: self.upload_dir.clone(),
+            clock,
+            limits: config.uploads.limits(),
+            capacity,
+            agent_resources,
+            webhooks: config.webhooks.clone(),
+            rate_limits: config.rates.limits(),
+            link_key: self.link_key.clone(),
+            metrics: Metrics::new(env!("CARGO_PKG_VERSION")),
+            process: machine::process,
+        }
+    }
+}
+
+async fn open_store(data_dir: &Path) -> anyhow::Result<Store> {
+    let store = Store::open(data_dir).await;
+    store.with_context(|| format!("opening the data folder {}", data_dir.display()))
+}
+
+/// Prints the address, including a port that the system has chosen, once connections are accepted, so that the parent process
+/// can read it. A closed standard output is no error.
+pub(super) fn announce(address: SocketAddr) {
+    let _ = writeln!(std::io::stdout(), "http://{address}");
+}
