@@ -6,6 +6,7 @@
 
 mod archive;
 mod download;
+mod evaluations;
 mod files;
 mod game;
 mod http;
@@ -14,6 +15,7 @@ mod pages;
 mod proposals;
 mod sessions;
 mod sse;
+mod stages;
 mod tls;
 mod tournament;
 mod uploads;
@@ -25,33 +27,22 @@ use anyhow::{Context, anyhow, bail};
 pub use download::DownloadedFile;
 use faceoff_api::{
     API_BASE,
-    requests::{
-        BoardFormat, BoardQuery, Cancellation, CloseSeason, ComparisonQuery, Confirmation,
-        Decision, MissedDay, NewExtraEvaluation, NewStage, NewTeam, Reason, StageChange, StartDay,
-    },
+    requests::{BoardFormat, BoardQuery, CloseSeason, Reason},
     views::{
-        board::BoardView,
-        capacity::CapacityView,
-        comparison::ComparisonView,
-        day::DayView,
-        evaluation::EvaluationView,
-        event::EventsView,
-        health::HealthView,
-        me::MeView,
-        runtimes::RuntimesView,
-        season::SeasonView,
-        stage::StageView,
-        team::{TeamView, TeamWithToken},
+        board::BoardView, event::EventsView, health::HealthView, me::MeView,
+        runtimes::RuntimesView, season::SeasonView,
     },
 };
-use faceoff_types::{EvaluationId, StageDay, StageId, Task, TeamId};
+use faceoff_types::Task;
 use http::Address;
-use jiff::civil::Date;
 pub use links::LinkTarget;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 pub use sse::ServerEvent;
-use std::{path::Path, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 pub use tls::{plain_client_config, tls_client_config};
 
 /// Longest silence of the server before a request fails.
@@ -66,6 +57,13 @@ pub struct ApiError {
     pub title: String,
     /// Expected and received value, and the remedy.
     pub detail: String,
+}
+
+/// The server has refused with this status.
+pub fn is_refused_with(error: &anyhow::Error, status: StatusCode) -> bool {
+    error
+        .downcast_ref::<ApiError>()
+        .is_some_and(|refused| refused.status == status)
 }
 
 /// The server did not answer, or answered as no Faceoff server does. The error's source has the cause.
@@ -118,8 +116,7 @@ impl Client {
     /// # Errors
     /// [`ApiError`] if the server refuses, [`Unreachable`] if it does not answer; the same holds for all calls below.
     pub async fn board(&self, task: Option<Task>, query: &BoardQuery) -> anyhow::Result<BoardView> {
-        let request = self.request(Method::GET, &board_path(task)).query(query);
-        read_json(self.send(request).await?).await
+        self.get_with_query(&board_path(task), query).await
     }
 
     /// A board as CSV.
@@ -136,18 +133,6 @@ impl Client {
         read_text(self.send(request).await?).await
     }
 
-    /// Compares two finished evaluations on the same episodes.
-    pub async fn compare(
-        &self,
-        a: EvaluationId,
-        b: EvaluationId,
-        query: ComparisonQuery,
-    ) -> anyhow::Result<ComparisonView> {
-        let path = format!("/evaluations/{a}/compare/{b}");
-        let request = self.request(Method::GET, &path).query(&query);
-        read_json(self.send(request).await?).await
-    }
-
     pub async fn season(&self) -> anyhow::Result<SeasonView> {
         self.get("/season").await
     }
@@ -157,47 +142,13 @@ impl Client {
         self.post("/season/close", &CloseSeason { confirm }).await
     }
 
-    /// Organiser: creates a team. Only this response has its token.
-    pub async fn create_team(&self, name: &str) -> anyhow::Result<TeamWithToken> {
-        self.post(
-            "/teams",
-            &NewTeam {
-                name: name.to_owned(),
-            },
-        )
-        .await
-    }
-
-    /// Organiser: all teams.
-    pub async fn teams(&self) -> anyhow::Result<Vec<TeamView>> {
-        self.list(self.request(Method::GET, "/teams")).await
-    }
-
-    /// Organiser: issues a new token for a team and revokes the old one.
-    pub async fn replace_token(&self, team: TeamId) -> anyhow::Result<TeamWithToken> {
-        self.post_empty(&format!("/teams/{team}/token")).await
-    }
-
-    /// Organiser: starts the evaluation day of a stage, by default of the open one.
-    pub async fn start_day(&self, stage: Option<StageId>) -> anyhow::Result<DayView> {
-        self.post("/days", &StartDay { stage }).await
-    }
-
-    /// All stages, by opening time.
-    pub async fn stages(&self) -> anyhow::Result<Vec<StageView>> {
-        self.get("/stages").await
-    }
-
     /// The environment of agents on the server: runtimes, packages, limits.
     ///
     /// # Errors
     /// If the server does not answer, or is of another version.
     pub async fn runtimes(&self) -> anyhow::Result<RuntimesView> {
         self.get("/runtimes").await.map_err(|error| {
-            let is_unknown_route = error
-                .downcast_ref::<ApiError>()
-                .is_some_and(|error| error.status == StatusCode::NOT_FOUND);
-            if is_unknown_route {
+            if is_refused_with(&error, StatusCode::NOT_FOUND) {
                 error.context(
                     "the server does not describe its runtimes; is it an older version of Faceoff?",
                 )
@@ -205,106 +156,6 @@ impl Client {
                 error
             }
         })
-    }
-
-    /// Organiser: whether the evaluation days of a stage fit into their time.
-    pub async fn capacity(&self, id: StageId) -> anyhow::Result<CapacityView> {
-        self.get(&format!("/stages/{id}/capacity")).await
-    }
-
-    /// Organiser: freezes the boards of a stage.
-    pub async fn freeze(&self, id: StageId, reason: String) -> anyhow::Result<StageView> {
-        self.post(&format!("/stages/{id}/freeze"), &Reason { reason })
-            .await
-    }
-
-    /// Organiser: unfreezes the boards of a stage.
-    pub async fn unfreeze(&self, id: StageId) -> anyhow::Result<StageView> {
-        self.post_empty(&format!("/stages/{id}/unfreeze")).await
-    }
-
-    /// Organiser: starts an evaluation day for a past date that had no cutoff.
-    pub async fn start_missed_day(
-        &self,
-        id: StageId,
-        missed: &MissedDay,
-    ) -> anyhow::Result<DayView> {
-        self.post(&format!("/stages/{id}/days"), missed).await
-    }
-
-    /// Organiser: adds one evaluation of a team to an evaluation day.
-    pub async fn add_evaluation(
-        &self,
-        day: StageDay,
-        extra: &NewExtraEvaluation,
-    ) -> anyhow::Result<EvaluationView> {
-        let path = format!("/stages/{}/days/{}/extra-evaluation", day.stage, day.date);
-        self.post(&path, extra).await
-    }
-
-    /// Organiser: creates a stage.
-    pub async fn create_stage(&self, new: &NewStage) -> anyhow::Result<StageView> {
-        self.post("/stages", new).await
-    }
-
-    /// Organiser: changes a stage.
-    pub async fn change_stage(
-        &self,
-        id: StageId,
-        change: &StageChange,
-    ) -> anyhow::Result<StageView> {
-        self.call_with_body(Method::PATCH, &format!("/stages/{id}"), change)
-            .await
-    }
-
-    /// Organiser: starts a stage's final day, the evaluation day after its close whose results decide it.
-    pub async fn start_final_day(&self, id: StageId) -> anyhow::Result<DayView> {
-        self.post_empty(&format!("/stages/{id}/final")).await
-    }
-
-    /// Organiser: signs off a stage's result; `confirm` is the stage's name.
-    pub async fn finalise(
-        &self,
-        id: StageId,
-        confirm: Option<String>,
-    ) -> anyhow::Result<StageView> {
-        self.post(&format!("/stages/{id}/finalise"), &Confirmation { confirm })
-            .await
-    }
-
-    /// Team: publishes one of its own evaluations.
-    pub async fn publish(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
-        self.post_empty(&format!("/evaluations/{id}/publish")).await
-    }
-
-    /// Organiser: repeats an evaluation that was cancelled or failed by a platform fault.
-    pub async fn rerun(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
-        self.post_empty(&format!("/evaluations/{id}/rerun")).await
-    }
-
-    /// Organiser: stops an evaluation.
-    pub async fn cancel(&self, id: EvaluationId, reason: String) -> anyhow::Result<EvaluationView> {
-        self.post(
-            &format!("/evaluations/{id}/cancel"),
-            &Cancellation { reason },
-        )
-        .await
-    }
-
-    /// Organiser: voids a result, which leaves the boards.
-    pub async fn void(
-        &self,
-        id: EvaluationId,
-        decision: &Decision,
-    ) -> anyhow::Result<EvaluationView> {
-        self.post(&format!("/evaluations/{id}/void"), decision)
-            .await
-    }
-
-    /// Organiser: voids a whole evaluation day.
-    pub async fn void_day(&self, day: StageDay, decision: &Decision) -> anyhow::Result<DayView> {
-        let path = format!("/stages/{}/days/{}/void", day.stage, day.date);
-        self.post(&path, decision).await
     }
 
     /// Organiser: pauses the queue.
@@ -319,51 +170,14 @@ impl Client {
         self.send(request).await.map(drop)
     }
 
-    /// Organiser: disqualifies a team.
-    pub async fn disqualify(&self, id: TeamId, decision: &Decision) -> anyhow::Result<TeamView> {
-        self.post(&format!("/teams/{id}/disqualify"), decision)
-            .await
-    }
-
-    /// Organiser: reinstates a disqualified team.
-    pub async fn reinstate(&self, id: TeamId, reason: String) -> anyhow::Result<TeamView> {
-        self.post(&format!("/teams/{id}/reinstate"), &Reason { reason })
-            .await
-    }
-
     /// Team: its name and limits, today's evaluations and its active submission.
     pub async fn me(&self) -> anyhow::Result<MeView> {
         self.get("/me").await
     }
 
-    /// Organiser: all evaluations of a day (default: today). Team: its own (default: of all days).
-    pub async fn evaluations(&self, day: Option<Date>) -> anyhow::Result<Vec<EvaluationView>> {
-        let request = self.request(Method::GET, "/evaluations");
-        let request = match day {
-            Some(day) => request.query(&[("day", day.to_string())]),
-            None => request,
-        };
-        self.list(request).await
-    }
-
-    /// Team: its newest evaluations, at most `limit` (up to 200).
-    pub async fn newest_evaluations(&self, limit: usize) -> anyhow::Result<Vec<EvaluationView>> {
-        let request = self.request(Method::GET, "/evaluations");
-        let request = request.query(&[("limit", limit.clamp(1, 200))]);
-        let mut newest: Vec<EvaluationView> = read_json(self.send(request).await?).await?;
-        newest.truncate(limit);
-        Ok(newest)
-    }
-
     /// Organiser: the newest entries of the log that match the parameters of `GET /events`.
     pub async fn events(&self, parameters: &[(&str, String)]) -> anyhow::Result<EventsView> {
-        let request = self.request(Method::GET, "/events").query(parameters);
-        read_json(self.send(request).await?).await
-    }
-
-    /// Team or organiser: one evaluation.
-    pub async fn evaluation(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
-        self.get(&format!("/evaluations/{id}")).await
+        self.get_with_query("/events", parameters).await
     }
 
     fn request(&self, method: Method, path: &str) -> RequestBuilder {
@@ -378,6 +192,15 @@ impl Client {
 
     async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
         self.call(Method::GET, path).await
+    }
+
+    async fn get_with_query<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        query: &(impl Serialize + ?Sized),
+    ) -> anyhow::Result<T> {
+        let request = self.request(Method::GET, path).query(query);
+        read_json(self.send(request).await?).await
     }
 
     async fn post<T: DeserializeOwned>(
@@ -463,6 +286,13 @@ async fn read_json<T: DeserializeOwned>(response: Response) -> anyhow::Result<T>
     serde_json::from_slice(&bytes).context(Unreachable(
         "the server's answer cannot be read; is it another version of Faceoff?".to_owned(),
     ))
+}
+
+/// A path beside `file`, for a part of it or about it.
+fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
+    let mut path = file.as_os_str().to_owned();
+    path.push(suffix);
+    PathBuf::from(path)
 }
 
 fn board_path(task: Option<Task>) -> String {

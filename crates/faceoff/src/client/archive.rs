@@ -1,17 +1,13 @@
 //! Download of the season's archive: one file with the season's data and a *manifest*, which lists its files with their hashes.
 //! The *edition* says whether it is for the public or for organisers.
 
-use super::Client;
+use super::{Client, with_suffix};
 use anyhow::{Context, bail};
 use faceoff_api::requests::ArchiveQuery;
 use faceoff_archive::{Edition, Manifest, check};
 use futures::StreamExt;
 use reqwest::Method;
-use std::{
-    io::ErrorKind,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{io::ErrorKind, path::Path, time::Duration};
 use tokio::{
     fs::{self, File},
     io::AsyncWriteExt,
@@ -48,9 +44,7 @@ impl Client {
             .request(Method::GET, "/season/archive")
             .query(&query);
         let response = slow_client.send(request).await?;
-        let mut name = file.as_os_str().to_owned();
-        name.push(".part");
-        let partial = PathBuf::from(name);
+        let partial = with_suffix(file, ".part");
         let fetched = fetch(response, &partial).await;
         let checked = match fetched {
             Ok(bytes) => check_archive(&partial)

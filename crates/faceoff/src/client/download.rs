@@ -1,7 +1,7 @@
 //! Resumable downloads of files. An interrupted download leaves a partial file, which the next one continues if the
 //! server's ETag, which identifies one content of a file, is still the same.
 
-use super::{ApiError, Client};
+use super::{Client, is_refused_with, with_suffix};
 use anyhow::{Context, anyhow, bail, ensure};
 use futures::StreamExt;
 use indicatif::ProgressBar;
@@ -44,7 +44,9 @@ impl Client {
         let mut part = PartialFile::open(file)?;
         let mut resumed_at = part.resumable_bytes();
         let mut answer = self.request_file(path, &part, resumed_at).await;
-        if resumed_at > 0 && answer.as_ref().is_err_and(is_range_not_satisfiable) {
+        let is_past_the_end =
+            |error: &anyhow::Error| is_refused_with(error, StatusCode::RANGE_NOT_SATISFIABLE);
+        if resumed_at > 0 && answer.as_ref().is_err_and(is_past_the_end) {
             resumed_at = 0;
             answer = self.request_file(path, &part, 0).await;
         }
@@ -117,12 +119,6 @@ impl Client {
     }
 }
 
-fn is_range_not_satisfiable(error: &anyhow::Error) -> bool {
-    error
-        .downcast_ref::<ApiError>()
-        .is_some_and(|error| error.status == StatusCode::RANGE_NOT_SATISFIABLE)
-}
-
 /// Headers of a response that describe the complete file.
 struct FileInfo {
     /// Length in bytes.
@@ -181,12 +177,8 @@ struct PartialFile {
 
 impl PartialFile {
     fn open(target: &Path) -> anyhow::Result<Self> {
-        let sibling = |suffix: &str| {
-            let mut name = target.as_os_str().to_owned();
-            name.push(suffix);
-            PathBuf::from(name)
-        };
-        let (path, tag_path) = (sibling(".part"), sibling(".part.etag"));
+        let path = with_suffix(target, ".part");
+        let tag_path = with_suffix(target, ".part.etag");
         let file = File::options()
             .read(true)
             .write(true)

@@ -2,7 +2,7 @@
 
 use super::*;
 use faceoff_api::{
-    requests::DeleteSubmission,
+    requests::{ComparisonQuery, DeleteSubmission, NewStage, StageChange},
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
@@ -13,8 +13,8 @@ use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
 use faceoff_store::{ClaimedJob, Job, Store};
 use faceoff_types::{
-    Clock, CountingResult, DayDeadline, Profile, Ruleset, StageRules, StageSettings, Task,
-    TimeLimits, ValidationOutcome, Zone,
+    Clock, CountingResult, DayDeadline, EvaluationId, Profile, Ruleset, StageRules, StageSettings,
+    Task, TimeLimits, ValidationOutcome, Zone,
 };
 use indicatif::ProgressBar;
 use jiff::Timestamp;

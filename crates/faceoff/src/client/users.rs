@@ -3,14 +3,15 @@
 use super::Client;
 use faceoff_api::{
     requests::{
-        Confirmation, JoinRequest, NewAnnouncement, NewAnswer, NewInvitation, NewPassword,
-        NewQuestion, NewTerms, NewToken, Reason, RegistrationRequest, SeasonChange, TeamChange,
+        Confirmation, Decision, JoinRequest, NewAnnouncement, NewAnswer, NewInvitation,
+        NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason, RegistrationRequest,
+        SeasonChange, TeamChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
         invitation::{InvitationView, NewInvitationView, NewRegistrationView, RegistrationView},
         season::SeasonView,
-        team::TeamView,
+        team::{TeamView, TeamWithToken},
         token::{NewTokenView, TokenView},
         user::{CallerView, NewAccountView, UserView},
     },
@@ -87,6 +88,39 @@ impl Client {
     /// Accepts an invitation; only this response has the token.
     pub async fn join(&self, join: &JoinRequest) -> anyhow::Result<NewAccountView> {
         self.post("/invitations/accept", join).await
+    }
+
+    /// Organiser: creates a team. Only this response has its token.
+    pub async fn create_team(&self, name: &str) -> anyhow::Result<TeamWithToken> {
+        self.post(
+            "/teams",
+            &NewTeam {
+                name: name.to_owned(),
+            },
+        )
+        .await
+    }
+
+    /// Organiser: all teams.
+    pub async fn teams(&self) -> anyhow::Result<Vec<TeamView>> {
+        self.list(self.request(Method::GET, "/teams")).await
+    }
+
+    /// Organiser: issues a new token for a team and revokes the old one.
+    pub async fn replace_token(&self, team: TeamId) -> anyhow::Result<TeamWithToken> {
+        self.post_empty(&format!("/teams/{team}/token")).await
+    }
+
+    /// Organiser: disqualifies a team.
+    pub async fn disqualify(&self, id: TeamId, decision: &Decision) -> anyhow::Result<TeamView> {
+        self.post(&format!("/teams/{id}/disqualify"), decision)
+            .await
+    }
+
+    /// Organiser: reinstates a disqualified team.
+    pub async fn reinstate(&self, id: TeamId, reason: String) -> anyhow::Result<TeamView> {
+        self.post(&format!("/teams/{id}/reinstate"), &Reason { reason })
+            .await
     }
 
     pub async fn team(&self, id: TeamId) -> anyhow::Result<TeamView> {

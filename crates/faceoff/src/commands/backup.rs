@@ -6,11 +6,11 @@ pub mod manifest;
 
 use super::{
     atomic_folder::{self, AtomicFolder, FolderOperation},
+    config_file::ConfigFile,
     output::print,
     serve::ADMIN_TOKEN_FILE,
     storage::format_bytes,
 };
-use crate::config::Config;
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_store::{RequiredArtifact, Store, StoreError};
@@ -31,9 +31,8 @@ use std::{
 pub struct BackupCommand {
     /// The folder to create; an existing folder must be empty
     folder: PathBuf,
-    /// Configuration file [default: faceoff.toml in the working folder, if it exists]
-    #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    config: ConfigFile,
     /// The server's data folder; overrides server.data_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
@@ -56,7 +55,7 @@ impl BackupCommand {
     pub fn run(self) -> anyhow::Result<()> {
         let data_dir = match self.data_dir {
             Some(folder) => folder,
-            None => Config::load(self.config.as_deref())?.server.data_dir,
+            None => self.config.load()?.server.data_dir,
         };
         let manifest = back_up(&data_dir, &self.folder, Timestamp::now())?;
         print(self.json, &manifest.summary(&self.folder), |_| {

@@ -90,11 +90,7 @@ impl DemoCommand {
     /// # Errors
     /// If a step fails.
     pub fn run(self) -> anyhow::Result<()> {
-        tokio::runtime::Builder::new_multi_thread()
-            .enable_all()
-            .build()
-            .context("starting the async runtime")?
-            .block_on(self.run_day())
+        super::block_on_all_cpus(self.run_day())
     }
 
     async fn run_day(self) -> anyhow::Result<()> {

@@ -9,6 +9,7 @@ mod permissions;
 mod report;
 mod worker_admission;
 
+use super::config_file::ConfigFile;
 use crate::{
     config::{Config, RuntimeConfig},
     descriptors::Descriptors,
@@ -29,9 +30,8 @@ use std::{io::Write as _, path::PathBuf};
 /// Checks whether this host can run agents, and how to fix what is missing.
 #[derive(Debug, Args)]
 pub struct DoctorCommand {
-    /// Configuration file [default: faceoff.toml in the working folder, if it exists]
-    #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    config: ConfigFile,
     /// NATS server, to check whether a worker on this host would get jobs; overrides nats.url of the configuration
     #[arg(long, value_name = "URL")]
     nats: Option<String>,
@@ -126,7 +126,7 @@ impl DoctorCommand {
     /// If a layer of the sandbox is missing that the configuration does not give up, or the configuration cannot be
     /// read.
     pub fn run(self) -> anyhow::Result<()> {
-        let mut config = Config::load(self.config.as_deref())?;
+        let mut config = self.config.load()?;
         config.override_nats_url(self.nats)?;
         let mut findings = Findings::gather(&config);
         findings.nats = worker_admission::check(&config, self.name)?;

@@ -1,6 +1,6 @@
 //! Text of an evaluation's status and of its results by task. A *tier* is the class of an agent by its penalty points.
 
-use super::queue::queue_text;
+use super::{queue::queue_text, table_cells::percent_interval};
 use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     task::TaskView,
@@ -51,12 +51,11 @@ pub(super) fn task_table(tasks: &BTreeMap<Task, TaskView>) -> String {
         "task", "episodes", "success", "95 % interval", "penalty"
     )];
     lines.extend(tasks.iter().map(|(task, result)| {
-        let [low, high] = result.success_ci95.map(|bound| 100.0 * bound);
         format!(
             "{task:<8} {:>8} {:>7.1} % {:>19} {:>8.1}  {}",
             result.episodes,
             100.0 * result.success_rate,
-            format!("{low:.1} to {high:.1} %"),
+            percent_interval(result.success_ci95),
             result.penalty_points,
             result.tier.title()
         )

@@ -3,7 +3,7 @@
 
 use super::{
     atomic_folder::{self, AtomicFolder, FolderOperation, create_private},
-    output::print,
+    output::{exact_time_text, print},
 };
 use anyhow::{Context, bail};
 use clap::Args;
@@ -67,7 +67,7 @@ impl ImportCommand {
                 "imported the {} archive of {:?} of {}: {} files of {} bytes",
                 manifest.edition,
                 manifest.season,
-                manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+                exact_time_text(manifest.made_at),
                 manifest.files.len(),
                 manifest.total_bytes()
             )];

@@ -1,7 +1,7 @@
 //! `faceoff log`: prints the log and the faults of an agent.
 
 use super::{game::own_side, output::print, server::ServerArgs};
-use crate::client::{ApiError, Client};
+use crate::client::{Client, is_refused_with};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::views::{
@@ -98,10 +98,8 @@ impl LogCommand {
 fn none_if_missing<T>(found: anyhow::Result<T>) -> anyhow::Result<Option<T>> {
     match found {
         Ok(found) => Ok(Some(found)),
-        Err(error) => match error.downcast_ref::<ApiError>() {
-            Some(refused) if refused.status == StatusCode::NOT_FOUND => Ok(None),
-            _ => Err(error),
-        },
+        Err(error) if is_refused_with(&error, StatusCode::NOT_FOUND) => Ok(None),
+        Err(error) => Err(error),
     }
 }
 

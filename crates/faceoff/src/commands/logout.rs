@@ -2,11 +2,12 @@
 
 use super::output::print;
 use crate::{
-    client::{ApiError, Client},
+    client::{Client, is_refused_with},
     credentials::{self, Credentials},
 };
 use anyhow::Context;
 use clap::Args;
+use reqwest::StatusCode;
 use serde_json::json;
 
 /// Signs out of a server: deletes the token that `faceoff login` has stored, and revokes it if `login` has created it.
@@ -51,7 +52,7 @@ impl LogoutCommand {
             revoked = match client.revoke_own_token().await {
                 Ok(()) => true,
                 // The token is already invalid.
-                Err(error) if is_unauthorised(&error) => false,
+                Err(error) if is_refused_with(&error, StatusCode::UNAUTHORIZED) => false,
                 Err(error) => {
                     return Err(error.context(
                         "the token was not revoked, so you are still signed in; faceoff logout --keep-token signs out without revoking it",
@@ -82,10 +83,4 @@ impl LogoutCommand {
             format!("signed out of {server}: {outcome}{next}")
         })
     }
-}
-
-fn is_unauthorised(error: &anyhow::Error) -> bool {
-    error
-        .downcast_ref::<ApiError>()
-        .is_some_and(|error| error.status == reqwest::StatusCode::UNAUTHORIZED)
 }

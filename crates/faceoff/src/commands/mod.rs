@@ -10,6 +10,7 @@ mod ca_file;
 mod capabilities;
 pub mod compare;
 pub mod completions;
+mod config_file;
 pub mod dataset;
 pub mod demo;
 pub mod doctor;
@@ -50,6 +51,7 @@ pub mod status;
 mod storage;
 pub mod submissions;
 pub mod submit;
+mod table_cells;
 pub mod team;
 pub mod token;
 pub mod tournament;
@@ -60,10 +62,23 @@ pub mod withdraw;
 pub mod worker;
 
 use anyhow::Context;
+use tokio::runtime::Builder;
 
 /// Runs a future that talks to a server.
 fn block_on<T>(future: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
-    tokio::runtime::Builder::new_current_thread()
+    block_on_runtime(Builder::new_current_thread(), future)
+}
+
+/// Runs a future of a server or a worker, on the CPUs of this process.
+fn block_on_all_cpus<T>(future: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
+    block_on_runtime(Builder::new_multi_thread(), future)
+}
+
+fn block_on_runtime<T>(
+    mut builder: Builder,
+    future: impl Future<Output = anyhow::Result<T>>,
+) -> anyhow::Result<T> {
+    builder
         .enable_all()
         .build()
         .context("starting the async runtime")?

@@ -53,6 +53,11 @@ pub(super) fn time_text(time: Timestamp) -> String {
     time.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
+/// A time to the second.
+pub(super) fn exact_time_text(time: Timestamp) -> String {
+    time.strftime("%Y-%m-%d %H:%M:%S UTC").to_string()
+}
+
 /// Downloads a file, shows the progress if standard error is a terminal, and prints where the file is.
 pub(super) async fn print_download(
     json: bool,

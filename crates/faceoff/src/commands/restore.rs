@@ -3,10 +3,11 @@
 use super::{
     atomic_folder::{self, AtomicFolder, FolderOperation},
     backup::{
-        self, files,
-        manifest::{ARTIFACTS, DATABASE, Manifest},
+        self,
+        files::{self, CopiedFile},
+        manifest::{ARTIFACTS, BackupFile, DATABASE, Manifest},
     },
-    output::print,
+    output::{exact_time_text, print},
     serve::lock,
     storage::format_bytes,
 };
@@ -75,7 +76,7 @@ impl RestoreCommand {
                     "{} is intact: {:?} of {}, {} files, {}",
                     self.folder.display(),
                     manifest.season,
-                    manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+                    exact_time_text(manifest.made_at),
                     manifest.files.len(),
                     format_bytes(manifest.total_bytes())
                 )
@@ -88,7 +89,7 @@ impl RestoreCommand {
             let mut lines = vec![format!(
                 "restored {:?} of {}: {} files, {}",
                 manifest.season,
-                manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+                exact_time_text(manifest.made_at),
                 manifest.files.len(),
                 format_bytes(manifest.total_bytes())
             )];
@@ -136,13 +137,7 @@ fn restore(
             atomic_folder::create_private(parent)?;
         }
         let copied = files::copy_file(&from, &to)?;
-        ensure!(
-            copied.blake3 == file.blake3,
-            "{} has changed since the backup: expected BLAKE3 {}, got {}",
-            from.display(),
-            file.blake3,
-            copied.blake3
-        );
+        check_unchanged(&from, file, &copied)?;
     }
     check_database(&content.join(DATABASE), new_folder.scratch())?;
     super::block_on(async {
@@ -192,16 +187,21 @@ fn check(folder: &Path, manifest: &Manifest) -> anyhow::Result<()> {
     for file in &manifest.files {
         let path = folder.join(&file.path);
         let found = files::hash_file(&path)?;
-        ensure!(
-            found.blake3 == file.blake3,
-            "{} has changed since the backup: expected BLAKE3 {}, got {}",
-            path.display(),
-            file.blake3,
-            found.blake3
-        );
+        check_unchanged(&path, file, &found)?;
     }
     let scratch = tempfile::tempdir().context("creating a folder for a copy of the database")?;
     check_database(&folder.join(DATABASE), scratch.path())
+}
+
+fn check_unchanged(path: &Path, listed: &BackupFile, found: &CopiedFile) -> anyhow::Result<()> {
+    ensure!(
+        found.blake3 == listed.blake3,
+        "{} has changed since the backup: expected BLAKE3 {}, got {}",
+        path.display(),
+        listed.blake3,
+        found.blake3
+    );
+    Ok(())
 }
 
 fn check_database(database: &Path, scratch: &Path) -> anyhow::Result<()> {

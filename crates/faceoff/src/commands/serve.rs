@@ -17,6 +17,7 @@ pub use data_folder::{ADMIN_TOKEN_FILE, lock};
 pub use http::shutdown_signal;
 pub use sandbox::{check_sandbox, hold_in_memory};
 
+use super::config_file::ConfigFile;
 use crate::{config::Config, descriptors::Descriptors, log::LogFormat};
 use anyhow::Context;
 use clap::Args;
@@ -31,9 +32,8 @@ use std::{
 /// Starts the competition server.
 #[derive(Debug, Args)]
 pub struct ServeCommand {
-    /// Configuration file [default: faceoff.toml in the working folder, if it exists]
-    #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    config: ConfigFile,
     /// Address of API and pages; overrides server.listen of the configuration
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<SocketAddr>,
@@ -65,18 +65,16 @@ impl ServeCommand {
         let connections = assign_descriptors(&config)?;
         match archived {
             // An archived season runs no agents, so no CPUs are reserved.
-            Some(archived) => tokio::runtime::Builder::new_multi_thread()
-                .enable_all()
-                .build()
-                .context("starting the async runtime")?
-                .block_on(archived_season::serve(config, connections, archived)),
+            Some(archived) => {
+                super::block_on_all_cpus(archived_season::serve(config, connections, archived))
+            }
             None => live_season::run(config, connections),
         }
     }
 
     /// The configuration with the options of the command line.
     fn load_config(self) -> anyhow::Result<Config> {
-        let mut config = Config::load(self.config.as_deref())?;
+        let mut config = self.config.load()?;
         if let Some(listen) = self.listen {
             config.server.listen = listen;
         }

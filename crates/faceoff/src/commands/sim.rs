@@ -2,6 +2,7 @@
 //! divided into *substeps* of the physics.
 
 mod bench;
+mod constraints;
 mod export;
 mod golden;
 mod kinematics;

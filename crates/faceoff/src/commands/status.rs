@@ -1,16 +1,20 @@
 //! `faceoff status`: prints the team's current state.
 
 use super::{
-    evaluation_text::status_text, output::print, server::ServerArgs, submissions::status_lines,
+    evaluation_text::status_text,
+    output::{exact_time_text, print},
+    server::ServerArgs,
+    submissions::status_lines,
 };
 use crate::{
-    client::{ApiError, Client},
+    client::{Client, is_refused_with},
     exit::Exit,
     terminal,
 };
 use anyhow::Context;
 use clap::Args;
 use faceoff_api::views::{evaluation::EvaluationView, me::MeView};
+use reqwest::StatusCode;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -84,7 +88,10 @@ impl StatusCommand {
                     }
                 }
                 // The server may be restarting, or limiting requests.
-                Err(error) if Exit::of(&error) == Exit::Unreachable || is_rate_limited(&error) => {
+                Err(error)
+                    if Exit::of(&error) == Exit::Unreachable
+                        || is_refused_with(&error, StatusCode::TOO_MANY_REQUESTS) =>
+                {
                     if !is_disconnected {
                         eprintln!("{error:#}; retrying");
                         is_disconnected = true;
@@ -103,18 +110,12 @@ impl StatusCommand {
             return Ok(());
         }
         if is_repeated {
-            let now = jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC");
+            let now = exact_time_text(jiff::Timestamp::now());
             println!("\n── {now}");
         }
         println!("{}", status.text());
         Ok(())
     }
-}
-
-fn is_rate_limited(error: &anyhow::Error) -> bool {
-    error
-        .downcast_ref::<ApiError>()
-        .is_some_and(|error| error.status == reqwest::StatusCode::TOO_MANY_REQUESTS)
 }
 
 impl TeamStatus {

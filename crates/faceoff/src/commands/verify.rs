@@ -229,6 +229,11 @@ pub fn verified_line(path: &Path) -> anyhow::Result<String> {
     Ok(describe(path, &simulated))
 }
 
+/// The hash of an archive as the end of a sentence; empty for a folder.
+fn hash_text(blake3: Option<&String>) -> String {
+    blake3.map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"))
+}
+
 fn describe(path: &Path, simulated: &SimulatedEvaluation) -> String {
     let SimulatedEvaluation {
         episodes,
@@ -239,9 +244,7 @@ fn describe(path: &Path, simulated: &SimulatedEvaluation) -> String {
         blake3,
         result,
     } = simulated;
-    let hash = blake3
-        .as_ref()
-        .map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"));
+    let hash = hash_text(blake3.as_ref());
     let seeds = if *season {
         "; seeds derived from the season's secret"
     } else {

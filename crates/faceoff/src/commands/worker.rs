@@ -123,11 +123,7 @@ impl WorkerCommand {
             nats = worker.nats.url,
             "worker started"
         );
-        tokio::runtime::Builder::new_multi_thread()
-            .enable_all()
-            .build()
-            .context("starting the async runtime")?
-            .block_on(run_until_signal(worker))
+        super::block_on_all_cpus(run_until_signal(worker))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The season's archive: exported from a server, imported, and served read-only.
 
+use crate::program::{command, faceoff_in};
 use faceoff_api::token::hash_token;
 use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
 use faceoff_http::{
@@ -31,12 +32,6 @@ const LEASE_SECONDS: u32 = 60;
 /// A fixed time for server and tests.
 fn now() -> Timestamp {
     "2026-03-01T10:00:00Z".parse().unwrap()
-}
-
-fn faceoff(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_faceoff"));
-    let output = command.args(arguments).current_dir(folder).output();
-    output.expect("the program can be started")
 }
 
 /// Standard output of a command that succeeded.
@@ -246,8 +241,7 @@ struct ServeProcess {
 
 impl ServeProcess {
     fn start(folder: &Path, data: &str) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_faceoff"))
-            .args(["serve", "--data-dir", data, "--listen", "127.0.0.1:0"])
+        let mut child = command(&["serve", "--data-dir", data, "--listen", "127.0.0.1:0"])
             .current_dir(folder)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -320,7 +314,7 @@ async fn exported_season_is_shown_on_another_host() {
     blocking(move || {
         let export = |arguments: &[&str]| {
             let command = ["admin", "--server", &url, "--token", ADMIN, "export"];
-            faceoff(&folder, &[&command[..], arguments].concat())
+            faceoff_in(&folder, &[&command[..], arguments].concat())
         };
         let message = stdout(&export(&["public.tar.zst", "--public"]));
         assert!(
@@ -342,7 +336,7 @@ async fn exported_season_is_shown_on_another_host() {
         assert_eq!(files, ["all.tar.zst", "public.tar.zst"]);
         for name in ["public", "all"] {
             let archive = format!("{name}.tar.zst");
-            let message = stdout(&faceoff(&folder, &["import", &archive, "--data", name]));
+            let message = stdout(&faceoff_in(&folder, &["import", &archive, "--data", name]));
             let manifest = fs::read(folder.join(name).join("archive/manifest.json")).unwrap();
             let manifest: Value = serde_json::from_slice(&manifest).unwrap();
             assert_eq!(manifest["season"], "Season 1");
@@ -352,7 +346,7 @@ async fn exported_season_is_shown_on_another_host() {
             );
         }
         assert_refused(
-            &faceoff(&folder, &["import", "all.tar.zst", "--data", "all"]),
+            &faceoff_in(&folder, &["import", "all.tar.zst", "--data", "all"]),
             &["all is not empty", "its own folder"],
         );
         // The dataset can be verified without the server.
@@ -364,8 +358,8 @@ async fn exported_season_is_shown_on_another_host() {
             fs::read(&dataset).unwrap(),
             fs::read(fixture("dataset-layout-3.zip")).unwrap()
         );
-        let verified = faceoff(&folder, &["verify", dataset.to_str().unwrap()]);
-        let original = faceoff(
+        let verified = faceoff_in(&folder, &["verify", dataset.to_str().unwrap()]);
+        let original = faceoff_in(
             &folder,
             &["verify", fixture("dataset-layout-3.zip").to_str().unwrap()],
         );
@@ -476,7 +470,8 @@ async fn refused_import_leaves_nothing() {
         Edition::Public,
     );
     fs::create_dir(folder.join("empty")).unwrap();
-    let import = |archive: &str, data: &str| faceoff(folder, &["import", archive, "--data", data]);
+    let import =
+        |archive: &str, data: &str| faceoff_in(folder, &["import", archive, "--data", data]);
     for (archive, expected) in [
         ("none", &["none is not imported", "No such file"][..]),
         ("text", &["expected a .tar.zst"]),
@@ -580,8 +575,7 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
     write_archive(folder, "season.tar.zst", &files, Edition::Public);
     let (mut killed, mut complete) = (0, 0);
     for round in 0_u64.. {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_faceoff"))
-            .args(["import", "season.tar.zst", "--data", "shown"])
+        let mut child = command(&["import", "season.tar.zst", "--data", "shown"])
             .current_dir(folder)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -609,7 +603,7 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
     }
     assert!(killed > 0, "no import was killed before its end");
     // A complete import removes what the killed ones have left.
-    stdout(&faceoff(
+    stdout(&faceoff_in(
         folder,
         &["import", "season.tar.zst", "--data", "shown"],
     ));

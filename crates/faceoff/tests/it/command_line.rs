@@ -1,13 +1,10 @@
 //! Help, completions and exit statuses of the program.
 
-use std::process::Command;
+use crate::program::command;
 
 /// Exit status, standard output and standard error.
 fn faceoff(args: &[&str]) -> (Option<i32>, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .args(args)
-        .output()
-        .unwrap();
+    let output = command(args).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (
         output.status.code(),

@@ -1,40 +1,15 @@
 //! `faceoff compare` on datasets of `faceoff eval`.
 
-use crate::LONG_TIME_LIMITS;
+use crate::program::{LONG_TIME_LIMITS, SEED, agent, faceoff_in, read_json, text};
 use serde_json::Value;
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::{Command, Output},
-};
-
-/// An arbitrary seed, which fixes the episodes.
-const SEED: &str = "5";
-
-fn faceoff(args: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn agent(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../agents")
-        .join(name)
-}
+use std::{fs, path::Path};
 
 /// Evaluates an agent into the folder `out` of `folder`.
 fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
     let bundle = agent(name);
     let bundle = bundle.to_str().unwrap();
     let eval = ["eval", bundle, "--out", out, "--config", LONG_TIME_LIMITS];
-    let output = faceoff(&[&eval, args].concat(), folder);
+    let output = faceoff_in(folder, &[&eval, args].concat());
     assert!(output.status.success(), "{out}: {}", text(&output.stderr));
 }
 
@@ -71,12 +46,12 @@ fn local_evaluations_with_equal_episodes_are_compared() {
         &[&common[..], &["--seed", SEED, "--profile", "ideal"]].concat(),
     );
 
-    let output = faceoff(&["compare", "a", "b", "--json"], folder);
+    let output = faceoff_in(folder, &["compare", "a", "b", "--json"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let view: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(view["a"]["agent"], "hold");
     assert!(view.get("episodes").is_none());
-    let output = faceoff(&["compare", "a", "b", "--episodes", "--json"], folder);
+    let output = faceoff_in(folder, &["compare", "a", "b", "--episodes", "--json"]);
     let listed: Value = serde_json::from_slice(&output.stdout).unwrap();
     for (task, counts) in view["tasks"].as_object().unwrap() {
         let episodes = &listed["episodes"][task];
@@ -89,12 +64,12 @@ fn local_evaluations_with_equal_episodes_are_compared() {
         all.sort_unstable();
         assert_eq!(all, [0, 1, 2, 3], "{task}");
     }
-    let output = faceoff(&["compare", "a", "b", "--episodes"], folder);
+    let output = faceoff_in(folder, &["compare", "a", "b", "--episodes"]);
     let table = text(&output.stdout);
     assert!(table.contains("\nepisodes\nhit      only A   "), "{table}");
     let results = |out: &str| -> Value {
         let file = folder.join(out).join("results.json");
-        serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
+        read_json(&file)
     };
     for (side, only_key) in [("a", "only_a"), ("b", "only_b")] {
         let results = results(side);
@@ -117,12 +92,12 @@ fn local_evaluations_with_equal_episodes_are_compared() {
         .extract(&unpacked)
         .unwrap();
     for copy in ["unpacked", "a/dataset.zip"] {
-        let output = faceoff(&["compare", copy, "b", "--json"], folder);
+        let output = faceoff_in(folder, &["compare", copy, "b", "--json"]);
         let mut copy_view: Value = serde_json::from_slice(&output.stdout).unwrap();
         copy_view["a"]["path"] = "a".into();
         assert_eq!(copy_view, view, "{copy}");
     }
-    let table = faceoff(&["compare", "a", "a"], folder);
+    let table = faceoff_in(folder, &["compare", "a", "a"]);
     let table = text(&table.stdout);
     for part in [
         "A: hold (a)",
@@ -144,7 +119,7 @@ fn local_evaluations_with_equal_episodes_are_compared() {
             "profile: the first evaluation played evaluation, the second ideal",
         ),
     ] {
-        let refused = faceoff(&["compare", "a", other], folder);
+        let refused = faceoff_in(folder, &["compare", "a", other]);
         assert!(!refused.status.success(), "{other}");
         let message = text(&refused.stderr);
         assert!(message.contains(field), "{field:?} is not in {message}");
@@ -155,13 +130,13 @@ fn local_evaluations_with_equal_episodes_are_compared() {
     let mut bytes = fs::read(&episodes).unwrap();
     bytes[40] ^= 1;
     fs::write(&episodes, bytes).unwrap();
-    let refused = faceoff(&["compare", "unpacked", "b"], folder);
+    let refused = faceoff_in(folder, &["compare", "unpacked", "b"]);
     assert!(
         text(&refused.stderr).contains("damaged or altered: episodes.parquet has"),
         "{}",
         text(&refused.stderr)
     );
-    let missing = faceoff(&["compare", ".", "b"], folder);
+    let missing = faceoff_in(folder, &["compare", ".", "b"]);
     assert!(
         text(&missing.stderr).contains("holds neither manifest.json nor dataset.zip"),
         "{}",

@@ -1,31 +1,16 @@
 //! `faceoff verify` and `faceoff dataset` on datasets of `faceoff eval`.
 
-use crate::LONG_TIME_LIMITS;
+use crate::program::{LONG_TIME_LIMITS, SEED, command, faceoff, hold, read_json, text};
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
     sync::OnceLock,
 };
 use tempfile::TempDir;
 
-/// An arbitrary seed, which fixes the episodes.
-const SEED: &str = "5";
-
-fn faceoff(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .args(args)
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
 /// Evaluates the agent `hold` in two episodes per task.
 fn eval(out: &Path, extra: &[&str]) {
-    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold");
+    let bundle = hold();
     let mut args = vec![
         "eval",
         bundle.to_str().unwrap(),
@@ -35,8 +20,7 @@ fn eval(out: &Path, extra: &[&str]) {
     args.extend(["--config", LONG_TIME_LIMITS]);
     args.extend(["--task", "hit,defend", "--episodes", "2", "--seed", SEED]);
     args.extend(extra);
-    let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .args(args)
+    let output = command(&args)
         .current_dir(out.parent().unwrap())
         .output()
         .unwrap();
@@ -83,8 +67,7 @@ fn evaluation_verifies_with_any_number_of_workers() {
     };
     assert_eq!(summary("1"), summary("8"));
     assert_eq!(summary("1")["verified"], true);
-    let results: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    let results = read_json(&out.join("results.json"));
     assert_eq!(summary("3")["result"], results);
 }
 

@@ -1,26 +1,17 @@
 //! `faceoff eval`: results, faults, ablations and refusals.
 
-use crate::LONG_TIME_LIMITS;
+use crate::program::{LONG_TIME_LIMITS, SEED, command, file_names, hold, read_json, text};
 use std::{
     fs,
-    path::{Path, PathBuf},
+    path::Path,
     process::{Command, Output},
 };
-
-/// An arbitrary seed, which fixes the episodes.
-const SEED: &str = "5";
 
 const MANIFEST: &str =
     "name = \"test\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
 
-/// The example agent that keeps its arm still.
-fn hold() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold")
-}
-
 fn eval(bundle: &Path, out: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .arg("eval")
+    command(&["eval"])
         .arg(bundle)
         .args(args)
         .arg("--out")
@@ -32,14 +23,9 @@ fn eval(bundle: &Path, out: &Path, args: &[&str]) -> Output {
         .unwrap()
 }
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
 /// `results.json` without measured values.
 fn result(out: &Path) -> serde_json::Value {
-    let mut result: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    let mut result = read_json(&out.join("results.json"));
     for key in ["penalty_points", "tier", "timing"] {
         result.as_object_mut().unwrap().remove(key).unwrap();
     }
@@ -82,13 +68,7 @@ fn result_does_not_depend_on_workers_sandbox_or_packing() {
         );
         assert!(table.contains("\ndefend          3 "), "{table}");
         results.push(result(&out));
-        let mut files: Vec<_> = out
-            .read_dir()
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name())
-            .collect();
-        files.sort();
-        assert_eq!(files, ["dataset.zip", "results.json"]);
+        assert_eq!(file_names(&out), ["dataset.zip", "results.json"]);
     }
     assert_eq!(results[0], results[1]);
     assert_eq!(results[0], results[2]);
@@ -178,11 +158,7 @@ fn bundle_can_be_evaluated_repeatedly_in_its_own_folder() {
         fs::copy(hold().join(file), dir.path().join(file)).unwrap();
     }
     let run_in_folder = |args: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
-            .args(args)
-            .current_dir(dir.path())
-            .output()
-            .unwrap();
+        let output = command(args).current_dir(dir.path()).output().unwrap();
         assert!(output.status.success(), "{}", text(&output.stderr));
         text(&output.stdout)
     };
@@ -267,8 +243,7 @@ fn ablation_compares_the_profiles_on_the_same_episodes() {
         "tracking_loss",
         "evaluation",
     ];
-    let file: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("ablation.json")).unwrap()).unwrap();
+    let file = read_json(&out.join("ablation.json"));
     let rows = file["tasks"]["prepare"].as_array().unwrap();
     assert_eq!(rows.len(), profiles.len());
     for (row, profile) in rows.iter().zip(profiles) {
@@ -310,8 +285,7 @@ fn rules_of_a_configuration_apply_and_verify() {
                  perturbations = { observation_noise = { puck_position_m = 0.05 } }\n";
     fs::write(&config, format!("{long_time_limits}\n{rules}")).unwrap();
     let run = |out: &Path| {
-        Command::new(env!("CARGO_BIN_EXE_faceoff"))
-            .arg("eval")
+        command(&["eval"])
             .arg(hold())
             .args([
                 "--task",
@@ -332,16 +306,14 @@ fn rules_of_a_configuration_apply_and_verify() {
     let out = dir.path().join("out");
     let output = run(&out);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let result: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    let result = read_json(&out.join("results.json"));
     assert_eq!(result["weights"]["hit"], 1.0);
     assert_eq!(result["tier"], "deployable");
     assert_eq!(
         result["perturbations"]["observation_noise"]["puck_position_m"],
         0.05
     );
-    let verified = Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .arg("verify")
+    let verified = command(&["verify"])
         .arg(out.join("dataset.zip"))
         .output()
         .unwrap();

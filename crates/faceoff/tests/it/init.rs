@@ -1,21 +1,12 @@
 //! `faceoff init`: the configuration file that it writes.
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
-
-fn faceoff(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_faceoff"));
-    let output = command.args(arguments).current_dir(folder).output();
-    output.expect("the program can be started")
-}
+use crate::program::faceoff_in;
+use std::fs;
 
 #[test]
 fn configuration_is_written_once_and_valid() {
     let folder = tempfile::tempdir().expect("a scratch folder can be made");
-    let init = || faceoff(folder.path(), &["init"]);
+    let init = || faceoff_in(folder.path(), &["init"]);
     let first = init();
     assert!(first.status.success(), "{first:?}");
     let message = String::from_utf8_lossy(&first.stdout);
@@ -36,7 +27,7 @@ fn configuration_is_written_once_and_valid() {
 
     let doctor = |text: &str| {
         fs::write(&file, text).expect("it can be changed");
-        faceoff(folder.path(), &["doctor", "--json"])
+        faceoff_in(folder.path(), &["doctor", "--json"])
     };
     let valid = doctor(&written);
     let message = String::from_utf8_lossy(&valid.stderr);

@@ -9,11 +9,6 @@ mod eval;
 mod init;
 mod new;
 mod play;
+mod program;
 mod replay;
 mod sim;
-
-/// A configuration with generous time limits, so that a busy machine causes no agent faults.
-const LONG_TIME_LIMITS: &str = concat!(
-    env!("CARGO_MANIFEST_DIR"),
-    "/../../tests/long_time_limits.toml"
-);

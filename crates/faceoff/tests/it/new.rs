@@ -1,6 +1,6 @@
 //! `faceoff new`: the new agents pass their tests and can be evaluated.
 
-use crate::LONG_TIME_LIMITS;
+use crate::program::{LONG_TIME_LIMITS, text};
 use serde_json::Value;
 use std::{
     fs,
@@ -9,10 +9,6 @@ use std::{
 };
 
 const FACEOFF: &str = env!("CARGO_BIN_EXE_faceoff");
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
 
 fn run(program: &str, args: &[&str], folder: &Path) -> Output {
     Command::new(program)

@@ -1,31 +1,14 @@
 //! `faceoff play`: games, forfeits, series and refusals.
 
-use crate::LONG_TIME_LIMITS;
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::{Command, Output},
-};
-
-/// An arbitrary seed, which fixes the episodes.
-const SEED: &str = "5";
-
-/// The example agent that keeps its arm still.
-fn hold() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold")
-}
+use crate::program::{LONG_TIME_LIMITS, SEED, command, file_names, hold, read_json, text};
+use std::{fs, path::Path, process::Output};
 
 fn faceoff(args: &[&str], paths: &[&Path]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .args(args)
-        .args(paths)
-        .output()
-        .unwrap()
+    command(args).args(paths).output().unwrap()
 }
 
 fn play(bundles: [&Path; 2], out: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .arg("play")
+    command(&["play"])
         .args(bundles)
         .args(args)
         .arg("--out")
@@ -33,10 +16,6 @@ fn play(bundles: [&Path; 2], out: &Path, args: &[&str]) -> Output {
         .args(["--config", LONG_TIME_LIMITS])
         .output()
         .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 #[test]
@@ -53,14 +32,8 @@ fn game_has_results_and_a_recording_that_verifies() {
         "{table}"
     );
     assert!(table.contains("1000 control steps, 2 windows"), "{table}");
-    let mut files: Vec<_> = out
-        .read_dir()
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name())
-        .collect();
-    files.sort();
     assert_eq!(
-        files,
+        file_names(&out),
         [
             "clips",
             "game.zip",
@@ -69,8 +42,7 @@ fn game_has_results_and_a_recording_that_verifies() {
             "side-2.zip"
         ]
     );
-    let results: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    let results = read_json(&out.join("results.json"));
     for key in ["ruleset", "profile", "seed", "steps", "sides", "end"] {
         assert!(results.get(key).is_some(), "{key}");
     }
@@ -286,8 +258,7 @@ fn series_alternates_sides_and_counts_goals_by_agent() {
         stdout.contains("per game: mean +10.00, variance 0.00"),
         "{stdout}"
     );
-    let results: serde_json::Value =
-        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    let results = read_json(&out.join("results.json"));
     assert!(results.get("spread").is_none(), "there are no pairs");
     let games = results["games"].as_array().unwrap();
     assert_ne!(games[0]["seed"], games[1]["seed"]);

@@ -1,34 +1,20 @@
 //! `faceoff replay`: the page and the picture of an episode.
 
-use crate::LONG_TIME_LIMITS;
+use crate::program::{LONG_TIME_LIMITS, SEED, agent, faceoff, text};
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::Command,
     sync::OnceLock,
 };
 use tempfile::TempDir;
-
-/// An arbitrary seed, which fixes the episodes.
-const SEED: &str = "5";
-
-fn faceoff(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_faceoff"))
-        .args(args)
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
 
 /// An evaluation with two episodes per task, of an agent that violates limits and whose name must be escaped.
 fn evaluated() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
-        let agents = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/reckless");
+        let agents = agent("reckless");
         let bundle = dir.path().join("bundle");
         fs::create_dir(&bundle).unwrap();
         for name in ["agent.py", "protocol.py"] {

@@ -2,7 +2,7 @@
 
 use super::*;
 use faceoff_api::views::submission::SubmissionView;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     net::{TcpListener, TcpStream},
@@ -33,10 +33,6 @@ async fn download(
     client
         .download_submission(submission.id, file, &submission.blake3, &bar)
         .await
-}
-
-fn sibling(file: &Path, suffix: &str) -> PathBuf {
-    PathBuf::from(format!("{}{suffix}", file.display()))
 }
 
 /// Starts a proxy that closes each connection after `limit` bytes of the response; returns its URL.
@@ -78,7 +74,9 @@ async fn interrupted_download_is_resumed() {
         "{message}"
     );
     assert!(!file.exists());
-    let partial_bytes = std::fs::metadata(sibling(&file, ".part")).unwrap().len();
+    let partial_bytes = std::fs::metadata(with_suffix(&file, ".part"))
+        .unwrap()
+        .len();
     assert!(
         partial_bytes > 0 && partial_bytes < uploaded.bytes,
         "{partial_bytes}"
@@ -94,7 +92,7 @@ async fn interrupted_download_is_resumed() {
         (uploaded.blake3.as_str(), true)
     );
     for suffix in [".part", ".part.etag"] {
-        assert!(!sibling(&file, suffix).exists(), "{suffix} is left");
+        assert!(!with_suffix(&file, suffix).exists(), "{suffix} is left");
     }
 }
 
@@ -108,10 +106,10 @@ async fn foreign_partial_file_is_not_resumed() {
     let bytes = std::fs::read(&file).unwrap();
     let tag = format!("\"blake3-{}\"", uploaded.blake3);
     let write_partial_file = |part: &[u8], tag: Option<&str>| {
-        std::fs::write(sibling(&file, ".part"), part).unwrap();
+        std::fs::write(with_suffix(&file, ".part"), part).unwrap();
         match tag {
-            Some(tag) => std::fs::write(sibling(&file, ".part.etag"), tag).unwrap(),
-            None => assert!(!sibling(&file, ".part.etag").exists()),
+            Some(tag) => std::fs::write(with_suffix(&file, ".part.etag"), tag).unwrap(),
+            None => assert!(!with_suffix(&file, ".part.etag").exists()),
         }
     };
     // Without an ETag, or with that of another file, the download starts at 0.
@@ -150,7 +148,7 @@ async fn foreign_partial_file_is_not_resumed() {
         download(&client, &uploaded, &file).await.unwrap_err()
     );
     assert!(message.contains("it was damaged in transfer"), "{message}");
-    assert!(!sibling(&file, ".part").exists() && !sibling(&file, ".part.etag").exists());
+    assert!(!with_suffix(&file, ".part").exists() && !with_suffix(&file, ".part.etag").exists());
     assert_eq!(download(&client, &uploaded, &file).await.unwrap(), whole);
     assert_eq!(std::fs::read(&file).unwrap(), bytes);
 }

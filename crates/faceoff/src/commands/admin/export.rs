@@ -1,6 +1,9 @@
 //! `faceoff admin export`: downloads the season's archive, one file with all its data, which `faceoff import` reads.
 
-use crate::{client::Client, commands::output::print};
+use crate::{
+    client::Client,
+    commands::output::{exact_time_text, print},
+};
 use faceoff_archive::Edition;
 use serde_json::json;
 use std::path::Path;
@@ -32,7 +35,7 @@ pub(super) async fn export(
             "{}: {bytes} bytes, the {edition} archive of {:?} of {}; {} files of {} bytes",
             file.display(),
             manifest.season,
-            manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+            exact_time_text(manifest.made_at),
             manifest.files.len(),
             manifest.total_bytes(),
         )];

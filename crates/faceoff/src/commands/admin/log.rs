@@ -2,7 +2,7 @@
 
 use crate::{
     client::Client,
-    commands::output::{lines_or, print},
+    commands::output::{exact_time_text, lines_or, print},
 };
 use clap::Args;
 use faceoff_api::views::event::EventView;
@@ -65,7 +65,7 @@ fn event_line(event: &EventView) -> String {
     format!(
         "{:>6}  {}  {}  {}  {}  {}",
         event.id,
-        event.at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+        exact_time_text(event.at),
         match &event.actor_name {
             Some(name) => format!("{} ({name})", event.actor),
             None => event.actor.clone(),

@@ -2,7 +2,7 @@
 
 use crate::{
     client::Client,
-    commands::output::{lines_or, print, time_text},
+    commands::output::{exact_time_text, lines_or, print, time_text},
 };
 use clap::Subcommand;
 use faceoff_api::views::workers::{
@@ -79,7 +79,7 @@ fn worker_lines(worker: &WorkerView) -> String {
         WorkerState::Refused => "refused",
         WorkerState::Silent => "silent",
     };
-    let last_contact = worker.last_at.strftime("%Y-%m-%d %H:%M:%S UTC");
+    let last_contact = exact_time_text(worker.last_at);
     let mut lines = vec![format!(
         "{:<24} {state}  slots:{}  version {}  last contact {last_contact}",
         worker.name, worker.slots, worker.version

@@ -4,12 +4,12 @@ use super::{
     files::{ABLATION, write_json},
     profile_run::{EvalSetup, run_profile},
 };
-use crate::commands::output::print;
+use crate::commands::{output::print, table_cells::percent_interval};
 use anyhow::Context;
 use faceoff_scoring::{EpisodeSummary, ProfileEffect};
 use faceoff_types::{Profile, RULESET, Seed, Task};
 use serde::Serialize;
-use std::{collections::BTreeMap, fmt::Write as _, path::Path};
+use std::{collections::BTreeMap, path::Path};
 
 /// `ablation.json`.
 #[derive(Debug, Serialize)]
@@ -49,12 +49,8 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
 
 /// The comparison as text.
 fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) -> String {
-    let mut out = format!("{agent}: ablation ({RULESET}), seed {seed}\n\n");
-    let mut line = |args: std::fmt::Arguments<'_>| {
-        out.write_fmt(args).expect("writing to memory cannot fail");
-        out.push('\n');
-    };
-    line(format_args!(
+    let mut lines = vec![format!("{agent}: ablation ({RULESET}), seed {seed}\n")];
+    lines.push(format!(
         "{:<8} {:<17} {:>8} {:>8} {:>17} {:>9} {:>5} {:>6} {:>7} {:>8}",
         "task",
         "profile",
@@ -69,13 +65,12 @@ fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) ->
     ));
     for (task, effects) in tasks {
         for effect in effects {
-            let [low, high] = effect.success_ci95.map(|bound| 100.0 * bound);
-            line(format_args!(
+            lines.push(format!(
                 "{task:<8} {:<17} {:>8} {:>6.1} % {:>17} {:>9} {:>5} {:>6} {:>7.4} {:>8.1}",
                 effect.profile,
                 effect.episodes,
                 100.0 * effect.success_rate,
-                format!("{low:.1} to {high:.1} %"),
+                percent_interval(effect.success_ci95),
                 format!("{:+.1}", 100.0 * effect.difference),
                 effect.lost,
                 effect.gained,
@@ -84,9 +79,9 @@ fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) ->
             ));
         }
     }
-    line(format_args!(
+    lines.push(format!(
         "\nto ideal: difference in percentage points; lost, gained: episodes that succeed only in the ideal profile, \
         only in this one; p: McNemar's exact test"
     ));
-    out
+    lines.join("\n") + "\n"
 }

@@ -1,6 +1,7 @@
 //! Tables of `faceoff play`: the result of a game, and of a series of games.
 
 use super::series_results::{SeriesGame, SeriesKind, SeriesResults};
+use crate::commands::table_cells::milliseconds;
 use faceoff_scoring::tournament::GameScore;
 use faceoff_types::Side;
 use std::fmt::Write as _;
@@ -8,17 +9,13 @@ use std::fmt::Write as _;
 /// The result of a game as text. The columns from `ee` to `time` count the violations of each constraint: end effector, links,
 /// joint positions, joint velocities, computation time.
 pub(super) fn game_table(game: &GameScore) -> String {
-    let mut out = String::new();
-    let mut line = |args: std::fmt::Arguments<'_>| {
-        out.write_fmt(args).expect("writing to memory cannot fail");
-        out.push('\n');
-    };
+    let mut lines = Vec::new();
     let [first, second] = &game.sides;
-    line(format_args!(
+    lines.push(format!(
         "{} against {}: {} ({}), seed {}",
         first.agent, second.agent, game.profile, game.ruleset, game.seed
     ));
-    line(format_args!(
+    lines.push(format!(
         "\n{:<4} {:<20} {:>5} {:>5} {:>5} {:>8}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4} {:>6} {:>6}  {:>23}",
         "side",
         "agent",
@@ -38,7 +35,7 @@ pub(super) fn game_table(game: &GameScore) -> String {
     ));
     for (number, side) in (1..).zip(&game.sides) {
         let (violations, time_s) = (side.violations, side.computation_time_s);
-        line(format_args!(
+        lines.push(format!(
             "{number:<4} {:<20} {:>5} {:>5} {:>5} {:>8.1}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4} {:>6} {:>6}  {:>23}",
             side.agent,
             side.score,
@@ -53,31 +50,26 @@ pub(super) fn game_table(game: &GameScore) -> String {
             violations.computation_time,
             side.late_answers,
             side.faults,
-            format!(
-                "{:.2} / {:.2} / {:.2}",
-                1e3 * time_s.mean,
-                1e3 * time_s.p99,
-                1e3 * time_s.max
-            ),
+            milliseconds(time_s),
         ));
     }
     for (number, side) in (1..).zip(&game.sides) {
         if let Some(cause) = &side.forfeit {
-            line(format_args!("\nside {number} forfeited: {cause}"));
+            lines.push(format!("\nside {number} forfeited: {cause}"));
         }
     }
     let (steps, windows, rallies) = (game.steps, game.windows, game.rallies);
     let played = format!("{steps} control steps, {windows} windows, {rallies} rallies");
     let result = game.result();
     match result.winner() {
-        Some(side) => line(format_args!(
+        Some(side) => lines.push(format!(
             "\nwinner: side {}, {} ({result}); {played}",
             side as u32 + 1,
             game.sides[side as usize].agent
         )),
-        None => line(format_args!("\na draw ({result}); {played}")),
+        None => lines.push(format!("\na draw ({result}); {played}")),
     }
-    out
+    lines.join("\n") + "\n"
 }
 
 /// The end of an agent's log.

@@ -6,7 +6,10 @@ use faceoff_scoring::tournament::{
     DepartureKind, HeadToHead, ScoredGame, StandingsRow,
     rating::{Pool, Ratings},
 };
-use std::{fmt::Write as _, io::Write};
+use std::{
+    fmt::{self, Write as _},
+    io::Write,
+};
 
 /// Writes games, standings, records and ratings.
 pub fn write(out: &mut impl Write, scored: &ScoredTournament) -> anyhow::Result<()> {
@@ -48,8 +51,8 @@ fn column_width<'a>(heading: &str, cells: impl Iterator<Item = &'a str>) -> usiz
 }
 
 /// Two numbers, e.g. the goals of both sides, as `3-1`.
-fn hyphenated(numbers: [u32; 2]) -> String {
-    format!("{}-{}", numbers[0], numbers[1])
+fn hyphenated<T: fmt::Display>([first, second]: [T; 2]) -> String {
+    format!("{first}-{second}")
 }
 
 fn write_games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
@@ -105,7 +108,7 @@ fn write_standings(out: &mut String, standings: &[StandingsRow]) -> std::fmt::Re
             row.wins,
             row.draws,
             row.losses,
-            format!("{}-{}", row.goals_for, row.goals_against),
+            hyphenated([row.goals_for, row.goals_against]),
             row.penalty_points,
             rounds.join(" + ")
         )?;
@@ -138,7 +141,7 @@ fn write_records(out: &mut String, records: &[HeadToHead]) -> std::fmt::Result {
             record.wins[0],
             record.draws,
             record.wins[1],
-            format!("{}-{}", record.goals[0], record.goals[1])
+            hyphenated(record.goals)
         )?;
     }
     Ok(())

@@ -4,6 +4,7 @@
 //! seven *driven* joints and, at its end, a passive *universal joint* with the mallet. The *plant* is the simulated robot with all
 //! of them; the controller's model has the driven joints only.
 
+use super::constraints::Constraints;
 use anyhow::{Context as _, Result, bail, ensure};
 use faceoff_sim::{
     ConstraintValues, JOINTS,
@@ -47,15 +48,6 @@ struct PoseModel {
     gravity: [f64; JOINTS],
     constraints: Constraints,
     plant: Plant,
-}
-
-/// The largest value of each group of constraints: above 0 if it is violated.
-#[derive(Debug, Serialize)]
-struct Constraints {
-    joint_pos: f64,
-    joint_vel: f64,
-    ee: f64,
-    link: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -181,12 +173,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
     let plant = bodies.plant(&[1.0; DOFS]);
     let lower_triangle = mass_matrix(&kinematics, &plant);
     let positions: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
-    let ConstraintValues {
-        joint_pos,
-        joint_vel,
-        ee: ee_constraint,
-        link,
-    } = ConstraintValues::new(&positions, &driven, &kinematics);
+    let constraints = ConstraintValues::new(&positions, &driven, &kinematics);
     PoseModel {
         links: kinematics.links.map(|link| link.origin.lane(0)),
         rotations: kinematics.links.map(|link| link.rotation(0)),
@@ -195,12 +182,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
         mass,
         bias: torques(&driven, &zero),
         gravity,
-        constraints: Constraints {
-            joint_pos,
-            joint_vel,
-            ee: ee_constraint,
-            link,
-        },
+        constraints: constraints.into(),
         plant: Plant {
             q: *q,
             mallet: kinematics.cylinder_centre().lane(0),

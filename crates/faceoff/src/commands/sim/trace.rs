@@ -1,6 +1,6 @@
 //! `faceoff sim trace`: simulates actions that are given in advance (open-loop), for comparison with other simulators.
 
-use super::scenario::Scenario;
+use super::{constraints::Constraints, scenario::Scenario};
 use anyhow::{Context as _, Result, ensure};
 use faceoff_sim::{
     ConstraintValues, Interpolation, JOINTS, MalletState, PerturbationSettings, Plant, SUBSTEPS,
@@ -33,15 +33,6 @@ struct Line {
     /// x, y, z, vx, vy.
     mallet: Vec<[f64; 5]>,
     constraints: Vec<Constraints>,
-}
-
-/// The largest value of each group of constraints: above 0 if it is violated.
-#[derive(Debug, Serialize)]
-struct Constraints {
-    joint_pos: f64,
-    joint_vel: f64,
-    ee: f64,
-    link: f64,
 }
 
 /// The last line of the output of a scenario with a task.
@@ -170,19 +161,8 @@ fn write_state(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
             velocity: [vx, vy],
         } = world.mallet(robot);
         state.mallet.push([x, y, z, vx, vy]);
-        let values = ConstraintValues::of(world, robot);
-        let ConstraintValues {
-            joint_pos,
-            joint_vel,
-            ee,
-            link,
-        } = values;
-        state.constraints.push(Constraints {
-            joint_pos,
-            joint_vel,
-            ee,
-            link,
-        });
+        let constraints = ConstraintValues::of(world, robot);
+        state.constraints.push(constraints.into());
     }
     write_line(&state, out)
 }

@@ -1,6 +1,6 @@
 //! Text of games.
 
-use crate::commands::output::lines_or;
+use crate::commands::output::{exact_time_text, lines_or};
 use faceoff_api::views::{
     attempt::{AttemptOutcomeView, GameAttemptView},
     game::{GameStatus, GameView, PurposeView, TestGamesView},
@@ -145,7 +145,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
                     AttemptOutcomeView::Lost => "lost with its slot",
                     AttemptOutcomeView::CalledOff => "cancelled",
                 };
-                format!("{outcome} {}", ended_at.strftime("%Y-%m-%d %H:%M:%S UTC"))
+                format!("{outcome} {}", exact_time_text(ended_at))
             }
             _ => "running".to_owned(),
         };
@@ -156,7 +156,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
         format!(
             "{:>3}  {}  {}  {end}{reason}",
             attempt.number,
-            attempt.started_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+            exact_time_text(attempt.started_at),
             attempt.worker
         )
     };

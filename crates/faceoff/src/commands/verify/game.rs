@@ -1,6 +1,9 @@
 //! Verification of games.
 
-use super::failure::{Failure, check_hash};
+use super::{
+    failure::{Failure, check_hash},
+    hash_text,
+};
 use anyhow::Context;
 use faceoff_dataset::{
     DatasetError,
@@ -59,9 +62,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
         blake3,
         result,
     } = simulated;
-    let hash = blake3
-        .as_ref()
-        .map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"));
+    let hash = hash_text(blake3.as_ref());
     let [first, second] = &result.sides;
     let limits = if result.limits == GameLimits::default() {
         String::new()
