@@ -8,6 +8,7 @@ mod double_option;
 mod episodes;
 mod links;
 mod merge_patch;
+mod stages;
 mod tournaments;
 mod users;
 mod webhooks;
@@ -15,20 +16,16 @@ mod webhooks;
 pub use boards::*;
 pub use episodes::*;
 pub use links::*;
+pub use stages::*;
 pub use tournaments::*;
 pub use users::*;
 pub use webhooks::*;
 
-use crate::objects_only;
 use double_option::{deserialize_some, serialize_option};
 use faceoff_archive::Edition;
-use faceoff_types::{
-    CountingResult, DayDeadline, EvaluationId, PerturbationSettings, Profile, Publication,
-    Retention, Runtimes, Schedule, StageId, StageLimits, StageUploadLimits, SubmissionId, Task,
-    TaskWeights, TeamId, TierBounds, Zone,
-};
-use jiff::{Timestamp, civil::Date};
-use serde::{Deserialize, Deserializer, Serialize};
+use faceoff_types::{EvaluationId, StageId, SubmissionId, TeamId};
+use jiff::civil::Date;
+use serde::{Deserialize, Serialize};
 use utoipa::{
     IntoParams, ToSchema,
     openapi::{Object, ObjectBuilder, Type},
@@ -134,202 +131,6 @@ pub struct StartDay {
     /// The day's stage. Default: the open stage, if there is only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stage: Option<StageId>,
-}
-
-/// A stage to create. Fields that are left out are copied from the open stage, or from the stage nearest in time,
-/// unless their description says otherwise.
-#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NewStage {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
-    pub name: String,
-    /// When its first evaluation day may start. Default: now.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub opens_at: Option<Timestamp>,
-    /// From then on no evaluation day starts. Default: no end.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub closes_at: Option<Timestamp>,
-    /// Time zone of its days and its schedule.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub zone: Option<Zone>,
-    /// Perturbation profile of the simulator.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<Profile>,
-    /// Tasks in the order in which they run; at least one, without duplicates.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tasks: Option<Vec<Task>>,
-    /// Episodes of each task per evaluation.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub episodes_per_task: Option<u32>,
-    /// An evaluation with more agent faults than this fails, without a score.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_faults: Option<u32>,
-    /// Weight of each task's success rate in the overall score.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub weights: Option<TaskWeights>,
-    /// For each tier, the most penalty points per episode that it allows.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile switches on. Fields that are left out have the ruleset's
-    /// values.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub perturbations: Option<Box<PerturbationSettings>>,
-    /// Resource limits of agents. Fields that are left out have the values of the server's configuration.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub limits: Option<Box<StageLimits>>,
-    /// Runtimes that agents may use, out of those that the server offers; null: all of them.
-    #[serde(
-        default,
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "deserialize_some",
-        serialize_with = "serialize_option"
-    )]
-    #[schema(value_type = Option<Runtimes>)]
-    pub runtimes: Option<Option<Runtimes>>,
-    /// Upload limits per team while the stage is open. Fields that are left out have the values of the server's
-    /// configuration.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub uploads: Option<StageUploadLimits>,
-    /// When its evaluation days start. Default: an organiser starts them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub schedule: Option<Schedule>,
-    /// Episodes per task and profile of the ablation that a scheduled day starts for each submission. Default: 0, no
-    /// ablation.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ablation_episodes: Option<u32>,
-    /// Episodes per shard, which is the part of a task that one job runs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub episodes_per_shard: Option<u32>,
-    /// Until when the evaluations of a day may run: "next_cut" (the next cutoff), "never" or {"hours":30}. Default: the
-    /// next cutoff.
-    #[serde(
-        default,
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "deserialize_deadline"
-    )]
-    pub day_deadline: Option<DayDeadline>,
-    /// Whether only organisers see its scores. Default: false.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blind: Option<bool>,
-    /// When its datasets become public. Default: when the stage closes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub publishes: Option<Publication>,
-    /// Which of a team's evaluations count for its board row. Default: the newest one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub standings: Option<CountingResult>,
-    /// Which of its files are kept. Default: all.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub retention: Option<Retention>,
-}
-
-/// Changes of a stage. Fields that are left out stay as they are.
-#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct StageChange {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Only while the stage has not opened.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub opens_at: Option<Timestamp>,
-    /// Only while the stage has not closed; null: no end.
-    #[serde(
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "deserialize_some",
-        serialize_with = "serialize_option"
-    )]
-    #[schema(value_type = Option<Timestamp>)]
-    pub closes_at: Option<Option<Timestamp>>,
-    /// Only before the stage's first cutoff.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub zone: Option<Zone>,
-    /// Perturbation profile of the simulator.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub profile: Option<Profile>,
-    /// Tasks in the order in which they run; at least one, without duplicates.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tasks: Option<Vec<Task>>,
-    /// Episodes of each task per evaluation.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub episodes_per_task: Option<u32>,
-    /// An evaluation with more agent faults than this fails, without a score.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_faults: Option<u32>,
-    /// Weight of each task's success rate in the overall score.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub weights: Option<TaskWeights>,
-    /// For each tier, the most penalty points per episode that it allows.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile switches on. Replaces all of them: fields that are left out get
-    /// the ruleset's values.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub perturbations: Option<Box<PerturbationSettings>>,
-    /// Resource limits of agents. Replaces all of them: fields that are left out get the values of the server's
-    /// configuration.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub limits: Option<Box<StageLimits>>,
-    /// Runtimes that agents may use, out of those that the server offers; null: all of them.
-    #[serde(
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "deserialize_some",
-        serialize_with = "serialize_option"
-    )]
-    #[schema(value_type = Option<Runtimes>)]
-    pub runtimes: Option<Option<Runtimes>>,
-    /// Upload limits per team while the stage is open. Replaces all of them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub uploads: Option<StageUploadLimits>,
-    /// When its evaluation days start; null: an organiser starts them.
-    #[serde(
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "deserialize_some",
-        serialize_with = "serialize_option"
-    )]
-    #[schema(value_type = Option<Schedule>)]
-    pub schedule: Option<Option<Schedule>>,
-    /// Episodes per task and profile of the ablation that a scheduled day starts for each submission; 0: no ablation.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ablation_episodes: Option<u32>,
-    /// Episodes per shard, which is the part of a task that one job runs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub episodes_per_shard: Option<u32>,
-    /// Until when the evaluations of a day may run: "next_cut" (the next cutoff), "never" or {"hours":30}. Applies to
-    /// running days, too.
-    #[serde(
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "deserialize_deadline"
-    )]
-    pub day_deadline: Option<DayDeadline>,
-    /// `false` reveals the scores of a blind stage, also after it has closed; once there are scores this is final.
-    /// `true` only before the stage has scores.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub blind: Option<bool>,
-    /// When its datasets become public. After the stage has closed only an earlier time is accepted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub publishes: Option<Publication>,
-    /// Which of a team's evaluations count for its board row.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub standings: Option<CountingResult>,
-    /// Which of its files are kept. Replaces the whole setting; `{}` keeps all. Also accepted after the stage has
-    /// closed or is signed off.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub retention: Option<Retention>,
-    /// The stage's name. Required if the change starts a new revision of an open stage, reorders its board, or removes
-    /// files.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub confirm: Option<String>,
-}
-
-/// Deserialises by way of a JSON value, so that a wrong deadline is reported as a wrong value and not as invalid JSON.
-fn deserialize_deadline<'de, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Option<DayDeadline>, D::Error> {
-    let value = Option::<serde_json::Value>::deserialize(deserializer)?;
-    let Some(value) = value else { return Ok(None) };
-    objects_only::check::<DayDeadline>(&value).map_err(serde::de::Error::custom)?;
-    let parsed = serde_json::from_value(value);
-    parsed.map(Some).map_err(serde::de::Error::custom)
 }
 
 /// A trial to start: evaluations that do not count.

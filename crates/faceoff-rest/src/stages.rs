@@ -3,7 +3,7 @@
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
-    requests::{NewStage, StageChange},
+    requests::{NewStage, StagePatch},
     views::stage::StageView,
 };
 use faceoff_service::{
@@ -68,7 +68,7 @@ pub(crate) async fn create_stage(
 /// `retention` does not begin a revision, but must be confirmed if it removes files.
 #[utoipa::path(
     patch, path = "/stages/{id}", tag = "organiser", security(("organiser" = [])),
-    params(("id" = StageId, Path)), request_body = StageChange,
+    params(("id" = StageId, Path)), request_body = StagePatch,
     responses(
         (status = 200, body = StageView),
         (status = 404),
@@ -80,7 +80,7 @@ pub(crate) async fn change_stage(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
-    Body(change): Body<StageChange>,
+    Body(change): Body<StagePatch>,
 ) -> Result<Json<StageView>, Problem> {
     let changed = stages::change_stage(&app, organiser.actor(), id, change);
     changed.await.map(Json)

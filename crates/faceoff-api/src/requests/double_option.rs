@@ -2,11 +2,12 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Deserialises a field that is present: `Some(None)` for null. With `serde(default)`, a field that is left out is `None`.
+/// Deserialises a field that is present, also null: `Some(None)` if `T` is an option. With `serde(default)`, a field that is
+/// left out is `None`.
 pub(super) fn deserialize_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
-) -> Result<Option<Option<T>>, D::Error> {
-    Option::deserialize(deserializer).map(Some)
+) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
 }
 
 #[expect(

@@ -1,6 +1,6 @@
 //! `/organiser/stages/{id}`: status, settings and decisions of a stage.
 
-use super::stage_form::StageForm;
+use super::stage_form::{InputKind, StageForm};
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     figures::utc_minute,
@@ -21,7 +21,7 @@ use faceoff_service::{
     viewer::Viewer,
     views::{season::SeasonHead, stage},
 };
-use faceoff_types::{CountingResult, Profile, StageId};
+use faceoff_types::{CountingResult, StageId};
 
 #[derive(Template)]
 #[template(path = "organiser_stage.html")]
@@ -30,7 +30,6 @@ struct Page {
     head: DashboardHeader,
     stage: StageView,
     form: StageForm,
-    profiles: [Profile; 7],
     /// The name that confirms a change with consequences; the refusal lists them.
     confirm: Option<String>,
     is_closed: bool,
@@ -61,7 +60,6 @@ async fn page_with(
         frame: Frame::for_app(app, season, ""),
         head: DashboardHeader::new(&user.caller, "/organiser/stages", notice),
         form,
-        profiles: Profile::ALL,
         confirm: needs_confirmation.then(|| view.name.to_string()),
         is_closed: view.phase == PhaseView::Closed,
         has_final_day: view.settings.standings == CountingResult::Final,

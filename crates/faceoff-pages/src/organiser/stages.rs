@@ -1,6 +1,6 @@
 //! `/organiser/stages`: the stages of the season, and a form for a new stage.
 
-use super::stage_form::StageForm;
+use super::stage_form::{InputKind, StageForm};
 use crate::{
     board_status,
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
@@ -21,7 +21,6 @@ use faceoff_service::{
     services::stages,
     views::{season::SeasonHead, stage},
 };
-use faceoff_types::Profile;
 
 #[derive(Template)]
 #[template(path = "organiser_stages.html")]
@@ -30,7 +29,6 @@ struct Page {
     head: DashboardHeader,
     stages: Vec<StageView>,
     form: StageForm,
-    profiles: [Profile; 7],
     /// Always `None`: creating a stage needs no confirmation. `stage_fields.html` expects the field.
     confirm: Option<String>,
     is_refused: bool,
@@ -63,7 +61,6 @@ async fn page_with(
         head: DashboardHeader::new(&user.caller, path, notice),
         stages: stage::all(app).await?,
         form,
-        profiles: Profile::ALL,
         confirm: None,
         is_refused: matches!(notice, Notice::Refused(_)),
     };

@@ -3,13 +3,13 @@
 
 use crate::{app::AppState, boxed, problem::Problem, viewer::Viewer, views::stage};
 use faceoff_api::{
-    requests::{NewStage, StageChange},
+    requests::{NewStage, OrNull, StagePatch},
     views::stage::StageView,
 };
 use faceoff_store::{Actor, Stage, StagePhase};
 use faceoff_types::{
-    CountingResult, MismatchSettings, PerturbationSettings, Retention, Ruleset, Runtimes, StageId,
-    StageName, StageRules, StageSettings, Variation,
+    CountingResult, InvalidStageRules, MismatchSettings, PerturbationSettings, Retention, Ruleset,
+    Runtimes, StageId, StageName, StageSettings,
 };
 
 fn parse_name(text: &str) -> Result<StageName, Problem> {
@@ -17,9 +17,13 @@ fn parse_name(text: &str) -> Result<StageName, Problem> {
         .map_err(|error| Problem::invalid("name", error))
 }
 
-fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
-    let checked = rules.check().and_then(|()| settings.check());
-    checked.map_err(|error| Problem::invalid(error.field(), error))
+fn invalid_rules(error: &InvalidStageRules) -> Problem {
+    Problem::invalid(error.field(), error)
+}
+
+fn requested_runtimes(patch: &StagePatch) -> Option<&Runtimes> {
+    let OrNull(runtimes) = patch.runtimes.as_ref()?;
+    runtimes.as_ref()
 }
 
 /// Refuses runtimes (environments such as Python) that the server does not offer. `None` stands for all.
@@ -79,45 +83,28 @@ pub async fn create_stage(
 ) -> Result<StageView, Problem> {
     let template = stage::current(app).await?;
     let now = app.config.clock.now();
-    check_offered(app, new.runtimes.as_ref().and_then(Option::as_ref))?;
-    let inherited = template.rules.rules;
-    let rules = StageRules {
-        ruleset: Ruleset::CURRENT,
-        profile: new.profile.unwrap_or(inherited.profile),
-        tasks: new.tasks.unwrap_or(inherited.tasks),
-        episodes_per_task: new.episodes_per_task.unwrap_or(inherited.episodes_per_task),
-        max_faults: new.max_faults.unwrap_or(inherited.max_faults),
-        variation: Variation {
-            weights: new.weights.unwrap_or(inherited.variation.weights),
-            tier_bounds: new.tier_bounds.unwrap_or(inherited.variation.tier_bounds),
-            perturbations: new
-                .perturbations
-                .unwrap_or(inherited.variation.perturbations),
-        },
-        limits: new.limits.unwrap_or(inherited.limits),
-        runtimes: new.runtimes.unwrap_or(inherited.runtimes),
+    let NewStage {
+        name,
+        settings: patch,
+    } = new;
+    check_offered(app, requested_runtimes(&patch))?;
+    let mut rules = template.rules.rules;
+    rules.ruleset = Ruleset::CURRENT;
+    let mut settings = StageSettings {
+        episodes_per_shard: template.settings.episodes_per_shard,
+        uploads: template.settings.uploads,
+        ..StageSettings::default()
     };
-    let default = StageSettings::default();
-    let settings = StageSettings {
-        schedule: new.schedule,
-        ablation_episodes: new.ablation_episodes.unwrap_or(0),
-        episodes_per_shard: new
-            .episodes_per_shard
-            .unwrap_or(template.settings.episodes_per_shard),
-        day_deadline: new.day_deadline.unwrap_or_default(),
-        blind: new.blind.unwrap_or(default.blind),
-        publishes: new.publishes.unwrap_or(default.publishes),
-        standings: new.standings.unwrap_or(default.standings),
-        uploads: new.uploads.unwrap_or(template.settings.uploads),
-    };
-    check(&rules, &settings)?;
-    let retention = checked_retention(new.retention)?.unwrap_or_default();
+    patch
+        .apply(&mut rules, &mut settings)
+        .map_err(|error| invalid_rules(&error))?;
+    let retention = checked_retention(patch.retention)?.unwrap_or_default();
     check_robot(app, &rules.variation.perturbations).await?;
     let new_stage = faceoff_store::NewStage {
-        name: parse_name(&new.name)?,
-        opens_at: new.opens_at.unwrap_or(now),
-        closes_at: new.closes_at,
-        zone: new.zone.unwrap_or(template.zone),
+        name: parse_name(&name)?,
+        opens_at: patch.opens_at.unwrap_or(now),
+        closes_at: patch.closes_at.and_then(|OrNull(at)| at),
+        zone: patch.zone.unwrap_or(template.zone),
         rules,
         settings,
     };
@@ -137,67 +124,17 @@ pub async fn change_stage(
     app: &AppState,
     actor: Actor,
     id: StageId,
-    change: StageChange,
+    change: StagePatch,
 ) -> Result<StageView, Problem> {
     let stage = app.store.stage(id).await?;
     let now = app.config.clock.now();
     let current_rules = &stage.rules.rules;
-    let has_new_rules = change.profile.is_some()
-        || change.tasks.is_some()
-        || change.episodes_per_task.is_some()
-        || change.max_faults.is_some()
-        || change.weights.is_some()
-        || change.tier_bounds.is_some()
-        || change.perturbations.is_some()
-        || change.limits.is_some()
-        || change.runtimes.is_some();
-    check_offered(app, change.runtimes.as_ref().and_then(Option::as_ref))?;
-    let rules = StageRules {
-        // A stage keeps its ruleset when a newer server version brings another one, until its rules are changed.
-        ruleset: if has_new_rules {
-            Ruleset::CURRENT
-        } else {
-            current_rules.ruleset
-        },
-        profile: change.profile.unwrap_or(current_rules.profile),
-        tasks: change.tasks.unwrap_or_else(|| current_rules.tasks.clone()),
-        episodes_per_task: change
-            .episodes_per_task
-            .unwrap_or(current_rules.episodes_per_task),
-        max_faults: change.max_faults.unwrap_or(current_rules.max_faults),
-        variation: Variation {
-            weights: change.weights.unwrap_or(current_rules.variation.weights),
-            tier_bounds: change
-                .tier_bounds
-                .unwrap_or(current_rules.variation.tier_bounds),
-            perturbations: change
-                .perturbations
-                .unwrap_or_else(|| current_rules.variation.perturbations.clone()),
-        },
-        limits: change
-            .limits
-            .unwrap_or_else(|| current_rules.limits.clone()),
-        runtimes: change
-            .runtimes
-            .unwrap_or_else(|| current_rules.runtimes.clone()),
-    };
-    let settings = StageSettings {
-        schedule: change
-            .schedule
-            .unwrap_or_else(|| stage.settings.schedule.clone()),
-        ablation_episodes: change
-            .ablation_episodes
-            .unwrap_or(stage.settings.ablation_episodes),
-        episodes_per_shard: change
-            .episodes_per_shard
-            .unwrap_or(stage.settings.episodes_per_shard),
-        day_deadline: change.day_deadline.unwrap_or(stage.settings.day_deadline),
-        blind: change.blind.unwrap_or(stage.settings.blind),
-        publishes: change.publishes.unwrap_or(stage.settings.publishes),
-        standings: change.standings.unwrap_or(stage.settings.standings),
-        uploads: change.uploads.unwrap_or(stage.settings.uploads),
-    };
-    check(&rules, &settings)?;
+    check_offered(app, requested_runtimes(&change))?;
+    let mut rules = current_rules.clone();
+    let mut settings = stage.settings.clone();
+    change
+        .apply(&mut rules, &mut settings)
+        .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != current_rules.variation.perturbations {
         check_robot(app, &rules.variation.perturbations).await?;
@@ -216,7 +153,7 @@ pub async fn change_stage(
     let stage_change = faceoff_store::StageChange {
         name: change.name.as_deref().map(parse_name).transpose()?,
         opens_at: change.opens_at,
-        closes_at: change.closes_at,
+        closes_at: change.closes_at.map(|OrNull(at)| at),
         zone: change.zone,
         rules: Some(rules),
         settings: Some(settings),

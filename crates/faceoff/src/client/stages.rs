@@ -4,7 +4,7 @@
 use super::Client;
 use faceoff_api::{
     requests::{
-        Confirmation, Decision, MissedDay, NewExtraEvaluation, NewStage, Reason, StageChange,
+        Confirmation, Decision, MissedDay, NewExtraEvaluation, NewStage, Reason, StagePatch,
         StartDay,
     },
     views::{capacity::CapacityView, day::DayView, evaluation::EvaluationView, stage::StageView},
@@ -32,7 +32,7 @@ impl Client {
     pub async fn change_stage(
         &self,
         id: StageId,
-        change: &StageChange,
+        change: &StagePatch,
     ) -> anyhow::Result<StageView> {
         self.call_with_body(Method::PATCH, &format!("/stages/{id}"), change)
             .await

@@ -2,7 +2,7 @@
 
 use super::*;
 use faceoff_api::{
-    requests::{ComparisonQuery, DeleteSubmission, NewStage, StageChange},
+    requests::{ComparisonQuery, DeleteSubmission, NewStage, OrNull, StagePatch},
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
@@ -315,31 +315,24 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
     let site = start_site(SMALL_BUNDLE_BYTES).await;
     let new = NewStage {
         name: "Final".into(),
-        opens_at: None,
-        closes_at: Some("2026-03-09T08:00:00Z".parse().unwrap()),
-        zone: Some("Europe/Berlin".parse().unwrap()),
-        profile: None,
-        tasks: None,
-        episodes_per_task: None,
-        max_faults: None,
-        weights: Some("0.5,0.5,0".parse().unwrap()),
-        tier_bounds: None,
-        perturbations: None,
-        runtimes: None,
-        limits: None,
-        uploads: None,
-        schedule: Some(faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap()),
-        ablation_episodes: None,
-        day_deadline: Some(DayDeadline::Hours(30)),
-        episodes_per_shard: None,
-        blind: Some(true),
-        publishes: None,
-        standings: Some(CountingResult::MeanOfLast(3)),
-        retention: serde_json::from_str(r#"{"last":3}"#).unwrap(),
+        settings: StagePatch {
+            closes_at: Some(OrNull(Some("2026-03-09T08:00:00Z".parse().unwrap()))),
+            zone: Some("Europe/Berlin".parse().unwrap()),
+            weights: Some("0.5,0.5,0".parse().unwrap()),
+            schedule: Some(OrNull(Some(
+                faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap(),
+            ))),
+            day_deadline: Some(DayDeadline::Hours(30)),
+            blind: Some(true),
+            standings: Some(CountingResult::MeanOfLast(3)),
+            retention: serde_json::from_str(r#"{"last":3}"#).unwrap(),
+            ..StagePatch::default()
+        },
     };
     let created = site.organiser.create_stage(&new).await.unwrap();
-    assert_eq!(created.settings.schedule, new.schedule);
-    let no_change = StageChange::default();
+    let schedule = created.settings.schedule.clone();
+    assert_eq!(Some(OrNull(schedule)), new.settings.schedule);
+    let no_change = StagePatch::default();
     let same = site
         .organiser
         .change_stage(created.id, &no_change)
@@ -347,10 +340,10 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
         .unwrap();
     assert_eq!(same, created);
     // An explicit null clears a field.
-    let cleared = StageChange {
-        closes_at: Some(None),
-        schedule: Some(None),
-        ..StageChange::default()
+    let cleared = StagePatch {
+        closes_at: Some(OrNull(None)),
+        schedule: Some(OrNull(None)),
+        ..StagePatch::default()
     };
     let changed = site
         .organiser

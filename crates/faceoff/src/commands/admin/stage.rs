@@ -8,25 +8,17 @@ use crate::{
         stage_lookup::find_stage,
     },
 };
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use clap::{Args, Subcommand};
 use faceoff_api::{
-    requests::{NewStage, StageChange},
+    requests::{NewStage, OrNull, StagePatch},
     views::{
         capacity::Fit,
         stage::{PhaseView, StageView},
     },
 };
-use faceoff_types::{
-    CountingResult, DayDeadline, PerturbationSettings, Profile, Publication, Retention, Runtimes,
-    Schedule, StageLimits, StageUploadLimits, Task, TaskWeights, TierBounds, Zone,
-};
-use jiff::{
-    Timestamp, Zoned,
-    civil::{Date, DateTime, Time},
-};
-use serde::de::DeserializeOwned;
-use std::path::PathBuf;
+use faceoff_types::{PerturbationSettings, Publication, Zone};
+use jiff::{Timestamp, Zoned, civil::DateTime};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum StageAction {
@@ -87,121 +79,24 @@ pub(super) struct StageOptions {
     /// Closing time [default of a new stage: open end]
     #[arg(long, value_name = "TIME")]
     closes: Option<String>,
-    /// Time zone of the evaluation days and the schedule, e.g. Europe/Berlin
-    #[arg(long, value_name = "NAME")]
-    zone: Option<Zone>,
-    /// Perturbation profile
-    #[arg(long)]
-    profile: Option<Profile>,
-    /// Tasks, e.g. hit,defend
-    #[arg(long, value_delimiter = ',', value_name = "TASKS")]
-    tasks: Option<Vec<Task>>,
-    /// Episodes per task and evaluation
-    #[arg(long)]
-    episodes: Option<u32>,
-    /// Agent faults allowed in an evaluation; with more, it has no score
-    #[arg(long)]
-    max_faults: Option<u32>,
-    /// Weights of hit, defend and prepare in the score, e.g. 0.4,0.4,0.2
-    #[arg(long, value_name = "WEIGHTS")]
-    weights: Option<TaskWeights>,
-    /// Penalty points per episode up to which an agent is deployable and improvable, e.g. 0.5,1.5
-    #[arg(long, value_name = "BOUNDS")]
-    tier_bounds: Option<TierBounds>,
-    /// A JSON file with magnitudes of the perturbations; those left out are the ruleset's, so {} resets all of them
-    #[arg(long, value_name = "FILE")]
-    perturbations: Option<PathBuf>,
-    /// Limits of agents instead of the server's, e.g. '{"memory_bytes":4294967296,"step_s":0.5}'; {} resets them
-    #[arg(long, value_name = "JSON", value_parser = parse_json::<StageLimits>)]
-    limits: Option<StageLimits>,
-    /// Allowed runtimes, e.g. native,python3; `all`: all that the server offers
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    runtimes: Option<Vec<String>>,
-    /// Upload limits of each team instead of the server's, e.g. '{"waiting":2,"day_bytes":1073741824}'
-    #[arg(long, value_name = "JSON", value_parser = parse_json::<StageUploadLimits>)]
-    uploads: Option<StageUploadLimits>,
-    /// Daily cutoff at this time
-    #[arg(long, value_name = "HH:MM", conflicts_with = "cron")]
-    daily: Option<Time>,
-    /// Cutoffs by a cron expression, e.g. "0 6 * * 1-5"; at most the first time of each date
-    #[arg(long, value_name = "EXPRESSION")]
-    cron: Option<String>,
-    /// Dates without a cutoff, with --daily or --cron, e.g. 2026-12-24,2026-12-25
-    #[arg(long, value_delimiter = ',', value_name = "DATES")]
-    days_off: Option<Vec<Date>>,
-    /// Episodes per task and profile of the ablation that the schedule starts for each submission; 0: none
-    #[arg(long)]
-    ablation_episodes: Option<u32>,
-    /// Episodes per shard, the job that one slot runs at a time
-    #[arg(long)]
-    episodes_per_shard: Option<u32>,
-    /// Deadline of an evaluation day: next-cut, never, or hours after its cutoff, e.g. 30h
-    #[arg(long, value_name = "DEADLINE")]
-    deadline: Option<DayDeadline>,
-    /// Hide the scores from everyone but organisers; `false` reveals them, permanently if there are any
-    #[arg(long, value_name = "true|false")]
-    blind: Option<bool>,
-    /// When datasets are published: never, at_close or at_release
-    #[arg(long, value_name = "TIME")]
-    publishes: Option<Publication>,
-    /// Retention of datasets and bundles, e.g. '{"last":5,"days_after_sign_off":90}' or
-    /// '{"until":"2027-06-01T00:00:00Z"}'; {} keeps all files
-    #[arg(long, value_name = "JSON", value_parser = parse_json::<Retention>)]
-    retention: Option<Retention>,
-    /// The result that counts for a team: latest, best, mean_of_last:N, or final
-    #[arg(long, value_name = "RESULT")]
-    standings: Option<CountingResult>,
+    #[command(flatten)]
+    settings: StagePatch,
 }
 
 impl StageOptions {
-    fn perturbations(&self) -> anyhow::Result<Option<Box<PerturbationSettings>>> {
-        let Some(path) = &self.perturbations else {
-            return Ok(None);
+    /// The settings, with times that are local in the option `--zone`, or else in `zone`.
+    fn settings(self, zone: &Zone) -> anyhow::Result<StagePatch> {
+        let zone = self.settings.zone.as_ref().unwrap_or(zone);
+        let parse = |text: Option<String>| {
+            let time = text.map(|text| parse_time(&text, zone));
+            time.transpose()
         };
-        let read = || -> anyhow::Result<Box<PerturbationSettings>> {
-            let text = std::fs::read_to_string(path)?;
-            let mut json = serde_json::Deserializer::from_str(&text);
-            let settings: Box<PerturbationSettings> = serde_path_to_error::deserialize(&mut json)?;
-            json.end()?;
-            settings.check()?;
-            Ok(settings)
-        };
-        let settings = read().with_context(|| format!("--perturbations {}", path.display()))?;
-        Ok(Some(settings))
+        Ok(StagePatch {
+            opens_at: parse(self.opens)?,
+            closes_at: parse(self.closes)?.map(|at| OrNull(Some(at))),
+            ..self.settings
+        })
     }
-
-    #[expect(
-        clippy::option_option,
-        reason = "the request distinguishes `all` from an option that is left out"
-    )]
-    fn runtimes(&self) -> Option<Option<Runtimes>> {
-        let names = self.runtimes.as_ref()?;
-        let is_all = names.iter().any(|name| name == "all");
-        Some((!is_all).then(|| names.iter().cloned().collect()))
-    }
-
-    fn schedule(&self) -> anyhow::Result<Option<Schedule>> {
-        let schedule = match (self.daily, &self.cron) {
-            (Some(time_of_day), _) => Schedule::daily(time_of_day),
-            (None, Some(pattern)) => Schedule::cron(pattern).context("--cron")?,
-            (None, None) => {
-                ensure!(
-                    self.days_off.is_none(),
-                    "--days-off needs --daily or --cron, which set the cutoffs"
-                );
-                return Ok(None);
-            }
-        };
-        Ok(Some(
-            schedule.without(self.days_off.clone().unwrap_or_default()),
-        ))
-    }
-}
-
-/// Parses an option in JSON; an error names the wrong field.
-fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
-    let mut json = serde_json::Deserializer::from_str(text);
-    serde_path_to_error::deserialize(&mut json).map_err(|error| error.to_string())
 }
 
 /// Parses a time with an offset or a zone; without them, it is local time in `zone`.
@@ -240,37 +135,13 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             })
         }
         StageAction::Create { name, options } => {
-            let zone = match &options.zone {
+            let zone = match &options.settings.zone {
                 Some(zone) => zone.clone(),
                 None => default_zone(client).await?,
             };
-            let parse_optional = |text: &Option<String>| {
-                let time = text.as_deref().map(|text| parse_time(text, &zone));
-                time.transpose()
-            };
             let new = NewStage {
                 name,
-                perturbations: options.perturbations()?,
-                runtimes: options.runtimes(),
-                opens_at: parse_optional(&options.opens)?,
-                closes_at: parse_optional(&options.closes)?,
-                schedule: options.schedule()?,
-                zone: options.zone,
-                profile: options.profile,
-                tasks: options.tasks,
-                episodes_per_task: options.episodes,
-                max_faults: options.max_faults,
-                weights: options.weights,
-                tier_bounds: options.tier_bounds,
-                limits: options.limits.map(Box::new),
-                uploads: options.uploads,
-                ablation_episodes: options.ablation_episodes,
-                episodes_per_shard: options.episodes_per_shard,
-                day_deadline: options.deadline,
-                blind: options.blind,
-                publishes: options.publishes,
-                standings: options.standings,
-                retention: options.retention,
+                settings: options.settings(&zone)?,
             };
             let created = client.create_stage(&new).await?;
             print(json, &created, stage_text)
@@ -284,41 +155,13 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             confirm,
         } => {
             let stage = find_stage(client, &stage).await?;
-            let zone = options.zone.clone().unwrap_or_else(|| stage.zone.clone());
-            let parse_optional = |text: &Option<String>| {
-                let time = text.as_deref().map(|text| parse_time(text, &zone));
-                time.transpose()
-            };
-            let schedule = options
-                .schedule()?
-                .map(Some)
-                .or(no_schedule.then_some(None));
-            let change = StageChange {
+            let settings = options.settings(&stage.zone)?;
+            let change = StagePatch {
                 name: rename,
-                perturbations: options.perturbations()?,
-                runtimes: options.runtimes(),
-                opens_at: parse_optional(&options.opens)?,
-                closes_at: parse_optional(&options.closes)?
-                    .map(Some)
-                    .or(open_end.then_some(None)),
-                schedule,
-                zone: options.zone,
-                profile: options.profile,
-                tasks: options.tasks,
-                episodes_per_task: options.episodes,
-                max_faults: options.max_faults,
-                weights: options.weights,
-                tier_bounds: options.tier_bounds,
-                limits: options.limits.map(Box::new),
-                uploads: options.uploads,
-                ablation_episodes: options.ablation_episodes,
-                episodes_per_shard: options.episodes_per_shard,
-                day_deadline: options.deadline,
-                blind: options.blind,
-                publishes: options.publishes,
-                standings: options.standings,
-                retention: options.retention,
+                closes_at: settings.closes_at.or(open_end.then_some(OrNull(None))),
+                schedule: settings.schedule.or(no_schedule.then_some(OrNull(None))),
                 confirm,
+                ..settings
             };
             let changed = client.change_stage(stage.id, &change).await?;
             print(json, &changed, stage_text)

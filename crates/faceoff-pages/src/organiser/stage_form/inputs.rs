@@ -1,0 +1,364 @@
+//! The inputs of the form of a stage: their labels, their texts for a stage, and the settings that are read from them.
+
+use super::StageForm;
+use faceoff_api::requests::{OrNull, StagePatch};
+use faceoff_service::problem::Problem;
+use faceoff_store::Stage;
+use faceoff_types::{Profile, Schedule, Task};
+use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
+use serde_json::{Value, json};
+use std::{fmt::Display, str::FromStr};
+
+/// An input of the form.
+pub(in crate::organiser) struct Input {
+    /// That of the setting in the API, if it is the setting's only input.
+    pub(in crate::organiser) name: &'static str,
+    pub(in crate::organiser) label: &'static str,
+    /// Unit or format; empty if the label says enough.
+    pub(in crate::organiser) note: &'static str,
+    pub(in crate::organiser) kind: InputKind,
+    /// The text for a stage.
+    pub(super) text: fn(&Stage) -> String,
+    /// Reads the setting, also from its other inputs.
+    pub(super) read: fn(&StageForm, &mut StagePatch) -> Result<(), Problem>,
+}
+
+pub(in crate::organiser) enum InputKind {
+    Text,
+    OptionalText,
+    /// In UTC, in the format of an input `datetime-local`: `2026-03-01T10:00`. May be empty.
+    DateTime,
+    /// A whole number from this one on.
+    Number(u32),
+    /// Values with their labels.
+    Choice(fn() -> Vec<(&'static str, &'static str)>),
+    Checkbox,
+}
+
+/// Inputs that are shown together.
+pub(in crate::organiser) struct InputGroup {
+    /// Empty: without a border.
+    pub(in crate::organiser) legend: &'static str,
+    pub(in crate::organiser) note: &'static str,
+    pub(super) inputs: &'static [Input],
+}
+
+impl InputGroup {
+    /// All inputs but checkboxes, which are shown below.
+    pub(in crate::organiser) fn fields(&self) -> impl Iterator<Item = &'static Input> {
+        let inputs = self.inputs.iter();
+        inputs.filter(|input| !matches!(input.kind, InputKind::Checkbox))
+    }
+
+    pub(in crate::organiser) fn checkboxes(&self) -> impl Iterator<Item = &'static Input> {
+        let inputs = self.inputs.iter();
+        inputs.filter(|input| matches!(input.kind, InputKind::Checkbox))
+    }
+}
+
+/// The stage's name, above all groups.
+pub(super) static NAME: Input = Input {
+    name: "name",
+    label: "Name",
+    note: "",
+    kind: InputKind::Text,
+    text: |stage| stage.name.to_string(),
+    read: |form, patch| {
+        patch.name = Some(form.text("name").to_owned());
+        Ok(())
+    },
+};
+
+pub(super) static GROUPS: [InputGroup; 4] = [
+    InputGroup {
+        legend: "",
+        note: "",
+        inputs: &[
+            Input {
+                name: "opens_at",
+                label: "Opens",
+                note: "UTC",
+                kind: InputKind::DateTime,
+                text: |stage| datetime_local(stage.opens_at),
+                read: |form, patch| {
+                    patch.opens_at = parse_time(form, "opens_at")?;
+                    Ok(())
+                },
+            },
+            Input {
+                name: "closes_at",
+                label: "Closes",
+                note: "UTC; empty: no date set",
+                kind: InputKind::DateTime,
+                text: |stage| stage.closes_at.map(datetime_local).unwrap_or_default(),
+                read: |form, patch| {
+                    patch.closes_at = Some(OrNull(parse_time(form, "closes_at")?));
+                    Ok(())
+                },
+            },
+            Input {
+                name: "zone",
+                label: "Time zone",
+                note: "",
+                kind: InputKind::Text,
+                text: |stage| stage.zone.to_string(),
+                read: |form, patch| parse(form, "zone", &mut patch.zone),
+            },
+        ],
+    },
+    InputGroup {
+        legend: "Daily cutoff",
+        note: "",
+        inputs: &[
+            Input {
+                name: "schedule",
+                label: "Time or cron expression",
+                note: "06:00 or 0 6 * * 1-5; empty: an organiser starts each day",
+                kind: InputKind::OptionalText,
+                text: time_or_cron,
+                read: read_schedule,
+            },
+            Input {
+                name: "days_off",
+                label: "Dates without evaluation",
+                note: "2026-12-24 2026-12-25",
+                kind: InputKind::OptionalText,
+                text: days_off,
+                read: read_schedule,
+            },
+            Input {
+                name: "day_deadline",
+                label: "Deadline of a day",
+                note: "next-cut: the next daily cutoff; never; or hours such as 30h",
+                kind: InputKind::Text,
+                text: |stage| stage.settings.day_deadline.to_string(),
+                read: |form, patch| parse(form, "day_deadline", &mut patch.day_deadline),
+            },
+        ],
+    },
+    InputGroup {
+        legend: "Rules",
+        note: "new rules start a new revision with its own board",
+        inputs: &[
+            Input {
+                name: "profile",
+                label: "Perturbations",
+                note: "",
+                kind: InputKind::Choice(profiles),
+                text: |stage| stage.rules.rules.profile.to_string(),
+                read: |form, patch| parse(form, "profile", &mut patch.profile),
+            },
+            Input {
+                name: "episodes_per_task",
+                label: "Episodes per task",
+                note: "",
+                kind: InputKind::Number(1),
+                text: |stage| stage.rules.rules.episodes_per_task.to_string(),
+                read: |form, patch| {
+                    parse_number(form, "episodes_per_task", &mut patch.episodes_per_task)
+                },
+            },
+            Input {
+                name: "max_faults",
+                label: "Faults allowed",
+                note: "",
+                kind: InputKind::Number(0),
+                text: |stage| stage.rules.rules.max_faults.to_string(),
+                read: |form, patch| parse_number(form, "max_faults", &mut patch.max_faults),
+            },
+            Input {
+                name: "task_hit",
+                label: "Hit",
+                note: "",
+                kind: InputKind::Checkbox,
+                text: |stage| task_checkbox(stage, Task::Hit),
+                read: read_tasks,
+            },
+            Input {
+                name: "task_defend",
+                label: "Defend",
+                note: "",
+                kind: InputKind::Checkbox,
+                text: |stage| task_checkbox(stage, Task::Defend),
+                read: read_tasks,
+            },
+            Input {
+                name: "task_prepare",
+                label: "Prepare",
+                note: "",
+                kind: InputKind::Checkbox,
+                text: |stage| task_checkbox(stage, Task::Prepare),
+                read: read_tasks,
+            },
+        ],
+    },
+    InputGroup {
+        legend: "Boards and files",
+        note: "",
+        inputs: &[
+            Input {
+                name: "standings",
+                label: "Which result counts",
+                note: "latest: the newest; best: the highest ranked; final: that of a final day after the stage has closed; \
+mean_of_last:5: the mean of the last 5 days",
+                kind: InputKind::Text,
+                text: |stage| stage.settings.standings.to_string(),
+                read: |form, patch| parse(form, "standings", &mut patch.standings),
+            },
+            Input {
+                name: "publishes",
+                label: "Datasets become public",
+                note: "",
+                kind: InputKind::Choice(publications),
+                text: |stage| stage.settings.publishes.to_string(),
+                read: |form, patch| parse(form, "publishes", &mut patch.publishes),
+            },
+            Input {
+                name: "ablation_episodes",
+                label: "Ablation episodes",
+                note: "per task and profile; 0: none",
+                kind: InputKind::Number(0),
+                text: |stage| stage.settings.ablation_episodes.to_string(),
+                read: |form, patch| {
+                    parse_number(form, "ablation_episodes", &mut patch.ablation_episodes)
+                },
+            },
+            Input {
+                name: "blind",
+                label: "Blind: only organisers see scores",
+                note: "",
+                kind: InputKind::Checkbox,
+                text: |stage| checkbox_text(stage.settings.blind),
+                read: |form, patch| {
+                    patch.blind = Some(form.is_ticked("blind"));
+                    Ok(())
+                },
+            },
+        ],
+    },
+];
+
+fn profiles() -> Vec<(&'static str, &'static str)> {
+    let names = Profile::ALL.iter().map(|profile| profile.as_str());
+    names.map(|name| (name, name)).collect()
+}
+
+fn publications() -> Vec<(&'static str, &'static str)> {
+    vec![
+        ("never", "never"),
+        ("at_close", "when the stage closes"),
+        ("at_release", "when their day is released"),
+    ]
+}
+
+fn read_tasks(form: &StageForm, patch: &mut StagePatch) -> Result<(), Problem> {
+    let checkboxes = [
+        (Task::Hit, "task_hit"),
+        (Task::Defend, "task_defend"),
+        (Task::Prepare, "task_prepare"),
+    ];
+    let ticked = checkboxes
+        .into_iter()
+        .filter(|(_, name)| form.is_ticked(name));
+    patch.tasks = Some(ticked.map(|(task, _)| task).collect());
+    Ok(())
+}
+
+fn invalid_field(name: &str, error: impl Display) -> Problem {
+    Problem::invalid(name, error)
+}
+
+/// Parses the text of the input `name`.
+fn parse<T: FromStr<Err: Display>>(
+    form: &StageForm,
+    name: &str,
+    setting: &mut Option<T>,
+) -> Result<(), Problem> {
+    let parsed = form.text(name).trim().parse();
+    *setting = Some(parsed.map_err(|error| invalid_field(name, error))?);
+    Ok(())
+}
+
+fn parse_number(form: &StageForm, name: &str, setting: &mut Option<u32>) -> Result<(), Problem> {
+    let text = form.text(name);
+    let invalid = |_| invalid_field(name, format!("expected a whole number, got {text:?}"));
+    *setting = Some(text.parse().map_err(invalid)?);
+    Ok(())
+}
+
+/// A time in the format of an input `datetime-local`.
+fn datetime_local(instant: Timestamp) -> String {
+    instant.strftime("%Y-%m-%dT%H:%M").to_string()
+}
+
+fn parse_time(form: &StageForm, name: &str) -> Result<Option<Timestamp>, Problem> {
+    let text = form.text(name);
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let local: DateTime = text.parse().map_err(|error| invalid_field(name, error))?;
+    let zoned = local.to_zoned(TimeZone::UTC);
+    Ok(Some(
+        zoned
+            .map_err(|error| invalid_field(name, error))?
+            .timestamp(),
+    ))
+}
+
+/// The text of a checkbox: the value that a browser sends if it is ticked.
+fn checkbox_text(is_ticked: bool) -> String {
+    if is_ticked {
+        "on".to_owned()
+    } else {
+        String::new()
+    }
+}
+
+fn task_checkbox(stage: &Stage, task: Task) -> String {
+    checkbox_text(stage.rules.rules.tasks.contains(&task))
+}
+
+fn schedule_json(stage: &Stage) -> Value {
+    serde_json::to_value(&stage.settings.schedule).unwrap_or_default()
+}
+
+fn json_text(value: &Value) -> String {
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+fn time_or_cron(stage: &Stage) -> String {
+    let schedule = schedule_json(stage);
+    match &schedule["daily"] {
+        Value::String(daily) => daily.strip_suffix(":00").unwrap_or(daily).to_owned(),
+        _ => json_text(&schedule["cron"]),
+    }
+}
+
+fn days_off(stage: &Stage) -> String {
+    let schedule = schedule_json(stage);
+    let dates = schedule["days_off"].as_array();
+    let dates = dates.map(|dates| dates.iter().map(json_text).collect::<Vec<_>>().join(" "));
+    dates.unwrap_or_default()
+}
+
+/// Reads a daily cutoff: a time, a cron expression of five fields, or nothing if an organiser starts each day. Dates without
+/// an evaluation are separated by spaces or commas.
+fn read_schedule(form: &StageForm, patch: &mut StagePatch) -> Result<(), Problem> {
+    let time_or_cron = form.text("schedule").trim();
+    if time_or_cron.is_empty() {
+        patch.schedule = Some(OrNull(None));
+        return Ok(());
+    }
+    let kind = if time_or_cron.contains(' ') || time_or_cron.starts_with('@') {
+        "cron"
+    } else {
+        "daily"
+    };
+    let dates = form.text("days_off").split([' ', ',', '\n', '\r']);
+    let dates: Vec<&str> = dates.filter(|date| !date.is_empty()).collect();
+    let fields = json!({ kind: time_or_cron, "days_off": dates });
+    let schedule: Schedule =
+        serde_json::from_value(fields).map_err(|error| invalid_field("schedule", error))?;
+    patch.schedule = Some(OrNull(Some(schedule)));
+    Ok(())
+}
