@@ -141,23 +141,24 @@ pub struct EvaluationConfig {
 
 impl Default for EvaluationConfig {
     fn default() -> Self {
+        let settings = StageSettings::default();
         Self {
             profile: Profile::Evaluation,
             tasks: Task::ALL.to_vec(),
             episodes_per_task: 1000,
-            episodes_per_shard: 50,
+            episodes_per_shard: settings.episodes_per_shard,
             at: None,
             cron: None,
             days_off: Vec::new(),
             zone: Zone::UTC,
-            day_deadline: DayDeadline::NextCutoff,
+            day_deadline: settings.day_deadline,
             max_faults: 10,
-            ablation_episodes: 0,
+            ablation_episodes: settings.ablation_episodes,
             weights: TaskWeights::default(),
             tier_bounds: TierBounds::default(),
             perturbations: None,
-            publishes: Publication::AtClose,
-            standings: CountingResult::Latest,
+            publishes: settings.publishes,
+            standings: settings.standings,
         }
     }
 }

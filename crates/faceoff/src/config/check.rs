@@ -1,12 +1,10 @@
 //! Checks of values that are invalid on any server or on this host.
 
 use super::Config;
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, anyhow, bail, ensure};
 use faceoff_dataset::can_draw_plant;
 use faceoff_sandbox::affinity;
-use faceoff_types::{
-    DayDeadline, IMAGE_RUNTIME, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
-};
+use faceoff_types::{IMAGE_RUNTIME, MismatchSettings, Seed};
 use std::collections::BTreeSet;
 
 /// More slots per CPU than this would make no progress.
@@ -121,40 +119,21 @@ impl Config {
         }
         let settings = self.settings().context("evaluation.cron")?;
         ensure!(
-            (1..=MAX_EPISODES_PER_TASK).contains(&evaluation.episodes_per_task),
-            "evaluation.episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {}",
-            evaluation.episodes_per_task
-        );
-        ensure!(
-            evaluation.episodes_per_shard >= 1,
-            "evaluation.episodes_per_shard: expected at least 1, got 0"
-        );
-        ensure!(
-            evaluation.ablation_episodes <= MAX_EPISODES_PER_TASK,
-            "evaluation.ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {}",
-            evaluation.ablation_episodes
-        );
-        if let DayDeadline::Hours(hours) = evaluation.day_deadline {
-            ensure!(
-                (1..=MAX_DEADLINE_H).contains(&hours),
-                "evaluation.day_deadline: expected 1 to {MAX_DEADLINE_H} hours, got {hours}"
-            );
-        }
-        ensure!(
             !evaluation.tasks.is_empty(),
             "evaluation.tasks: expected at least one task"
         );
-        self.rules()
+        let rules = self.rules();
+        rules
             .variation
             .perturbations
             .check()
             .context("evaluation.perturbations")?;
-        settings.check().context("evaluation")?;
         let mut unique = BTreeSet::new();
         if let Some(duplicate) = evaluation.tasks.iter().find(|task| !unique.insert(**task)) {
             bail!("evaluation.tasks: {duplicate} is listed twice");
         }
-        Ok(())
+        let checked = rules.check().and_then(|()| settings.check());
+        checked.map_err(|error| anyhow!("evaluation.{error}"))
     }
 
     fn check_workers(&self) -> anyhow::Result<()> {
