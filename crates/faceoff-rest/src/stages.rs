@@ -15,6 +15,7 @@ use faceoff_service::{
     viewer::Viewer,
     views::stage,
 };
+use faceoff_store::Stage;
 use faceoff_types::StageId;
 
 /// Lists all stages, in order of their opening.
@@ -58,7 +59,8 @@ pub(crate) async fn create_stage(
     State(app): State<App>,
     Body(request): Body<NewStage>,
 ) -> Result<(StatusCode, Json<StageView>), Problem> {
-    let view = stages::create_stage(&app, organiser.actor(), request).await?;
+    let created = stages::create_stage(&app, organiser.actor(), request).await?;
+    let view = organiser_view(&app, created).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -82,6 +84,11 @@ pub(crate) async fn change_stage(
     PathParam(id): PathParam<StageId>,
     Body(change): Body<StagePatch>,
 ) -> Result<Json<StageView>, Problem> {
-    let changed = stages::change_stage(&app, organiser.actor(), id, change);
-    changed.await.map(Json)
+    let changed = stages::change_stage(&app, organiser.actor(), id, change).await?;
+    organiser_view(&app, changed).await.map(Json)
+}
+
+async fn organiser_view(app: &App, changed: Stage) -> Result<StageView, Problem> {
+    let view = stage::build(app, changed).await?;
+    stage::for_viewer(view, app, Viewer::Organiser).await
 }

@@ -1,11 +1,8 @@
 //! Creating and changing stages. A *stage* is a part of the season with its own rules, board and daily evaluations. A change of the
 //! rules of an open stage begins a new *revision*, with an empty board.
 
-use crate::{app::AppState, boxed, problem::Problem, viewer::Viewer, views::stage};
-use faceoff_api::{
-    requests::{NewStage, OrNull, StagePatch},
-    views::stage::StageView,
-};
+use crate::{app::AppState, boxed, problem::Problem, views::stage};
+use faceoff_api::requests::{NewStage, OrNull, StagePatch};
 use faceoff_store::{Actor, Stage, StagePhase};
 use faceoff_types::{
     CountingResult, InvalidStageRules, MismatchSettings, PerturbationSettings, Retention, Ruleset,
@@ -76,11 +73,7 @@ pub async fn check_robot(app: &AppState, settings: &PerturbationSettings) -> Res
 
 /// Creates a stage. Fields that are left out are copied from the open stage, or from the nearest one.
 #[boxed]
-pub async fn create_stage(
-    app: &AppState,
-    actor: Actor,
-    new: NewStage,
-) -> Result<StageView, Problem> {
+pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result<Stage, Problem> {
     let template = stage::current(app).await?;
     let now = app.config.clock.now();
     let NewStage {
@@ -113,8 +106,7 @@ pub async fn create_stage(
         .create_stage_with_retention(actor, new_stage, retention, now)
         .await?;
     tracing::info!(stage = %created.name, id = %created.id, "stage created");
-    let view = stage::build(app, created).await?;
-    stage::for_viewer(view, app, Viewer::Organiser).await
+    Ok(created)
 }
 
 /// Changes a stage. A change that begins a new revision, reorders a board or removes files must be confirmed with the
@@ -125,7 +117,7 @@ pub async fn change_stage(
     actor: Actor,
     id: StageId,
     change: StagePatch,
-) -> Result<StageView, Problem> {
+) -> Result<Stage, Problem> {
     let stage = app.store.stage(id).await?;
     let now = app.config.clock.now();
     let current_rules = &stage.rules.rules;
@@ -161,8 +153,7 @@ pub async fn change_stage(
     };
     let changed = app.store.change_stage(actor, id, stage_change, now).await?;
     tracing::info!(stage = %changed.name, %id, revision = changed.rules.number, "stage changed");
-    let view = stage::build(app, changed).await?;
-    stage::for_viewer(view, app, Viewer::Organiser).await
+    Ok(changed)
 }
 
 fn checked_retention(retention: Option<Retention>) -> Result<Option<Retention>, Problem> {
