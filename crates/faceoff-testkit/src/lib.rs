@@ -1,38 +1,23 @@
-//! Shared setup of tests of several crates: a *store*, which is the database and files of a season, in an empty folder.
+//! Shared setup of tests of several crates: a *store*, which is the database and files of a season, the steps that bring it to
+//! the state that a test needs, and assertions about its answers. All of it panics where a step fails, as tests do.
 #![expect(
-    clippy::expect_used,
+    clippy::unwrap_used,
     reason = "helpers of tests fail as tests do: by panicking"
 )]
 
-use faceoff_store::Store;
-use std::{
-    env, fs,
-    path::{Path, PathBuf},
+mod assertions;
+mod outcomes;
+mod stages;
+mod stores;
+mod submissions;
+mod waiting;
+
+pub use assertions::{assert_conflict, assert_contains};
+pub use outcomes::{outcome, shard_commit, shard_outcomes};
+pub use stages::{
+    accept_runtimes, configure_stage, one_shard_plan, rules_and_settings, six_shard_plan,
+    two_shard_plan,
 };
-
-/// Opens a store on a new data folder at this path.
-///
-/// Its database is a copy of a template that was migrated once, since running all migrations in hundreds of tests would
-/// be slow. Each store draws its own season secret.
-///
-/// # Panics
-/// If there is a database already, or the folder cannot be written.
-pub async fn new_store(data_dir: &Path) -> Store {
-    let template = Store::template(&template_folder())
-        .await
-        .expect("an empty database can be created next to the test program");
-    fs::create_dir_all(data_dir).expect("the data folder can be created");
-    let database = data_dir.join(Store::DATABASE_FILE);
-    assert!(!database.exists(), "{} exists", database.display());
-    fs::copy(&template, &database).expect("an empty database can be copied");
-    Store::open(data_dir)
-        .await
-        .expect("a store can be opened on a new data folder")
-}
-
-/// Folder of the templates: inside the target folder, so that `cargo clean` removes them.
-fn template_folder() -> PathBuf {
-    let program = env::current_exe().expect("the path of the test program is known");
-    let folder = program.parent().expect("the test program is in a folder");
-    folder.join("databases")
-}
+pub use stores::new_store;
+pub use submissions::{bundle_ref, create_team, finish_validation, submit, valid_outcome};
+pub use waiting::{wait_for, wait_for_evaluation, wait_for_validation};

@@ -6,8 +6,9 @@ use crate::{
     site::{ADMIN, Site, TestTeam, outcome},
 };
 use faceoff_scoring::EpisodeSummary;
-use faceoff_store::{Artifacts, ShardCommit};
-use faceoff_types::{Profile, SubmissionId};
+use faceoff_store::Artifacts;
+use faceoff_testkit::{shard_commit, shard_outcomes};
+use faceoff_types::{EpisodeOutcome, Profile, SubmissionId};
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -19,23 +20,18 @@ const TASK_PROFILES: u32 = 3 * 6;
 async fn run_shards(site: &Site, shards: u32) {
     for _ in 0..shards {
         let (claim, run, shard) = site.claim_shard().await;
-        let outcomes: Vec<_> = (shard.first_episode..shard.end_episode)
-            .map(|episode| {
-                let mut outcome = outcome(shard.task, episode, false);
-                outcome.success = match run.plan.profile {
-                    Profile::Ideal => true,
-                    Profile::TrackingLoss => false,
-                    _ => episode % 2 == 0,
-                };
-                outcome
-            })
-            .collect();
-        let commit = ShardCommit {
-            outcomes,
-            log: String::new(),
-            stopped_by_faults: false,
-            recording: None,
-        };
+        let outcomes = shard_outcomes(&shard, |task, episode| {
+            let success = match run.plan.profile {
+                Profile::Ideal => true,
+                Profile::TrackingLoss => false,
+                _ => episode % 2 == 0,
+            };
+            EpisodeOutcome {
+                success,
+                ..outcome(task, episode, false)
+            }
+        });
+        let commit = shard_commit(outcomes, None);
         site.store
             .commit_shard(&claim, commit, site.now())
             .await

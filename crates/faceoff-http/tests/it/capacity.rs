@@ -1,8 +1,9 @@
 //! Tests of the capacity forecast (will a day's evaluations finish before its deadline?), of queue positions and next steps,
 //! and of warnings about days that do not fit.
 
-use crate::site::{ADMIN, Answer, Site, string};
+use crate::site::{ADMIN, Answer, Site, outcome, string};
 use faceoff_store::*;
+use faceoff_testkit::{shard_commit, shard_outcomes};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -20,14 +21,9 @@ pub async fn run_evaluation_slowly(site: &Site, job_s: i64) {
         site.advance(job_s);
         match job {
             Job::Shard { run, shard, .. } => {
-                let commit = ShardCommit {
-                    outcomes: (shard.first_episode..shard.end_episode)
-                        .map(|episode| crate::site::outcome(shard.task, episode, false))
-                        .collect(),
-                    log: String::new(),
-                    stopped_by_faults: false,
-                    recording: Some(claim.recording_key(run.id)),
-                };
+                let outcomes =
+                    shard_outcomes(&shard, |task, episode| outcome(task, episode, false));
+                let commit = shard_commit(outcomes, Some(claim.recording_key(run.id)));
                 let committed = site.store.commit_shard(&claim, commit, site.now());
                 assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
             }

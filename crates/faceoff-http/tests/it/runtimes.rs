@@ -2,7 +2,7 @@
 
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, string};
 use faceoff_store::Job;
-use faceoff_types::ValidationOutcome;
+use faceoff_testkit::valid_outcome;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -25,13 +25,8 @@ async fn set_runtimes(site: &Site, runtimes: Value) -> Value {
 /// Uploads a submission that is valid and uses this runtime. Returns its path in the API.
 async fn valid_submission(site: &Site, team: &TestTeam, runtime: &str) -> String {
     let uploaded = site.upload(&team.token, GZIP.to_vec()).await.json(201);
-    site.finish_validation(ValidationOutcome::Valid {
-        agent_name: "a".into(),
-        runtime: runtime.into(),
-        timing: Vec::new(),
-        log: String::new(),
-    })
-    .await;
+    site.finish_validation(valid_outcome(runtime, "a", ""))
+        .await;
     format!("/api/v1/submissions/{}", string(&uploaded["id"]))
 }
 

@@ -10,6 +10,10 @@ use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
 use faceoff_store::*;
+pub use faceoff_testkit::outcome;
+use faceoff_testkit::{
+    configure_stage, shard_commit, shard_outcomes, six_shard_plan, valid_outcome,
+};
 use faceoff_types::*;
 use faceoff_wire::grant::GrantKey;
 use jiff::{SignedDuration, Timestamp};
@@ -414,24 +418,14 @@ impl Site {
     /// Returns the submission's path in the API.
     pub async fn valid_submission(&self, team: &TestTeam, agent_name: &str) -> String {
         let submission = self.upload(&team.token, GZIP.to_vec()).await.json(201);
-        let outcome = ValidationOutcome::Valid {
-            runtime: "native".into(),
-            agent_name: agent_name.into(),
-            timing: Vec::new(),
-            log: "ready\n".into(),
-        };
+        let outcome = valid_outcome("native", agent_name, "ready\n");
         self.finish_validation(outcome).await;
         format!("/api/v1/submissions/{}", string(&submission["id"]))
     }
 
     /// Claims the next validation run and commits its outcome.
     pub async fn finish_validation(&self, outcome: ValidationOutcome) {
-        let ClaimedJob { claim, job } = self.claim().await;
-        assert!(matches!(job, Job::Validation { .. }), "claimed {job:?}");
-        self.store
-            .commit_validation(&claim, outcome, self.now())
-            .await
-            .unwrap();
+        faceoff_testkit::finish_validation(&self.store, outcome, self.now()).await;
     }
 
     /// Claims the next job.
@@ -456,13 +450,12 @@ impl Site {
     pub async fn run_shards(&self, faults: usize) {
         for _ in Task::ALL {
             let (claim, run, shard) = self.claim_shard().await;
+            let outcomes = shard_outcomes(&shard, |task, episode| {
+                outcome(task, episode, (episode as usize) < faults)
+            });
             let commit = ShardCommit {
-                outcomes: (shard.first_episode..shard.end_episode)
-                    .map(|episode| outcome(shard.task, episode, (episode as usize) < faults))
-                    .collect(),
                 log: format!("log of {}\n", shard.task),
-                stopped_by_faults: false,
-                recording: Some(claim.recording_key(run.id)),
+                ..shard_commit(outcomes, Some(claim.recording_key(run.id)))
             };
             self.store
                 .commit_shard(&claim, commit, self.now())
@@ -518,16 +511,9 @@ impl Site {
             let ClaimedJob { claim, job } = self.claim().await;
             match job {
                 Job::Shard { run, shard, .. } => {
-                    let shard_outcomes: Vec<_> = (shard.first_episode..shard.end_episode)
-                        .map(|episode| outcome_fn(shard.task, episode))
-                        .collect();
-                    outcomes.extend(shard_outcomes.iter().cloned());
-                    let commit = ShardCommit {
-                        outcomes: shard_outcomes,
-                        log: String::new(),
-                        stopped_by_faults: false,
-                        recording: Some(claim.recording_key(run.id)),
-                    };
+                    let new_outcomes = shard_outcomes(&shard, &outcome_fn);
+                    outcomes.extend(new_outcomes.iter().cloned());
+                    let commit = shard_commit(new_outcomes, Some(claim.recording_key(run.id)));
                     let committed = self.store.commit_shard(&claim, commit, self.now());
                     assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
                 }
@@ -642,43 +628,11 @@ pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> Eva
 /// The run plan of the first stage: one shard for each task, and one agent fault is allowed.
 fn plan() -> RunPlan {
     RunPlan {
-        profile: Profile::Evaluation,
         tasks: Task::ALL.to_vec(),
-        episodes_per_task: 4,
         episodes_per_shard: 4,
         max_faults: 1,
-        variation: Default::default(),
-        limits: Default::default(),
+        ..six_shard_plan()
     }
-}
-
-/// Configures the season's first stage by this plan. Returns its id.
-async fn configure_stage(
-    store: &Store,
-    plan: &RunPlan,
-    schedule: Option<Schedule>,
-    now: Timestamp,
-) -> StageId {
-    let rules = StageRules {
-        runtimes: None,
-        ruleset: Ruleset::CURRENT,
-        profile: plan.profile,
-        tasks: plan.tasks.clone(),
-        episodes_per_task: plan.episodes_per_task,
-        max_faults: plan.max_faults,
-        variation: Default::default(),
-        limits: Default::default(),
-    };
-    let settings = StageSettings {
-        schedule,
-        episodes_per_shard: plan.episodes_per_shard,
-        ..StageSettings::default()
-    };
-    store
-        .configure_stage(rules, settings, Zone::UTC, now)
-        .await
-        .unwrap();
-    store.stages().await.unwrap()[0].id
 }
 
 /// The outcome of an agent in an episode.
@@ -724,34 +678,6 @@ pub fn string(value: &Value) -> String {
         .as_str()
         .unwrap_or_else(|| panic!("{value} is not a string"))
         .to_owned()
-}
-
-/// The outcome of an episode that ended with an agent fault or successfully. Steps and times are arbitrary.
-pub fn outcome(task: Task, episode: u32, has_fault: bool) -> EpisodeOutcome {
-    let fault = has_fault.then(|| AgentFault {
-        fault: AgentFaultKind::NonFinite,
-        agent_task: task.into(),
-        episode: Some(episode),
-        step: Some(3),
-        line: Some("{\"type\":\"act\"}".into()),
-    });
-    EpisodeOutcome {
-        task,
-        episode,
-        steps: 17,
-        end: if has_fault {
-            EpisodeEnd::AgentFault
-        } else {
-            EpisodeEnd::LeftTable
-        },
-        success: !has_fault,
-        violations: Violations::default(),
-        computation_time: ComputationTime {
-            mean_s: 1e-4,
-            max_s: 1e-3,
-        },
-        fault,
-    }
 }
 
 /// A result over 1000 episodes with these success rates (hit, defend, prepare) and these overall penalty points, all of

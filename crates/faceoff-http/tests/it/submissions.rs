@@ -3,6 +3,7 @@
 use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, generous_limits, string};
 use bytes::Bytes;
 use faceoff_http::{HttpLimits, MinTransferRate};
+use faceoff_testkit::valid_outcome;
 use faceoff_types::ValidationOutcome;
 use reqwest::{Body, Method};
 use serde_json::{Value, json};
@@ -58,12 +59,7 @@ async fn upload_is_stored_hashed_and_queued() {
     );
     assert_eq!(temporary_uploads(&site), 0);
 
-    let outcome = ValidationOutcome::Valid {
-        runtime: "native".into(),
-        agent_name: "striker 1.0".into(),
-        timing: Vec::new(),
-        log: "model loaded\n".into(),
-    };
+    let outcome = valid_outcome("native", "striker 1.0", "model loaded\n");
     site.finish_validation(outcome).await;
     let mut submission = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(submission["state"], "valid");
@@ -132,12 +128,7 @@ async fn newest_valid_submission_is_active_until_another_is_chosen() {
         .await
         .problem(409, "conflict", &["wait"]);
     assert_eq!(active().await, first);
-    let outcome = ValidationOutcome::Valid {
-        runtime: "native".into(),
-        agent_name: "second".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    };
+    let outcome = valid_outcome("native", "second", "");
     site.finish_validation(outcome).await;
     assert!(active().await.ends_with(&waiting));
 
@@ -287,13 +278,8 @@ async fn pending_uploads_of_a_team_are_limited() {
     let refused = site.upload(&team.token, GZIP.to_vec()).await;
     refused.problem(429, "too-many-pending", &["2 submissions", "verdict"]);
     assert_eq!(refused.header("retry-after"), "30");
-    site.finish_validation(ValidationOutcome::Valid {
-        runtime: "native".into(),
-        agent_name: "a".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    })
-    .await;
+    site.finish_validation(valid_outcome("native", "a", ""))
+        .await;
     site.upload(&team.token, GZIP.to_vec()).await.json(201);
 }
 

@@ -175,12 +175,7 @@ async fn valid_upload_becomes_active_unless_superseded() {
     f.upload(&team).await;
     let quick = f.validate().await;
     assert!(quick.active);
-    let valid_outcome = || ValidationOutcome::Valid {
-        runtime: "native".into(),
-        agent_name: "late".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    };
+    let valid_outcome = || valid_outcome("native", "late", "");
     let late = f
         .store
         .commit_validation(&slow_claim, valid_outcome(), f.now)
@@ -435,11 +430,7 @@ async fn board_shows_newest_finished_day_of_each_team() {
     let mut f = TestStore::new().await;
     f.valid_submission_of("Alpha").await;
     f.valid_submission_of("Beta").await;
-    let one_shard = RunPlan {
-        tasks: vec![faceoff_types::Task::Hit],
-        episodes_per_task: 1,
-        ..six_shard_plan()
-    };
+    let one_shard = one_shard_plan();
     for (day, score) in [(1, 10.0), (2, 20.0), (3, 30.0)] {
         f.now = format!("2026-03-0{day}T12:00:00Z").parse().unwrap();
         assert_eq!(

@@ -6,17 +6,9 @@ use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
 
-/// Two shards of one task, so that an evaluation can be half finished.
-fn two_shards() -> RunPlan {
-    RunPlan {
-        tasks: vec![Task::Hit],
-        ..six_shard_plan()
-    }
-}
-
 /// Configures the first stage with days at 10:00 UTC and this deadline.
 async fn configure_daily_stage(f: &TestStore, day_deadline: DayDeadline) -> StageId {
-    let (rules, settings) = rules_and_settings(&two_shards());
+    let (rules, settings) = rules_and_settings(&two_shard_plan());
     let settings = StageSettings {
         schedule: Some(Schedule::daily("10:00".parse().unwrap())),
         day_deadline,

@@ -24,10 +24,7 @@ fn event_kinds(records: &[EventRecord]) -> Vec<String> {
 #[tokio::test]
 async fn events_record_each_step_of_a_submission() {
     let f = TestStore::new().await;
-    let one_task = RunPlan {
-        tasks: vec![faceoff_types::Task::Hit],
-        ..six_shard_plan()
-    };
+    let one_task = two_shard_plan();
     f.configure_stage(&one_task).await;
     let submission = f.valid_submission_of("Alpha").await;
     let evaluation = f.evaluate(submission.id, &one_task).await;
@@ -102,10 +99,8 @@ async fn events_record_each_end_of_an_evaluation() {
     let mut f = TestStore::new().await;
     let alpha = f.valid_submission_of("Alpha").await;
     let one_task = RunPlan {
-        tasks: vec![faceoff_types::Task::Hit],
-        episodes_per_task: 1,
         max_faults: 0,
-        ..six_shard_plan()
+        ..one_shard_plan()
     };
     #[derive(Debug)]
     enum End {

@@ -4,6 +4,11 @@
 //! the queue, which are the *shards* of a run (episodes that are run together), and a scoring job at the end.
 
 use faceoff_store::*;
+pub use faceoff_testkit::{
+    assert_conflict, assert_contains, one_shard_plan, rules_and_settings, six_shard_plan,
+    two_shard_plan, valid_outcome,
+};
+use faceoff_testkit::{bundle_ref, shard_outcomes};
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
 use sqlx::{Connection, SqliteConnection};
@@ -54,30 +59,12 @@ impl TestStore {
     }
 
     pub async fn create_team(&self, name: &str) -> Team {
-        let token_hash = *blake3::hash(name.as_bytes()).as_bytes();
-        self.store
-            .create_team(
-                Actor::Organiser,
-                &name.parse().unwrap(),
-                token_hash,
-                self.now,
-            )
-            .await
-            .unwrap()
+        faceoff_testkit::create_team(&self.store, name, self.now).await
     }
 
     /// Submits [`bundle`] as a team's agent. Its validation run is queued.
     pub async fn upload(&self, team: &Team) -> Submission {
-        self.store
-            .create_submission(
-                Actor::Team(team.id),
-                team.id,
-                bundle(),
-                &UploadQuota::default(),
-                self.now,
-            )
-            .await
-            .unwrap()
+        faceoff_testkit::submit(&self.store, team.id, bundle(), self.now).await
     }
 
     /// Claims the next job of the queue, as a worker's slot.
@@ -87,18 +74,8 @@ impl TestStore {
 
     /// Claims the next job, which must be a validation run, and reports the agent as valid.
     pub async fn validate(&self) -> Submission {
-        let (claim, submission) = self.claim_validation().await;
-        let outcome = ValidationOutcome::Valid {
-            runtime: "native".into(),
-            agent_name: "striker".into(),
-            timing: Vec::new(),
-            log: "hello\n".into(),
-        };
-        self.store
-            .commit_validation(&claim, outcome, self.now)
-            .await
-            .unwrap();
-        self.store.submission(submission.id).await.unwrap()
+        let outcome = valid_outcome("native", "striker", "hello\n");
+        faceoff_testkit::finish_validation(&self.store, outcome, self.now).await
     }
 
     /// Creates a team and its valid submission.
@@ -269,59 +246,14 @@ impl TestStore {
     }
 }
 
-/// Expects that the result is a conflict whose reason contains these phrases.
-#[track_caller]
-pub fn assert_conflict<T: std::fmt::Debug>(result: Result<T, StoreError>, phrases: &[&str]) {
-    let Err(StoreError::Conflict(reason)) = result else {
-        panic!("expected a conflict with {phrases:?}: {result:?}");
-    };
-    for phrase in phrases {
-        assert!(reason.contains(phrase), "{phrase:?} is not in {reason:?}");
-    }
-}
-
-/// Expects that the error's text contains these phrases.
-#[track_caller]
-pub fn assert_contains(error: &StoreError, phrases: &[&str]) {
-    let text = error.to_string();
-    for phrase in phrases {
-        assert!(text.contains(phrase), "{phrase:?} is not in {text:?}");
-    }
-}
-
 /// Configures the first stage of the store's season with this plan, from now on.
 pub async fn configure_first_stage(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
-    let (rules, settings) = rules_and_settings(plan);
     // A new stage has been open for 90 days, so that tests can set the clock back.
     let configured_at = match store.stages().await.unwrap().is_empty() {
         true => now - SignedDuration::from_hours(24 * 90),
         false => now,
     };
-    store
-        .configure_stage(rules, settings, Zone::UTC, configured_at)
-        .await
-        .unwrap();
-    store.stages().await.unwrap()[0].id
-}
-
-/// Rules and settings of a stage with this plan.
-pub fn rules_and_settings(plan: &RunPlan) -> (StageRules, StageSettings) {
-    let rules = StageRules {
-        runtimes: None,
-        ruleset: Ruleset::CURRENT,
-        profile: plan.profile,
-        tasks: plan.tasks.clone(),
-        episodes_per_task: plan.episodes_per_task,
-        max_faults: plan.max_faults,
-        // No deviations from the ruleset's weights, tiers and perturbations.
-        variation: Default::default(),
-        limits: Default::default(),
-    };
-    let settings = StageSettings {
-        episodes_per_shard: plan.episodes_per_shard,
-        ..StageSettings::default()
-    };
-    (rules, settings)
+    faceoff_testkit::configure_stage(store, plan, None, configured_at).await
 }
 
 /// The description of each query in `.sqlx/`, with its path.
@@ -344,69 +276,25 @@ pub fn blake3_of(dataset: &str) -> String {
 
 /// A submitted agent's archive.
 pub fn bundle() -> BundleRef {
-    BundleRef {
-        key: "bundles/abc".into(),
-        bytes: 3,
-        blake3: blake3::hash(b"abc").to_string(),
-        file_name: "agent.tar.gz".into(),
-    }
-}
-
-/// 3 tasks of 4 episodes in shards of 2 episodes: six shards.
-pub fn six_shard_plan() -> RunPlan {
-    RunPlan {
-        profile: Profile::Evaluation,
-        tasks: vec![Task::Prepare, Task::Hit, Task::Defend],
-        episodes_per_task: 4,
-        episodes_per_shard: 2,
-        max_faults: 3,
-        variation: Default::default(),
-        limits: Default::default(),
-    }
-}
-
-/// One shard of one episode.
-pub fn one_shard_plan() -> RunPlan {
-    RunPlan {
-        tasks: vec![Task::Hit],
-        episodes_per_task: 1,
-        ..six_shard_plan()
-    }
+    bundle_ref("bundles/abc", b"abc")
 }
 
 /// Commit of a worker that ran `shard`; its first `faults` episodes ended by an agent fault.
 pub fn shard_commit(shard: &Shard, faults: u32) -> ShardCommit {
-    let outcomes = (shard.first_episode..shard.end_episode)
-        .enumerate()
-        .map(|(index, episode)| outcome(shard.task, episode, (index as u32) < faults))
-        .collect();
+    let first_valid = shard.first_episode + faults;
+    let outcomes = shard_outcomes(shard, |task, episode| {
+        outcome(task, episode, episode < first_valid)
+    });
+    let recording = format!("recordings/{}", shard.id);
     ShardCommit {
-        outcomes,
         log: format!("log of {} {}\n", shard.task, shard.first_episode),
-        stopped_by_faults: false,
-        recording: Some(format!("recordings/{}", shard.id)),
+        ..faceoff_testkit::shard_commit(outcomes, Some(recording))
     }
 }
 
 /// Outcome of an episode that ended by an agent fault, or in success. Its times are no short decimals.
 pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
-    let fault = is_faulty.then(|| AgentFault {
-        fault: AgentFaultKind::NonFinite,
-        agent_task: task.into(),
-        episode: Some(episode),
-        step: Some(3),
-        line: Some("{\"type\":\"act\"}".into()),
-    });
     EpisodeOutcome {
-        task,
-        episode,
-        steps: 17,
-        end: if is_faulty {
-            EpisodeEnd::AgentFault
-        } else {
-            EpisodeEnd::LeftTable
-        },
-        success: !is_faulty,
         violations: Violations {
             ee: true,
             ..Violations::default()
@@ -415,7 +303,7 @@ pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
             mean_s: 0.1 + 0.2,
             max_s: 1e-3 / 3.0,
         },
-        fault,
+        ..faceoff_testkit::outcome(task, episode, is_faulty)
     }
 }
 

@@ -113,12 +113,7 @@ async fn child_process_writes_until_killed() {
             };
             match job {
                 Job::Validation { submission, .. } => {
-                    let outcome = ValidationOutcome::Valid {
-                        runtime: "native".into(),
-                        agent_name: "a".into(),
-                        timing: Vec::new(),
-                        log: String::new(),
-                    };
+                    let outcome = valid_outcome("native", "a", "");
                     store.commit_validation(&claim, outcome, now).await.unwrap();
                     report(format!("valid {}", submission.id));
                     match store.start_day(Actor::Organiser, stage, now).await {
@@ -280,12 +275,7 @@ async fn remove_files(
         let Job::Validation { .. } = job else {
             panic!("expected a validation run, claimed {job:?}")
         };
-        let outcome = ValidationOutcome::Valid {
-            runtime: "native".into(),
-            agent_name: "b".into(),
-            timing: Vec::new(),
-            log: String::new(),
-        };
+        let outcome = valid_outcome("native", "b", "");
         store.commit_validation(&claim, outcome, now).await.unwrap();
     }
     let first = submissions[0];

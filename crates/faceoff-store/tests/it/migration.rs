@@ -763,12 +763,7 @@ async fn migrated_queue_continues() {
             Job::Validation { submission, .. } => {
                 validations += 1;
                 assert!([id(1), id(2)].contains(&submission.id));
-                let outcome = ValidationOutcome::Valid {
-                    runtime: "native".into(),
-                    agent_name: "a".into(),
-                    timing: Vec::new(),
-                    log: String::new(),
-                };
+                let outcome = valid_outcome("native", "a", "");
                 let committed = f.store.commit_validation(&claim, outcome, f.now).await;
                 assert_eq!(committed.unwrap(), CommitOutcome::Stored);
             }

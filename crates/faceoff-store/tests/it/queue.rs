@@ -292,11 +292,7 @@ async fn scoring_and_validation_precede_shards() {
     let f = TestStore::new().await;
     let alpha = f.valid_submission_of("Alpha").await;
     let beta = f.valid_submission_of("Beta").await;
-    let one_shard = RunPlan {
-        tasks: vec![Task::Hit],
-        episodes_per_task: 1,
-        ..six_shard_plan()
-    };
+    let one_shard = one_shard_plan();
     let first = f.evaluate(alpha.id, &one_shard).await;
     f.evaluate(beta.id, &one_shard).await;
     let (claim, run, shard) = f.claim_shard().await;
@@ -385,11 +381,7 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
 async fn failed_scoring_reruns_the_evaluation() {
     let mut f = TestStore::new().await;
     let submission = f.valid_submission_of("Alpha").await;
-    let one_shard = RunPlan {
-        tasks: vec![Task::Hit],
-        episodes_per_task: 1,
-        ..six_shard_plan()
-    };
+    let one_shard = one_shard_plan();
     let evaluation = f.evaluate(submission.id, &one_shard).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
@@ -441,11 +433,7 @@ async fn failed_validation_run_ends_as_platform_fault() {
 async fn job_fails_after_too_many_expired_leases() {
     let mut f = TestStore::new().await;
     let submission = f.valid_submission_of("Alpha").await;
-    let one_shard = RunPlan {
-        tasks: vec![Task::Hit],
-        episodes_per_task: 1,
-        ..six_shard_plan()
-    };
+    let one_shard = one_shard_plan();
     let evaluation = f.evaluate(submission.id, &one_shard).await;
     for _ in 0..MAX_LEASES {
         f.claim_shard().await;

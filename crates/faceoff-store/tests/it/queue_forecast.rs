@@ -3,16 +3,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::*;
 use jiff::SignedDuration;
-
-/// Two shards of two episodes each.
-fn two_shards() -> RunPlan {
-    RunPlan {
-        tasks: vec![Task::Hit],
-        ..six_shard_plan()
-    }
-}
 
 /// The forecast for one slot (a worker runs one job at a time in each slot).
 async fn forecast(f: &TestStore) -> QueueForecast {
@@ -25,12 +16,7 @@ async fn run_next_job(f: &mut TestStore) -> bool {
     match job {
         Job::Validation { .. } => {
             f.advance_clock_s(20);
-            let outcome = ValidationOutcome::Valid {
-                runtime: "native".into(),
-                agent_name: "striker".into(),
-                timing: Vec::new(),
-                log: String::new(),
-            };
+            let outcome = valid_outcome("native", "striker", "");
             f.store
                 .commit_validation(&claim, outcome, f.now)
                 .await
@@ -107,7 +93,7 @@ async fn forecast_uses_recent_durations() {
     }
 
     // Evaluations: two shards each, without measured durations.
-    let stage = f.configure_stage(&two_shards()).await;
+    let stage = f.configure_stage(&two_shard_plan()).await;
     let day = f.store.start_day(Actor::Organiser, stage, f.now).await;
     let day = day.unwrap();
     let estimate = forecast(&f).await;

@@ -21,9 +21,8 @@ async fn platform_faults_count_as_retries_and_shutdowns_do_not() {
     let mut f = TestStore::new().await;
     let submission = f.valid_submission_of("Alpha").await;
     let one_shard = RunPlan {
-        tasks: vec![faceoff_types::Task::Hit],
         episodes_per_shard: six_shard_plan().episodes_per_task,
-        ..six_shard_plan()
+        ..two_shard_plan()
     };
     f.evaluate(submission.id, &one_shard).await;
     let (claim, retries) = claim_shard_and_retries(&f).await;

@@ -100,10 +100,7 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
 async fn paused_queue_starts_no_job_and_loses_none() {
     let mut f = TestStore::new().await;
     let submission = f.valid_submission_of("Alpha").await;
-    let two_shards = RunPlan {
-        tasks: vec![Task::Hit],
-        ..six_shard_plan()
-    };
+    let two_shards = two_shard_plan();
     f.evaluate(submission.id, &two_shards).await;
     let (claim, _, shard) = f.claim_shard().await;
     let pause = async |f: &TestStore| f.store.pause_queue(Actor::Organiser, REASON, f.now).await;

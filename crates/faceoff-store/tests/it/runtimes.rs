@@ -2,21 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::*;
-
-/// Lets a stage accept only this runtime.
-async fn accept_only(f: &TestStore, stage: StageId, runtime: &str) {
-    let rules = StageRules {
-        runtimes: Some([runtime.to_owned()].into_iter().collect()),
-        ..f.store.stage(stage).await.unwrap().rules.rules
-    };
-    let change = StageChange {
-        rules: Some(rules),
-        ..StageChange::default()
-    };
-    let changed = f.store.change_stage(Actor::Organiser, stage, change, f.now);
-    changed.await.unwrap();
-}
+use faceoff_testkit::accept_runtimes;
 
 /// Subjects of the events that the stage did not accept a submission.
 async fn excluded_submissions(f: &TestStore) -> Vec<Subject> {
@@ -32,7 +18,7 @@ async fn scheduled_day_without_submissions_is_released() {
     let f = TestStore::new().await;
     let native = f.valid_submission_of("Alpha").await;
     let stage = f.configure_stage(&six_shard_plan()).await;
-    accept_only(&f, stage, "python3").await;
+    accept_runtimes(&f.store, stage, Some(&["python3"]), f.now).await;
     let started = f.store.start_scheduled_day(stage, f.now).await.unwrap();
     assert_eq!(started, Some(Vec::new()));
     assert_eq!(
@@ -65,7 +51,7 @@ async fn submission_with_unknown_runtime_must_be_uploaded_again() {
         Ok(()),
         "all runtimes are accepted"
     );
-    accept_only(&f, stage, "native").await;
+    accept_runtimes(&f.store, stage, Some(&["native"]), f.now).await;
     let refused = current_stage()
         .await
         .check_accepts(&active_submission().await)

@@ -4,7 +4,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{EvaluationId, Task, TeamId};
+use faceoff_types::{EvaluationId, TeamId};
 use sqlx::{Row, SqlSafeStr};
 use std::collections::BTreeMap;
 
@@ -79,10 +79,9 @@ impl Slots {
         }
         for (team, submission, shards) in submissions {
             let plan = RunPlan {
-                tasks: vec![Task::Hit],
                 episodes_per_task: shards,
                 episodes_per_shard: 1,
-                ..six_shard_plan()
+                ..two_shard_plan()
             };
             // Each evaluation has its own day, so that their numbers of shards can differ.
             let evaluation = self.f.evaluate_alone(submission, &plan).await;

@@ -21,6 +21,10 @@ use faceoff_runner::{
 };
 use faceoff_sandbox::{Isolation, Limits};
 use faceoff_store::*;
+use faceoff_testkit::{
+    bundle_ref, configure_stage, create_team, finish_validation, six_shard_plan, submit,
+    valid_outcome,
+};
 use faceoff_types::*;
 use faceoff_wire::dataset::FileDigest;
 use jiff::{SignedDuration, Timestamp};
@@ -357,46 +361,16 @@ impl Server {
     /// Creates a team and uploads a bundle, which is not validated yet.
     pub(super) async fn upload(&self, team: &str, content: &[u8]) -> Submission {
         self.put_artifact(&format!("bundles/{team}"), content).await;
-        let bundle = BundleRef {
-            key: format!("bundles/{team}"),
-            bytes: content.len() as u64,
-            blake3: blake3::hash(content).to_string(),
-            file_name: "agent.tar.gz".into(),
-        };
-        let token_hash = *blake3::hash(team.as_bytes()).as_bytes();
-        let now = self.now();
-        let team = self
-            .store
-            .create_team(Actor::Organiser, &team.parse().unwrap(), token_hash, now)
-            .await
-            .unwrap();
-        self.store
-            .create_submission(
-                Actor::Team(team.id),
-                team.id,
-                bundle,
-                &UploadQuota::default(),
-                now,
-            )
-            .await
-            .unwrap()
+        let bundle = bundle_ref(format!("bundles/{team}"), content);
+        let team = create_team(&self.store, team, self.now()).await;
+        submit(&self.store, team.id, bundle, self.now()).await
     }
 
     /// Creates a team with a valid submission.
     pub(super) async fn upload_valid(&self, team: &str) -> Submission {
         let submission = self.upload(team, VALID_ARCHIVE).await;
-        let claimed = self.store.claim("test", LEASE_S, self.now()).await.unwrap();
-        let claim = claimed.expect("a validation run is queued").claim;
-        let outcome = ValidationOutcome::Valid {
-            runtime: "native".into(),
-            agent_name: "scripted".into(),
-            timing: Vec::new(),
-            log: String::new(),
-        };
-        self.store
-            .commit_validation(&claim, outcome, self.now())
-            .await
-            .unwrap();
+        let outcome = valid_outcome("native", "scripted", "");
+        finish_validation(&self.store, outcome, self.now()).await;
         submission
     }
 
@@ -404,13 +378,9 @@ impl Server {
     pub(super) async fn start_evaluation(&self) -> EvaluationId {
         let submission = self.upload_valid("Alpha").await;
         let plan = RunPlan {
-            profile: Profile::Evaluation,
             tasks: Task::ALL.to_vec(),
-            episodes_per_task: 4,
-            episodes_per_shard: 2,
             max_faults: 10,
-            variation: Default::default(),
-            limits: Default::default(),
+            ..six_shard_plan()
         };
         let stage = configure_stage(&self.store, &plan, None, self.now()).await;
         let started = self
@@ -490,15 +460,7 @@ impl Server {
 
     /// Waits for the end of an evaluation.
     pub(super) async fn wait_for_end(&self, id: EvaluationId) -> EvaluationState {
-        let mut events = self.store.events();
-        loop {
-            let state = self.store.evaluation(id).await.unwrap().state;
-            if state.is_over() {
-                return state;
-            }
-            // Any event may be due to a change; after a lag, too, the state is read again.
-            let _ = events.recv().await;
-        }
+        faceoff_testkit::wait_for_evaluation(&self.store, id).await
     }
 }
 
@@ -526,33 +488,4 @@ impl RunningSlots {
         self.shutdown.cancel();
         self.task.await.unwrap().unwrap();
     }
-}
-
-/// Configures the season's first stage with this plan.
-pub(super) async fn configure_stage(
-    store: &Store,
-    plan: &RunPlan,
-    schedule: Option<Schedule>,
-    now: Timestamp,
-) -> StageId {
-    let rules = StageRules {
-        runtimes: None,
-        ruleset: Ruleset::CURRENT,
-        profile: plan.profile,
-        tasks: plan.tasks.clone(),
-        episodes_per_task: plan.episodes_per_task,
-        max_faults: plan.max_faults,
-        variation: Default::default(),
-        limits: Default::default(),
-    };
-    let settings = StageSettings {
-        schedule,
-        episodes_per_shard: plan.episodes_per_shard,
-        ..StageSettings::default()
-    };
-    store
-        .configure_stage(rules, settings, Zone::UTC, now)
-        .await
-        .unwrap();
-    store.stages().await.unwrap()[0].id
 }

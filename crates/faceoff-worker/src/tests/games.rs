@@ -7,6 +7,7 @@ use super::{
 use crate::server::{ClaimResult, JobServer as _};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
+use faceoff_testkit::wait_for;
 use faceoff_types::*;
 use faceoff_wire::job::{JobPayload, JobReport};
 use std::{
@@ -64,15 +65,11 @@ async fn wait_for_state(
     id: GameId,
     condition: impl Fn(&GameState) -> bool,
 ) -> GameState {
-    let mut events = server.store.events();
-    loop {
+    wait_for(&server.store, async || {
         let state = server.store.game(id).await.unwrap().state;
-        if condition(&state) {
-            return state;
-        }
-        // After a lag, the state is read again.
-        let _ = events.recv().await;
-    }
+        condition(&state).then_some(state)
+    })
+    .await
 }
 
 /// Waits for the result of a game.

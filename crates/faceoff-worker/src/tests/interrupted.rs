@@ -6,6 +6,7 @@ use super::{
 };
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
+use faceoff_testkit::shard_commit;
 use faceoff_types::Task;
 use std::{
     sync::{
@@ -194,12 +195,7 @@ async fn result_of_a_lost_lease_is_discarded() {
     );
     let shard = server.store.shards(run).await.unwrap().remove(0);
     let outcomes = (0..2).map(|episode| outcome(shard.task, episode)).collect();
-    let commit = ShardCommit {
-        outcomes,
-        log: String::new(),
-        stopped_by_faults: false,
-        recording: Some(recording),
-    };
+    let commit = shard_commit(outcomes, Some(recording));
     let committed = server
         .store
         .commit_shard(&claim, commit, server.now())

@@ -6,7 +6,8 @@ use super::{
 };
 use crate::server::{ClaimResult, JobServer as _, LeaseStatus};
 use faceoff_store::*;
-use faceoff_types::{Profile, Task, ValidationOutcome};
+use faceoff_testkit::{six_shard_plan, valid_outcome};
+use faceoff_types::Task;
 use faceoff_wire::job::{JobPayload, JobReport, JobSpec, OutputFiles};
 
 /// Claims the next job.
@@ -27,12 +28,9 @@ async fn commit(server: &Server, job: &JobSpec, report: JobReport) -> LeaseStatu
 /// The report with which a slot would complete the job, after storing the job's files.
 async fn complete(server: &Server, job: &JobSpec) -> JobReport {
     match &job.payload {
-        JobPayload::Validation { .. } => JobReport::Validation(ValidationOutcome::Valid {
-            runtime: "native".into(),
-            agent_name: "scripted".into(),
-            timing: Vec::new(),
-            log: String::new(),
-        }),
+        JobPayload::Validation { .. } => {
+            JobReport::Validation(valid_outcome("native", "scripted", ""))
+        }
         JobPayload::Shard { spec, output, .. } => {
             let recording = match output {
                 OutputFiles::Recording(key) => Some(key.clone()),
@@ -73,13 +71,11 @@ async fn jobs_do_not_contain_the_season_secret() {
     let submission = server.store.evaluation(id).await.unwrap().submission;
     server.upload("Beta", VALID_ARCHIVE).await;
     let plan = RunPlan {
-        profile: Profile::Evaluation,
         tasks: Task::ALL.to_vec(),
         episodes_per_task: 3,
         episodes_per_shard: 3,
         max_faults: 0,
-        variation: Default::default(),
-        limits: Default::default(),
+        ..six_shard_plan()
     };
     server
         .store

@@ -6,6 +6,7 @@ use faceoff_replay::{ClipKey, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::*;
+use faceoff_testkit::{configure_stage, finish_validation, one_shard_plan, valid_outcome};
 use faceoff_types::*;
 use std::{
     sync::{
@@ -196,31 +197,12 @@ async fn lasting_platform_fault_fails_and_requeues_evaluation() {
 async fn missed_day_is_started_once() {
     let server = Server::new().await;
     let submission = server.upload("Alpha", VALID_ARCHIVE).await;
-    let claimed = server
-        .store
-        .claim("test", LEASE_S, server.now())
-        .await
-        .unwrap()
-        .unwrap();
-    let outcome = ValidationOutcome::Valid {
-        runtime: "native".into(),
-        agent_name: "a".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    };
-    server
-        .store
-        .commit_validation(&claimed.claim, outcome, server.now())
-        .await
-        .unwrap();
+    let outcome = valid_outcome("native", "a", "");
+    finish_validation(&server.store, outcome, server.now()).await;
     let plan = RunPlan {
         profile: Profile::Ideal,
-        tasks: vec![Task::Hit],
-        episodes_per_task: 1,
-        episodes_per_shard: 1,
         max_faults: 0,
-        variation: Default::default(),
-        limits: Default::default(),
+        ..one_shard_plan()
     };
     let midnight = Schedule::daily(jiff::civil::Time::midnight());
     // A stage that opened after midnight would start at the next midnight.

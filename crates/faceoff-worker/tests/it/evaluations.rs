@@ -1,20 +1,19 @@
 //! Evaluations on a real server: their outcomes do not depend on shards, slots and restarts, and failures are reported.
 
-use crate::server::{Server, configure_stage};
+use crate::server::Server;
 use faceoff_store::*;
+use faceoff_testkit::{configure_stage, six_shard_plan};
 use faceoff_types::*;
 use jiff::Timestamp;
 
 /// A plan of two episodes of each task.
 pub fn plan(episodes_per_shard: u32) -> RunPlan {
     RunPlan {
-        profile: Profile::Evaluation,
         tasks: Task::ALL.to_vec(),
         episodes_per_task: 2,
         episodes_per_shard,
         max_faults: 2,
-        variation: Default::default(),
-        limits: Default::default(),
+        ..six_shard_plan()
     }
 }
 
@@ -73,7 +72,7 @@ async fn play_day(
 async fn outcomes_do_not_depend_on_shards_and_slots() {
     let server = Server::new().await;
     // The stage is configured before the copy, since seeds depend on the stage's id.
-    configure_stage(&server.store, &plan(1), Timestamp::now()).await;
+    configure_stage(&server.store, &plan(1), None, Timestamp::now()).await;
     let worker = server.start_worker(2);
     for team in ["Alpha", "Beta"] {
         let submission = server.upload(team, "").await;

@@ -5,6 +5,10 @@ use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
 use faceoff_store::*;
+use faceoff_testkit::{
+    bundle_ref, configure_stage, create_team, finish_validation, submit, valid_outcome,
+    wait_for_evaluation, wait_for_validation,
+};
 use faceoff_types::*;
 use faceoff_worker::{CpuLayout, SlotThreads, SlotsConfig, WorkerConfig};
 use jiff::Timestamp;
@@ -118,60 +122,30 @@ impl Server {
         let archive = self.path().join("upload.tar.gz");
         write_bundle(&archive, env);
         let content = std::fs::read(&archive).unwrap();
-        let hash = blake3::hash(&content);
-        let bundle = BundleRef {
-            key: format!("bundles/{hash}"),
-            bytes: content.len() as u64,
-            blake3: hash.to_string(),
-            file_name: "agent.tar.gz".into(),
-        };
+        let key = format!("bundles/{}", blake3::hash(&content));
+        let bundle = bundle_ref(key, &content);
         self.store
             .artifacts()
             .put_file(&bundle.key, &archive)
             .await
             .unwrap();
-        let token_hash = *blake3::hash(team.as_bytes()).as_bytes();
         let now = Timestamp::now();
-        let team = self
-            .store
-            .create_team(Actor::Organiser, &team.parse().unwrap(), token_hash, now)
-            .await
-            .unwrap();
-        self.store
-            .create_submission(
-                Actor::Team(team.id),
-                team.id,
-                bundle,
-                &UploadQuota::default(),
-                now,
-            )
-            .await
-            .unwrap()
-            .id
+        let team = create_team(&self.store, team, now).await;
+        submit(&self.store, team.id, bundle, now).await.id
     }
 
     /// Uploads an agent, commits a validation run with the verdict “valid”, and returns the agent's team.
     pub async fn upload_valid(&self, team: &str, env: &str) -> TeamId {
-        let id = self.upload(team, env).await;
-        let (lease_s, now) = (3600, Timestamp::now());
-        let claimed = self.store.claim("test", lease_s, now).await.unwrap();
-        let claim = claimed.expect("a validation run is queued").claim;
-        let outcome = ValidationOutcome::Valid {
-            runtime: "python3".into(),
-            agent_name: "passive".into(),
-            timing: Vec::new(),
-            log: String::new(),
-        };
-        self.store
-            .commit_validation(&claim, outcome, now)
+        self.upload(team, env).await;
+        let outcome = valid_outcome("python3", "passive", "");
+        finish_validation(&self.store, outcome, Timestamp::now())
             .await
-            .unwrap();
-        self.store.submission(id).await.unwrap().team
+            .team
     }
 
     /// Starts a day with this plan. Returns the evaluations in the order of the uploads.
     pub async fn start_day(&self, plan: &RunPlan, now: Timestamp) -> Vec<Evaluation> {
-        let stage = configure_stage(&self.store, plan, now).await;
+        let stage = configure_stage(&self.store, plan, None, now).await;
         let started = self.store.start_day(Actor::Organiser, stage, now);
         started.await.unwrap()
     }
@@ -195,27 +169,12 @@ impl Server {
 
     /// Waits for the end of the validation run.
     pub async fn wait_for_validation(&self, id: SubmissionId) -> SubmissionState {
-        let mut events = self.store.events();
-        loop {
-            let state = self.store.submission(id).await.unwrap().state;
-            if state.is_checked() {
-                return state;
-            }
-            // After a lag, the state is read again.
-            let _ = events.recv().await;
-        }
+        wait_for_validation(&self.store, id).await.state
     }
 
     /// Waits for the end of an evaluation.
     pub async fn wait_for_end(&self, id: EvaluationId) -> EvaluationState {
-        let mut events = self.store.events();
-        loop {
-            let state = self.store.evaluation(id).await.unwrap().state;
-            if state.is_over() {
-                return state;
-            }
-            let _ = events.recv().await;
-        }
+        wait_for_evaluation(&self.store, id).await
     }
 }
 
@@ -238,27 +197,4 @@ fn write_bundle(archive: &Path, env: &str) {
             .unwrap();
     }
     tar.into_inner().unwrap().finish().unwrap();
-}
-
-/// Configures the season's first stage with this plan.
-pub async fn configure_stage(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
-    let rules = StageRules {
-        runtimes: None,
-        ruleset: Ruleset::CURRENT,
-        profile: plan.profile,
-        tasks: plan.tasks.clone(),
-        episodes_per_task: plan.episodes_per_task,
-        max_faults: plan.max_faults,
-        variation: Default::default(),
-        limits: Default::default(),
-    };
-    let settings = StageSettings {
-        episodes_per_shard: plan.episodes_per_shard,
-        ..StageSettings::default()
-    };
-    store
-        .configure_stage(rules, settings, Zone::UTC, now)
-        .await
-        .unwrap();
-    store.stages().await.unwrap()[0].id
 }

@@ -2,6 +2,7 @@
 
 use crate::server::Server;
 use faceoff_store::*;
+use faceoff_testkit::wait_for;
 use faceoff_types::*;
 use jiff::Timestamp;
 use std::{io::Read as _, path::PathBuf};
@@ -62,19 +63,16 @@ pub fn all_pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
 
 /// Waits until a tournament's games are over. Returns their results in the order of play.
 pub async fn wait_for_results(server: &Server, tournament: TournamentId) -> Vec<GameResultRow> {
-    let mut events = server.store.events();
-    let round_games = || server.store.games(tournament, GameFilter::Rounds);
-    let mut games = round_games().await.unwrap();
-    while games.iter().any(|game| game.state.is_open()) {
-        // After a lag, the state is read again.
-        let _ = events.recv().await;
-        games = round_games().await.unwrap();
-    }
-    let result = |game: Game| match game.state {
-        GameState::Played(result) => *result,
-        state => panic!("{state:?}"),
-    };
-    games.into_iter().map(result).collect()
+    wait_for(&server.store, async || {
+        let games = server.store.games(tournament, GameFilter::Rounds).await;
+        let results = games.unwrap().into_iter().map(|game| match game.state {
+            GameState::Played(result) => Some(*result),
+            state if state.is_open() => None,
+            state => panic!("{state:?}"),
+        });
+        results.collect()
+    })
+    .await
 }
 
 /// The path of a game's stored recording, which must have the reported hash.

@@ -11,11 +11,11 @@ use faceoff_http::{
 };
 use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
-use faceoff_store::{ClaimedJob, Job, Store};
-use faceoff_types::{
-    Clock, CountingResult, DayDeadline, EvaluationId, Profile, Ruleset, StageRules, StageSettings,
-    Task, TimeLimits, ValidationOutcome, Zone,
+use faceoff_store::{RunPlan, Store};
+use faceoff_testkit::{
+    configure_stage, finish_validation, new_store, one_shard_plan, valid_outcome,
 };
+use faceoff_types::{Clock, CountingResult, DayDeadline, EvaluationId, TimeLimits};
 use indicatif::ProgressBar;
 use jiff::Timestamp;
 use tempfile::TempDir;
@@ -26,8 +26,6 @@ const ADMIN: &str = "fo_admin_test";
 const SMALL_BUNDLE_BYTES: u64 = 64;
 /// The bundle limit of servers that accept the bundle of these tests.
 const BUNDLE_BYTES: u64 = 1 << 20;
-/// How long a claimed job is leased.
-const LEASE_SECONDS: u32 = 60;
 
 mod download;
 mod tls;
@@ -48,27 +46,18 @@ fn now() -> Timestamp {
 /// Starts a server that accepts bundles of at most `max_bundle_bytes`.
 async fn start_site(max_bundle_bytes: u64) -> Site {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path()).await.unwrap();
+    let store = new_store(folder.path()).await;
     assert!(
         store
             .set_host_token(hash_token(ADMIN), now())
             .await
             .unwrap()
     );
-    let rules = StageRules {
-        runtimes: None,
-        ruleset: Ruleset::CURRENT,
-        profile: Profile::Evaluation,
-        tasks: vec![Task::Hit],
-        episodes_per_task: 1,
+    let plan = RunPlan {
         max_faults: 0,
-        variation: Default::default(),
-        limits: Default::default(),
+        ..one_shard_plan()
     };
-    store
-        .configure_stage(rules, StageSettings::default(), Zone::UTC, now())
-        .await
-        .unwrap();
+    configure_stage(&store, &plan, None, now()).await;
     let config = HttpConfig {
         max_bundle_bytes,
         public_url: None,
@@ -142,22 +131,8 @@ async fn submission_passes_from_upload_to_evaluation() {
     files.sort();
     assert_eq!(files, ["agent.py", "agent.toml"]);
 
-    let claimed = site.store.claim("slot 0", LEASE_SECONDS, now());
-    let ClaimedJob { claim, job } = claimed
-        .await
-        .unwrap()
-        .expect("the validation run is queued");
-    assert!(matches!(job, Job::Validation { .. }), "{job:?}");
-    let outcome = ValidationOutcome::Valid {
-        runtime: "native".into(),
-        agent_name: "mine".into(),
-        timing: Vec::new(),
-        log: "hello".into(),
-    };
-    site.store
-        .commit_validation(&claim, outcome, now())
-        .await
-        .unwrap();
+    let outcome = valid_outcome("native", "mine", "hello");
+    finish_validation(&site.store, outcome, now()).await;
     let valid = client.submission(uploaded.id).await.unwrap();
     assert_eq!(
         valid.status,

@@ -8,11 +8,12 @@ use faceoff_http::{
 };
 use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
-use faceoff_store::{Actor, ClaimedJob, Job, Store, UploadQuota};
-use faceoff_types::{
-    BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, StageRules, StageSettings,
-    Task, TimeLimits, ValidationOutcome, Zone,
+use faceoff_store::{Actor, ClaimedJob, Job, RunPlan, Store};
+use faceoff_testkit::{
+    bundle_ref, create_team, new_store, one_shard_plan, outcome, rules_and_settings, shard_commit,
+    shard_outcomes, submit, valid_outcome,
 };
+use faceoff_types::{Clock, EvaluationId, EvaluationResult, StageSettings, Task, TimeLimits, Zone};
 use jiff::Timestamp;
 use serde_json::Value;
 use std::{
@@ -67,26 +68,21 @@ fn fixture(name: &str) -> PathBuf {
 
 async fn start_site() -> Site {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path()).await.unwrap();
+    let store = new_store(folder.path()).await;
     assert!(
         store
             .set_host_token(hash_token(ADMIN), now())
             .await
             .unwrap()
     );
-    let rules = StageRules {
-        ruleset: Ruleset::CURRENT,
-        profile: Profile::Evaluation,
-        tasks: vec![Task::Hit],
-        episodes_per_task: 1,
+    let plan = RunPlan {
         max_faults: 0,
-        variation: Default::default(),
-        limits: Default::default(),
-        runtimes: Default::default(),
+        ..one_shard_plan()
     };
+    let (rules, settings) = rules_and_settings(&plan);
     let settings = StageSettings {
         publishes: faceoff_types::Publication::AtRelease,
-        ..StageSettings::default()
+        ..settings
     };
     store
         .configure_stage(rules, settings, Zone::UTC, now())
@@ -130,20 +126,8 @@ async fn start_site() -> Site {
 
 /// Runs an evaluation day of one team.
 async fn run_day(store: &Store) -> EvaluationId {
-    /// Hash of the team's token, which no request uses.
-    const TOKEN_HASH: [u8; 32] = [1; 32];
-    let host = Actor::Organiser;
-    let name = "Alpha".parse().unwrap();
-    let team = store
-        .create_team(host.clone(), &name, TOKEN_HASH, now())
-        .await
-        .unwrap();
-    let bundle = BundleRef {
-        key: "bundles/abc".into(),
-        bytes: 3,
-        blake3: blake3::hash(b"abc").to_string(),
-        file_name: "agent.tar.gz".into(),
-    };
+    let team = create_team(store, "Alpha", now()).await;
+    let bundle = bundle_ref("bundles/abc", b"abc");
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(file.path(), "abc").unwrap();
     store
@@ -151,16 +135,7 @@ async fn run_day(store: &Store) -> EvaluationId {
         .put_file(&bundle.key, file.path())
         .await
         .unwrap();
-    store
-        .create_submission(
-            host.clone(),
-            team.id,
-            bundle,
-            &UploadQuota::default(),
-            now(),
-        )
-        .await
-        .unwrap();
+    submit(store, team.id, bundle, now()).await;
     let mut stage = Some(store.stages().await.unwrap()[0].id);
     loop {
         let claimed = store.claim("slot 0", LEASE_SECONDS, now()).await.unwrap();
@@ -170,31 +145,21 @@ async fn run_day(store: &Store) -> EvaluationId {
         match job {
             Job::Game { .. } => panic!("no game is queued"),
             Job::Validation { .. } => {
-                let outcome = ValidationOutcome::Valid {
-                    runtime: "native".into(),
-                    agent_name: "striker".into(),
-                    timing: Vec::new(),
-                    log: String::new(),
-                };
+                let outcome = valid_outcome("native", "striker", "");
                 store
                     .commit_validation(&claim, outcome, now())
                     .await
                     .unwrap();
                 let stage = stage.take().unwrap();
-                store.start_day(host.clone(), stage, now()).await.unwrap();
+                store
+                    .start_day(Actor::Organiser, stage, now())
+                    .await
+                    .unwrap();
             }
             Job::Shard { run, shard, .. } => {
-                let outcome = serde_json::from_value(serde_json::json!({
-                    "task": "hit", "episode": 0, "steps": 17, "end": "left_table", "success": true,
-                    "violations": { "ee": false, "link": false, "joint_pos": false, "joint_vel": false },
-                    "computation_time": { "mean_s": 1e-4, "max_s": 1e-3 }, "fault": null,
-                }));
-                let commit = faceoff_store::ShardCommit {
-                    outcomes: vec![outcome.unwrap()],
-                    log: String::new(),
-                    stopped_by_faults: false,
-                    recording: Some(claim.recording_key(run.id)),
-                };
+                let outcomes =
+                    shard_outcomes(&shard, |task, episode| outcome(task, episode, false));
+                let commit = shard_commit(outcomes, Some(claim.recording_key(run.id)));
                 assert_eq!(shard.episodes(), 1);
                 store.commit_shard(&claim, commit, now()).await.unwrap();
             }

@@ -2,10 +2,10 @@
 //! like a real worker: it claims jobs, commits results and scores evaluations.
 
 use crate::site::{LEASE_S, Site, score_outcomes};
-use faceoff_store::{ClaimedJob, Job, RunOwner, ShardCommit};
+use faceoff_store::{ClaimedJob, Job, RunOwner};
+use faceoff_testkit::{shard_commit, shard_outcomes, valid_outcome};
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationId, RunId, Task, ValidationOutcome,
-    Violations,
+    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationId, RunId, Task, Violations,
 };
 use std::collections::HashMap;
 
@@ -101,12 +101,7 @@ impl FakeWorker {
         match job {
             Job::Validation { submission, .. } => {
                 let agent_name = submission.bundle.file_name.replace(".tar.gz", "");
-                let outcome = ValidationOutcome::Valid {
-                    agent_name,
-                    runtime: "native".into(),
-                    timing: Vec::new(),
-                    log: "ready\n".repeat(20),
-                };
+                let outcome = valid_outcome("native", &agent_name, &"ready\n".repeat(20));
                 let committed = site.store.commit_validation(&claim, outcome, site.now());
                 committed.await.unwrap();
             }
@@ -125,19 +120,13 @@ impl FakeWorker {
                 let solved_per_mille = 300 + u64::from(bundle.blake3.as_bytes()[0]) * 2;
                 let seed = u128::from_le_bytes(*shard.id.as_uuid().as_bytes()) as u64;
                 let mut random = Random(seed);
-                let outcomes: Vec<_> = (shard.first_episode..shard.end_episode)
-                    .map(|episode| {
-                        random_outcome(shard.task, episode, solved_per_mille, &mut random)
-                    })
-                    .collect();
+                let outcomes = shard_outcomes(&shard, |task, episode| {
+                    random_outcome(task, episode, solved_per_mille, &mut random)
+                });
                 let run_outcomes = self.unscored.entry(run.id).or_default();
                 run_outcomes.extend(outcomes.iter().cloned());
-                let commit = ShardCommit {
-                    outcomes,
-                    log: String::new(),
-                    stopped_by_faults: false,
-                    recording: run.keeps_recordings.then(|| claim.recording_key(run.id)),
-                };
+                let recording = run.keeps_recordings.then(|| claim.recording_key(run.id));
+                let commit = shard_commit(outcomes, recording);
                 site.store
                     .commit_shard(&claim, commit, site.now())
                     .await

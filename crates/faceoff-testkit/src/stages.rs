@@ -1,0 +1,96 @@
+//! Plans of runs, and stages that have them.
+
+use faceoff_store::{Actor, RunPlan, StageChange, Store};
+use faceoff_types::{
+    Profile, Ruleset, Runtimes, Schedule, StageId, StageRules, StageSettings, Task, Zone,
+};
+use jiff::Timestamp;
+
+/// 3 tasks of 4 episodes in shards of 2 episodes. 3 agent faults are allowed.
+pub fn six_shard_plan() -> RunPlan {
+    RunPlan {
+        profile: Profile::Evaluation,
+        tasks: vec![Task::Prepare, Task::Hit, Task::Defend],
+        episodes_per_task: 4,
+        episodes_per_shard: 2,
+        max_faults: 3,
+        variation: Default::default(),
+        limits: Default::default(),
+    }
+}
+
+/// 4 episodes of one task in shards of 2 episodes.
+pub fn two_shard_plan() -> RunPlan {
+    RunPlan {
+        tasks: vec![Task::Hit],
+        ..six_shard_plan()
+    }
+}
+
+/// One shard of one episode.
+pub fn one_shard_plan() -> RunPlan {
+    RunPlan {
+        episodes_per_task: 1,
+        ..two_shard_plan()
+    }
+}
+
+/// Rules and settings of a stage with this plan.
+pub fn rules_and_settings(plan: &RunPlan) -> (StageRules, StageSettings) {
+    let rules = StageRules {
+        runtimes: None,
+        ruleset: Ruleset::CURRENT,
+        profile: plan.profile,
+        tasks: plan.tasks.clone(),
+        episodes_per_task: plan.episodes_per_task,
+        max_faults: plan.max_faults,
+        variation: plan.variation.clone(),
+        limits: plan.limits.clone(),
+    };
+    let settings = StageSettings {
+        episodes_per_shard: plan.episodes_per_shard,
+        ..StageSettings::default()
+    };
+    (rules, settings)
+}
+
+/// Configures the season's first stage with this plan. Returns its id.
+pub async fn configure_stage(
+    store: &Store,
+    plan: &RunPlan,
+    schedule: Option<Schedule>,
+    now: Timestamp,
+) -> StageId {
+    let (rules, settings) = rules_and_settings(plan);
+    let settings = StageSettings {
+        schedule,
+        ..settings
+    };
+    store
+        .configure_stage(rules, settings, Zone::UTC, now)
+        .await
+        .unwrap();
+    store.stages().await.unwrap()[0].id
+}
+
+/// Lets a stage accept only agents of these runtimes; `None` accepts all.
+pub async fn accept_runtimes(
+    store: &Store,
+    stage: StageId,
+    runtimes: Option<&[&str]>,
+    now: Timestamp,
+) {
+    let to_set = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Runtimes>();
+    let rules = StageRules {
+        runtimes: runtimes.map(to_set),
+        ..store.stage(stage).await.unwrap().rules.rules
+    };
+    let change = StageChange {
+        rules: Some(rules),
+        ..StageChange::default()
+    };
+    store
+        .change_stage(Actor::Organiser, stage, change, now)
+        .await
+        .unwrap();
+}
