@@ -3,7 +3,9 @@
 
 use crate::{
     CONFIG, Team,
-    commands::{FAILED, NOT_ALLOWED, REFUSED, UNREACHABLE, USAGE_ERROR, admin, faceoff_with_home},
+    commands::{
+        FAILED, NOT_ALLOWED, REFUSED, UNREACHABLE, USAGE_ERROR, admin, faceoff_with_home, join_args,
+    },
     start_day,
 };
 use faceoff_tests::{
@@ -55,18 +57,9 @@ fn sign_in_and_sign_out_never_print_the_token() {
 
     // Joining with --sign-in stores the token.
     let link = team_invitation_link(&server);
-    let join = [
-        "join",
-        &link,
-        "--server",
-        &server.url,
-        "--name",
-        "Ada",
-        "--team",
-        "Alpha",
-        "--password-stdin",
-        "--sign-in",
-    ];
+    let founder = ["--name", "Ada", "--team", "Alpha", "--sign-in"];
+    let founder = [&founder[..], &["--password-stdin"]].concat();
+    let join = join_args(&server, &link, &founder);
     let output = ada(&join, PASSWORD).expect_success();
     assert!(
         output.contains("signed in to") && !output.contains(TOKEN_PREFIX),
@@ -172,17 +165,8 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     // Runs the program as Ada, a member of a team.
     let ada = |args: &[&str]| faceoff_with_home(&home, args, "");
     let link = team_invitation_link(&server);
-    let join = [
-        "join",
-        &link,
-        "--server",
-        &server.url,
-        "--name",
-        "Ada",
-        "--team",
-        "Alpha",
-        "--sign-in",
-    ];
+    let founder = ["--name", "Ada", "--team", "Alpha", "--sign-in"];
+    let join = join_args(&server, &link, &founder);
     ada(&join).expect_success();
 
     let bundle = scratch.path().join("my-agent");

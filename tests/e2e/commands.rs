@@ -108,6 +108,11 @@ pub fn admin(server: &Server, args: &[&str]) -> CommandOutput {
     admin_as(server, &server.admin_token, args)
 }
 
+/// Arguments of `faceoff join`, which accepts an invitation.
+pub fn join_args<'a>(server: &'a Server, link: &'a str, options: &[&'a str]) -> Vec<&'a str> {
+    [&["join", link, "--server", &server.url], options].concat()
+}
+
 /// A command that team members use, with a token.
 pub fn member(server: &Server, token: &str, command: &str, args: &[&str]) -> CommandOutput {
     let options = [command, "--server", &server.url, "--token", token];

@@ -1,13 +1,11 @@
 //! Actions of agents (joint commands for one step) that could break the simulation. Each is either refused as the agent's
 //! fault or simulated; none is a fault of the platform, which would give the agent another try.
 
-use crate::{CONFIG, Team};
+use crate::{CONFIG, Team, upgrade::verify};
 use faceoff_tests::{
     bundle::{pack, python_agent, python_bundle},
-    program,
     server::Server,
 };
-use std::{fs, path::Path, process::Command};
 
 /// Interpolations (how the joint commands between two steps are computed), each with the shape of its actions. `N` is a number,
 /// and `None` is Python's name for JSON's null.
@@ -169,21 +167,6 @@ const EXTREME_ACTIONS: [(&str, &str, &str); 7] = [
     ("positions-only", "1", "[s] * 7"),
     ("denormal", "4", "[[5e-324] * 7, [-0.0] * 7]"),
 ];
-
-/// Downloads a dataset and verifies it with `faceoff verify`.
-fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
-    let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
-    assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
-    let file = folder.join("dataset.zip");
-    fs::write(&file, answer.bytes().expect("the download completes")).expect("a scratch file");
-    let verified = Command::new(program("faceoff"))
-        .arg("verify")
-        .arg(&file)
-        .output()
-        .expect("the program starts");
-    let errors = String::from_utf8_lossy(&verified.stderr);
-    assert!(verified.status.success(), "{evaluation}: {errors}");
-}
 
 #[test]
 fn extreme_valid_actions_are_simulated_and_verified() {

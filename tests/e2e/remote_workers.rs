@@ -14,16 +14,17 @@ mod nats_problems;
 mod shutdown;
 
 use crate::{
-    Team, evaluation_path,
+    Team, dataset, entry, evaluation_path,
     kills::{Archive, assert_same, copy_folder, wait_for_outcome},
     start_day,
 };
-use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server};
+use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server, worker::Worker};
 use serde_json::{Value, json};
 use std::{
     net::SocketAddr,
     path::{Path, PathBuf},
 };
+use tempfile::TempDir;
 
 /// Episodes of each of the three tasks. Each episode is a shard, the job that a worker runs.
 const EPISODES: u32 = 4;
@@ -145,6 +146,15 @@ impl ReferenceRun {
         assert_eq!(submission["state"], "valid", "{submission:#}");
         assert_eq!(assert_same(found, self.expected.clone()), self.episodes);
     }
+
+    /// Asserts that no shard of the finished evaluation counts a retry because of a platform fault.
+    fn assert_no_retries(&self, server: &Server) {
+        let mut dataset = dataset(server, &self.evaluation, &self.team.token);
+        let shards = entry(&mut dataset, "calibration.json");
+        for shard in shards["shards"].as_array().expect("it lists the shards") {
+            assert_eq!(shard.get("platform_retries"), None, "{shards:#}");
+        }
+    }
 }
 
 /// Starts a server on the data of a reference run, and connects the relay for files to it.
@@ -152,6 +162,43 @@ fn start_server(reference_run: &ReferenceRun, config: &str, file_relay: &Relay) 
     let server = Server::start(&reference_run.data_dir, config);
     file_relay.set_target(server.address().into());
     server
+}
+
+/// A server with the data of a reference run, and the connections that its workers need. Fields are dropped in their order.
+struct RemoteSetup {
+    server: Server,
+    file_relay: Relay,
+    nats: Nats,
+    reference_run: ReferenceRun,
+    scratch: TempDir,
+}
+
+impl RemoteSetup {
+    fn start() -> Self {
+        let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+        let reference_run = ReferenceRun::prepare(scratch.path());
+        let nats = Nats::start(&scratch.path().join("nats"));
+        let file_relay = Relay::start();
+        let config = server_config(&nats, file_relay.address());
+        Self {
+            server: start_server(&reference_run, &config, &file_relay),
+            file_relay,
+            nats,
+            reference_run,
+            scratch,
+        }
+    }
+
+    /// Starts a worker with one slot.
+    fn start_worker(&self, name: &str) -> Worker {
+        let config = worker_config(self.nats.address(), 1);
+        Worker::start(self.scratch.path(), name, &config)
+    }
+
+    /// Waits for the end of the evaluation, and asserts that result and dataset equal the reference.
+    fn assert_equal_result(&self) {
+        self.reference_run.assert_equal_result(&self.server);
+    }
 }
 
 /// Waits until the server lists this number of workers.

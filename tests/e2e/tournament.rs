@@ -8,12 +8,37 @@ use crate::{
     commands::{CommandOutput, FAILED, NOT_ALLOWED, REFUSED, USAGE_ERROR, admin, faceoff, member},
     users::invite_and_join,
 };
-use faceoff_tests::{bundle, server::Server};
+use faceoff_tests::{bundle, repository, server::Server};
 use serde_json::Value;
 use std::{fs::File, path::Path};
 use zip::ZipArchive;
 
 const TEAMS: [&str; 3] = ["Ada", "Bob", "Cyd"];
+
+/// Arguments that open the tournament “Cup” of Ada and Bob, with one round of short games (1500 control steps).
+pub(crate) const OPEN_CUP: [&str; 12] = [
+    "tournament",
+    "open",
+    "Cup",
+    "--teams",
+    "Ada,Bob",
+    "--json",
+    "--format",
+    "round-robin",
+    "--rounds",
+    "1",
+    "--steps",
+    "1500",
+];
+
+/// Creates teams with a valid submission of the agent `hold`.
+pub(crate) fn create_teams_with_hold(server: &Server, names: &[&str]) {
+    for name in names {
+        let team = Team::create(server, name);
+        let submission = team.submit(server, &repository().join("agents/hold"));
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+    }
+}
 
 /// `faceoff tournament` without a token.
 fn visitor_command(server: &Server, args: &[&str]) -> CommandOutput {
@@ -62,21 +87,12 @@ fn commands_run_a_tournament_from_opening_to_close() {
 
     // Opening: rules, teams, and games that do not count. A test game needs a baseline, a submission that the organiser names.
     visitor_command(&server, &["show"]).expect_refusal(FAILED, &["there is no tournament yet"]);
-    let rules = [
-        "--format",
-        "round-robin",
-        "--rounds",
-        "1",
-        "--steps",
-        "1500",
-    ];
-    let open = ["tournament", "open", "Cup", "--teams", "Ada,Bob", "--json"];
-    let cup = admin(&server, &[&open[..], &rules].concat()).json();
+    let cup = admin(&server, &OPEN_CUP).json();
     assert_eq!(
         (&cup["phase"], &cup["rules"]["steps"]),
         (&"open".into(), &1500.into())
     );
-    admin(&server, &[&open[..], &rules].concat()).expect_refusal(REFUSED, &["409"]);
+    admin(&server, &OPEN_CUP).expect_refusal(REFUSED, &["409"]);
     admin(&server, &["tournament", "open", "Other", "--rounds", "3"])
         .expect_refusal(USAGE_ERROR, &["--format"]);
     let entered = admin(&server, &["tournament", "enter", "cup", "Cyd"]).expect_success();

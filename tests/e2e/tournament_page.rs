@@ -1,13 +1,13 @@
 //! Pages of a tournament round in a real browser: live updates, and hidden results for visitors who avoid spoilers.
 
 use crate::{
-    CONFIG, Team,
+    CONFIG,
     axe::{axe_script, faults},
     commands::admin,
+    tournament::{OPEN_CUP, create_teams_with_hold},
 };
 use faceoff_tests::{
     browser::{Browser, Page, View},
-    repository,
     server::Server,
 };
 use serde_json::{Value, json};
@@ -23,21 +23,8 @@ fn round_pages_update_live_and_can_hide_results() {
     let axe = axe_script();
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    for name in ["Ada", "Bob"] {
-        let team = Team::create(&server, name);
-        let submission = team.submit(&server, &repository().join("agents/hold"));
-        assert_eq!(submission["state"], "valid", "{submission:#}");
-    }
-    let rules = [
-        "--format",
-        "round-robin",
-        "--rounds",
-        "1",
-        "--steps",
-        "1500",
-    ];
-    let open = ["tournament", "open", "Cup", "--teams", "Ada,Bob", "--json"];
-    let cup = admin(&server, &[&open[..], &rules].concat()).json();
+    create_teams_with_hold(&server, &["Ada", "Bob"]);
+    let cup = admin(&server, &OPEN_CUP).json();
     let cup = cup["id"].as_str().expect("a tournament has an id");
     let browser = Browser::start(scratch.path());
     let tournament = browser.open(&format!("{}/tournaments/{cup}", server.url));

@@ -4,7 +4,8 @@
 use crate::{
     CONFIG,
     commands::{
-        CommandOutput, FAILED, NOT_ALLOWED, REFUSED, USAGE_ERROR, admin, admin_as, faceoff, member,
+        CommandOutput, FAILED, NOT_ALLOWED, REFUSED, USAGE_ERROR, admin, admin_as, faceoff,
+        join_args, member,
     },
 };
 use faceoff_tests::server::{Server, http};
@@ -15,10 +16,7 @@ const UNKNOWN_ID: &str = "00000000-0000-7000-8000-000000000000";
 
 /// `faceoff join`: accepts an invitation.
 fn join(server: &Server, link: &str, args: &[&str]) -> CommandOutput {
-    faceoff(
-        &[&["join", link, "--server", &server.url], args].concat(),
-        "",
-    )
+    faceoff(&join_args(server, link, args), "")
 }
 
 /// The first word of a text that contains this part, such as the prefix of a token.
@@ -95,16 +93,8 @@ fn commands_invite_and_remove_users() {
     let invited = people(&["invite-member", "Alpha", "Ada"]).expect_success();
     let link = find_word(&invited, "/join/fo_invite_");
     let with_password = |password: &str| {
-        let args = [
-            "join",
-            &link,
-            "--server",
-            &server.url,
-            "--name",
-            "Ada",
-            "--password-stdin",
-        ];
-        faceoff(&args, password)
+        let options = ["--name", "Ada", "--password-stdin"];
+        faceoff(&join_args(&server, &link, &options), password)
     };
     with_password("too short\n").expect_refusal(REFUSED, &["password", "12"]);
     let output = with_password("a dozen characters, and more\n").expect_success();

@@ -15,8 +15,8 @@ mod waiting;
 pub use assertions::{assert_conflict, assert_contains};
 pub use outcomes::{outcome, shard_commit, shard_outcomes};
 pub use stages::{
-    accept_runtimes, configure_stage, one_shard_plan, rules_and_settings, six_shard_plan,
-    two_shard_plan,
+    accept_runtimes, change_rules, change_settings, configure_stage, one_shard_plan,
+    rules_and_settings, six_shard_plan, two_shard_plan,
 };
 pub use stores::new_store;
 pub use submissions::{bundle_ref, create_team, finish_validation, submit, valid_outcome};

@@ -1,9 +1,7 @@
 //! Plans of runs, and stages that have them.
 
-use faceoff_store::{Actor, RunPlan, StageChange, Store};
-use faceoff_types::{
-    Profile, Ruleset, Runtimes, Schedule, StageId, StageRules, StageSettings, Task, Zone,
-};
+use faceoff_store::{Actor, RunPlan, Stage, StageChange, Store, StoreError};
+use faceoff_types::{Profile, Ruleset, Schedule, StageId, StageRules, StageSettings, Task, Zone};
 use jiff::Timestamp;
 
 /// 3 tasks of 4 episodes in shards of 2 episodes. 3 agent faults are allowed.
@@ -73,6 +71,48 @@ pub async fn configure_stage(
     store.stages().await.unwrap()[0].id
 }
 
+/// Changes the rules of a stage.
+///
+/// # Errors
+/// Those of [`Store::change_stage`].
+pub async fn change_rules(
+    store: &Store,
+    stage: StageId,
+    now: Timestamp,
+    change: impl FnOnce(&mut StageRules),
+) -> Result<Stage, StoreError> {
+    let mut rules = store.stage(stage).await?.rules.rules;
+    change(&mut rules);
+    let change = StageChange {
+        rules: Some(rules),
+        ..StageChange::default()
+    };
+    store
+        .change_stage(Actor::Organiser, stage, change, now)
+        .await
+}
+
+/// Changes the settings of a stage.
+///
+/// # Errors
+/// Those of [`Store::change_stage`].
+pub async fn change_settings(
+    store: &Store,
+    stage: StageId,
+    now: Timestamp,
+    change: impl FnOnce(&mut StageSettings),
+) -> Result<Stage, StoreError> {
+    let mut settings = store.stage(stage).await?.settings;
+    change(&mut settings);
+    let change = StageChange {
+        settings: Some(settings),
+        ..StageChange::default()
+    };
+    store
+        .change_stage(Actor::Organiser, stage, change, now)
+        .await
+}
+
 /// Lets a stage accept only agents of these runtimes; `None` accepts all.
 pub async fn accept_runtimes(
     store: &Store,
@@ -80,17 +120,8 @@ pub async fn accept_runtimes(
     runtimes: Option<&[&str]>,
     now: Timestamp,
 ) {
-    let to_set = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Runtimes>();
-    let rules = StageRules {
-        runtimes: runtimes.map(to_set),
-        ..store.stage(stage).await.unwrap().rules.rules
-    };
-    let change = StageChange {
-        rules: Some(rules),
-        ..StageChange::default()
-    };
-    store
-        .change_stage(Actor::Organiser, stage, change, now)
+    let runtimes = runtimes.map(|names| names.iter().map(ToString::to_string).collect());
+    change_rules(store, stage, now, |rules| rules.runtimes = runtimes)
         .await
         .unwrap();
 }

@@ -4,10 +4,13 @@
 //! secret for the transfer of files. A *nonce* distinguishes the leases of one job.
 
 use super::{
-    EPISODES, ReferenceRun, local_config, queue_evaluation, resume, server_config, start_server,
-    worker_config,
+    EPISODES, ReferenceRun, RemoteSetup, local_config, queue_evaluation, resume, server_config,
+    start_server, worker_config,
 };
-use crate::{Team, commands::admin};
+use crate::{
+    commands::admin,
+    tournament::{OPEN_CUP, create_teams_with_hold},
+};
 use async_nats::{
     Client, HeaderMap,
     jetstream::{self, consumer::PullConsumer},
@@ -15,7 +18,6 @@ use async_nats::{
 use faceoff_tests::{
     nats::Nats,
     relay::Relay,
-    repository,
     server::{Server, http},
     worker::Worker,
 };
@@ -286,44 +288,30 @@ fn recording_of_other_episodes_is_rejected_and_worker_banned() {
 
 #[test]
 fn missing_result_message_requeues_job() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let reference_run = ReferenceRun::prepare(scratch.path());
-    let nats = Nats::start(&scratch.path().join("nats"));
-    let file_relay = Relay::start();
-    let server = start_server(
-        &reference_run,
-        &server_config(&nats, file_relay.address()),
-        &file_relay,
-    );
-    resume(&server);
+    let setup = RemoteSetup::start();
+    resume(&setup.server);
     let runtime = Runtime::new().expect("a runtime starts");
-    let fake = runtime.block_on(FakeWorker::connect(&nats));
+    let fake = runtime.block_on(FakeWorker::connect(&setup.nats));
     let job = runtime.block_on(fake.take_job());
     // For the server a false announcement looks like a loss in NATS: it finds no result message with this sequence number.
     let announcement = json!({
         "kind": "handed_in", "lease": job["order"]["lease"], "episodes_done": 1, "sequence": 1_000_000,
     });
     assert_eq!(runtime.block_on(fake.request(&announcement))["kind"], "yes");
-    server.wait_for_log("NATS has lost a result: the job is queued again", 1);
-    let other = Worker::start(scratch.path(), "other", &worker_config(nats.address(), 1));
-    reference_run.assert_equal_result(&server);
+    setup
+        .server
+        .wait_for_log("NATS has lost a result: the job is queued again", 1);
+    let other = setup.start_worker("other");
+    setup.assert_equal_result();
     other.stop();
 }
 
 #[test]
 fn repeated_late_stolen_and_forged_results_change_nothing() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let reference_run = ReferenceRun::prepare(scratch.path());
-    let nats = Nats::start(&scratch.path().join("nats"));
-    let file_relay = Relay::start();
-    let server = start_server(
-        &reference_run,
-        &server_config(&nats, file_relay.address()),
-        &file_relay,
-    );
+    let setup = RemoteSetup::start();
     let runtime = Runtime::new().expect("a runtime starts");
     let (fake, mut messages) = runtime.block_on(async {
-        let client = async_nats::connect(nats.url()).await;
+        let client = async_nats::connect(setup.nats.url()).await;
         let client = client.expect("NATS is there");
         let messages = client.subscribe("faceoff.outcomes.honest").await;
         (
@@ -333,8 +321,8 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
             messages.expect("the test may subscribe"),
         )
     });
-    let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
-    resume(&server);
+    let honest = setup.start_worker("honest");
+    resume(&setup.server);
     let shards = 3 * EPISODES as usize;
     let mut results = Vec::new();
     runtime.block_on(async {
@@ -352,14 +340,16 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
             results.push(result);
         }
     });
-    reference_run.assert_equal_result(&server);
+    setup.assert_equal_result();
     runtime.block_on(async {
         for result in &results {
             fake.repeat_result(result, "late").await;
         }
     });
     // The server processes all messages and accepts no repeated one.
-    server.wait_for_log("without a valid grant", 2 * shards);
+    setup
+        .server
+        .wait_for_log("without a valid grant", 2 * shards);
     runtime.block_on(async {
         let jetstream = jetstream::new(fake.client.clone());
         loop {
@@ -377,15 +367,17 @@ fn repeated_late_stolen_and_forged_results_change_nothing() {
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
     });
-    let log = server.log();
+    let log = setup.server.log();
     let is_accepted_from_thief =
         |line: &str| line.contains("result accepted job=") && line.contains("worker=thief");
     assert!(!log.lines().any(is_accepted_from_thief), "{log}");
     assert!(log.contains("over already"), "{log}");
-    let view = server.get("/api/v1/workers", Some(&server.admin_token));
+    let view = setup
+        .server
+        .get("/api/v1/workers", Some(&setup.server.admin_token));
     let view: Value = view.json().expect("the API speaks JSON");
     assert_eq!(view["bans"], json!([]), "{view:#}");
-    reference_run.assert_equal_result(&server);
+    setup.assert_equal_result();
     honest.stop();
 }
 
@@ -463,22 +455,8 @@ fn false_game_result_bans_worker_and_real_one_is_accepted() {
         &server_config(&nats, file_relay.address()),
     );
     file_relay.set_target(server.address().into());
-    for name in ["Ada", "Bob"] {
-        let team = Team::create(&server, name);
-        let submission = team.submit(&server, &repository().join("agents/hold"));
-        assert_eq!(submission["state"], "valid", "{submission:#}");
-    }
-    // A short game of 1500 control steps.
-    let rules = [
-        "--format",
-        "round-robin",
-        "--rounds",
-        "1",
-        "--steps",
-        "1500",
-    ];
-    let open = ["tournament", "open", "Cup", "--teams", "Ada,Bob", "--json"];
-    let cup = admin(&server, &[&open[..], &rules].concat()).json();
+    create_teams_with_hold(&server, &["Ada", "Bob"]);
+    let cup = admin(&server, &OPEN_CUP).json();
     let round = admin(&server, &["tournament", "start-round", "Cup"]);
     let _ = round.expect_success();
 

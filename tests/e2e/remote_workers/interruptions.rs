@@ -1,10 +1,8 @@
 //! Interruptions of remote workers: cut and slow network connections, full disks, wrong clocks. Each evaluation ends with the
 //! same result as on a single machine, and no agent gets a fault.
 
-use super::{ReferenceRun, resume, server_config, start_server, wait_for_workers, worker_config};
-use crate::{dataset, entry};
+use super::{RemoteSetup, resume, wait_for_workers, worker_config};
 use faceoff_tests::{
-    nats::Nats,
     program,
     relay::{ConnectionBreaks, Relay},
     small_disk::{FilledDisk, MountedDisk},
@@ -20,47 +18,32 @@ const SEED_BREAKING_BUNDLE: u64 = 65;
 
 #[test]
 fn disconnected_worker_stops_and_another_gets_its_job() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let reference_run = ReferenceRun::prepare(scratch.path());
-    let nats = Nats::start(&scratch.path().join("nats"));
-    let (file_relay, nats_relay) = (Relay::start(), Relay::start());
-    nats_relay.set_target(nats.address());
-    let server = start_server(
-        &reference_run,
-        &server_config(&nats, file_relay.address()),
-        &file_relay,
-    );
+    let setup = RemoteSetup::start();
+    let nats_relay = Relay::start();
+    nats_relay.set_target(setup.nats.address());
     let disconnected = Worker::start(
-        scratch.path(),
+        setup.scratch.path(),
         "disconnected",
         &worker_config(nats_relay.address(), 1),
     );
-    resume(&server);
+    resume(&setup.server);
     disconnected.wait_for_log("committed", 1);
     disconnected.wait_for_log("started job=", 2);
     // The worker cannot send the result of its current job in time.
     nats_relay.disconnect();
-    let other = Worker::start(scratch.path(), "other", &worker_config(nats.address(), 1));
-    reference_run.assert_equal_result(&server);
-    nats_relay.set_target(nats.address());
+    let other = setup.start_worker("other");
+    setup.assert_equal_result();
+    nats_relay.set_target(setup.nats.address());
     other.stop();
     disconnected.stop();
 }
 
 #[test]
 fn slow_and_breaking_connections_lose_no_result() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let reference_run = ReferenceRun::prepare(scratch.path());
-    let nats = Nats::start(&scratch.path().join("nats"));
-    let file_relay = Relay::start();
-    let server = start_server(
-        &reference_run,
-        &server_config(&nats, file_relay.address()),
-        &file_relay,
-    );
+    let setup = RemoteSetup::start();
     let nats_relays = [Relay::start(), Relay::start()];
     for (seed, relay) in (0..).zip(&nats_relays) {
-        relay.set_target(nats.address());
+        relay.set_target(setup.nats.address());
         relay.set_breaks(ConnectionBreaks {
             seed,
             refused_percent: 5,
@@ -68,23 +51,23 @@ fn slow_and_breaking_connections_lose_no_result() {
         });
         relay.set_delay(Duration::from_millis(200));
     }
-    file_relay.set_breaks(ConnectionBreaks {
+    setup.file_relay.set_breaks(ConnectionBreaks {
         seed: SEED_BREAKING_BUNDLE,
         refused_percent: 5,
         max_bytes: 16 << 20,
     });
-    file_relay.set_delay(Duration::from_millis(200));
+    setup.file_relay.set_delay(Duration::from_millis(200));
     let workers = [0, 1].map(|index: usize| {
         let name = format!("worker-{index}");
         Worker::start(
-            scratch.path(),
+            setup.scratch.path(),
             &name,
             &worker_config(nats_relays[index].address(), 1),
         )
     });
-    resume(&server);
-    reference_run.assert_equal_result(&server);
-    for relay in nats_relays.iter().chain([&file_relay]) {
+    resume(&setup.server);
+    setup.assert_equal_result();
+    for relay in nats_relays.iter().chain([&setup.file_relay]) {
         assert!(
             relay.broken_connections() > 0,
             "a relay had no broken connection"
@@ -98,26 +81,21 @@ fn slow_and_breaking_connections_lose_no_result() {
 
 #[test]
 fn worker_with_full_disk_releases_jobs_until_it_has_space() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let reference_run = ReferenceRun::prepare(scratch.path());
-    let nats = Nats::start(&scratch.path().join("nats"));
-    let file_relay = Relay::start();
-    let server = start_server(
-        &reference_run,
-        &server_config(&nats, file_relay.address()),
-        &file_relay,
+    let setup = RemoteSetup::start();
+    let disk = MountedDisk::at(
+        &setup.scratch.path().join("full/scratch"),
+        SCRATCH_DISK_BYTES,
     );
-    let disk = MountedDisk::at(&scratch.path().join("full/scratch"), SCRATCH_DISK_BYTES);
     let mut command = disk.namespace_command();
     command.arg(program("faceoff"));
-    let config = worker_config(nats.address(), 1);
+    let config = worker_config(setup.nats.address(), 1);
     let full_disk_worker =
-        Worker::start_with_command(command, scratch.path(), "full", &config, &[]);
-    wait_for_workers(&server, 1);
+        Worker::start_with_command(command, setup.scratch.path(), "full", &config, &[]);
+    wait_for_workers(&setup.server, 1);
     let filled_disk = FilledDisk::fill(&disk.outside_path());
-    resume(&server);
+    resume(&setup.server);
     full_disk_worker.wait_for_log("disk full: job released", 3);
-    let other = Worker::start(scratch.path(), "other", &config);
+    let other = Worker::start(setup.scratch.path(), "other", &config);
     other.wait_for_log("committed", 2);
     assert!(
         !full_disk_worker.log().contains("committed"),
@@ -128,22 +106,9 @@ fn worker_with_full_disk_releases_jobs_until_it_has_space() {
     drop(filled_disk);
     full_disk_worker.wait_for_log("committed", 1);
 
-    let (evaluation, token) = (
-        reference_run.evaluation.clone(),
-        reference_run.team.token.clone(),
-    );
-    reference_run.assert_equal_result(&server);
-    let shards = entry(
-        &mut dataset(&server, &evaluation, &token),
-        "calibration.json",
-    );
-    for shard in shards["shards"].as_array().expect("it lists the shards") {
-        assert_eq!(
-            shard.get("platform_retries"),
-            None,
-            "a full disk counts as no failure: {shards:#}"
-        );
-    }
+    setup.assert_equal_result();
+    // A full disk counts as no failure.
+    setup.reference_run.assert_no_retries(&setup.server);
 }
 
 /// The library that gives a program a wrong clock when it is preloaded.
@@ -158,15 +123,7 @@ fn faketime_library() -> PathBuf {
 
 #[test]
 fn workers_with_wrong_clocks_run_jobs_normally() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let reference_run = ReferenceRun::prepare(scratch.path());
-    let nats = Nats::start(&scratch.path().join("nats"));
-    let file_relay = Relay::start();
-    let server = start_server(
-        &reference_run,
-        &server_config(&nats, file_relay.address()),
-        &file_relay,
-    );
+    let setup = RemoteSetup::start();
     let started_at = Timestamp::now();
     let workers = [("behind", "-3600"), ("ahead", "+3600")].map(|(name, offset_s)| {
         let mut command = Command::new(program("faceoff"));
@@ -179,15 +136,15 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
             .env("FAKETIME_DISABLE_SHM", "1");
         Worker::start_with_command(
             command,
-            scratch.path(),
+            setup.scratch.path(),
             name,
-            &worker_config(nats.address(), 1),
+            &worker_config(setup.nats.address(), 1),
             &[],
         )
     });
-    wait_for_workers(&server, workers.len());
-    resume(&server);
-    reference_run.assert_equal_result(&server);
+    wait_for_workers(&setup.server, workers.len());
+    resume(&setup.server);
+    setup.assert_equal_result();
     for (worker, expected_offset_h) in workers.into_iter().zip([-1.0, 1.0]) {
         let log = worker.log();
         assert!(log.contains("committed"), "a worker has run no job:\n{log}");

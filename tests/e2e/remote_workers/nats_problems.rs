@@ -2,8 +2,8 @@
 //! changed streams, a missing NATS server. Each is reported, and jobs continue once it is fixed.
 
 use super::{
-    COMMON_CONFIG, ReferenceRun, resume, server_config, start_server, wait_for_workers,
-    with_episodes, worker_config,
+    COMMON_CONFIG, ReferenceRun, RemoteSetup, resume, server_config, start_server,
+    wait_for_workers, with_episodes, worker_config,
 };
 use crate::Team;
 use async_nats::jetstream::{
@@ -92,28 +92,23 @@ impl NatsAdministrator {
 
 #[test]
 fn result_waits_while_stream_is_full() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let reference_run = ReferenceRun::prepare(scratch.path());
-    let nats = Nats::start(&scratch.path().join("nats"));
-    let file_relay = Relay::start();
-    let config = server_config(&nats, file_relay.address());
-    let server = start_server(&reference_run, &config, &file_relay);
-    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
-    wait_for_workers(&server, 1);
-    let administrator = NatsAdministrator::connect(&nats);
+    let setup = RemoteSetup::start();
+    let worker = setup.start_worker("worker");
+    wait_for_workers(&setup.server, 1);
+    let administrator = NatsAdministrator::connect(&setup.nats);
     let original_config = administrator.stream_config("faceoff-outcomes");
     administrator.update_stream(&Config {
         max_bytes: 1,
         ..original_config.clone()
     });
-    resume(&server);
+    resume(&setup.server);
     let message = "the result is not stored by NATS yet; trying again";
     worker.wait_for_log(message, 1);
     assert!(worker.log().contains("maximum bytes"), "{}", worker.log());
     // The page of workers and the health endpoints report the problem, too.
-    wait_for_problem(&server, "maximum bytes");
+    wait_for_problem(&setup.server, "maximum bytes");
     for path in ["/api/v1/health", "/readyz"] {
-        let _ = server.poll(path, &server.admin_token, |view| {
+        let _ = setup.server.poll(path, &setup.server.admin_token, |view| {
             let detail = view["detail"].as_str();
             detail.is_some_and(|detail| detail.contains("maximum bytes"))
         });
@@ -122,7 +117,7 @@ fn result_waits_while_stream_is_full() {
     thread::sleep(Duration::from_secs(12));
     assert!(!worker.log().contains("committed"), "{}", worker.log());
     administrator.update_stream(&original_config);
-    reference_run.assert_equal_result(&server);
+    setup.assert_equal_result();
     let log = worker.log();
     let count = |word: &str| log.matches(word).count();
     assert!(count("platform fault") == 0, "{log}");

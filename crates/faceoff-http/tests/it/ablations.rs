@@ -3,7 +3,7 @@
 
 use crate::{
     clips,
-    site::{ADMIN, Site, TestTeam, outcome},
+    site::{ADMIN, GZIP, Site, TestTeam, outcome, string},
 };
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::Artifacts;
@@ -128,6 +128,15 @@ async fn ablation_is_started_by_organiser_and_hidden_from_other_teams() {
     site.get(&api, Some(&other_team.token))
         .await
         .problem(404, "not-found", &[]);
+    let validating = site.upload(&other_team.token, GZIP.to_vec()).await;
+    let id = string(&validating.json(201)["id"]);
+    site.post(
+        &format!("/api/v1/submissions/{id}/ablation"),
+        Some(ADMIN),
+        &json!({}),
+    )
+    .await
+    .problem(409, "conflict", &["only a valid submission"]);
 }
 
 #[tokio::test]

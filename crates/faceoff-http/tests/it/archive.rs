@@ -74,10 +74,9 @@ impl Season {
             json!({ "role": "organiser", "note": "an open one" }),
         )
         .await;
-        let opened = site
-            .request(Method::PATCH, "/api/v1/season", Some(ADMIN))
-            .json(&json!({ "takes_registrations": true }));
-        assert!(opened.send().await.unwrap().status().is_success());
+        let open = json!({ "takes_registrations": true });
+        let opened = site.patch("/api/v1/season", Some(ADMIN), &open).await;
+        assert!(opened.status.is_success());
         let register = json!({ "team": { "name": "Gamma" }, "contact": "gamma@example.org" });
         assert_eq!(
             site.post("/api/v1/registrations", None, &register)
@@ -98,8 +97,8 @@ impl Season {
                 string(&response.json(201)["id"])
             );
             let answer = json!({ "text": "an answer", "public": public });
-            let request = site.request(Method::PUT, &path, Some(ADMIN)).json(&answer);
-            assert!(request.send().await.unwrap().status().is_success());
+            let answered = site.send(Method::PUT, &path, Some(ADMIN), &answer).await;
+            assert!(answered.status.is_success());
         }
         let person = string(&joined["person"]["id"]);
         let mut season = Self {
@@ -139,12 +138,8 @@ impl Season {
     /// allowed. On the second, one evaluation is still open. Returns its id.
     async fn add_unfinished_day(&mut self) -> EvaluationId {
         let site = &self.site;
-        let path = format!("/api/v1/stages/{}", site.stage().await);
         let more_faults = json!({ "max_faults": 5, "confirm": "Qualifying" });
-        let changed = site
-            .request(Method::PATCH, &path, Some(ADMIN))
-            .json(&more_faults);
-        assert_eq!(changed.send().await.unwrap().status(), 200);
+        site.change_first_stage(more_faults).await.json(200);
         site.next_day();
         post(site, "/api/v1/days", json!({})).await;
         site.run_shards(10).await;
@@ -471,14 +466,9 @@ async fn public_archive_has_no_private_data() {
 #[tokio::test]
 async fn public_archive_hides_blind_stages_and_frozen_results() {
     let site = Site::start().await;
-    let stage = site.stage().await;
-    let request = |body: Value| {
-        let path = format!("/api/v1/stages/{stage}");
-        site.request(Method::PATCH, &path, Some(ADMIN)).json(&body)
-    };
-    let blinded = request(json!({ "blind": true, "publishes": "at_release" }));
-    let blinded = Answer::read(blinded.send().await.unwrap()).await;
-    assert_eq!(blinded.status, 200, "{blinded:?}");
+    site.change_first_stage(json!({ "blind": true, "publishes": "at_release" }))
+        .await
+        .json(200);
     let evaluation_before_freeze = site.run_day(3, [("Alpha", &good_outcome)]).await[0];
     let (folder, manifest) = export(&site, "public").await;
     for file in files_of(&folder.path().join("archive")) {
@@ -507,9 +497,10 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
         "the seed of a blind day is hidden"
     );
 
-    let revealed = Answer::read(request(json!({ "blind": false })).send().await.unwrap()).await;
-    assert_eq!(revealed.status, 200, "{revealed:?}");
-    let freeze = format!("/api/v1/stages/{stage}/freeze");
+    site.change_first_stage(json!({ "blind": false }))
+        .await
+        .json(200);
+    let freeze = format!("/api/v1/stages/{}/freeze", site.stage().await);
     post(&site, &freeze, json!({ "reason": "the ceremony" })).await;
     site.next_day();
     post(&site, "/api/v1/days", json!({})).await;
@@ -641,46 +632,24 @@ async fn archive_is_made_one_at_a_time_and_dropped_when_unread() {
     second.problem(503, "busy", &["only one"]);
     assert_eq!(second.header("retry-after"), "60");
     drop(unread_download);
-    // The large file does not match the dataset's stored hash, so the archive ends with an error.
-    let broken = loop {
-        let path = "/api/v1/season/archive?edition=organiser";
-        let response = site
-            .request(Method::GET, path, Some(ADMIN))
-            .send()
-            .await
-            .unwrap();
+    // Waits until the sender before has ended: it may not have noticed yet that its client disconnected.
+    let download = async |edition: &str| loop {
+        let path = format!("/api/v1/season/archive?edition={edition}");
+        let request = site.request(Method::GET, &path, Some(ADMIN));
+        let response = request.send().await.unwrap();
         if response.status() == 200 {
             break response.bytes().await;
         }
-        // The first sender has not noticed yet that its client disconnected.
         tokio::task::yield_now().await;
     };
+    // The large file does not match the dataset's stored hash, so the archive ends with an error.
     assert!(
-        broken.is_err(),
+        download("organiser").await.is_err(),
         "an incomplete archive must not look complete"
     );
-    let public = loop {
-        let path = "/api/v1/season/archive?edition=public";
-        let response = site
-            .request(Method::GET, path, Some(ADMIN))
-            .send()
-            .await
-            .unwrap();
-        if response.status() == 200 {
-            break response.bytes().await;
-        }
-        tokio::task::yield_now().await;
-    };
-    assert!(public.is_ok());
+    assert!(download("public").await.is_ok());
     // The sender removes its files after the last byte, and only then may the next archive begin.
-    while site
-        .get("/api/v1/season/archive?edition=public", Some(ADMIN))
-        .await
-        .status
-        != 200
-    {
-        tokio::task::yield_now().await;
-    }
+    assert!(download("public").await.is_ok());
 
     let refused = site
         .get("/api/v1/season/archive?edition=mine", Some(ADMIN))

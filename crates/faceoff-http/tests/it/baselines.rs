@@ -1,13 +1,11 @@
 //! Tests of baselines, the organisers' reference agents, which boards show beside the ranked teams.
 
 use crate::site::{ADMIN, Answer, Site, TestTeam, result, string};
-use reqwest::Method;
 use serde_json::{Value, json};
 
 async fn change_team(site: &Site, team: &TestTeam, token: &str, change: &Value) -> Answer {
     let path = format!("/api/v1/teams/{}", team.id);
-    let request = site.request(Method::PATCH, &path, Some(token));
-    Answer::read(request.json(change).send().await.unwrap()).await
+    site.patch(&path, Some(token), change).await
 }
 
 /// Three teams with results; "Reference" is in the middle.
@@ -120,10 +118,7 @@ async fn baseline_is_set_by_organiser_and_not_entered_in_tournaments() {
     // A signed-off result does not change any more.
     let stage = format!("/api/v1/stages/{}", site.stage().await);
     let closes = json!({ "closes_at": "2026-03-01T10:01:00Z" });
-    let close = site.request(Method::PATCH, &stage, Some(ADMIN));
-    Answer::read(close.json(&closes).send().await.unwrap())
-        .await
-        .json(200);
+    site.patch(&stage, Some(ADMIN), &closes).await.json(200);
     site.advance(60);
     let name = string(&site.get(&stage, None).await.json(200)["name"]);
     site.post(

@@ -1,15 +1,7 @@
 //! Tests of blind stages, whose results only organisers see until they reveal them, on every page and in the whole API.
 
 use crate::site::{ADMIN, Answer, Site, TestTeam, result};
-use reqwest::Method;
-use serde_json::{Value, json};
-
-/// Changes the first stage as an organiser.
-async fn change_stage(site: &Site, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::read(request.json(&body).send().await.unwrap()).await
-}
+use serde_json::json;
 
 /// Starts an evaluation day of a blind stage with two teams. Returns the API paths of their evaluations.
 async fn blind_day(site: &Site) -> ([TestTeam; 2], [String; 2]) {
@@ -18,7 +10,10 @@ async fn blind_day(site: &Site) -> ([TestTeam; 2], [String; 2]) {
     for team in &teams {
         submissions.push(site.valid_submission(team, "agent").await);
     }
-    let blind = change_stage(site, json!({ "blind": true })).await.json(200);
+    let blind = site
+        .change_first_stage(json!({ "blind": true }))
+        .await
+        .json(200);
     assert_eq!(blind["blind"], true);
     let paths = [
         site.evaluate(&teams[0], &submissions[0]).await,
@@ -186,7 +181,8 @@ async fn blind_results_are_visible_to_organisers_only() {
         .problem(401, "unauthenticated", &[]);
 
     // Once revealed, results cannot be hidden again.
-    let revealed = change_stage(&site, json!({ "blind": false }))
+    let revealed = site
+        .change_first_stage(json!({ "blind": false }))
         .await
         .json(200);
     assert_eq!(revealed["blind"], false);
@@ -214,11 +210,17 @@ async fn blind_results_are_visible_to_organisers_only() {
         .get(&format!("{alpha_evaluation}/dataset"), Some(&alpha.token))
         .await;
     assert_eq!(dataset.status, 200);
-    change_stage(&site, json!({ "blind": true })).await.problem(
-        409,
-        "conflict",
-        &["2 evaluations", "that was visible"],
-    );
+    site.change_first_stage(json!({ "blind": true }))
+        .await
+        .problem(
+            409,
+            "conflict",
+            &[
+                "blind: 2 evaluations",
+                "that was visible",
+                "before its first score",
+            ],
+        );
 }
 
 #[tokio::test]
@@ -249,7 +251,7 @@ async fn faults_of_a_blind_stage_are_hidden() {
     assert!(!board.contains("failed"), "{board}");
     let organiser_view = site.get(&alpha_evaluation, Some(ADMIN)).await.json(200);
     assert_eq!(organiser_view["faults"].as_array().unwrap().len(), 2);
-    change_stage(&site, json!({ "blind": false }))
+    site.change_first_stage(json!({ "blind": false }))
         .await
         .json(200);
     let team_view = site
@@ -282,18 +284,13 @@ async fn blind_setting_is_validated_and_for_organisers_only() {
         ("standings", json!({ "mean_of_last": -1 })),
     ] {
         let body = json!({ field: wrong });
-        change_stage(&site, body)
+        site.change_first_stage(body)
             .await
             .problem(422, "invalid-content", &[field]);
     }
     let path = format!("/api/v1/stages/{}", site.stage().await);
     for (token, status) in [(None, 401), (Some(team.token.as_str()), 403)] {
-        let request = site.request(Method::PATCH, &path, token);
-        let answer = request
-            .json(&json!({ "blind": true }))
-            .send()
-            .await
-            .unwrap();
-        assert_eq!(answer.status().as_u16(), status);
+        let answer = site.patch(&path, token, &json!({ "blind": true })).await;
+        assert_eq!(answer.status.as_u16(), status);
     }
 }

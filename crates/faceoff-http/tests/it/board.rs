@@ -100,9 +100,7 @@ async fn board_shows_only_score_and_points_before_the_release() {
         let team = site.team(name).await;
         site.valid_submission(&team, name).await;
     }
-    let late = site.team("Late").await;
-    let submission = site.valid_submission(&late, "late").await;
-    let late_evaluation = site.evaluate(&late, &submission).await;
+    let (_, _, late_evaluation) = site.team_with_evaluation("Late", "late").await;
     for (_, rates, points) in TEAMS {
         site.finish_evaluation(&result(rates, points)).await;
     }
@@ -265,9 +263,7 @@ async fn board_page_shows_next_steps_and_progress() {
     }
     page(&site, "/tasks/hit").await;
 
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "striker").await;
-    let evaluation = site.evaluate(&team, &submission).await;
+    let (_, _, evaluation) = site.team_with_evaluation("Alpha", "striker").await;
     let (claim, ..) = site.claim_shard().await;
     let episodes_done = 3;
     site.store

@@ -1,18 +1,10 @@
 //! Tests of the capacity forecast (will a day's evaluations finish before its deadline?), of queue positions and next steps,
 //! and of warnings about days that do not fit.
 
-use crate::site::{ADMIN, Answer, Site, outcome, string};
+use crate::site::{ADMIN, Site, outcome, string};
 use faceoff_store::*;
 use faceoff_testkit::{shard_commit, shard_outcomes};
-use reqwest::Method;
 use serde_json::{Value, json};
-
-/// Changes a stage as an organiser.
-pub async fn change_stage(site: &Site, stage: &str, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{stage}");
-    let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
-    Answer::read(request.send().await.unwrap()).await
-}
 
 /// Runs the next evaluation. Each job takes `job_s` seconds.
 pub async fn run_evaluation_slowly(site: &Site, job_s: i64) {
@@ -82,12 +74,11 @@ async fn forecast_reports_a_day_that_will_not_fit() {
     let expected = (3.0 * (125.0 + 40.0) + 125.0 + 12.0 * 23.2) / (2.0 * 3600.0);
     assert!((worst_case - expected).abs() < 1e-9, "{worst_case}");
     assert_eq!(unmeasured["fit"], "surely");
-    change_stage(&site, &stage, json!({ "day_deadline": { "hours": 1 }, "episodes_per_task": 1000, "confirm": "Qualifying" }))
+    site.change_stage(&stage, json!({ "day_deadline": { "hours": 1 }, "episodes_per_task": 1000, "confirm": "Qualifying" }))
         .await
         .json(200);
     assert_eq!(capacity().await["days"][0]["fit"], "unknown");
-    change_stage(
-        &site,
+    site.change_stage(
         &stage,
         json!({ "episodes_per_task": 4, "confirm": "Qualifying" }),
     )
@@ -97,8 +88,7 @@ async fn forecast_reports_a_day_that_will_not_fit() {
     site.evaluate(&alpha, &submission).await;
     run_evaluation_slowly(&site, 300).await;
     site.next_day();
-    change_stage(
-        &site,
+    site.change_stage(
         &stage,
         json!({ "episodes_per_task": 1000, "confirm": "Qualifying" }),
     )
@@ -277,7 +267,7 @@ async fn capacity_is_for_organisers_and_deadlines_are_validated() {
         (json!(30), "day_deadline"),
     ] {
         let body = json!({ "day_deadline": wrong });
-        change_stage(&site, &stage, body.clone())
+        site.change_stage(&stage, body.clone())
             .await
             .problem(422, "invalid-content", &[words]);
         let body = json!({ "name": "Final", "day_deadline": wrong });
@@ -307,11 +297,11 @@ async fn monitor_warns_once_of_each_day_that_does_not_fit() {
     let mut monitor = site.capacity_monitor();
     let set_episodes = async |episodes: u32| {
         let rules = json!({ "episodes_per_task": episodes, "confirm": "Qualifying" });
-        change_stage(&site, &stage, rules).await.json(200)
+        site.change_stage(&stage, rules).await.json(200)
     };
     let set_deadline = async |hours: u32| {
         let deadline = json!({ "day_deadline": { "hours": hours } });
-        change_stage(&site, &stage, deadline).await.json(200);
+        site.change_stage(&stage, deadline).await.json(200);
     };
     set_deadline(1).await;
     let changed = set_episodes(1000).await;

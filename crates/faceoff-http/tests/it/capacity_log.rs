@@ -1,9 +1,6 @@
 //! Tests of the log's warnings about evaluation days that will not finish before their deadline.
 
-use crate::{
-    capacity::{change_stage, run_evaluation_slowly},
-    site::Site,
-};
+use crate::{capacity::run_evaluation_slowly, site::Site};
 use serde_json::json;
 use std::{
     fmt::{Debug, Write as _},
@@ -70,7 +67,7 @@ async fn overfull_day_is_logged_once_and_again_at_its_cutoff() {
     run_evaluation_slowly(&site, 300).await;
     site.next_day();
     let rules = json!({ "episodes_per_task": 1000, "day_deadline": { "hours": 1 }, "confirm": "Qualifying" });
-    change_stage(&site, &stage, rules).await.json(200);
+    site.change_stage(&stage, rules).await.json(200);
 
     let warnings = Warnings::default();
     let _guard = tracing::subscriber::set_default(warnings.clone());

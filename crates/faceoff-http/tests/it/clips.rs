@@ -238,14 +238,9 @@ async fn motion_is_public_and_observations_follow_the_dataset() {
 #[tokio::test]
 async fn blind_stage_hides_episodes() {
     let site = Site::start().await;
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    let changed = request
-        .json(&json!({ "blind": true }))
-        .send()
+    site.change_first_stage(json!({ "blind": true }))
         .await
-        .unwrap();
-    assert_eq!(changed.status(), 200);
+        .json(200);
     let day = record_day_on(site, true).await;
     for path in ["episodes", "episodes/prepare/0/motion"] {
         for token in [None, Some(day.alpha.token.as_str())] {
@@ -281,9 +276,7 @@ async fn clip_is_compressed_and_cached_by_etag() {
 #[tokio::test]
 async fn evaluation_without_clips_has_no_replays() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "striker").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (_, _, path) = site.team_with_evaluation("Alpha", "striker").await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     let answer = site.get(&format!("{path}/episodes"), None).await;

@@ -45,9 +45,7 @@ async fn confirm_decision(site: &Site, path: &str, confirm: &str, words: &[&str]
 #[tokio::test]
 async fn voided_evaluation_leaves_the_board_with_its_reason() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "a").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (team, _, path) = site.team_with_evaluation("Alpha", "a").await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     assert_eq!(board_teams(&site).await, json!(["Alpha"]));
@@ -118,9 +116,7 @@ async fn voided_day_voids_or_cancels_all_its_evaluations() {
 #[tokio::test]
 async fn disqualified_team_leaves_the_board_with_the_reason() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "a").await;
-    site.evaluate(&team, &submission).await;
+    let (team, submission, _) = site.team_with_evaluation("Alpha", "a").await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     site.next_day();
@@ -214,9 +210,7 @@ async fn paused_queue_is_shown_and_server_stays_healthy() {
 #[tokio::test]
 async fn decisions_are_for_organisers_only() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "a").await;
-    let evaluation = site.evaluate(&team, &submission).await;
+    let (team, _, evaluation) = site.team_with_evaluation("Alpha", "a").await;
     let stage = site.stage().await;
     for path in [
         format!("{evaluation}/void"),

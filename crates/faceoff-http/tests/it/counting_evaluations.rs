@@ -1,22 +1,14 @@
 //! Tests of the stage setting `standings`, which says which of a team's evaluations count on the board: the newest, the best, a
 //! mean of several days, or that of a final day.
 
-use crate::site::{ADMIN, Answer, Site, outcome};
+use crate::site::{ADMIN, Site, outcome};
 use faceoff_types::{EpisodeOutcome, Task, Violations};
-use reqwest::Method;
 use serde_json::{Value, json};
-
-/// Changes the first stage as an organiser.
-async fn change_stage(site: &Site, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::read(request.json(&body).send().await.unwrap()).await
-}
 
 /// Sets which evaluations count, in an open stage.
 async fn set_counting(site: &Site, standings: Value) {
     let body = json!({ "standings": standings, "confirm": "Qualifying" });
-    let changed = change_stage(site, body).await.json(200);
+    let changed = site.change_first_stage(body).await.json(200);
     assert_eq!(changed["standings"], standings);
 }
 
@@ -175,7 +167,9 @@ async fn means_of_the_same_days_are_compared_pairwise() {
 #[tokio::test]
 async fn changed_counting_of_an_open_stage_needs_confirmation() {
     let site = Site::start().await;
-    let problem = change_stage(&site, json!({ "standings": "best" })).await;
+    let problem = site
+        .change_first_stage(json!({ "standings": "best" }))
+        .await;
     let problem = problem.problem(409, "not-confirmed", &["best", "latest", "confirm"]);
     assert_eq!(problem["confirm"], "Qualifying");
     let stages = site.get("/api/v1/stages", None).await.json(200);
@@ -208,7 +202,7 @@ async fn final_day_replaces_the_board_once_it_has_started() {
             .contains("Only the final day counts")
     );
 
-    change_stage(&site, json!({ "closes_at": "2026-03-01T20:00:00Z" }))
+    site.change_first_stage(json!({ "closes_at": "2026-03-01T20:00:00Z" }))
         .await
         .json(200);
     site.advance(11 * 3600);
@@ -265,7 +259,7 @@ async fn frozen_board_ignores_the_final_day() {
         .await;
     set_counting(&site, json!("final")).await;
     let path = format!("/api/v1/stages/{}", site.stage().await);
-    change_stage(&site, json!({ "closes_at": "2026-03-01T20:00:00Z" }))
+    site.change_first_stage(json!({ "closes_at": "2026-03-01T20:00:00Z" }))
         .await
         .json(200);
     let reason = json!({ "reason": "the finale is a surprise" });

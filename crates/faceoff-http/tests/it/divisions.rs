@@ -1,16 +1,13 @@
 //! Tests of divisions, which are groups of teams with a ranking of their own, on boards.
 
 use crate::site::{ADMIN, Site, result};
-use reqwest::Method;
 use scraper::{Html, Selector};
 use serde_json::{Value, json};
 
 /// Changes a resource as an organiser. The request must succeed.
 async fn patch(site: &Site, path: &str, body: &Value) -> Value {
-    let request = site.request(Method::PATCH, &format!("/api/v1{path}"), Some(ADMIN));
-    crate::site::Answer::read(request.json(body).send().await.unwrap())
-        .await
-        .json(200)
+    let path = format!("/api/v1{path}");
+    site.patch(&path, Some(ADMIN), body).await.json(200)
 }
 
 /// Four teams in the board order A, B, C, D. A and C are students, B is open, D has no division.
@@ -61,6 +58,41 @@ fn places(board: &Value) -> Vec<(u64, u64, String)> {
 
 fn team_names(places: &[(u64, u64, String)]) -> Vec<&str> {
     places.iter().map(|(_, _, team)| team.as_str()).collect()
+}
+
+#[tokio::test]
+async fn divisions_keep_their_order_and_teams() {
+    let site = Site::start().await;
+    let change_season =
+        async |change: Value| site.patch("/api/v1/season", Some(ADMIN), &change).await;
+    let set_divisions = async |names: &[&str]| change_season(json!({ "divisions": names })).await;
+    set_divisions(&["Open", "Students"]).await.json(200);
+    set_divisions(&["Students", "Open"]).await.json(200);
+    let stored = site.get("/api/v1/season", None).await.json(200)["divisions"].clone();
+    assert_eq!(stored, json!(["Students", "Open"]));
+    set_divisions(&["Open", "OPEN"])
+        .await
+        .problem(409, "conflict", &["“OPEN” is listed twice"]);
+    change_season(json!({ "takes_registrations": true }))
+        .await
+        .json(200);
+    let registration =
+        json!({ "team": { "name": "Beta", "division": "open" }, "contact": "ada@example.org" });
+    let registered = site.post("/api/v1/registrations", None, &registration);
+    let registered = registered.await.json(201);
+    assert_eq!(registered["division"], "Open");
+    let approve = format!(
+        "/api/v1/registrations/{}/approve",
+        registered["id"].as_str().unwrap()
+    );
+    site.post(&approve, Some(ADMIN), &json!({})).await.json(200);
+    set_divisions(&["Students"])
+        .await
+        .problem(409, "conflict", &["“Open” has 1 teams"]);
+    assert_eq!(
+        site.get("/api/v1/season", None).await.json(200)["divisions"],
+        stored
+    );
 }
 
 #[tokio::test]

@@ -69,9 +69,7 @@ async fn link_is_for_one_file_and_cannot_be_forged() {
     let site = Site::start().await;
     let (alpha, alpha_evaluation, _) = finished_evaluation(&site, "Alpha").await;
     site.next_day();
-    let beta = site.team("Beta").await;
-    let submission = site.valid_submission(&beta, "b").await;
-    let beta_evaluation = site.evaluate(&beta, &submission).await;
+    let (beta, _, beta_evaluation) = site.team_with_evaluation("Beta", "b").await;
     site.finish_evaluation(&result([0.5; 3], 100.0)).await;
     site.finish_evaluation(&result([0.5; 3], 100.0)).await;
     let url = create_link(&site, &format!("{alpha_evaluation}/dataset"), ADMIN).await;
@@ -180,9 +178,7 @@ async fn link_is_valid_while_its_creator_may_download() {
 #[tokio::test]
 async fn link_to_an_unfinished_dataset_is_refused() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "striker").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (team, _, path) = site.team_with_evaluation("Alpha", "striker").await;
     let link_path = format!("{path}/dataset/link");
     site.post(&link_path, Some(&team.token), &json!({}))
         .await

@@ -14,9 +14,7 @@ struct FinishedEvaluation {
 impl FinishedEvaluation {
     async fn start() -> Self {
         let site = Site::start().await;
-        let team = site.team("Alpha").await;
-        let submission = site.valid_submission(&team, "striker").await;
-        let path = site.evaluate(&team, &submission).await;
+        let (team, submission, path) = site.team_with_evaluation("Alpha", "striker").await;
         site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
             .await;
         Self {

@@ -6,9 +6,7 @@ use serde_json::json;
 #[tokio::test]
 async fn evaluation_shows_progress_result_and_dataset() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "striker").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (team, _, path) = site.team_with_evaluation("Alpha", "striker").await;
     let token = Some(team.token.as_str());
     let queued = site.get(&path, token).await.json(200);
     assert_eq!(queued["state"], "queued");
@@ -109,9 +107,7 @@ async fn single_evaluation_cannot_be_started() {
 #[tokio::test]
 async fn failed_evaluation_shows_its_faults_and_log() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "striker").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (team, _, path) = site.team_with_evaluation("Alpha", "striker").await;
     site.run_shards(2).await;
     let failed = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(failed["state"], "agent_failed", "{failed:#}");
@@ -146,9 +142,7 @@ async fn failed_evaluation_shows_its_faults_and_log() {
 #[tokio::test]
 async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "striker").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (team, _, path) = site.team_with_evaluation("Alpha", "striker").await;
     let cancel = format!("{path}/cancel");
     let reason = json!({ "reason": "power cut" });
     site.post(&cancel, Some(&team.token), &reason)

@@ -18,12 +18,6 @@ async fn announce(site: &Site) {
     site.post(path, Some(ADMIN), &announcement).await.json(201);
 }
 
-async fn change_stage(site: &Site, body: Value) {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
-    Answer::read(request.send().await.unwrap()).await.json(200);
-}
-
 /// All events from the beginning of the season until the announcement.
 async fn events_until_announcement(site: &Site, query: &str, token: Option<&str>) -> Vec<Event> {
     let mut stream = Stream::open(site, &format!("{STREAM_PATH}{query}"), token, Some("0")).await;
@@ -196,7 +190,9 @@ async fn stream_shows_visible_events_without_scores() {
 async fn stream_of_a_blind_stage_hides_evaluations_of_others() {
     let site = Site::start().await;
     let teams = two_teams(&site).await;
-    change_stage(&site, json!({ "blind": true })).await;
+    site.change_first_stage(json!({ "blind": true }))
+        .await
+        .json(200);
     let evaluation = run_day(&site, &teams).await;
     let id = evaluation.rsplit('/').next().unwrap();
     announce(&site).await;

@@ -1,7 +1,6 @@
 //! Tests of frozen boards: who sees results that came after the boards of a stage were frozen.
 
-use crate::site::{ADMIN, Answer, Site, TestTeam, result};
-use reqwest::Method;
+use crate::site::{ADMIN, Site, TestTeam, result};
 use serde_json::{Value, json};
 
 const REASON: &str = "the last week is a surprise";
@@ -10,15 +9,13 @@ const REASON: &str = "the last week is a surprise";
 /// of three evaluations: the first team's before and after the freeze, and the second team's after it.
 async fn frozen_stage(site: &Site) -> ([TestTeam; 2], [String; 3]) {
     let teams = [site.team("Alpha").await, site.team("Beta").await];
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    let publishes = json!({ "publishes": "at_release" });
-    let changed = request.json(&publishes).send().await.unwrap();
-    Answer::read(changed).await.json(200);
+    site.change_first_stage(json!({ "publishes": "at_release" }))
+        .await
+        .json(200);
     let alpha_submission = site.valid_submission(&teams[0], "a").await;
     let before = site.evaluate(&teams[0], &alpha_submission).await;
     site.finish_evaluation(&result([0.5, 0.5, 0.5], 10.0)).await;
-    let freeze = format!("{path}/freeze");
+    let freeze = format!("/api/v1/stages/{}/freeze", site.stage().await);
     site.post(&freeze, Some(ADMIN), &json!({ "reason": REASON }))
         .await
         .json(200);

@@ -33,6 +33,7 @@ mod feed;
 mod free_space;
 mod frozen_boards;
 mod html;
+mod invitations;
 mod openapi;
 mod organiser_dashboard;
 mod pagination;

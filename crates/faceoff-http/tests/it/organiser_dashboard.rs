@@ -7,7 +7,6 @@ use crate::{
     site::{ADMIN, Answer, Site, TestTeam, result, string},
     team_dashboard::{dashboard_page, links, redirect_target},
 };
-use reqwest::Method;
 use serde_json::{Value, json};
 
 /// The browser of Grace, an organiser.
@@ -224,15 +223,9 @@ async fn platform_fault_needs_attention_until_the_rerun() {
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .json(200);
-    let stage = string(&site.get("/api/v1/stages", None).await.json(200)[0]["id"]);
-    let change = site
-        .request(
-            Method::PATCH,
-            &format!("/api/v1/stages/{stage}"),
-            Some(ADMIN),
-        )
-        .json(&json!({ "day_deadline": { "hours": 1 } }));
-    assert_eq!(change.send().await.unwrap().status(), 200);
+    site.change_first_stage(json!({ "day_deadline": { "hours": 1 } }))
+        .await
+        .json(200);
     site.advance(3700);
     site.store.end_overdue_days(site.now()).await.unwrap();
     let mut grace = grace(&site).await;

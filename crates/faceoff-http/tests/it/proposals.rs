@@ -349,6 +349,17 @@ async fn invalid_re_evaluation_is_refused_with_the_reason() {
     )
     .await
     .problem(409, "conflict", &["newest rules"]);
+    site.next_day();
+    post(&site, "/api/v1/days", json!({ "stage": stage }))
+        .await
+        .json(200);
+    post(
+        &site,
+        &path,
+        json!({ "day": "2026-03-02", "reason": REASON }),
+    )
+    .await
+    .problem(409, "conflict", &["not released"]);
     for action in ["", "/apply", "/drop"] {
         let path = format!("/api/v1/proposals/{}{action}", uuid::Uuid::nil());
         let answer = match action {
@@ -368,13 +379,8 @@ async fn re_evaluation_by_new_rules_has_its_own_board() {
     let site = Site::start().await;
     run_day(&site).await;
     let stage = site.stage().await;
-    let request = site.request(
-        reqwest::Method::PATCH,
-        &format!("/api/v1/stages/{stage}"),
-        Some(ADMIN),
-    );
     let rules = json!({ "max_faults": 3, "confirm": "Qualifying" });
-    assert_eq!(request.json(&rules).send().await.unwrap().status(), 200);
+    site.change_stage(stage, rules).await.json(200);
     let path = format!("/api/v1/stages/{stage}/proposals");
     let request = json!({ "day": "2026-03-01", "new_rules": true, "reason": REASON });
     let created = post(&site, &path, request).await.json(201);

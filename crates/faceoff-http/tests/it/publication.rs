@@ -1,18 +1,10 @@
 //! Tests of the publication of datasets (recordings of evaluations), by the stage or by their team.
 
-use crate::site::{ADMIN, Answer, Site, TestTeam, result};
-use reqwest::Method;
-use serde_json::{Value, json};
+use crate::site::{ADMIN, Site, TestTeam, result};
+use serde_json::json;
 
 /// When the stage closes: 23 hours after the start of the test.
 const CLOSES_AT: &str = "2026-03-02T09:00:00Z";
-
-/// Changes the first stage as an organiser.
-async fn change_stage(site: &Site, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::read(request.json(&body).send().await.unwrap()).await
-}
 
 /// A stage with an end, and a day of two teams. The first evaluation is finished, the second one is still queued.
 async fn unfinished_day(site: &Site, publishes: &str) -> ([TestTeam; 2], String) {
@@ -20,7 +12,7 @@ async fn unfinished_day(site: &Site, publishes: &str) -> ([TestTeam; 2], String)
     let submission = site.valid_submission(&teams[0], "a").await;
     site.valid_submission(&teams[1], "b").await;
     let settings = json!({ "publishes": publishes, "closes_at": CLOSES_AT });
-    change_stage(site, settings).await.json(200);
+    site.change_first_stage(settings).await.json(200);
     let path = site.evaluate(&teams[0], &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
@@ -88,6 +80,22 @@ async fn datasets_are_public_when_the_stage_says() {
 }
 
 #[tokio::test]
+async fn closed_stage_can_publish_earlier_but_not_later() {
+    let site = Site::start().await;
+    site.change_first_stage(json!({ "closes_at": CLOSES_AT }))
+        .await
+        .json(200);
+    site.set_time(CLOSES_AT.parse().unwrap());
+    let earlier = site.change_first_stage(json!({ "publishes": "at_release" }));
+    assert_eq!(earlier.await.json(200)["publishes"], "at_release");
+    for later in ["at_close", "never"] {
+        site.change_first_stage(json!({ "publishes": later }))
+            .await
+            .problem(409, "conflict", &["cannot be changed"]);
+    }
+}
+
+#[tokio::test]
 async fn team_publishes_its_dataset_after_the_release() {
     let site = Site::start().await;
     let ([alpha, beta], path) = unfinished_day(&site, "at_close").await;
@@ -140,7 +148,7 @@ async fn published_failure_hides_faults_and_log() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
-    change_stage(&site, json!({ "publishes": "at_release" }))
+    site.change_first_stage(json!({ "publishes": "at_release" }))
         .await
         .json(200);
     let path = site.evaluate(&team, &submission).await;

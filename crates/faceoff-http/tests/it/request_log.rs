@@ -77,9 +77,7 @@ async fn changes_are_logged_with_request_id_and_actor() {
 async fn reads_are_logged_at_debug_level() {
     let log = Log::default();
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "striker").await;
-    let evaluation = site.evaluate(&team, &submission).await;
+    let (team, _, evaluation) = site.team_with_evaluation("Alpha", "striker").await;
     let _guard = log.capture(Level::DEBUG);
     let found = site.get(&evaluation, Some(&team.token)).await;
     site.get("/readyz", None).await.json(200);

@@ -1,15 +1,9 @@
 //! Tests of retention (a stage's rule that says which datasets and bundles are kept), of deleted submissions, and of disk usage.
 
 use crate::site::{ADMIN, Answer, DATASET, GZIP, Site, TestTeam, result, string};
+use faceoff_types::ValidationOutcome;
 use reqwest::Method;
 use serde_json::{Value, json};
-
-/// Changes the first stage as an organiser.
-async fn change_stage(site: &Site, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
-    Answer::read(request.send().await.unwrap()).await
-}
 
 /// The first stage, as visitors see it.
 async fn stage_view(site: &Site) -> Value {
@@ -27,8 +21,7 @@ async fn run_day(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]
 
 /// Deletes a submission.
 async fn delete(site: &Site, submission: &str, token: Option<&str>, body: Value) -> Answer {
-    let request = site.request(Method::DELETE, submission, token).json(&body);
-    Answer::read(request.send().await.unwrap()).await
+    site.send(Method::DELETE, submission, token, &body).await
 }
 
 #[tokio::test]
@@ -43,7 +36,7 @@ async fn retention_is_confirmed_applied_and_reported() {
     let before = stage_view(&site).await;
     assert_eq!(before["retention"], json!({}));
     let request = json!({ "retention": { "last": 1 } });
-    let unconfirmed = change_stage(&site, request).await;
+    let unconfirmed = site.change_first_stage(request).await;
     let problem = unconfirmed.problem(
         409,
         "not-confirmed",
@@ -57,7 +50,7 @@ async fn retention_is_confirmed_applied_and_reported() {
     assert_eq!(problem["confirm"], "Qualifying");
     assert_eq!(stage_view(&site).await, before);
     let confirmed = json!({ "retention": { "last": 1 }, "confirm": "Qualifying" });
-    let changed = change_stage(&site, confirmed).await.json(200);
+    let changed = site.change_first_stage(confirmed).await.json(200);
     assert_eq!(changed["retention"], json!({ "last": 1 }));
     assert_eq!(
         changed["revision"], before["revision"],
@@ -115,7 +108,8 @@ async fn retention_is_confirmed_applied_and_reported() {
     );
 
     // Keeping more removes nothing, so no confirmation is needed.
-    let changed = change_stage(&site, json!({ "retention": {} }))
+    let changed = site
+        .change_first_stage(json!({ "retention": {} }))
         .await
         .json(200);
     assert_eq!(changed["retention"], json!({}));
@@ -142,7 +136,7 @@ async fn retention_is_set_at_creation_and_after_sign_off() {
     let submission = site.valid_submission(&team, "a").await;
     let evaluation = run_day(&site, &team, &submission, [0.5; 3]).await;
     let closes_at = site.now() + jiff::SignedDuration::from_hours(1);
-    change_stage(&site, json!({ "closes_at": closes_at }))
+    site.change_first_stage(json!({ "closes_at": closes_at }))
         .await
         .json(200);
     site.advance(3600);
@@ -151,15 +145,15 @@ async fn retention_is_set_at_creation_and_after_sign_off() {
         .await
         .json(200);
     let mut request = json!({ "retention": { "days_after_sign_off": 2 } });
-    change_stage(&site, request.clone()).await.problem(
+    site.change_first_stage(request.clone()).await.problem(
         409,
         "not-confirmed",
         &["1 datasets", "not before 2026-03-04 at 11:00 UTC"],
     );
     request["confirm"] = json!("Qualifying");
-    let signed_off = change_stage(&site, request).await.json(200);
+    let signed_off = site.change_first_stage(request).await.json(200);
     assert_eq!(signed_off["retention"], json!({ "days_after_sign_off": 2 }));
-    change_stage(&site, json!({ "name": "Other", "retention": {} }))
+    site.change_first_stage(json!({ "name": "Other", "retention": {} }))
         .await
         .problem(409, "conflict", &["signed off"]);
     assert_eq!(
@@ -198,7 +192,7 @@ async fn invalid_retention_is_refused_with_valid_values() {
             "one of them at most",
         ),
     ] {
-        let changed = change_stage(&site, json!({ "retention": wrong })).await;
+        let changed = site.change_first_stage(json!({ "retention": wrong })).await;
         changed.problem(422, "invalid-content", &[words]);
         let new_stage = json!({ "name": "Other", "retention": wrong });
         let refused = site.post("/api/v1/stages", Some(ADMIN), &new_stage).await;
@@ -207,6 +201,40 @@ async fn invalid_retention_is_refused_with_valid_values() {
     assert_eq!(stage_view(&site).await["retention"], json!({}));
     let stages = site.get("/api/v1/stages", None).await.json(200);
     assert_eq!(stages.as_array().unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn submission_without_bundle_cannot_be_deleted() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let uploaded = site.upload(&team.token, GZIP.to_vec()).await.json(201);
+    let submission = format!("/api/v1/submissions/{}", string(&uploaded["id"]));
+    let delete_it = async |submission: &str| {
+        let request = json!({ "confirm": "striker.tar.gz", "reason": "a mistake" });
+        delete(&site, submission, Some(ADMIN), request).await
+    };
+    delete_it(&submission)
+        .await
+        .problem(409, "conflict", &["validation run is queued or running"]);
+    site.finish_validation(ValidationOutcome::Invalid {
+        runtime: None,
+        agent_name: None,
+        reason: "no manifest".into(),
+        timing: Vec::new(),
+        log: String::new(),
+    })
+    .await;
+    delete_it(&submission)
+        .await
+        .problem(409, "conflict", &["removes its bundle automatically"]);
+    site.store.remove_refused_bundles(site.now()).await.unwrap();
+    delete_it(&submission)
+        .await
+        .problem(409, "conflict", &["nothing left to delete"]);
+    let unknown = format!("/api/v1/submissions/{}", uuid::Uuid::nil());
+    delete_it(&unknown)
+        .await
+        .problem(404, "not-found", &["submission"]);
 }
 
 #[tokio::test]
@@ -373,7 +401,7 @@ async fn storage_is_shown_to_its_team_and_organisers() {
     assert_eq!(usage[0]["proposal_bytes"], 0);
     assert_eq!(usage[1]["bundles"], 0);
     // The quota of the stage applies.
-    change_stage(&site, json!({ "uploads": { "stored_bytes": 5 } }))
+    site.change_first_stage(json!({ "uploads": { "stored_bytes": 5 } }))
         .await
         .json(200);
     let view = site.get(&path, Some(&team.token)).await.json(200);

@@ -243,10 +243,7 @@ async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     let opened = site.post("/api/v1/tournaments", Some(ADMIN), &cup).await;
     let path = opened.header("location").to_owned();
     let baseline = json!({ "baseline": baseline.rsplit('/').next().unwrap() });
-    let change = site
-        .request(Method::PATCH, &path, Some(ADMIN))
-        .json(&baseline);
-    Answer::read(change.send().await.unwrap()).await.json(200);
+    site.patch(&path, Some(ADMIN), &baseline).await.json(200);
     let created = site
         .post(&format!("{path}/test-games"), Some(&team.token), &json!({}))
         .await

@@ -1,17 +1,9 @@
 //! Tests of runtimes, the environments in which agents run on the server, and of stages that accept only some runtimes.
 
-use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, string};
+use crate::site::{ADMIN, GZIP, Site, TestTeam, result, string};
 use faceoff_store::Job;
 use faceoff_testkit::valid_outcome;
-use reqwest::Method;
 use serde_json::{Value, json};
-
-/// Changes the first stage as an organiser.
-async fn change_stage(site: &Site, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::read(request.json(&body).send().await.unwrap()).await
-}
 
 /// The events of excluded submissions.
 const EXCLUSIONS_IN_LOG: &str = "/api/v1/events?kind=submission_not_taken";
@@ -19,7 +11,7 @@ const EXCLUSIONS_IN_LOG: &str = "/api/v1/events?kind=submission_not_taken";
 /// Limits the first stage to these runtimes; null allows all.
 async fn set_runtimes(site: &Site, runtimes: Value) -> Value {
     let body = json!({ "runtimes": runtimes, "confirm": "Qualifying" });
-    change_stage(site, body).await.json(200)
+    site.change_first_stage(body).await.json(200)
 }
 
 /// Uploads a submission that is valid and uses this runtime. Returns its path in the API.
@@ -45,7 +37,7 @@ async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
         texts.collect::<Vec<_>>()
     };
     assert_eq!(sent_runtimes().await, [""; 0]);
-    change_stage(&site, json!({ "runtimes": ["python3"] }))
+    site.change_first_stage(json!({ "runtimes": ["python3"] }))
         .await
         .problem(409, "not-confirmed", &["revision 2"]);
     let changed = set_runtimes(&site, json!(["python3", "native", "python3"])).await;
@@ -241,7 +233,7 @@ async fn invalid_runtimes_are_refused_by_name() {
         (json!({ "native": true }), &["runtimes"]),
     ] {
         let body = json!({ "runtimes": runtimes, "confirm": "Qualifying" });
-        change_stage(&site, body)
+        site.change_first_stage(body)
             .await
             .problem(422, "invalid-content", words);
         let new_stage = json!({ "name": "Final", "runtimes": runtimes });
@@ -283,7 +275,7 @@ async fn agent_environment_is_public() {
         "runtimes": ["python3"], "limits": { "memory_bytes": 536_870_912, "step_s": 0.25 },
         "confirm": "Qualifying",
     });
-    change_stage(&site, settings).await.json(200);
+    site.change_first_stage(settings).await.json(200);
     site.team("Alpha").await;
     let rules = json!({ "runtimes": ["native"], "limits": { "pids": 16 } });
     let cup = json!({ "name": "Cup", "teams": ["Alpha"], "rules": rules });
@@ -332,7 +324,7 @@ async fn closed_stage_lists_no_runtimes() {
     };
     assert_eq!(stages().await, 1);
     let closing = json!({ "closes_at": "2026-03-01T23:00:00Z" });
-    change_stage(&site, closing).await.json(200);
+    site.change_first_stage(closing).await.json(200);
     site.next_day();
     assert_eq!(stages().await, 0);
     let page = site.get("/help", None).await.body;

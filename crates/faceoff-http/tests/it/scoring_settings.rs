@@ -1,17 +1,9 @@
 //! Tests of a stage's scoring settings: weights of the tasks, bounds of the tiers (deployable, improvable), and magnitudes of
 //! the simulator's perturbations.
 
-use crate::site::{ADMIN, Answer, Site, outcome};
+use crate::site::{ADMIN, Site, outcome};
 use faceoff_types::{EpisodeOutcome, Task, Violations};
-use reqwest::Method;
-use serde_json::{Value, json};
-
-/// Changes the first stage as an organiser.
-async fn change_stage(site: &Site, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::read(request.json(&body).send().await.unwrap()).await
-}
+use serde_json::json;
 
 #[tokio::test]
 async fn scoring_settings_are_rules_and_apply_to_the_board() {
@@ -23,14 +15,14 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
         "tier_bounds": { "deployable": 0.1, "improvable": 1.6 },
         "perturbations": { "tracking_loss": { "probability": 0.5 } },
     });
-    change_stage(&site, settings.clone()).await.problem(
+    site.change_first_stage(settings.clone()).await.problem(
         409,
         "not-confirmed",
         &["revision 2", "empty board"],
     );
     let mut confirmed = settings;
     confirmed["confirm"] = json!("Qualifying");
-    let changed = change_stage(&site, confirmed).await.json(200);
+    let changed = site.change_first_stage(confirmed).await.json(200);
     assert_eq!(changed["revision"], 2);
     assert_eq!(
         changed["weights"],
@@ -93,7 +85,7 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
 
     // An empty object restores the default magnitudes. Settings that the request does not name do not change.
     let default_magnitudes = json!({ "perturbations": {}, "confirm": "Qualifying" });
-    let changed = change_stage(&site, default_magnitudes).await.json(200);
+    let changed = site.change_first_stage(default_magnitudes).await.json(200);
     assert_eq!(
         (changed.get("perturbations"), &changed["weights"]["hit"]),
         (None, &json!(0.75))
@@ -171,7 +163,7 @@ async fn invalid_scoring_settings_are_refused_by_name() {
     ] {
         let mut body = body;
         body["confirm"] = json!("Qualifying");
-        change_stage(&site, body)
+        site.change_first_stage(body)
             .await
             .problem(422, "invalid-content", words);
     }

@@ -9,9 +9,7 @@ const CLOSE_PATH: &str = "/api/v1/season/close";
 #[tokio::test]
 async fn closing_the_season_reveals_its_secret() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "a").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (team, submission, path) = site.team_with_evaluation("Alpha", "a").await;
     let confirm = json!({ "confirm": "Test season" });
     let open = site.get("/api/v1/season", None).await.json(200);
     for field in ["closed_at", "secret", "mismatch_seed"] {

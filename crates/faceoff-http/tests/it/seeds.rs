@@ -203,9 +203,7 @@ async fn comparison_is_refused_while_the_day_is_open() {
 #[tokio::test]
 async fn mismatch_seed_is_hidden_until_the_season_closes() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "a").await;
-    let path = site.evaluate(&team, &submission).await;
+    let (team, _, path) = site.team_with_evaluation("Alpha", "a").await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     site.next_day();

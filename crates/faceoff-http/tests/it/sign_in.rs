@@ -4,7 +4,6 @@ use crate::{
     browser::{Browser, PASSWORD, first_text, invite},
     site::{ADMIN, Site, string},
 };
-use reqwest::Method;
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -122,10 +121,10 @@ async fn registration_link_shows_its_status() {
     let mut browser = Browser::new(&site);
     let closed = browser.open("/register").await;
     assert!(closed.body.contains("Registration is closed"));
-    let open = site
-        .request(Method::PATCH, "/api/v1/season", Some(ADMIN))
-        .json(&json!({ "takes_registrations": true }));
-    open.send().await.unwrap();
+    let open = json!({ "takes_registrations": true });
+    site.patch("/api/v1/season", Some(ADMIN), &open)
+        .await
+        .json(200);
     let terms = json!({ "text": "Be <b>fair</b>." });
     site.post("/api/v1/terms", Some(ADMIN), &terms)
         .await

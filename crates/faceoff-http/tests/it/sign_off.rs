@@ -1,18 +1,7 @@
 //! Tests of the sign-off: the result of a stage is provisional until an organiser signs it off, and does not change after that.
 
-use crate::site::{ADMIN, Answer, Site, result};
-use reqwest::Method;
+use crate::site::{ADMIN, Site, result};
 use serde_json::{Value, json};
-
-/// Changes a stage as an organiser.
-async fn change_stage(site: &Site, stage: &str, body: Value) -> Answer {
-    let request = site.request(
-        Method::PATCH,
-        &format!("/api/v1/stages/{stage}"),
-        Some(ADMIN),
-    );
-    Answer::read(request.json(&body).send().await.unwrap()).await
-}
 
 #[tokio::test]
 async fn signed_off_stage_does_not_change() {
@@ -30,13 +19,9 @@ async fn signed_off_stage_does_not_change() {
         "conflict",
         &["has not closed", "no end yet"],
     );
-    change_stage(
-        &site,
-        &stage,
-        json!({ "closes_at": "2026-03-01T12:00:00Z" }),
-    )
-    .await
-    .json(200);
+    site.change_stage(&stage, json!({ "closes_at": "2026-03-01T12:00:00Z" }))
+        .await
+        .json(200);
     post_sign_off(confirmed.clone()).await.problem(
         409,
         "conflict",
@@ -118,7 +103,7 @@ async fn signed_off_stage_does_not_change() {
         json!({ "publishes": "at_release" }),
         json!({ "closes_at": null }),
     ] {
-        change_stage(&site, &stage, body)
+        site.change_stage(&stage, body)
             .await
             .problem(409, "conflict", &words);
     }
@@ -147,14 +132,14 @@ async fn signed_off_stage_does_not_change() {
 async fn season_with_a_blind_stage_cannot_be_closed() {
     let site = Site::start().await;
     let stage = site.stage().await.to_string();
-    change_stage(&site, &stage, json!({ "blind": true }))
+    site.change_stage(&stage, json!({ "blind": true }))
         .await
         .json(200);
     let close = json!({ "confirm": "Test season" });
     site.post("/api/v1/season/close", Some(ADMIN), &close)
         .await
         .problem(409, "conflict", &["Qualifying", "blind", "open it first"]);
-    change_stage(&site, &stage, json!({ "blind": false }))
+    site.change_stage(&stage, json!({ "blind": false }))
         .await
         .json(200);
     site.post("/api/v1/season/close", Some(ADMIN), &close)

@@ -21,6 +21,7 @@ use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use serde_json::{Value, json};
 use std::{
     collections::BTreeMap,
+    fmt::Display,
     sync::{Arc, Mutex},
     time::Duration,
 };
@@ -384,9 +385,35 @@ impl Site {
         Answer::read(self.request(Method::GET, path, token).send().await.unwrap()).await
     }
 
-    pub async fn post(&self, path: &str, token: Option<&str>, body: &Value) -> Answer {
-        let request = self.request(Method::POST, path, token).json(body);
+    /// Sends a JSON body by this method.
+    pub async fn send(
+        &self,
+        method: Method,
+        path: &str,
+        token: Option<&str>,
+        body: &Value,
+    ) -> Answer {
+        let request = self.request(method, path, token).json(body);
         Answer::read(request.send().await.unwrap()).await
+    }
+
+    pub async fn post(&self, path: &str, token: Option<&str>, body: &Value) -> Answer {
+        self.send(Method::POST, path, token, body).await
+    }
+
+    pub async fn patch(&self, path: &str, token: Option<&str>, body: &Value) -> Answer {
+        self.send(Method::PATCH, path, token, body).await
+    }
+
+    /// Changes a stage as an organiser.
+    pub async fn change_stage(&self, stage: impl Display, body: Value) -> Answer {
+        let path = format!("/api/v1/stages/{stage}");
+        self.patch(&path, Some(ADMIN), &body).await
+    }
+
+    /// Changes the season's first stage as an organiser.
+    pub async fn change_first_stage(&self, body: Value) -> Answer {
+        self.change_stage(self.stage().await, body).await
     }
 
     /// Uploads `body` as the bundle of a submission.
@@ -498,6 +525,18 @@ impl Site {
         let newest = &evaluations.unwrap()[0];
         assert!(submission.ends_with(&newest.submission.to_string()));
         format!("/api/v1/evaluations/{}", newest.id)
+    }
+
+    /// Creates a team with a valid submission, and starts its evaluation. Returns also the paths of both in the API.
+    pub async fn team_with_evaluation(
+        &self,
+        name: &str,
+        agent_name: &str,
+    ) -> (TestTeam, String, String) {
+        let team = self.team(name).await;
+        let submission = self.valid_submission(&team, agent_name).await;
+        let evaluation = self.evaluate(&team, &submission).await;
+        (team, submission, evaluation)
     }
 
     /// Runs the next evaluation with the outcomes that `outcome_fn` returns for its episodes, and scores it by the rules.

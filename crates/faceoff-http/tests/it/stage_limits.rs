@@ -1,16 +1,8 @@
 //! Tests of the agent limits and upload quotas of a stage. Limits that the stage does not set are those of the server.
 
-use crate::site::{ADMIN, Answer, GZIP, Site};
+use crate::site::{GZIP, Site};
 use faceoff_store::Job;
-use reqwest::Method;
-use serde_json::{Value, json};
-
-/// Changes the first stage as an organiser.
-async fn change_stage(site: &Site, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", site.stage().await);
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::read(request.json(&body).send().await.unwrap()).await
-}
+use serde_json::json;
 
 #[tokio::test]
 async fn stage_limits_are_rules_and_apply_to_validation_runs() {
@@ -19,12 +11,12 @@ async fn stage_limits_are_rules_and_apply_to_validation_runs() {
     let before = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     assert_eq!((before.get("limits"), before.get("uploads")), (None, None));
     let limits = json!({ "limits": { "memory_bytes": 67108864, "step_s": 0.5 } });
-    change_stage(&site, limits.clone())
+    site.change_first_stage(limits.clone())
         .await
         .problem(409, "not-confirmed", &["revision 2"]);
     let mut limits = limits;
     limits["confirm"] = json!("Qualifying");
-    let changed = change_stage(&site, limits).await.json(200);
+    let changed = site.change_first_stage(limits).await.json(200);
     assert_eq!(
         changed["limits"],
         json!({ "memory_bytes": 67108864, "step_s": 0.5 })
@@ -39,7 +31,10 @@ async fn stage_limits_are_rules_and_apply_to_validation_runs() {
     // An empty object restores the server's limits.
     let no_limits = json!({ "limits": {}, "confirm": "Qualifying" });
     assert_eq!(
-        change_stage(&site, no_limits).await.json(200).get("limits"),
+        site.change_first_stage(no_limits)
+            .await
+            .json(200)
+            .get("limits"),
         None
     );
 }
@@ -50,7 +45,7 @@ async fn upload_quotas_are_those_of_the_open_stage() {
     let team = site.team("Alpha").await;
     let quotas = json!({ "uploads": { "waiting": 1, "day_bytes": 10 } });
     assert_eq!(
-        change_stage(&site, quotas).await.json(200)["uploads"],
+        site.change_first_stage(quotas).await.json(200)["uploads"],
         json!({ "waiting": 1, "day_bytes": 10 })
     );
     let upload = async || site.upload(&team.token, GZIP.to_vec()).await;
@@ -58,7 +53,7 @@ async fn upload_quotas_are_those_of_the_open_stage() {
     upload()
         .await
         .problem(429, "too-many-pending", &["1 submissions"]);
-    change_stage(&site, json!({ "uploads": { "day_bytes": 10 } }))
+    site.change_first_stage(json!({ "uploads": { "day_bytes": 10 } }))
         .await
         .json(200);
     upload().await.json(201);
@@ -69,13 +64,13 @@ async fn upload_quotas_are_those_of_the_open_stage() {
         (&problem["limit_bytes"], &problem["used_bytes"]),
         (&json!(10), &json!(2 * GZIP.len()))
     );
-    change_stage(&site, json!({ "uploads": { "stored_bytes": 9 } }))
+    site.change_first_stage(json!({ "uploads": { "stored_bytes": 9 } }))
         .await
         .json(200);
     upload()
         .await
         .problem(409, "stored-quota-spent", &["at most 9 bytes"]);
-    change_stage(&site, json!({ "uploads": {} }))
+    site.change_first_stage(json!({ "uploads": {} }))
         .await
         .json(200);
     upload().await.json(201);
@@ -112,7 +107,7 @@ async fn invalid_limits_and_quotas_are_refused_by_name() {
     ] {
         let mut body = body;
         body["confirm"] = json!("Qualifying");
-        change_stage(&site, body)
+        site.change_first_stage(body)
             .await
             .problem(422, "invalid-content", words);
     }

@@ -1,9 +1,8 @@
 //! Tests of stages (periods of the season with rules and boards of their own) in the API and on pages.
 
 use crate::site::{ADMIN, Answer, Site, result};
-use faceoff_store::{Actor, StageChange};
-use faceoff_types::{Ruleset, StageRules};
-use reqwest::Method;
+use faceoff_testkit::change_rules;
+use faceoff_types::Ruleset;
 use serde_json::{Value, json};
 
 async fn create_stage(site: &Site, body: Value) -> Answer {
@@ -11,9 +10,7 @@ async fn create_stage(site: &Site, body: Value) -> Answer {
 }
 
 async fn change_stage(site: &Site, stage: &Value, body: Value) -> Answer {
-    let path = format!("/api/v1/stages/{}", stage["id"].as_str().unwrap());
-    let request = site.request(Method::PATCH, &path, Some(ADMIN));
-    Answer::read(request.json(&body).send().await.unwrap()).await
+    site.change_stage(stage["id"].as_str().unwrap(), body).await
 }
 
 #[tokio::test]
@@ -108,9 +105,7 @@ async fn stage_is_created_changed_and_played() {
 #[tokio::test]
 async fn changed_rules_need_confirmation_and_have_their_own_board() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "a").await;
-    site.evaluate(&team, &submission).await;
+    site.team_with_evaluation("Alpha", "a").await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
@@ -170,20 +165,12 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
 #[tokio::test]
 async fn stage_keeps_its_ruleset_until_its_rules_change() {
     let site = Site::start().await;
-    let stage = site.store.stages().await.unwrap().remove(0);
     // The change stores the stage as a server with the previous ruleset would have stored it.
-    let earlier_ruleset = StageChange {
-        rules: Some(StageRules {
-            ruleset: Ruleset::Second,
-            ..stage.rules.rules
-        }),
-        ..StageChange::default()
-    };
-    let now = site.now();
-    let changed = site
-        .store
-        .change_stage(Actor::Organiser, stage.id, earlier_ruleset, now);
-    changed.await.unwrap();
+    change_rules(&site.store, site.stage().await, site.now(), |rules| {
+        rules.ruleset = Ruleset::Second;
+    })
+    .await
+    .unwrap();
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     for (body, revision, ruleset) in [
         (json!({ "name": "Heats" }), 2, "airhockey-2023.2"),
@@ -199,6 +186,84 @@ async fn stage_keeps_its_ruleset_until_its_rules_change() {
             (&json!(revision), &json!(ruleset))
         );
     }
+}
+
+#[tokio::test]
+async fn started_stage_refuses_most_changes() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    site.valid_submission(&team, "a").await;
+    let create_until_tuesday = async |name: &str, opens_at: &str| {
+        let stage = json!({
+            "name": name,
+            "opens_at": opens_at,
+            "closes_at": "2026-03-03T10:00:00Z",
+        });
+        create_stage(&site, stage).await.json(201)
+    };
+    let open = create_until_tuesday("Warm-up", "2026-03-01T10:00:00Z").await;
+    let upcoming = create_until_tuesday("Final", "2026-03-02T10:00:00Z").await;
+    for (stage, change, words) in [
+        (
+            &open,
+            json!({ "opens_at": "2026-03-02T00:00:00Z" }),
+            ["opens_at", "opened at 2026-03-01T10:00:00Z"],
+        ),
+        (
+            &upcoming,
+            json!({ "opens_at": "2026-03-01T09:00:00Z" }),
+            ["opens_at", "future"],
+        ),
+        (
+            &upcoming,
+            json!({ "opens_at": "2026-03-04T10:00:00Z" }),
+            ["closes_at", "after the opening"],
+        ),
+        (
+            &open,
+            json!({ "closes_at": "2026-03-01T10:00:00Z" }),
+            ["closes_at", "after the opening"],
+        ),
+    ] {
+        change_stage(&site, stage, change)
+            .await
+            .problem(409, "conflict", &words);
+    }
+    change_stage(&site, &upcoming, json!({ "name": "warm-UP" }))
+        .await
+        .problem(409, "stage-name-taken", &["warm-UP"]);
+    change_stage(&site, &open, json!({ "zone": "Europe/Berlin" }))
+        .await
+        .json(200);
+
+    // Before the opening, new rules replace the old ones without a new revision.
+    let new_rules_and_opening =
+        json!({ "episodes_per_task": 9, "opens_at": "2026-03-02T12:00:00Z" });
+    let changed = change_stage(&site, &upcoming, new_rules_and_opening)
+        .await
+        .json(200);
+    assert_eq!(
+        [
+            &changed["revision"],
+            &changed["since"],
+            &changed["episodes_per_task"]
+        ],
+        [&json!(1), &json!("2026-03-02T12:00:00Z"), &json!(9)]
+    );
+
+    site.post("/api/v1/days", Some(ADMIN), &json!({ "stage": open["id"] }))
+        .await
+        .json(200);
+    change_stage(&site, &open, json!({ "zone": "UTC" }))
+        .await
+        .problem(409, "conflict", &["zone", "Europe/Berlin"]);
+    site.set_time("2026-03-03T10:00:00Z".parse().unwrap());
+    change_stage(&site, &open, json!({ "name": "Done" }))
+        .await
+        .problem(409, "conflict", &["closed at", "another stage"]);
+    change_stage(&site, &open, json!({ "closes_at": "2026-03-09T10:00:00Z" }))
+        .await
+        .problem(409, "conflict", &["closed at"]);
 }
 
 #[tokio::test]
@@ -237,6 +302,7 @@ async fn pages_show_stages() {
 #[tokio::test]
 async fn invalid_stage_is_refused_with_valid_values() {
     let site = Site::start().await;
+    let log_before = site.get("/api/v1/events", Some(ADMIN)).await.json(200);
     for (body, status, slug, words) in [
         (json!({}), 422, "invalid-content", &["name"][..]),
         (json!({ "name": "" }), 422, "invalid-content", &["1 to 40"]),
@@ -277,6 +343,12 @@ async fn invalid_stage_is_refused_with_valid_values() {
             &["episodes_per_task", "got 0"],
         ),
         (
+            json!({ "name": "F", "episodes_per_shard": 0 }),
+            422,
+            "invalid-content",
+            &["episodes_per_shard"],
+        ),
+        (
             json!({ "name": "F", "profile": "easy" }),
             422,
             "invalid-content",
@@ -315,15 +387,10 @@ async fn invalid_stage_is_refused_with_valid_values() {
     ] {
         create_stage(&site, body).await.problem(status, slug, words);
     }
-    assert_eq!(
-        site.get("/api/v1/stages", None)
-            .await
-            .json(200)
-            .as_array()
-            .unwrap()
-            .len(),
-        1
-    );
+    let stages = site.get("/api/v1/stages", None).await.json(200);
+    assert_eq!(stages.as_array().unwrap().len(), 1);
+    let log = site.get("/api/v1/events", Some(ADMIN)).await.json(200);
+    assert_eq!(log, log_before, "a refusal is no event");
     let team = site.team("Alpha").await;
     let by_team = site
         .post("/api/v1/stages", Some(&team.token), &json!({ "name": "F" }))

@@ -320,10 +320,7 @@ async fn team_labels_and_withdraws_its_submission() {
     let site = Site::start().await;
     let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
     let path = site.valid_submission(&team, "a").await;
-    let describe = async |token: &str, body: Value| {
-        let request = site.request(reqwest::Method::PATCH, &path, Some(token));
-        Answer::read(request.json(&body).send().await.unwrap()).await
-    };
+    let describe = async |token: &str, body: Value| site.patch(&path, Some(token), &body).await;
     let labelled = describe(&team.token, json!({ "label": " baseline " }))
         .await
         .json(200);

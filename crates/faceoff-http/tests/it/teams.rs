@@ -87,6 +87,8 @@ async fn invalid_or_taken_team_name_is_refused_with_reason() {
     create("alpha")
         .await
         .problem(409, "team-name-taken", &["alpha"]);
+    let teams = site.get("/api/v1/teams", Some(ADMIN)).await.json(200);
+    assert_eq!(teams.as_array().unwrap().len(), 1);
     create("")
         .await
         .problem(422, "invalid-content", &["name", "1 to 40"]);

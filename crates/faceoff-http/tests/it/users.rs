@@ -15,32 +15,31 @@ async fn send(
     body: &Value,
 ) -> Answer {
     let path = format!("/api/v1{path}");
-    let request = site.request(method, &path, token).json(body);
-    Answer::read(request.send().await.unwrap()).await
+    site.send(method, &path, token, body).await
 }
 
-async fn post(site: &Site, path: &str, token: &str, body: &Value) -> Answer {
+pub async fn post(site: &Site, path: &str, token: &str, body: &Value) -> Answer {
     send(site, Method::POST, path, Some(token), body).await
 }
 
-async fn get(site: &Site, path: &str, token: &str) -> Value {
+pub async fn get(site: &Site, path: &str, token: &str) -> Value {
     let answer = send(site, Method::GET, path, Some(token), &Value::Null).await;
     answer.json(200)
 }
 
 /// The code of a new invitation.
-async fn invite(site: &Site, token: &str, body: &Value) -> String {
+pub async fn invite(site: &Site, token: &str, body: &Value) -> String {
     string(&post(site, "/invitations", token, body).await.json(201)["code"])
 }
 
 /// A user with a token of theirs.
-struct User {
-    id: String,
-    token: String,
+pub struct User {
+    pub id: String,
+    pub token: String,
 }
 
 /// Accepts the invitation with this code.
-async fn join(site: &Site, code: &str, name: &str) -> User {
+pub async fn join(site: &Site, code: &str, name: &str) -> User {
     let body = json!({ "code": code, "name": name, "password": PASSWORD });
     let joined = send(site, Method::POST, "/invitations/accept", None, &body).await;
     let joined = joined.json(201);

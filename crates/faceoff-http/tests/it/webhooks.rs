@@ -66,8 +66,7 @@ async fn announce(site: &Site) {
 }
 
 async fn patch(site: &Site, path: &str, token: &str, body: Value) -> Answer {
-    let request = site.request(Method::PATCH, path, Some(token)).json(&body);
-    Answer::read(request.send().await.unwrap()).await
+    site.patch(path, Some(token), &body).await
 }
 
 /// The deliveries of a webhook, newest first.

@@ -2,7 +2,7 @@
 //! the job's files while the worker holds the lease, the right to run the job for a time.
 
 use crate::site::{Answer, GZIP, Site};
-use faceoff_store::{Actor, ClaimedJob, Job};
+use faceoff_store::{Actor, ClaimedJob, Job, JobClaim};
 use faceoff_types::{BundleRef, PerturbationSettings};
 use faceoff_wire::{
     game::GameSpec,
@@ -23,12 +23,10 @@ async fn send(site: &Site, method: Method, path: &str, grant: &str, body: &'stat
     Answer::read(request.send().await.unwrap()).await
 }
 
-#[tokio::test]
-async fn grant_opens_its_files_while_the_lease_is_held() {
-    let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "hold").await;
-    site.evaluate(&team, &submission).await;
+/// Starts an evaluation and claims its first shard. Returns also the shard's bundle, and its grant, which does not allow to
+/// store files.
+async fn claim_shard(site: &Site) -> (JobClaim, BundleRef, Grant) {
+    site.team_with_evaluation("Alpha", "hold").await;
     let ClaimedJob { claim, job } = site.claim().await;
     let Job::Shard { bundle, .. } = job else {
         panic!("expected a shard");
@@ -37,9 +35,30 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
         job_id: claim.job,
         nonce: claim.nonce,
         bundles: vec![bundle.clone()],
+        write_scope: WriteScope::None,
+        expected_recording: ExpectedRecording::None,
+        program: String::new(),
+    };
+    (claim, bundle, grant)
+}
+
+/// Starts the job on a remote worker, which takes the lease over.
+async fn start_job(site: &Site, claim: &JobClaim) {
+    let slot = "remote/rack-1/slot-0";
+    let transferred = site
+        .store
+        .transfer_lease(claim, slot, WORKER_LEASE_S, site.now());
+    assert!(transferred.await.unwrap());
+}
+
+#[tokio::test]
+async fn grant_opens_its_files_while_the_lease_is_held() {
+    let site = Site::start().await;
+    let (claim, bundle, grant) = claim_shard(&site).await;
+    let grant = Grant {
         write_scope: WriteScope::Folder("runs/of-this/lease".into()),
         expected_recording: ExpectedRecording::Game(game()),
-        program: String::new(),
+        ..grant
     };
     let sealed = grant.seal(&site.grant_key()).unwrap();
     let bundle_path = |bundle: &BundleRef| format!("/work/bundles/{}", bundle.blake3);
@@ -52,13 +71,7 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
         let answer = send(&site, method, &path, &sealed, b"").await;
         answer.problem(403, "forbidden", &["no worker has started the job"]);
     }
-    let start = async |slot: &str| {
-        let transferred = site
-            .store
-            .transfer_lease(&claim, slot, WORKER_LEASE_S, site.now());
-        assert!(transferred.await.unwrap());
-    };
-    start("remote/rack-1/slot-0").await;
+    start_job(&site, &claim).await;
     let fetched = send(&site, Method::GET, &bundle_path(&bundle), &sealed, b"").await;
     assert_eq!(fetched.status, 200, "{}", fetched.body);
     assert_eq!(fetched.header("content-length"), GZIP.len().to_string());
@@ -122,22 +135,13 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
 #[tokio::test]
 async fn late_upload_does_not_replace_a_checked_file() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "hold").await;
-    site.evaluate(&team, &submission).await;
-    let ClaimedJob { claim, .. } = site.claim().await;
-    let slot = "remote/rack-1/slot-0";
-    let transferred = site
-        .store
-        .transfer_lease(&claim, slot, WORKER_LEASE_S, site.now());
-    assert!(transferred.await.unwrap());
+    let (claim, _, grant) = claim_shard(&site).await;
+    start_job(&site, &claim).await;
     let grant = Grant {
-        job_id: claim.job,
-        nonce: claim.nonce,
         bundles: Vec::new(),
         write_scope: WriteScope::Folder("runs/of-this/lease".into()),
         expected_recording: ExpectedRecording::Game(game()),
-        program: String::new(),
+        ..grant
     };
     let sealed = grant.seal(&site.grant_key()).unwrap();
     let stored_bytes = async |name: &str| {
@@ -189,34 +193,12 @@ async fn late_upload_does_not_replace_a_checked_file() {
 #[tokio::test]
 async fn banned_worker_loses_access() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let submission = site.valid_submission(&team, "hold").await;
-    site.evaluate(&team, &submission).await;
-    let slot = "remote/rack-1/slot-0";
-    // Claims and starts a job. Returns the path of its bundle, and its grant.
-    let start_job = async || {
-        let ClaimedJob { claim, job } = site.claim().await;
-        let Job::Shard { bundle, .. } = job else {
-            panic!("expected a shard");
-        };
-        let transferred = site
-            .store
-            .transfer_lease(&claim, slot, WORKER_LEASE_S, site.now());
-        assert!(transferred.await.unwrap());
-        let path = format!("/work/bundles/{}", bundle.blake3);
-        let grant = Grant {
-            job_id: claim.job,
-            nonce: claim.nonce,
-            bundles: vec![bundle],
-            write_scope: WriteScope::None,
-            expected_recording: ExpectedRecording::None,
-            program: String::new(),
-        };
-        (path, grant.seal(&site.grant_key()).unwrap())
-    };
-    let (path, grant) = start_job().await;
+    let (claim, bundle, grant) = claim_shard(&site).await;
+    let sealed = grant.seal(&site.grant_key()).unwrap();
+    let path = format!("/work/bundles/{}", bundle.blake3);
+    start_job(&site, &claim).await;
     assert_eq!(
-        send(&site, Method::GET, &path, &grant, b"").await.status,
+        send(&site, Method::GET, &path, &sealed, b"").await.status,
         200
     );
     let worker = "rack-1".parse().unwrap();
@@ -224,14 +206,21 @@ async fn banned_worker_loses_access() {
         .store
         .ban_worker(Actor::Organiser, &worker, "it lies", site.now());
     ban.await.unwrap();
-    send(&site, Method::GET, &path, &grant, b"").await.problem(
+    send(&site, Method::GET, &path, &sealed, b"").await.problem(
         403,
         "forbidden",
         &["no longer holds the lease"],
     );
     // A job that the worker starts at the moment of the ban.
-    let (path, grant) = start_job().await;
-    send(&site, Method::GET, &path, &grant, b"").await.problem(
+    let ClaimedJob { claim, .. } = site.claim().await;
+    start_job(&site, &claim).await;
+    let grant = Grant {
+        job_id: claim.job,
+        nonce: claim.nonce,
+        ..grant
+    };
+    let sealed = grant.seal(&site.grant_key()).unwrap();
+    send(&site, Method::GET, &path, &sealed, b"").await.problem(
         403,
         "forbidden",
         &["this worker is banned"],

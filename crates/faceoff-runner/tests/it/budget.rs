@@ -1,7 +1,10 @@
 //! Malicious archives that are small and take long to read, unless the cost of reading is counted.
 
-use crate::archives::{MANIFEST, Tar, write};
-use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
+use crate::{
+    archives::{MANIFEST, Tar},
+    unpacking::{assert_refused, try_unpack, unpack_unless},
+};
+use faceoff_runner::bundle::{BundleError, BundleLimits};
 use flate2::{Compression, Crc, write::GzEncoder};
 use std::{
     cell::Cell,
@@ -16,23 +19,7 @@ const TOO_MUCH: &str = "more bytes than its files explain";
 
 /// The result of unpacking an archive.
 fn verdict(bytes: &[u8]) -> Result<(), BundleError> {
-    verdict_unless(bytes, &|| false)
-}
-
-/// The result of unpacking an archive, which stops when `cancelled` returns true.
-fn verdict_unless(bytes: &[u8], cancelled: &dyn Fn() -> bool) -> Result<(), BundleError> {
-    let dir = tempfile::tempdir().unwrap();
-    let archive = write(dir.path(), "upload", bytes);
-    let limits = BundleLimits::default();
-    unpack(&archive, &dir.path().join("out"), &limits, cancelled).map(drop)
-}
-
-#[track_caller]
-fn assert_refused(bytes: &[u8], needle: &str) {
-    match verdict(bytes) {
-        Err(BundleError::Invalid(message)) => assert!(message.contains(needle), "{message:?}"),
-        other => panic!("expected a refusal with {needle:?}, got {other:?}"),
-    }
+    try_unpack(bytes, BundleLimits::default()).1.map(drop)
 }
 
 /// A comment of about a MiB in the format of an extension header.
@@ -193,7 +180,7 @@ fn cancellation_stops_unpacking_at_any_point() {
                 checks.set(checks.get() + 1);
                 checks.get() > checks_before
             };
-            let result = verdict_unless(&bytes, &cancelled);
+            let result = unpack_unless(&bytes, &BundleLimits::default(), &cancelled).1;
             assert!(matches!(result, Err(BundleError::Cancelled)), "{result:?}");
             let message = "unpacking continues after the cancellation";
             assert_eq!(checks.get(), checks_before + 1, "{message}");

@@ -1,6 +1,9 @@
 //! Unpacking of bundles (archives with an agent and its `agent.toml`): accepted formats, and attacks that must fail.
 
-use crate::archives::{MANIFEST, Tar, write, zip};
+use crate::{
+    archives::{MANIFEST, Tar, write, zip},
+    unpacking::{assert_refused, assert_refused_with_limits, try_unpack},
+};
 use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, open, unpack};
 use std::{
     fs,
@@ -10,36 +13,11 @@ use std::{
 use tar::EntryType;
 use tempfile::TempDir;
 
-fn try_unpack(bytes: &[u8], limits: BundleLimits) -> (TempDir, Result<Bundle, BundleError>) {
-    let dir = tempfile::tempdir().unwrap();
-    let archive = write(dir.path(), "upload", bytes);
-    let result = unpack(&archive, &dir.path().join("out"), &limits, &|| false);
-    (dir, result)
-}
-
 /// Unpacks a valid bundle.
 #[track_caller]
 fn unpack_valid(bytes: &[u8]) -> (TempDir, Bundle) {
     let (dir, result) = try_unpack(bytes, BundleLimits::default());
     (dir, result.unwrap())
-}
-
-/// Asserts that the archive is refused with a message that contains `needle`. Returns the folder with the leftovers.
-#[track_caller]
-fn assert_refused_with_limits(bytes: &[u8], limits: BundleLimits, needle: &str) -> TempDir {
-    let (dir, result) = try_unpack(bytes, limits);
-    match result {
-        Err(BundleError::Invalid(message)) => {
-            assert!(message.contains(needle), "{message:?} lacks {needle:?}");
-        }
-        other => panic!("expected a refusal with {needle:?}, got {other:?}"),
-    }
-    dir
-}
-
-#[track_caller]
-fn assert_refused(bytes: &[u8], needle: &str) -> TempDir {
-    assert_refused_with_limits(bytes, BundleLimits::default(), needle)
 }
 
 /// Asserts a refusal before anything was written.

@@ -20,4 +20,5 @@ mod recording;
 mod shard;
 mod supervision;
 mod two_agents;
+mod unpacking;
 mod unread_questions;

@@ -137,25 +137,6 @@ async fn ablation_runs_last_and_reaches_no_board() {
 }
 
 #[tokio::test]
-async fn ablation_request_needs_valid_idle_submission() {
-    let f = TestStore::new().await;
-    let team = f.create_team("Alpha").await;
-    let submission = f.upload(&team).await;
-    let plan = six_shard_plan();
-    let request_ablation = |id| f.store.request_ablation(Actor::Organiser, id, &plan, f.now);
-    assert!(matches!(
-        request_ablation(submission.id).await,
-        Err(StoreError::Conflict(_))
-    ));
-    f.validate().await;
-    request_ablation(submission.id).await.unwrap();
-    assert!(matches!(
-        request_ablation(submission.id).await,
-        Err(StoreError::Conflict(_))
-    ));
-}
-
-#[tokio::test]
 async fn ablation_failure_records_agent_or_platform_fault() {
     let mut f = TestStore::new().await;
     let submission = f.valid_submission_of("Alpha").await;

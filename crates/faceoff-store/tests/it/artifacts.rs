@@ -94,8 +94,7 @@ async fn artifact_folders_are_complete_and_separate() {
 #[tokio::test]
 async fn recordings_are_deleted_a_day_after_the_evaluation() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     let scratch = tempfile::tempdir().unwrap();
     fs::write(scratch.path().join("steps.parquet"), "steps").unwrap();

@@ -119,8 +119,7 @@ async fn cleared_run_keeps_summary_and_loses_shards() {
 #[tokio::test]
 async fn cleared_run_keeps_agent_faults() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
     while !f.state(evaluation.id).await.is_over() {
@@ -152,8 +151,7 @@ async fn cleared_run_keeps_agent_faults() {
 #[tokio::test]
 async fn open_run_is_not_clearable() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard, 0).await;
     f.advance_clock_s(30 * RECORDINGS_KEPT_FOR.as_secs());

@@ -20,14 +20,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
             .activate_submission(Actor::Team(team.id), submission.id, f.now)
             .await
             .unwrap_err(),
-        f.store
-            .start_day(
-                Actor::Organiser,
-                f.configure_stage(&six_shard_plan()).await,
-                f.now,
-            )
-            .await
-            .unwrap_err(),
+        f.start_day(&six_shard_plan()).await.unwrap_err(),
     ] {
         assert!(matches!(error, StoreError::Conflict(_)), "{error}");
     }

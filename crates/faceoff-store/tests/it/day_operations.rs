@@ -12,11 +12,7 @@ const REASON: &str = "the network was down";
 async fn event_kinds(f: &TestStore, subject: Subject) -> Vec<String> {
     let events = f.store.events_after(0, 1000).await.unwrap();
     let records = events.iter().filter(|record| record.subject == subject);
-    let kind = |record: &EventRecord| {
-        let event = serde_json::to_value(&record.event).unwrap();
-        event["kind"].as_str().unwrap().to_owned()
-    };
-    records.map(kind).collect()
+    records.map(event_kind).collect()
 }
 
 #[tokio::test]
@@ -164,15 +160,7 @@ async fn missed_day_runs_on_its_date_with_active_submissions() {
         start_missed(&f, "2025-11-30").await,
         &["before the stage's first day", "2025-12-01"],
     );
-    let closing = StageChange {
-        closes_at: Some(Some(f.now + jiff::SignedDuration::from_secs(1))),
-        ..StageChange::default()
-    };
-    let changed = f
-        .store
-        .change_stage(Actor::Organiser, missed_day.stage, closing, f.now);
-    changed.await.unwrap();
-    f.advance_clock_s(1);
+    f.close_stage_after_s(missed_day.stage, 1).await;
     let result = start_missed(&f, "2026-03-03").await;
     assert!(
         matches!(result, Err(StoreError::StageNotOpen { .. })),
@@ -196,8 +184,7 @@ async fn add_extra(
 #[tokio::test]
 async fn extra_evaluation_of_open_day_uses_its_episodes() {
     let f = TestStore::new().await;
-    let alpha = f.valid_submission_of("Alpha").await;
-    let day = f.evaluate(alpha.id, &one_shard_plan()).await;
+    let day = f.start_evaluation(&one_shard_plan()).await;
     let late = f.create_team("Late").await;
     assert_conflict(
         add_extra(&f, day.stage_day, late.id, false).await,
@@ -331,15 +318,7 @@ async fn extra_evaluation_uses_rules_of_its_day() {
         matches!(result, Err(StoreError::Disqualified { .. })),
         "{result:?}"
     );
-    let closing = StageChange {
-        closes_at: Some(Some(f.now + jiff::SignedDuration::from_secs(1))),
-        ..StageChange::default()
-    };
-    let changed = f
-        .store
-        .change_stage(Actor::Organiser, stage, closing, f.now);
-    changed.await.unwrap();
-    f.advance_clock_s(1);
+    f.close_stage_after_s(stage, 1).await;
     let result = add_extra(&f, day.stage_day, alpha.team, true).await;
     assert!(
         matches!(result, Err(StoreError::StageNotOpen { .. })),

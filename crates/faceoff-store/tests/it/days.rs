@@ -27,14 +27,7 @@ async fn day_has_one_cutoff() {
     f.upload(&team).await;
     let second = f.validate().await;
     f.valid_submission_of("Beta").await;
-    let repeated = f
-        .store
-        .start_day(
-            Actor::Organiser,
-            f.configure_stage(&six_shard_plan()).await,
-            f.now,
-        )
-        .await;
+    let repeated = f.start_day(&six_shard_plan()).await;
     assert_eq!(expect_cutoff_passed(repeated), date(2026, 3, 1));
     assert_eq!(
         f.store.evaluations_on(date(2026, 3, 1)).await.unwrap(),
@@ -64,14 +57,7 @@ async fn day_has_one_cutoff() {
     );
     // A clock that was set back starts nothing.
     f.now = "2026-02-27T00:00:00Z".parse().unwrap();
-    let repeated = f
-        .store
-        .start_day(
-            Actor::Organiser,
-            f.configure_stage(&six_shard_plan()).await,
-            f.now,
-        )
-        .await;
+    let repeated = f.start_day(&six_shard_plan()).await;
     assert_eq!(expect_cutoff_passed(repeated), date(2026, 3, 2));
 }
 
@@ -105,14 +91,7 @@ async fn concurrent_day_starts_make_one_cutoff() {
 async fn empty_day_keeps_its_cutoff_unless_scheduled() {
     let mut f = TestStore::new().await;
     let team = f.create_team("Alpha").await;
-    let refused = f
-        .store
-        .start_day(
-            Actor::Organiser,
-            f.configure_stage(&six_shard_plan()).await,
-            f.now,
-        )
-        .await;
+    let refused = f.start_day(&six_shard_plan()).await;
     assert!(
         matches!(refused, Err(StoreError::Conflict(_))),
         "{refused:?}"
@@ -139,15 +118,7 @@ async fn empty_day_keeps_its_cutoff_unless_scheduled() {
     // A later submission is evaluated on the next day.
     f.upload(&team).await;
     let submission = f.validate().await;
-    expect_cutoff_passed(
-        f.store
-            .start_day(
-                Actor::Organiser,
-                f.configure_stage(&six_shard_plan()).await,
-                f.now,
-            )
-            .await,
-    );
+    expect_cutoff_passed(f.start_day(&six_shard_plan()).await);
     f.advance_clock_s(86_400);
     f.evaluate(submission.id, &six_shard_plan()).await;
 }
@@ -308,15 +279,7 @@ async fn cutoff_takes_newest_valid_submission_of_each_team() {
     let newer = f.validate().await;
     f.upload(&team).await; // not validated yet: the previous submission is evaluated
 
-    let started = f
-        .store
-        .start_day(
-            Actor::Organiser,
-            f.configure_stage(&six_shard_plan()).await,
-            f.now,
-        )
-        .await
-        .unwrap();
+    let started = f.start_day(&six_shard_plan()).await.unwrap();
     let submissions: Vec<_> = started
         .iter()
         .map(|evaluation| evaluation.submission)
@@ -433,14 +396,7 @@ async fn board_shows_newest_finished_day_of_each_team() {
     let one_shard = one_shard_plan();
     for (day, score) in [(1, 10.0), (2, 20.0), (3, 30.0)] {
         f.now = format!("2026-03-0{day}T12:00:00Z").parse().unwrap();
-        assert_eq!(
-            f.store
-                .start_day(Actor::Organiser, f.configure_stage(&one_shard).await, f.now)
-                .await
-                .unwrap()
-                .len(),
-            2
-        );
+        assert_eq!(f.start_day(&one_shard).await.unwrap().len(), 2);
         for team in 0..2 {
             let (claim, _, shard) = f.claim_shard().await;
             // On day 3 Beta's agent fails.

@@ -3,8 +3,8 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
+use faceoff_testkit::change_settings;
 use faceoff_types::*;
-use jiff::Timestamp;
 
 /// Configures the first stage with days at 10:00 UTC and this deadline.
 async fn configure_daily_stage(f: &TestStore, day_deadline: DayDeadline) -> StageId {
@@ -42,19 +42,6 @@ async fn run_shard(f: &TestStore) -> (String, TeamId) {
     };
     let played = f.store.evaluation(id).await.unwrap();
     (played.stage_day.date.to_string(), played.team)
-}
-
-fn time(text: &str) -> Timestamp {
-    text.parse().unwrap()
-}
-
-async fn event_kinds_since(f: &TestStore, id: i64) -> Vec<String> {
-    let events = f.store.events_after(id, 1000).await.unwrap();
-    let kind = |record: &EventRecord| {
-        let event = serde_json::to_value(&record.event).unwrap();
-        event["kind"].as_str().unwrap().to_owned()
-    };
-    events.iter().map(kind).collect()
 }
 
 #[tokio::test]
@@ -191,7 +178,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
         CommitOutcome::LeaseLost
     );
     assert_eq!(
-        event_kinds_since(&f, newest_event).await,
+        f.event_kinds_since(newest_event).await,
         ["day_overdue", "evaluation_not_played"]
     );
     assert_eq!(
@@ -302,17 +289,10 @@ async fn deadline_follows_settings_but_never_into_the_past() {
     let stage = configure_daily_stage(&f, DayDeadline::NextCutoff).await;
     start_day(&f, stage).await;
     let change_deadline = async |f: &TestStore, day_deadline| {
-        let settings = f.store.stage(stage).await.unwrap().settings;
-        let change = StageChange {
-            settings: Some(StageSettings {
-                day_deadline,
-                ..settings
-            }),
-            ..StageChange::default()
-        };
-        f.store
-            .change_stage(Actor::Organiser, stage, change, f.now)
-            .await
+        change_settings(&f.store, stage, f.now, |settings| {
+            settings.day_deadline = day_deadline;
+        })
+        .await
     };
     let deadline =
         async |f: &TestStore| f.store.unreleased_days(stage).await.unwrap()[0].deadline_at;

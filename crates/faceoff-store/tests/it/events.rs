@@ -12,13 +12,7 @@ async fn stored_events(f: &TestStore) -> Vec<EventRecord> {
 
 /// The kinds of events, as they are stored.
 fn event_kinds(records: &[EventRecord]) -> Vec<String> {
-    records
-        .iter()
-        .map(|record| {
-            let json = serde_json::to_value(&record.event).unwrap();
-            json["kind"].as_str().unwrap().to_owned()
-        })
-        .collect()
+    records.iter().map(event_kind).collect()
 }
 
 #[tokio::test]
@@ -160,8 +154,7 @@ async fn events_record_each_end_of_an_evaluation() {
 #[tokio::test]
 async fn failed_operation_changes_nothing_and_sends_no_event() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let cancelled = f
         .store
         .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now);

@@ -7,8 +7,7 @@ use faceoff_store::*;
 #[tokio::test]
 async fn evaluation_at_fault_limit_is_scored() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     // Faults of each of the six shards: three in all.
     for faults in [2, 1, 0, 0, 0, 0] {
         let (claim, _, shard) = f.claim_shard().await;
@@ -20,8 +19,7 @@ async fn evaluation_at_fault_limit_is_scored() {
 #[tokio::test]
 async fn evaluation_above_fault_limit_ends_without_score() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (first, _, first_shard) = f.claim_shard().await;
     let (running, _, running_shard) = f.claim_shard().await;
     let (third, _, third_shard) = f.claim_shard().await;

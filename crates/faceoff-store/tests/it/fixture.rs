@@ -99,14 +99,53 @@ impl TestStore {
         self.store.board(stage.id, revision).await.unwrap()
     }
 
-    /// Starts the day unless it has started already. Returns the submission's evaluation.
-    pub async fn evaluate(&self, submission: SubmissionId, plan: &RunPlan) -> Evaluation {
+    /// Starts a day of the season's first stage, which has this plan.
+    pub async fn start_day(&self, plan: &RunPlan) -> Result<Vec<Evaluation>, StoreError> {
         let stage = self.configure_stage(plan).await;
-        match self
-            .store
+        self.store
             .start_day(Actor::Organiser, stage, self.now)
             .await
-        {
+    }
+
+    /// Changes a stage so that it closes after this number of seconds, and advances the clock to that time.
+    pub async fn close_stage_after_s(&mut self, stage: StageId, seconds: i64) {
+        let closing = StageChange {
+            closes_at: Some(Some(self.now + SignedDuration::from_secs(seconds))),
+            ..StageChange::default()
+        };
+        self.store
+            .change_stage(Actor::Organiser, stage, closing, self.now)
+            .await
+            .unwrap();
+        self.advance_clock_s(seconds);
+    }
+
+    /// A released day with a result of 1.0 for each of two teams.
+    pub async fn released_day(&self) -> ([Submission; 2], StageDay) {
+        let submissions = [
+            self.valid_submission_of("Alpha").await,
+            self.valid_submission_of("Beta").await,
+        ];
+        let evaluation = self.evaluate(submissions[0].id, &one_shard_plan()).await;
+        self.run_all_with_score(1.0).await;
+        (submissions, evaluation.stage_day)
+    }
+
+    /// Kinds of the events after the one with this id, the oldest first.
+    pub async fn event_kinds_since(&self, id: i64) -> Vec<String> {
+        let events = self.store.events_after(id, 1000).await.unwrap();
+        events.iter().map(event_kind).collect()
+    }
+
+    /// Creates a team with a valid submission, and starts its evaluation.
+    pub async fn start_evaluation(&self, plan: &RunPlan) -> Evaluation {
+        let submission = self.valid_submission_of("Alpha").await;
+        self.evaluate(submission.id, plan).await
+    }
+
+    /// Starts the day unless it has started already. Returns the submission's evaluation.
+    pub async fn evaluate(&self, submission: SubmissionId, plan: &RunPlan) -> Evaluation {
+        match self.start_day(plan).await {
             Ok(_) | Err(StoreError::CutoffPassed { .. }) => {}
             Err(error) => panic!("{error}"),
         }
@@ -244,6 +283,16 @@ impl TestStore {
     pub async fn state(&self, id: EvaluationId) -> EvaluationState {
         self.store.evaluation(id).await.unwrap().state
     }
+}
+
+/// The kind of an event, as it is stored.
+pub fn event_kind(record: &EventRecord) -> String {
+    let event = serde_json::to_value(&record.event).unwrap();
+    event["kind"].as_str().unwrap().to_owned()
+}
+
+pub fn time(text: &str) -> Timestamp {
+    text.parse().unwrap()
 }
 
 /// Configures the first stage of the store's season with this plan, from now on.

@@ -30,8 +30,7 @@ async fn write_summary(f: &TestStore, run: faceoff_types::RunId, number: u8) {
 
 /// Creates a run, for which summaries can be stored.
 async fn create_run(f: &TestStore) -> faceoff_types::RunId {
-    let submission = f.valid_submission_of("Alpha").await;
-    f.evaluate(submission.id, &six_shard_plan()).await.run
+    f.start_evaluation(&six_shard_plan()).await.run
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

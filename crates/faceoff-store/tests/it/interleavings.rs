@@ -73,8 +73,7 @@ impl History {
 
 async fn run_actions(actions: Vec<Action>) {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let mut history = History::default();
     for action in actions {
         match action {

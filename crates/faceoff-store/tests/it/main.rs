@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod ablations;
+mod announcements;
 mod archives;
 mod artifacts;
 mod bundles;
@@ -25,7 +26,6 @@ mod queries;
 mod query_data;
 mod queue;
 mod queue_forecast;
-mod registrations;
 mod releases;
 mod renamed_tables;
 mod retention;

@@ -822,14 +822,7 @@ async fn migrated_queue_continues() {
             .released_at,
         Some(f.now)
     );
-    let repeated = f
-        .store
-        .start_day(
-            Actor::Organiser,
-            f.configure_stage(&six_shard_plan()).await,
-            f.now,
-        )
-        .await;
+    let repeated = f.start_day(&six_shard_plan()).await;
     assert!(
         matches!(repeated, Err(StoreError::CutoffPassed { .. })),
         "{repeated:?}"
@@ -839,14 +832,7 @@ async fn migrated_queue_continues() {
     // Old recordings are deleted a day after the end of their evaluation, like new ones.
     f.advance_clock_s(86_400);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 7);
-    let started = f
-        .store
-        .start_day(
-            Actor::Organiser,
-            f.configure_stage(&six_shard_plan()).await,
-            f.now,
-        )
-        .await;
+    let started = f.start_day(&six_shard_plan()).await;
     let teams: Vec<_> = started
         .unwrap()
         .iter()

@@ -131,8 +131,7 @@ async fn damaged_job_does_not_block_others() {
 #[tokio::test]
 async fn rows_without_data_of_their_state_are_refused() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    f.evaluate(submission.id, &six_shard_plan()).await;
+    f.start_evaluation(&six_shard_plan()).await;
     let mut connection = f.connection().await;
     for sql in [
         "UPDATE evaluations SET state = 'finished', finished_at = 1, dataset = 'd'",

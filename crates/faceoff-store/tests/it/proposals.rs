@@ -42,20 +42,6 @@ fn row(name: &str, score: f64) -> (String, f64) {
     (name.to_owned(), score)
 }
 
-/// A released day with a result of 1.0 for each of two teams.
-async fn released_day(f: &TestStore) -> ([Submission; 2], StageDay) {
-    let submissions = [
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    ];
-    let stage_day = f
-        .evaluate(submissions[0].id, &one_shard_plan())
-        .await
-        .stage_day;
-    f.run_all_with_score(1.0).await;
-    (submissions, stage_day)
-}
-
 #[tokio::test]
 async fn trial_runs_last_and_reaches_no_board() {
     let mut f = TestStore::new().await;
@@ -155,15 +141,7 @@ async fn impossible_trial_is_refused() {
         CommitOutcome::LeaseLost
     );
     assert!(f.claim().await.is_none());
-    let closing = StageChange {
-        closes_at: Some(Some(f.now + jiff::SignedDuration::from_secs(1))),
-        ..StageChange::default()
-    };
-    let changed = f
-        .store
-        .change_stage(Actor::Organiser, stage, closing, f.now);
-    changed.await.unwrap();
-    f.advance_clock_s(1);
+    f.close_stage_after_s(stage, 1).await;
     assert_conflict(propose_trial(&f, stage).await, &["closed"]);
     f.store.close_season(Actor::Organiser, f.now).await.unwrap();
 }
@@ -171,7 +149,7 @@ async fn impossible_trial_is_refused() {
 #[tokio::test]
 async fn reevaluation_counts_only_once_applied() {
     let mut f = TestStore::new().await;
-    let (submissions, stage_day) = released_day(&f).await;
+    let (submissions, stage_day) = f.released_day().await;
     let originals = f.store.evaluations_of_day(stage_day).await.unwrap();
     let proposed = propose_reevaluation(&f, Reevaluation::Day(stage_day))
         .await
@@ -242,7 +220,7 @@ async fn reevaluation_counts_only_once_applied() {
 #[tokio::test]
 async fn proposal_with_voided_original_is_refused_whole() {
     let f = TestStore::new().await;
-    let (submissions, stage_day) = released_day(&f).await;
+    let (submissions, stage_day) = f.released_day().await;
     let proposed = propose_reevaluation(&f, Reevaluation::Day(stage_day))
         .await
         .unwrap();
@@ -275,7 +253,7 @@ async fn proposal_with_voided_original_is_refused_whole() {
 #[tokio::test]
 async fn reevaluation_replaces_result_by_agent_failure() {
     let mut f = TestStore::new().await;
-    let (submissions, _) = released_day(&f).await;
+    let (submissions, _) = f.released_day().await;
     let alpha_evaluation = f.store.evaluations_of(submissions[0].team).await.unwrap()[0].id;
     let proposed = propose_reevaluation(&f, Reevaluation::Evaluation(alpha_evaluation))
         .await
@@ -326,7 +304,7 @@ async fn reevaluation_replaces_result_by_agent_failure() {
 #[tokio::test]
 async fn reevaluation_by_new_rules_has_its_own_board() {
     let f = TestStore::new().await;
-    let (_, stage_day) = released_day(&f).await;
+    let (_, stage_day) = f.released_day().await;
     assert_conflict(
         propose_reevaluation(&f, Reevaluation::Rules(stage_day)).await,
         &["stage's newest rules"],
@@ -361,35 +339,5 @@ async fn reevaluation_by_new_rules_has_its_own_board() {
     assert_conflict(
         propose_reevaluation(&f, Reevaluation::Rules(stage_day)).await,
         &["stage's newest rules"],
-    );
-}
-
-#[tokio::test]
-async fn open_day_is_not_reevaluated() {
-    let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let stage_day = f.evaluate(submission.id, &one_shard_plan()).await.stage_day;
-    assert_conflict(
-        propose_reevaluation(&f, Reevaluation::Day(stage_day)).await,
-        &["not released"],
-    );
-    let not_started = StageDay {
-        date: stage_day.date.tomorrow().unwrap(),
-        ..stage_day
-    };
-    let result = propose_reevaluation(&f, Reevaluation::Day(not_started)).await;
-    assert!(
-        matches!(result, Err(StoreError::NotFound("day"))),
-        "{result:?}"
-    );
-    let unknown = propose_reevaluation(&f, Reevaluation::Evaluation(EvaluationId::new())).await;
-    assert!(
-        matches!(unknown, Err(StoreError::NotFound("evaluation"))),
-        "{unknown:?}"
-    );
-    let unknown = apply(&f, ProposalId::new()).await;
-    assert!(
-        matches!(unknown, Err(StoreError::NotFound("proposal"))),
-        "{unknown:?}"
     );
 }

@@ -47,8 +47,7 @@ async fn concurrent_claims_never_share_a_job() {
 #[tokio::test]
 async fn expired_lease_is_reassigned_and_old_holder_refused() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    f.evaluate(submission.id, &six_shard_plan()).await;
+    f.start_evaluation(&six_shard_plan()).await;
     let (first, _, shard) = f.claim_shard().await;
     f.advance_clock_s(i64::from(LEASE_S) - 1);
     assert!(f.store.heartbeat(&first, 0, LEASE_S, f.now).await.unwrap());
@@ -93,8 +92,7 @@ async fn expired_lease_is_reassigned_and_old_holder_refused() {
 #[tokio::test]
 async fn job_filter_limits_claims() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let team = f.create_team("Beta").await;
     f.upload(&team).await;
     let claim = async |filter| {
@@ -128,8 +126,7 @@ async fn job_filter_limits_claims() {
 #[tokio::test]
 async fn lease_transfer_succeeds_for_one_worker() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    f.evaluate(submission.id, &six_shard_plan()).await;
+    f.start_evaluation(&six_shard_plan()).await;
     let claimed = f.store.claim("reserved", LEASE_S, f.now).await;
     let ClaimedJob { claim, .. } = claimed.unwrap().unwrap();
     f.advance_clock_s(i64::from(LEASE_S) - 1);
@@ -193,8 +190,7 @@ async fn lease_transfer_succeeds_for_one_worker() {
 #[tokio::test]
 async fn leases_of_killed_worker_end_at_once() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    f.evaluate(submission.id, &six_shard_plan()).await;
+    f.start_evaluation(&six_shard_plan()).await;
     let mut claims = Vec::new();
     for worker in ["old/slot-0", "old/slot-1", "older/slot-0", "old"] {
         let claimed = f
@@ -228,8 +224,7 @@ async fn leases_of_killed_worker_end_at_once() {
 #[tokio::test]
 async fn late_commit_counts_without_a_new_lease() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    f.evaluate(submission.id, &six_shard_plan()).await;
+    f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.advance_clock_s(3600);
     assert_eq!(
@@ -241,8 +236,7 @@ async fn late_commit_counts_without_a_new_lease() {
 #[tokio::test]
 async fn second_commit_changes_nothing() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     assert_eq!(
         f.commit_shard(&claim, &shard, 0).await,
@@ -266,8 +260,7 @@ async fn second_commit_changes_nothing() {
 #[tokio::test]
 async fn outcomes_must_cover_their_shard() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     let complete = shard_commit(&shard, 0);
     let mut without_last = complete.clone();
@@ -325,8 +318,7 @@ async fn job_released_at_shutdown_loses_no_attempt() {
 #[tokio::test]
 async fn platform_faults_pause_shard_then_rerun_evaluation() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (first_claim, _, shard) = f.claim_shard().await;
     f.store
         .release_failed(&first_claim, "disk full", f.now)

@@ -117,15 +117,7 @@ fn new_columns(old: &[String]) -> String {
 /// Rows of every renamed table: a validation run, evaluations in all states, a running trial, a tournament.
 async fn filled_store() -> TestStore {
     let mut f = TestStore::new().await;
-    let submissions = [
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    ];
-    let stage_day = f
-        .evaluate(submissions[0].id, &one_shard_plan())
-        .await
-        .stage_day;
-    f.run_all_with_score(1.0).await;
+    let (submissions, stage_day) = f.released_day().await;
     let proposed = f.store.propose_reevaluation(
         Actor::Organiser,
         Reevaluation::Day(stage_day),

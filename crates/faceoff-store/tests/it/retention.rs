@@ -3,6 +3,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
+use faceoff_testkit::change_settings;
 use faceoff_types::*;
 use jiff::SignedDuration;
 use sqlx::{Connection, SqliteConnection, migrate::Migrator, sqlite::SqliteConnectOptions};
@@ -50,15 +51,7 @@ async fn run_day(
 
 /// Closes a stage in an hour, and signs it off then (declares its results final).
 async fn sign_off(f: &mut TestStore, stage: StageId) {
-    let closing = StageChange {
-        closes_at: Some(Some(f.now + SignedDuration::from_hours(1))),
-        ..StageChange::default()
-    };
-    f.store
-        .change_stage(Actor::Organiser, stage, closing, f.now)
-        .await
-        .unwrap();
-    f.advance_clock_s(3600);
+    f.close_stage_after_s(stage, 3600).await;
     f.store
         .sign_off_stage(Actor::Organiser, stage, f.now)
         .await
@@ -343,15 +336,7 @@ async fn retention_keeps_datasets_of_blind_stage() {
         .storage(Some(alpha.team), StorageScope::Released)
         .await;
     assert_eq!(storage.unwrap()[0].datasets, 0);
-    let unblinded = StageChange {
-        settings: Some(StageSettings {
-            blind: false,
-            ..blind
-        }),
-        ..StageChange::default()
-    };
-    f.store
-        .change_stage(Actor::Organiser, stage, unblinded, f.now)
+    change_settings(&f.store, stage, f.now, |settings| settings.blind = false)
         .await
         .unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 1);
@@ -374,15 +359,7 @@ async fn retention_ends_at_its_date_or_after_sign_off() {
         .await
         .unwrap();
     assert!(removed.is_empty());
-    let closing = StageChange {
-        closes_at: Some(Some(f.now + SignedDuration::from_hours(1))),
-        ..StageChange::default()
-    };
-    f.store
-        .change_stage(Actor::Organiser, stage, closing, f.now)
-        .await
-        .unwrap();
-    f.advance_clock_s(3600);
+    f.close_stage_after_s(stage, 3600).await;
     let removed = f
         .store
         .preview_removal(stage, &ends_now, f.now)
@@ -609,42 +586,6 @@ async fn team_can_delete_unneeded_submission() {
         .store
         .rerun_evaluation(Actor::Organiser, evaluation.id, f.now);
     assert_conflict(rerun.await, &["was removed", "by its team"]);
-}
-
-#[tokio::test]
-async fn submission_without_bundle_cannot_be_deleted() {
-    let f = TestStore::new().await;
-    let team = f.create_team("Alpha").await;
-    let waiting = f.upload(&team).await;
-    let delete = async |id: SubmissionId| {
-        f.store
-            .delete_submission(Actor::Organiser, id, "by an organiser: a mistake", f.now)
-            .await
-    };
-    assert_conflict(
-        delete(waiting.id).await,
-        &["validation run is queued or running"],
-    );
-    let (claim, _) = f.claim_validation().await;
-    let outcome = ValidationOutcome::Invalid {
-        runtime: None,
-        agent_name: None,
-        reason: "no manifest".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    };
-    f.store
-        .commit_validation(&claim, outcome, f.now)
-        .await
-        .unwrap();
-    assert_conflict(
-        delete(waiting.id).await,
-        &["removes its bundle automatically"],
-    );
-    f.store.remove_refused_bundles(f.now).await.unwrap();
-    assert_conflict(delete(waiting.id).await, &["nothing left to delete"]);
-    let result = delete(SubmissionId::new()).await;
-    assert!(matches!(result, Err(StoreError::NotFound("submission"))));
 }
 
 #[tokio::test]

@@ -19,15 +19,6 @@ async fn board_rows(f: &TestStore) -> Vec<(String, f64)> {
     board.iter().map(row).collect()
 }
 
-async fn event_kinds_since(f: &TestStore, id: i64) -> Vec<String> {
-    let events = f.store.events_after(id, 1000).await.unwrap();
-    let kind = |record: &EventRecord| {
-        let event = serde_json::to_value(&record.event).unwrap();
-        event["kind"].as_str().unwrap().to_owned()
-    };
-    events.iter().map(kind).collect()
-}
-
 /// Id of the newest event.
 async fn newest_event(f: &TestStore) -> i64 {
     f.store
@@ -67,7 +58,7 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
         "the result stays readable"
     );
     assert_eq!(
-        event_kinds_since(&f, event_before).await,
+        f.event_kinds_since(event_before).await,
         ["evaluation_voided"]
     );
     // The result of the day before counts again.
@@ -163,7 +154,7 @@ async fn voided_day_is_over_at_once() {
     f.advance_clock_s(60);
     assert_eq!(void_day(&f).await.unwrap(), 2);
     assert_eq!(
-        event_kinds_since(&f, event_before).await,
+        f.event_kinds_since(event_before).await,
         [
             "evaluation_voided",
             "evaluation_cancelled",

@@ -4,11 +4,6 @@
 use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
-use jiff::Timestamp;
-
-fn time(text: &str) -> Timestamp {
-    text.parse().unwrap()
-}
 
 /// When the stages of these tests close.
 const CLOSES_AT: &str = "2026-03-03T10:00:00Z";
@@ -57,16 +52,7 @@ async fn change_settings(
     stage: &Stage,
     change: impl FnOnce(&mut StageSettings),
 ) -> Result<Stage, StoreError> {
-    let mut settings = f.store.stage(stage.id).await.unwrap().settings;
-    change(&mut settings);
-    let stage_change = StageChange {
-        settings: Some(settings),
-        ..StageChange::default()
-    };
-    let changed = f
-        .store
-        .change_stage(Actor::Organiser, stage.id, stage_change, f.now);
-    changed.await
+    faceoff_testkit::change_settings(&f.store, stage.id, f.now, change).await
 }
 
 async fn sign_off(f: &TestStore, stage: &Stage) -> Result<Stage, StoreError> {
@@ -116,35 +102,6 @@ async fn blind_stage_is_opened_once() {
     let repeated = change_settings(&f, &stage, |settings| settings.blind = true).await;
     assert_conflict(repeated, &["closed at"]);
     f.store.close_season(Actor::Organiser, f.now).await.unwrap();
-}
-
-#[tokio::test]
-async fn stage_with_scores_cannot_be_made_blind() {
-    let f = TestStore::new().await;
-    f.valid_submission_of("Alpha").await;
-    let stage = create_stage(&f, StageSettings::default()).await;
-    start_day(&f, &stage).await;
-    f.run_all_with_score(10.0).await;
-    let changed = change_settings(&f, &stage, |settings| settings.blind = true).await;
-    assert_conflict(changed, &["blind: 1 evaluations", "before its first score"]);
-}
-
-#[tokio::test]
-async fn closed_stage_can_publish_earlier_but_not_later() {
-    let mut f = TestStore::new().await;
-    let stage = create_stage(&f, StageSettings::default()).await;
-    f.now = time(CLOSES_AT);
-    let changed = change_settings(&f, &stage, |settings| {
-        settings.publishes = Publication::AtRelease
-    });
-    assert_eq!(
-        changed.await.unwrap().settings.publishes,
-        Publication::AtRelease
-    );
-    for publication in [Publication::AtClose, Publication::Never] {
-        let changed = change_settings(&f, &stage, |settings| settings.publishes = publication);
-        assert_conflict(changed.await, &["cannot be changed"]);
-    }
 }
 
 #[tokio::test]

@@ -1,4 +1,4 @@
-//! Teams: unique names, their API tokens, and ids that do not exist.
+//! Teams: their API tokens, and ids that do not exist.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,21 +6,6 @@ use faceoff_types::TeamId;
 
 const TOKEN_HASH: [u8; 32] = [7; 32];
 const OTHER_TOKEN_HASH: [u8; 32] = [8; 32];
-
-#[tokio::test]
-async fn team_names_are_unique_ignoring_case() {
-    let f = TestStore::new().await;
-    f.create_team("Air-HocKIT").await;
-    let name = "AIR-hockit".parse().unwrap();
-    let error = f
-        .store
-        .create_team(Actor::Organiser, &name, [1; 32], f.now)
-        .await
-        .unwrap_err();
-    assert!(matches!(error, StoreError::TeamNameTaken(taken) if taken == "AIR-hockit"));
-    let teams = f.store.teams().await.unwrap();
-    assert_eq!(teams.len(), 1);
-}
 
 #[tokio::test]
 async fn team_token_is_valid_until_replaced() {

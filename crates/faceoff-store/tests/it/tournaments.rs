@@ -61,6 +61,23 @@ async fn start(
         .await
 }
 
+/// A tournament of two teams whose first round, of one game, has started.
+async fn one_game(f: &TestStore, rules: TournamentRules) -> (Tournament, Vec<TeamId>) {
+    let (cup, teams) = opened(f, &["A", "B"], rules).await;
+    let round = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
+    start(f, cup.id, &round).await.unwrap();
+    (cup, teams)
+}
+
+/// A tournament of three teams whose first round has started. Each of its three matchdays has one game.
+async fn three_games(f: &TestStore) -> (Tournament, [TeamId; 3]) {
+    let (cup, teams) = opened(f, &["A", "B", "C"], TournamentRules::default()).await;
+    let [a, b, c] = teams[..] else { panic!() };
+    let round = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
+    start(f, cup.id, &round).await.unwrap();
+    (cup, [a, b, c])
+}
+
 async fn record(f: &TestStore, id: TournamentId) -> TournamentRecord {
     f.store.tournament_record(id).await.unwrap()
 }
@@ -237,10 +254,7 @@ async fn mirrored_halves_share_a_seed_and_swap_sides() {
         mirrored: true,
         ..TournamentRules::default()
     };
-    let (cup, teams) = opened(&f, &["A", "B"], rules).await;
-    start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
-        .await
-        .unwrap();
+    let (cup, _) = one_game(&f, rules).await;
     let games = record(&f, cup.id).await.games;
     let [first, second] = &games[..] else {
         panic!()
@@ -306,10 +320,7 @@ async fn round_refuses_runtimes_that_rules_exclude() {
 #[tokio::test]
 async fn game_with_platform_faults_has_attempts_but_no_result() {
     let mut f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
-    start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
-        .await
-        .unwrap();
+    let (cup, teams) = one_game(&f, TournamentRules::default()).await;
     let game = record(&f, cup.id).await.games[0].id;
     // A slot that dies, one that shuts down, and platform faults until the game is given up.
     let (lost, _, _) = claim_game(&f).await;
@@ -410,10 +421,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
 #[tokio::test]
 async fn paused_tournament_starts_no_game() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
-    start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
-        .await
-        .unwrap();
+    let (cup, teams) = one_game(&f, TournamentRules::default()).await;
     let paused = f
         .store
         .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
@@ -448,15 +456,7 @@ async fn paused_tournament_starts_no_game() {
 #[tokio::test]
 async fn game_forecast_uses_recent_durations() {
     let mut f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
-    let [a, b, c] = teams[..] else { panic!() };
-    start(
-        &f,
-        cup.id,
-        &drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]),
-    )
-    .await
-    .unwrap();
+    let (cup, _) = three_games(&f).await;
     let ids: Vec<GameId> = record(&f, cup.id)
         .await
         .games
@@ -497,15 +497,7 @@ async fn game_forecast_uses_recent_durations() {
 #[tokio::test]
 async fn departure_cancels_open_games() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
-    let [a, b, c] = teams[..] else { panic!() };
-    start(
-        &f,
-        cup.id,
-        &drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]),
-    )
-    .await
-    .unwrap();
+    let (cup, [a, b, c]) = three_games(&f).await;
     run_next_game(&f).await;
     let (claim, running, _) = claim_game(&f).await;
     let leave = |kind, from| departure(c, kind, from);
@@ -849,10 +841,7 @@ async fn tournament_keeps_its_earlier_ruleset() {
         ruleset: Ruleset::Second,
         ..TournamentRules::default()
     };
-    let (cup, teams) = opened(&f, &["A", "B"], rules).await;
-    start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
-        .await
-        .unwrap();
+    one_game(&f, rules).await;
     // A newer version starts.
     let claimed = f.reopen().await.claim("slot 0", LEASE_S, f.now).await;
     let Some(ClaimedJob {
@@ -967,15 +956,7 @@ fn actions() -> impl Strategy<Value = Vec<Action>> {
 /// For any order of actions, each game has at most one result, and all have one in the end.
 async fn run_actions(actions: Vec<Action>) {
     let mut f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
-    let [a, b, c] = teams[..] else { panic!() };
-    start(
-        &f,
-        cup.id,
-        &drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]),
-    )
-    .await
-    .unwrap();
+    let (cup, _) = three_games(&f).await;
     let mut claims: Vec<(JobClaim, GameId)> = Vec::new();
     let mut committed = std::collections::BTreeMap::<GameId, u32>::new();
     for action in actions {

@@ -1,9 +1,9 @@
-//! Users: how they join by an invitation with a secret code, what they can do, and how they leave. In these tests each byte of
+//! Users: how they return, leave, and accept new terms; their teams. In these tests each byte of
 //! a code's hash is the same number.
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{TeamId, UserId};
+use faceoff_types::UserId;
 use jiff::SignedDuration;
 
 async fn invite(f: &TestStore, code: u8, role: InvitationRole) -> Invitation {
@@ -31,78 +31,6 @@ async fn principal(f: &TestStore, code: u8) -> Result<Principal, TokenRejection>
     let hash = *blake3::hash(&[code; 32]).as_bytes();
     let verified = f.store.verify_token(hash, TokenKind::ApiToken, f.now).await;
     verified.unwrap().map(|token| token.principal)
-}
-
-#[tokio::test]
-async fn invitation_creates_one_user_with_its_role() {
-    let mut f = TestStore::new().await;
-    let alpha = f.create_team("Alpha").await;
-    let member = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
-    assert_eq!(member.team, Some(alpha.id));
-    assert_eq!(
-        principal(&f, 1).await,
-        Ok(Principal::Member(member.clone(), alpha))
-    );
-    let organiser = add_user(&f, 2, "Grace", InvitationRole::Organiser).await;
-    assert_eq!(principal(&f, 2).await, Ok(Principal::Organiser(organiser)));
-
-    let repeated = f.store.join(join_request([1; 32], "Eve"), f.now).await;
-    assert_contains(&repeated.unwrap_err(), &["was accepted", "only once"]);
-    let unknown = f.store.join(join_request([9; 32], "Eve"), f.now).await;
-    assert_contains(&unknown.unwrap_err(), &["no such invitation"]);
-    let revoked = invite(&f, 3, InvitationRole::Organiser).await;
-    f.store
-        .revoke_invitation(Actor::Organiser, revoked.id, f.now)
-        .await
-        .unwrap();
-    let error = f.store.join(join_request([3; 32], "Eve"), f.now).await;
-    assert_contains(&error.unwrap_err(), &["was revoked"]);
-    invite(&f, 4, InvitationRole::Organiser).await;
-    let refused = f.store.join(join_request([4; 32], "ADA"), f.now).await;
-    assert!(matches!(refused, Err(StoreError::UserNameTaken(name)) if name == "ADA"));
-    f.advance_clock_s(3600);
-    let late = f.store.join(join_request([4; 32], "Eve"), f.now).await;
-    assert_contains(&late.unwrap_err(), &["expired on"]);
-    assert_eq!(
-        f.store.users().await.unwrap().len(),
-        2,
-        "no other user joined"
-    );
-}
-
-#[tokio::test]
-async fn founder_invitation_requires_a_team_name() {
-    let f = TestStore::new().await;
-    let alpha = f.create_team("Alpha").await;
-    invite(&f, 1, InvitationRole::Founder).await;
-    let founder = |name: &str| JoinRequest {
-        team: Some((name.parse().unwrap(), TeamProfile::default())),
-        ..join_request([1; 32], "Ada")
-    };
-    let without_team = f.store.join(join_request([1; 32], "Ada"), f.now).await;
-    assert_contains(&without_team.unwrap_err(), &["expected the team's name"]);
-    let refused = f.store.join(founder("ALPHA"), f.now).await;
-    assert!(matches!(refused, Err(StoreError::TeamNameTaken(_))));
-    let mut without_name = founder("Beta");
-    without_name.name = None;
-    let error = f.store.join(without_name, f.now).await.unwrap_err();
-    assert_contains(&error, &["name: expected"]);
-    assert_eq!(
-        f.store.teams().await.unwrap().len(),
-        1,
-        "a failed request changes nothing"
-    );
-    let joined = f.store.join(founder("Beta"), f.now).await.unwrap();
-    let team = joined.team.unwrap();
-    assert_eq!(team.name.as_str(), "Beta");
-    assert_eq!(joined.user.team, Some(team.id));
-    invite(&f, 2, InvitationRole::Member(alpha.id)).await;
-    let member = JoinRequest {
-        team: founder("Gamma").team,
-        ..join_request([2; 32], "Eve")
-    };
-    let error = f.store.join(member, f.now).await.unwrap_err();
-    assert_contains(&error, &["leave it out"]);
 }
 
 #[tokio::test]
@@ -174,45 +102,6 @@ async fn removed_user_loses_all_access() {
         .find(|record| record.subject == Subject::User(ada.id) && record.id > 1)
         .unwrap();
     assert!(matches!(joined.event, Event::PersonJoined { .. }));
-}
-
-#[tokio::test]
-async fn invalid_invitations_are_refused() {
-    let f = TestStore::new().await;
-    let alpha = f.create_team("Alpha").await;
-    let invitation = |code, role, expires_at| NewInvitation {
-        code_hash: [code; 32],
-        role,
-        note: "a user".into(),
-        expires_at,
-    };
-    let expires_at = f.now + SignedDuration::from_hours(1);
-    let invite = async |invitation| -> Result<Invitation, StoreError> {
-        f.store.invite(Actor::Organiser, invitation, f.now).await
-    };
-    let expired = invite(invitation(1, InvitationRole::Organiser, f.now)).await;
-    assert_contains(&expired.unwrap_err(), &["in the future"]);
-    let unknown_team = invite(invitation(
-        1,
-        InvitationRole::Member(TeamId::new()),
-        expires_at,
-    ))
-    .await;
-    assert!(matches!(unknown_team, Err(StoreError::NotFound("team"))));
-    for code in 0..u8::try_from(MAX_OPEN_INVITATIONS).unwrap() {
-        invite(invitation(
-            code,
-            InvitationRole::Member(alpha.id),
-            expires_at,
-        ))
-        .await
-        .unwrap();
-    }
-    let refused = invite(invitation(99, InvitationRole::Member(alpha.id), expires_at)).await;
-    assert_contains(&refused.unwrap_err(), &["which is the limit"]);
-    invite(invitation(100, InvitationRole::Organiser, expires_at))
-        .await
-        .unwrap();
 }
 
 #[tokio::test]

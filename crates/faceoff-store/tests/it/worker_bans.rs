@@ -24,8 +24,7 @@ async fn claim_for(f: &TestStore, holder: &str) -> (JobClaim, Shard) {
 #[tokio::test]
 async fn ban_requeues_shards_of_open_runs() {
     let f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
+    let evaluation = f.start_evaluation(&six_shard_plan()).await;
     // A worker with a similar name and the server's own slot are not affected.
     let (own, own_shard) = claim_for(&f, "slot-0").await;
     assert_eq!(
@@ -111,8 +110,7 @@ async fn ban_requeues_shards_of_open_runs() {
 #[tokio::test]
 async fn remote_leases_survive_a_server_restart() {
     let mut f = TestStore::new().await;
-    let submission = f.valid_submission_of("Alpha").await;
-    f.evaluate(submission.id, &six_shard_plan()).await;
+    f.start_evaluation(&six_shard_plan()).await;
     let (remote, shard) = claim_for(&f, "remote/rack-1/slot-0").await;
     let (own, own_shard) = claim_for(&f, "slot-0").await;
     let (unstarted, _) = claim_for(&f, "reserved").await;

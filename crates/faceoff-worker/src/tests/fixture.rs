@@ -462,6 +462,13 @@ impl Server {
     pub(super) async fn wait_for_end(&self, id: EvaluationId) -> EvaluationState {
         faceoff_testkit::wait_for_evaluation(&self.store, id).await
     }
+
+    /// Waits for the end of an evaluation, which must have a result.
+    pub(super) async fn wait_for_result(&self, id: EvaluationId) {
+        let state = self.wait_for_end(id).await;
+        let is_finished = matches!(state, EvaluationState::Finished { .. });
+        assert!(is_finished, "{state:?}");
+    }
 }
 
 /// Limits of agents; the scripted evaluator does not apply them.

@@ -30,11 +30,7 @@ async fn full_disk_does_not_count_as_an_attempt() {
         Ok(())
     });
     let running = server.start_slots(1, &evaluator);
-    let state = server.wait_for_end(id).await;
-    assert!(
-        matches!(state, EvaluationState::Finished { .. }),
-        "{state:?}"
-    );
+    server.wait_for_result(id).await;
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
     running.stop().await;
     let events = server.store.events_after(0, 1000).await.unwrap();
@@ -57,11 +53,7 @@ async fn commit_waits_for_disk_space_without_replaying() {
             _ => Ok(()),
         })
     });
-    let state = server.wait_for_end(id).await;
-    assert!(
-        matches!(state, EvaluationState::Finished { .. }),
-        "{state:?}"
-    );
+    server.wait_for_result(id).await;
     running.stop().await;
     assert_eq!(evaluator.played.lock().unwrap().len(), 6, "each shard once");
 }
@@ -86,10 +78,6 @@ async fn release_waits_for_disk_space() {
             _ => Ok(()),
         })
     });
-    let state = server.wait_for_end(id).await;
-    assert!(
-        matches!(state, EvaluationState::Finished { .. }),
-        "{state:?}"
-    );
+    server.wait_for_result(id).await;
     running.stop().await;
 }

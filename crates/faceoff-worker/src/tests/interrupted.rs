@@ -36,10 +36,7 @@ async fn shutdown_releases_jobs_for_the_next_worker() {
 
     let healthy = Scripted::new(|_, _| Ok(()));
     let running = server.start_slots(1, &healthy);
-    assert!(matches!(
-        server.wait_for_end(id).await,
-        EvaluationState::Finished { .. }
-    ));
+    server.wait_for_result(id).await;
     assert_eq!(healthy.played.lock().unwrap().len(), 6);
     running.stop().await;
 }
@@ -202,10 +199,7 @@ async fn result_of_a_lost_lease_is_discarded() {
         .await
         .unwrap();
     assert_eq!(committed, CommitOutcome::Stored);
-    assert!(matches!(
-        server.wait_for_end(id).await,
-        EvaluationState::Finished { .. }
-    ));
+    server.wait_for_result(id).await;
     assert_eq!(
         evaluator.assembled.lock().unwrap()[0],
         "by the second worker"
@@ -234,10 +228,7 @@ async fn restarted_worker_releases_its_former_leases() {
         .unwrap();
     drop(scratch);
     let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
-    assert!(matches!(
-        server.wait_for_end(id).await,
-        EvaluationState::Finished { .. }
-    ));
+    server.wait_for_result(id).await;
     running.stop().await;
 }
 

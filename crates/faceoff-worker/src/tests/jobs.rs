@@ -6,7 +6,7 @@ use super::{
 };
 use crate::server::{ClaimResult, JobServer as _, LeaseStatus};
 use faceoff_store::*;
-use faceoff_testkit::{six_shard_plan, valid_outcome};
+use faceoff_testkit::{change_rules, six_shard_plan, valid_outcome};
 use faceoff_types::Task;
 use faceoff_wire::job::{JobPayload, JobReport, JobSpec, OutputFiles};
 
@@ -113,17 +113,12 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     let id = server.start_evaluation().await;
     // Jobs of the started day keep the old rules.
     let stage = server.store.stages().await.unwrap()[0].clone();
-    let mut rules = stage.rules.rules.clone();
-    rules.variation.weights = "1,0,0".parse().unwrap();
-    rules.variation.perturbations.tracking_loss.probability = 0.25;
-    let changed_variation = rules.variation.clone();
-    let change = StageChange {
-        rules: Some(rules),
-        ..StageChange::default()
-    };
-    let changed = server
-        .store
-        .change_stage(Actor::Organiser, stage.id, change, server.now());
+    let mut changed_variation = stage.rules.rules.variation.clone();
+    changed_variation.weights = "1,0,0".parse().unwrap();
+    changed_variation.perturbations.tracking_loss.probability = 0.25;
+    let changed = change_rules(&server.store, stage.id, server.now(), |rules| {
+        rules.variation = changed_variation.clone();
+    });
     let plan = changed.await.unwrap().plan();
     assert_eq!(plan.variation, changed_variation);
     let job = claim_next(&server).await.unwrap();
@@ -163,16 +158,10 @@ async fn stage_limits_apply_to_validation_and_later_days() {
     let server = Server::new().await;
     server.start_evaluation().await;
     let stage = server.store.stages().await.unwrap()[0].clone();
-    let mut rules = stage.rules.rules.clone();
-    rules.limits.pids = Some(7);
-    rules.limits.step_s = Some(0.25);
-    let change = StageChange {
-        rules: Some(rules),
-        ..StageChange::default()
-    };
-    let changed = server
-        .store
-        .change_stage(Actor::Organiser, stage.id, change, server.now());
+    let changed = change_rules(&server.store, stage.id, server.now(), |rules| {
+        rules.limits.pids = Some(7);
+        rules.limits.step_s = Some(0.25);
+    });
     assert_eq!(changed.await.unwrap().plan().limits.pids, Some(7));
     server.upload("Beta", VALID_ARCHIVE).await;
     let (mut validation, mut shards) = (Vec::new(), Vec::new());

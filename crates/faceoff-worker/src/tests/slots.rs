@@ -6,7 +6,9 @@ use faceoff_replay::{ClipKey, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::*;
-use faceoff_testkit::{configure_stage, finish_validation, one_shard_plan, valid_outcome};
+use faceoff_testkit::{
+    change_settings, configure_stage, finish_validation, one_shard_plan, valid_outcome,
+};
 use faceoff_types::*;
 use std::{
     sync::{
@@ -16,6 +18,7 @@ use std::{
     thread,
     time::Duration,
 };
+use tokio::sync::broadcast;
 use tokio_util::sync::CancellationToken;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -115,10 +118,7 @@ async fn panics_and_platform_faults_are_retried() {
         }
     });
     let running = server.start_slots(1, &evaluator);
-    assert!(matches!(
-        server.wait_for_end(id).await,
-        EvaluationState::Finished { .. }
-    ));
+    server.wait_for_result(id).await;
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
     running.stop().await;
 }
@@ -149,10 +149,7 @@ async fn failed_slot_pauses_and_stops_at_shutdown() {
         }
     });
     let running = server.start_slots(2, &evaluator);
-    assert!(matches!(
-        server.wait_for_end(id).await,
-        EvaluationState::Finished { .. }
-    ));
+    server.wait_for_result(id).await;
     // Without the shutdown, the pause would outlast the test.
     running.stop().await;
     let thread_names = started.lock().unwrap();
@@ -193,6 +190,22 @@ async fn lasting_platform_fault_fails_and_requeues_evaluation() {
     assert_eq!(rerun.unwrap().submission, failed.submission);
 }
 
+/// The next events, all of which the schedule must have caused.
+async fn next_schedule_events(
+    events: &mut broadcast::Receiver<Change>,
+    count: usize,
+) -> Vec<Event> {
+    let mut found = Vec::new();
+    while found.len() < count {
+        let Change::Recorded(record) = events.recv().await.unwrap() else {
+            panic!("every change is recorded as an event")
+        };
+        assert_eq!(record.actor, Actor::Schedule);
+        found.push(record.event);
+    }
+    found
+}
+
 #[tokio::test]
 async fn missed_day_is_started_once() {
     let server = Server::new().await;
@@ -208,33 +221,18 @@ async fn missed_day_is_started_once() {
     // A stage that opened after midnight would start at the next midnight.
     let opened = server.now() - jiff::SignedDuration::from_hours(24);
     let stage = configure_stage(&server.store, &plan, Some(midnight), opened).await;
-    let settings = StageSettings {
-        ablation_episodes: 2,
-        ..server.store.stage(stage).await.unwrap().settings
-    };
-    let with_ablations = StageChange {
-        settings: Some(settings),
-        ..StageChange::default()
-    };
-    server
-        .store
-        .change_stage(Actor::Organiser, stage, with_ablations, server.now())
-        .await
-        .unwrap();
+    change_settings(&server.store, stage, server.now(), |settings| {
+        settings.ablation_episodes = 2;
+    })
+    .await
+    .unwrap();
     for is_first_start in [true, false] {
         let mut events = server.store.events();
         let shutdown = CancellationToken::new();
         let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
         let schedule = tokio::spawn(schedule);
         if is_first_start {
-            let mut kinds = Vec::new();
-            for _ in 0..3 {
-                let Change::Recorded(record) = events.recv().await.unwrap() else {
-                    panic!("every change is recorded as an event")
-                };
-                assert_eq!(record.actor, Actor::Schedule);
-                kinds.push(record.event);
-            }
+            let kinds = next_schedule_events(&mut events, 3).await;
             assert!(
                 matches!(
                     kinds[..],
@@ -269,38 +267,19 @@ async fn overdue_day_ends_before_the_next_one_starts() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
     let evaluation = server.store.evaluation(id).await.unwrap();
-    let stage = server
-        .store
-        .stage(evaluation.stage_day.stage)
-        .await
-        .unwrap();
     // The next day starts in 24 hours, which is also the deadline.
     let cutoff = server.now().to_zoned(jiff::tz::TimeZone::UTC).time();
-    let settings = StageSettings {
-        schedule: Some(Schedule::daily(cutoff)),
-        ..stage.settings
-    };
-    let scheduled = StageChange {
-        settings: Some(settings),
-        ..StageChange::default()
-    };
-    let scheduled = server
-        .store
-        .change_stage(Actor::Organiser, stage.id, scheduled, server.now());
+    let stage = evaluation.stage_day.stage;
+    let scheduled = change_settings(&server.store, stage, server.now(), |settings| {
+        settings.schedule = Some(Schedule::daily(cutoff));
+    });
     scheduled.await.unwrap();
     server.advance(24 * 3600);
     let mut events = server.store.events();
     let shutdown = CancellationToken::new();
     let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
     let schedule = tokio::spawn(schedule);
-    let mut kinds = Vec::new();
-    for _ in 0..5 {
-        let Change::Recorded(record) = events.recv().await.unwrap() else {
-            panic!("every change is recorded as an event")
-        };
-        assert_eq!(record.actor, Actor::Schedule);
-        kinds.push(record.event);
-    }
+    let kinds = next_schedule_events(&mut events, 5).await;
     assert!(
         matches!(
             kinds[..],

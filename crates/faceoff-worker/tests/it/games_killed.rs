@@ -1,23 +1,14 @@
 //! Repeated `kill -9` of a server during a hundred games.
 
 use crate::{
+    killed_child::{run_and_kill, run_jobs},
     server::Server,
     tournament::{recording, rules, start_round, wait_for_results},
 };
 use faceoff_store::*;
 use faceoff_types::{TeamId, TournamentId};
-use std::{
-    collections::BTreeMap,
-    io::{BufRead as _, BufReader, Write as _},
-    path::Path,
-    process::{Command, Stdio},
-};
+use std::collections::BTreeMap;
 
-/// Environment of the child process: the server's folder and the tournament's id.
-const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
-const TOURNAMENT: &str = "FACEOFF_WORKER_TEST_TOURNAMENT";
-/// The line that the child process prints for each event.
-const EVENT_LINE: &str = "an event";
 const GAMES: usize = 100;
 
 /// Are all games over?
@@ -31,21 +22,10 @@ async fn are_over(server: &Server, tournament: TournamentId) -> bool {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "the child process of tournament_survives_killed_servers"]
 async fn child() {
-    let Ok(folder) = std::env::var(FOLDER) else {
-        return;
-    };
-    let server = Server::at(Path::new(&folder)).await;
-    let id = std::env::var(TOURNAMENT).unwrap().parse().unwrap();
-    let mut events = server.store.events();
-    let worker = server.start_worker(2);
-    while !are_over(&server, id).await {
-        let _ = events.recv().await;
-        let mut out = std::io::stdout().lock();
-        writeln!(out, "\n{EVENT_LINE}")
-            .and_then(|()| out.flush())
-            .unwrap();
-    }
-    worker.stop().await;
+    run_jobs(2, async |server, id| {
+        are_over(server, id.parse().unwrap()).await
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -65,24 +45,9 @@ async fn tournament_survives_killed_servers() {
     assert_eq!(games.len(), GAMES);
     let tournament = games[0].tournament;
 
+    let id = tournament.to_string();
     for events_to_live in [1, 2, 3, 5, 8, 13, 21, 13, 8, 5, 3, 2] {
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "games_killed::child", "--ignored", "--nocapture"])
-            .env(FOLDER, server.path())
-            .env(TOURNAMENT, tournament.to_string())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let lines = BufReader::new(child.stdout.take().unwrap())
-            .lines()
-            .map_while(Result::ok);
-        let seen = lines
-            .filter(|line| line == EVENT_LINE)
-            .take(events_to_live)
-            .count();
-        child.kill().unwrap();
-        child.wait().unwrap();
+        let seen = run_and_kill(&server, "games_killed::child", &id, events_to_live);
         assert_eq!(seen, events_to_live, "the child ended early");
     }
     let worker = server.start_worker(2);

@@ -2,42 +2,22 @@
 
 use crate::{
     evaluations::{plan, without_times},
+    killed_child::{run_and_kill, run_jobs},
     server::Server,
 };
 use faceoff_store::*;
 use jiff::Timestamp;
-use std::{
-    io::{BufRead as _, BufReader, Write as _},
-    path::Path,
-    process::{Command, Stdio},
-};
-
-/// Environment of the child process: the server's folder and the evaluation's id.
-const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
-const EVALUATION: &str = "FACEOFF_WORKER_TEST_EVALUATION";
-/// The line that the child process prints for each event.
-const EVENT_LINE: &str = "an event";
 
 /// Runs jobs until the process is killed or the evaluation is over, and prints a line for each event. Started by the
 /// test below.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "the child process of killed_evaluation_has_the_same_result"]
 async fn child() {
-    let Ok(folder) = std::env::var(FOLDER) else {
-        return;
-    };
-    let server = Server::at(Path::new(&folder)).await;
-    let id = std::env::var(EVALUATION).unwrap().parse().unwrap();
-    let mut events = server.store.events();
-    let worker = server.start_worker(1);
-    while !server.store.evaluation(id).await.unwrap().state.is_over() {
-        let _ = events.recv().await;
-        let mut out = std::io::stdout().lock();
-        writeln!(out, "\n{EVENT_LINE}")
-            .and_then(|()| out.flush())
-            .unwrap();
-    }
-    worker.stop().await;
+    run_jobs(1, async |server, id| {
+        let id = id.parse().unwrap();
+        server.store.evaluation(id).await.unwrap().state.is_over()
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -63,24 +43,9 @@ async fn killed_evaluation_has_the_same_result() {
     // The other evaluation has hardly started.
     worker.stop().await;
 
+    let id = killed.id.to_string();
     for events_to_live in [1, 2, 3, 1, 4, 2] {
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "kill::child", "--ignored", "--nocapture"])
-            .env(FOLDER, server.path())
-            .env(EVALUATION, killed.id.to_string())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let lines = BufReader::new(child.stdout.take().unwrap())
-            .lines()
-            .map_while(Result::ok);
-        let seen = lines
-            .filter(|line| line == EVENT_LINE)
-            .take(events_to_live)
-            .count();
-        child.kill().unwrap();
-        child.wait().unwrap();
+        let seen = run_and_kill(&server, "kill::child", &id, events_to_live);
         let over = server
             .store
             .evaluation(killed.id)

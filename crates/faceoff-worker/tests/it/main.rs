@@ -5,5 +5,6 @@ mod evaluations;
 mod games;
 mod games_killed;
 mod kill;
+mod killed_child;
 mod server;
 mod tournament;

@@ -4,7 +4,6 @@ use super::fake_slot::{self, GameOutcome};
 use crate::site::{ADMIN, Answer, Site, TestTeam, string};
 use faceoff_store::{Game, JobClaim};
 use faceoff_types::Seed;
-use reqwest::Method;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -21,6 +20,16 @@ impl Cup {
     /// Creates teams with valid submissions, and a tournament of them. `body` has the other fields of the request.
     pub async fn open(names: &[&str], body: Value) -> Self {
         Self::open_on(Site::start().await, names, body).await
+    }
+
+    /// A round robin of three teams whose first round has started. `publishes` says when recordings become public.
+    pub async fn start_round_robin(publishes: &str) -> Self {
+        let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
+        let settings = json!({ "publishes": publishes });
+        let body = json!({ "rules": rules, "settings": settings });
+        let cup = Self::open(&["A", "B", "C"], body).await;
+        cup.start_round().await;
+        cup
     }
 
     /// As [`Self::open`], on a given site.
@@ -57,8 +66,7 @@ impl Cup {
 
     /// Changes the tournament as an organiser.
     pub async fn change(&self, body: Value) -> Answer {
-        let request = self.site.request(Method::PATCH, &self.path, Some(ADMIN));
-        Answer::read(request.json(&body).send().await.unwrap()).await
+        self.site.patch(&self.path, Some(ADMIN), &body).await
     }
 
     /// The tournament's public view.

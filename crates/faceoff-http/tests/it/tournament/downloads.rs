@@ -34,14 +34,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
         ("at_close", false, true),
         ("never", false, false),
     ] {
-        let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
-        let settings = json!({ "publishes": publishes });
-        let cup = Cup::open(
-            &["A", "B", "C"],
-            json!({ "rules": rules, "settings": settings }),
-        )
-        .await;
-        cup.start_round().await;
+        let cup = Cup::start_round_robin(publishes).await;
         let waiting = string(&cup.games().await[0]["id"]);
         assert_eq!(
             file_statuses(&cup, &waiting, Some(ADMIN)).await,

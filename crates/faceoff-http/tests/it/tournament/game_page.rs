@@ -10,7 +10,6 @@ use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
 use faceoff_types::{GameLimits, Interpolation, Profile, Seed, Side};
 use scraper::{Html, Selector};
-use serde_json::json;
 
 /// Control steps of the recorded game.
 const STEPS: u32 = 600;
@@ -50,14 +49,7 @@ fn record_game_clips() -> Vec<u8> {
 
 /// A tournament in which one game is played and others are queued. `publishes` says when recordings become public.
 async fn play_one_game(publishes: &str) -> (Cup, Game) {
-    let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
-    let settings = json!({ "publishes": publishes });
-    let cup = Cup::open(
-        &["A", "B", "C"],
-        json!({ "rules": rules, "settings": settings }),
-    )
-    .await;
-    cup.start_round().await;
+    let cup = Cup::start_round_robin(publishes).await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     (cup, game)
 }

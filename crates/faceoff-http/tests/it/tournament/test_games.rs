@@ -184,11 +184,9 @@ async fn team_declines_and_cancels_friendly_games() {
     let bob = string(&joined["secret"]);
     let team = format!("/api/v1/teams/{}", cup.teams["B"].id);
     let set_declines = async |declines: bool| {
-        let request = cup.site.request(Method::PATCH, &team, Some(&bob));
         let body = json!({ "declines_friendly_games": declines });
-        Answer::read(request.json(&body).send().await.unwrap())
-            .await
-            .json(200)
+        let changed = cup.site.patch(&team, Some(&bob), &body).await;
+        changed.json(200)
     };
     assert_eq!(
         cup.site.get(&team, None).await.json(200)["declines_friendly_games"],

@@ -1,9 +1,8 @@
 //! Actions of the organiser and of teams on single days of the season, with checks of their effects.
 
 use super::season::{ALL_EVALUATIONS, DAYS, Season, date, local_time};
-use crate::site::{ADMIN, Answer, string};
+use crate::site::{ADMIN, string};
 use faceoff_worker::start_due;
-use reqwest::Method;
 use serde_json::{Value, json};
 
 // The days of the actions, counted from 0.
@@ -78,9 +77,8 @@ impl Season {
     async fn rename(&mut self) {
         let team = &mut self.teams[2];
         let path = format!("/api/v1/teams/{}", team.team.id);
-        let request = self.site.request(Method::PATCH, &path, Some(ADMIN));
         let body = json!({ "name": "The Mallets" });
-        let renamed = Answer::read(request.json(&body).send().await.unwrap()).await;
+        let renamed = self.site.patch(&path, Some(ADMIN), &body).await;
         assert_eq!(renamed.json(200)["name"], "The Mallets");
         team.name = "The Mallets".into();
         let names = self.teams_on_board(RENAMING).await;

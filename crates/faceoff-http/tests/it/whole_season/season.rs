@@ -122,11 +122,7 @@ impl Season {
 
     /// Changes a stage as an organiser.
     pub async fn change_stage(&self, stage: &str, body: Value) -> Value {
-        let path = format!("/api/v1/stages/{stage}");
-        let request = self.site.request(Method::PATCH, &path, Some(ADMIN));
-        Answer::read(request.json(&body).send().await.unwrap())
-            .await
-            .json(200)
+        self.site.change_stage(stage, body).await.json(200)
     }
 
     /// The id of the stage that is open on this day.

@@ -176,6 +176,21 @@ impl ValidRecording {
     }
 }
 
+/// The label of a recording's outcome.
+pub(super) fn label(outcome: &Result<(), VerifyError>) -> &'static str {
+    match outcome {
+        Ok(()) => "read",
+        Err(VerifyError::Differs(_)) => "differs",
+        Err(VerifyError::Dataset(DatasetError::Io(_))) => "io",
+        Err(VerifyError::Dataset(DatasetError::Unreadable(_))) => "unreadable",
+        Err(VerifyError::Dataset(DatasetError::Foreign(_))) => "foreign",
+        Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
+        Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
+        Err(VerifyError::Workers(error)) => panic!("{error}"),
+        Err(VerifyError::Recording(error)) => panic!("{error}"),
+    }
+}
+
 /// Reads the whole dataset, and stops at the first error.
 fn read(path: &Path, rng: &mut Rng) -> Result<(), VerifyError> {
     let dataset = if rng.once_in(2) {
@@ -209,17 +224,7 @@ fn dataset_is_read_or_refused() {
         // The larger dataset is simulated only occasionally.
         let valid = &valid[usize::from(rng.once_in(20))];
         let path = valid.write_mutated(&dir, rng);
-        let label = match read(&path, rng) {
-            Ok(()) => "read",
-            Err(VerifyError::Differs(_)) => "differs",
-            Err(VerifyError::Dataset(DatasetError::Io(_))) => "io",
-            Err(VerifyError::Dataset(DatasetError::Unreadable(_))) => "unreadable",
-            Err(VerifyError::Dataset(DatasetError::Foreign(_))) => "foreign",
-            Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
-            Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
-            Err(VerifyError::Workers(error)) => panic!("{error}"),
-            Err(VerifyError::Recording(error)) => panic!("{error}"),
-        };
+        let label = label(&read(&path, rng));
         fs::remove_dir_all(&dir).unwrap();
         label.to_owned()
     });

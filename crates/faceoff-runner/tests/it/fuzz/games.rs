@@ -1,8 +1,11 @@
 //! Fuzz test of recordings of games: each is read, or refused as differing, altered or unreadable.
 
-use super::{assert_outcomes, datasets::ValidRecording, fuzz, rng::Rng};
+use super::{
+    assert_outcomes,
+    datasets::{ValidRecording, label},
+    fuzz,
+};
 use faceoff_dataset::{
-    DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
     verify::VerifyError,
 };
@@ -85,21 +88,6 @@ fn read(path: &Path) -> Result<(), VerifyError> {
     verify_game(&recording, &|_| ()).map(drop)
 }
 
-/// Reads a mutated recording; returns the label of the outcome.
-fn read_mutated(valid: &ValidRecording, dir: &Path, rng: &mut Rng) -> &'static str {
-    match read(&valid.write_mutated(dir, rng)) {
-        Ok(()) => "read",
-        Err(VerifyError::Differs(_)) => "differs",
-        Err(VerifyError::Dataset(DatasetError::Io(_))) => "io",
-        Err(VerifyError::Dataset(DatasetError::Unreadable(_))) => "unreadable",
-        Err(VerifyError::Dataset(DatasetError::Foreign(_))) => "foreign",
-        Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
-        Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
-        Err(VerifyError::Workers(error)) => panic!("{error}"),
-        Err(VerifyError::Recording(error)) => panic!("{error}"),
-    }
-}
-
 #[test]
 fn game_recording_is_read_or_refused() {
     let scratch = TempDir::new().unwrap();
@@ -108,7 +96,7 @@ fn game_recording_is_read_or_refused() {
     let outcomes = fuzz("games", 800, |rng| {
         let dir = scratch.path().join("changed");
         fs::create_dir(&dir).unwrap();
-        let label = read_mutated(&valid, &dir, rng);
+        let label = label(&read(&valid.write_mutated(&dir, rng)));
         fs::remove_dir_all(&dir).unwrap();
         label.to_owned()
     });
