@@ -2,6 +2,7 @@
 
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime, RuntimeFiles};
+use faceoff_types::{AgentFaultKind, Phase};
 use faceoff_wire::Manifest;
 use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
 use tempfile::TempDir;
@@ -145,4 +146,11 @@ pub fn unconfined() -> AgentEnvironment {
         },
     );
     env
+}
+
+/// Asserts that an agent exceeded the time limit of this phase.
+#[track_caller]
+pub fn assert_timed_out(fault: &AgentFaultKind, expected: Phase) {
+    let is_expected = matches!(fault, AgentFaultKind::TimedOut { phase, .. } if *phase == expected);
+    assert!(is_expected, "{fault:?}");
 }

@@ -3,7 +3,7 @@
 //! counters.
 
 use crate::{
-    agents::{Agent, sandboxed},
+    agents::{Agent, assert_timed_out, sandboxed},
     shard::{RecordingObserver, spec},
 };
 use faceoff_runner::{
@@ -85,16 +85,7 @@ fn validation_timeout_by_the_host_is_a_platform_fault() {
     else {
         panic!("{:?}", report.failure)
     };
-    assert!(
-        matches!(
-            fault.fault,
-            AgentFaultKind::TimedOut {
-                phase: Phase::Step,
-                ..
-            }
-        ),
-        "{fault:?}"
-    );
+    assert_timed_out(&fault.fault, Phase::Step);
     assert!(wait.wall >= Duration::from_millis(100), "{wait:?}");
     for message in [failure.to_string(), report.log] {
         assert!(
@@ -118,16 +109,7 @@ fn start_up_limit_excludes_host_interference() {
     else {
         panic!("{:?}", report.failure)
     };
-    assert!(
-        matches!(
-            fault.fault,
-            AgentFaultKind::TimedOut {
-                phase: Phase::StartUp,
-                ..
-            }
-        ),
-        "{fault:?}"
-    );
+    assert_timed_out(&fault.fault, Phase::StartUp);
     // The agent never starts; as long as the monitor blames the host, it is a platform fault.
     let result = run_validation(
         &Agent::with("def on_hello(hello): time.sleep(10_000)"),

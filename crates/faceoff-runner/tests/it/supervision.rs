@@ -2,14 +2,14 @@
 //! death.
 
 use crate::{
-    agents::{Agent, sandboxed},
+    agents::{Agent, assert_timed_out, sandboxed},
     shard::{RecordingObserver, spec},
 };
 use faceoff_runner::{
     AgentEnvironment, InterferenceMonitor, PlatformFault, Supervision, run_shard,
     run_shard_monitored, stuck_threads,
 };
-use faceoff_types::{AgentFaultKind, Phase, Task};
+use faceoff_types::{Phase, Task};
 use std::{
     fs,
     sync::{
@@ -85,16 +85,7 @@ fn agent_that_blocks_its_evaluator_is_killed_and_blamed() {
     assert_eq!(report.outcomes.len(), 2);
     for outcome in &report.outcomes {
         let fault = &outcome.fault.as_ref().unwrap().fault;
-        assert!(
-            matches!(
-                fault,
-                AgentFaultKind::TimedOut {
-                    phase: Phase::Step,
-                    ..
-                }
-            ),
-            "{fault:?}"
-        );
+        assert_timed_out(fault, Phase::Step);
     }
     assert_eq!(stuck_threads(), [] as [String; 0]);
 }

@@ -1,32 +1,15 @@
 //! The perturbation `delay`, which is for rehearsals on a real robot: the agent sees the puck late, its actions are applied late, and the
 //! table is tilted and damps the puck differently (`docs/rules.md`, "Perturbations").
 
+use crate::held_arm::{episode, hold};
 use faceoff_sim::{
-    Episode, Interpolation, PerturbationSettings, Plant, World, model::INITIAL_Q,
+    Episode, Interpolation, PerturbationSettings, Plant, World,
     perturbation::rehearsal_table::RehearsalTable, stream::RandomStream,
 };
 use faceoff_types::{Factor, Factors, Seed, Task};
 
 /// Distance of the robot's base from the table's centre along x, m.
 const BASE_X_M: f64 = 1.51;
-
-fn episode(task: Task, factors: Factors, seed: u64) -> Episode {
-    Episode::new(
-        task,
-        Interpolation::Cubic,
-        factors,
-        &PerturbationSettings::default(),
-        &Plant::nominal(),
-        Seed::from_number(seed),
-    )
-}
-
-/// An action that holds the initial position: seven positions, rad, and seven velocities, rad/s.
-fn hold() -> [f64; 14] {
-    Interpolation::Cubic.hold_position(&INITIAL_Q)[..14]
-        .try_into()
-        .unwrap()
-}
 
 #[test]
 fn puck_is_observed_one_or_two_control_steps_late() {

@@ -2,7 +2,7 @@
 //! simulator), and the rules of `docs/rules.md` ("Tournament") hold. A *rally* lasts from a serve to a goal, a foul or another end.
 //! Robots are 0 and 1.
 
-use crate::reference::{array, max_difference, recording};
+use crate::reference::{array, cases, max_difference};
 use faceoff_sim::{
     Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, World,
     game::referee::Referee,
@@ -49,8 +49,7 @@ fn serving_robot(value: &Value) -> usize {
 
 #[test]
 fn goals_fouls_and_stuck_pucks_match_the_recording() {
-    let recording = recording("game_rules");
-    for case in recording["cases"].as_array().unwrap() {
+    for case in cases("game_rules") {
         let name = case["name"].as_str().unwrap();
         let mut referee = Referee::new(serving_robot(&case["start_side_before"]));
         referee.fouls = pair(&case["faults_before"]);

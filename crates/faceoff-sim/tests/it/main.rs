@@ -19,6 +19,7 @@ mod episode_step;
 mod episodes;
 mod game;
 mod golden;
+mod held_arm;
 mod hostile;
 mod kinematics;
 mod mallet_impact;

@@ -1,9 +1,9 @@
 //! The perturbations have the statistics of the rules (`docs/rules.md`, "Perturbations"), and they are independent: no *factor* (kind of
 //! perturbation) changes the random numbers of another.
 
+use crate::held_arm::{episode, hold};
 use faceoff_sim::{
-    Episode, Interpolation, PerturbationSettings, Plant,
-    model::INITIAL_Q,
+    PerturbationSettings, Plant,
     perturbation::{
         disturbance::Disturbance, noise::ObservationNoise, tracking_loss::TrackingLoss,
     },
@@ -23,24 +23,6 @@ fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (
         mean,
         (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt(),
-    )
-}
-
-/// An action that holds the initial position: seven positions, rad, and seven velocities, rad/s.
-fn hold() -> [f64; 14] {
-    let mut action = [0.0; 14];
-    action[..7].copy_from_slice(&INITIAL_Q);
-    action
-}
-
-fn episode(task: Task, factors: Factors, seed: u64) -> Episode {
-    Episode::new(
-        task,
-        Interpolation::Cubic,
-        factors,
-        &PerturbationSettings::default(),
-        &Plant::nominal(),
-        Seed::from_number(seed),
     )
 }
 

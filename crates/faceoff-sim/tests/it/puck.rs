@@ -2,7 +2,7 @@
 //! *Rims* are the walls of the table. States are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
 
 use crate::{
-    reference::{array, max_difference, quantile, recording, rows},
+    reference::{array, cases, max_difference, quantile, rows},
     replay::{Bounce, bounces, first_touch, slide, speed},
 };
 
@@ -19,7 +19,7 @@ fn is_near_rim(state: &[f64; 6]) -> bool {
 
 #[test]
 fn slides_match_until_the_first_rim_contact() {
-    for case in recording("puck_slide")["cases"].as_array().unwrap() {
+    for case in cases("puck_slide") {
         let recorded: Vec<[f64; 6]> = rows(&case["state"]);
         let simulated = slide(array(&case["init"]), recorded.len());
         for (simulated, recorded) in simulated.iter().zip(&recorded) {

@@ -15,6 +15,11 @@ pub fn recording(name: &str) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
+/// The cases of a recording.
+pub fn cases(name: &str) -> Vec<Value> {
+    recording(name)["cases"].as_array().unwrap().clone()
+}
+
 /// All numbers of a nested array, in order.
 pub fn flat(value: &Value) -> Vec<f64> {
     match value {

@@ -2,7 +2,7 @@
 //! episodes. The tests and `examples/fidelity.rs` compare the results. `docs/simulator.md` ("Compared with recordings") lists the
 //! recordings. States of the puck are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
 
-use crate::reference::{array, flat, max_difference, recording, rows};
+use crate::reference::{array, cases, flat, max_difference, recording, rows};
 use faceoff_sim::{
     Episode, Interpolation, MalletState, PerturbationSettings, Plant, SUBSTEPS, World,
 };
@@ -85,13 +85,7 @@ pub fn bounces() -> Vec<Bounce> {
             recorded,
         }
     };
-    let recording = recording("rim_bounce");
-    recording["cases"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(replay)
-        .collect()
+    cases("rim_bounce").iter().map(replay).collect()
 }
 
 /// Differences between a recorded impact of a mallet on the puck (recording `mallet_impact`) and the simulated one, at the end.
@@ -145,13 +139,7 @@ pub fn impacts() -> Vec<Impact> {
             position_error_m: (simulated[0] - last[0]).hypot(simulated[1] - last[1]),
         }
     };
-    let recording = recording("mallet_impact");
-    recording["cases"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(replay)
-        .collect()
+    cases("mallet_impact").iter().map(replay).collect()
 }
 
 /// A recorded episode (recordings `episodes_*`) that is simulated with its recorded actions, whatever the simulated puck does, and the
