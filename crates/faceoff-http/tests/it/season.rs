@@ -68,6 +68,9 @@ async fn closing_the_season_reveals_its_secret() {
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
         .problem(409, "season-closed", &closed_words);
+    site.post("/api/v1/stages", Some(ADMIN), &json!({ "name": "Late" }))
+        .await
+        .problem(409, "season-closed", &closed_words);
     site.next_day();
     let activate = format!("{submission}/activate");
     site.post(&activate, Some(&team.token), &json!({}))
