@@ -3,6 +3,7 @@
 
 mod failure;
 mod game;
+mod hash_text;
 
 use crate::exit::Exit;
 use anyhow::Context;
@@ -15,6 +16,7 @@ use faceoff_dataset::{
 use faceoff_types::{EvaluationResult, Seed, StageId};
 use failure::{Failure, check_hash};
 use game::SimulatedGame;
+use hash_text::hash_text;
 use indicatif::{ProgressBar, ProgressStyle};
 use jiff::civil::Date;
 use serde::Serialize;
@@ -227,11 +229,6 @@ pub fn verified_line(path: &Path) -> anyhow::Result<String> {
     };
     let simulated = command.verify_dataset()?;
     Ok(describe(path, &simulated))
-}
-
-/// The hash of an archive as the end of a sentence; empty for a folder.
-fn hash_text(blake3: Option<&String>) -> String {
-    blake3.map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"))
 }
 
 fn describe(path: &Path, simulated: &SimulatedEvaluation) -> String {

@@ -2,7 +2,7 @@
 
 use super::{
     failure::{Failure, check_hash},
-    hash_text,
+    hash_text::hash_text,
 };
 use anyhow::Context;
 use faceoff_dataset::{
