@@ -14,6 +14,7 @@ mod users;
 mod webhooks;
 
 pub use boards::*;
+pub use double_option::OrNull;
 pub use episodes::*;
 pub use links::*;
 pub use stages::*;

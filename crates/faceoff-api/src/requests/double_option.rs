@@ -2,6 +2,11 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+/// A new value of a setting that can be unset, which is null in JSON.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct OrNull<T>(pub Option<T>);
+
 /// Deserialises a field that is present, also null: `Some(None)` if `T` is an option. With `serde(default)`, a field that is
 /// left out is `None`.
 pub(super) fn deserialize_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(

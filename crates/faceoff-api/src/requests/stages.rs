@@ -4,7 +4,7 @@
 mod options;
 mod schema;
 
-use super::double_option::deserialize_some;
+use super::double_option::{OrNull, deserialize_some};
 use crate::objects_only;
 use faceoff_types::{
     CountingResult, DayDeadline, InvalidStageRules, PerturbationSettings, Profile, Publication,
@@ -14,11 +14,6 @@ use faceoff_types::{
 use jiff::Timestamp;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use utoipa::ToSchema;
-
-/// A new value of a setting that can be unset, which is null in JSON.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct OrNull<T>(pub Option<T>);
 
 /// Changes of a stage. Fields that are left out stay as they are.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]

@@ -1,19 +1,15 @@
 //! A form with the most important settings of a stage, and its conversion into requests of the API.
 
 mod inputs;
+mod texts;
 
 use faceoff_api::requests::{NewStage, StagePatch};
 use faceoff_service::problem::Problem;
 use faceoff_store::Stage;
 pub(super) use inputs::InputKind;
 use inputs::{GROUPS, Input, InputGroup, NAME};
-use serde::Deserialize;
-use std::{collections::BTreeMap, iter};
-
-/// Texts by the name of their input.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(transparent)]
-pub(super) struct StageForm(BTreeMap<String, String>);
+use std::iter;
+pub(super) use texts::StageForm;
 
 fn inputs() -> impl Iterator<Item = &'static Input> {
     let grouped = GROUPS.iter().flat_map(|group| group.inputs);
@@ -48,15 +44,6 @@ impl StageForm {
     /// The inputs, except that of the name.
     pub(super) const fn groups(&self) -> &'static [InputGroup] {
         &GROUPS
-    }
-
-    /// Text of an input; empty if it is not in the form, like a checkbox that is not ticked.
-    pub(super) fn text(&self, input: &str) -> &str {
-        self.0.get(input).map_or("", String::as_str)
-    }
-
-    pub(super) fn is_ticked(&self, checkbox: &str) -> bool {
-        !self.text(checkbox).is_empty()
     }
 
     fn differs(&self, other: &Self, input: &Input) -> bool {

@@ -1,6 +1,6 @@
 //! Settings of a stage that are written differently on the command line than in JSON.
 
-use super::OrNull;
+use crate::requests::double_option::OrNull;
 use clap::{ArgMatches, Args, Command, FromArgMatches, Id, error::ErrorKind};
 use faceoff_types::{PerturbationSettings, Runtimes, Schedule};
 use jiff::civil::{Date, Time};

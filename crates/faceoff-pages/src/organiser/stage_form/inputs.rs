@@ -1,6 +1,6 @@
 //! The inputs of the form of a stage: their labels, their texts for a stage, and the settings that are read from them.
 
-use super::StageForm;
+use super::texts::StageForm;
 use faceoff_api::requests::{OrNull, StagePatch};
 use faceoff_service::problem::Problem;
 use faceoff_store::Stage;
