@@ -122,13 +122,17 @@ impl AppState {
         tournament: TournamentId,
         compute: impl Future<Output = Result<T, Problem>>,
     ) -> Result<Arc<T>, Problem> {
-        // Read before the computation, which may then include a later change, too.
         let key = (self.store.newest_change().await?, tournament);
-        let compute = async {
-            let _permit = self.tournament_computation.acquire().await;
-            compute.await.map(Arc::new)
-        };
-        answers.get(key, compute).await
+        if let Some(answer) = answers.cached(&key).await {
+            return Ok(answer);
+        }
+        let _permit = self.tournament_computation.acquire().await;
+        // Read again after the wait, so that all who waited share one computation, but before it: it may then include a later
+        // change, too.
+        let key = (self.store.newest_change().await?, tournament);
+        answers
+            .get(key, async { compute.await.map(Arc::new) })
+            .await
     }
 
     /// Counts a request with a token.

@@ -75,7 +75,7 @@ impl Database {
                     tracing::warn!(
                         bytes = bytes_before,
                         cause = outcome.err().map_or_else(
-                            || "another process reads the database".to_owned(),
+                            || "a read is still running, here or in another process".to_owned(),
                             |error| error.to_string()
                         ),
                         "the database's log cannot be emptied and grows; trying again"

@@ -64,7 +64,7 @@ pub use operations::{
     rerun::RERUN_PAUSES_S,
     retention::{FILES_KEPT_FOR, RemovalSummary},
     runs::RunOwner,
-    snapshot::Snapshot,
+    snapshot::{MissingSummaries, Snapshot},
     stages::{NewStage, StageChange},
     submission_description::SubmissionDescription,
     teams::TeamChange,

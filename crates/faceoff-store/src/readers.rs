@@ -25,19 +25,26 @@ tokio::task_local! {
     static GROUP: ReadGroup;
 }
 
-/// Reads that share one transaction. It begins with the first of them.
+/// Reads that share one transaction.
 #[derive(Debug, Clone)]
 struct ReadGroup {
     /// The database; a task may read others as well.
     file: Arc<Path>,
-    transaction: Arc<Mutex<Option<GroupTransaction>>>,
+    state: Arc<Mutex<GroupState>>,
 }
 
-/// The transaction of a group, with the permit that counts it.
-#[derive(Debug)]
-pub(crate) struct GroupTransaction {
-    transaction: Transaction<'static, Sqlite>,
-    _permit: OwnedSemaphorePermit,
+/// A group begins with its first read.
+#[derive(Debug, Default)]
+pub(crate) enum GroupState {
+    #[default]
+    NotBegun,
+    Begun {
+        transaction: Transaction<'static, Sqlite>,
+        /// Counts the transaction.
+        _permit: OwnedSemaphorePermit,
+    },
+    /// All connections for groups were in use: its reads are single ones.
+    Ungrouped,
 }
 
 /// The read connections of a database.
@@ -47,7 +54,7 @@ pub(crate) struct Readers {
     /// Connections for single reads.
     single: SqlitePool,
     /// Connections for groups of reads. They are separate, because a group keeps its connection while it waits for other tasks,
-    /// which may need one for themselves.
+    /// which need one for themselves.
     groups: SqlitePool,
     /// One permit per connection for groups.
     group_permits: Arc<Semaphore>,
@@ -77,66 +84,66 @@ impl Readers {
 
     /// Waits for running reads and keeps others from starting.
     pub(crate) async fn all(&self) -> sqlx::Result<AllReaders> {
+        // Groups first: one that has begun may wait for a task that needs a connection for a single read.
+        let groups = Arc::clone(&self.group_permits).acquire_many_owned(READ_GROUPS);
+        let groups = groups.await.map_err(|_| sqlx::Error::PoolClosed)?;
         let mut single = Vec::with_capacity(SINGLE_READS as usize);
         for _ in 0..SINGLE_READS {
             single.push(self.single.acquire().await?);
         }
         Ok(AllReaders {
             _single: single,
-            _groups: self.group_permit(READ_GROUPS).await?,
+            _groups: groups,
         })
     }
 
     /// A connection for one read.
     pub(crate) async fn acquire(&self) -> sqlx::Result<ReadConnection> {
-        match self.group() {
-            Some(group) => self.in_group(group).await,
+        match self.in_group().await? {
+            Some(connection) => Ok(connection),
             None => Ok(ReadConnection::Single(self.single.acquire().await?)),
         }
     }
 
     /// A connection for several reads that see the same state.
     pub(crate) async fn begin(&self) -> sqlx::Result<ReadConnection> {
-        match self.group() {
-            Some(group) => self.in_group(group).await,
+        match self.in_group().await? {
+            Some(connection) => Ok(connection),
             None => Ok(ReadConnection::Transaction(self.single.begin().await?)),
         }
     }
 
-    /// Runs a future, all of whose reads see the same state of this database. Reads in tasks that it spawns are not included.
+    /// Runs a future, all of whose reads see the same state of this database, unless all connections for groups are in use. Reads
+    /// in tasks that it spawns are not included.
     pub(crate) async fn consistent<T>(&self, reads: impl Future<Output = T>) -> T {
         let group = ReadGroup {
             file: Arc::clone(&self.file),
-            transaction: Arc::default(),
+            state: Arc::default(),
         };
         GROUP.scope(group, reads).await
     }
 
-    fn group(&self) -> Option<ReadGroup> {
+    /// The connection of the current task's group; `None` if it is in none, or the group has no connection.
+    async fn in_group(&self) -> sqlx::Result<Option<ReadConnection>> {
         let group = GROUP.try_with(ReadGroup::clone).ok();
-        group.filter(|group| Arc::ptr_eq(&group.file, &self.file))
-    }
-
-    async fn in_group(&self, group: ReadGroup) -> sqlx::Result<ReadConnection> {
-        let mut transaction = group.transaction.lock_owned().await;
-        if transaction.is_none() {
-            let permit = self.group_permit(1).await?;
-            *transaction = Some(GroupTransaction {
-                transaction: self.groups.begin().await?,
-                _permit: permit,
-            });
+        let Some(group) = group.filter(|group| Arc::ptr_eq(&group.file, &self.file)) else {
+            return Ok(None);
+        };
+        let mut state = group.state.lock_owned().await;
+        if let GroupState::NotBegun = *state {
+            *state = match Arc::clone(&self.group_permits).try_acquire_owned() {
+                Ok(permit) => GroupState::Begun {
+                    transaction: self.groups.begin().await?,
+                    _permit: permit,
+                },
+                Err(_) => GroupState::Ungrouped,
+            };
         }
-        let connection = OwnedMutexGuard::try_map(transaction, |begun| {
-            begun.as_mut().map(|group| &mut group.transaction)
+        let connection = OwnedMutexGuard::try_map(state, |state| match state {
+            GroupState::Begun { transaction, .. } => Some(transaction),
+            GroupState::NotBegun | GroupState::Ungrouped => None,
         });
-        connection
-            .map(ReadConnection::Group)
-            .map_err(|_| sqlx::Error::PoolClosed)
-    }
-
-    async fn group_permit(&self, count: u32) -> sqlx::Result<OwnedSemaphorePermit> {
-        let permits = Arc::clone(&self.group_permits).acquire_many_owned(count);
-        permits.await.map_err(|_| sqlx::Error::PoolClosed)
+        Ok(connection.ok().map(ReadConnection::Group))
     }
 
     /// Waits for running reads and closes the connections.
@@ -150,7 +157,7 @@ impl Readers {
 pub(crate) enum ReadConnection {
     Single(PoolConnection<Sqlite>),
     Transaction(Transaction<'static, Sqlite>),
-    Group(OwnedMappedMutexGuard<Option<GroupTransaction>, Transaction<'static, Sqlite>>),
+    Group(OwnedMappedMutexGuard<GroupState, Transaction<'static, Sqlite>>),
 }
 
 impl Deref for ReadConnection {

@@ -59,7 +59,8 @@ impl Store {
     }
 
     /// Runs a future, for example the handler of a page, all of whose reads see the same state of the database. Its writes, and
-    /// reads in tasks that it spawns, are not included. It must not read what it has written itself.
+    /// reads in tasks that it spawns, are not included. It must not read what it has written itself. While very many such futures
+    /// run at once, further ones read one by one instead of waiting.
     pub async fn read_consistently<T>(&self, reads: impl Future<Output = T>) -> T {
         self.database.read.consistent(reads).await
     }

@@ -189,7 +189,7 @@ impl LocalServer {
         let (recording, now) = (commit.recording.clone(), self.clock.now());
         let status = lease_status(self.store.commit_shard(claim, commit, now).await?);
         // Runs with recordings are scored; the others end with their last shard.
-        if recording.is_none() {
+        if status == LeaseStatus::Held && recording.is_none() {
             episode_summaries::store_missing(&self.store, now).await;
         }
         if status == LeaseStatus::Lost
@@ -245,7 +245,9 @@ impl LocalServer {
             .store
             .finish_evaluation(claim, result, dataset, blake3, now);
         let status = lease_status(finished.await?);
-        episode_summaries::store_missing(&self.store, now).await;
+        if status == LeaseStatus::Held {
+            episode_summaries::store_missing(&self.store, now).await;
+        }
         let artifacts = self.store.artifacts();
         let cleaned = match (status, dataset.rsplit_once('/')) {
             // Removes datasets of scorings that were killed between upload and commit.

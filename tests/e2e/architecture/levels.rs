@@ -69,7 +69,11 @@ pub fn violations(folder: &Path, levels: &Levels) -> Vec<String> {
             let (Some(from), Some(to)) = (module_of(file), module_of(target)) else {
                 continue;
             };
-            if level_of(&from) < level_of(&to) {
+            // A module without a level is reported above.
+            let is_upward = level_of(&from)
+                .zip(level_of(&to))
+                .is_some_and(|(from, to)| from < to);
+            if is_upward {
                 let file = file.strip_prefix(folder).unwrap_or(file).display();
                 violations.push(format!("{file} of {from} uses {name} of {to}"));
             }

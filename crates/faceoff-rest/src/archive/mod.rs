@@ -4,6 +4,7 @@
 
 use faceoff_archive::{Edition, FORMAT, Manifest};
 use faceoff_live::LiveState;
+use faceoff_scoring::EpisodeSummary;
 use faceoff_service::{
     app::{App, AppState},
     config::HttpConfig,
@@ -11,7 +12,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
-use faceoff_store::{ArtifactOwner, Snapshot};
+use faceoff_store::{ArtifactOwner, MissingSummaries, Snapshot};
 use faceoff_types::Clock;
 use files::Files;
 use jiff::Timestamp;
@@ -74,7 +75,13 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
     let now = app.config.clock.now();
     let snapshot = app
         .store
-        .snapshot(folder.path(), store_edition(edition), PROGRAM, now)
+        .snapshot(
+            folder.path(),
+            store_edition(edition),
+            PROGRAM,
+            &missing_summaries(app).await?,
+            now,
+        )
         .await?;
     let Some(archived) = snapshot.store().archived_season().cloned() else {
         return Err(Problem::internal("a snapshot has no archive metadata"));
@@ -143,6 +150,18 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
         local_paths,
         _folder: folder,
     })
+}
+
+/// The summaries of runs that have ended since the worker last stored summaries, or whose season is imported.
+async fn missing_summaries(app: &App) -> Result<MissingSummaries, Problem> {
+    let version = EpisodeSummary::VERSION;
+    let mut of_runs = Vec::new();
+    for run in app.store.unsummarised_runs(version).await? {
+        let summary = app.summaries.load_run(run).await?;
+        let json = serde_json::to_string(&*summary).map_err(Problem::internal)?;
+        of_runs.push((run, json));
+    }
+    Ok(MissingSummaries { version, of_runs })
 }
 
 /// An application state that shows the snapshot at its time, as a server with the imported archive does.

@@ -157,7 +157,11 @@ const STEPS: &[(Scope, &str)] = &[
 
 /// Removes from a copy what its edition of the archive must not contain. Unused pages of the file still hold the
 /// removed data, so it must be copied once more.
-pub(crate) async fn scrub(connection: &mut SqliteConnection, edition: Edition) -> Result<()> {
+pub(crate) async fn scrub(
+    connection: &mut SqliteConnection,
+    edition: Edition,
+    summary_version: u32,
+) -> Result<()> {
     let triggers: Vec<(String, String)> =
         sqlx::query_as("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'")
             .fetch_all(&mut *connection)
@@ -166,7 +170,7 @@ pub(crate) async fn scrub(connection: &mut SqliteConnection, edition: Edition) -
         run(connection, format!("DROP TRIGGER {name}")).await?;
     }
     if edition == Edition::Public {
-        check_summarised(connection).await?;
+        check_summarised(connection, summary_version).await?;
         forget_lifted_rulings(connection).await?;
         keep_public_events(connection).await?;
     }
@@ -227,15 +231,16 @@ async fn keep_public_events(connection: &mut SqliteConnection) -> Result<()> {
 
 /// Refuses to remove the episodes of a result that has no summary yet: with neither, its board could not be
 /// shown.
-async fn check_summarised(connection: &mut SqliteConnection) -> Result<()> {
+async fn check_summarised(connection: &mut SqliteConnection, version: u32) -> Result<()> {
     let unsummarised: u32 = sqlx::query_scalar(
         "SELECT COUNT(*) FROM runs r
            WHERE r.state = 'played' AND r.cleared_at IS NULL
-             AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id)
+             AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
              AND (EXISTS (SELECT 1 FROM evaluations e WHERE e.run_id = r.id AND e.state = 'finished')
                   OR EXISTS (SELECT 1 FROM ablation_runs p JOIN ablations a ON a.id = p.ablation_id
                              WHERE p.run_id = r.id AND a.finished_at IS NOT NULL))",
     )
+    .bind(version)
     .fetch_one(connection)
     .await?;
     if unsummarised > 0 {

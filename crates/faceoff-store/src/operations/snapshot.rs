@@ -11,9 +11,10 @@ use crate::{
     store::Store,
     tables::{
         archive::{self, ArchivedArtifact, ArchivedSeason, Edition},
-        days, evaluations, proposed_evaluations, season, stages,
+        days, episode_summaries, evaluations, proposed_evaluations, season, stages,
     },
 };
+use faceoff_types::RunId;
 use jiff::Timestamp;
 use sqlx::{
     Connection, SqliteConnection,
@@ -34,17 +35,28 @@ pub struct Snapshot {
     pub open_evaluations: u32,
 }
 
+/// Episode summaries for an archive, which the season does not have yet: the public edition has no other data about episodes.
+#[derive(Debug, Clone, Default)]
+pub struct MissingSummaries {
+    /// The current version of their format.
+    pub version: u32,
+    /// In JSON.
+    pub of_runs: Vec<(RunId, String)>,
+}
+
 impl Store {
     /// Copies the database as it is now into `folder`, without credentials, open jobs and the secret of a running
     /// season. The public edition also lacks users, bundles, logs, and hidden scores. `program`, the name and version of
-    /// this program, is recorded in the copy. Takes disk space and time in proportion to the database; writers are not blocked. [`StoreError::Conflict`] if a public
-    /// archive is asked for the organiser's edition.
+    /// this program, is recorded in the copy. The copy gets the episode summaries that the database lacks. Takes disk space and
+    /// time in proportion to the database; writers are not blocked. [`StoreError::Conflict`] if a public archive is asked for the
+    /// organiser's edition, or if a result without a summary came in meanwhile.
     #[boxed]
     pub async fn snapshot(
         &self,
         folder: &Path,
         edition: Edition,
         program: &str,
+        summaries: &MissingSummaries,
         now: Timestamp,
     ) -> Result<Snapshot> {
         if let Some(archived) = &self.archive
@@ -72,7 +84,10 @@ impl Store {
             open_evaluations += proposed_evaluations::count_open(&mut connection, None).await?;
         }
         describe_archive(&mut connection, edition, program, now).await?;
-        scrub(&mut connection, edition).await?;
+        for (run, summary) in &summaries.of_runs {
+            episode_summaries::put(&mut connection, *run, summaries.version, summary).await?;
+        }
+        scrub(&mut connection, edition, summaries.version).await?;
         connection.close().await?;
         let database = Database::open(&file).await?;
         let archived = archive::read(&mut *database.read.acquire().await?).await?;

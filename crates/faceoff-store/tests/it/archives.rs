@@ -119,14 +119,15 @@ async fn count(file: &Path, table: &str) -> i64 {
 
 /// A folder with the database of an archive of this edition.
 async fn export(f: &TestStore, edition: Edition) -> tempfile::TempDir {
-    for run in f.store.unsummarised_runs(1).await.unwrap() {
-        let stored = f.store.store_episode_summary(run, 1, "{}", f.now);
-        stored.await.unwrap();
-    }
+    let runs = f.store.unsummarised_runs(1).await.unwrap();
+    let summaries = MissingSummaries {
+        version: 1,
+        of_runs: runs.iter().map(|run| (*run, "{}".to_owned())).collect(),
+    };
     let folder = tempfile::tempdir().unwrap();
     let snapshot = f
         .store
-        .snapshot(folder.path(), edition, "a test", f.now)
+        .snapshot(folder.path(), edition, "a test", &summaries, f.now)
         .await
         .unwrap();
     let file = folder.path().join("faceoff.sqlite3");
@@ -280,9 +281,10 @@ async fn public_archive_has_results_without_episodes() {
     let alpha = f.valid_submission_of("Alpha").await;
     let evaluation = f.evaluate(alpha.id, &one_shard_plan()).await;
     f.run_all_with_score(1.0).await;
+    let none = MissingSummaries::default();
     let public = f
         .store
-        .snapshot(f.folder.path(), Edition::Public, "a test", f.now);
+        .snapshot(f.folder.path(), Edition::Public, "a test", &none, f.now);
     let error = public.await.unwrap_err();
     assert!(
         matches!(&error, StoreError::Conflict(reason) if reason.contains("1 results came in")),
@@ -300,6 +302,12 @@ async fn public_archive_has_results_without_episodes() {
         .await
         .unwrap();
     assert_eq!(summaries.len(), 1);
+    let unsummarised = f.store.unsummarised_runs(1).await.unwrap();
+    assert_eq!(
+        unsummarised,
+        [evaluation.run],
+        "only the copy has the summary"
+    );
     let outcomes = imported.outcomes(evaluation.run).await;
     assert!(
         matches!(outcomes, Err(StoreError::OutcomesRemoved { at }) if at == f.now),
@@ -363,7 +371,13 @@ async fn snapshot_is_unaffected_by_later_changes() {
     let folder = tempfile::tempdir().unwrap();
     let snapshot = f
         .store
-        .snapshot(folder.path(), Edition::Organiser, "a test", f.now)
+        .snapshot(
+            folder.path(),
+            Edition::Organiser,
+            "a test",
+            &MissingSummaries::default(),
+            f.now,
+        )
         .await
         .unwrap();
     assert_eq!(snapshot.open_evaluations, 2);
@@ -393,12 +407,19 @@ async fn public_archive_cannot_become_organiser_edition() {
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
     let other = tempfile::tempdir().unwrap();
-    let snapshot = imported.snapshot(other.path(), Edition::Organiser, "a test", f.now);
+    let none = MissingSummaries::default();
+    let snapshot = imported.snapshot(other.path(), Edition::Organiser, "a test", &none, f.now);
     let error = snapshot.await.unwrap_err();
     assert!(error.to_string().contains("public archive"), "{error}");
     assert!(
         imported
-            .snapshot(other.path(), Edition::Public, "a test", f.now)
+            .snapshot(
+                other.path(),
+                Edition::Public,
+                "a test",
+                &MissingSummaries::default(),
+                f.now
+            )
             .await
             .is_ok()
     );
@@ -544,7 +565,13 @@ async fn public_archive_has_only_games_that_count() {
         let folder = tempfile::tempdir().unwrap();
         let snapshot = f
             .store
-            .snapshot(folder.path(), edition, "a test", f.now)
+            .snapshot(
+                folder.path(),
+                edition,
+                "a test",
+                &MissingSummaries::default(),
+                f.now,
+            )
             .await
             .unwrap();
         let artifacts = snapshot.artifacts_to_archive().await.unwrap();

@@ -11,10 +11,15 @@ async fn reads_of_a_group_see_one_state() {
     let f = TestStore::new().await;
     let other = TestStore::new().await;
     let store = f.store.clone();
-    store
+    let _f = store
         .read_consistently(async {
             assert_eq!(count_submissions(&store).await, 0);
-            f.valid_submission_of("Alpha").await;
+            // Another task writes, because this setup reads what it has written.
+            let written = tokio::spawn(async move {
+                f.valid_submission_of("Alpha").await;
+                f
+            });
+            let f = written.await.unwrap();
             assert_eq!(
                 count_submissions(&store).await,
                 0,
@@ -25,6 +30,7 @@ async fn reads_of_a_group_see_one_state() {
             assert_eq!(seen.await.unwrap(), 1, "another task reads for itself");
             other.valid_submission_of("Beta").await;
             assert_eq!(count_submissions(&other.store).await, 1, "another database");
+            f
         })
         .await;
     assert_eq!(count_submissions(&store).await, 1);

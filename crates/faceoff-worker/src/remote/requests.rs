@@ -335,7 +335,7 @@ impl RequestHandler {
 
 /// The response if the database cannot be read.
 fn unknown(worker: &WorkerName, error: &StoreError) -> WorkerResponse {
-    tracing::warn!(%worker, %error, "the queue could not be read for a worker's request");
+    tracing::warn!(%worker, %error, "the database could not be read for a worker's request");
     WorkerResponse::Unknown
 }
 

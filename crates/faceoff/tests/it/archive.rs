@@ -8,7 +8,7 @@ use faceoff_http::{
 };
 use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
-use faceoff_store::{Actor, ClaimedJob, Job, RunPlan, Store};
+use faceoff_store::{Actor, ClaimedJob, Job, MissingSummaries, RunPlan, Store};
 use faceoff_testkit::{
     bundle_ref, create_team, new_store, one_shard_plan, outcome, rules_and_settings, shard_commit,
     shard_outcomes, submit, valid_outcome,
@@ -403,7 +403,13 @@ async fn refused_import_leaves_nothing() {
     let folder = scratch.path();
     let store = Store::open(&folder.join("running")).await.unwrap();
     let snapshot = store
-        .snapshot(folder, faceoff_store::Edition::Public, "a test", now())
+        .snapshot(
+            folder,
+            faceoff_store::Edition::Public,
+            "a test",
+            &MissingSummaries::default(),
+            now(),
+        )
         .await
         .unwrap();
     let database = folder.join("database");
@@ -490,17 +496,18 @@ async fn data_folder_of_an_earlier_version_can_be_archived() {
         .unpack(folder.path())
         .unwrap();
     let store = Store::open(&folder.path().join("data")).await.unwrap();
-    for run in store.unsummarised_runs(0).await.unwrap() {
-        let stored = store.store_episode_summary(run, 0, "{}", now());
-        stored.await.unwrap();
-    }
+    let runs = store.unsummarised_runs(0).await.unwrap();
+    let summaries = MissingSummaries {
+        version: 0,
+        of_runs: runs.iter().map(|run| (*run, "{}".to_owned())).collect(),
+    };
     for edition in [
         faceoff_store::Edition::Public,
         faceoff_store::Edition::Organiser,
     ] {
         let target = tempfile::tempdir().unwrap();
         let snapshot = store
-            .snapshot(target.path(), edition, "a test", now())
+            .snapshot(target.path(), edition, "a test", &summaries, now())
             .await
             .unwrap();
         let file = target.path().join("faceoff.sqlite3");
@@ -527,7 +534,15 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
     let folder = scratch.path();
     let store = Store::open(&folder.join("running")).await.unwrap();
     let edition = faceoff_store::Edition::Public;
-    let snapshot = store.snapshot(folder, edition, "a test", now()).await;
+    let snapshot = store
+        .snapshot(
+            folder,
+            edition,
+            "a test",
+            &MissingSummaries::default(),
+            now(),
+        )
+        .await;
     let database = folder.join("database");
     snapshot.unwrap().finish(&database).await.unwrap();
     let database = fs::read(database).unwrap();
