@@ -158,7 +158,7 @@ async fn ablation_is_no_evaluation_but_is_linked_from_it() {
 /// The stored summary is changed to one success more than the outcomes have. A response that shows it was made from the
 /// summary, not from the outcomes.
 #[tokio::test]
-async fn reading_an_ablation_stores_nothing_and_prefers_the_stored_summary() {
+async fn viewing_an_ablation_stores_nothing_and_reads_the_summary() {
     let mut site = Site::start().await;
     let (_, api, page) = team_with_submission(&site).await;
     site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 4 }))

@@ -79,9 +79,10 @@ fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) ->
             ));
         }
     }
-    lines.push(format!(
+    lines.push(
         "\nto ideal: difference in percentage points; lost, gained: episodes that succeed only in the ideal profile, \
         only in this one; p: McNemar's exact test"
-    ));
+            .to_owned(),
+    );
     lines.join("\n") + "\n"
 }
