@@ -73,13 +73,18 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
         .tempdir_in(&app.config.upload_dir)
         .map_err(free_space::write_problem)?;
     let now = app.config.clock.now();
+    let summaries = match edition {
+        Edition::Public => missing_summaries(app).await?,
+        // It has the episodes themselves.
+        Edition::Organiser => MissingSummaries::default(),
+    };
     let snapshot = app
         .store
         .snapshot(
             folder.path(),
             store_edition(edition),
             PROGRAM,
-            &missing_summaries(app).await?,
+            &summaries,
             now,
         )
         .await?;
@@ -152,7 +157,7 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchi
     })
 }
 
-/// The summaries of runs that have ended since the worker last stored summaries, or whose season is imported.
+/// The summaries of runs that have none, because they have just ended or the season was imported without.
 async fn missing_summaries(app: &App) -> Result<MissingSummaries, Problem> {
     let version = EpisodeSummary::VERSION;
     let mut of_runs = Vec::new();
