@@ -131,9 +131,9 @@ async fn insert_season(folder: &Path, stage: StageId) {
             .unwrap();
             let result = evaluation_result(40.0 + team_number as f64 / 10.0);
             sqlx::query(
-                "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at,
+                "INSERT INTO evaluations (id, purpose, submission_id, team_id, stage_id, day, revision, run_id, created_at,
                                           state, finished_at, dataset, dataset_blake3, result)
-                 VALUES (?, ?, ?, ?, ?, 1, ?, ?, 'finished', ?, 'datasets/x.zip', 'x', ?)",
+                 VALUES (?, 'counting', ?, ?, ?, ?, 1, ?, ?, 'finished', ?, 'datasets/x.zip', 'x', ?)",
             )
             .bind(EvaluationId::new().to_string())
             .bind(&submission)

@@ -107,7 +107,7 @@ pub use tables::{
     days::Day,
     deliveries::{Delivery, DeliveryAttempt, DeliveryState},
     entrants::{Departure, Entrant},
-    evaluations::{Evaluation, EvaluationState},
+    evaluations::{Evaluation, EvaluationState, ProposedEvaluation},
     events::EventFilter,
     game_attempts::{AttemptEnd, AttemptOutcome, GameAttempt},
     games::{
@@ -117,7 +117,6 @@ pub use tables::{
     job_durations::JobDurations,
     plan::RunPlan,
     proposals::{Proposal, ProposalKind, ProposalOutcome},
-    proposed_evaluations::ProposedEvaluation,
     questions::{Question, Reply},
     registrations::{Registration, RegistrationState},
     required_artifacts::RequiredArtifact,

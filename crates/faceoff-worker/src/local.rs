@@ -87,9 +87,8 @@ impl LocalServer {
                 platform_retries,
             } => JobPayload::Shard {
                 part_of: match owner {
-                    RunOwner::Evaluation(id) => id.as_uuid(),
+                    RunOwner::Evaluation { id, .. } => id.as_uuid(),
                     RunOwner::Ablation(id) => id.as_uuid(),
-                    RunOwner::ProposedEvaluation { id, .. } => id.as_uuid(),
                 },
                 agent: self.agent(bundle, &run.plan.limits),
                 spec: ShardSpec {
@@ -113,9 +112,7 @@ impl LocalServer {
                         shard.task,
                         shard.first_episode,
                     )),
-                    RunOwner::Evaluation(_) | RunOwner::ProposedEvaluation { .. } => {
-                        OutputFiles::None
-                    }
+                    RunOwner::Evaluation { .. } => OutputFiles::None,
                 },
             },
             Job::Game {

@@ -30,7 +30,7 @@ impl Store {
                     "the evaluation is over already".into(),
                 ));
             }
-            completion::fail_evaluation(tx, id, evaluation.run, Failure::Cancelled(reason)).await
+            completion::fail_evaluation(tx, id, Failure::Cancelled(reason)).await
         })
         .await
     }

@@ -16,7 +16,7 @@ use crate::{
     queue::{self, JobClaim, LeasedJob},
     store::Store,
     tables::{
-        evaluations, runs as run_rows,
+        runs as run_rows,
         runs::Run,
         season, shards, stage_runtimes, stages,
         submissions::{self, Submission},
@@ -145,13 +145,8 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
             })
         }
         Purpose::Scoring(evaluation) => {
-            tx.record_progress(Subject::Evaluation(evaluation));
-            let run = evaluations::run_of(tx, evaluation).await?;
-            describe_scoring(tx, evaluation, run).await
-        }
-        Purpose::ProposedScoring { id, run, proposal } => {
-            tx.record_progress(Subject::Proposal(proposal));
-            describe_scoring(tx, id, run).await
+            tx.record_progress(evaluation.owner().subject());
+            describe_scoring(tx, evaluation.id, evaluation.run).await
         }
     };
     job.map(Some)

@@ -6,7 +6,7 @@ use crate::{
     event::Actor,
     queue::JobClaim,
     store::Store,
-    tables::{bundles, proposed_evaluations, runs},
+    tables::{bundles, evaluations, retentions, runs},
 };
 use faceoff_types::RunId;
 use jiff::{SignedDuration, Timestamp};
@@ -64,13 +64,12 @@ impl Store {
             .saturating_sub(RECORDINGS_KEPT_FOR)
             .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        let dropped =
-            proposed_evaluations::dropped_with_datasets(&mut connection, ended_before).await?;
+        let dropped = evaluations::dropped_with_datasets(&mut connection, ended_before).await?;
         drop(connection);
         for (id, key) in &dropped {
             self.artifacts().delete_dataset(key).await?;
             self.write(Actor::Server, now, async |tx| {
-                proposed_evaluations::set_dataset_removed(tx, *id, now).await
+                retentions::set_dropped_dataset_deleted(tx, *id, now).await
             })
             .await?;
         }

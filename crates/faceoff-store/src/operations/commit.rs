@@ -56,10 +56,7 @@ impl Store {
             let purpose = purpose::of_job(tx, claim.job, &kind).await?;
             let progress = match &purpose {
                 Purpose::Shard { shard, .. } => shard.episodes(),
-                Purpose::Validation(_)
-                | Purpose::Game(_)
-                | Purpose::Scoring(_)
-                | Purpose::ProposedScoring { .. } => 0,
+                Purpose::Validation(_) | Purpose::Game(_) | Purpose::Scoring(_) => 0,
             };
             queue::mark_done(tx, claim, progress).await?;
             commit(tx, purpose).await?;

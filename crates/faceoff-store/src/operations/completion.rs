@@ -1,22 +1,21 @@
-//! Start and end of runs and evaluations. A run plays episodes for its owner: an evaluation, a proposed evaluation or an
-//! ablation. When it ends, its owner is scored, finished or failed here; so is an evaluation that ends for another reason.
+//! Start and end of runs and evaluations. A run plays episodes for its owner: an evaluation or an ablation. When it ends, its owner is scored, finished or failed here; so is an evaluation that ends for another reason.
 
 use crate::{
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        proposal_completion, purpose, release_day, rerun,
+        purpose, release_day, rerun,
         runs::{self, RunOwner},
     },
     queue,
     tables::{
         ablations,
-        evaluations::{self, Failure},
+        evaluations::{self, EvaluationRun, Failure},
         runs as run_rows, scorings,
     },
     write::Tx,
 };
-use faceoff_types::{AblationId, EvaluationId, RunId};
+use faceoff_types::{AblationId, EvaluationId, ProposalId, RunId};
 
 /// How a run ends.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +31,7 @@ pub(crate) enum RunEnd<'a> {
 /// Marks a run as started when its first shard is claimed.
 pub(crate) async fn record_run_start(tx: &mut Tx, run: RunId, owner: RunOwner) -> Result<()> {
     if run_rows::begin(tx, run).await?
-        && let RunOwner::Evaluation(_) = owner
+        && let Subject::Evaluation(_) = owner.subject()
     {
         tx.record(owner.subject(), Event::EvaluationBegun);
     }
@@ -51,21 +50,18 @@ pub(crate) async fn end_run(
         RunEnd::AgentFailed | RunEnd::PlatformFailed(_) => runs::stop(tx, run).await?,
     }
     match (owner, end) {
-        (RunOwner::Evaluation(id), RunEnd::Completed) => queue_scoring(tx, id).await,
-        (RunOwner::Evaluation(id), RunEnd::AgentFailed) => {
-            fail_evaluation(tx, id, run, Failure::Agent).await
+        (RunOwner::Evaluation { id, proposal }, RunEnd::Completed) => {
+            queue_scoring(tx, id).await?;
+            if proposal.is_none() {
+                tx.record(Subject::Evaluation(id), Event::EvaluationFinalising);
+            }
+            Ok(())
         }
-        (RunOwner::Evaluation(id), RunEnd::PlatformFailed(reason)) => {
-            fail_evaluation(tx, id, run, Failure::Platform(reason)).await
+        (RunOwner::Evaluation { id, .. }, RunEnd::AgentFailed) => {
+            fail_evaluation(tx, id, Failure::Agent).await
         }
-        (RunOwner::ProposedEvaluation { id, .. }, RunEnd::Completed) => {
-            proposal_completion::queue_scoring(tx, id).await
-        }
-        (RunOwner::ProposedEvaluation { id, proposal }, RunEnd::AgentFailed) => {
-            proposal_completion::fail(tx, id, run, proposal, Failure::Agent).await
-        }
-        (RunOwner::ProposedEvaluation { id, proposal }, RunEnd::PlatformFailed(reason)) => {
-            proposal_completion::fail(tx, id, run, proposal, Failure::Platform(reason)).await
+        (RunOwner::Evaluation { id, .. }, RunEnd::PlatformFailed(reason)) => {
+            fail_evaluation(tx, id, Failure::Platform(reason)).await
         }
         (RunOwner::Ablation(id), RunEnd::Completed) => finish_ablation_if_complete(tx, id).await,
         (RunOwner::Ablation(id), RunEnd::AgentFailed) => {
@@ -85,24 +81,25 @@ pub(crate) async fn end_run(
 async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
     let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT).await?;
     let job = queue::insert(tx, purpose::SCORING, account).await?;
-    scorings::insert(tx, id, job).await?;
-    tx.record(Subject::Evaluation(id), Event::EvaluationFinalising);
-    Ok(())
+    scorings::insert(tx, id, job).await
 }
 
-/// Ends an evaluation without a score, whether its run was over or not. After a platform fault it is
-/// rerun automatically, a bounded number of times.
+/// Ends an evaluation without a score, whether its run was over or not. After a platform fault one that counts is rerun
+/// automatically, a bounded number of times.
 pub(crate) async fn fail_evaluation(
     tx: &mut Tx,
     id: EvaluationId,
-    run: RunId,
     failure: Failure<'_>,
 ) -> Result<()> {
+    let EvaluationRun { run, proposal, .. } = evaluations::run_of(tx, id).await?;
     runs::stop(tx, run).await?;
     let scoring = scorings::job_of(tx, id).await?;
     queue::drop_jobs(tx, scoring.as_slice()).await?;
     let now = tx.now;
     evaluations::set_failed(tx, id, failure, now).await?;
+    if let Some(proposal) = proposal {
+        return record_proposal_end(tx, proposal).await;
+    }
     let event = match failure {
         Failure::Agent => Event::EvaluationAgentFailed,
         Failure::Platform(reason) => Event::EvaluationPlatformFailed {
@@ -120,6 +117,14 @@ pub(crate) async fn fail_evaluation(
         log_damage(id, rerun::rerun_after_platform_fault(tx, id).await)?;
     }
     log_damage(id, release_day::release_if_over(tx, id).await)
+}
+
+/// Records the end of a proposal once all its evaluations have ended.
+pub(crate) async fn record_proposal_end(tx: &mut Tx, proposal: ProposalId) -> Result<()> {
+    if evaluations::count_open_proposed(tx, Some(proposal)).await? == 0 {
+        tx.record(Subject::Proposal(proposal), Event::ProposalPlayed);
+    }
+    Ok(())
 }
 
 /// Logs damaged rows instead of failing. A damaged evaluation is not rerun and releases no day, but it must

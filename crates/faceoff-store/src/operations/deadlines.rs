@@ -61,8 +61,8 @@ async fn end_day(tx: &mut Tx, stage_day: StageDay) -> Result<u32> {
     let unfinished = counting_evaluations::incomplete_of_day(tx, stage_day).await?;
     let not_played = u32::try_from(unfinished.len()).unwrap_or(u32::MAX);
     tx.record(Subject::Day(stage_day), Event::DayOverdue { not_played });
-    for (evaluation, run) in unfinished {
-        completion::fail_evaluation(tx, evaluation, run, Failure::NotPlayed(&reason)).await?;
+    for evaluation in unfinished {
+        completion::fail_evaluation(tx, evaluation, Failure::NotPlayed(&reason)).await?;
     }
     Ok(not_played)
 }

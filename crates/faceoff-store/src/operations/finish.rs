@@ -6,13 +6,16 @@ use crate::{
     event::{Event, Subject},
     operations::{
         commit::{CommitOutcome, wrong_job},
-        proposal_completion,
+        completion,
         purpose::Purpose,
         release_day,
     },
     queue::JobClaim,
     store::Store,
-    tables::{evaluations, proposed_evaluations, retentions},
+    tables::{
+        evaluations::{self, EvaluationRun},
+        retentions,
+    },
 };
 use faceoff_types::EvaluationResult;
 use jiff::Timestamp;
@@ -34,10 +37,13 @@ impl Store {
     ) -> Result<CommitOutcome> {
         let dataset_bytes = self.artifacts().size_bytes(dataset).await?;
         self.commit(claim, now, async |tx, purpose| match purpose {
-            Purpose::Scoring(id) => {
+            Purpose::Scoring(EvaluationRun { id, proposal, .. }) => {
                 evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
                 if let Some(dataset_bytes) = dataset_bytes {
                     retentions::set_dataset_bytes(tx, id, dataset_bytes).await?;
+                }
+                if let Some(proposal) = proposal {
+                    return completion::record_proposal_end(tx, proposal).await;
                 }
                 let event = Event::EvaluationFinished {
                     score: result.score,
@@ -45,14 +51,6 @@ impl Store {
                 };
                 tx.record(Subject::Evaluation(id), event);
                 release_day::release_if_over(tx, id).await
-            }
-            Purpose::ProposedScoring { id, proposal, .. } => {
-                proposed_evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now)
-                    .await?;
-                if let Some(dataset_bytes) = dataset_bytes {
-                    retentions::set_dataset_bytes(tx, id, dataset_bytes).await?;
-                }
-                proposal_completion::record_if_over(tx, proposal).await
             }
             other => Err(wrong_job("scoring job", &other)),
         })

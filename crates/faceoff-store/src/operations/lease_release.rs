@@ -7,18 +7,13 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         completion::{self, RunEnd},
-        proposal_completion,
         purpose::{self, Purpose},
         runs,
         tournament::game_lifecycle,
     },
     queue::{self, ClaimState, JobClaim},
     store::Store,
-    tables::{
-        evaluations::{self, Failure},
-        game_attempts::AttemptOutcome,
-        submissions,
-    },
+    tables::{evaluations::Failure, game_attempts::AttemptOutcome, submissions},
     write::Tx,
 };
 use jiff::Timestamp;
@@ -41,8 +36,7 @@ pub(crate) async fn event_subject(
         Purpose::Validation(id) => Subject::Submission(*id),
         Purpose::Game(id) => Subject::Game(*id),
         Purpose::Shard { run, .. } => runs::owner(connection, *run).await?.subject(),
-        Purpose::Scoring(id) => Subject::Evaluation(*id),
-        Purpose::ProposedScoring { proposal, .. } => Subject::Proposal(*proposal),
+        Purpose::Scoring(evaluation) => evaluation.owner().subject(),
     })
 }
 
@@ -64,12 +58,8 @@ pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, label: &str, reason: &str) -
             let owner = runs::owner(tx, run).await?;
             completion::end_run(tx, run, owner, RunEnd::PlatformFailed(reason)).await
         }
-        Ok(Purpose::Scoring(id)) => {
-            let run = evaluations::run_of(tx, id).await?;
-            completion::fail_evaluation(tx, id, run, Failure::Platform(reason)).await
-        }
-        Ok(Purpose::ProposedScoring { id, run, proposal }) => {
-            proposal_completion::fail(tx, id, run, proposal, Failure::Platform(reason)).await
+        Ok(Purpose::Scoring(evaluation)) => {
+            completion::fail_evaluation(tx, evaluation.id, Failure::Platform(reason)).await
         }
         // No row refers to the job, so there is nothing to end.
         Err(StoreError::Damaged(_)) => Ok(()),

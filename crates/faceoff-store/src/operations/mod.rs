@@ -23,7 +23,6 @@ pub(crate) mod lease_release;
 mod new_evaluation;
 mod open;
 mod pause;
-pub(crate) mod proposal_completion;
 pub(crate) mod proposals;
 mod publish;
 pub(crate) mod purpose;

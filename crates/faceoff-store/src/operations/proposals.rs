@@ -5,21 +5,20 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{proposal_completion, purpose, rulings::void, runs},
+    operations::{completion, purpose, rulings::void, runs},
     queries,
     queue::NewJob,
     store::Store,
     tables::{
         counting_evaluations, days,
         entries::{self, Entry},
-        evaluations::{self, EvaluationState, Failure},
+        evaluations::{self, EvaluationState, Failure, ProposedEvaluation},
         freezes,
         plan::RunPlan,
         proposals::{self, Proposal, ProposalKind, ProposalOutcome},
-        proposed_evaluations::{self, ProposedEvaluation},
-        retentions, runs as run_rows,
+        runs as run_rows,
         runs::Run,
-        scorings, season, sign_offs, stage_runtimes,
+        season, sign_offs, stage_runtimes,
         stages::{self, Stage, StagePhase},
         submissions,
     },
@@ -59,9 +58,8 @@ fn conflict<T>(reason: impl Into<String>) -> Result<T> {
 /// Adds a proposal and queues its evaluations, behind everything that counts.
 async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRun>) -> Result<()> {
     proposals::insert(tx, proposal).await?;
-    let now = tx.now;
     let job = NewJob {
-        batch: now.as_millisecond(),
+        batch: tx.now.as_millisecond(),
         ..purpose::PROPOSAL_SHARD
     };
     let count = u32::try_from(proposed.len()).unwrap_or(u32::MAX);
@@ -74,17 +72,8 @@ async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRu
             keeps_recordings: true,
         };
         runs::queue_run(tx, &run, &[proposed_run.submission], job, proposed_run.team).await?;
-        let evaluation = ProposedEvaluation {
-            id: EvaluationId::new(),
-            proposal: proposal.id,
-            submission: proposed_run.submission,
-            team: proposed_run.team,
-            replaces: proposed_run.replaces,
-            run: run.id,
-            created_at: now,
-            state: EvaluationState::Queued,
-        };
-        proposed_evaluations::insert(tx, &evaluation).await?;
+        let owner = (proposed_run.submission, proposed_run.team);
+        entries::insert_proposed(tx, proposal, owner, run.id, proposed_run.replaces).await?;
     }
     let event = Event::ProposalMade {
         stage: proposal.stage,
@@ -297,7 +286,7 @@ impl Store {
             let Some(date) = proposal.kind.day() else {
                 return conflict("a trial cannot be applied, since it had episodes of its own; it can be dropped");
             };
-            let open = proposed_evaluations::count_open(tx, Some(id)).await?;
+            let open = evaluations::count_open_proposed(tx, Some(id)).await?;
             if open > 0 {
                 return conflict(format!(
                     "{open} of its evaluations are queued or running: wait for their end"
@@ -337,8 +326,7 @@ impl Store {
             for evaluation in queries::proposals::evaluations_of_proposal(tx, id).await? {
                 if !evaluation.state.is_over() {
                     let failure = Failure::Cancelled("the proposal was dropped");
-                    proposal_completion::fail(tx, evaluation.id, evaluation.run, id, failure)
-                        .await?;
+                    completion::fail_evaluation(tx, evaluation.id, failure).await?;
                 }
             }
             proposals::set_outcome(tx, id, ProposalOutcome::Dropped(now)).await?;
@@ -365,13 +353,18 @@ async fn apply_evaluation(
     stage_day: StageDay,
     evaluation: ProposedEvaluation,
 ) -> Result<()> {
-    let now = tx.now;
-    if !matches!(
-        evaluation.state,
-        EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. }
-    ) {
-        return Ok(());
-    }
+    let end = match evaluation.state {
+        EvaluationState::Finished {
+            result,
+            dataset_blake3,
+            ..
+        } => Event::EvaluationFinished {
+            score: result.score,
+            dataset_blake3: dataset_blake3.unwrap_or_default(),
+        },
+        EvaluationState::AgentFailed { .. } => Event::EvaluationAgentFailed,
+        _ => return Ok(()),
+    };
     if let (Some(replaced), false) = (
         evaluation.replaces,
         matches!(proposal.kind, ProposalKind::Rules(_)),
@@ -388,50 +381,13 @@ async fn apply_evaluation(
         let void_reason = format!("evaluated again: {}", proposal.reason);
         void(tx, replaced, &void_reason).await?;
     }
-    let entry = Entry {
-        id: evaluation.id,
-        submission: evaluation.submission,
-        team: evaluation.team,
-        stage_day,
-        revision: proposal.revision,
-        run: evaluation.run,
-        rerun_of: evaluation.replaces,
-    };
-    entries::insert(tx, &entry, evaluation.created_at).await?;
-    if let Some(replaced) = evaluation.replaces {
-        entries::copy_extra(tx, evaluation.id, replaced).await?;
-    }
-    if let Some(job) = proposed_evaluations::job_of(tx, evaluation.id).await? {
-        scorings::insert(tx, evaluation.id, job).await?;
-    }
-    let event = Event::EvaluationApplied {
+    let now = tx.now;
+    entries::set_counting(tx, evaluation.id, stage_day.date, now).await?;
+    let subject = Subject::Evaluation(evaluation.id);
+    let applied = Event::EvaluationApplied {
         proposal: proposal.id,
     };
-    tx.record(Subject::Evaluation(evaluation.id), event);
-    match evaluation.state {
-        EvaluationState::Finished {
-            result,
-            dataset,
-            dataset_blake3,
-            ..
-        } => {
-            let dataset_blake3 = dataset_blake3.unwrap_or_default();
-            evaluations::set_finished(tx, evaluation.id, &result, &dataset, &dataset_blake3, now)
-                .await?;
-            retentions::copy_dataset_bytes(tx, evaluation.id).await?;
-            let event = Event::EvaluationFinished {
-                score: result.score,
-                dataset_blake3,
-            };
-            tx.record(Subject::Evaluation(evaluation.id), event);
-        }
-        _ => {
-            evaluations::set_failed(tx, evaluation.id, Failure::Agent, now).await?;
-            tx.record(
-                Subject::Evaluation(evaluation.id),
-                Event::EvaluationAgentFailed,
-            );
-        }
-    }
+    tx.record(subject, applied);
+    tx.record(subject, end);
     Ok(())
 }

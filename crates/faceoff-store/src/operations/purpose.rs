@@ -5,12 +5,13 @@ use crate::{
     error::{Result, StoreError},
     queue::{Lane, NewJob},
     tables::{
-        games, proposed_evaluations, scorings,
+        evaluations::{self, EvaluationRun},
+        games,
         shards::{self, Shard},
         validation_runs,
     },
 };
-use faceoff_types::{EvaluationId, GameId, ProposalId, RunId, SubmissionId};
+use faceoff_types::{GameId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
@@ -97,16 +98,8 @@ pub(crate) const PLATFORM_ACCOUNT: &str = "";
 pub(crate) enum Purpose {
     Validation(SubmissionId),
     Game(GameId),
-    Shard {
-        run: RunId,
-        shard: Shard,
-    },
-    Scoring(EvaluationId),
-    ProposedScoring {
-        id: EvaluationId,
-        run: RunId,
-        proposal: ProposalId,
-    },
+    Shard { run: RunId, shard: Shard },
+    Scoring(EvaluationRun),
 }
 
 /// Purpose of a job, from its label and the row that refers to it.
@@ -123,13 +116,9 @@ pub(crate) async fn of_job(
         Some(JobKind::Shard) => shards::of_job(connection, job)
             .await?
             .map(|(run, shard)| Purpose::Shard { run, shard }),
-        // Once applied, an evaluation of a proposal is an evaluation of its day.
-        Some(JobKind::Scoring) => match scorings::of_job(connection, job).await? {
-            Some(id) => Some(Purpose::Scoring(id)),
-            None => proposed_evaluations::of_job(connection, job)
-                .await?
-                .map(|(id, run, proposal)| Purpose::ProposedScoring { id, run, proposal }),
-        },
+        Some(JobKind::Scoring) => evaluations::of_scoring_job(connection, job)
+            .await?
+            .map(Purpose::Scoring),
         None => None,
     };
     purpose.ok_or_else(|| {

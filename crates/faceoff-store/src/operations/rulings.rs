@@ -104,8 +104,7 @@ impl Store {
             for evaluation in counting_evaluations::of_day(tx, stage_day, None).await? {
                 if evaluation.is_open {
                     let cancelled = Failure::Cancelled(reason);
-                    completion::fail_evaluation(tx, evaluation.id, evaluation.run, cancelled)
-                        .await?;
+                    completion::fail_evaluation(tx, evaluation.id, cancelled).await?;
                 } else if evaluation.counts {
                     void(tx, evaluation.id, reason).await?;
                 } else {
@@ -147,9 +146,9 @@ impl Store {
             };
             teams::set_disqualified(tx, id, Some(&ruling)).await?;
             let cancellation_reason = format!("the team is disqualified: {reason}");
-            for (evaluation, run) in counting_evaluations::open_of_team(tx, id).await? {
+            for evaluation in counting_evaluations::open_of_team(tx, id).await? {
                 let cancelled = Failure::Cancelled(&cancellation_reason);
-                completion::fail_evaluation(tx, evaluation, run, cancelled).await?;
+                completion::fail_evaluation(tx, evaluation, cancelled).await?;
             }
             leave_tournaments(tx, id, &cancellation_reason).await?;
             let reason = ruling.reason;

@@ -6,7 +6,9 @@ use crate::{
     event::Subject,
     queue::{self, NewJob},
     tables::{
-        ablations, bundles, evaluations, proposed_evaluations, runs,
+        ablations, bundles,
+        evaluations::{self, EvaluationRun},
+        runs,
         runs::Run,
         shards::{self, Shard},
     },
@@ -15,25 +17,37 @@ use crate::{
 use faceoff_types::{AblationId, EvaluationId, ProposalId, RunId, ShardId, SubmissionId, TeamId};
 use sqlx::SqliteConnection;
 
-/// The evaluation, proposed evaluation or ablation that a run belongs to.
+/// The evaluation or ablation that a run belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunOwner {
-    Evaluation(EvaluationId),
+    Evaluation {
+        id: EvaluationId,
+        /// The proposal that it belongs to, while it does not count.
+        proposal: Option<ProposalId>,
+    },
     /// The run is one profile of the ablation.
     Ablation(AblationId),
-    /// An evaluation of a proposal.
-    ProposedEvaluation {
-        id: EvaluationId,
-        proposal: ProposalId,
-    },
 }
 
 impl RunOwner {
     pub(crate) const fn subject(self) -> Subject {
         match self {
-            Self::Evaluation(id) => Subject::Evaluation(id),
+            Self::Evaluation { id, proposal: None } => Subject::Evaluation(id),
+            Self::Evaluation {
+                proposal: Some(proposal),
+                ..
+            } => Subject::Proposal(proposal),
             Self::Ablation(id) => Subject::Ablation(id),
-            Self::ProposedEvaluation { proposal, .. } => Subject::Proposal(proposal),
+        }
+    }
+}
+
+impl EvaluationRun {
+    /// The evaluation as the owner of its run.
+    pub(crate) const fn owner(self) -> RunOwner {
+        RunOwner::Evaluation {
+            id: self.id,
+            proposal: self.proposal,
         }
     }
 }
@@ -44,18 +58,15 @@ pub(crate) async fn subjects(
     run: RunId,
 ) -> Result<Vec<Subject>> {
     let mut subjects = vec![owner(connection, run).await?.subject()];
-    if let Some((id, proposal)) = proposed_evaluations::of_run(connection, run).await? {
-        subjects.push(RunOwner::ProposedEvaluation { id, proposal }.subject());
-    }
+    let proposal = evaluations::proposal_of_run(connection, run).await?;
+    subjects.extend(proposal.map(Subject::Proposal));
+    subjects.dedup();
     Ok(subjects)
 }
 
 pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Result<RunOwner> {
-    if let Some(id) = evaluations::of_run(connection, run).await? {
-        return Ok(RunOwner::Evaluation(id));
-    }
-    if let Some((id, proposal)) = proposed_evaluations::of_run(connection, run).await? {
-        return Ok(RunOwner::ProposedEvaluation { id, proposal });
+    if let Some(evaluation) = evaluations::of_run(connection, run).await? {
+        return Ok(evaluation.owner());
     }
     ablations::of_run(connection, run)
         .await?

@@ -53,10 +53,16 @@ enum Scope {
 
 /// The statements that scrub a copy, in this order: first results are removed, then the rows that belong to removed results.
 const STEPS: &[(Scope, &str)] = &[
+    // Proposals are for organisers, who get those without an open evaluation.
+    (Scope::Both, "DELETE FROM proposals WHERE id IN
+        (SELECT proposal_id FROM evaluations WHERE state = 'open' AND purpose <> 'counting')"),
+    (Scope::Public, "DELETE FROM proposals"),
+    (Scope::Both, "DELETE FROM evaluations WHERE purpose <> 'counting' AND proposal_id NOT IN (SELECT id FROM proposals)"),
+    (Scope::Both, "UPDATE evaluations SET proposal_id = NULL WHERE proposal_id NOT IN (SELECT id FROM proposals)"),
     // Open evaluations are no results, and days are secret until their release.
-    (Scope::Both, "DELETE FROM evaluations WHERE state = 'open' OR NOT EXISTS
+    (Scope::Both, "DELETE FROM evaluations WHERE purpose = 'counting' AND (state = 'open' OR NOT EXISTS
         (SELECT 1 FROM days d WHERE d.stage_id = evaluations.stage_id AND d.day = evaluations.day
-           AND d.released_at IS NOT NULL)"),
+           AND d.released_at IS NOT NULL))"),
     // Hidden scores.
     (Scope::Public, "DELETE FROM evaluations WHERE stage_id IN
         (SELECT id FROM stages WHERE json_extract(settings, '$.blind'))"),
@@ -67,14 +73,6 @@ const STEPS: &[(Scope, &str)] = &[
            AND f.frozen_at < evaluations.finished_at)"),
     (Scope::Both, "UPDATE evaluations SET rerun_of = NULL WHERE rerun_of NOT IN (SELECT id FROM evaluations)"),
     (Scope::Both, "DELETE FROM scorings WHERE evaluation_id NOT IN (SELECT id FROM evaluations)"),
-    (Scope::Both, "DELETE FROM proposals WHERE id IN
-        (SELECT proposal_id FROM proposed_evaluations WHERE state = 'open')"),
-    (Scope::Public, "DELETE FROM proposals"),
-    (Scope::Both, "DELETE FROM proposed_evaluations WHERE proposal_id NOT IN (SELECT id FROM proposals)"),
-    (Scope::Both, "UPDATE proposed_evaluations SET replaces = NULL
-        WHERE replaces NOT IN (SELECT id FROM evaluations)"),
-    (Scope::Both, "DELETE FROM proposed_evaluation_scorings
-        WHERE proposed_evaluation_id NOT IN (SELECT id FROM proposed_evaluations)"),
     (Scope::Both, "DELETE FROM ablations WHERE finished_at IS NULL"),
     (Scope::Both, "DELETE FROM ablation_runs WHERE ablation_id NOT IN (SELECT id FROM ablations)"),
     // Open games have no result; test and friendly games are visible to their teams only.
@@ -95,7 +93,7 @@ const STEPS: &[(Scope, &str)] = &[
                     WHEN 'at_close' THEN t.closed_at IS NOT NULL ELSE 0 END)"),
     (Scope::Public, "UPDATE tournaments SET baseline_id = NULL"),
     (Scope::Both, "DELETE FROM runs WHERE id NOT IN (SELECT run_id FROM evaluations)
-        AND id NOT IN (SELECT run_id FROM proposed_evaluations) AND id NOT IN (SELECT run_id FROM ablation_runs)"),
+        AND id NOT IN (SELECT run_id FROM ablation_runs)"),
     (Scope::Both, "DELETE FROM contestants WHERE run_id NOT IN (SELECT id FROM runs)"),
     (Scope::Both, "DELETE FROM episode_summaries WHERE run_id NOT IN (SELECT id FROM runs)"),
     (Scope::Both, "DELETE FROM shards WHERE run_id NOT IN (SELECT id FROM runs)"),
@@ -130,7 +128,6 @@ const STEPS: &[(Scope, &str)] = &[
     // Jobs are never run in an archive, and the workers that ran them are private.
     (Scope::Both, "DELETE FROM jobs WHERE id NOT IN (SELECT job_id FROM shards)
         AND id NOT IN (SELECT job_id FROM validation_runs) AND id NOT IN (SELECT job_id FROM scorings)
-        AND id NOT IN (SELECT job_id FROM proposed_evaluation_scorings)
         AND id NOT IN (SELECT job_id FROM games WHERE job_id IS NOT NULL)"),
     (Scope::Both, "UPDATE jobs SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"),
     (Scope::Both, "UPDATE jobs SET nonce = '' WHERE nonce IS NOT NULL"),
@@ -236,7 +233,7 @@ async fn check_summarised(connection: &mut SqliteConnection, version: u32) -> Re
         "SELECT COUNT(*) FROM runs r
            WHERE r.state = 'played' AND r.cleared_at IS NULL
              AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
-             AND (EXISTS (SELECT 1 FROM evaluations e WHERE e.run_id = r.id AND e.state = 'finished')
+             AND (EXISTS (SELECT 1 FROM counting_evaluations e WHERE e.run_id = r.id AND e.state = 'finished')
                   OR EXISTS (SELECT 1 FROM ablation_runs p JOIN ablations a ON a.id = p.ablation_id
                              WHERE p.run_id = r.id AND a.finished_at IS NOT NULL))",
     )

@@ -6,7 +6,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::stage_sign_off::is_final_day_pending,
     store::Store,
-    tables::{evaluations, games, proposed_evaluations, season, stages, tournaments},
+    tables::{evaluations, games, season, stages, tournaments},
 };
 use jiff::Timestamp;
 
@@ -32,7 +32,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let open_evaluations = evaluations::count_open(tx, None).await?;
-            let open_proposed = proposed_evaluations::count_open(tx, None).await?;
+            let open_proposed = evaluations::count_open_proposed(tx, None).await?;
             if open_proposed > 0 {
                 return Err(StoreError::Conflict(format!(
                     "{open_proposed} evaluations of trials and proposed re-evaluations are queued or running: wait until they \

@@ -11,7 +11,7 @@ use crate::{
     store::Store,
     tables::{
         archive::{self, ArchivedArtifact, ArchivedSeason, Edition},
-        days, episode_summaries, evaluations, proposed_evaluations, season, stages,
+        days, episode_summaries, evaluations, season, stages,
     },
 };
 use faceoff_types::RunId;
@@ -81,7 +81,7 @@ impl Store {
         let mut connection = SqliteConnection::connect_with(&options).await?;
         let mut open_evaluations = evaluations::count_open(&mut connection, None).await?;
         if edition == Edition::Organiser {
-            open_evaluations += proposed_evaluations::count_open(&mut connection, None).await?;
+            open_evaluations += evaluations::count_open_proposed(&mut connection, None).await?;
         }
         describe_archive(&mut connection, edition, program, now).await?;
         for (run, summary) in &summaries.of_runs {

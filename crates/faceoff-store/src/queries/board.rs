@@ -98,7 +98,7 @@ macro_rules! select_board {
             crate::queries::board::BoardRow,
             $name + r#"SELECT t.id AS team, t.name, t.created_at AS invited_at, t.affiliation, t.link, t.division,
                       t.retired_at, t.is_baseline, s.id AS submission, s.created_at AS submitted_at, s.agent_name,
-                      e.id AS evaluation, e.run_id AS run, e.day, d.released_at, e.extra_for,
+                      e.id AS evaluation, e.run_id AS run, d.day, d.released_at, e.extra_for,
                       e.finished_at AS "finished_at!", e.result AS "result!" "# + $tail,
             $($argument),*
         )
@@ -131,7 +131,7 @@ impl Store {
         let (id, finished_until) = (stage.id, scope.finished_until.map(Instant));
         let last_day = scope.last_day.map(Text);
         let newest = sqlx::query_scalar!(
-            r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
+            r#"SELECT MAX(revision) AS "revision: u32" FROM counting_evaluations
                WHERE stage_id = ?1 AND state = 'finished' AND voided_at IS NULL
                  AND (?2 IS NULL OR finished_at <= ?2) AND (?3 IS NULL OR day <= ?3)"#,
             id,
@@ -156,10 +156,10 @@ impl Store {
         let finished_until = scope.finished_until.map(Instant);
         let last_day = scope.last_day.map(Text);
         let days = sqlx::query_scalar!(
-            "SELECT DISTINCT day FROM evaluations
+            r#"SELECT DISTINCT day AS "day!" FROM counting_evaluations
              WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
                AND (?3 IS NULL OR finished_at <= ?3) AND (?4 IS NULL OR day <= ?4)
-             ORDER BY day",
+             ORDER BY day"#,
             stage,
             revision,
             finished_until,
@@ -194,7 +194,7 @@ impl Store {
         let rows = select_board!(
             "/* board */ ",
             "FROM teams t
-             JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
+             JOIN counting_evaluations e ON e.row_no = (SELECT n.row_no FROM counting_evaluations n
                                               WHERE n.team_id = t.id AND n.stage_id = ?1
                                                 AND n.revision = ?2 AND n.state = 'finished'
                                                 AND n.voided_at IS NULL

@@ -48,13 +48,13 @@ impl Store {
         };
         let rows = select_board!(
             "/* board of days */ ",
-            "FROM (SELECT n.rowid AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
-                   FROM evaluations n
+            "FROM (SELECT n.row_no AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
+                   FROM counting_evaluations n
                    WHERE n.stage_id = ?1 AND n.revision = ?2 AND n.state = 'finished'
                      AND n.voided_at IS NULL AND (?5 IS NULL OR n.finished_at <= ?5)
                      AND (?7 IS NULL OR n.day <= ?7)
                      AND n.id NOT IN (SELECT value FROM json_each(?6))) a
-             JOIN evaluations e ON e.rowid = a.row
+             JOIN counting_evaluations e ON e.row_no = a.row
              JOIN teams t ON t.id = e.team_id
              JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
              JOIN submissions s ON s.id = e.submission_id

@@ -11,20 +11,28 @@ use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::{Timestamp, civil::Date};
 use sqlx::SqliteConnection;
 
-/// Adds the progress of running evaluations.
-async fn with_progress(
+/// Turns rows into evaluations by `convert`, which is given the number of episodes done in a running one.
+pub(super) async fn with_progress_by<T>(
     connection: &mut SqliteConnection,
     rows: Vec<EvaluationRow>,
-) -> Result<Vec<Evaluation>> {
+    convert: fn(EvaluationRow, u32) -> Result<T>,
+) -> Result<Vec<T>> {
     let running: Vec<_> = rows.iter().filter_map(EvaluationRow::open_run).collect();
     let episodes_done = progress::of_runs(connection, &running).await?;
     rows.into_iter()
         .map(|row| {
             let run = row.open_run();
             let done = run.and_then(|run| episodes_done.get(&run).copied());
-            row.into_evaluation(done.unwrap_or(0))
+            convert(row, done.unwrap_or(0))
         })
         .collect()
+}
+
+async fn with_progress(
+    connection: &mut SqliteConnection,
+    rows: Vec<EvaluationRow>,
+) -> Result<Vec<Evaluation>> {
+    with_progress_by(connection, rows, EvaluationRow::into_evaluation).await
 }
 
 /// One evaluation with its progress.

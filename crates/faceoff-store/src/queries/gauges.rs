@@ -28,7 +28,7 @@ impl Store {
         let mut connection = self.database.read.acquire().await?;
         let queue = queue::gauges(&mut connection, now).await?;
         let open_evaluations = sqlx::query_scalar!(
-            r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations WHERE state = 'open'"#
+            r#"SELECT COUNT(*) AS "count!: u32" FROM counting_evaluations WHERE state = 'open'"#
         )
         .fetch_one(&mut *connection)
         .await?;

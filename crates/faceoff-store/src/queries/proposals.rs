@@ -2,12 +2,12 @@
 
 use crate::{
     boxed,
-    error::Result,
-    queries::progress,
+    error::{Result, StoreError},
+    queries::evaluations::with_progress_by,
     store::Store,
     tables::{
+        evaluations::{self, EvaluationRow, ProposedEvaluation},
         proposals::{self, Proposal},
-        proposed_evaluations::{self, ProposedEvaluation},
     },
 };
 use faceoff_types::{EvaluationId, ProposalId};
@@ -18,15 +18,8 @@ pub(crate) async fn evaluations_of_proposal(
     connection: &mut SqliteConnection,
     proposal: ProposalId,
 ) -> Result<Vec<ProposedEvaluation>> {
-    let rows = proposed_evaluations::of_proposal(connection, proposal).await?;
-    let runs: Vec<_> = rows.iter().map(|row| row.run).collect();
-    let progress_by_run = progress::of_runs(connection, &runs).await?;
-    rows.into_iter()
-        .map(|row| {
-            let episodes_done = progress_by_run.get(&row.run).copied().unwrap_or(0);
-            row.into_evaluation(episodes_done)
-        })
-        .collect()
+    let rows = evaluations::of_proposal(connection, proposal).await?;
+    with_progress_by(connection, rows, EvaluationRow::into_proposed).await
 }
 
 impl Store {
@@ -37,18 +30,18 @@ impl Store {
     }
 
     /// An evaluation of a proposal, with the proposal. [`StoreError::NotFound`](crate::StoreError::NotFound)
-    /// for other evaluations.
+    /// for evaluations that count.
     #[boxed]
     pub async fn proposed_evaluation(
         &self,
         id: EvaluationId,
     ) -> Result<(Proposal, ProposedEvaluation)> {
         let mut tx = self.database.read.begin().await?;
-        let row = proposed_evaluations::find(&mut tx, id).await?;
-        let proposal = proposals::find(&mut tx, row.proposal).await?;
-        let progress_by_run = progress::of_runs(&mut tx, &[row.run]).await?;
-        let episodes_done = progress_by_run.get(&row.run).copied().unwrap_or(0);
-        Ok((proposal, row.into_evaluation(episodes_done)?))
+        let row = evaluations::find_proposed(&mut tx, id).await?;
+        let proposal = proposals::find(&mut tx, row.proposal()?).await?;
+        let mut found = with_progress_by(&mut tx, vec![row], EvaluationRow::into_proposed).await?;
+        let evaluation = found.pop().ok_or(StoreError::NotFound("evaluation"))?;
+        Ok((proposal, evaluation))
     }
 
     /// A proposal with its evaluations.

@@ -83,11 +83,11 @@ impl Store {
                        WHERE s.team_id = t.id AND s.bundle_removed_at IS NULL) AS "archive_bytes!: i64",
                       COUNT(e.id) AS "datasets!: u32", COALESCE(SUM(e.dataset_bytes), 0) AS "dataset_bytes!: i64",
                       COUNT(e.id) - COUNT(e.dataset_bytes) AS "unmeasured!: u32",
-                      (SELECT COALESCE(SUM(p.dataset_bytes), 0) FROM proposed_evaluations p
-                       WHERE p.team_id = t.id AND p.dataset_removed_at IS NULL
-                         AND NOT EXISTS (SELECT 1 FROM evaluations x WHERE x.id = p.id)) AS "proposal_bytes!: i64"
+                      (SELECT COALESCE(SUM(p.dataset_bytes), 0) FROM evaluations p
+                       WHERE p.team_id = t.id AND p.purpose <> 'counting' AND p.state = 'finished'
+                         AND p.dataset_removed_at IS NULL) AS "proposal_bytes!: i64"
                FROM teams t
-               LEFT JOIN evaluations e
+               LEFT JOIN counting_evaluations e
                    ON e.team_id = t.id AND e.state = 'finished' AND e.dataset_removed_at IS NULL
                   AND (?2 OR EXISTS (SELECT 1 FROM days d JOIN stages g ON g.id = d.stage_id
                                      WHERE d.stage_id = e.stage_id AND d.day = e.day AND d.released_at IS NOT NULL

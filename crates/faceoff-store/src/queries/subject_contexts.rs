@@ -65,9 +65,9 @@ async fn evaluation_context(
     id: EvaluationId,
 ) -> Result<SubjectContext> {
     let row = sqlx::query!(
-        r#"SELECT e.team_id AS team, e.submission_id AS submission, e.stage_id AS stage, e.day, e.finished_at,
+        r#"SELECT e.team_id AS team, e.submission_id AS submission, e.stage_id AS stage, e.day AS "day!", e.finished_at,
                   d.released_at IS NOT NULL AS "is_released!: bool"
-           FROM evaluations e LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day WHERE e.id = ?"#,
+           FROM counting_evaluations e LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day WHERE e.id = ?"#,
         id
     )
     .fetch_optional(connection)

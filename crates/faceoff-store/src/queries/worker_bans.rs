@@ -41,7 +41,7 @@ impl Store {
         let mut connection = self.database.read.acquire().await?;
         let evaluations = sqlx::query_scalar!(
             r#"SELECT e.id AS "id!"
-               FROM jobs j JOIN shards s ON s.job_id = j.id JOIN evaluations e ON e.run_id = s.run_id
+               FROM jobs j JOIN shards s ON s.job_id = j.id JOIN counting_evaluations e ON e.run_id = s.run_id
                WHERE j.state = 'done' AND j.worker >= 'remote/' AND j.worker < 'remote0'
                  AND j.worker >= ?1 || '/' AND j.worker < ?1 || '0'
                  AND e.state = 'finished' AND e.voided_at IS NULL

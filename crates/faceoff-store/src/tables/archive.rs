@@ -167,8 +167,8 @@ pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<A
     .await?;
     let datasets = sqlx::query!(
         r#"SELECT id, dataset AS "dataset!", dataset_blake3 AS "dataset_blake3!"
-           FROM proposed_evaluations WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
-             AND id NOT IN (SELECT id FROM evaluations)
+           FROM evaluations WHERE proposal_id IS NOT NULL AND purpose <> 'counting'
+             AND dataset IS NOT NULL AND dataset_removed_at IS NULL
              AND proposal_id NOT IN (SELECT id FROM proposals WHERE outcome = 'dropped') ORDER BY created_at, id"#
     )
     .fetch_all(&mut *connection)

@@ -268,12 +268,12 @@ pub(crate) async fn uses(
     Ok(sqlx::query_as!(
         BundleUses,
         r#"SELECT EXISTS (SELECT 1 FROM active_submissions WHERE submission_id = ?1) AS "is_active!: bool",
-                  (SELECT COUNT(*) FROM evaluations WHERE submission_id = ?1 AND state = 'open')
+                  (SELECT COUNT(*) FROM counting_evaluations WHERE submission_id = ?1 AND state = 'open')
                   + (SELECT COUNT(*) FROM ablations WHERE submission_id = ?1 AND finished_at IS NULL)
                   AS "open!: u32",
-                  (SELECT COUNT(*) FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+                  (SELECT COUNT(*) FROM counting_evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                    WHERE e.submission_id = ?1 AND d.released_at IS NULL) AS "unreleased!: u32",
-                  (SELECT COUNT(DISTINCT p.id) FROM proposed_evaluations d JOIN proposals p ON p.id = d.proposal_id
+                  (SELECT COUNT(DISTINCT p.id) FROM evaluations d JOIN proposals p ON p.id = d.proposal_id
                    WHERE d.submission_id = ?1 AND p.outcome IS NULL) AS "proposed!: u32""#,
         id
     )

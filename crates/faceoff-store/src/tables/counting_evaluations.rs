@@ -2,7 +2,7 @@
 //! count or are voided.
 
 use crate::{column::Instant, error::Result, tables::rulings::Ruling};
-use faceoff_types::{EvaluationId, RunId, StageDay, TeamId};
+use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -10,7 +10,6 @@ use sqlx::{SqliteConnection, types::Text};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EvaluationStatus {
     pub(crate) id: EvaluationId,
-    pub(crate) run: RunId,
     pub(crate) is_open: bool,
     /// True if it finished, or failed by agent faults, and was not voided.
     pub(crate) counts: bool,
@@ -25,9 +24,9 @@ pub(crate) async fn of_day(
     let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_as!(
         EvaluationStatus,
-        r#"SELECT id, run_id AS run, state = 'open' AS "is_open!: bool",
+        r#"SELECT id, state = 'open' AS "is_open!: bool",
                   state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
-           FROM evaluations WHERE stage_id = ?1 AND day = ?2 AND (?3 IS NULL OR team_id = ?3) ORDER BY created_at, id"#,
+           FROM counting_evaluations WHERE stage_id = ?1 AND day = ?2 AND (?3 IS NULL OR team_id = ?3) ORDER BY created_at, id"#,
         stage,
         day,
         team
@@ -43,7 +42,7 @@ pub(crate) async fn revision_of_day(
 ) -> Result<Option<u32>> {
     let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_scalar!(
-        r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations WHERE stage_id = ? AND day = ?"#,
+        r#"SELECT MAX(revision) AS "revision: u32" FROM counting_evaluations WHERE stage_id = ? AND day = ?"#,
         stage,
         day
     )
@@ -55,34 +54,32 @@ pub(crate) async fn revision_of_day(
 pub(crate) async fn incomplete_of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
-) -> Result<Vec<(EvaluationId, RunId)>> {
+) -> Result<Vec<EvaluationId>> {
     let (stage, day) = (stage_day.stage, Text(stage_day.date));
-    let rows = sqlx::query!(
-        "SELECT e.id, e.run_id AS run
-         FROM evaluations e JOIN runs r ON r.id = e.run_id
+    Ok(sqlx::query_scalar!(
+        "SELECT e.id
+         FROM counting_evaluations e JOIN runs r ON r.id = e.run_id
          WHERE e.stage_id = ? AND e.day = ? AND e.state = 'open' AND r.state <> 'played'
          ORDER BY e.created_at, e.id",
         stage,
         day
     )
     .fetch_all(connection)
-    .await?;
-    Ok(rows.into_iter().map(|row| (row.id, row.run)).collect())
+    .await?)
 }
 
 /// The open evaluations of a team.
 pub(crate) async fn open_of_team(
     connection: &mut SqliteConnection,
     team: TeamId,
-) -> Result<Vec<(EvaluationId, RunId)>> {
-    let rows = sqlx::query!(
-        "SELECT id, run_id AS run
-         FROM evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id",
+) -> Result<Vec<EvaluationId>> {
+    Ok(sqlx::query_scalar!(
+        "SELECT id
+         FROM counting_evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id",
         team
     )
     .fetch_all(connection)
-    .await?;
-    Ok(rows.into_iter().map(|row| (row.id, row.run)).collect())
+    .await?)
 }
 
 /// Voids an evaluation: it does not count any more.

@@ -42,7 +42,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
     let rows = sqlx::query!(
         r#"SELECT d.stage_id AS stage, d.day, d.cutoff_at,
                   d.deadline_at, d.released_at,
-                  (SELECT COUNT(*) FROM evaluations e
+                  (SELECT COUNT(*) FROM counting_evaluations e
                    WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'finished'
                      AND e.voided_at IS NULL) AS "finished!: u32"
            FROM days d ORDER BY d.cutoff_at DESC, d.day DESC, d.stage_id"#
@@ -144,7 +144,7 @@ pub(crate) async fn overdue(
     let rows = sqlx::query!(
         "SELECT d.stage_id AS stage, d.day FROM days d
          WHERE d.released_at IS NULL AND d.deadline_at <= ?
-           AND EXISTS (SELECT 1 FROM evaluations e JOIN runs r ON r.id = e.run_id
+           AND EXISTS (SELECT 1 FROM counting_evaluations e JOIN runs r ON r.id = e.run_id
                        WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'open'
                          AND r.state <> 'played')
          ORDER BY d.cutoff_at",

@@ -1,11 +1,12 @@
-//! Entries of evaluations: the submission, team and day of each, without its state and result.
+//! Entries of evaluations: the purpose, submission, team and day of each, without its state and result.
 
 use crate::{
     column::Instant,
     error::{Result, StoreError},
+    tables::{evaluations::EvaluationPurpose, proposals::Proposal},
 };
 use faceoff_types::{EvaluationId, RunId, StageDay, SubmissionId, TeamId};
-use jiff::Timestamp;
+use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
 /// The fixed data of an evaluation, without its state.
@@ -25,9 +26,9 @@ pub(crate) struct Entry {
 /// The evaluation with this id.
 pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<Entry> {
     let row = sqlx::query!(
-        "SELECT submission_id AS submission, team_id AS team, stage_id AS stage, day, revision, run_id AS run,
+        r#"SELECT submission_id AS submission, team_id AS team, stage_id AS stage, day AS "day!", revision, run_id AS run,
                 rerun_of
-         FROM evaluations WHERE id = ?",
+         FROM counting_evaluations WHERE id = ?"#,
         id
     )
     .fetch_optional(connection)
@@ -47,8 +48,22 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) ->
     })
 }
 
-/// Adds a queued evaluation. [`StoreError::Conflict`] if the team has another evaluation on that day which counts or is
+/// The day's place is taken: [`StoreError::Conflict`] if the team has another evaluation on that day which counts or is
 /// open.
+fn one_per_day(date: Date) -> impl Fn(sqlx::Error) -> StoreError {
+    move |error| {
+        if StoreError::is_duplicate(&error, "evaluations.day") {
+            StoreError::Conflict(format!(
+                "the team has another evaluation on {date} that counts or is running"
+            ))
+        } else {
+            error.into()
+        }
+    }
+}
+
+/// Adds a queued evaluation that counts. [`StoreError::Conflict`] if the team has another one on that day which counts or
+/// is open.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     entry: &Entry,
@@ -58,9 +73,9 @@ pub(crate) async fn insert(
     let (stage, day) = (entry.stage_day.stage, Text(entry.stage_day.date));
     let (run, now, rerun_of) = (entry.run, Instant(now), entry.rerun_of);
     sqlx::query!(
-        "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at, state,
-                                  rerun_of)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
+        "INSERT INTO evaluations (id, purpose, submission_id, team_id, stage_id, day, revision, run_id, created_at,
+                                  state, rerun_of)
+         VALUES (?, 'counting', ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
         id,
         submission,
         team,
@@ -73,16 +88,66 @@ pub(crate) async fn insert(
     )
     .execute(connection)
     .await
-    .map_err(|error| {
-        if StoreError::is_duplicate(&error, "evaluations.day") {
-            StoreError::Conflict(format!(
-                "the team has another evaluation on {} that counts or is running",
-                entry.stage_day.date
-            ))
-        } else {
-            error.into()
-        }
-    })?;
+    .map_err(one_per_day(entry.stage_day.date))?;
+    Ok(())
+}
+
+/// Adds a queued evaluation of a proposal: of submission and team, in a run, and the evaluation that it repeats.
+pub(crate) async fn insert_proposed(
+    connection: &mut SqliteConnection,
+    proposal: &Proposal,
+    (submission, team): (SubmissionId, TeamId),
+    run: RunId,
+    replaces: Option<EvaluationId>,
+) -> Result<()> {
+    let id = EvaluationId::new();
+    let purpose = match proposal.kind.day() {
+        None => EvaluationPurpose::Trial,
+        Some(_) => EvaluationPurpose::Reevaluation,
+    };
+    let (proposal_id, stage, day) = (proposal.id, proposal.stage, proposal.kind.day().map(Text));
+    let created_at = Instant(proposal.created_at);
+    sqlx::query!(
+        "INSERT INTO evaluations (id, purpose, proposal_id, submission_id, team_id, stage_id, day, revision, run_id,
+                                  created_at, state, rerun_of)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
+        id,
+        purpose,
+        proposal_id,
+        submission,
+        team,
+        stage,
+        day,
+        proposal.revision,
+        run,
+        created_at,
+        replaces,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Lets a re-evaluation that is over count from now on. It is an extra evaluation if the one that it repeats is.
+/// [`StoreError::Conflict`] as for [`insert`].
+pub(crate) async fn set_counting(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    date: Date,
+    now: Timestamp,
+) -> Result<()> {
+    let now = Instant(now);
+    sqlx::query!(
+        "UPDATE evaluations
+         SET purpose = 'counting', finished_at = ?,
+             extra_for = (SELECT o.extra_for FROM evaluations o WHERE o.id = evaluations.rerun_of)
+         WHERE id = ?",
+        now,
+        id
+    )
+    .execute(connection)
+    .await
+    .map_err(one_per_day(date))?;
     Ok(())
 }
 

@@ -1,4 +1,5 @@
-//! The table of evaluations: their state from the queue to the result.
+//! The table of evaluations: their state from the queue to the result. It holds those of days, which count, and those of
+//! proposals (trials and proposed re-evaluations), which do not. The view `counting_evaluations` has the former only.
 
 use crate::{
     column::{Instant, Json},
@@ -6,11 +7,12 @@ use crate::{
     tables::{plan::RunPlan, rulings::Ruling, runs::RunState},
 };
 use faceoff_types::{
-    EvaluationId, EvaluationResult, Profile, RunId, StageDay, StageId, StageLimits, SubmissionId,
-    Task, TeamId, Variation,
+    EvaluationId, EvaluationResult, Profile, ProposalId, RunId, StageDay, StageId, StageLimits,
+    SubmissionId, Task, TeamId, Variation,
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
+use uuid::Uuid;
 
 /// An evaluation: a team's run of all tasks on an evaluation day.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +44,42 @@ pub struct Evaluation {
     /// Set if its dataset was removed; the reason names the retention.
     pub dataset_removed: Option<Ruling>,
     pub state: EvaluationState,
+}
+
+/// An evaluation of a proposal: a trial, or a re-evaluation until the proposal is applied. It does not count.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProposedEvaluation {
+    /// It keeps its id when it is applied.
+    pub id: EvaluationId,
+    pub submission: SubmissionId,
+    pub team: TeamId,
+    /// The evaluation that it repeats; `None` in a trial.
+    pub replaces: Option<EvaluationId>,
+    pub run: RunId,
+    /// When it was queued.
+    pub created_at: Timestamp,
+    pub state: EvaluationState,
+}
+
+/// The purpose of an evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx::Type)]
+#[sqlx(rename_all = "snake_case")]
+pub(crate) enum EvaluationPurpose {
+    /// It is a team's evaluation of a day.
+    Counting,
+    /// It has episodes of its own and never counts.
+    Trial,
+    /// It repeats an evaluation of a day, and counts once its proposal is applied.
+    Reevaluation,
+}
+
+/// An evaluation as its jobs need it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct EvaluationRun {
+    pub(crate) id: EvaluationId,
+    pub(crate) run: RunId,
+    /// The proposal that it belongs to, while it does not count.
+    pub(crate) proposal: Option<ProposalId>,
 }
 
 /// State of an evaluation, from the queue to its result.
@@ -105,7 +143,10 @@ pub(crate) struct EvaluationRow {
     submission_id: SubmissionId,
     team_id: TeamId,
     stage_id: StageId,
-    day: Text<Date>,
+    /// The proposal that it was made by, if it was.
+    proposal_id: Option<ProposalId>,
+    /// `None` for a trial.
+    day: Option<Text<Date>>,
     revision: u32,
     released_at: Option<Instant>,
     deadline_at: Option<Instant>,
@@ -141,34 +182,48 @@ impl EvaluationRow {
         (self.state == "open" && self.run_state == RunState::Running).then_some(self.run_id)
     }
 
-    pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<Evaluation> {
-        let damaged = |problem: &str| {
-            StoreError::Damaged(format!("evaluation {}: {} {problem}", self.id, self.state))
-        };
-        let plan = RunPlan {
+    /// The proposal that the evaluation was made by.
+    pub(crate) fn proposal(&self) -> Result<ProposalId> {
+        self.proposal_id
+            .ok_or_else(|| self.damaged("without a proposal"))
+    }
+
+    fn damaged(&self, problem: &str) -> StoreError {
+        StoreError::Damaged(format!("evaluation {}: {} {problem}", self.id, self.state))
+    }
+
+    fn take_plan(&mut self) -> RunPlan {
+        RunPlan {
             profile: self.profile,
-            tasks: self.tasks.0,
+            tasks: std::mem::take(&mut self.tasks.0),
             episodes_per_task: self.episodes_per_task,
             episodes_per_shard: self.episodes_per_shard,
             max_faults: self.max_faults,
             variation: self
                 .variation
+                .take()
                 .map(|variation| variation.0)
                 .unwrap_or_default(),
-            limits: self.limits.map(|limits| limits.0).unwrap_or_default(),
-        };
+            limits: self
+                .limits
+                .take()
+                .map(|limits| limits.0)
+                .unwrap_or_default(),
+        }
+    }
+
+    fn take_state(&mut self, episodes_done: u32, episodes_total: u32) -> Result<EvaluationState> {
         let finished_at = || {
             self.finished_at
                 .map(|at| at.0)
-                .ok_or_else(|| damaged("without an end"))
+                .ok_or_else(|| self.damaged("without an end"))
         };
         let reason = || {
             self.reason
                 .clone()
-                .ok_or_else(|| damaged("without a reason"))
+                .ok_or_else(|| self.damaged("without a reason"))
         };
-        let episodes_total = plan.episodes_total();
-        let state = match (self.state.as_str(), self.run_state) {
+        Ok(match (self.state.as_str(), self.run_state) {
             ("open", RunState::Queued) => EvaluationState::Queued,
             ("open", RunState::Running) => EvaluationState::Running {
                 episodes_done: episodes_done.min(episodes_total),
@@ -177,15 +232,15 @@ impl EvaluationRow {
             ("open", RunState::Complete) => EvaluationState::Finalising,
             ("finished", _) => EvaluationState::Finished {
                 finished_at: finished_at()?,
-                result: match self.result {
+                result: match self.result.take() {
                     Some(result) => Box::new(result.0),
-                    None => return Err(damaged("without a result")),
+                    None => return Err(self.damaged("without a result")),
                 },
-                dataset: match self.dataset {
+                dataset: match self.dataset.take() {
                     Some(dataset) => dataset,
-                    None => return Err(damaged("without a dataset")),
+                    None => return Err(self.damaged("without a dataset")),
                 },
-                dataset_blake3: self.dataset_blake3,
+                dataset_blake3: self.dataset_blake3.take(),
             },
             ("agent_failed", _) => EvaluationState::AgentFailed {
                 finished_at: finished_at()?,
@@ -202,7 +257,31 @@ impl EvaluationRow {
                 finished_at: finished_at()?,
                 reason: reason()?,
             },
-            (_, run) => return Err(damaged(&format!("with a run that is {run:?}"))),
+            (_, run) => return Err(self.damaged(&format!("with a run that is {run:?}"))),
+        })
+    }
+
+    /// For a row of a proposal.
+    pub(crate) fn into_proposed(mut self, episodes_done: u32) -> Result<ProposedEvaluation> {
+        let episodes_total = self.take_plan().episodes_total();
+        let state = self.take_state(episodes_done, episodes_total)?;
+        Ok(ProposedEvaluation {
+            id: self.id,
+            submission: self.submission_id,
+            team: self.team_id,
+            replaces: self.rerun_of,
+            run: self.run_id,
+            created_at: self.created_at.0,
+            state,
+        })
+    }
+
+    /// For a row of `counting_evaluations`.
+    pub(crate) fn into_evaluation(mut self, episodes_done: u32) -> Result<Evaluation> {
+        let plan = self.take_plan();
+        let state = self.take_state(episodes_done, plan.episodes_total())?;
+        let Some(day) = self.day else {
+            return Err(self.damaged("without a day"));
         };
         Ok(Evaluation {
             id: self.id,
@@ -210,7 +289,7 @@ impl EvaluationRow {
             team: self.team_id,
             stage_day: StageDay {
                 stage: self.stage_id,
-                date: self.day.0,
+                date: day.0,
             },
             revision: self.revision,
             released_at: self.released_at.map(|at| at.0),
@@ -231,17 +310,20 @@ impl EvaluationRow {
     }
 }
 
-/// `SELECT` of evaluations `e` with their runs `r`; the argument is the SQL after the tables.
+/// `SELECT` of evaluations `e` with their runs `r`; the arguments are the table or view, and the SQL after it.
 macro_rules! select_evaluations {
     ($tail:literal $(, $argument:expr)*) => {
+        select_evaluations!(from "counting_evaluations", $tail $(, $argument)*)
+    };
+    (from $table:literal, $tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             EvaluationRow,
-            "SELECT e.id, e.submission_id, e.team_id, e.stage_id, e.day, e.revision, d.released_at, d.deadline_at,
+            "SELECT e.id, e.proposal_id, e.submission_id, e.team_id, e.stage_id, e.day, e.revision, d.released_at, d.deadline_at,
                     e.rerun_of, e.run_id, r.profile, r.tasks, r.episodes_per_task, r.episodes_per_shard, r.max_faults,
                     r.variation, r.limits, r.state AS run_state, e.created_at, e.state, e.finished_at, e.result,
                     e.dataset, e.dataset_blake3, e.reason, e.unplayed, e.extra_for, e.voided_at, e.voided_for,
                     e.published_at, e.dataset_removed_at, e.dataset_removed_for
-             FROM evaluations e JOIN runs r ON r.id = e.run_id 
+             FROM " + $table + " e JOIN runs r ON r.id = e.run_id
              LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day " + $tail
             $(, $argument)*
         )
@@ -276,7 +358,10 @@ pub(crate) async fn created_at(
     connection: &mut SqliteConnection,
     id: EvaluationId,
 ) -> Result<Option<Timestamp>> {
-    let at = sqlx::query_scalar!("SELECT created_at AS at FROM evaluations WHERE id = ?", id);
+    let at = sqlx::query_scalar!(
+        "SELECT created_at AS at FROM counting_evaluations WHERE id = ?",
+        id
+    );
     Ok(at.fetch_optional(connection).await?.map(|at| at.0))
 }
 
@@ -341,22 +426,90 @@ pub(crate) async fn of_day(
     .await?)
 }
 
+/// The evaluations that a proposal was made of, in the order in which they were queued. Those that it was applied with
+/// count.
+pub(crate) async fn of_proposal(
+    connection: &mut SqliteConnection,
+    proposal: ProposalId,
+) -> Result<Vec<EvaluationRow>> {
+    Ok(select_evaluations!(
+        from "evaluations",
+        "WHERE e.proposal_id = ? ORDER BY e.created_at, e.id",
+        proposal
+    )
+    .fetch_all(connection)
+    .await?)
+}
+
+/// An evaluation that does not count.
+pub(crate) async fn find_proposed(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<EvaluationRow> {
+    select_evaluations!(from "evaluations", "WHERE e.id = ? AND e.purpose <> 'counting'", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("evaluation"))
+}
+
+/// `SELECT` of evaluations as their jobs need them; the arguments are the condition and its argument.
+macro_rules! select_runs {
+    ($condition:literal, $argument:expr) => {
+        sqlx::query_as!(
+            EvaluationRun,
+            r#"SELECT e.id, e.run_id AS run,
+                      CASE WHEN e.purpose <> 'counting' THEN e.proposal_id END AS "proposal: ProposalId"
+               FROM evaluations e WHERE "# + $condition,
+            $argument
+        )
+    };
+}
+
+/// The evaluation with this id as its jobs need it.
+pub(crate) async fn run_of(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<EvaluationRun> {
+    select_runs!("e.id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("evaluation"))
+}
+
 /// The evaluation that owns a run, if one does.
 pub(crate) async fn of_run(
     connection: &mut SqliteConnection,
     run: RunId,
-) -> Result<Option<EvaluationId>> {
-    let found = sqlx::query_scalar!("SELECT id FROM evaluations WHERE run_id = ?", run)
-        .fetch_optional(connection)
-        .await?;
-    Ok(found)
+) -> Result<Option<EvaluationRun>> {
+    let found = select_runs!("e.run_id = ?", run).fetch_optional(connection);
+    Ok(found.await?)
 }
 
-pub(crate) async fn run_of(connection: &mut SqliteConnection, id: EvaluationId) -> Result<RunId> {
-    sqlx::query_scalar!("SELECT run_id AS id FROM evaluations WHERE id = ?", id)
-        .fetch_optional(connection)
-        .await?
-        .ok_or(StoreError::NotFound("evaluation"))
+/// The evaluation that a job scores.
+pub(crate) async fn of_scoring_job(
+    connection: &mut SqliteConnection,
+    job: Uuid,
+) -> Result<Option<EvaluationRun>> {
+    let job = Text(job);
+    let found = select_runs!(
+        "e.id = (SELECT s.evaluation_id FROM scorings s WHERE s.job_id = ?)",
+        job
+    );
+    Ok(found.fetch_optional(connection).await?)
+}
+
+/// The proposal that the evaluation of a run was made by, whether it is applied or not.
+pub(crate) async fn proposal_of_run(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<Option<ProposalId>> {
+    let proposal = sqlx::query_scalar!(
+        "SELECT proposal_id AS proposal FROM evaluations WHERE run_id = ?",
+        run
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(proposal.flatten())
 }
 
 /// Number of a team's evaluations on a day that ended by a platform fault.
@@ -367,7 +520,7 @@ pub(crate) async fn count_platform_failed(
 ) -> Result<usize> {
     let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let count = sqlx::query_scalar!(
-        r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
+        r#"SELECT COUNT(*) AS "count!: u32" FROM counting_evaluations
            WHERE team_id = ? AND stage_id = ? AND day = ? AND state = 'platform_failed'"#,
         team,
         stage,
@@ -387,12 +540,10 @@ pub(crate) async fn set_finished(
     now: Timestamp,
 ) -> Result<()> {
     let (result, now) = (Json(result), Instant(now));
-    // The slot time is unknown if the evaluation comes from a proposal whose run was cleared before it was applied.
     sqlx::query!(
         "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
                                 slot_ms = (SELECT SUM(j.charged_ms) FROM shards s JOIN jobs j ON j.id = s.job_id
-                                           JOIN runs r ON r.id = s.run_id
-                                           WHERE s.run_id = evaluations.run_id AND r.cleared_at IS NULL)
+                                           WHERE s.run_id = evaluations.run_id)
          WHERE id = ?",
         now,
         result,
@@ -444,7 +595,39 @@ pub(crate) async fn set_failed(
     Ok(())
 }
 
-/// Number of open evaluations, of one day or of all days.
+/// Number of open evaluations of proposals: of one, or of all.
+pub(crate) async fn count_open_proposed(
+    connection: &mut SqliteConnection,
+    proposal: Option<ProposalId>,
+) -> Result<u32> {
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
+           WHERE state = 'open' AND purpose <> 'counting' AND (?1 IS NULL OR proposal_id = ?1)"#,
+        proposal
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// Evaluations of proposals that were dropped until `dropped_until` and whose datasets are still stored, with the keys of
+/// these datasets.
+pub(crate) async fn dropped_with_datasets(
+    connection: &mut SqliteConnection,
+    dropped_until: Timestamp,
+) -> Result<Vec<(EvaluationId, String)>> {
+    let dropped_until = Instant(dropped_until);
+    let rows = sqlx::query!(
+        r#"SELECT e.id, e.dataset AS "dataset!"
+           FROM proposals p CROSS JOIN evaluations e ON e.proposal_id = p.id
+           WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND e.dataset IS NOT NULL AND e.dataset_removed_at IS NULL"#,
+        dropped_until
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
+}
+
+/// Number of open evaluations that count, of one day or of all days.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
     stage_day: Option<StageDay>,
@@ -454,7 +637,7 @@ pub(crate) async fn count_open(
         stage_day.map(|day| Text(day.date)),
     );
     Ok(sqlx::query_scalar!(
-        r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
+        r#"SELECT COUNT(*) AS "count!: u32" FROM counting_evaluations
            WHERE state = 'open' AND (?1 IS NULL OR stage_id = ?1 AND day = ?2)"#,
         stage,
         day

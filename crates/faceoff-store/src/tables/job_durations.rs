@@ -61,7 +61,7 @@ pub(crate) async fn open_evaluations(
                   SUM(CASE WHEN j.state = 'done' THEN j.charged_ms ELSE 0 END) AS "done_ms!: i64",
                   SUM(CASE WHEN j.state <> 'done' THEN s.end_episode - s.first_episode ELSE 0 END) AS "episodes_left!: u32",
                   SUM(j.state <> 'done') AS "shards_left!: u32"
-           FROM evaluations e JOIN runs r ON r.id = e.run_id JOIN shards s ON s.run_id = e.run_id
+           FROM counting_evaluations e JOIN runs r ON r.id = e.run_id JOIN shards s ON s.run_id = e.run_id
            JOIN jobs j ON j.id = s.job_id
            WHERE e.state = 'open' GROUP BY +e.id ORDER BY e.created_at, e.id"#
     )
@@ -101,7 +101,7 @@ pub(crate) async fn recent(
     let rows = sqlx::query!(
         r#"SELECT e.team_id AS "team!", SUM(e.slot_ms) AS "slot_ms!: i64",
                   SUM(r.episodes_per_task * json_array_length(r.tasks)) AS "episodes!: i64"
-           FROM evaluations e JOIN runs r ON r.id = e.run_id
+           FROM counting_evaluations e JOIN runs r ON r.id = e.run_id
            WHERE e.day >= ? AND e.finished_at >= ? AND e.state = 'finished' AND e.slot_ms > 0 GROUP BY +e.team_id"#,
         first_day,
         since
@@ -134,7 +134,7 @@ pub(crate) async fn recent(
     .await?;
     let scoring_ms = sqlx::query_scalar!(
         r#"SELECT AVG(j.charged_ms) AS "ms: f64"
-           FROM evaluations e JOIN scorings s ON s.evaluation_id = e.id JOIN jobs j ON j.id = s.job_id
+           FROM counting_evaluations e JOIN scorings s ON s.evaluation_id = e.id JOIN jobs j ON j.id = s.job_id
            WHERE e.day >= ? AND e.finished_at >= ? AND j.state = 'done' AND j.charged_ms > 0"#,
         first_day,
         since

@@ -26,7 +26,6 @@ pub(crate) mod job_durations;
 pub(crate) mod plan;
 pub(crate) mod programs;
 pub(crate) mod proposals;
-pub(crate) mod proposed_evaluations;
 pub(crate) mod questions;
 pub(crate) mod registrations;
 pub(crate) mod required_artifacts;

@@ -32,10 +32,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Require
     let datasets = sqlx::query!(
         r#"/* backup */ SELECT dataset AS "dataset!", dataset_blake3 FROM evaluations
            WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
-           UNION
-           SELECT dataset AS "dataset!", dataset_blake3 FROM proposed_evaluations
-           WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
-             AND proposal_id NOT IN (SELECT id FROM proposals WHERE outcome = 'dropped')
+             AND NOT EXISTS (SELECT 1 FROM proposals p WHERE p.id = proposal_id AND p.outcome = 'dropped')
            ORDER BY 1"#
     )
     .fetch_all(&mut *connection)
@@ -47,8 +44,7 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Require
     let recordings = sqlx::query_scalar!(
         r#"/* backup */ SELECT s.recording AS "recording!" FROM shards s
            WHERE s.recording IS NOT NULL
-             AND (s.run_id IN (SELECT run_id FROM evaluations WHERE state = 'open')
-                  OR s.run_id IN (SELECT run_id FROM proposed_evaluations WHERE state = 'open'))
+             AND s.run_id IN (SELECT run_id FROM evaluations WHERE state = 'open')
            ORDER BY s.run_id, s.position"#
     )
     .fetch_all(&mut *connection)

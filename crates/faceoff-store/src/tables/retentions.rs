@@ -102,7 +102,7 @@ pub(crate) async fn scored_evaluations(
                   e.dataset_removed_at IS NULL AS "is_kept!: bool",
                   t.disqualified_at IS NOT NULL OR t.retired_by_organiser = 1 AS "is_evidence!: bool",
                   e.dataset_bytes AS bytes, s.created_at AS submitted_at, e.result AS "rank!: Json<Rank>"
-           FROM evaluations e JOIN teams t ON t.id = e.team_id JOIN submissions s ON s.id = e.submission_id
+           FROM counting_evaluations e JOIN teams t ON t.id = e.team_id JOIN submissions s ON s.id = e.submission_id
            WHERE e.stage_id = ? AND e.state = 'finished'
            ORDER BY e.team_id, e.day DESC, e.created_at DESC, e.id DESC"#,
         stage
@@ -152,17 +152,17 @@ pub(crate) async fn idle_bundles(
          FROM submissions s JOIN teams t ON t.id = s.team_id
          WHERE s.state = 'valid' AND s.bundle_removed_at IS NULL
            AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
-           AND s.id IN (SELECT e.submission_id FROM evaluations e WHERE e.stage_id = ?1 AND e.state = 'finished')
+           AND s.id IN (SELECT e.submission_id FROM counting_evaluations e WHERE e.stage_id = ?1 AND e.state = 'finished')
            AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.submission_id = s.id)
-           AND NOT EXISTS (SELECT 1 FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+           AND NOT EXISTS (SELECT 1 FROM counting_evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                            WHERE e.submission_id = s.id
                              AND (e.state = 'open' OR d.released_at IS NULL
                                   OR e.state = 'finished' AND e.dataset_removed_at IS NULL
                                      AND e.id NOT IN (SELECT value FROM json_each(?2))))
            AND ((SELECT closed_at FROM season) IS NOT NULL
-                OR NOT EXISTS (SELECT 1 FROM evaluations e JOIN stages st ON st.id = e.stage_id
+                OR NOT EXISTS (SELECT 1 FROM counting_evaluations e JOIN stages st ON st.id = e.stage_id
                                WHERE e.submission_id = s.id AND st.finalised_at IS NULL))
-           AND NOT EXISTS (SELECT 1 FROM proposed_evaluations d JOIN proposals p ON p.id = d.proposal_id
+           AND NOT EXISTS (SELECT 1 FROM evaluations d JOIN proposals p ON p.id = d.proposal_id
                            WHERE d.submission_id = s.id AND p.outcome IS NULL)
            AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)
            AND NOT EXISTS (SELECT 1 FROM round_submissions r JOIN tournaments o ON o.id = r.tournament_id
@@ -178,7 +178,7 @@ pub(crate) async fn idle_bundles(
     Ok(rows.into_iter().map(|row| (row.id, row.bytes)).collect())
 }
 
-/// Marks an evaluation's dataset as removed, also in the proposal that it came from. The file is deleted later.
+/// Marks an evaluation's dataset as removed. The file is deleted later.
 pub(crate) async fn set_dataset_removed(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -190,13 +190,6 @@ pub(crate) async fn set_dataset_removed(
         "UPDATE evaluations SET dataset_removed_at = ?, dataset_removed_for = ? WHERE id = ?",
         now,
         reason,
-        id,
-    )
-    .execute(&mut *connection)
-    .await?;
-    sqlx::query!(
-        "UPDATE proposed_evaluations SET dataset_removed_at = ? WHERE id = ? AND dataset IS NOT NULL",
-        now,
         id,
     )
     .execute(connection)
@@ -212,7 +205,7 @@ pub(crate) async fn deletable_datasets(
 ) -> Result<Vec<(EvaluationId, String)>> {
     let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
-        r#"SELECT e.id, e.dataset AS "dataset!" FROM evaluations e
+        r#"SELECT e.id, e.dataset AS "dataset!" FROM counting_evaluations e
            JOIN teams t ON t.id = e.team_id
            WHERE e.dataset_removed_at IS NOT NULL AND e.dataset_removed_at <= ? AND e.dataset_gone = 0
              AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0"#,
@@ -221,6 +214,24 @@ pub(crate) async fn deletable_datasets(
     .fetch_all(connection)
     .await?;
     Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
+}
+
+/// Records that the dataset of a dropped proposal's evaluation was removed with its file.
+pub(crate) async fn set_dropped_dataset_deleted(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    now: Timestamp,
+) -> Result<()> {
+    let now = Instant(now);
+    sqlx::query!(
+        "UPDATE evaluations
+         SET dataset_removed_at = ?, dataset_removed_for = 'the proposal was dropped', dataset_gone = 1 WHERE id = ?",
+        now,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
 }
 
 /// Records that the file of a removed dataset was deleted.
@@ -234,16 +245,12 @@ pub(crate) async fn set_dataset_file_deleted(
     Ok(())
 }
 
-/// Datasets whose size is unknown, with their keys. An applied proposed evaluation has the same dataset as the evaluation
-/// that it has become.
+/// Datasets whose size is unknown, with their keys.
 pub(crate) async fn unmeasured(
     connection: &mut SqliteConnection,
 ) -> Result<Vec<(EvaluationId, String)>> {
     let rows = sqlx::query!(
-        r#"SELECT id AS "id!", dataset AS "dataset!: String" FROM evaluations
-           WHERE state = 'finished' AND dataset_bytes IS NULL AND dataset_removed_at IS NULL
-           UNION
-           SELECT id, dataset FROM proposed_evaluations
+        r#"SELECT id, dataset AS "dataset!" FROM evaluations
            WHERE state = 'finished' AND dataset_bytes IS NULL AND dataset_removed_at IS NULL"#
     )
     .fetch_all(connection)
@@ -251,7 +258,7 @@ pub(crate) async fn unmeasured(
     Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
 }
 
-/// Stores the size of the dataset of an evaluation, or of the proposed evaluation with this id.
+/// Stores the size of an evaluation's dataset.
 pub(crate) async fn set_dataset_bytes(
     connection: &mut SqliteConnection,
     id: EvaluationId,
@@ -262,29 +269,6 @@ pub(crate) async fn set_dataset_bytes(
     sqlx::query!(
         "UPDATE evaluations SET dataset_bytes = ? WHERE id = ? AND state = 'finished'",
         bytes,
-        id
-    )
-    .execute(&mut *connection)
-    .await?;
-    sqlx::query!(
-        "UPDATE proposed_evaluations SET dataset_bytes = ? WHERE id = ? AND state = 'finished'",
-        bytes,
-        id
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
-/// Copies the size of the dataset from an applied proposed evaluation.
-pub(crate) async fn copy_dataset_bytes(
-    connection: &mut SqliteConnection,
-    id: EvaluationId,
-) -> Result<()> {
-    sqlx::query!(
-        "UPDATE evaluations SET dataset_bytes =
-             (SELECT d.dataset_bytes FROM proposed_evaluations d WHERE d.id = evaluations.id)
-         WHERE id = ?",
         id
     )
     .execute(connection)

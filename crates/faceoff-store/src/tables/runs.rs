@@ -161,9 +161,8 @@ pub(crate) async fn with_old_recordings(
     let ended_until = Instant(ended_until);
     let runs = sqlx::query_scalar!(
         "SELECT r.id
-         FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
-         WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL
-           AND COALESCE(e.finished_at, d.finished_at) <= ?",
+         FROM runs r JOIN evaluations e ON e.run_id = r.id
+         WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL AND e.finished_at <= ?",
         ended_until,
     )
     .fetch_all(connection)
@@ -197,12 +196,12 @@ pub(crate) async fn clearable(
     let ended_until = Instant(ended_until);
     Ok(sqlx::query_scalar!(
         r#"SELECT r.id AS "run!"
-           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
+           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id
            LEFT JOIN ablation_runs p ON p.run_id = r.id LEFT JOIN ablations a ON a.id = p.ablation_id
-           WHERE r.cleared_at IS NULL AND COALESCE(e.finished_at, d.finished_at, a.finished_at) <= ?
+           WHERE r.cleared_at IS NULL AND COALESCE(e.finished_at, a.finished_at) <= ?
              AND (r.state <> 'played'
                   OR EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?))
-           ORDER BY COALESCE(e.finished_at, d.finished_at, a.finished_at), r.id"#,
+           ORDER BY COALESCE(e.finished_at, a.finished_at), r.id"#,
         ended_until,
         summary_version,
     )
@@ -217,12 +216,12 @@ pub(crate) async fn unsummarised(
 ) -> Result<Vec<RunId>> {
     Ok(sqlx::query_scalar!(
         r#"SELECT r.id AS "run!"
-           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN proposed_evaluations d ON d.run_id = r.id
+           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id
            LEFT JOIN ablation_runs p ON p.run_id = r.id LEFT JOIN ablations a ON a.id = p.ablation_id
            WHERE r.cleared_at IS NULL AND r.state = 'played'
-             AND COALESCE(e.finished_at, d.finished_at, a.finished_at) IS NOT NULL
+             AND COALESCE(e.finished_at, a.finished_at) IS NOT NULL
              AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
-           ORDER BY COALESCE(e.finished_at, d.finished_at, a.finished_at), r.id"#,
+           ORDER BY COALESCE(e.finished_at, a.finished_at), r.id"#,
         summary_version,
     )
     .fetch_all(connection)

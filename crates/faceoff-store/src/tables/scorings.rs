@@ -21,21 +21,6 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// The evaluation that a job scores.
-pub(crate) async fn of_job(
-    connection: &mut SqliteConnection,
-    job: Uuid,
-) -> Result<Option<EvaluationId>> {
-    let job = Text(job);
-    let found = sqlx::query_scalar!(
-        "SELECT evaluation_id AS id FROM scorings WHERE job_id = ?",
-        job
-    )
-    .fetch_optional(connection)
-    .await?;
-    Ok(found)
-}
-
 /// The job that scores an evaluation; `None` before it is queued.
 pub(crate) async fn job_of(
     connection: &mut SqliteConnection,

@@ -79,7 +79,7 @@ pub(crate) async fn sign_off(
 /// Number of a stage's open evaluations.
 pub(crate) async fn count_open(connection: &mut SqliteConnection, stage: StageId) -> Result<u32> {
     Ok(sqlx::query_scalar!(
-        r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations WHERE stage_id = ? AND state = 'open'"#,
+        r#"SELECT COUNT(*) AS "count!: u32" FROM counting_evaluations WHERE stage_id = ? AND state = 'open'"#,
         stage
     )
     .fetch_one(connection)
@@ -89,7 +89,7 @@ pub(crate) async fn count_open(connection: &mut SqliteConnection, stage: StageId
 /// Number of a stage's evaluations with a score, including voided ones.
 pub(crate) async fn count_scored(connection: &mut SqliteConnection, stage: StageId) -> Result<u32> {
     Ok(sqlx::query_scalar!(
-        r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations WHERE stage_id = ? AND state = 'finished'"#,
+        r#"SELECT COUNT(*) AS "count!: u32" FROM counting_evaluations WHERE stage_id = ? AND state = 'finished'"#,
         stage
     )
     .fetch_one(connection)

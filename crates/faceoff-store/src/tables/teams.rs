@@ -188,7 +188,7 @@ pub(crate) async fn signed_off_stage(
     Ok(sqlx::query_scalar!(
         "SELECT g.name FROM stages g
          WHERE g.finalised_at IS NOT NULL
-           AND EXISTS (SELECT 1 FROM evaluations e
+           AND EXISTS (SELECT 1 FROM counting_evaluations e
                        WHERE e.team_id = ? AND e.stage_id = g.id AND e.state = 'finished' AND e.voided_at IS NULL)
          LIMIT 1",
         id

@@ -34,7 +34,7 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ("episode_summaries", "run_id summary version"),
     (
         "evaluations",
-        "created_at dataset dataset_blake3 dataset_bytes dataset_gone dataset_removed_at dataset_removed_for day extra_for finished_at id published_at reason rerun_of result revision \
+        "created_at dataset dataset_blake3 dataset_bytes dataset_gone dataset_removed_at dataset_removed_for day extra_for finished_at id proposal_id published_at purpose reason rerun_of result revision \
          run_id slot_ms stage_id state submission_id team_id unplayed voided_at voided_for",
     ),
     ("events", "actor at id kind payload subject_id subject_kind"),

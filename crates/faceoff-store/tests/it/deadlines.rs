@@ -37,7 +37,7 @@ async fn run_shard(f: &TestStore) -> (String, TeamId) {
         panic!("a shard is queued")
     };
     f.commit_shard(&claim, &shard, 0).await;
-    let RunOwner::Evaluation(id) = owner else {
+    let RunOwner::Evaluation { id, .. } = owner else {
         panic!("expected a shard of an evaluation, claimed one of {owner:?}")
     };
     let played = f.store.evaluation(id).await.unwrap();
@@ -81,7 +81,7 @@ async fn unfinished_day_runs_before_the_next_one() {
                 job: Job::Shard { owner, shard, .. },
             }) => {
                 f.commit_shard(&claim, &shard, 0).await;
-                let RunOwner::Evaluation(id) = owner else {
+                let RunOwner::Evaluation { id, .. } = owner else {
                     panic!("expected a shard of an evaluation, claimed one of {owner:?}")
                 };
                 let played = f.store.evaluation(id).await.unwrap();
@@ -134,7 +134,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
                 claim,
                 job: Job::Shard { owner, shard, .. },
             } => {
-                if owner == RunOwner::Evaluation(id_of(alpha.team)) {
+                if matches!(owner, RunOwner::Evaluation { id, .. } if id == id_of(alpha.team)) {
                     break (claim, shard);
                 }
                 f.commit_shard(&claim, &shard, 0).await;

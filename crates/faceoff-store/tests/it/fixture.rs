@@ -201,7 +201,7 @@ impl TestStore {
                 panic!("a job is queued")
             };
             let Job::Shard {
-                owner: RunOwner::Evaluation(id),
+                owner: RunOwner::Evaluation { id, .. },
                 ..
             } = job
             else {

@@ -469,12 +469,11 @@ async fn stored_writes(folder: &Path) -> HashSet<String> {
          UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'
          UNION SELECT 'proposal ' || id FROM proposals
          UNION SELECT outcome || ' ' || id FROM proposals WHERE outcome IS NOT NULL
-         UNION SELECT 'finished ' || id FROM proposed_evaluations WHERE state = 'finished'
          UNION SELECT 'finalised ' || id FROM stages WHERE finalised_at IS NOT NULL
          UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
          UNION SELECT 'joined ' || id FROM people
          UNION SELECT 'keeps ' || stage_id FROM stage_retentions
-         UNION SELECT 'removed ' || id FROM evaluations WHERE dataset_removed_at IS NOT NULL
+         UNION SELECT 'removed ' || id FROM counting_evaluations WHERE dataset_removed_at IS NOT NULL
          UNION SELECT 'deleted ' || id FROM submissions WHERE deleted_at IS NOT NULL
          UNION SELECT 'left ' || id FROM people WHERE left_at IS NOT NULL
          UNION SELECT 'disqualified ' || subject_id FROM events WHERE kind = 'team_disqualified'",
@@ -509,7 +508,7 @@ async fn check_consistency(folder: &Path, store: &Store) {
          "SELECT COUNT(*) FROM submissions s WHERE NOT EXISTS
               (SELECT 1 FROM validation_runs r JOIN jobs j ON j.id = r.job_id WHERE r.submission_id = s.id)"),
         ("an evaluation without its contestant or all of its shards",
-         "SELECT COUNT(*) FROM evaluations e
+         "SELECT COUNT(*) FROM counting_evaluations e
               WHERE (SELECT COUNT(*) FROM shards s JOIN jobs j ON j.id = s.job_id
                      WHERE s.run_id = e.run_id) <> 6
                  OR (SELECT COUNT(*) FROM contestants c WHERE c.run_id = e.run_id) <> 1"),
@@ -528,11 +527,11 @@ async fn check_consistency(folder: &Path, store: &Store) {
               JOIN jobs j ON j.id = f.job_id WHERE (e.state = 'finished') <> (j.state = 'done')"),
         ("a day that is over and not released",
          "SELECT COUNT(*) FROM days d WHERE d.released_at IS NULL
-              AND NOT EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
+              AND NOT EXISTS (SELECT 1 FROM counting_evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
                               AND e.state = 'open')"),
         ("a released day with open evaluations other than reruns",
          "SELECT COUNT(*) FROM days d WHERE d.released_at IS NOT NULL
-              AND EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
+              AND EXISTS (SELECT 1 FROM counting_evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
                           AND e.state = 'open' AND e.rerun_of IS NULL AND e.extra_for IS NULL)"),
         ("a valid submission of a team without an active one",
          "SELECT COUNT(*) FROM submissions s WHERE s.state = 'valid'
@@ -554,13 +553,13 @@ async fn check_consistency(folder: &Path, store: &Store) {
                + (SELECT COUNT(*) FROM events WHERE kind = 'team_reinstated')"),
         ("a proposal without evaluations, or half applied",
          "SELECT COUNT(*) FROM proposals p
-              WHERE NOT EXISTS (SELECT 1 FROM proposed_evaluations d WHERE d.proposal_id = p.id)
+              WHERE NOT EXISTS (SELECT 1 FROM evaluations d WHERE d.proposal_id = p.id)
                  OR (p.outcome IS NOT NULL AND EXISTS
-                     (SELECT 1 FROM proposed_evaluations d WHERE d.proposal_id = p.id AND d.state = 'open'))
+                     (SELECT 1 FROM evaluations d WHERE d.proposal_id = p.id AND d.state = 'open'))
                  OR (p.outcome IS 'applied') <> EXISTS
-                     (SELECT 1 FROM proposed_evaluations d JOIN evaluations e ON e.id = d.id WHERE d.proposal_id = p.id)"),
+                     (SELECT 1 FROM counting_evaluations e WHERE e.proposal_id = p.id)"),
         ("an operation without its event",
-         "SELECT (SELECT COUNT(*) FROM evaluations WHERE extra_for IS NOT NULL AND rerun_of IS NULL)
+         "SELECT (SELECT COUNT(*) FROM counting_evaluations WHERE extra_for IS NOT NULL AND rerun_of IS NULL)
                + (SELECT COUNT(*) FROM days WHERE missed_for IS NOT NULL)
                + (SELECT COUNT(*) FROM proposals) + (SELECT COUNT(*) FROM proposals WHERE outcome IS NOT NULL)
                + (SELECT COUNT(*) FROM frozen_boards)
@@ -569,7 +568,7 @@ async fn check_consistency(folder: &Path, store: &Store) {
                + (SELECT COUNT(*) FROM events WHERE kind = 'boards_unfrozen')"),
         ("a removal without its event",
          "SELECT (SELECT COUNT(*) FROM submissions WHERE bundle_removed_for IS NOT NULL)
-               + (SELECT COUNT(*) FROM evaluations WHERE dataset_removed_at IS NOT NULL)
+               + (SELECT COUNT(*) FROM counting_evaluations WHERE dataset_removed_at IS NOT NULL)
                + (SELECT COUNT(*) FROM stage_retentions)
                - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_deleted', 'archive_removed', 'dataset_removed',
                                                              'stage_retention_changed'))"),
@@ -577,9 +576,9 @@ async fn check_consistency(folder: &Path, store: &Store) {
          "SELECT (SELECT COUNT(*) FROM stages WHERE finalised_at IS NOT NULL)
                - (SELECT COUNT(*) FROM events WHERE kind = 'stage_finalised')"),
         ("a change without its event",
-         "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM evaluations)
+         "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM counting_evaluations)
                + (SELECT COUNT(*) FROM shards WHERE committed_at IS NOT NULL)
-               + (SELECT COUNT(*) FROM evaluations WHERE state = 'finished')
+               + (SELECT COUNT(*) FROM counting_evaluations WHERE state = 'finished')
                - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_uploaded', 'evaluation_queued', 'evaluation_applied',
                                                              'shard_committed', 'evaluation_finished'))"),
     ];

@@ -776,12 +776,11 @@ async fn migrated_queue_continues() {
             } => {
                 let mut played = shard_commit(&shard, 0);
                 match owner {
-                    RunOwner::Evaluation(_) => {
+                    RunOwner::Evaluation { .. } => {
                         shards += 1;
                         assert_eq!(ablation_shards, 0, "ablations run last");
                         assert_eq!(seeds.episodes, secret.day(date(2026, 3, 1)));
                     }
-                    RunOwner::ProposedEvaluation { .. } => panic!("there were no proposals"),
                     RunOwner::Ablation(ablation) => {
                         ablation_shards += 1;
                         assert_eq!(ablation, id(11_000));

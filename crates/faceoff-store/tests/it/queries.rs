@@ -1,4 +1,5 @@
-//! Query plans: no query may scan (read completely) a table that grows with the season.
+//! Queries: none may scan (read completely) a table that grows with the season, and those of days, teams and boards read the
+//! evaluations that count.
 
 use crate::fixture::*;
 use sqlx::{Row, SqlSafeStr};
@@ -16,9 +17,10 @@ const LARGE: [&str; 8] = [
 ];
 
 /// Partial indexes, which contain few rows of a large table: a scan of such an index reads only these rows.
-const SMALL_INDEXES: [&str; 7] = [
+const SMALL_INDEXES: [&str; 8] = [
     "jobs_open",
     "evaluations_open",
+    "evaluations_of_proposal",
     "runs_with_recordings",
     "datasets_going",
     "datasets_unmeasured",
@@ -72,6 +74,43 @@ async fn queries_do_not_scan_growing_tables() {
         }
     }
     assert_eq!(board_queries, 1, "the board query is checked, too");
+}
+
+/// Queries of the table of evaluations that need not ask for which of them count, identified by a fragment, each with its
+/// reason.
+const OF_ALL_EVALUATIONS: [(&str, &str); 4] = [
+    (
+        "FROM runs r",
+        "recordings and shards go with any evaluation",
+    ),
+    ("/* backup */", "a backup has all files"),
+    ("dataset_bytes IS NULL", "all datasets are measured"),
+    (
+        "UPDATE evaluations SET extra_for",
+        "the query copies from one evaluation, by its id",
+    ),
+];
+
+#[test]
+fn other_queries_read_evaluations_that_count() {
+    let mut whole_table = 0;
+    for (_, data) in query_data() {
+        let sql = data["query"].as_str().unwrap();
+        let words: Vec<_> = sql.split_whitespace().collect();
+        let reads_all = words
+            .windows(2)
+            .any(|pair| ["FROM", "JOIN"].contains(&pair[0]) && pair[1] == "evaluations");
+        let names_purpose = sql.contains("purpose") || sql.contains("proposal_id");
+        let has_reason = OF_ALL_EVALUATIONS
+            .iter()
+            .any(|(fragment, _)| sql.contains(fragment));
+        assert!(
+            !reads_all || names_purpose || has_reason,
+            "this query reads trials, too: {sql}"
+        );
+        whole_table += usize::from(reads_all);
+    }
+    assert!(whole_table > 0, "the table is found in the queries");
 }
 
 /// The table of an alias in a query (`FROM evaluations e`).

@@ -97,7 +97,7 @@ impl Slots {
                 (self.teams[&submission.team], JobKind::Validation)
             }
             Job::Shard {
-                owner: RunOwner::Evaluation(id),
+                owner: RunOwner::Evaluation { id, .. },
                 ..
             } => (self.teams[&self.evaluations[id]], JobKind::Shard),
             Job::Shard { .. } => ("", JobKind::Ablation),
