@@ -1,11 +1,12 @@
 //! The rules of `ARCHITECTURE.md`: each crate uses only the crates that the table there lists for it, no module uses one of a
-//! higher level of its crate, and there are no import cycles (files that import from each other, directly or through further
-//! files).
+//! higher level of its crate, crates of the platform know no word of air hockey, and there are no import cycles (files that
+//! import from each other, directly or through further files).
 
 mod crate_table;
 mod import_cycles;
 mod imports;
 mod levels;
+mod line;
 
 use import_cycles::find_cycles;
 use std::{collections::BTreeSet, fs, path::Path};
@@ -83,6 +84,58 @@ fn modules_use_only_their_own_and_lower_levels() {
         violations.is_empty(),
         "not allowed by the levels of ARCHITECTURE.md: {violations:#?}"
     );
+}
+
+#[test]
+fn platform_knows_no_word_of_air_hockey() {
+    let platform = line::side("platform");
+    let air_hockey = line::side("air hockey");
+    let both = line::side("both, to be divided");
+    let members = crate_table::members();
+    let mut words = Vec::new();
+    for member in &members {
+        let is_once = [&platform, &air_hockey, &both]
+            .iter()
+            .filter(|side| side.contains(&member.name))
+            .count();
+        assert_eq!(is_once, 1, "{} is on one side of the line", member.name);
+        if platform.contains(&member.name) {
+            let found = line::words_in(&member.folder.join("src"));
+            words.extend(found.iter().map(|word| format!("{}: {word}", member.name)));
+            let crossing = member
+                .dependencies
+                .iter()
+                .filter(|name| air_hockey.contains(*name));
+            words.extend(crossing.map(|name| format!("{} uses {name}", member.name)));
+        }
+    }
+    assert!(
+        words.is_empty(),
+        "the platform knows air hockey: {words:#?}"
+    );
+}
+
+#[test]
+fn word_of_air_hockey_is_found() {
+    let words = |text: &str| line::words_in(write_crate(&[("lib.rs", text)]).path());
+    assert_eq!(words("pub enum Task { Hit }"), ["\"hit\" in lib.rs"]);
+    assert_eq!(words("pub fn joint_pos() {}"), ["\"joint\" in lib.rs"]);
+    assert_eq!(
+        words("pub const TITLE: &str = \"Goals\";"),
+        ["\"goals\" in lib.rs"]
+    );
+    assert_eq!(
+        words("pub fn log() { println!(\"a puck\"); }"),
+        ["\"puck\" in lib.rs"]
+    );
+    assert_eq!(
+        words("#[cfg(feature = \"prepare\")] pub fn f() {}"),
+        ["\"prepare\" in lib.rs"]
+    );
+    let allowed = "/// A comment on the puck.
+        pub fn whitelist() {}
+        #[cfg(test)] mod tests { fn hit() {} }";
+    assert_eq!(words(allowed), [""; 0]);
 }
 
 #[test]

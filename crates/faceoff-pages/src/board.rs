@@ -29,6 +29,7 @@ use faceoff_types::Task;
 use heading::Heading;
 use rows::{Context, Group, OverallRow, TaskRow, common_conditions};
 use sort::Sort;
+use std::sync::Arc;
 
 /// Interval at which `live.js` reloads the progress of running evaluations.
 const POLL_SECONDS: u32 = 10;
@@ -78,7 +79,8 @@ pub(super) async fn overall(
 ) -> Result<Response, PageProblem> {
     let QueryParams(query) = query?;
     let address = Address::new("/", &query);
-    let sort = Sort::new(&query, None, &address)?;
+    let competition = Arc::clone(&app.config.competition);
+    let sort = Sort::new(&query, None, &address, &competition)?;
     let visibility = Visibility::load(&app, viewer?).await?;
     let season = SeasonHead::load(&app).await?;
     let mut board = board::query(&app, &visibility, query.board(), None).await?;
@@ -95,7 +97,7 @@ pub(super) async fn overall(
         conditions: common_conditions(&board.rows),
         comparison_day: timeline.previous_board.as_ref().map(|earlier| earlier.day),
         has_ties: context.has_ties(),
-        groups: context.groups(|row| OverallRow::new(row, &context, &board.weights)),
+        groups: context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition)),
         baselines: baselines::rows(&board),
         progress: DayProgress::load(&app, &visibility, today, board.division.as_ref()).await?,
         disqualified: board.disqualified.clone(),
@@ -111,9 +113,9 @@ struct TaskPage {
     heading: Heading,
     days: Days,
     sort: Sort,
-    title: &'static str,
+    title: String,
     /// Aim of the task in one sentence.
-    aim: &'static str,
+    aim: String,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
     conditions: Option<String>,
     comparison_day: Option<jiff::civil::Date>,
@@ -140,23 +142,13 @@ pub(super) async fn by_task(
     let (PathParam(task), QueryParams(query)) = (task?, query?);
     let path = format!("/tasks/{task}");
     let address = Address::new(&path, &query);
-    let sort = Sort::new(&query, Some(task), &address)?;
+    let competition = Arc::clone(&app.config.competition);
+    let sort = Sort::new(&query, Some(task), &address, &competition)?;
+    let info = competition
+        .task(task)
+        .ok_or_else(|| Problem::not_found("task"))?;
     let visibility = Visibility::load(&app, viewer?).await?;
     let season = SeasonHead::load(&app).await?;
-    let (title, aim) = match task {
-        Task::Hit => (
-            "Hit",
-            "Score a goal against an opponent that moves in a fixed pattern.",
-        ),
-        Task::Defend => (
-            "Defend",
-            "Stop an incoming puck on the agent’s side of the table.",
-        ),
-        Task::Prepare => (
-            "Prepare",
-            "Move a puck from the rim to a good hitting position.",
-        ),
-    };
     let mut board = board::query(&app, &visibility, query.board(), Some(task)).await?;
     // The board excludes teams without a result in this task.
     board.rows.retain(|row| row.tasks.contains_key(&task));
@@ -167,8 +159,8 @@ pub(super) async fn by_task(
         frame: Frame::for_app(&app, season.name, path.clone()),
         heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
         days: Days::new(&board, &timeline, &address),
-        title,
-        aim,
+        title: info.title.clone(),
+        aim: info.aim.clone(),
         conditions: common_conditions(&board.rows),
         comparison_day: timeline.previous_board.as_ref().map(|earlier| earlier.day),
         has_ties: context.has_ties(),

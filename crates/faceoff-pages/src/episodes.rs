@@ -125,7 +125,7 @@ pub(super) async fn page(
         is_selected: selected == value,
     };
     let is_played = |task: &Task| view.episodes.iter().any(|line| line.task == *task);
-    let tasks = Task::ALL.into_iter().filter(is_played);
+    let tasks = app.config.competition.task_names().filter(is_played);
     let groups = [
         ("any", "any limit"),
         ("ee", "end effector"),

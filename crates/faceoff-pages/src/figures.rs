@@ -70,6 +70,16 @@ pub(super) fn score_interval(
     ]
 }
 
+/// A number as text counts things: up to ten in words.
+pub(super) fn in_words(number: usize) -> String {
+    const WORDS: [&str; 11] = [
+        "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
+    ];
+    WORDS
+        .get(number)
+        .map_or_else(|| number.to_string(), |word| (*word).to_owned())
+}
+
 /// Time in UTC, to the minute.
 pub(super) fn utc_minute(instant: Timestamp) -> String {
     instant.strftime("%Y-%m-%d %H:%M UTC").to_string()

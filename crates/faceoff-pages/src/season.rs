@@ -10,8 +10,9 @@ use faceoff_api::views::{
     stage::StageView,
 };
 use faceoff_service::{app::App, problem::Problem, viewer::Viewer, views::season};
-use faceoff_types::{StageId, StageName, TournamentId};
+use faceoff_types::{Competition, StageId, StageName, Task, TournamentId};
 use jiff::Timestamp;
+use std::sync::Arc;
 
 #[derive(Template)]
 #[template(path = "season.html")]
@@ -21,9 +22,25 @@ struct Page {
     opened: String,
     closed: Option<String>,
     tournaments: Vec<(TournamentId, StageName)>,
+    competition: Arc<Competition>,
 }
 
 impl Page {
+    /// Names of the tasks with the word that joins item `index` to the one before it.
+    fn tasks_of_seeds(&self) -> Vec<(&'static str, Task)> {
+        let last = self.competition.tasks.len().saturating_sub(1);
+        let joined = |(index, task)| match index {
+            0 => ("", task),
+            _ if index == last => (" or ", task),
+            _ => (", ", task),
+        };
+        self.competition
+            .task_names()
+            .enumerate()
+            .map(joined)
+            .collect()
+    }
+
     fn local_time(&self, stage: &StageView, instant: &Timestamp) -> String {
         let local = instant.to_zoned(stage.zone.time_zone());
         format!("{} {}", local.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
@@ -74,6 +91,7 @@ pub(super) async fn page(
             .map(|tournament| (tournament.id, tournament.name))
             .collect(),
         frame: Frame::for_app(&app, season.name.clone(), "/season"),
+        competition: Arc::clone(&app.config.competition),
         opened: utc_second(season.created_at),
         closed: season.closed_at.map(utc_second),
         season,

@@ -41,6 +41,7 @@ struct Page {
     tournaments: Vec<(TournamentId, StageName)>,
     latest: Option<LatestResult>,
     day_charts: Vec<DayChart>,
+    task_titles: Vec<String>,
     /// The newest first.
     days: Vec<DayResult>,
     violations: Vec<TaskViolations>,
@@ -112,13 +113,20 @@ pub(super) async fn page(
             .rows
             .last()
             .map(|row| LatestResult::new(row, &variation.tier_bounds)),
-        day_charts: days::charts(&history.rows, &variation),
-        violations: days::violations(&history.rows),
+        task_titles: app
+            .config
+            .competition
+            .tasks
+            .iter()
+            .map(|info| info.title.clone())
+            .collect(),
+        day_charts: days::charts(&history.rows, &variation, &app.config.competition),
+        violations: days::violations(&history.rows, &app.config.competition),
         days: history
             .rows
             .iter()
             .rev()
-            .map(|row| DayResult::new(row, &variation))
+            .map(|row| DayResult::new(row, &variation, &app.config.competition))
             .collect(),
         history_query: format!("?stage={}&revision={}", stage.id, history.revision),
         frozen: history.frozen,

@@ -1,6 +1,6 @@
 //! Why an agent's process tree ended: agent fault, platform fault, or killed by the service.
 
-use crate::{Limits, cgroup::LimitHit};
+use crate::{Limits, cgroup::ExceededLimit};
 use faceoff_types::AgentFaultKind;
 use std::{os::unix::process::ExitStatusExt, process::ExitStatus};
 
@@ -22,7 +22,7 @@ pub(crate) struct ExitReport<'a> {
     pub status: ExitStatus,
     /// With bubblewrap: the agent's exit code; the inner `None` if the agent never ran.
     pub sandboxed_exit: Option<Option<i32>>,
-    pub limit_hit: Option<LimitHit>,
+    pub exceeded_limit: Option<ExceededLimit>,
     pub stderr: &'a str,
     pub limits: &'a Limits,
 }
@@ -60,7 +60,7 @@ impl ExitReport<'_> {
             });
         }
         // The OOM killer may choose bubblewrap's own process in the agent's cgroup.
-        if let Some(LimitHit::Memory { peak_bytes }) = self.limit_hit {
+        if let Some(ExceededLimit::Memory { peak_bytes }) = self.exceeded_limit {
             return self.memory_limit_exceeded(peak_bytes);
         }
         let message = self.stderr.trim();
@@ -80,11 +80,11 @@ impl ExitReport<'_> {
         if self.sandboxed_exit.is_some() && (129..=192).contains(&code) {
             return self.classify_signal(code - 128);
         }
-        match &self.limit_hit {
-            Some(LimitHit::Memory { peak_bytes }) if code != 0 => {
+        match &self.exceeded_limit {
+            Some(ExceededLimit::Memory { peak_bytes }) if code != 0 => {
                 self.memory_limit_exceeded(*peak_bytes)
             }
-            Some(LimitHit::Pids { refused }) if code != 0 => {
+            Some(ExceededLimit::Pids { refused }) if code != 0 => {
                 ExitCause::Agent(AgentFaultKind::LimitExceeded {
                     limit: "processes".into(),
                     allowed: self.limits.pids.to_string(),
@@ -96,8 +96,8 @@ impl ExitReport<'_> {
     }
 
     fn classify_signal(&self, signal: i32) -> ExitCause {
-        match &self.limit_hit {
-            Some(LimitHit::Memory { peak_bytes }) => self.memory_limit_exceeded(*peak_bytes),
+        match &self.exceeded_limit {
+            Some(ExceededLimit::Memory { peak_bytes }) => self.memory_limit_exceeded(*peak_bytes),
             _ if signal == libc::SIGXFSZ => ExitCause::Agent(AgentFaultKind::LimitExceeded {
                 limit: "file size".into(),
                 allowed: format!("{} bytes", self.limits.file_size_bytes),
@@ -124,7 +124,7 @@ mod tests {
     fn cause(
         sandboxed_exit: Option<Option<i32>>,
         status: i32,
-        limit_hit: Option<LimitHit>,
+        exceeded_limit: Option<ExceededLimit>,
         stderr: &str,
     ) -> ExitCause {
         let limits = Limits::default();
@@ -132,7 +132,7 @@ mod tests {
         ExitReport {
             status,
             sandboxed_exit,
-            limit_hit,
+            exceeded_limit,
             stderr,
             limits: &limits,
         }
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn memory_limit_is_reported_only_if_it_killed_the_agent() {
         let memory = || {
-            Some(LimitHit::Memory {
+            Some(ExceededLimit::Memory {
                 peak_bytes: Some(7),
             })
         };

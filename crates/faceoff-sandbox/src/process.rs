@@ -399,7 +399,11 @@ impl AgentProcess {
             let report = ExitReport {
                 status,
                 sandboxed_exit: self.tree.status.as_mut().map(StatusPipe::exit_code),
-                limit_hit: self.tree.cgroup.as_ref().and_then(AgentCgroup::limit_hit),
+                exceeded_limit: self
+                    .tree
+                    .cgroup
+                    .as_ref()
+                    .and_then(AgentCgroup::exceeded_limit),
                 stderr: &self.stderr.text(),
                 limits: &self.limits,
             };

@@ -11,6 +11,8 @@ pub const LINK_POINTS: f64 = 3.0;
 pub const JOINT_POS_POINTS: f64 = 2.0;
 /// Penalty points for a joint beyond its velocity limits (paper §2.2).
 pub const JOINT_VEL_POINTS: f64 = 1.0;
+/// Lowest penalty for computation time in one episode that is not 0 (paper §2.2).
+pub const COMPUTATION_TIME_MIN_POINTS: f64 = 0.5;
 /// Highest penalty for computation time in one episode (paper §2.2), and the penalty for an agent fault.
 pub const COMPUTATION_TIME_MAX_POINTS: f64 = 2.0;
 /// Highest penalty of one episode.
@@ -33,7 +35,7 @@ pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
     } else if time.max_s > one_point_s {
         1.0
     } else if time.max_s > half_point_s {
-        0.5
+        COMPUTATION_TIME_MIN_POINTS
     } else {
         0.0
     }

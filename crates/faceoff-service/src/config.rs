@@ -7,8 +7,8 @@ use crate::{
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
 use faceoff_store::UploadQuota;
-use faceoff_types::{Clock, TimeLimits};
-use std::{path::PathBuf, time::Duration};
+use faceoff_types::{Clock, Competition, TimeLimits};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 /// Limits and timeouts of the web server.
 #[derive(Debug, Clone, Copy)]
@@ -63,6 +63,8 @@ pub struct Capacity {
 /// Everything that the handlers need besides the store.
 #[derive(Debug, Clone)]
 pub struct HttpConfig {
+    /// Its tasks and violations are the columns of boards and files.
+    pub competition: Arc<Competition>,
     /// Largest packed bundle, in bytes.
     pub max_bundle_bytes: u64,
     /// The server's public URL without a trailing slash. Links begin with it; if it begins with https, cookies are sent

@@ -294,6 +294,17 @@ fn is_test(attributes: &[Attribute]) -> bool {
     })
 }
 
+/// Whether an item is a test, or a module or import of tests.
+pub fn is_test_item(item: &Item) -> bool {
+    match item {
+        Item::Mod(item) => is_test(&item.attrs),
+        Item::Fn(item) => is_test(&item.attrs),
+        Item::Use(item) => is_test(&item.attrs),
+        Item::Impl(item) => is_test(&item.attrs),
+        _ => false,
+    }
+}
+
 /// Collects the paths in a file, except those of its tests: imports and inline paths.
 #[derive(Default)]
 struct PathVisitor {
@@ -304,14 +315,7 @@ struct PathVisitor {
 
 impl<'ast> Visit<'ast> for PathVisitor {
     fn visit_item(&mut self, item: &'ast Item) {
-        let attributes = match item {
-            Item::Mod(item) => &item.attrs,
-            Item::Fn(item) => &item.attrs,
-            Item::Use(item) => &item.attrs,
-            Item::Impl(item) => &item.attrs,
-            _ => &Vec::new(),
-        };
-        if !is_test(attributes) {
+        if !is_test_item(item) {
             visit::visit_item(self, item);
         }
     }

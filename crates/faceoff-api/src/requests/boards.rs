@@ -140,15 +140,12 @@ impl BoardColumn {
     }
 
     /// All columns, in the order in which a page shows them.
-    pub const ALL: [Self; 7] = [
-        Self::Place,
-        Self::Team,
-        Self::Score,
-        Self::Task(Task::Hit),
-        Self::Task(Task::Defend),
-        Self::Task(Task::Prepare),
-        Self::Points,
-    ];
+    fn all() -> impl Iterator<Item = Self> {
+        [Self::Place, Self::Team, Self::Score]
+            .into_iter()
+            .chain(Task::ALL.map(Self::Task))
+            .chain([Self::Points])
+    }
 }
 
 impl From<BoardSort> for String {
@@ -166,11 +163,10 @@ impl TryFrom<String> for BoardSort {
             Some(name) => (name, true),
             None => (text.as_str(), false),
         };
-        let column = BoardColumn::ALL
-            .into_iter()
-            .find(|column| column.as_str() == name);
+        let column = BoardColumn::all().find(|column| column.as_str() == name);
         let unknown = || {
-            let names = BoardColumn::ALL.map(BoardColumn::as_str).join(", ");
+            let names: Vec<_> = BoardColumn::all().map(BoardColumn::as_str).collect();
+            let names = names.join(", ");
             format!("expected sort to be one of {names}, with a - before it to reverse the order")
         };
         column

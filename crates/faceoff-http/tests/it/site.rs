@@ -233,6 +233,7 @@ impl Site {
         let now = Arc::new(Mutex::new(start));
         let clock = Arc::clone(&now);
         let config = HttpConfig {
+            competition: Arc::new(faceoff_airhockey::competition()),
             max_bundle_bytes: MAX_BUNDLE_BYTES,
             public_url: None,
             upload_dir,
@@ -284,6 +285,7 @@ impl Site {
                 .unwrap()
         );
         let config = HttpConfig {
+            competition: Arc::new(faceoff_airhockey::competition()),
             max_bundle_bytes: MAX_BUNDLE_BYTES,
             public_url: None,
             upload_dir,

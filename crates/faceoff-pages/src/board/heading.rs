@@ -1,7 +1,11 @@
 //! The heading of a board: stage, notices, rules, and links to other boards.
 
 use super::address::Address;
-use crate::{board_status, figures::utc_minute, frame::PageProblem};
+use crate::{
+    board_status,
+    figures::{in_words, utc_minute},
+    frame::PageProblem,
+};
 use faceoff_api::views::{
     board::BoardView,
     day::NextCutoff,
@@ -13,8 +17,9 @@ use faceoff_service::{
     problem::Problem,
     views::{stage, visibility::Visibility},
 };
-use faceoff_types::{DivisionName, Task, TaskWeights, TierBounds};
+use faceoff_types::{Competition, DivisionName, Task, TaskWeights, TierBounds};
 use jiff::Timestamp;
+use std::iter;
 
 pub(super) struct Heading {
     pub(super) stage: String,
@@ -36,7 +41,12 @@ pub(super) struct Heading {
     pub(super) frozen: Option<RulingView>,
     /// What a row contains, for the caption of the table.
     pub(super) rows_caption: String,
-    pub(super) weights: TaskWeights,
+    /// The shares of the tasks in the score, as a sum.
+    pub(super) weighted_sum: String,
+    /// Their number, in words.
+    pub(super) task_count: String,
+    /// Penalty points by kind of violation.
+    pub(super) points_by_violation: String,
     pub(super) tier_bounds: TierBounds,
     /// The stage has its own magnitudes of the perturbations.
     pub(super) has_own_magnitudes: bool,
@@ -59,18 +69,10 @@ pub(super) struct OtherBoard {
 
 /// A board of the same stage and day.
 pub(super) struct Tab {
-    pub(super) name: &'static str,
+    pub(super) name: String,
     pub(super) address: String,
     pub(super) is_shown: bool,
 }
-
-/// Task, name and path of each board.
-const TABS: [(Option<Task>, &str, &str); 4] = [
-    (None, "Overall", "/"),
-    (Some(Task::Hit), "Hit", "/tasks/hit"),
-    (Some(Task::Defend), "Defend", "/tasks/defend"),
-    (Some(Task::Prepare), "Prepare", "/tasks/prepare"),
-];
 
 impl Heading {
     pub(super) async fn load(
@@ -123,7 +125,9 @@ impl Heading {
                     paused: None,
                     frozen: board.frozen.clone(),
                     rows_caption: board_status::rows_caption(board),
-                    weights: board.weights,
+                    weighted_sum: weighted_sum(&app.config.competition, &board.weights),
+                    task_count: in_words(app.config.competition.tasks.len()),
+                    points_by_violation: points_by_violation(&app.config.competition),
                     tier_bounds: board.tier_bounds,
                     has_own_magnitudes: board.perturbations.is_some(),
                     final_day_notice: board_status::final_day_notice(board),
@@ -131,7 +135,7 @@ impl Heading {
                     is_hidden,
                     result_status: board_status::result_status(board),
                     is_provisional: board.provisional,
-                    tabs: tabs(board.task, address),
+                    tabs: tabs(&app.config.competition, board.task, address),
                 });
             }
         }
@@ -167,13 +171,40 @@ impl NextEvaluation {
     }
 }
 
-fn tabs(shown: Option<Task>, address: &Address<'_>) -> Vec<Tab> {
-    let tab = |(task, name, path): (Option<Task>, &'static str, &str)| Tab {
-        name,
+/// The overall board, and the board of each task.
+fn tabs(competition: &Competition, shown: Option<Task>, address: &Address<'_>) -> Vec<Tab> {
+    let tab = |task: Option<Task>, name: &str, path: &str| Tab {
+        name: name.to_owned(),
         address: address.with_path(path),
         is_shown: task == shown,
     };
-    TABS.into_iter().map(tab).collect()
+    let of_tasks = competition.tasks.iter().map(|info| {
+        tab(
+            Some(info.task),
+            &info.title,
+            &format!("/tasks/{}", info.task),
+        )
+    });
+    iter::once(tab(None, "Overall", "/"))
+        .chain(of_tasks)
+        .collect()
+}
+
+/// As `0.4 × task + 0.6 × other`.
+fn weighted_sum(competition: &Competition, weights: &TaskWeights) -> String {
+    let terms = competition
+        .task_names()
+        .map(|task| format!("{} × {task}", weights.weight(task)));
+    terms.collect::<Vec<_>>().join(" + ")
+}
+
+/// As `out of bounds 3, late answers 0.5 to 2`.
+fn points_by_violation(competition: &Competition) -> String {
+    let kinds = competition
+        .violations
+        .iter()
+        .map(|kind| format!("{} {}", kind.breach, kind.points_text()));
+    kinds.collect::<Vec<_>>().join(", ")
 }
 
 fn stage_dates(stage: &StageView) -> String {

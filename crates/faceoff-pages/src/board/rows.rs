@@ -6,7 +6,9 @@ use faceoff_api::views::{
     task::TaskView,
 };
 use faceoff_service::views::board_timeline::EarlierBoard;
-use faceoff_types::{DivisionName, EvaluationId, Task, TaskWeights, TeamId, Tier, ViolationCounts};
+use faceoff_types::{
+    Competition, DivisionName, EvaluationId, Task, TaskWeights, TeamId, Tier, ViolationCounts,
+};
 use jiff::civil;
 use std::{cmp::Ordering, collections::BTreeMap};
 
@@ -231,19 +233,24 @@ impl<'a> Context<'a> {
 pub(super) struct OverallRow {
     pub(super) team: TeamCell,
     pub(super) score: Rate,
-    /// In the order of `Task::ALL`; `None`: task not played.
+    /// In the competition's order; `None`: task not played.
     pub(super) rates: Vec<(Task, Option<Rate>)>,
     pub(super) penalty_points: String,
     pub(super) per_episode: String,
 }
 
 impl OverallRow {
-    pub(super) fn new(row: &BoardRow, context: &Context, weights: &TaskWeights) -> Self {
+    pub(super) fn new(
+        row: &BoardRow,
+        context: &Context,
+        weights: &TaskWeights,
+        competition: &Competition,
+    ) -> Self {
         Self {
             team: context.team_cell(row),
             score: Rate::of_score(row.score, &row.tasks, weights),
-            rates: Task::ALL
-                .into_iter()
+            rates: competition
+                .task_names()
                 .map(|task| (task, row.tasks.get(&task).map(Rate::new)))
                 .collect(),
             penalty_points: figures::one_decimal(row.penalty_points),

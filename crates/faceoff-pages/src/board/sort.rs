@@ -6,12 +6,12 @@ use faceoff_api::{
     views::board::BoardRow,
 };
 use faceoff_service::problem::{Problem, ProblemKind};
-use faceoff_types::Task;
+use faceoff_types::{Competition, Task};
 use std::cmp::Ordering;
 
 /// Head of a sortable column.
 pub(super) struct ColumnHead {
-    pub(super) title: &'static str,
+    pub(super) title: String,
     /// Unit of the column; empty without one.
     pub(super) unit: &'static str,
     pub(super) class: &'static str,
@@ -32,37 +32,25 @@ impl ColumnHead {
 }
 
 /// Columns of the overall board, or of the board of a task: column, title, unit, CSS class.
-fn columns(task: Option<Task>) -> Vec<(BoardColumn, &'static str, &'static str, &'static str)> {
-    let rank = (BoardColumn::Place, "#", "", "rank");
-    let team = (BoardColumn::Team, "Team", "", "");
-    let points = (BoardColumn::Points, "Penalty", "points", "number");
-    match task {
-        Some(_) => vec![
-            rank,
-            team,
-            (BoardColumn::Score, "Success", "percent", "number"),
-            points,
-        ],
-        None => vec![
-            rank,
-            team,
-            (BoardColumn::Score, "Score", "percent", "number"),
-            (BoardColumn::Task(Task::Hit), "Hit", "success", "number"),
-            (
-                BoardColumn::Task(Task::Defend),
-                "Defend",
-                "success",
-                "number",
-            ),
-            (
-                BoardColumn::Task(Task::Prepare),
-                "Prepare",
-                "success",
-                "number",
-            ),
-            points,
-        ],
-    }
+fn columns(
+    competition: &Competition,
+    task: Option<Task>,
+) -> Vec<(BoardColumn, &str, &'static str, &'static str)> {
+    let (score, tasks) = match task {
+        Some(_) => ("Success", &[][..]),
+        None => ("Score", &competition.tasks[..]),
+    };
+    let mut columns = vec![
+        (BoardColumn::Place, "#", "", "rank"),
+        (BoardColumn::Team, "Team", "", ""),
+        (BoardColumn::Score, score, "percent", "number"),
+    ];
+    columns.extend(tasks.iter().map(|info| {
+        let column = BoardColumn::Task(info.task);
+        (column, info.title.as_str(), "success", "number")
+    }));
+    columns.push((BoardColumn::Points, "Penalty", "points", "number"));
+    columns
 }
 
 /// The sort of a board, with the heads of its columns.
@@ -78,20 +66,21 @@ impl Sort {
         query: &BoardPageQuery,
         task: Option<Task>,
         address: &Address,
+        competition: &Competition,
     ) -> Result<Self, Problem> {
         let by_rank = BoardSort {
             column: BoardColumn::Place,
             is_reversed: false,
         };
         let key = query.sort.unwrap_or(by_rank);
-        let columns = columns(task);
+        let columns = columns(competition, task);
         if !columns.iter().any(|(column, ..)| *column == key.column) {
             return Err(Problem::new(
                 ProblemKind::InvalidRequest,
                 format!("this board cannot be sorted by {:?}", key.column.as_str()),
             ));
         }
-        let head = |(column, title, unit, class)| {
+        let head = |(column, title, unit, class): (BoardColumn, &str, _, _)| {
             let is_sorted = key.column == column;
             let is_ascending = is_ascending_by_default(column) != key.is_reversed;
             let sort = BoardSort {
@@ -99,7 +88,7 @@ impl Sort {
                 is_reversed: is_sorted && !key.is_reversed,
             };
             ColumnHead {
-                title,
+                title: title.to_owned(),
                 unit,
                 class,
                 address: address.with_sort(sort),

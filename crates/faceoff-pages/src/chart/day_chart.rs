@@ -23,7 +23,7 @@ pub(crate) struct Bound {
 /// A chart over days, in the form that `chart.html` draws.
 #[derive(Debug)]
 pub(crate) struct DayChart {
-    pub(crate) title: &'static str,
+    pub(crate) title: String,
     /// Unit of the axis.
     pub(crate) unit: &'static str,
     /// Text alternative for screen readers.
@@ -47,13 +47,13 @@ pub(crate) struct Point {
 
 impl DayChart {
     /// A chart of rates from 0 to 100 percent.
-    pub(crate) fn from_percent(title: &'static str, values: &[DayValue]) -> Self {
+    pub(crate) fn from_percent(title: &str, values: &[DayValue]) -> Self {
         Self::new(title, "percent", values, &[], Scale { max: 100.0 })
     }
 
     /// A chart of non-negative values; the scale includes the first bound.
     pub(crate) fn from_zero(
-        title: &'static str,
+        title: &str,
         unit: &'static str,
         values: &[DayValue],
         bounds: &[Bound],
@@ -65,7 +65,7 @@ impl DayChart {
     }
 
     fn new(
-        title: &'static str,
+        title: &str,
         unit: &'static str,
         values: &[DayValue],
         bounds: &[Bound],
@@ -94,7 +94,7 @@ impl DayChart {
             .collect();
         let shown = bounds.iter().filter(|bound| bound.value <= scale.max);
         Self {
-            title,
+            title: title.to_owned(),
             unit,
             description: description(title, unit, values),
             grid: scale.grid(),

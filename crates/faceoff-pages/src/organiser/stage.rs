@@ -30,6 +30,8 @@ struct Page {
     head: DashboardHeader,
     stage: StageView,
     form: StageForm,
+    /// Names and titles.
+    task_checkboxes: Vec<(String, String)>,
     /// The name that confirms a change with consequences; the refusal lists them.
     confirm: Option<String>,
     is_closed: bool,
@@ -60,6 +62,7 @@ async fn page_with(
         frame: Frame::for_app(app, season, ""),
         head: DashboardHeader::new(&user.caller, "/organiser/stages", notice),
         form,
+        task_checkboxes: StageForm::task_checkboxes(&app.config.competition),
         confirm: needs_confirmation.then(|| view.name.to_string()),
         is_closed: view.phase == PhaseView::Closed,
         has_final_day: view.settings.standings == CountingResult::Final,
@@ -87,7 +90,7 @@ pub(super) async fn change(
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let stage = app.store.stage(id).await.map_err(Problem::from)?;
     let actor = user.organiser.actor();
-    let changed = match form.change(&stage) {
+    let changed = match form.change(&stage, &app.config.competition) {
         Ok(change) => stages::change_stage(&app, actor, id, change).await,
         Err(problem) => Err(problem),
     };

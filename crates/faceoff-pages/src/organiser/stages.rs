@@ -29,6 +29,8 @@ struct Page {
     head: DashboardHeader,
     stages: Vec<StageView>,
     form: StageForm,
+    /// Names and titles.
+    task_checkboxes: Vec<(String, String)>,
     /// Always `None`: creating a stage needs no confirmation. `stage_fields.html` expects the field.
     confirm: Option<String>,
     is_refused: bool,
@@ -61,6 +63,7 @@ async fn page_with(
         head: DashboardHeader::new(&user.caller, path, notice),
         stages: stage::all(app).await?,
         form,
+        task_checkboxes: StageForm::task_checkboxes(&app.config.competition),
         confirm: None,
         is_refused: matches!(notice, Notice::Refused(_)),
     };
@@ -82,7 +85,7 @@ pub(super) async fn create(
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
     let actor = user.organiser.actor();
-    let created = match form.new_stage() {
+    let created = match form.new_stage(&app.config.competition) {
         Ok(new) => stages::create_stage(&app, actor, new).await,
         Err(problem) => Err(problem),
     };

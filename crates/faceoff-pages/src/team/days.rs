@@ -5,7 +5,9 @@ use crate::{
     figures::{self, Rate},
 };
 use faceoff_api::views::history::HistoryRow;
-use faceoff_types::{EvaluationId, Task, Tier, TierBounds, Variation, ViolationCounts};
+use faceoff_types::{
+    Competition, EvaluationId, Task, Tier, TierBounds, Variation, ViolationCounts,
+};
 use jiff::civil::Date;
 
 /// The latest result.
@@ -46,14 +48,14 @@ pub(super) struct DayResult {
     pub(super) score: String,
     pub(super) score_low: String,
     pub(super) score_high: String,
-    /// In the order of `Task::ALL`; `None`: task not played.
+    /// In the competition's order; `None`: task not played.
     pub(super) rates: Vec<Option<Rate>>,
     pub(super) penalty_points: String,
     pub(super) per_episode: String,
 }
 
 impl DayResult {
-    pub(super) fn new(row: &HistoryRow, variation: &Variation) -> Self {
+    pub(super) fn new(row: &HistoryRow, variation: &Variation, competition: &Competition) -> Self {
         let [low, high] = figures::score_interval(row.score, &row.tasks, &variation.weights);
         Self {
             day: row.day,
@@ -64,8 +66,8 @@ impl DayResult {
             score: figures::one_decimal(row.score),
             score_low: figures::one_decimal(low),
             score_high: figures::one_decimal(high),
-            rates: Task::ALL
-                .into_iter()
+            rates: competition
+                .task_names()
                 .map(|task| row.tasks.get(&task).map(Rate::new))
                 .collect(),
             penalty_points: figures::one_decimal(row.penalty_points),
@@ -83,7 +85,11 @@ fn points_per_episode(row: &HistoryRow) -> f64 {
 }
 
 /// Charts of score, penalty points and the success rate of each task, over the same days.
-pub(super) fn charts(rows: &[HistoryRow], variation: &Variation) -> Vec<DayChart> {
+pub(super) fn charts(
+    rows: &[HistoryRow],
+    variation: &Variation,
+    competition: &Competition,
+) -> Vec<DayChart> {
     let day_value = |row: &HistoryRow, value, interval| DayValue {
         day: row.day,
         value,
@@ -116,19 +122,15 @@ pub(super) fn charts(rows: &[HistoryRow], variation: &Variation) -> Vec<DayChart
             &bounds,
         ),
     ];
-    for (task, title) in [
-        (Task::Hit, "Hit"),
-        (Task::Defend, "Defend"),
-        (Task::Prepare, "Prepare"),
-    ] {
+    for info in &competition.tasks {
         let rates = rows.iter().filter_map(|row| {
-            let result = row.tasks.get(&task)?;
+            let result = row.tasks.get(&info.task)?;
             let interval = result.success_ci95.map(|end| 100.0 * end);
             Some(day_value(row, 100.0 * result.success_rate, Some(interval)))
         });
         let rates: Vec<_> = rates.collect();
         if !rates.is_empty() {
-            charts.push(DayChart::from_percent(title, &rates));
+            charts.push(DayChart::from_percent(&info.title, &rates));
         }
     }
     charts
@@ -143,7 +145,7 @@ pub(super) struct TaskViolations {
 }
 
 /// Violations by task; tasks without violations are omitted.
-pub(super) fn violations(rows: &[HistoryRow]) -> Vec<TaskViolations> {
+pub(super) fn violations(rows: &[HistoryRow], competition: &Competition) -> Vec<TaskViolations> {
     let task_violations = |task: Task| {
         let results = rows.iter().filter_map(|row| row.tasks.get(&task));
         let released: Vec<(u32, ViolationCounts)> = results
@@ -169,5 +171,8 @@ pub(super) fn violations(rows: &[HistoryRow]) -> Vec<TaskViolations> {
                 kinds: kinds.map(|count| figures::count_with_share(count, episodes)),
             })
     };
-    Task::ALL.into_iter().filter_map(task_violations).collect()
+    competition
+        .task_names()
+        .filter_map(task_violations)
+        .collect()
 }

@@ -29,7 +29,7 @@ const BUBBLEWRAP_PROCESSES: u64 = 1;
 
 /// A limit that the tree reached, according to the kernel's counters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum LimitHit {
+pub(crate) enum ExceededLimit {
     /// The kernel killed a process because the memory limit was reached.
     Memory { peak_bytes: Option<u64> },
     /// `refused`: number of refused processes and threads.
@@ -155,7 +155,7 @@ impl AgentCgroup {
     ) -> io::Result<PathBuf> {
         // Another service in the same cgroup may remove the empty parent folder between the two calls.
         for _ in 0..8 {
-            let leaf = hierarchy.prepare_folder(controllers)?.join(name);
+            let leaf = hierarchy.create_agents_folder(controllers)?.join(name);
             match fs::create_dir(&leaf) {
                 Ok(()) => self.leaves.push(leaf.clone()),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
@@ -330,7 +330,7 @@ impl AgentCgroup {
 
     /// The limit that the tree reached, memory first. If the whole host runs out of memory, a kill is not the tree's
     /// fault, so its own limit must have been reached as well.
-    pub(crate) fn limit_hit(&self) -> Option<LimitHit> {
+    pub(crate) fn exceeded_limit(&self) -> Option<ExceededLimit> {
         if let Some((version, leaf)) = &self.memory {
             let was_killed_at_limit = match version {
                 Version::V1 => {
@@ -348,13 +348,13 @@ impl AgentCgroup {
                 }
             };
             if was_killed_at_limit {
-                return Some(LimitHit::Memory {
+                return Some(ExceededLimit::Memory {
                     peak_bytes: self.peak_memory_bytes(),
                 });
             }
         }
         let refused = files::read_keyed(&self.pids.as_ref()?.join("pids.events"), "max")?;
-        (refused > 0).then_some(LimitHit::Pids { refused })
+        (refused > 0).then_some(ExceededLimit::Pids { refused })
     }
 
     /// All processes in the cgroup, including bubblewrap's own.

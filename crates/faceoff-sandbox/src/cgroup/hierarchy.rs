@@ -88,7 +88,7 @@ impl Hierarchy {
     }
 
     /// Creates the folder for agents and enables `controllers` in it.
-    pub(super) fn prepare_folder(&self, controllers: &[&str]) -> io::Result<PathBuf> {
+    pub(super) fn create_agents_folder(&self, controllers: &[&str]) -> io::Result<PathBuf> {
         let folder = self.service_dir.join(AGENTS_FOLDER);
         if self.version == Version::V2 {
             self.delegate(&self.service_dir, controllers)?;

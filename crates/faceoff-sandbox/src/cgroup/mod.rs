@@ -11,6 +11,6 @@ mod hierarchy;
 mod leaf;
 mod stale;
 
-pub(crate) use agent::{AgentCgroup, LimitHit};
+pub(crate) use agent::{AgentCgroup, ExceededLimit};
 pub(crate) use leaf::kill_and_thaw;
 pub(crate) use stale::sweep;

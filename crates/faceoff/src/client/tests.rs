@@ -18,6 +18,7 @@ use faceoff_testkit::{
 use faceoff_types::{Clock, CountingResult, DayDeadline, EvaluationId, TimeLimits};
 use indicatif::ProgressBar;
 use jiff::Timestamp;
+use std::sync::Arc;
 use tempfile::TempDir;
 
 /// The organiser's token.
@@ -59,6 +60,7 @@ async fn start_site(max_bundle_bytes: u64) -> Site {
     };
     configure_stage(&store, &plan, None, now()).await;
     let config = HttpConfig {
+        competition: Arc::new(faceoff_airhockey::competition()),
         max_bundle_bytes,
         public_url: None,
         upload_dir: folder.path().to_owned(),

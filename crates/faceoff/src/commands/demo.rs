@@ -101,7 +101,7 @@ impl DemoCommand {
                 self.listen
             )
         })?;
-        prepare_folder(&self.data_dir)?;
+        open_folder(&self.data_dir)?;
         let progress = Progress {
             to_stderr: self.json,
         };
@@ -222,7 +222,7 @@ fn tail(log: &Path) -> String {
 }
 
 /// Creates the folder, or empties that of an earlier demo; refuses a folder with other content.
-fn prepare_folder(folder: &Path) -> anyhow::Result<()> {
+fn open_folder(folder: &Path) -> anyhow::Result<()> {
     /// Marks a folder that a demo may replace.
     const MARKER: &str = ".faceoff-demo";
     if folder.exists() {

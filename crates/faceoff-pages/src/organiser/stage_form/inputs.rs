@@ -4,7 +4,7 @@ use super::texts::StageForm;
 use faceoff_api::requests::{OrNull, StagePatch};
 use faceoff_service::problem::Problem;
 use faceoff_store::Stage;
-use faceoff_types::{Profile, Schedule, Task};
+use faceoff_types::{Profile, Schedule};
 use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
 use serde_json::{Value, json};
 use std::{fmt::Display, str::FromStr};
@@ -41,6 +41,8 @@ pub(in crate::organiser) struct InputGroup {
     pub(in crate::organiser) legend: &'static str,
     pub(in crate::organiser) note: &'static str,
     pub(super) inputs: &'static [Input],
+    /// Followed by a checkbox for each task.
+    pub(in crate::organiser) has_tasks: bool,
 }
 
 impl InputGroup {
@@ -73,6 +75,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
     InputGroup {
         legend: "",
         note: "",
+        has_tasks: false,
         inputs: &[
             Input {
                 name: "opens_at",
@@ -109,6 +112,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
     InputGroup {
         legend: "Daily cutoff",
         note: "",
+        has_tasks: false,
         inputs: &[
             Input {
                 name: "schedule",
@@ -139,6 +143,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
     InputGroup {
         legend: "Rules",
         note: "new rules start a new revision with its own board",
+        has_tasks: true,
         inputs: &[
             Input {
                 name: "profile",
@@ -166,35 +171,12 @@ pub(super) static GROUPS: [InputGroup; 4] = [
                 text: |stage| stage.rules.rules.max_faults.to_string(),
                 read: |form, patch| parse_number(form, "max_faults", &mut patch.max_faults),
             },
-            Input {
-                name: "task_hit",
-                label: "Hit",
-                note: "",
-                kind: InputKind::Checkbox,
-                text: |stage| task_checkbox(stage, Task::Hit),
-                read: read_tasks,
-            },
-            Input {
-                name: "task_defend",
-                label: "Defend",
-                note: "",
-                kind: InputKind::Checkbox,
-                text: |stage| task_checkbox(stage, Task::Defend),
-                read: read_tasks,
-            },
-            Input {
-                name: "task_prepare",
-                label: "Prepare",
-                note: "",
-                kind: InputKind::Checkbox,
-                text: |stage| task_checkbox(stage, Task::Prepare),
-                read: read_tasks,
-            },
         ],
     },
     InputGroup {
         legend: "Boards and files",
         note: "",
+        has_tasks: false,
         inputs: &[
             Input {
                 name: "standings",
@@ -251,19 +233,6 @@ fn publications() -> Vec<(&'static str, &'static str)> {
     ]
 }
 
-fn read_tasks(form: &StageForm, patch: &mut StagePatch) -> Result<(), Problem> {
-    let checkboxes = [
-        (Task::Hit, "task_hit"),
-        (Task::Defend, "task_defend"),
-        (Task::Prepare, "task_prepare"),
-    ];
-    let ticked = checkboxes
-        .into_iter()
-        .filter(|(_, name)| form.is_ticked(name));
-    patch.tasks = Some(ticked.map(|(task, _)| task).collect());
-    Ok(())
-}
-
 fn invalid_field(name: &str, error: impl Display) -> Problem {
     Problem::invalid(name, error)
 }
@@ -312,10 +281,6 @@ fn checkbox_text(is_ticked: bool) -> String {
     } else {
         String::new()
     }
-}
-
-fn task_checkbox(stage: &Stage, task: Task) -> String {
-    checkbox_text(stage.rules.rules.tasks.contains(&task))
 }
 
 fn schedule_json(stage: &Stage) -> Value {

@@ -93,12 +93,12 @@ fn agents_have_ten_times_the_default_weight() {
         mount_point: host.path().into(),
         service_dir: host.path().into(),
     };
-    let folder = hierarchy.prepare_folder(&["memory"]).unwrap();
+    let folder = hierarchy.create_agents_folder(&["memory"]).unwrap();
     assert!(
         !folder.join("cpu.shares").exists(),
         "only with the controller cpu"
     );
-    assert_eq!(hierarchy.prepare_folder(&["cpu"]).unwrap(), folder);
+    assert_eq!(hierarchy.create_agents_folder(&["cpu"]).unwrap(), folder);
     let written = std::fs::read_to_string(folder.join("cpu.shares")).unwrap();
     assert_eq!(written, "10240");
 }

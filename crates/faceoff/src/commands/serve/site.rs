@@ -13,6 +13,7 @@ use std::{
     io::Write as _,
     net::SocketAddr,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 use tokio::net::TcpListener;
 
@@ -66,6 +67,7 @@ impl Site {
         agent_resources: AgentResources,
     ) -> HttpConfig {
         HttpConfig {
+            competition: Arc::new(faceoff_airhockey::competition()),
             max_bundle_bytes: config.bundle.packed_bytes,
             public_url: config.server.public_url.clone(),
             upload_dir: self.upload_dir.clone(),
