@@ -4,7 +4,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
-use faceoff_episode::{AnswerTiming, EpisodeStart, StepRow, StepSink};
+use faceoff_episode::{AirHockeyStep, AnswerTiming, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Task, Violations,
@@ -36,7 +36,7 @@ fn record(spec: &ShardSpec, out: &Path) {
         recorder.begin(EpisodeStart {
             episode,
             seed,
-            interpolation: Some(Interpolation::Cubic),
+            choice: Some(Interpolation::Cubic),
             state: &state,
         });
         for step in 0..STEPS {
@@ -56,11 +56,13 @@ fn record(spec: &ShardSpec, out: &Path) {
                     host_time_s: 0.0,
                     cpu_time_s: Some(5e-4),
                 },
-                state: &state,
-                constraints: Default::default(),
                 next_observation: &observation,
-                puck_lost: false,
-                impacts: &[],
+                world: AirHockeyStep {
+                    state: &state,
+                    constraints: Default::default(),
+                    puck_lost: false,
+                    impacts: &[],
+                },
             });
         }
         let outcome = EpisodeOutcome {

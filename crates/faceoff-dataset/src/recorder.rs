@@ -7,7 +7,7 @@ use crate::{
     shard_folder::ShardFolder,
     table::{EpisodeRows, StepRows, TableWriter},
 };
-use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{AirHockeyWorld, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_replay::ClipRecorder;
 use faceoff_types::{EpisodeOutcome, Task};
 use fs_err::File;
@@ -80,8 +80,8 @@ impl std::fmt::Debug for Recorder {
     }
 }
 
-impl StepSink for Recorder {
-    fn begin(&mut self, start: EpisodeStart<'_>) {
+impl StepSink<AirHockeyWorld> for Recorder {
+    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
         self.steps.begin(start.episode);
         self.episodes.begin(&start);
         self.clips.begin(start);
@@ -92,7 +92,7 @@ impl StepSink for Recorder {
         self.clips.observe(observation);
     }
 
-    fn step(&mut self, row: &StepRow<'_>) {
+    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         self.steps.push(row);
         self.episodes.step(row);
         self.clips.step(row);

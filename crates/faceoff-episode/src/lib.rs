@@ -4,22 +4,17 @@
 //!
 //! This crate starts no process, opens no file and reads no clock.
 
-mod arena;
-mod end_description;
-mod game_record;
+mod air_hockey;
 mod record;
 mod running_episode;
-mod running_game;
-mod running_side;
 mod time_sum;
+mod world;
 
-pub use arena::Arena;
-pub use end_description::describe_end;
-pub use game_record::{
-    Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
-    SideFault, SideStep,
+pub use air_hockey::{
+    AirHockeyStep, AirHockeyWorld, Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding,
+    RallyEntry, RallyRow, RallyStart, Response, RunningGame, SideFault, SideStep, describe_end,
 };
 pub use record::{AnswerTiming, EpisodeStart, NullSink, RecordError, StepRow, StepSink};
 pub use running_episode::{NonFiniteObservation, Question, RunningEpisode};
-pub use running_game::{FinishedGame, RunningGame};
 pub use time_sum::TimeSum;
+pub use world::{Environment, World};

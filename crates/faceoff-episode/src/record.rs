@@ -1,8 +1,8 @@
 //! Rows of the recording of an episode (one attempt of an agent at a task), and the trait of their receivers. In an *evaluation* one agent
 //! plays many episodes of each task.
 
-use faceoff_sim::{ConstraintValues, EpisodeState, Impact};
-use faceoff_types::{EpisodeOutcome, Interpolation, Seed};
+use crate::world::World;
+use faceoff_types::{EpisodeOutcome, Seed};
 
 /// Measured times of one answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,36 +18,30 @@ pub struct AnswerTiming {
 
 /// The start of an episode.
 #[derive(Debug, Clone, Copy)]
-pub struct EpisodeStart<'a> {
+pub struct EpisodeStart<'a, W: World + 'a> {
     /// Index within the evaluation.
     pub episode: u32,
     /// The episode's own seed.
     pub seed: Seed,
-    /// The interpolation of the agent's actions; `None` if the agent failed before it stated one.
-    pub interpolation: Option<Interpolation>,
+    /// What the agent has chosen; `None` if it failed before it stated that.
+    pub choice: Option<W::Choice>,
     /// The true initial state.
-    pub state: &'a EpisodeState,
+    pub state: W::Start<'a>,
 }
 
 /// An answered control step. Its observation was passed to [`StepSink::observe`] before.
 #[derive(Debug, Clone, Copy)]
-pub struct StepRow<'a> {
+pub struct StepRow<'a, W: World + 'a> {
     /// The control step, from 0.
     pub step: u32,
     /// The agent's action, row-major.
     pub action: &'a [f64],
     /// Times of the answer.
     pub timing: AnswerTiming,
-    /// The true state after the step.
-    pub state: &'a EpisodeState,
-    /// Constraint values after the step; a constraint is violated if its value is above 0.
-    pub constraints: ConstraintValues,
     /// The observation after the step.
     pub next_observation: &'a [f64],
-    /// Had the (simulated) puck tracking lost the puck after the step? Then the observation repeats an earlier pose.
-    pub puck_lost: bool,
-    /// Contacts of the puck that began in the step.
-    pub impacts: &'a [Impact],
+    /// What else is recorded of the step.
+    pub world: W::Step<'a>,
 }
 
 /// A failure to write a recording; never an agent fault.
@@ -59,14 +53,14 @@ pub struct RecordError {
     pub source: Box<dyn std::error::Error + Send + Sync>,
 }
 
-/// Receives the start, the steps and the end of episodes, e.g. to record them.
-pub trait StepSink {
+/// Receives the start, the steps and the end of episodes in a kind of world, e.g. to record them.
+pub trait StepSink<W: World> {
     /// Starts an episode. If the previous episode has not ended, its recording is discarded, since the caller repeats it.
-    fn begin(&mut self, start: EpisodeStart<'_>);
+    fn begin(&mut self, start: EpisodeStart<'_, W>);
     /// The observation for the agent, before the step.
     fn observe(&mut self, observation: &[f64]);
     /// The step after the observation.
-    fn step(&mut self, row: &StepRow<'_>);
+    fn step(&mut self, row: &StepRow<'_, W>);
     /// Ends the episode. `host_noise_reruns` is the number of earlier tries that were discarded because of host interference.
     ///
     /// # Errors
@@ -74,14 +68,14 @@ pub trait StepSink {
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError>;
 }
 
-impl<S: StepSink + ?Sized> StepSink for &mut S {
-    fn begin(&mut self, start: EpisodeStart<'_>) {
+impl<W: World, S: StepSink<W> + ?Sized> StepSink<W> for &mut S {
+    fn begin(&mut self, start: EpisodeStart<'_, W>) {
         (**self).begin(start);
     }
     fn observe(&mut self, observation: &[f64]) {
         (**self).observe(observation);
     }
-    fn step(&mut self, row: &StepRow<'_>) {
+    fn step(&mut self, row: &StepRow<'_, W>) {
         (**self).step(row);
     }
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
@@ -93,10 +87,10 @@ impl<S: StepSink + ?Sized> StepSink for &mut S {
 #[derive(Debug, Clone, Copy)]
 pub struct NullSink;
 
-impl StepSink for NullSink {
-    fn begin(&mut self, _: EpisodeStart<'_>) {}
+impl<W: World> StepSink<W> for NullSink {
+    fn begin(&mut self, _: EpisodeStart<'_, W>) {}
     fn observe(&mut self, _: &[f64]) {}
-    fn step(&mut self, _: &StepRow<'_>) {}
+    fn step(&mut self, _: &StepRow<'_, W>) {}
     fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
         Ok(())
     }

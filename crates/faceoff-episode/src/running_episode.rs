@@ -1,13 +1,12 @@
 //! An *episode*: one attempt of an agent at a task, control step by control step.
 
 use crate::{
-    arena::Arena,
     record::{AnswerTiming, EpisodeStart, StepRow, StepSink},
     time_sum::TimeSum,
+    world::{Environment, World},
 };
-use faceoff_sim::{EPISODE_STEPS, Episode};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Interpolation, Phase, Task,
+    AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Phase, Task,
 };
 
 /// A running episode. It provides the observations for the agent, takes its answers and computes their effects. The caller
@@ -39,11 +38,11 @@ use faceoff_types::{
 /// The sink receives the start of the episode and each step. The caller reports the end to the sink, unless the try does not count
 /// and is repeated.
 #[derive(Debug)]
-pub struct RunningEpisode<S> {
+pub struct RunningEpisode<W, S> {
     task: Task,
     episode: u32,
     max_steps: u32,
-    simulation: Episode,
+    world: W,
     times: TimeSum,
     end: Option<EpisodeEnd>,
     /// The fault, if the last answer made the world diverge.
@@ -56,7 +55,7 @@ pub struct RunningEpisode<S> {
 pub struct Question<'a> {
     /// The control step, from 0.
     pub step: u32,
-    /// 23 finite numbers with an opponent on the table, 20 without.
+    /// Finite numbers; in air hockey 23 with an opponent on the table, 20 without.
     pub observation: &'a [f64],
 }
 
@@ -71,29 +70,28 @@ pub struct NonFiniteObservation {
     pub episode: u32,
 }
 
-impl<S: StepSink> RunningEpisode<S> {
-    /// Starts an episode. `interpolation` is `None` if the agent failed before it stated one; then only its fault can follow. The
+impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
+    /// Starts an episode. `choice` is `None` if the agent failed before it stated one; then only its fault can follow. The
     /// initial state, which is the same for all agents, is recorded nevertheless.
     pub fn begin(
-        arena: &Arena,
+        environment: &impl Environment<World = W>,
         task: Task,
         episode: u32,
-        interpolation: Option<Interpolation>,
+        choice: Option<W::Choice>,
         mut sink: S,
     ) -> Self {
-        let simulation =
-            arena.episode(task, episode, interpolation.unwrap_or(Interpolation::Cubic));
+        let world = environment.reset(task, episode, choice);
         sink.begin(EpisodeStart {
             episode,
-            seed: arena.seed(task, episode),
-            interpolation,
-            state: &simulation.state(),
+            seed: environment.seed(task, episode),
+            choice,
+            state: world.start(),
         });
         Self {
             task,
             episode,
-            max_steps: EPISODE_STEPS,
-            simulation,
+            max_steps: environment.max_steps(task),
+            world,
             times: TimeSum::default(),
             end: None,
             diverged: None,
@@ -112,7 +110,7 @@ impl<S: StepSink> RunningEpisode<S> {
     /// # Errors
     /// If the simulator failed, which is neither an end of the episode nor an agent fault.
     pub fn question(&self) -> Result<Question<'_>, NonFiniteObservation> {
-        let (step, observation) = (self.simulation.steps(), self.simulation.observation());
+        let (step, observation) = (self.world.steps(), self.world.observation());
         // Later observations are finite, since a diverging world ends the episode.
         if step == 0 && !are_finite(observation) {
             return Err(NonFiniteObservation {
@@ -135,23 +133,20 @@ impl<S: StepSink> RunningEpisode<S> {
         timing: AnswerTiming,
     ) -> Result<Option<EpisodeOutcome>, AgentFaultKind> {
         debug_assert_eq!(self.end, None, "the episode has ended");
-        let step = self.simulation.steps();
-        self.sink.observe(self.simulation.observation());
-        let outcome = self.simulation.step(action);
+        let step = self.world.steps();
+        self.sink.observe(self.world.observation());
+        let end = self.world.step(action);
         self.times.add(timing.computation_time_s);
         self.sink.step(&StepRow {
             step,
             action,
             timing,
-            state: &self.simulation.state(),
-            constraints: outcome.constraints,
-            next_observation: self.simulation.observation(),
-            puck_lost: self.simulation.is_puck_lost(),
-            impacts: self.simulation.world().impacts(),
+            next_observation: self.world.observation(),
+            world: self.world.last_step(),
         });
-        let detail = match self.simulation.divergence() {
-            Some(divergence) => Some(divergence.cause.to_string()),
-            None if !are_finite(self.simulation.observation()) => {
+        let detail = match self.world.divergence() {
+            Some(cause) => Some(cause),
+            None if !are_finite(self.world.observation()) => {
                 Some("an observation is not finite".to_owned())
             }
             None => None,
@@ -163,7 +158,7 @@ impl<S: StepSink> RunningEpisode<S> {
             return Err(fault);
         }
         let horizon = (self.steps() >= self.max_steps).then_some(EpisodeEnd::Horizon);
-        self.end = outcome.end.or(horizon);
+        self.end = end.or(horizon);
         Ok(self.end.map(|end| self.outcome(end, None)))
     }
 
@@ -224,7 +219,7 @@ impl<S: StepSink> RunningEpisode<S> {
     }
 
     pub fn steps(&self) -> u32 {
-        self.simulation.steps()
+        self.world.steps()
     }
 
     /// The sink of the episode.
@@ -238,8 +233,8 @@ impl<S: StepSink> RunningEpisode<S> {
             episode: self.episode,
             steps: self.steps(),
             end,
-            success: fault.is_none() && self.simulation.success(),
-            violations: self.simulation.violations(),
+            success: fault.is_none() && self.world.success(),
+            violations: self.world.violations(),
             computation_time: self.times.summary(),
             fault,
         }

@@ -5,7 +5,7 @@ use crate::{
     actions::{ActionFormat, ActionMode},
     errors::{OrderError, argument_error, catch_panic, simulator_error},
 };
-use faceoff_episode::{AnswerTiming, Arena, NullSink, RunningEpisode};
+use faceoff_episode::{AirHockeyWorld, AnswerTiming, Arena, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
 use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
 use faceoff_types::{EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskResult, Variation};
@@ -172,7 +172,7 @@ impl Evaluation {
 /// A running episode of a policy.
 #[pyclass(module = "faceoff._native")]
 pub struct PolicyEpisode {
-    running: RunningEpisode<NullSink>,
+    running: RunningEpisode<AirHockeyWorld, NullSink>,
     action_format: ActionFormat,
     /// Last commanded joint positions, rad.
     commanded: [f64; JOINTS],

@@ -12,7 +12,7 @@ use crate::{
     motion::Motion,
     violations::ViolationTracker,
 };
-use faceoff_episode::{EpisodeStart, StepRow, describe_end};
+use faceoff_episode::{AirHockeyWorld, EpisodeStart, StepRow, describe_end};
 use faceoff_sim::{
     EpisodeState, JOINTS,
     model::{CONTROL_STEP_S, LINKS},
@@ -45,7 +45,7 @@ pub(crate) struct EpisodeClips {
 }
 
 impl Recording {
-    pub fn begin(start: &EpisodeStart<'_>) -> Self {
+    pub fn begin(start: &EpisodeStart<'_, AirHockeyWorld>) -> Self {
         let mut motion = Motion::new(start.state.opponent_q.is_some());
         motion.push(start.state);
         Self {
@@ -67,22 +67,22 @@ impl Recording {
         }
     }
 
-    pub fn step(&mut self, row: &StepRow<'_>) {
+    pub fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         let sample = row.step + 1;
-        self.motion.push(row.state);
-        self.motion.add_contacts(row.step, row.impacts);
+        self.motion.push(row.world.state);
+        self.motion.add_contacts(row.step, row.world.impacts);
         self.agent_view.observe(row.next_observation);
         self.agent_view
-            .answer(sample, row.action, &row.timing, row.puck_lost);
-        self.tracker.update(0, sample, &row.constraints);
+            .answer(sample, row.action, &row.timing, row.world.puck_lost);
+        self.tracker.update(0, sample, &row.world.constraints);
         for group in Group::ALL {
-            let value = group.value(&row.constraints);
+            let value = group.value(&row.world.constraints);
             if value > 0.0 {
-                self.add_violation(group, sample, value, row.state);
+                self.add_violation(group, sample, value, row.world.state);
             }
         }
         self.times_s.push(row.timing.computation_time_s);
-        self.last = row.state.puck;
+        self.last = row.world.state.puck;
     }
 
     fn add_violation(&mut self, group: Group, sample: u32, value: f64, state: &EpisodeState) {

@@ -7,7 +7,7 @@ use crate::{
     gzip::Gzip,
     pack::{ClipKey, PackWriter},
 };
-use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{AirHockeyWorld, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{EpisodeOutcome, Task};
 use std::io::Write;
 
@@ -71,8 +71,8 @@ impl<W: Write> ClipRecorder<W> {
     }
 }
 
-impl<W: Write> StepSink for ClipRecorder<W> {
-    fn begin(&mut self, start: EpisodeStart<'_>) {
+impl<W: Write> StepSink<AirHockeyWorld> for ClipRecorder<W> {
+    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
         self.current = Some(Recording::begin(&start));
     }
 
@@ -82,7 +82,7 @@ impl<W: Write> StepSink for ClipRecorder<W> {
         }
     }
 
-    fn step(&mut self, row: &StepRow<'_>) {
+    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         if let Some(recording) = &mut self.current {
             recording.step(row);
         }

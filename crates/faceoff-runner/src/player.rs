@@ -11,7 +11,7 @@ use crate::{
     session::Session,
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{Arena, Question, RunningEpisode, StepSink};
+use faceoff_episode::{AirHockeyWorld, Arena, Question, RunningEpisode, StepSink};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
@@ -97,7 +97,7 @@ struct StartUpFault {
 }
 
 /// A running episode with a sink of any type.
-type DynEpisode<'a> = RunningEpisode<&'a mut dyn StepSink>;
+type DynEpisode<'a> = RunningEpisode<AirHockeyWorld, &'a mut dyn StepSink<AirHockeyWorld>>;
 
 impl<'a> Player<'a> {
     /// The first episode starts the agent. `episodes` determines how many tries may be repeated because of host
@@ -155,7 +155,7 @@ impl<'a> Player<'a> {
         &mut self,
         episode: u32,
         max_steps: u32,
-        sink: &mut dyn StepSink,
+        sink: &mut dyn StepSink<AirHockeyWorld>,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, PlatformFault> {
         let mut reruns = 0;
@@ -196,7 +196,7 @@ impl<'a> Player<'a> {
         &mut self,
         episode: u32,
         max_steps: u32,
-        sink: &mut dyn StepSink,
+        sink: &mut dyn StepSink<AirHockeyWorld>,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<Try, PlatformFault> {
         let session = match self.session.take() {

@@ -9,7 +9,7 @@ use crate::{
     player::{OnHostInterference, Player},
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
-use faceoff_episode::{Arena, StepSink};
+use faceoff_episode::{AirHockeyWorld, Arena, StepSink};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::EpisodeOutcome;
 use faceoff_wire::job::ShardSpec;
@@ -71,7 +71,7 @@ pub fn play_shard(
     spec: &ShardSpec,
     bundle: &Bundle,
     env: &AgentEnvironment,
-    sink: &mut dyn StepSink,
+    sink: &mut dyn StepSink<AirHockeyWorld>,
     observer: &mut dyn Observer,
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
@@ -119,7 +119,7 @@ pub fn play_shard(
 fn play(
     spec: &ShardSpec,
     player: &mut Player<'_>,
-    sink: &mut dyn StepSink,
+    sink: &mut dyn StepSink<AirHockeyWorld>,
     observer: &mut dyn Observer,
     calibration: &mut Calibration,
 ) -> Result<(Vec<EpisodeOutcome>, bool), PlatformFault> {

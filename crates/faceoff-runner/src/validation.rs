@@ -10,7 +10,9 @@ use crate::{
     player::{OnHostInterference, Player},
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{AnswerTiming, Arena, EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{
+    AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, RecordError, StepRow, StepSink,
+};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
 use faceoff_sim::EPISODE_STEPS;
@@ -249,14 +251,14 @@ impl Answers {
     }
 }
 
-impl StepSink for Answers {
-    fn begin(&mut self, _: EpisodeStart<'_>) {
+impl StepSink<AirHockeyWorld> for Answers {
+    fn begin(&mut self, _: EpisodeStart<'_, AirHockeyWorld>) {
         self.timings.truncate(self.completed);
     }
 
     fn observe(&mut self, _: &[f64]) {}
 
-    fn step(&mut self, row: &StepRow<'_>) {
+    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         self.timings.push(row.timing);
     }
 

@@ -10,7 +10,7 @@ use arrow_array::{
     builder::{ArrayBuilder, BooleanBuilder, StringBuilder, UInt32Builder},
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use faceoff_episode::{EpisodeStart, StepRow};
+use faceoff_episode::{AirHockeyWorld, EpisodeStart, StepRow};
 use faceoff_sim::EpisodeState;
 use faceoff_types::EpisodeOutcome;
 use std::sync::Arc;
@@ -118,17 +118,17 @@ impl EpisodeRows {
     }
 
     /// Begins an episode; drops one that has not ended.
-    pub fn begin(&mut self, start: &EpisodeStart<'_>) {
+    pub fn begin(&mut self, start: &EpisodeStart<'_, AirHockeyWorld>) {
         self.started = Some(StartedEpisode {
             seed: start.seed.to_string(),
-            interpolation: start.interpolation.map(|code| code.to_string()),
+            interpolation: start.choice.map(|code| code.to_string()),
             initial: start.state.clone(),
         });
         self.digests = StepDigests::default();
         self.last_observation.clear();
     }
 
-    pub fn step(&mut self, row: &StepRow<'_>) {
+    pub fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         self.digests.add(row.action, &row.timing);
         self.last_observation.clear();
         self.last_observation

@@ -7,7 +7,7 @@ use arrow_array::{
     builder::{Float64Builder, Int64Builder, ListBuilder, UInt32Builder},
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
-use faceoff_episode::StepRow;
+use faceoff_episode::{AirHockeyWorld, StepRow};
 use faceoff_types::Task;
 use std::sync::Arc;
 
@@ -108,7 +108,7 @@ impl StepRows {
         self.observations.end_row();
     }
 
-    pub fn push(&mut self, row: &StepRow<'_>) {
+    pub fn push(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         self.episodes.append_value(self.episode);
         self.steps.append_value(row.step);
         self.actions.values().append_slice(row.action);
@@ -120,8 +120,8 @@ impl StepRows {
         self.cpu_times
             .append_option(row.timing.cpu_time_s.map(nanoseconds));
         let state_and_constraints = &mut self.state_and_constraints;
-        state_and_constraints.put_state(row.state);
-        let constraints = row.constraints;
+        state_and_constraints.put_state(row.world.state);
+        let constraints = row.world.constraints;
         state_and_constraints.put(&[
             constraints.joint_pos,
             constraints.joint_vel,

@@ -15,7 +15,8 @@ use arrow_array::{
     types::{Float64Type, Int64Type},
 };
 use faceoff_episode::{
-    AnswerTiming, Arena, EpisodeStart, RecordError, RunningEpisode, StepRow, StepSink,
+    AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, RecordError, RunningEpisode, StepRow,
+    StepSink,
 };
 use faceoff_types::{ACTION_LIMIT, AgentFault, EpisodeOutcome, Interpolation, Ruleset};
 
@@ -39,7 +40,7 @@ struct EpisodeReplay<'a> {
     recorded: &'a RecordedEpisode,
     ruleset: Ruleset,
     interpolation: Interpolation,
-    running: RunningEpisode<ReplayRows>,
+    running: RunningEpisode<AirHockeyWorld, ReplayRows>,
 }
 
 /// The rows that the simulation gives, which the recording must equal.
@@ -49,8 +50,8 @@ struct ReplayRows {
     measured: Vec<StepMeasurement>,
 }
 
-impl StepSink for ReplayRows {
-    fn begin(&mut self, start: EpisodeStart<'_>) {
+impl StepSink<AirHockeyWorld> for ReplayRows {
+    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
         self.steps.begin(start.episode);
         self.episodes.begin(&start);
     }
@@ -59,10 +60,10 @@ impl StepSink for ReplayRows {
         self.steps.observe(observation);
     }
 
-    fn step(&mut self, row: &StepRow<'_>) {
+    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         self.steps.push(row);
         self.episodes.step(row);
-        let constraints = row.constraints;
+        let constraints = row.world.constraints;
         self.measured.push(StepMeasurement {
             timing: row.timing,
             constraints: [

@@ -4,7 +4,7 @@ use arrow_array::RecordBatch;
 use faceoff_dataset::{
     AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble,
 };
-use faceoff_episode::{AnswerTiming, EpisodeStart, StepRow, StepSink};
+use faceoff_episode::{AirHockeyStep, AnswerTiming, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, Plant};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
@@ -81,7 +81,7 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
         recorder.begin(EpisodeStart {
             episode,
             seed,
-            interpolation: agent.map(|_| Interpolation::Cubic),
+            choice: agent.map(|_| Interpolation::Cubic),
             state: &simulation.state(),
         });
         let outcome = match agent {
@@ -164,11 +164,13 @@ fn play_episode(
                 host_time_s: 0.0,
                 cpu_time_s: (!step.is_multiple_of(5)).then(|| (time / 2).as_secs_f64()),
             },
-            state: &simulation.state(),
-            constraints: outcome.constraints,
             next_observation: simulation.observation(),
-            puck_lost: simulation.is_puck_lost(),
-            impacts: simulation.world().impacts(),
+            world: AirHockeyStep {
+                state: &simulation.state(),
+                constraints: outcome.constraints,
+                puck_lost: simulation.is_puck_lost(),
+                impacts: simulation.world().impacts(),
+            },
         });
         if let Some(divergence) = simulation.divergence() {
             let mut outcome = outcome_after_fault(

@@ -1,8 +1,8 @@
 //! Episodes from scripted answers: recordings, limits on steps, faults and divergence.
 
 use faceoff_episode::{
-    AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError, RunningEpisode, StepRow,
-    StepSink,
+    AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError,
+    RunningEpisode, StepRow, StepSink,
 };
 use faceoff_sim::Bounds;
 use faceoff_types::{
@@ -19,14 +19,14 @@ struct SinkLog {
     times: Vec<AnswerTiming>,
 }
 
-impl StepSink for SinkLog {
-    fn begin(&mut self, start: EpisodeStart<'_>) {
+impl StepSink<AirHockeyWorld> for SinkLog {
+    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
         self.lines.push(format!("{start:?}"));
     }
     fn observe(&mut self, observation: &[f64]) {
         self.lines.push(format!("{observation:?}"));
     }
-    fn step(&mut self, row: &StepRow<'_>) {
+    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
         self.lines.push(format!("{row:?}"));
         self.actions.push(row.action.to_vec());
         self.times.push(row.timing);
@@ -49,12 +49,14 @@ fn arena() -> Arena {
     Arena::new(Profile::Evaluation, seed, seed.model_mismatch())
 }
 
-fn begin<S: StepSink>(task: Task, sink: S) -> RunningEpisode<S> {
+fn begin<S: StepSink<AirHockeyWorld>>(task: Task, sink: S) -> RunningEpisode<AirHockeyWorld, S> {
     RunningEpisode::begin(&arena(), task, EPISODE, Some(Interpolation::Cubic), sink)
 }
 
 /// Answers with slightly moved joint positions, and a computation time that depends on the step.
-fn answer<S: StepSink>(running: &mut RunningEpisode<S>) -> Option<EpisodeOutcome> {
+fn answer<S: StepSink<AirHockeyWorld>>(
+    running: &mut RunningEpisode<AirHockeyWorld, S>,
+) -> Option<EpisodeOutcome> {
     let question = running.question().unwrap();
     let mut action = question.observation[JOINT_POSITIONS].to_vec();
     action[0] += 0.01;
@@ -166,7 +168,10 @@ fn extreme_action(observation: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn begin_within<S: StepSink>(bounds: Bounds, sink: S) -> RunningEpisode<S> {
+fn begin_within<S: StepSink<AirHockeyWorld>>(
+    bounds: Bounds,
+    sink: S,
+) -> RunningEpisode<AirHockeyWorld, S> {
     let interpolation = Some(Interpolation::Trajectory);
     let arena = arena().with_bounds(bounds);
     RunningEpisode::begin(&arena, Task::Prepare, EPISODE, interpolation, sink)

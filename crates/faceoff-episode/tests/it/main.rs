@@ -3,3 +3,4 @@
 
 mod episode;
 mod game;
+mod point_mass;

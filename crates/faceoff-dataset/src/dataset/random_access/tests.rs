@@ -3,7 +3,7 @@
 use super::*;
 use crate::table::{ShardTable, StepRows, TableWriter, join};
 use bytes::Bytes;
-use faceoff_episode::{AnswerTiming, StepRow};
+use faceoff_episode::{AirHockeyStep, AnswerTiming, StepRow};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed};
 use parquet::file::reader::Length;
@@ -108,11 +108,13 @@ fn write_shards(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) 
                             host_time_s: 0.0,
                             cpu_time_s: None,
                         },
-                        state: &state,
-                        constraints: Default::default(),
                         next_observation: simulation.observation(),
-                        puck_lost: false,
-                        impacts: &[],
+                        world: AirHockeyStep {
+                            state: &state,
+                            constraints: Default::default(),
+                            puck_lost: false,
+                            impacts: &[],
+                        },
                     });
                 }
                 writer.write(rows.take()).unwrap();

@@ -52,7 +52,7 @@ impl Arena {
     }
 
     /// The seed of an episode; `index` is its index within the evaluation.
-    pub(crate) fn seed(&self, task: Task, index: u32) -> Seed {
+    pub(crate) fn episode_seed(&self, task: Task, index: u32) -> Seed {
         self.seed.episode(task, index)
     }
 
@@ -65,7 +65,7 @@ impl Arena {
             self.factors,
             &self.magnitudes,
             &self.plant,
-            self.seed(task, index),
+            self.episode_seed(task, index),
         )
         .with_bounds(self.bounds)
     }

@@ -2,7 +2,7 @@
 //! episodes.
 
 use crate::{
-    game_record::{RallyEntry, SideFault},
+    air_hockey::game_record::{RallyEntry, SideFault},
     record::AnswerTiming,
     time_sum::TimeSum,
 };

@@ -2,14 +2,16 @@
 //! to a goal, a foul or another end.
 
 use crate::{
-    arena::Arena,
-    game_record::{
-        Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
-        SideFault, SideStep,
+    air_hockey::{
+        arena::Arena,
+        game_record::{
+            Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
+            SideFault, SideStep,
+        },
+        running_side::RunningSide,
     },
     record::RecordError,
     running_episode::{NonFiniteObservation, Question, are_finite},
-    running_side::RunningSide,
 };
 use faceoff_sim::{Command, Divergence, Game};
 use faceoff_types::{

@@ -1,0 +1,189 @@
+//! Episodes in a world other than air hockey: a mass on a line, which the agent pushes to the origin.
+
+use faceoff_episode::{
+    AnswerTiming, Environment, EpisodeStart, NullSink, RecordError, RunningEpisode, StepRow,
+    StepSink, World,
+};
+use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task, Violations};
+
+/// Control steps of the longest episode.
+const MAX_STEPS: u32 = 40;
+/// Beyond this distance from the origin, m, the mass is lost.
+const BOUND_M: f64 = 10.0;
+
+/// What the agent's action is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Action {
+    /// A displacement, m.
+    Displacement,
+    /// Half of a displacement, m.
+    HalfDisplacement,
+}
+
+struct PointMass {
+    action: Action,
+    position_m: [f64; 1],
+    steps: u32,
+}
+
+impl World for PointMass {
+    type Choice = Action;
+    type Start<'a> = f64;
+    type Step<'a> = f64;
+
+    fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    fn observation(&self) -> &[f64] {
+        &self.position_m
+    }
+
+    fn step(&mut self, action: &[f64]) -> Option<EpisodeEnd> {
+        self.position_m[0] += match self.action {
+            Action::Displacement => action[0],
+            Action::HalfDisplacement => action[0] / 2.0,
+        };
+        self.steps += 1;
+        self.success().then_some(EpisodeEnd::Stopped)
+    }
+
+    fn divergence(&self) -> Option<String> {
+        let is_lost = self.position_m[0].abs() > BOUND_M;
+        is_lost.then(|| "the mass is lost".to_owned())
+    }
+
+    fn success(&self) -> bool {
+        self.position_m[0].abs() < 0.01
+    }
+
+    fn violations(&self) -> Violations {
+        Violations::default()
+    }
+
+    fn start(&self) -> f64 {
+        self.position_m[0]
+    }
+
+    fn last_step(&self) -> f64 {
+        self.position_m[0]
+    }
+}
+
+/// Starts the mass at a position that depends on seed and episode, or at `start_m`.
+struct Line {
+    start_m: Option<f64>,
+}
+
+impl Environment for Line {
+    type World = PointMass;
+
+    fn seed(&self, task: Task, index: u32) -> Seed {
+        Seed::from_number(5).episode(task, index)
+    }
+
+    fn max_steps(&self, _: Task) -> u32 {
+        MAX_STEPS
+    }
+
+    fn reset(&self, task: Task, index: u32, choice: Option<Action>) -> PointMass {
+        let drawn = f64::from(self.seed(task, index).as_bytes()[0]) / 256.0 + 1.0;
+        PointMass {
+            action: choice.unwrap_or(Action::Displacement),
+            position_m: [self.start_m.unwrap_or(drawn)],
+            steps: 0,
+        }
+    }
+}
+
+/// Positions that a recording has.
+#[derive(Default)]
+struct Positions {
+    choice: Option<Action>,
+    true_m: Vec<f64>,
+    observed_m: Vec<f64>,
+    next_observed_m: Vec<f64>,
+}
+
+impl StepSink<PointMass> for Positions {
+    fn begin(&mut self, start: EpisodeStart<'_, PointMass>) {
+        self.choice = start.choice;
+        self.true_m.push(start.state);
+    }
+    fn observe(&mut self, observation: &[f64]) {
+        self.observed_m.push(observation[0]);
+    }
+    fn step(&mut self, row: &StepRow<'_, PointMass>) {
+        self.true_m.push(row.world);
+        self.next_observed_m.push(row.next_observation[0]);
+    }
+    fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+const TIMING: AnswerTiming = AnswerTiming {
+    computation_time_s: 0.001,
+    host_time_s: 0.0,
+    cpu_time_s: None,
+};
+
+/// Plays an episode with an agent that answers with `factor` times the observed position.
+fn play<S: StepSink<PointMass>>(
+    line: &Line,
+    choice: Action,
+    factor: f64,
+    sink: S,
+) -> Result<EpisodeOutcome, AgentFaultKind> {
+    let mut running = RunningEpisode::begin(line, Task::Hit, 3, Some(choice), sink);
+    loop {
+        let action = [factor * running.question().unwrap().observation[0]];
+        if let Some(outcome) = running.answer(&action, TIMING)? {
+            return Ok(outcome);
+        }
+    }
+}
+
+#[test]
+fn other_world_is_played_and_recorded() {
+    let line = Line { start_m: None };
+    let mut recorded = Positions::default();
+    let outcome = play(&line, Action::HalfDisplacement, -1.0, &mut recorded).unwrap();
+    assert_eq!((outcome.end, outcome.success), (EpisodeEnd::Stopped, true));
+    assert_eq!(outcome.computation_time.max_s, TIMING.computation_time_s);
+    assert_eq!(recorded.choice, Some(Action::HalfDisplacement));
+    let steps = usize::try_from(outcome.steps).unwrap();
+    assert_eq!(recorded.true_m.len(), 1 + steps);
+    assert_eq!(recorded.observed_m, recorded.true_m[..steps]);
+    assert_eq!(recorded.next_observed_m, recorded.true_m[1..]);
+    assert_eq!(recorded.true_m[1], recorded.true_m[0] / 2.0);
+
+    let again = play(&line, Action::HalfDisplacement, -1.0, NullSink).unwrap();
+    assert_eq!(again, outcome, "the same seed gives the same episode");
+    let idle = play(&line, Action::Displacement, 0.0, NullSink).unwrap();
+    assert_eq!(
+        (idle.steps, idle.end, idle.success),
+        (MAX_STEPS, EpisodeEnd::Horizon, false)
+    );
+}
+
+#[test]
+fn other_world_that_diverges_is_an_agent_fault() {
+    let line = Line { start_m: Some(1.0) };
+    let fault = play(&line, Action::Displacement, 100.0, NullSink).unwrap_err();
+    let detail = "the mass is lost".to_owned();
+    assert_eq!(fault, AgentFaultKind::Diverged { detail });
+    let running = RunningEpisode::begin(&line, Task::Hit, 3, None, NullSink);
+    let outcome = running.outcome_after_fault(Phase::StartUp, fault, None);
+    assert_eq!((outcome.steps, outcome.success), (0, false));
+}
+
+#[test]
+fn first_observation_that_is_not_finite_is_no_agent_fault() {
+    let line = Line {
+        start_m: Some(f64::NAN),
+    };
+    let running = RunningEpisode::begin(&line, Task::Hit, 3, None, NullSink);
+    let error = running.question().unwrap_err();
+    assert_eq!(error.episode, 3);
+}
