@@ -10,6 +10,8 @@ use faceoff_types::{Competition, EPISODE_STEPS, Task, TaskInfo, TaskWeights, Vio
 #[must_use]
 pub fn competition() -> Competition {
     Competition {
+        id: "airhockey-2023".to_owned(),
+        title: "Robot Air Hockey Challenge".to_owned(),
         tasks: vec![
             task(
                 Task::Hit,
@@ -99,6 +101,27 @@ mod tests {
             .map(|violation| violation.points[1])
             .sum();
         assert_eq!(most, MAX_EPISODE_PENALTY);
+    }
+
+    #[test]
+    fn hash_covers_rules_and_no_texts() {
+        let hash = competition().hash();
+        let changed = |change: fn(&mut Competition)| {
+            let mut other = competition();
+            change(&mut other);
+            other.hash()
+        };
+        assert_eq!(changed(|other| other.title.clear()), hash);
+        assert_eq!(changed(|other| other.tasks[0].aim.clear()), hash);
+        assert_eq!(changed(|other| other.violations[0].breach.clear()), hash);
+        for other in [
+            changed(|other| other.id.push('x')),
+            changed(|other| other.tasks[0].max_steps += 1),
+            changed(|other| other.tasks.swap(0, 1)),
+            changed(|other| other.violations[0].points[1] += 1.0),
+        ] {
+            assert_ne!(other, hash);
+        }
     }
 
     #[test]

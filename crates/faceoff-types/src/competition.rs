@@ -5,6 +5,10 @@ use crate::{Millionths, Task};
 /// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Competition {
+    /// Letters, digits and dashes. It tells competitions apart.
+    pub id: String,
+    /// Its name for people.
+    pub title: String,
     /// In the order of boards.
     pub tasks: Vec<TaskInfo>,
     /// Kinds of violations of the agent's limits, in the order of tables.
@@ -40,6 +44,29 @@ pub struct ViolationInfo {
 }
 
 impl Competition {
+    /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points. Texts
+    /// are not part of it.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        // Each text is followed by a byte that none contains.
+        let mut add = |text: &str| {
+            hasher.update(text.as_bytes());
+            hasher.update(&[0]);
+        };
+        add(&self.id);
+        for task in &self.tasks {
+            add(task.task.as_str());
+            add(&task.weight.to_string());
+            add(&task.max_steps.to_string());
+        }
+        for violation in &self.violations {
+            add(&violation.name);
+            add(&violation.points_text());
+        }
+        hasher.finalize().to_string()
+    }
+
     /// The tasks in the order of boards.
     pub fn task_names(&self) -> impl Iterator<Item = Task> + Clone + '_ {
         self.tasks.iter().map(|info| info.task)

@@ -8,6 +8,7 @@ use crate::{
     store::Store,
     tables::{evaluations, games, season, stages, tournaments},
 };
+use faceoff_types::Competition;
 use jiff::Timestamp;
 
 impl Store {
@@ -22,6 +23,30 @@ impl Store {
             Ok(())
         })
         .await
+    }
+
+    /// Binds the season to the competition of the server, which is about to show it and to run its jobs. The hash covers what scores
+    /// depend on; a newer version of the program may have another. [`StoreError::Conflict`] if the season belongs to another
+    /// competition.
+    #[boxed]
+    pub async fn bind_competition(&self, competition: &Competition, now: Timestamp) -> Result<()> {
+        let hash = competition.hash();
+        let bound = season::competition(&mut *self.database.read.acquire().await?).await?;
+        match bound {
+            Some((id, _)) if id != competition.id => Err(StoreError::Conflict(format!(
+                "the season belongs to the competition {id:?}, and this program runs {:?}",
+                competition.id
+            ))),
+            Some((_, bound_hash)) if bound_hash == hash => Ok(()),
+            // An archive is not written.
+            _ if self.archived_season().is_some() => Ok(()),
+            _ => {
+                self.write(Actor::Server, now, async |tx| {
+                    season::set_competition(tx, &competition.id, &hash).await
+                })
+                .await
+            }
+        }
     }
 
     /// Closes the season for good: uploads and evaluations end, and its secret becomes public.

@@ -56,6 +56,31 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
     })
 }
 
+/// The id of the season's competition, and the hash of what its scores depend on; `None` if no server has stored them.
+pub(crate) async fn competition(
+    connection: &mut SqliteConnection,
+) -> Result<Option<(String, String)>> {
+    let row = sqlx::query!("SELECT competition_id, competition_hash FROM season")
+        .fetch_one(connection)
+        .await?;
+    Ok(row.competition_id.zip(row.competition_hash))
+}
+
+pub(crate) async fn set_competition(
+    connection: &mut SqliteConnection,
+    id: &str,
+    hash: &str,
+) -> Result<()> {
+    sqlx::query!(
+        "UPDATE season SET competition_id = ?, competition_hash = ?",
+        id,
+        hash
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
 /// Refuses changes to a closed season.
 pub(crate) async fn check_open(connection: &mut SqliteConnection) -> Result<()> {
     match read(connection).await?.closed_at {

@@ -69,7 +69,7 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ),
     (
         "season",
-        "closed_at created_at id name paused_at paused_for secret takes_registrations",
+        "closed_at competition_hash competition_id created_at id name paused_at paused_for secret takes_registrations",
     ),
     ("stage_retentions", "retention stage_id"),
     ("stage_revisions", "revision rules since stage_id"),

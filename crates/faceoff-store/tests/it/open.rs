@@ -2,6 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
+use faceoff_types::{Competition, Millionths, Task, TaskInfo};
 use sqlx::Connection;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
@@ -153,4 +154,44 @@ async fn rows_without_data_of_their_state_are_refused() {
             "{sql}: {error}"
         );
     }
+}
+
+#[tokio::test]
+async fn season_belongs_to_one_competition() {
+    let f = TestStore::new().await;
+    let competition = |id: &str, max_steps| Competition {
+        id: id.to_owned(),
+        title: "A competition".to_owned(),
+        tasks: vec![TaskInfo {
+            task: Task::Hit,
+            title: "A task".to_owned(),
+            aim: "An aim.".to_owned(),
+            weight: Millionths::new(1_000_000),
+            max_steps,
+        }],
+        violations: Vec::new(),
+    };
+    let stored = async || -> (Option<String>, Option<String>) {
+        sqlx::query_as("SELECT competition_id, competition_hash FROM season")
+            .fetch_one(&mut f.connection().await)
+            .await
+            .unwrap()
+    };
+    assert_eq!(stored().await, (None, None));
+    for max_steps in [500, 500, 400] {
+        let first = competition("first", max_steps);
+        f.store.bind_competition(&first, f.now).await.unwrap();
+        assert_eq!(
+            stored().await,
+            (Some("first".to_owned()), Some(first.hash()))
+        );
+    }
+    let other = f
+        .store
+        .bind_competition(&competition("other", 500), f.now)
+        .await;
+    assert_conflict(
+        other,
+        &["belongs to the competition \"first\"", "\"other\""],
+    );
 }

@@ -6,7 +6,7 @@ use anyhow::Context;
 use faceoff_http::{AgentResources, Capacity, HttpConfig, LinkKey};
 use faceoff_metrics::Metrics;
 use faceoff_store::{FreeSpace, Store};
-use faceoff_types::Clock;
+use faceoff_types::{Clock, Competition};
 use jiff::Timestamp;
 use std::{
     fs::File,
@@ -18,6 +18,7 @@ use std::{
 use tokio::net::TcpListener;
 
 pub(super) struct Site {
+    competition: Arc<Competition>,
     pub(super) store: Store,
     pub(super) listener: TcpListener,
     pub(super) address: SocketAddr,
@@ -43,12 +44,16 @@ impl Site {
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
+        let competition = Arc::new(faceoff_airhockey::competition());
+        let bound = store.bind_competition(&competition, Timestamp::now()).await;
+        bound.with_context(|| format!("opening the data folder {}", data_dir.display()))?;
         set_admin_token(&store, data_dir, Timestamp::now()).await?;
         let listen = config.server.listen;
         let listener = TcpListener::bind(listen).await.with_context(|| {
             format!("listening on {listen}; choose another address with --listen")
         })?;
         Ok(Self {
+            competition,
             store,
             address: listener.local_addr().context("reading the bound address")?,
             listener,
@@ -67,7 +72,7 @@ impl Site {
         agent_resources: AgentResources,
     ) -> HttpConfig {
         HttpConfig {
-            competition: Arc::new(faceoff_airhockey::competition()),
+            competition: Arc::clone(&self.competition),
             max_bundle_bytes: config.bundle.packed_bytes,
             public_url: config.server.public_url.clone(),
             upload_dir: self.upload_dir.clone(),
