@@ -113,12 +113,11 @@ pub(crate) async fn insert(
     submission: SubmissionId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "INSERT INTO ablations (id, submission_id, created_at) VALUES (?, ?, ?)",
         id,
         submission,
-        now,
+        Instant(now),
     )
     .execute(connection)
     .await
@@ -156,10 +155,9 @@ pub(crate) async fn set_ended(
     reason: Option<&str>,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE ablations SET finished_at = ?, reason = ? WHERE id = ? AND finished_at IS NULL",
-        now,
+        Instant(now),
         reason,
         id,
     )

@@ -91,12 +91,11 @@ pub(crate) async fn newest(
 
 /// The day; [`StoreError::NotFound`] if its cutoff has not passed.
 pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let row = sqlx::query!(
         "SELECT cutoff_at, deadline_at, released_at
          FROM days WHERE stage_id = ? AND day = ?",
-        stage,
-        day
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .fetch_optional(connection)
     .await?
@@ -140,7 +139,6 @@ pub(crate) async fn overdue(
     connection: &mut SqliteConnection,
     now: Timestamp,
 ) -> Result<Vec<StageDay>> {
-    let now = Instant(now);
     let rows = sqlx::query!(
         "SELECT d.stage_id AS stage, d.day FROM days d
          WHERE d.released_at IS NULL AND d.deadline_at <= ?
@@ -148,7 +146,7 @@ pub(crate) async fn overdue(
                        WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'open'
                          AND r.state <> 'played')
          ORDER BY d.cutoff_at",
-        now
+        Instant(now)
     )
     .fetch_all(connection)
     .await?;
@@ -185,11 +183,10 @@ pub(crate) async fn set_deadline(
 
 /// Has the day's cutoff passed?
 pub(crate) async fn exists(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<bool> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM days WHERE stage_id = ? AND day = ?) AS "exists!: bool""#,
-        stage,
-        day
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .fetch_one(connection)
     .await?)
@@ -211,14 +208,12 @@ pub(crate) async fn insert(
             cutoff_at: newest.cutoff_at,
         });
     }
-    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
-    let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cutoff_at, deadline_at) VALUES (?, ?, ?, ?)",
-        stage,
-        day,
-        now,
-        deadline_at
+        stage_day.stage,
+        Text(stage_day.date),
+        Instant(now),
+        deadline_at.map(Instant)
     )
     .execute(connection)
     .await?;
@@ -243,14 +238,12 @@ pub(crate) async fn insert_missed(
         }
         Err(error) => return Err(error),
     }
-    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
-    let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cutoff_at, deadline_at, missed_for) VALUES (?, ?, ?, ?, ?)",
-        stage,
-        day,
-        now,
-        deadline_at,
+        stage_day.stage,
+        Text(stage_day.date),
+        Instant(now),
+        deadline_at.map(Instant),
         reason,
     )
     .execute(connection)
@@ -264,12 +257,11 @@ pub(crate) async fn set_released(
     stage_day: StageDay,
     now: Timestamp,
 ) -> Result<bool> {
-    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
     let released = sqlx::query!(
         "UPDATE days SET released_at = ? WHERE stage_id = ? AND day = ? AND released_at IS NULL",
-        now,
-        stage,
-        day
+        Instant(now),
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .execute(connection)
     .await?;

@@ -122,8 +122,7 @@ pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
     job: Uuid,
 ) -> Result<Option<(RunId, Shard)>> {
-    let job = Text(job);
-    Ok(select_shards!("WHERE job_id = ?", job)
+    Ok(select_shards!("WHERE job_id = ?", Text(job))
         .fetch_optional(connection)
         .await?
         .map(|row| (row.run, row.into())))
@@ -200,14 +199,13 @@ pub(crate) async fn insert(
     position: u32,
     job: Uuid,
 ) -> Result<()> {
-    let job = Text(job);
     let (id, task) = (shard.id, shard.task);
     sqlx::query!(
         "INSERT INTO shards (id, run_id, job_id, position, task, first_episode, end_episode)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
         id,
         run,
-        job,
+        Text(job),
         position,
         task,
         shard.first_episode,
@@ -225,17 +223,16 @@ pub(crate) async fn commit(
     commit: &ShardCommit,
     now: Timestamp,
 ) -> Result<()> {
-    let (id_text, now, outcomes) = (id, Instant(now), Json(&commit.outcomes));
     let agent_faults = commit.agent_faults();
     let stored = sqlx::query!(
         "UPDATE shards SET committed_at = ?, recording = ?, outcomes = ?, agent_faults = ?, log = ?
          WHERE id = ? AND committed_at IS NULL",
-        now,
+        Instant(now),
         commit.recording,
-        outcomes,
+        Json(&commit.outcomes),
         agent_faults,
         commit.log,
-        id_text,
+        id,
     )
     .execute(connection)
     .await?;

@@ -96,13 +96,12 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: TeamId) -> Resul
 /// Adds a team. [`StoreError::TeamNameTaken`] if the name exists, regardless of case.
 pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Result<()> {
     let (id, name) = (team.id, &team.name);
-    let created_at = Instant(team.created_at);
     let division = team.profile.division.as_ref().map(DivisionName::as_str);
     sqlx::query!(
         "INSERT INTO teams (id, name, created_at, affiliation, link, division) VALUES (?, ?, ?, ?, ?, ?)",
         id,
         name,
-        created_at,
+        Instant(team.created_at),
         team.profile.affiliation,
         team.profile.link,
         division,
@@ -153,10 +152,9 @@ pub(crate) async fn set_retired(
     is_by_organiser: bool,
 ) -> Result<()> {
     let is_by_organiser = is_by_organiser && retired_at.is_some();
-    let retired_at = retired_at.map(Instant);
     sqlx::query!(
         "UPDATE teams SET retired_at = ?, retired_by_organiser = ? WHERE id = ?",
-        retired_at,
+        retired_at.map(Instant),
         is_by_organiser,
         id
     )

@@ -128,17 +128,15 @@ pub(crate) async fn insert(
     tournament: &Tournament,
 ) -> Result<()> {
     let (id, name) = (tournament.id, tournament.name.as_str());
-    let (created_at, stage) = (Instant(tournament.created_at), tournament.stage);
-    let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
     sqlx::query!(
         "INSERT INTO tournaments (id, number, name, created_at, stage_id, rules, settings) VALUES (?, ?, ?, ?, ?, ?, ?)",
         id,
         tournament.number,
         name,
-        created_at,
-        stage,
-        rules,
-        settings,
+        Instant(tournament.created_at),
+        tournament.stage,
+        Json(&tournament.rules),
+        Json(&tournament.settings),
     )
     .execute(connection)
     .await
@@ -152,20 +150,18 @@ pub(crate) async fn update(
     tournament: &Tournament,
 ) -> Result<()> {
     let (id, name) = (tournament.id, tournament.name.as_str());
-    let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
-    let (baseline, closed_at) = (tournament.baseline, tournament.closed_at.map(Instant));
     let paused_at = tournament.paused.as_ref().map(|paused| Instant(paused.at));
     let paused_for = tournament.paused.as_ref().map(|paused| &paused.reason);
     sqlx::query!(
         "UPDATE tournaments SET name = ?, rules = ?, settings = ?, baseline_id = ?, paused_at = ?, paused_for = ?,
                 closed_at = ? WHERE id = ?",
         name,
-        rules,
-        settings,
-        baseline,
+        Json(&tournament.rules),
+        Json(&tournament.settings),
+        tournament.baseline,
         paused_at,
         paused_for,
-        closed_at,
+        tournament.closed_at.map(Instant),
         id,
     )
     .execute(connection)

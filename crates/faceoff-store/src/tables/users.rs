@@ -107,13 +107,12 @@ pub(crate) async fn insert(
     password: Option<&str>,
 ) -> Result<()> {
     let (id, name) = (user.id, user.name.as_str());
-    let (team, joined_at) = (user.team, Instant(user.joined_at));
     sqlx::query!(
         "INSERT INTO people (id, name, team_id, joined_at, password, accepted_terms) VALUES (?, ?, ?, ?, ?, ?)",
         id,
         name,
-        team,
-        joined_at,
+        user.team,
+        Instant(user.joined_at),
         password,
         user.accepted_terms,
     )
@@ -161,10 +160,9 @@ pub(crate) async fn set_left(
     id: UserId,
     left_at: Timestamp,
 ) -> Result<()> {
-    let left_at = Instant(left_at);
     sqlx::query!(
         "UPDATE people SET left_at = ?, password = NULL WHERE id = ?",
-        left_at,
+        Instant(left_at),
         id
     )
     .execute(connection)
