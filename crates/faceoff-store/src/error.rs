@@ -155,6 +155,11 @@ fn is_full(error: &dyn DatabaseError) -> bool {
 }
 
 impl StoreError {
+    /// Refuses a request with [`Conflict`](Self::Conflict).
+    pub(crate) fn conflict<T>(reason: impl Into<String>) -> Result<T> {
+        Err(Self::Conflict(reason.into()))
+    }
+
     /// The error for an artifact that could not be read or written.
     pub(crate) fn artifact(context: impl Display, error: &(dyn Error + 'static)) -> Self {
         let text = format!("{context}: {error}");

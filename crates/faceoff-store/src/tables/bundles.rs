@@ -234,11 +234,11 @@ pub(crate) async fn check_available(
     .await?;
     match removed {
         None => Ok(()),
-        Some(row) => Err(StoreError::Conflict(format!(
+        Some(row) => StoreError::conflict(format!(
             "the bundle of the submission {id} was removed on {} {}, so it cannot be evaluated again",
             row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
             row.reason.as_deref().unwrap_or(VALIDATION_FAILED),
-        ))),
+        )),
     }
 }
 

@@ -56,21 +56,21 @@ impl ShardCommit {
         let is_complete = self.outcomes.len() == episodes.len()
             || (self.stopped_by_faults && self.outcomes.len() < episodes.len());
         if !(is_in_order && is_complete) {
-            return Err(StoreError::Conflict(format!(
+            return StoreError::conflict(format!(
                 "the outcomes do not cover {} episodes {} to {}",
                 shard.task,
                 shard.first_episode,
                 shard.end_episode - 1
-            )));
+            ));
         }
         match (&self.recording, keeps_recordings) {
             (Some(_), true) | (None, false) => Ok(()),
-            (None, true) => Err(StoreError::Conflict(
-                "the run keeps recordings: upload the shard's and name its key".into(),
-            )),
-            (Some(key), false) => Err(StoreError::Conflict(format!(
+            (None, true) => StoreError::conflict(
+                "the run keeps recordings: upload the shard's and name its key",
+            ),
+            (Some(key), false) => StoreError::conflict(format!(
                 "the run keeps no recordings: do not upload one (got {key})"
-            ))),
+            )),
         }
     }
 

@@ -47,12 +47,12 @@ pub(crate) async fn check_not_signed_off(
     .await?;
     match sign_off {
         None => Ok(()),
-        Some(row) => Err(StoreError::Conflict(format!(
+        Some(row) => StoreError::conflict(format!(
             "the stage {:?} was signed off on {} by {}: it cannot be changed any more",
             row.name,
             row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
             row.by
-        ))),
+        )),
     }
 }
 

@@ -106,10 +106,10 @@ pub(crate) async fn find_open(
     let tournament = find(connection, id).await?;
     match tournament.closed_at {
         None => Ok(tournament),
-        Some(at) => Err(StoreError::Conflict(format!(
+        Some(at) => StoreError::conflict(format!(
             "the tournament was closed on {}: it cannot be changed any more",
             at.strftime("%Y-%m-%d at %H:%M UTC")
-        ))),
+        )),
     }
 }
 
