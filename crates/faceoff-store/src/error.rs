@@ -170,10 +170,16 @@ impl StoreError {
         }
     }
 
-    /// Did the statement violate a uniqueness constraint whose columns contain `column`?
-    pub(crate) fn is_duplicate(error: &sqlx::Error, column: &str) -> bool {
-        error
-            .as_database_error()
-            .is_some_and(|error| error.is_unique_violation() && error.message().contains(column))
+    /// For a failed statement: `duplicate` if it violated a uniqueness constraint whose columns contain `column`.
+    pub(crate) fn if_duplicate(
+        column: &str,
+        duplicate: impl FnOnce() -> Self,
+    ) -> impl FnOnce(sqlx::Error) -> Self {
+        move |error| match error.as_database_error() {
+            Some(found) if found.is_unique_violation() && found.message().contains(column) => {
+                duplicate()
+            }
+            _ => error.into(),
+        }
     }
 }

@@ -121,15 +121,9 @@ pub(crate) async fn insert(
     )
     .execute(connection)
     .await
-    .map_err(|error| {
-        if StoreError::is_duplicate(&error, "ablations.submission_id") {
-            StoreError::Conflict(
-                "an ablation of this submission is running: wait for its end".into(),
-            )
-        } else {
-            error.into()
-        }
-    })?;
+    .map_err(StoreError::if_duplicate("ablations.submission_id", || {
+        StoreError::Conflict("an ablation of this submission is running: wait for its end".into())
+    }))?;
     Ok(())
 }
 

@@ -22,6 +22,40 @@ pub struct Day {
     pub released_at: Option<Timestamp>,
 }
 
+/// A row of a statement that reads days.
+struct DayRow {
+    stage: StageId,
+    day: Text<Date>,
+    cutoff_at: Instant,
+    deadline_at: Option<Instant>,
+    released_at: Option<Instant>,
+}
+
+impl From<DayRow> for Day {
+    fn from(row: DayRow) -> Self {
+        Self {
+            stage_day: StageDay {
+                stage: row.stage,
+                date: row.day.0,
+            },
+            cutoff_at: row.cutoff_at.0,
+            deadline_at: row.deadline_at.map(|at| at.0),
+            released_at: row.released_at.map(|at| at.0),
+        }
+    }
+}
+
+/// `SELECT` of days; the argument is the SQL after `FROM days`.
+macro_rules! select_days {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            DayRow,
+            "SELECT stage_id AS stage, day, cutoff_at, deadline_at, released_at FROM days " + $tail
+            $(, $argument)*
+        )
+    };
+}
+
 /// The days that were started later than on their date, each with the reason.
 pub(crate) async fn missed(connection: &mut SqliteConnection) -> Result<Vec<(StageDay, String)>> {
     let rows = sqlx::query!(
@@ -71,41 +105,23 @@ pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Option<Day>> {
-    let row = sqlx::query!(
-        "SELECT day, cutoff_at, deadline_at, released_at
-         FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1",
-        stage
-    )
-    .fetch_optional(connection)
-    .await?;
-    Ok(row.map(|row| Day {
-        stage_day: StageDay {
-            stage,
-            date: row.day.0,
-        },
-        cutoff_at: row.cutoff_at.0,
-        deadline_at: row.deadline_at.map(|at| at.0),
-        released_at: row.released_at.map(|at| at.0),
-    }))
+    let row = select_days!("WHERE stage_id = ? ORDER BY day DESC LIMIT 1", stage)
+        .fetch_optional(connection)
+        .await?;
+    Ok(row.map(Day::from))
 }
 
 /// The day; [`StoreError::NotFound`] if its cutoff has not passed.
 pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
-    let row = sqlx::query!(
-        "SELECT cutoff_at, deadline_at, released_at
-         FROM days WHERE stage_id = ? AND day = ?",
+    select_days!(
+        "WHERE stage_id = ? AND day = ?",
         stage_day.stage,
         Text(stage_day.date)
     )
     .fetch_optional(connection)
     .await?
-    .ok_or(StoreError::NotFound("day"))?;
-    Ok(Day {
-        stage_day,
-        cutoff_at: row.cutoff_at.0,
-        deadline_at: row.deadline_at.map(|at| at.0),
-        released_at: row.released_at.map(|at| at.0),
-    })
+    .map(Day::from)
+    .ok_or(StoreError::NotFound("day"))
 }
 
 /// The unreleased days of a stage, the earliest cutoff first.
@@ -113,25 +129,13 @@ pub(crate) async fn unreleased(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Vec<Day>> {
-    let rows = sqlx::query!(
-        "SELECT day, cutoff_at, deadline_at
-         FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day",
+    let rows = select_days!(
+        "WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day",
         stage
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| Day {
-            stage_day: StageDay {
-                stage,
-                date: row.day.0,
-            },
-            cutoff_at: row.cutoff_at.0,
-            deadline_at: row.deadline_at.map(|at| at.0),
-            released_at: None,
-        })
-        .collect())
+    Ok(rows.into_iter().map(Day::from).collect())
 }
 
 /// The days with incomplete evaluations whose deadline has passed.
@@ -165,16 +169,11 @@ pub(crate) async fn set_deadline(
     stage_day: StageDay,
     deadline_at: Option<Timestamp>,
 ) -> Result<()> {
-    let (stage, day, deadline_at) = (
-        stage_day.stage,
-        Text(stage_day.date),
-        deadline_at.map(Instant),
-    );
     sqlx::query!(
         "UPDATE days SET deadline_at = ? WHERE stage_id = ? AND day = ?",
-        deadline_at,
-        stage,
-        day
+        deadline_at.map(Instant),
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .execute(connection)
     .await?;

@@ -50,16 +50,12 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) ->
 
 /// The day's place is taken: [`StoreError::Conflict`] if the team has another evaluation on that day which counts or is
 /// open.
-fn one_per_day(date: Date) -> impl Fn(sqlx::Error) -> StoreError {
-    move |error| {
-        if StoreError::is_duplicate(&error, "evaluations.day") {
-            StoreError::Conflict(format!(
-                "the team has another evaluation on {date} that counts or is running"
-            ))
-        } else {
-            error.into()
-        }
-    }
+fn one_per_day(date: Date) -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("evaluations.day", move || {
+        StoreError::Conflict(format!(
+            "the team has another evaluation on {date} that counts or is running"
+        ))
+    })
 }
 
 /// Adds a queued evaluation that counts. [`StoreError::Conflict`] if the team has another one on that day which counts or
@@ -69,14 +65,13 @@ pub(crate) async fn insert(
     entry: &Entry,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, submission, team) = (entry.id, entry.submission, entry.team);
     sqlx::query!(
         "INSERT INTO evaluations (id, purpose, submission_id, team_id, stage_id, day, revision, run_id, created_at,
                                   state, rerun_of)
          VALUES (?, 'counting', ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
-        id,
-        submission,
-        team,
+        entry.id,
+        entry.submission,
+        entry.team,
         entry.stage_day.stage,
         Text(entry.stage_day.date),
         entry.revision,

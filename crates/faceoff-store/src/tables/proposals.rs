@@ -140,14 +140,13 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: ProposalId) -> R
 }
 
 pub(crate) async fn insert(connection: &mut SqliteConnection, proposal: &Proposal) -> Result<()> {
-    let (id, stage, kind) = (proposal.id, proposal.stage, proposal.kind.label());
     sqlx::query!(
         "INSERT INTO proposals (id, stage_id, revision, kind, day, reason, created_at)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
-        id,
-        stage,
+        proposal.id,
+        proposal.stage,
         proposal.revision,
-        kind,
+        proposal.kind.label(),
         proposal.kind.day().map(Text),
         proposal.reason,
         Instant(proposal.created_at),

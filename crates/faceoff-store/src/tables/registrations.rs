@@ -147,11 +147,10 @@ pub(crate) async fn count_pending(connection: &mut SqliteConnection) -> Result<i
 
 /// Is a registration for this team name pending?
 pub(crate) async fn is_pending(connection: &mut SqliteConnection, name: &TeamName) -> Result<bool> {
-    let name = name.as_str();
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM registrations WHERE state = 'waiting' AND team_name = ? COLLATE NOCASE)
                   AS "waits!: bool""#,
-        name
+        name.as_str()
     )
     .fetch_one(connection)
     .await?)
@@ -162,7 +161,6 @@ pub(crate) async fn insert(
     registration: &Registration,
     code_hash: [u8; 32],
 ) -> Result<()> {
-    let name = registration.team_name.as_str();
     let division = registration.division.as_ref().map(DivisionName::as_str);
     sqlx::query!(
         "INSERT INTO registrations (id, code_hash, team_name, affiliation, link, division, contact, accepted_terms,
@@ -170,7 +168,7 @@ pub(crate) async fn insert(
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 'waiting')",
         registration.id,
         Bytes32(code_hash),
-        name,
+        registration.team_name.as_str(),
         registration.affiliation,
         registration.link,
         division,

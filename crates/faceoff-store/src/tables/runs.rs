@@ -42,7 +42,6 @@ pub(crate) async fn insert(
     contestants: &[SubmissionId],
 ) -> Result<()> {
     let (id, plan) = (run.id, &run.plan);
-    let ruleset = run.ruleset;
     let limits = (!plan.limits.is_none()).then_some(Json(&plan.limits));
     let variation = (!plan.variation.is_none()).then_some(Json(&plan.variation));
     sqlx::query!(
@@ -57,7 +56,7 @@ pub(crate) async fn insert(
         plan.episodes_per_shard,
         plan.max_faults,
         run.keeps_recordings,
-        ruleset,
+        run.ruleset,
         variation,
         limits,
     )

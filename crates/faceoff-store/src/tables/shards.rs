@@ -199,15 +199,14 @@ pub(crate) async fn insert(
     position: u32,
     job: Uuid,
 ) -> Result<()> {
-    let (id, task) = (shard.id, shard.task);
     sqlx::query!(
         "INSERT INTO shards (id, run_id, job_id, position, task, first_episode, end_episode)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
-        id,
+        shard.id,
         run,
         Text(job),
         position,
-        task,
+        shard.task,
         shard.first_episode,
         shard.end_episode,
     )

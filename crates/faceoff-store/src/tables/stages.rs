@@ -278,7 +278,7 @@ pub(crate) async fn insert(
     )
     .execute(&mut *connection)
     .await
-    .map_err(|error| name_error(error, &stage.name))?;
+    .map_err(name_error(&stage.name))?;
     insert_revision(connection, stage.id, &stage.rules).await
 }
 
@@ -332,16 +332,14 @@ pub(crate) async fn update(connection: &mut SqliteConnection, stage: &Stage) -> 
     )
     .execute(connection)
     .await
-    .map_err(|error| name_error(error, &stage.name))?;
+    .map_err(name_error(&stage.name))?;
     Ok(())
 }
 
-fn name_error(error: sqlx::Error, name: &StageName) -> StoreError {
-    if StoreError::is_duplicate(&error, "stages.name") {
+fn name_error(name: &StageName) -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("stages.name", || {
         StoreError::StageNameTaken(name.to_string())
-    } else {
-        error.into()
-    }
+    })
 }
 
 #[cfg(test)]

@@ -199,23 +199,22 @@ pub(crate) async fn insert(
     hash: [u8; 32],
 ) -> Result<()> {
     let owner = token.owner;
-    let (owner_kind, team, user) = (owner.kind(), owner.team(), owner.user());
     sqlx::query!(
         "INSERT INTO tokens (id, hash, kind, owner, team_id, person_id, name, created_at, expires_at)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
         token.id,
         Bytes32(hash),
         token.kind.name(),
-        owner_kind,
-        team,
-        user,
+        owner.kind(),
+        owner.team(),
+        owner.user(),
         token.name,
         Instant(token.created_at),
         token.expires_at.map(Instant),
     )
     .execute(connection)
     .await
-    .map_err(hash_error)?;
+    .map_err(hash_error())?;
     Ok(())
 }
 
@@ -232,7 +231,7 @@ pub(crate) async fn set_hash(
     )
     .execute(connection)
     .await
-    .map_err(hash_error)?;
+    .map_err(hash_error())?;
     Ok(())
 }
 
@@ -273,14 +272,13 @@ pub(crate) async fn revoke_others(
     kept: Option<TokenId>,
     revoked_at: Timestamp,
 ) -> Result<()> {
-    let (kind, team, user) = (owner.kind(), owner.team(), owner.user());
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ?
          WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL AND id IS NOT ?",
         Instant(revoked_at),
-        kind,
-        team,
-        user,
+        owner.kind(),
+        owner.team(),
+        owner.user(),
         kept,
     )
     .execute(connection)
@@ -303,10 +301,8 @@ pub(crate) async fn delete_old_sessions(
 }
 
 /// The store's error for a failed write of a token's hash.
-fn hash_error(error: sqlx::Error) -> StoreError {
-    if StoreError::is_duplicate(&error, "tokens.hash") {
+fn hash_error() -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("tokens.hash", || {
         StoreError::Conflict("there is such a token: draw a new one".into())
-    } else {
-        error.into()
-    }
+    })
 }

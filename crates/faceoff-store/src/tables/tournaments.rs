@@ -127,12 +127,11 @@ pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
 ) -> Result<()> {
-    let (id, name) = (tournament.id, tournament.name.as_str());
     sqlx::query!(
         "INSERT INTO tournaments (id, number, name, created_at, stage_id, rules, settings) VALUES (?, ?, ?, ?, ?, ?, ?)",
-        id,
+        tournament.id,
         tournament.number,
-        name,
+        tournament.name.as_str(),
         Instant(tournament.created_at),
         tournament.stage,
         Json(&tournament.rules),
@@ -140,7 +139,7 @@ pub(crate) async fn insert(
     )
     .execute(connection)
     .await
-    .map_err(|error| name_error(error, &tournament.name))?;
+    .map_err(name_error(&tournament.name))?;
     Ok(())
 }
 
@@ -149,32 +148,29 @@ pub(crate) async fn update(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
 ) -> Result<()> {
-    let (id, name) = (tournament.id, tournament.name.as_str());
     let paused_at = tournament.paused.as_ref().map(|paused| Instant(paused.at));
     let paused_for = tournament.paused.as_ref().map(|paused| &paused.reason);
     sqlx::query!(
         "UPDATE tournaments SET name = ?, rules = ?, settings = ?, baseline_id = ?, paused_at = ?, paused_for = ?,
                 closed_at = ? WHERE id = ?",
-        name,
+        tournament.name.as_str(),
         Json(&tournament.rules),
         Json(&tournament.settings),
         tournament.baseline,
         paused_at,
         paused_for,
         tournament.closed_at.map(Instant),
-        id,
+        tournament.id,
     )
     .execute(connection)
     .await
-    .map_err(|error| name_error(error, &tournament.name))?;
+    .map_err(name_error(&tournament.name))?;
     Ok(())
 }
 
 /// The store's error for a failed write of a tournament's name.
-fn name_error(error: sqlx::Error, name: &StageName) -> StoreError {
-    if StoreError::is_duplicate(&error, "tournaments.name") {
+fn name_error(name: &StageName) -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("tournaments.name", || {
         StoreError::TournamentNameTaken(name.to_string())
-    } else {
-        error.into()
-    }
+    })
 }

@@ -106,11 +106,10 @@ pub(crate) async fn insert(
     user: &User,
     password: Option<&str>,
 ) -> Result<()> {
-    let (id, name) = (user.id, user.name.as_str());
     sqlx::query!(
         "INSERT INTO people (id, name, team_id, joined_at, password, accepted_terms) VALUES (?, ?, ?, ?, ?, ?)",
-        id,
-        name,
+        user.id,
+        user.name.as_str(),
         user.team,
         Instant(user.joined_at),
         password,
@@ -118,13 +117,9 @@ pub(crate) async fn insert(
     )
     .execute(connection)
     .await
-    .map_err(|error| {
-        if StoreError::is_duplicate(&error, "people.name") {
-            StoreError::UserNameTaken(user.name.to_string())
-        } else {
-            error.into()
-        }
-    })?;
+    .map_err(StoreError::if_duplicate("people.name", || {
+        StoreError::UserNameTaken(user.name.to_string())
+    }))?;
     Ok(())
 }
 
