@@ -3,7 +3,7 @@
 use crate::program::Program;
 use faceoff_types::is_full_disk;
 use jiff::{Timestamp, civil::Date};
-use sqlx::error::DatabaseError;
+use sqlx::{error::DatabaseError, migrate::MigrateError};
 use std::{error::Error, fmt::Display};
 
 /// Why an operation of the store failed.
@@ -142,6 +142,12 @@ impl From<sqlx::Error> for StoreError {
             sqlx::Error::Database(error) if is_full(&*error) => Self::DiskFull(error.to_string()),
             error => Self::Database(error),
         }
+    }
+}
+
+impl From<MigrateError> for StoreError {
+    fn from(error: MigrateError) -> Self {
+        Self::Database(error.into())
     }
 }
 

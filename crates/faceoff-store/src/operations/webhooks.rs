@@ -4,6 +4,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
+    operations::cleanup::earlier,
     store::Store,
     tables::{
         deliveries::{self, Delivery, DeliveryAttempt, DeliveryState},
@@ -429,9 +430,7 @@ impl Store {
     /// Deletes deliveries that ended at least [`DELIVERIES_KEPT_FOR`] ago. Returns the number of deliveries.
     #[boxed]
     pub async fn delete_old_deliveries(&self, now: Timestamp) -> Result<u64> {
-        let ended_before = now
-            .saturating_sub(DELIVERIES_KEPT_FOR)
-            .unwrap_or(Timestamp::MIN);
+        let ended_before = earlier(now, DELIVERIES_KEPT_FOR);
         self.write(Actor::Server, now, async |tx| {
             deliveries::delete_ended(tx, ended_before).await
         })
