@@ -1,4 +1,5 @@
-//! File names of datasets and of shards (recordings of a part of an evaluation's episodes), and their removal.
+//! File names of datasets and of shards (recordings of a part of an evaluation's episodes), and the removal of files that
+//! may be missing.
 
 use std::io::{self, ErrorKind};
 
@@ -24,7 +25,7 @@ pub(crate) const LOG_FILE: &str = "agent.log";
 ///
 /// # Errors
 /// Any other error of the removal.
-pub fn missing_is_removed(removed: io::Result<()>) -> io::Result<()> {
+pub fn allow_missing(removed: io::Result<()>) -> io::Result<()> {
     match removed {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
         other => other,

@@ -30,7 +30,7 @@ pub use arena::{game_arena, shard_arena};
 pub use assemble::{AssembledDataset, assemble};
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
-pub use files::{ARCHIVE_FILE, CLIPS_FILE, missing_is_removed};
+pub use files::{ARCHIVE_FILE, CLIPS_FILE, allow_missing};
 pub use granted_files::writable_files;
 pub use recorder::Recorder;
 pub use shard::ShardReport;

@@ -4,7 +4,7 @@
 use crate::{
     digest,
     error::RecordingError,
-    files::{CLIPS_FILE, EPISODES_FILE, LOG_FILE, STEPS_FILE, missing_is_removed},
+    files::{CLIPS_FILE, EPISODES_FILE, LOG_FILE, STEPS_FILE, allow_missing},
     shard::ShardReport,
     simulator::simulator_id,
     table::ShardTable,
@@ -75,7 +75,7 @@ impl ShardFolder {
         };
         for name in [SHARD_FILE].into_iter().chain(FILES) {
             for path in [dir.join(name), folder.partial(name)] {
-                missing_is_removed(fs::remove_file(&path))?;
+                allow_missing(fs::remove_file(&path))?;
             }
         }
         Ok(folder)

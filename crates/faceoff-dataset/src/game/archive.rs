@@ -11,7 +11,7 @@ use crate::{
     archive_writer::ArchiveWriter,
     digest,
     error::RecordingError,
-    files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, missing_is_removed},
+    files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, allow_missing},
     simulator::simulator_id,
 };
 use faceoff_episode::FinishedGame;
@@ -133,7 +133,7 @@ pub fn remove_game(out: &Path) -> std::io::Result<()> {
     let files = [GAME_FILE, CLIPS_FILE].into_iter();
     for name in files.chain(Side::BOTH.map(side_file)) {
         for path in [out.join(name), partial(name, out)] {
-            missing_is_removed(fs::remove_file(path))?;
+            allow_missing(fs::remove_file(path))?;
         }
     }
     Ok(())

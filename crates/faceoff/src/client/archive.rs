@@ -5,7 +5,7 @@ use super::{Client, with_suffix};
 use anyhow::{Context, bail};
 use faceoff_api::requests::ArchiveQuery;
 use faceoff_archive::{Edition, Manifest, check};
-use faceoff_dataset::missing_is_removed;
+use faceoff_dataset::allow_missing;
 use futures::StreamExt;
 use reqwest::Method;
 use std::{path::Path, time::Duration};
@@ -69,7 +69,7 @@ impl Client {
 async fn fetch(response: reqwest::Response, partial: &Path) -> anyhow::Result<u64> {
     let writing = || format!("writing {}", partial.display());
     // A download that was killed may have left a partial file.
-    missing_is_removed(fs::remove_file(partial).await).with_context(writing)?;
+    allow_missing(fs::remove_file(partial).await).with_context(writing)?;
     // The archive may contain everything that only organisers may read.
     let mut writer = File::options()
         .write(true)

@@ -3,7 +3,7 @@
 
 use super::{Client, is_refused_with, with_suffix};
 use anyhow::{Context, anyhow, bail, ensure};
-use faceoff_dataset::missing_is_removed;
+use faceoff_dataset::allow_missing;
 use futures::StreamExt;
 use indicatif::ProgressBar;
 use reqwest::{Method, Response, StatusCode, header};
@@ -219,7 +219,7 @@ impl PartialFile {
         let writing = || format!("writing {}", self.path.display());
         if length == 0 {
             // The old ETag does not describe the new file.
-            missing_is_removed(fs::remove_file(&self.tag_path)).with_context(writing)?;
+            allow_missing(fs::remove_file(&self.tag_path)).with_context(writing)?;
         }
         self.file.set_len(length).with_context(writing)?;
         self.file

@@ -1,7 +1,7 @@
 //! The files of `faceoff eval --out`.
 
 use anyhow::Context;
-use faceoff_dataset::{ARCHIVE_FILE, missing_is_removed};
+use faceoff_dataset::{ARCHIVE_FILE, allow_missing};
 use std::{fs, path::Path};
 
 pub(super) const RESULTS: &str = "results.json";
@@ -13,7 +13,7 @@ pub(super) const ABLATION: &str = "ablation.json";
 /// Removes the files of an earlier run, so that they are not mistaken for results of this one.
 pub(super) fn remove_earlier(out: &Path) -> anyhow::Result<()> {
     for path in [RESULTS, ARCHIVE_FILE, LOG, ABLATION].map(|name| out.join(name)) {
-        missing_is_removed(fs::remove_file(&path))
+        allow_missing(fs::remove_file(&path))
             .with_context(|| format!("removing {}", path.display()))?;
     }
     Ok(())

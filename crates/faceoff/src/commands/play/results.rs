@@ -1,7 +1,7 @@
 //! The file `results.json` of `faceoff play`.
 
 use anyhow::Context;
-use faceoff_dataset::missing_is_removed;
+use faceoff_dataset::allow_missing;
 use serde::Serialize;
 use std::{
     fs,
@@ -18,7 +18,7 @@ impl Results {
     /// The file in a folder; removes an earlier one.
     pub(super) fn clear_in(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join("results.json");
-        missing_is_removed(fs::remove_file(&path))
+        allow_missing(fs::remove_file(&path))
             .with_context(|| format!("removing {}", path.display()))?;
         Ok(Self { path })
     }

@@ -4,7 +4,7 @@
 use super::super::atomic_folder::create_private;
 use anyhow::{Context, bail};
 use faceoff_api::token::{Secret, SecretKind, hash_token};
-use faceoff_dataset::missing_is_removed;
+use faceoff_dataset::allow_missing;
 use faceoff_http::LinkKey;
 use faceoff_store::Store;
 use jiff::Timestamp;
@@ -110,7 +110,7 @@ fn is_alive(id: i32) -> bool {
 /// # Errors
 /// If the folder cannot be emptied or created.
 pub fn empty_folder(folder: &Path) -> anyhow::Result<()> {
-    missing_is_removed(fs::remove_dir_all(folder))
+    allow_missing(fs::remove_dir_all(folder))
         .with_context(|| format!("emptying {}", folder.display()))?;
     create_private(folder)
 }
