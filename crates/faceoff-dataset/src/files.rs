@@ -1,4 +1,7 @@
-//! File names of datasets and of shards (recordings of a part of an evaluation's episodes).
+//! File names of datasets and of shards (recordings of a part of an evaluation's episodes), and the removal of files that
+//! may be missing.
+
+use std::io::{self, ErrorKind};
 
 /// The dataset's archive in the folder that `faceoff eval` writes.
 pub const ARCHIVE_FILE: &str = "dataset.zip";
@@ -17,3 +20,14 @@ pub(crate) const MANIFEST_FILE: &str = "manifest.json";
 pub const CLIPS_FILE: &str = "clips";
 /// The end of the agent's standard error.
 pub(crate) const LOG_FILE: &str = "agent.log";
+
+/// The result of a removal, which has also succeeded if there was nothing to remove.
+///
+/// # Errors
+/// Any other error of the removal.
+pub fn allow_missing(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        other => other,
+    }
+}

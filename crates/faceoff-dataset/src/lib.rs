@@ -8,6 +8,7 @@
 //! from the caller or from the recording.
 
 mod archive_writer;
+mod arena;
 mod assemble;
 mod dataset;
 mod digest;
@@ -25,10 +26,11 @@ mod table;
 mod times;
 pub mod verify;
 
+pub use arena::{game_arena, shard_arena};
 pub use assemble::{AssembledDataset, assemble};
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
-pub use files::{ARCHIVE_FILE, CLIPS_FILE};
+pub use files::{ARCHIVE_FILE, CLIPS_FILE, allow_missing};
 pub use granted_files::writable_files;
 pub use recorder::Recorder;
 pub use shard::ShardReport;

@@ -4,7 +4,7 @@
 use crate::{
     digest,
     error::RecordingError,
-    files::{CLIPS_FILE, EPISODES_FILE, LOG_FILE, STEPS_FILE},
+    files::{CLIPS_FILE, EPISODES_FILE, LOG_FILE, STEPS_FILE, allow_missing},
     shard::ShardReport,
     simulator::simulator_id,
     table::ShardTable,
@@ -75,10 +75,7 @@ impl ShardFolder {
         };
         for name in [SHARD_FILE].into_iter().chain(FILES) {
             for path in [dir.join(name), folder.partial(name)] {
-                match fs::remove_file(&path) {
-                    Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
-                    _ => {}
-                }
+                allow_missing(fs::remove_file(&path))?;
             }
         }
         Ok(folder)

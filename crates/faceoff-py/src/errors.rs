@@ -1,5 +1,6 @@
 //! Errors as Python exceptions: the classes of the package's `errors.py`.
 
+use faceoff_types::PerturbationSettings;
 use pyo3::{import_exception, prelude::*};
 use std::{
     any::Any,
@@ -37,6 +38,13 @@ pub fn panic_message(panic: &(dyn Any + Send)) -> String {
         .map(|message| (*message).to_owned())
         .or_else(|| panic.downcast_ref::<String>().cloned())
         .unwrap_or_else(|| "a panic without a message".to_owned())
+}
+
+/// Refuses magnitudes of perturbations that are outside of their ranges.
+pub fn check_perturbations(magnitudes: &PerturbationSettings) -> PyResult<()> {
+    magnitudes
+        .check()
+        .map_err(|error| argument_error("perturbations", "valid magnitudes", error))
 }
 
 /// The error of an invalid argument.

@@ -3,7 +3,7 @@
 
 use crate::{
     actions::{ActionFormat, ActionMode},
-    errors::{OrderError, argument_error, catch_panic, simulator_error},
+    errors::{OrderError, argument_error, catch_panic, check_perturbations, simulator_error},
 };
 use faceoff_episode::{AirHockeyWorld, AnswerTiming, Arena, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
@@ -60,9 +60,7 @@ impl Evaluation {
         };
         let magnitudes: PerturbationSettings = serde_json::from_str(perturbations)
             .map_err(|error| argument_error("perturbations", "magnitudes of factors", error))?;
-        magnitudes
-            .check()
-            .map_err(|error| argument_error("perturbations", "valid magnitudes", error))?;
+        check_perturbations(&magnitudes)?;
         let arena = py.detach(|| {
             catch_panic(|| {
                 let ruleset = Ruleset::CURRENT;

@@ -3,7 +3,9 @@
 
 use crate::{
     actions::{ActionFormat, ActionMode},
-    errors::{ClosedError, OrderError, argument_error, catch_panic, simulator_error},
+    errors::{
+        ClosedError, OrderError, argument_error, catch_panic, check_perturbations, simulator_error,
+    },
     observation,
 };
 use faceoff_sim::{
@@ -50,10 +52,7 @@ impl Game {
     fn new(setup: &str) -> PyResult<Self> {
         let setup: Setup = serde_json::from_str(setup)
             .map_err(|error| argument_error("setup", "a setup in JSON", error))?;
-        setup
-            .perturbations
-            .check()
-            .map_err(|error| argument_error("perturbations", "valid magnitudes", error))?;
+        check_perturbations(&setup.perturbations)?;
         let action_formats = [0, 1].map(|robot| ActionFormat {
             mode: setup.action_mode[robot],
             interpolation: setup.interpolation[robot],

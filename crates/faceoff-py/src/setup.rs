@@ -5,7 +5,7 @@
 
 use crate::{
     actions::{ActionFormat, ActionMode},
-    errors::argument_error,
+    errors::{argument_error, check_perturbations},
 };
 use faceoff_sim::{Episode, Plant};
 use faceoff_types::{
@@ -51,10 +51,7 @@ impl Setup {
                 setup.max_episode_steps,
             ));
         }
-        setup
-            .perturbations
-            .check()
-            .map_err(|error| argument_error("perturbations", "valid magnitudes", error))?;
+        check_perturbations(&setup.perturbations)?;
         let magnitudes = &setup.perturbations;
         let is_drawn = setup.factors.contains(&Factor::ModelMismatch);
         // Thousands of unsuccessful draws would look like a hang.

@@ -262,9 +262,8 @@ mod tests {
     use super::*;
     use crate::{
         column::Column,
-        header::{CLIP_FORMAT, ClipKind, Header, ViolationSpan},
+        header::{Header, ViolationSpan},
     };
-    use faceoff_sim::model::CONTROL_STEP_S;
 
     /// A clip with the given x of the puck at each sample, and a speed of 2 m/s. The side 0 defends x < 0.
     fn clip(first: u32, xs: &[f64]) -> Clip {
@@ -276,22 +275,8 @@ mod tests {
         let constant = |value: f64| vec![value; xs.len()];
         Clip {
             header: Header {
-                format: CLIP_FORMAT.to_owned(),
-                kind: ClipKind::Motion,
-                contest: "game".to_owned(),
-                episode: None,
-                side: None,
-                first,
-                samples: u32::try_from(xs.len()).unwrap(),
-                step_s: CONTROL_STEP_S,
-                columns: Vec::new(),
-                contacts: Vec::new(),
-                violations: Vec::new(),
-                breaks: Vec::new(),
                 score: Some([0; 2]),
-                late: Vec::new(),
-                lost: Vec::new(),
-                end: None,
+                ..Header::new("game", first, u32::try_from(xs.len()).unwrap())
             },
             columns: vec![
                 column("puck_x", xs),

@@ -8,16 +8,12 @@ use crate::{
     error::ReplayError,
     group::Group,
     gzip::Gzip,
-    header::{CLIP_FORMAT, ClipKind, EpisodeEndSummary, Header},
+    header::{ClipKind, EpisodeEndSummary, Header},
     motion::Motion,
     violations::ViolationTracker,
 };
 use faceoff_episode::{AirHockeyWorld, EpisodeStart, StepRow, describe_end};
-use faceoff_sim::{
-    EpisodeState, JOINTS,
-    model::{CONTROL_STEP_S, LINKS},
-    table::frames::table_from_robot,
-};
+use faceoff_sim::{EpisodeState, JOINTS, model::LINKS, table::frames::table_from_robot};
 use faceoff_types::{EpisodeOutcome, Task, escape_unprintable};
 
 /// An episode that is being recorded.
@@ -157,22 +153,15 @@ impl Recording {
             .first()
             .map_or(0, |column| column.counts.len());
         let header = Header {
-            format: CLIP_FORMAT.to_owned(),
-            kind: ClipKind::Motion,
-            contest: contest(outcome.task),
             episode: Some(self.episode),
-            side: None,
-            first: 0,
-            samples: u32::try_from(samples).unwrap_or(u32::MAX),
-            step_s: CONTROL_STEP_S,
-            columns: Vec::new(),
             contacts,
             violations: self.tracker.take(),
-            breaks: Vec::new(),
-            score: None,
-            late: Vec::new(),
-            lost: Vec::new(),
             end: Some(end(public_reason)),
+            ..Header::new(
+                &contest(outcome.task),
+                0,
+                u32::try_from(samples).unwrap_or(u32::MAX),
+            )
         };
         EpisodeClips {
             observed: Clip {

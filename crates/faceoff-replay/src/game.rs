@@ -6,7 +6,7 @@ use crate::{
     clip::Clip,
     error::ReplayError,
     gzip::Gzip,
-    header::{CLIP_FORMAT, ClipKind, Header, RallyEndEvent, RallyEndKind},
+    header::{ClipKind, Header, RallyEndEvent, RallyEndKind},
     motion::Motion,
     pack::{ClipKey, PackWriter},
     violations::ViolationTracker,
@@ -14,7 +14,7 @@ use crate::{
 use faceoff_episode::{
     AnswerTiming, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, RecordError,
 };
-use faceoff_sim::{GameState, RallyEnd, model::CONTROL_STEP_S};
+use faceoff_sim::{GameState, RallyEnd};
 use faceoff_types::{Side, WINDOW_STEPS};
 use std::io::Write;
 
@@ -103,24 +103,7 @@ impl Chunk {
     /// The chunk's number and its clips: the motion, and the view of each side.
     fn end(mut self) -> (u32, [Clip; 3]) {
         let first = self.number * CHUNK_STEPS;
-        let header = Header {
-            format: CLIP_FORMAT.to_owned(),
-            kind: ClipKind::Motion,
-            contest: "game".to_owned(),
-            episode: None,
-            side: None,
-            first,
-            samples: self.last - first + 1,
-            step_s: CONTROL_STEP_S,
-            columns: Vec::new(),
-            contacts: Vec::new(),
-            violations: Vec::new(),
-            breaks: Vec::new(),
-            score: None,
-            late: Vec::new(),
-            lost: Vec::new(),
-            end: None,
-        };
+        let header = Header::new("game", first, self.last - first + 1);
         let [home, away] = self.sides;
         let view_clip = |side: u32, view: AgentView| {
             let (columns, late, lost) = view.take();

@@ -2,6 +2,7 @@
 //! numbers. A *sample* is the state after a control step.
 
 use crate::group::Group;
+use faceoff_sim::model::CONTROL_STEP_S;
 use faceoff_types::EpisodeEnd;
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +62,30 @@ pub struct Header {
     /// How an episode ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<EpisodeEndSummary>,
+}
+
+impl Header {
+    /// The header of a clip of the true motion, so far without columns and events.
+    pub(crate) fn new(contest: &str, first: u32, samples: u32) -> Self {
+        Self {
+            format: CLIP_FORMAT.to_owned(),
+            kind: ClipKind::Motion,
+            contest: contest.to_owned(),
+            episode: None,
+            side: None,
+            first,
+            samples,
+            step_s: CONTROL_STEP_S,
+            columns: Vec::new(),
+            contacts: Vec::new(),
+            violations: Vec::new(),
+            breaks: Vec::new(),
+            score: None,
+            late: Vec::new(),
+            lost: Vec::new(),
+            end: None,
+        }
+    }
 }
 
 /// The header of a column, with the fields of [`crate::Column`].

@@ -8,8 +8,8 @@ use crate::{
     host_interference::{InterferenceMonitor, KernelCounters},
     player::{OnHostInterference, Player},
 };
-use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
-use faceoff_episode::{AirHockeyWorld, Arena, StepSink};
+use faceoff_dataset::{Recorder, ShardFolder, ShardReport, shard_arena};
+use faceoff_episode::{AirHockeyWorld, StepSink};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::EpisodeOutcome;
 use faceoff_wire::job::ShardSpec;
@@ -82,13 +82,7 @@ pub fn play_shard(
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        Arena::with_ruleset(
-            spec.ruleset,
-            spec.profile,
-            &spec.perturbations,
-            spec.seed,
-            spec.mismatch_seed,
-        ),
+        shard_arena(spec),
         monitor,
         OnHostInterference::KeepLastTry,
     );

@@ -107,16 +107,8 @@ pub(crate) fn score_difference(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::paired::tests::tally;
     use statrs::distribution::{Binomial, Discrete};
-
-    fn tally(both: u32, only_a: u32, only_b: u32, neither: u32) -> PairedTally {
-        PairedTally {
-            both,
-            only_a,
-            only_b,
-            neither,
-        }
-    }
 
     /// The values come from a separate implementation of the formula in the paper.
     #[test]

@@ -162,10 +162,10 @@ fn lcm(a: i128, b: i128) -> i128 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn tally(both: u32, only_a: u32, only_b: u32, neither: u32) -> PairedTally {
+    pub(crate) fn tally(both: u32, only_a: u32, only_b: u32, neither: u32) -> PairedTally {
         PairedTally {
             both,
             only_a,

@@ -1,7 +1,7 @@
 //! The SQLite database of a data folder: the pools of its connections, and how they are opened.
 
 use crate::{
-    error::{Result, StoreError},
+    error::Result,
     readers::Readers,
     schema::{self, MIGRATIONS, Upgrade},
     write_ahead_log::{MAX_LOG_BYTES, WriteAheadLog},
@@ -69,10 +69,7 @@ impl Database {
             .connect_with(options.clone())
             .await?;
         let schema_before = schema::check_migratable(&mut *write.acquire().await?).await?;
-        MIGRATIONS
-            .run(&write)
-            .await
-            .map_err(|error| StoreError::Database(error.into()))?;
+        MIGRATIONS.run(&write).await?;
         let upgrade = schema::record_program(&mut *write.acquire().await?, schema_before).await?;
         let read_options = options.create_if_missing(false).pragma("query_only", "ON");
         let pool = |connections| {

@@ -3,7 +3,7 @@
 use crate::program::Program;
 use faceoff_types::is_full_disk;
 use jiff::{Timestamp, civil::Date};
-use sqlx::error::DatabaseError;
+use sqlx::{error::DatabaseError, migrate::MigrateError};
 use std::{error::Error, fmt::Display};
 
 /// Why an operation of the store failed.
@@ -145,6 +145,12 @@ impl From<sqlx::Error> for StoreError {
     }
 }
 
+impl From<MigrateError> for StoreError {
+    fn from(error: MigrateError) -> Self {
+        Self::Database(error.into())
+    }
+}
+
 /// SQLITE_FULL, or SQLITE_IOERR_SHMSIZE: the index of the write-ahead log could not grow.
 fn is_full(error: &dyn DatabaseError) -> bool {
     /// Result codes of SQLite, as sqlx formats them.
@@ -155,6 +161,11 @@ fn is_full(error: &dyn DatabaseError) -> bool {
 }
 
 impl StoreError {
+    /// Refuses a request with [`Conflict`](Self::Conflict).
+    pub(crate) fn conflict<T>(reason: impl Into<String>) -> Result<T> {
+        Err(Self::Conflict(reason.into()))
+    }
+
     /// The error for an artifact that could not be read or written.
     pub(crate) fn artifact(context: impl Display, error: &(dyn Error + 'static)) -> Self {
         let text = format!("{context}: {error}");
@@ -165,10 +176,16 @@ impl StoreError {
         }
     }
 
-    /// Did the statement violate a uniqueness constraint whose columns contain `column`?
-    pub(crate) fn is_duplicate(error: &sqlx::Error, column: &str) -> bool {
-        error
-            .as_database_error()
-            .is_some_and(|error| error.is_unique_violation() && error.message().contains(column))
+    /// For a failed statement: `duplicate` if it violated a uniqueness constraint whose columns contain `column`.
+    pub(crate) fn if_duplicate(
+        column: &str,
+        duplicate: impl FnOnce() -> Self,
+    ) -> impl FnOnce(sqlx::Error) -> Self {
+        move |error| match error.as_database_error() {
+            Some(found) if found.is_unique_violation() && found.message().contains(column) => {
+                duplicate()
+            }
+            _ => error.into(),
+        }
     }
 }

@@ -86,17 +86,16 @@ async fn append(
         Some(Value::String(kind)) => kind,
         _ => return Err(damaged(&"it has no kind")),
     };
-    let (now, payload) = (Instant(now), Json(payload));
     let (subject_kind, subject_id) = subject.columns();
     Ok(sqlx::query_scalar!(
         r#"INSERT INTO events (at, actor, subject_kind, subject_id, kind, payload)
            VALUES (?, ?, ?, ?, ?, ?) RETURNING id AS "id!""#,
-        now,
+        Instant(now),
         actor,
         subject_kind,
         subject_id,
         kind,
-        payload,
+        Json(payload),
     )
     .fetch_one(connection)
     .await?)

@@ -11,7 +11,7 @@ use crate::{
     archive_writer::ArchiveWriter,
     digest,
     error::RecordingError,
-    files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE},
+    files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, allow_missing},
     simulator::simulator_id,
 };
 use faceoff_episode::FinishedGame;
@@ -25,7 +25,7 @@ use faceoff_wire::{
 };
 use fs_err::{self as fs, File};
 use std::{
-    io::{ErrorKind, Write},
+    io::Write,
     path::{Path, PathBuf},
 };
 
@@ -133,10 +133,7 @@ pub fn remove_game(out: &Path) -> std::io::Result<()> {
     let files = [GAME_FILE, CLIPS_FILE].into_iter();
     for name in files.chain(Side::BOTH.map(side_file)) {
         for path in [out.join(name), partial(name, out)] {
-            match fs::remove_file(path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
+            allow_missing(fs::remove_file(path))?;
         }
     }
     Ok(())

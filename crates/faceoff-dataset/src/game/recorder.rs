@@ -5,7 +5,7 @@ use super::{
     files::{CLIPS_FILE, MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
     rows::{GameRows, record_error},
 };
-use crate::{error::RecordingError, table::TableWriter};
+use crate::{error::RecordingError, files::allow_missing, table::TableWriter};
 use faceoff_episode::{GameSink, GameStepRow, RallyRow, RallyStart, RecordError};
 use faceoff_replay::GameClipRecorder;
 use faceoff_types::Side;
@@ -58,10 +58,7 @@ impl GameRecorder {
     /// # Errors
     /// [`RecordingError::Io`].
     pub fn create(dir: &Path) -> Result<Self, RecordingError> {
-        match fs::remove_dir_all(dir) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error.into()),
-            _ => {}
-        }
+        allow_missing(fs::remove_dir_all(dir))?;
         fs::create_dir_all(dir)?;
         let rows = GameRows::new();
         let create = |name: &str, schema| {

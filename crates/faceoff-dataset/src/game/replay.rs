@@ -9,13 +9,14 @@ use super::{
     table::GameTable,
 };
 use crate::{
+    arena::game_arena,
     dataset::Columns,
     error::DatasetError,
     verify::{Difference, VerifyError, compare},
 };
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::SchemaRef;
-use faceoff_episode::{Arena, FinishedGame, RecordError, RunningGame};
+use faceoff_episode::{FinishedGame, RecordError, RunningGame};
 use faceoff_types::{AgentFault, Interpolation, Side};
 
 /// Simulates a game again with its recorded inputs.
@@ -38,13 +39,7 @@ struct RecordedRally {
 impl GameReplay {
     pub fn open(recording: &GameRecording) -> Result<Self, DatasetError> {
         let spec = &recording.manifest().spec;
-        let arena = Arena::with_ruleset(
-            spec.ruleset,
-            spec.profile,
-            &spec.perturbations,
-            spec.seed,
-            spec.mismatch_seed,
-        );
+        let arena = game_arena(spec);
         let rows = GameRows::new();
         let entries =
             |side: Side| recording.table(entries_file(side), rows.entries[side.index()].schema());

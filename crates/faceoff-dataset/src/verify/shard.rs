@@ -4,13 +4,13 @@ use super::{
     difference::Difference, episode_reader::EpisodeReader, error::VerifyError, replay::Replayer,
 };
 use crate::{
+    arena::shard_arena,
     dataset::Columns,
     error::{DatasetError, RecordingError},
     files::EPISODES_FILE,
     shard_folder::ShardRecording,
 };
 use arrow_array::RecordBatch;
-use faceoff_episode::Arena;
 use faceoff_types::EpisodeOutcome;
 use faceoff_wire::job::ShardSpec;
 use std::path::Path;
@@ -39,13 +39,7 @@ pub fn verify_shard(
     if recording.report.outcomes != outcomes {
         return Err(unusable("the recording and the report have different outcomes").into());
     }
-    let arena = Arena::with_ruleset(
-        spec.ruleset,
-        spec.profile,
-        &spec.perturbations,
-        spec.seed,
-        spec.mismatch_seed,
-    );
+    let arena = shard_arena(spec);
     let replayer = Replayer::new(spec.ruleset, arena);
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
     let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps)?;

@@ -11,9 +11,12 @@ use crate::{
     fault::PlatformFault,
     host_interference::{InterferenceMonitor, KernelCounters},
 };
-use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, remove_game};
+use faceoff_dataset::{
+    game::{GameArchives, GameRecorder, RecordedGame, remove_game},
+    game_arena,
+};
 use faceoff_episode::{
-    Arena, FinishedGame, GameSink, GameStepRow, RallyRow, RallyStart, RecordError, RunningGame,
+    FinishedGame, GameSink, GameStepRow, RallyRow, RallyStart, RecordError, RunningGame,
 };
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::Side;
@@ -137,13 +140,7 @@ pub fn play_game<S: GameSink>(
         Calibration::start(&first.agent_cpus)?,
         Calibration::start(&second.agent_cpus)?,
     ];
-    let arena = Arena::with_ruleset(
-        spec.ruleset,
-        spec.profile,
-        &spec.perturbations,
-        spec.seed,
-        spec.mismatch_seed,
-    );
+    let arena = game_arena(spec);
     let mut sides = Side::BOTH.map(|side| {
         let index = side.index();
         let restart_s = spec.limits.restart_s;

@@ -40,11 +40,10 @@ impl Store {
             season::check_open(tx).await?;
             let ablated = submissions::find(tx, submission).await?;
             if ablated.state != SubmissionState::Valid {
-                return Err(StoreError::Conflict(
+                return StoreError::conflict(
                     "only a valid submission can be ablated: wait for its validation run, or upload a \
-                     corrected one"
-                        .into(),
-                ));
+                     corrected one",
+                );
             }
             let id = AblationId::new();
             ablations::insert(tx, id, submission, now).await?;

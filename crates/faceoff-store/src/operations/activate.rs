@@ -17,7 +17,7 @@ use jiff::Timestamp;
 
 /// Refuses a submission that cannot be evaluated. The error says what its team can do.
 fn check_valid(submission: &Submission) -> Result<()> {
-    Err(StoreError::Conflict(match &submission.state {
+    StoreError::conflict(match &submission.state {
         SubmissionState::Valid => return Ok(()),
         SubmissionState::Validating => {
             "the submission's validation run is not over: wait until it is valid".into()
@@ -29,7 +29,7 @@ fn check_valid(submission: &Submission) -> Result<()> {
             "the submission could not be checked because of a platform fault: upload it again"
                 .into()
         }
-    }))
+    })
 }
 
 async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {

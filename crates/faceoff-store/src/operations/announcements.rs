@@ -58,9 +58,9 @@ impl Store {
     ) -> Result<Question> {
         self.write(actor, now, async |tx| {
             if questions::count_open(tx, team).await? >= MAX_OPEN_QUESTIONS {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "the team has {MAX_OPEN_QUESTIONS} unanswered questions, which is the limit: wait for an answer"
-                )));
+                ));
             }
             let question = Question {
                 id: QuestionId::new(),

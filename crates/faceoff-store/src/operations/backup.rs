@@ -154,10 +154,7 @@ async fn read_migrated_copy(
         .journal_mode(SqliteJournalMode::Off)
         .synchronous(SqliteSynchronous::Off);
     let mut connection = SqliteConnection::connect_with(&options).await?;
-    MIGRATIONS
-        .run(&mut connection)
-        .await
-        .map_err(|error| StoreError::Database(error.into()))?;
+    MIGRATIONS.run(&mut connection).await?;
     let contents = read_contents(&mut connection).await;
     connection.close().await?;
     std::fs::remove_file(copy_file)

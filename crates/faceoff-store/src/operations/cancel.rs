@@ -26,9 +26,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             let evaluation = queries::evaluations::find(tx, id).await?;
             if evaluation.state.is_over() {
-                return Err(StoreError::Conflict(
-                    "the evaluation is over already".into(),
-                ));
+                return StoreError::conflict("the evaluation is over already");
             }
             completion::fail_evaluation(tx, id, Failure::Cancelled(reason)).await
         })

@@ -20,6 +20,11 @@ pub const RECORDINGS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
 /// Time for which a bundle is kept after a platform fault in its validation run, for investigation.
 pub const UNCHECKED_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
 
+/// The time this much before `now`: what ended until then is not kept any more.
+pub(super) fn earlier(now: Timestamp, kept_for: SignedDuration) -> Timestamp {
+    now.saturating_sub(kept_for).unwrap_or(Timestamp::MIN)
+}
+
 /// Artifact key prefix of all recordings of a run.
 fn recordings_of(run: RunId) -> String {
     format!("recordings/{run}")
@@ -40,9 +45,7 @@ impl Store {
     /// of runs. To be called periodically; an interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_old_recordings(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = now
-            .saturating_sub(RECORDINGS_KEPT_FOR)
-            .unwrap_or(Timestamp::MIN);
+        let ended_before = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
         let runs_to_clean = runs::with_old_recordings(&mut connection, ended_before).await?;
         drop(connection);
@@ -60,9 +63,7 @@ impl Store {
     /// [`RECORDINGS_KEPT_FOR`] ago; their results stay readable. Returns the number of datasets. An interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = now
-            .saturating_sub(RECORDINGS_KEPT_FOR)
-            .unwrap_or(Timestamp::MIN);
+        let ended_before = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
         let dropped = evaluations::dropped_with_datasets(&mut connection, ended_before).await?;
         drop(connection);
@@ -81,9 +82,7 @@ impl Store {
     /// call is completed by the next one.
     #[boxed]
     pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = now
-            .saturating_sub(UNCHECKED_KEPT_FOR)
-            .unwrap_or(Timestamp::MIN);
+        let ended_before = earlier(now, UNCHECKED_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
         let refused = bundles::refused(&mut connection, ended_before).await?;
         drop(connection);

@@ -5,7 +5,10 @@ use crate::{
     boxed,
     error::Result,
     event::Actor,
-    operations::{cleanup::RECORDINGS_KEPT_FOR, runs as run_owners},
+    operations::{
+        cleanup::{RECORDINGS_KEPT_FOR, earlier},
+        runs as run_owners,
+    },
     store::Store,
     tables::{events, runs, shards},
 };
@@ -17,9 +20,7 @@ impl Store {
     /// an episode summary of this format version are left out: the summary is made from the shards.
     #[boxed]
     pub async fn clearable_runs(&self, summary_version: u32, now: Timestamp) -> Result<Vec<RunId>> {
-        let ended_before = now
-            .saturating_sub(RECORDINGS_KEPT_FOR)
-            .unwrap_or(Timestamp::MIN);
+        let ended_before = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
         runs::clearable(&mut connection, summary_version, ended_before).await
     }

@@ -32,11 +32,11 @@ pub(crate) async fn update_deadlines(
         match deadline_at {
             Some(at) if at <= tx.now && keeps_if_past => continue,
             Some(at) if at <= tx.now => {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "the deadline of {}, which is under way, would have been at {at}: give it more time, or \
                      cancel its open evaluations first",
                     day.stage_day.date
-                )));
+                ));
             }
             _ => days::set_deadline(tx, day.stage_day, deadline_at).await?,
         }

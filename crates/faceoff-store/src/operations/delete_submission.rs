@@ -15,10 +15,6 @@ use crate::{
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
 
-fn conflict<T>(reason: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(reason.into()))
-}
-
 /// Refuses to remove evidence against a team, and submissions of a team that an organiser has withdrawn.
 async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
     let reason = match teams::evidence(tx, team).await? {
@@ -34,20 +30,20 @@ async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
             at.strftime("%Y-%m-%d at %H:%M UTC")
         ),
     };
-    conflict(reason)
+    StoreError::conflict(reason)
 }
 
 /// Refuses to remove a bundle that is still needed.
 async fn check_not_needed(tx: &mut Tx, submission: &Submission) -> Result<()> {
     if let Some(deleted) = &submission.deleted {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "it was deleted on {} by {}",
             deleted.deleted_at.strftime("%Y-%m-%d at %H:%M UTC"),
             deleted.actor
         ));
     }
     if let Some(removed) = &submission.bundle_removed {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "its bundle was removed on {} {}: there is nothing left to delete",
             removed.at.strftime("%Y-%m-%d at %H:%M UTC"),
             removed.reason
@@ -56,10 +52,12 @@ async fn check_not_needed(tx: &mut Tx, submission: &Submission) -> Result<()> {
     match submission.state {
         SubmissionState::Valid => {}
         SubmissionState::Validating => {
-            return conflict("its validation run is queued or running: wait for its result");
+            return StoreError::conflict(
+                "its validation run is queued or running: wait for its result",
+            );
         }
         SubmissionState::Invalid { .. } | SubmissionState::ValidationError { .. } => {
-            return conflict(
+            return StoreError::conflict(
                 "it failed its validation run, so the server removes its bundle automatically: there is nothing to delete",
             );
         }
@@ -67,29 +65,29 @@ async fn check_not_needed(tx: &mut Tx, submission: &Submission) -> Result<()> {
     check_no_evidence(tx, submission.team).await?;
     let uses = bundles::uses(tx, submission.id).await?;
     if uses.is_active {
-        return conflict(
+        return StoreError::conflict(
             "it is active and will be evaluated at the next cutoff: choose another one, or withdraw it, first",
         );
     }
     if uses.open > 0 {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "it is being evaluated ({} evaluations or ablations are queued or running): wait for their end",
             uses.open
         ));
     }
     if uses.unreleased > 0 {
-        return conflict(
+        return StoreError::conflict(
             "it was evaluated on a day that is not released, and a rerun may still need it: wait for the release",
         );
     }
     if games::needs_submission(tx, submission.id).await? {
-        return conflict(
+        return StoreError::conflict(
             "it takes part in a tournament that is not closed: until then a game may have to be played again",
         );
     }
     if uses.proposed > 0 {
         // Proposals are visible to organisers only.
-        return conflict(
+        return StoreError::conflict(
             "the organisers still need it for something that is not decided yet: try again later",
         );
     }

@@ -63,9 +63,9 @@ impl Store {
             teams::check_may_compete(tx, team).await?;
             let active = submissions::active(tx).await?;
             let Some(active) = active.into_iter().find(|submission| submission.team == team) else {
-                return Err(StoreError::Conflict(
-                    "the team has no active submission: it has to upload one, or choose one, first".into(),
-                ));
+                return StoreError::conflict(
+                    "the team has no active submission: it has to upload one, or choose one, first",
+                );
             };
             let stage = rules_of_day(tx, stage, stage_day).await?;
             stage
@@ -73,14 +73,14 @@ impl Store {
                 .map_err(|refusal| stage_runtimes::conflict(&refusal))?;
             for evaluation in counting_evaluations::of_day(tx, stage_day, Some(team)).await? {
                 if evaluation.is_open {
-                    return Err(StoreError::Conflict(
-                        "an evaluation of the team on that day is queued or running: cancel it, or wait for its end".into(),
-                    ));
+                    return StoreError::conflict(
+                        "an evaluation of the team on that day is queued or running: cancel it, or wait for its end",
+                    );
                 }
                 if evaluation.counts && !replaces {
-                    return Err(StoreError::Conflict(
-                        "the team has a counting evaluation of that day: an extra evaluation would replace it".into(),
-                    ));
+                    return StoreError::conflict(
+                        "the team has a counting evaluation of that day: an extra evaluation would replace it",
+                    );
                 }
                 if evaluation.counts {
                     let void_reason = format!("replaced by an extra evaluation: {reason}");

@@ -24,10 +24,10 @@ impl Store {
         self.write(actor, now, async |tx| {
             stages::find(tx, stage).await?;
             if let Some(frozen) = freezes::find(tx, stage).await? {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "the boards of the stage are frozen already, since {}",
                     frozen.at
-                )));
+                ));
             }
             let ruling = Ruling {
                 at: now,
@@ -52,9 +52,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             stages::find(tx, stage).await?;
             if freezes::find(tx, stage).await?.is_none() {
-                return Err(StoreError::Conflict(
-                    "the boards of the stage are not frozen".into(),
-                ));
+                return StoreError::conflict("the boards of the stage are not frozen");
             }
             freezes::remove(tx, stage).await?;
             tx.record(Subject::Stage(stage), Event::BoardsUnfrozen);

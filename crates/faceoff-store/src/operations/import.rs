@@ -136,10 +136,7 @@ async fn has_archive_table(connection: &mut SqliteConnection) -> Result<bool> {
 /// read.
 async fn check_schema(connection: &mut SqliteConnection) -> Result<()> {
     let mut reference = SqliteConnection::connect("sqlite::memory:").await?;
-    MIGRATIONS
-        .run(&mut reference)
-        .await
-        .map_err(|error| StoreError::Database(error.into()))?;
+    MIGRATIONS.run(&mut reference).await?;
     let (expected, found) = (schema(&mut reference).await?, schema(connection).await?);
     reference.close().await?;
     match found.symmetric_difference(&expected).next() {

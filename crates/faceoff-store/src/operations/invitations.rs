@@ -129,13 +129,13 @@ pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation
 /// Refuses if the user has not accepted the season's newest terms, or has accepted terms although it has none.
 pub(super) async fn check_terms(tx: &mut Tx, accepted: Option<u32>) -> Result<()> {
     match terms::newest(tx).await? {
-        Some(newest) if accepted != Some(newest) => Err(StoreError::Conflict(format!(
+        Some(newest) if accepted != Some(newest) => StoreError::conflict(format!(
             "accepted_terms: taking part needs consent to version {newest} of the terms (GET /api/v1/terms); got {}",
             accepted.map_or_else(|| "none".to_owned(), |version| format!("{version}"))
-        ))),
-        None if accepted.is_some() => Err(StoreError::Conflict(
-            "accepted_terms: this season has no terms, so leave it out".into(),
         )),
+        None if accepted.is_some() => {
+            StoreError::conflict("accepted_terms: this season has no terms, so leave it out")
+        }
         _ => Ok(()),
     }
 }
@@ -166,10 +166,9 @@ pub(super) async fn add_team(
 
 async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) -> Result<UserId> {
     let Some(name) = request.name.clone() else {
-        return Err(StoreError::Conflict(
-            "name: expected the name that the user is shown with and signs in with; got none"
-                .into(),
-        ));
+        return StoreError::conflict(
+            "name: expected the name that the user is shown with and signs in with; got none",
+        );
     };
     check_terms(tx, request.accepted_terms).await?;
     let user = User {
@@ -191,10 +190,10 @@ async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) 
 async fn restore_access(tx: &mut Tx, id: UserId, request: &JoinRequest) -> Result<()> {
     let user = users::find(tx, id).await?;
     if request.name.as_ref().is_some_and(|name| *name != user.name) {
-        return Err(StoreError::Conflict(format!(
+        return StoreError::conflict(format!(
             "name: the link belongs to {}; leave the name out",
             user.name
-        )));
+        ));
     }
     if user.left_at.is_some() {
         return invalid_invitation(format!("{} has left", user.name));
@@ -226,11 +225,11 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
     };
     let is_founder = invitation.role == InvitationRole::Founder;
     if is_founder != request.team.is_some() {
-        return Err(StoreError::Conflict(if is_founder {
-            "team: the link is for the founder of a team; expected the team's name".into()
+        return StoreError::conflict(if is_founder {
+            "team: the link is for the founder of a team; expected the team's name"
         } else {
-            "team: the link is not for the founder of a team; leave it out".into()
-        }));
+            "team: the link is not for the founder of a team; leave it out"
+        });
     }
     let user = match invitation.role {
         InvitationRole::Organiser => add_user(tx, &mut request, None).await?,
@@ -304,28 +303,28 @@ impl Store {
     ) -> Result<Invitation> {
         self.write(actor, now, async |tx| {
             if new.expires_at <= now {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "expires_at: expected a time in the future, got {}",
                     new.expires_at
-                )));
+                ));
             }
             match new.role {
                 InvitationRole::Member(team) => {
                     teams::find(tx, team).await?;
                     if invitations::count_open(tx, team, now).await? >= MAX_OPEN_INVITATIONS {
-                        return Err(StoreError::Conflict(format!(
+                        return StoreError::conflict(format!(
                             "the team has {MAX_OPEN_INVITATIONS} open invitations, which is the limit: revoke one that \
                              is not needed (DELETE /api/v1/invitations/ID)"
-                        )));
+                        ));
                     }
                 }
                 InvitationRole::PasswordReset(user) => {
                     let user = users::find(tx, user).await?;
                     if user.left_at.is_some() {
-                        return Err(StoreError::Conflict(format!(
+                        return StoreError::conflict(format!(
                             "{} has left; create a new invitation, for another name",
                             user.name
-                        )));
+                        ));
                     }
                 }
                 InvitationRole::Organiser | InvitationRole::Founder => {}
@@ -347,10 +346,9 @@ impl Store {
             let invitation = invitations::find(tx, id).await?;
             match invitation.state {
                 InvitationState::Accepted { .. } => {
-                    return Err(StoreError::Conflict(
-                        "the invitation was accepted; remove the user with DELETE /api/v1/people/ID"
-                            .into(),
-                    ));
+                    return StoreError::conflict(
+                        "the invitation was accepted; remove the user with DELETE /api/v1/people/ID",
+                    );
                 }
                 InvitationState::Revoked { .. } => {}
                 InvitationState::Open => {

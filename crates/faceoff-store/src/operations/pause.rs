@@ -17,7 +17,7 @@ impl Store {
     pub async fn pause_queue(&self, actor: Actor, reason: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if season::is_paused(tx).await? {
-                return Err(StoreError::Conflict("the queue is paused already".into()));
+                return StoreError::conflict("the queue is paused already");
             }
             let ruling = Ruling {
                 at: now,
@@ -36,7 +36,7 @@ impl Store {
     pub async fn resume_queue(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if !season::is_paused(tx).await? {
-                return Err(StoreError::Conflict("the queue is not paused".into()));
+                return StoreError::conflict("the queue is not paused");
             }
             season::set_paused(tx, None).await?;
             tx.record(Subject::Season, Event::QueueResumed);

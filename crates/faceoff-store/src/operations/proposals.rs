@@ -51,10 +51,6 @@ struct ProposedRun {
     plan: RunPlan,
 }
 
-fn conflict<T>(reason: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(reason.into()))
-}
-
 /// Adds a proposal and queues its evaluations, behind everything that counts.
 async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRun>) -> Result<()> {
     proposals::insert(tx, proposal).await?;
@@ -149,7 +145,7 @@ impl Store {
             season::check_open(tx).await?;
             let stage = stages::find(tx, stage).await?;
             if stage.phase(now) == StagePhase::Closed {
-                return conflict("the stage has closed: no trial can start");
+                return StoreError::conflict("the stage has closed: no trial can start");
             }
             let active = match submission {
                 None => {
@@ -160,7 +156,7 @@ impl Store {
                 Some(id) => vec![submissions::find(tx, id).await?],
             };
             if active.is_empty() {
-                return conflict(
+                return StoreError::conflict(
                     "no team has a valid submission that the stage accepts, so there is nothing to try",
                 );
             }
@@ -168,7 +164,7 @@ impl Store {
                 .iter()
                 .any(|submission| submission.state != submissions::SubmissionState::Valid)
             {
-                return conflict("only a valid submission can be tried");
+                return StoreError::conflict("only a valid submission can be tried");
             }
             for submission in &active {
                 stage
@@ -219,7 +215,7 @@ impl Store {
             sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
             let stage = stages::find(tx, stage_day.stage).await?;
             if days::find(tx, stage_day).await?.released_at.is_none() {
-                return conflict(format!(
+                return StoreError::conflict(format!(
                     "{} is not released yet: a re-evaluation is possible once it is",
                     stage_day.date
                 ));
@@ -240,7 +236,7 @@ impl Store {
             };
             let proposed = runs_to_repeat(tx, &counting, newest).await?;
             let Some(revision) = proposed.iter().map(|(revision, _)| *revision).max() else {
-                return conflict(if newest.is_some() && !counting.is_empty() {
+                return StoreError::conflict(if newest.is_some() && !counting.is_empty() {
                     "there is nothing to re-evaluate: the counting results of that day have the stage's newest rules, or their submissions were deleted or are not accepted by these rules"
                 } else {
                     "there is nothing to re-evaluate: no result counts, or the bundles were removed; `rerun` repeats what was voided or cancelled"
@@ -284,16 +280,18 @@ impl Store {
             let proposal = find_undecided(tx, id).await?;
             sign_offs::check_not_signed_off(tx, proposal.stage).await?;
             let Some(date) = proposal.kind.day() else {
-                return conflict("a trial cannot be applied, since it had episodes of its own; it can be dropped");
+                return StoreError::conflict(
+                    "a trial cannot be applied, since it had episodes of its own; it can be dropped",
+                );
             };
             let open = evaluations::count_open_proposed(tx, Some(id)).await?;
             if open > 0 {
-                return conflict(format!(
+                return StoreError::conflict(format!(
                     "{open} of its evaluations are queued or running: wait for their end"
                 ));
             }
             if let Some(frozen) = freezes::find(tx, proposal.stage).await? {
-                return conflict(format!(
+                return StoreError::conflict(format!(
                     "the boards of the stage are frozen since {}: unfreeze them first",
                     frozen.at
                 ));
@@ -341,8 +339,12 @@ async fn find_undecided(tx: &mut Tx, id: ProposalId) -> Result<Proposal> {
     let proposal = proposals::find(tx, id).await?;
     match proposal.outcome {
         None => Ok(proposal),
-        Some(ProposalOutcome::Applied(at)) => conflict(format!("the proposal was applied at {at}")),
-        Some(ProposalOutcome::Dropped(at)) => conflict(format!("the proposal was dropped at {at}")),
+        Some(ProposalOutcome::Applied(at)) => {
+            StoreError::conflict(format!("the proposal was applied at {at}"))
+        }
+        Some(ProposalOutcome::Dropped(at)) => {
+            StoreError::conflict(format!("the proposal was dropped at {at}"))
+        }
     }
 }
 
@@ -374,7 +376,7 @@ async fn apply_evaluation(
             .iter()
             .any(|evaluation| evaluation.id == replaced && evaluation.counts)
         {
-            return conflict(format!(
+            return StoreError::conflict(format!(
                 "the evaluation {replaced}, which would be replaced, does not count any more: drop the proposal and create another"
             ));
         }

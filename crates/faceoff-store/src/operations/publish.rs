@@ -28,17 +28,16 @@ impl Store {
         self.write(actor, now, async |tx| {
             let evaluation = queries::evaluations::find(tx, id).await?;
             let stage = stages::find(tx, evaluation.stage_day.stage).await?;
-            let conflict = |reason: &str| Err(StoreError::Conflict(reason.to_owned()));
             if !matches!(evaluation.state, EvaluationState::Finished { .. }) {
-                return conflict("only a finished evaluation has a dataset to publish");
+                return StoreError::conflict("only a finished evaluation has a dataset to publish");
             }
             if stage.settings.blind {
-                return conflict(
+                return StoreError::conflict(
                     "the stage is blind: no dataset is published before the organiser opens it",
                 );
             }
             if evaluation.released_at.is_none() {
-                return conflict(
+                return StoreError::conflict(
                     "other evaluations of the day are still running the same episodes: the dataset can be published \
                      once the day is released",
                 );

@@ -39,12 +39,12 @@ async fn find_pending(tx: &mut Tx, id: RegistrationId) -> Result<Registration> {
     let registration = registrations::find(tx, id).await?;
     match registration.state {
         RegistrationState::Pending => Ok(registration),
-        RegistrationState::Approved { at, .. } => Err(StoreError::Conflict(format!(
-            "the registration was approved at {at}"
-        ))),
-        RegistrationState::Refused { at, .. } => Err(StoreError::Conflict(format!(
+        RegistrationState::Approved { at, .. } => {
+            StoreError::conflict(format!("the registration was approved at {at}"))
+        }
+        RegistrationState::Refused { at, .. } => StoreError::conflict(format!(
             "the registration was refused at {at}; the team may register again"
-        ))),
+        )),
     }
 }
 
@@ -57,14 +57,14 @@ impl Store {
         self.write(Actor::Visitor, now, async |tx| {
             season::check_open(tx).await?;
             if !season::read(tx).await?.registration_open {
-                return Err(StoreError::Conflict(
-                    "registration is closed: teams join by invitation; ask the organisers for one".into(),
-                ));
+                return StoreError::conflict(
+                    "registration is closed: teams join by invitation; ask the organisers for one",
+                );
             }
             if registrations::count_pending(tx).await? >= MAX_PENDING_REGISTRATIONS {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "{MAX_PENDING_REGISTRATIONS} registrations are pending, which is the limit: try again later"
-                )));
+                ));
             }
             check_terms(tx, new.accepted_terms).await?;
             let division = match &new.profile.division {
@@ -207,9 +207,7 @@ async fn set_divisions(tx: &mut Tx, names: &[DivisionName]) -> Result<()> {
             .iter()
             .any(|other| lowercase(other) == lowercase(name));
         if is_repeated {
-            return Err(StoreError::Conflict(format!(
-                "divisions: “{name}” is listed twice"
-            )));
+            return StoreError::conflict(format!("divisions: “{name}” is listed twice"));
         }
     }
     let divisions_before = divisions::all(tx).await?;
@@ -222,9 +220,9 @@ async fn set_divisions(tx: &mut Tx, names: &[DivisionName]) -> Result<()> {
         }
         let teams = divisions::teams_in(tx, removed).await?;
         if teams > 0 {
-            return Err(StoreError::Conflict(format!(
+            return StoreError::conflict(format!(
                 "divisions: “{removed}” has {teams} teams; move them to another one first (PATCH /api/v1/teams/ID)"
-            )));
+            ));
         }
         divisions::remove(tx, removed).await?;
     }

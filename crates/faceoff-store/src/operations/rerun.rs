@@ -80,11 +80,10 @@ impl Store {
                     | EvaluationState::NotPlayed { .. }
             );
             if !ended_without_result && evaluation.voided.is_none() {
-                return Err(StoreError::Conflict(
+                return StoreError::conflict(
                     "only an evaluation that was cancelled or voided, was not run in time, or failed because of a \
-                     platform fault can be rerun"
-                        .into(),
-                ));
+                     platform fault can be rerun",
+                );
             }
             let entry = entries::find(tx, id).await?;
             sign_offs::check_not_signed_off(tx, entry.stage_day.stage).await?;

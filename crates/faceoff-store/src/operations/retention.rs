@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::cleanup::RECORDINGS_KEPT_FOR,
+    operations::cleanup::{RECORDINGS_KEPT_FOR, earlier},
     store::Store,
     tables::{
         bundles, days,
@@ -253,7 +253,7 @@ impl Store {
     /// request. Evidence is kept. Returns the number of deleted files.
     #[boxed]
     pub async fn remove_files_of_removed(&self, now: Timestamp) -> Result<usize> {
-        let removed_before = now.saturating_sub(FILES_KEPT_FOR).unwrap_or(Timestamp::MIN);
+        let removed_before = earlier(now, FILES_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
         let datasets = retentions::deletable_datasets(&mut connection, removed_before).await?;
         let bundles = bundles::deletable(&mut connection, removed_before).await?;

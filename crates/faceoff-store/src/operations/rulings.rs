@@ -72,11 +72,10 @@ impl Store {
             sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
             let counting = counting_evaluations::of_day(tx, stage_day, None).await?;
             if !counting.iter().any(|evaluation| evaluation.id == id && evaluation.counts) {
-                return Err(StoreError::Conflict(
+                return StoreError::conflict(
                     "only a counting evaluation that is finished, or that its agent failed, can be voided; \
-                     one that is queued or running can be cancelled"
-                        .into(),
-                ));
+                     one that is queued or running can be cancelled",
+                );
             }
             void(tx, id, reason).await?;
             queries::evaluations::find(tx, id).await
@@ -113,9 +112,7 @@ impl Store {
                 count += 1;
             }
             if count == 0 {
-                return Err(StoreError::Conflict(
-                    "no evaluation of that day counts".into(),
-                ));
+                return StoreError::conflict("no evaluation of that day counts");
             }
             let reason = reason.to_owned();
             tx.record(Subject::Day(stage_day), Event::DayVoided { reason });
@@ -136,9 +133,7 @@ impl Store {
     ) -> Result<Team> {
         self.write(actor, now, async |tx| {
             if teams::find(tx, id).await?.disqualified.is_some() {
-                return Err(StoreError::Conflict(
-                    "the team is disqualified already".into(),
-                ));
+                return StoreError::conflict("the team is disqualified already");
             }
             let ruling = Ruling {
                 at: now,
@@ -170,7 +165,7 @@ impl Store {
     ) -> Result<Team> {
         self.write(actor, now, async |tx| {
             if teams::find(tx, id).await?.disqualified.is_none() {
-                return Err(StoreError::Conflict("the team is not disqualified".into()));
+                return StoreError::conflict("the team is not disqualified");
             }
             teams::set_disqualified(tx, id, None).await?;
             let reason = reason.to_owned();

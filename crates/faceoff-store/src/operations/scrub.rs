@@ -241,9 +241,9 @@ async fn check_summarised(connection: &mut SqliteConnection, version: u32) -> Re
     .fetch_one(connection)
     .await?;
     if unsummarised > 0 {
-        return Err(StoreError::Conflict(format!(
+        return StoreError::conflict(format!(
             "{unsummarised} results came in while the season was copied, and their episode summaries are not stored yet: try again"
-        )));
+        ));
     }
     Ok(())
 }

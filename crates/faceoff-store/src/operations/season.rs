@@ -59,32 +59,32 @@ impl Store {
             let open_evaluations = evaluations::count_open(tx, None).await?;
             let open_proposed = evaluations::count_open_proposed(tx, None).await?;
             if open_proposed > 0 {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "{open_proposed} evaluations of trials and proposed re-evaluations are queued or running: wait until they \
                      are over, or drop them"
-                )));
+                ));
             }
             let open_games = games::count_open(tx).await?;
             if open_games > 0 {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "{open_games} games are queued or running, and closing the season publishes their seeds: wait until they \
                      are over, or cancel them"
-                )));
+                ));
             }
             let tournaments = tournaments::all(tx).await?;
             if let Some(open) = tournaments
                 .iter()
                 .find(|tournament| tournament.closed_at.is_none()) {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "the tournament {:?} is not closed, and a closed season has no games: close it first",
                     open.name.as_str()
-                )));
+                ));
             }
             if open_evaluations > 0 {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "{open_evaluations} evaluations are queued or running, and closing the season publishes \
                      their seeds: wait until they are over, or cancel them"
-                )));
+                ));
             }
             for stage in stages::all(tx).await? {
                 let obstacle = if stage.settings.blind {
@@ -95,10 +95,10 @@ impl Store {
                 } else {
                     continue;
                 };
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "the stage {:?} {obstacle}",
                     stage.name.as_str()
-                )));
+                ));
             }
             season::close(tx, now).await?;
             tx.record(Subject::Season, Event::SeasonClosed);

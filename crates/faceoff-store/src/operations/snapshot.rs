@@ -63,10 +63,9 @@ impl Store {
             && archived.edition == Edition::Public
             && edition == Edition::Organiser
         {
-            return Err(StoreError::Conflict(
-                "this is a season's public archive, which has no data for organisers only: ask for the public edition"
-                    .into(),
-            ));
+            return StoreError::conflict(
+                "this is a season's public archive, which has no data for organisers only: ask for the public edition",
+            );
         }
         let file = folder.join("snapshot.sqlite3");
         copy(&self.database.file, &file).await?;

@@ -17,10 +17,6 @@ use crate::{
 use faceoff_types::{CountingResult, StageId};
 use jiff::Timestamp;
 
-fn conflict<T>(reason: String) -> Result<T> {
-    Err(StoreError::Conflict(reason))
-}
-
 /// Refuses a step that requires a closed stage; `requirement` is the rule that the error quotes.
 fn check_closed(stage: &Stage, now: Timestamp, requirement: &str) -> Result<()> {
     if stage.phase(now) == StagePhase::Closed {
@@ -30,7 +26,7 @@ fn check_closed(stage: &Stage, now: Timestamp, requirement: &str) -> Result<()> 
         Some(at) => format!("it closes on {}", at.strftime("%Y-%m-%d at %H:%M:%S UTC")),
         None => "it has no end yet: give it one".to_owned(),
     };
-    conflict(format!(
+    StoreError::conflict(format!(
         "the stage {:?} has not closed, and {requirement}; {closing_time}",
         stage.name.as_str()
     ))
@@ -53,20 +49,20 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
     }
     let open_evaluations = sign_offs::count_open(tx, stage.id).await?;
     if open_evaluations > 0 {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "{open_evaluations} evaluations of the stage {:?} are queued or running: wait until they are over, or \
              cancel them",
             stage.name.as_str()
         ));
     }
     if stage.settings.blind {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "the stage {:?} is blind, so no team could check its results: open it first",
             stage.name.as_str()
         ));
     }
     if let Some(frozen) = freezes::find(tx, stage.id).await? {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "the boards of the stage {:?} are frozen since {}: unfreeze them first",
             stage.name.as_str(),
             frozen.at
@@ -77,13 +73,13 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
         proposals.filter(|proposal| proposal.stage == stage.id && proposal.outcome.is_none());
     let proposals = proposals.count();
     if proposals > 0 {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "{proposals} trials or proposed re-evaluations of the stage {:?} are pending: apply or drop them first",
             stage.name.as_str()
         ));
     }
     if is_final_day_pending(tx, stage).await? {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "the stage {:?} is decided by its final day, which has not been evaluated: start it first",
             stage.name.as_str()
         ));
@@ -138,7 +134,7 @@ impl Store {
             let stage = stages::find(tx, id).await?;
             sign_offs::check_not_signed_off(tx, id).await?;
             if stage.settings.standings != CountingResult::Final {
-                return conflict(format!(
+                return StoreError::conflict(format!(
                     "the standings of the stage {:?} are “{}”, so it has no final day; only one whose standings are \
                      “final” has",
                     stage.name.as_str(),
@@ -147,7 +143,7 @@ impl Store {
             }
             check_closed(&stage, now, "its final day comes after that")?;
             if let Some(cutoff_at) = sign_offs::final_cutoff(tx, id).await? {
-                return conflict(format!(
+                return StoreError::conflict(format!(
                     "the final day of the stage {:?} had its cutoff at {cutoff_at}; a stage has only one",
                     stage.name.as_str()
                 ));

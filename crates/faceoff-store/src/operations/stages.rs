@@ -69,10 +69,6 @@ impl StageChange {
 /// The name of a season's first stage.
 const FIRST_STAGE_NAME: &str = "Qualifying";
 
-fn conflict<T>(reason: String) -> Result<T> {
-    Err(StoreError::Conflict(reason))
-}
-
 /// Truncated to milliseconds, the resolution of the database.
 fn truncate(instant: Timestamp) -> Timestamp {
     Timestamp::from_millisecond(instant.as_millisecond()).unwrap_or(instant)
@@ -80,10 +76,10 @@ fn truncate(instant: Timestamp) -> Timestamp {
 
 fn check_times(opens_at: Timestamp, closes_at: Option<Timestamp>, now: Timestamp) -> Result<()> {
     match closes_at {
-        Some(at) if at <= opens_at => conflict(format!(
+        Some(at) if at <= opens_at => StoreError::conflict(format!(
             "closes_at: expected a time after the opening at {opens_at}, got {at}"
         )),
-        Some(at) if at <= now => conflict(format!(
+        Some(at) if at <= now => StoreError::conflict(format!(
             "closes_at: expected a time in the future, got {at}; the past cannot be changed"
         )),
         _ => Ok(()),
@@ -153,7 +149,7 @@ async fn change(
     let increases_visibility =
         rules == stage.rules.rules && only_increases_visibility(stage, &changed);
     if phase == StagePhase::Closed && !increases_visibility {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "the stage {:?} closed at {}, and a closed stage cannot be changed, except to open a blind one or to publish \
              datasets earlier. Create another stage",
             stage.name.as_str(),
@@ -162,7 +158,7 @@ async fn change(
     }
     if changed.opens_at != stage.opens_at && (phase == StagePhase::Open || changed.opens_at <= now)
     {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "opens_at: the stage {} at {}; the opening can be moved only before it has passed, and only to a time in the \
              future",
             if phase == StagePhase::Open {
@@ -177,7 +173,7 @@ async fn change(
         check_times(changed.opens_at, changed.closes_at, now)?;
     }
     if changed.zone != stage.zone && days::newest(tx, stage.id).await?.is_some() {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "zone: the stage already has days, named by their date in {}; create another stage",
             stage.zone
         ));
@@ -185,7 +181,7 @@ async fn change(
     if changed.settings.blind && !stage.settings.blind {
         let scored = sign_offs::count_scored(tx, stage.id).await?;
         if scored > 0 {
-            return conflict(format!(
+            return StoreError::conflict(format!(
                 "blind: {scored} evaluations of the stage {:?} have a score that was visible; a stage can be made blind \
                  only before its first score",
                 stage.name.as_str()

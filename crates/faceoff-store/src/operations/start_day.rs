@@ -57,16 +57,16 @@ async fn insert_day(tx: &mut Tx, stage: &Stage, cutoff: CutoffDate<'_>) -> Resul
         CutoffDate::Missed { date, reason } => {
             let first = stage.zone.date(stage.opens_at);
             if date >= today.date {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "day: {date} has not passed in the stage's zone, where it is {} now; only a missed day can be \
                      started late",
                     today.date
-                )));
+                ));
             }
             if date < first {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "day: {date} is before the stage's first day, {first}"
-                )));
+                ));
             }
             let stage_day = StageDay { date, ..today };
             days::insert_missed(tx, stage_day, stage.deadline(date, now), reason, now).await?;

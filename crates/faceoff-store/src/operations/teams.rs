@@ -121,10 +121,10 @@ impl Store {
             }
             if let Some(baseline) = change.baseline.filter(|new| *new != team.is_baseline) {
                 if let Some(stage) = teams::signed_off_stage(tx, id).await? {
-                    return Err(StoreError::Conflict(format!(
+                    return StoreError::conflict(format!(
                         "the stage {stage:?} is signed off with results of the team, and its ranks would change: whether \
                          the team is a baseline cannot be changed any more. Nothing was changed"
-                    )));
+                    ));
                 }
                 teams::set_baseline(tx, id, baseline).await?;
                 let event = if baseline {
@@ -151,7 +151,7 @@ impl Store {
                 _ => false,
             };
             if teams::find(tx, id).await?.retired_at.is_some() {
-                return Err(StoreError::Conflict("the team has retired already".into()));
+                return StoreError::conflict("the team has retired already");
             }
             teams::set_retired(tx, id, Some(now), is_by_organiser).await?;
             tx.record(Subject::Team(id), Event::TeamRetired);
@@ -165,7 +165,7 @@ impl Store {
     pub async fn return_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor, now, async |tx| {
             if teams::find(tx, id).await?.retired_at.is_none() {
-                return Err(StoreError::Conflict("the team has not retired".into()));
+                return StoreError::conflict("the team has not retired");
             }
             teams::set_retired(tx, id, None, false).await?;
             tx.record(Subject::Team(id), Event::TeamReturned);

@@ -71,16 +71,16 @@ const fn subject(owner: TokenOwner) -> Subject {
 pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
     let now = tx.now;
     if tokens::count_valid(tx, new.owner, now).await? >= MAX_TOKENS {
-        return Err(StoreError::Conflict(format!(
+        return StoreError::conflict(format!(
             "there are {MAX_TOKENS} tokens already, which is the limit: revoke one that is not needed \
              (DELETE /api/v1/tokens/ID)"
-        )));
+        ));
     }
     if new.expires_at.is_some_and(|at| at <= now) {
-        return Err(StoreError::Conflict(format!(
+        return StoreError::conflict(format!(
             "expires_at: expected a time in the future, got {}",
             new.expires_at.unwrap_or(now)
-        )));
+        ));
     }
     let token = Token {
         id: TokenId::new(),
@@ -240,22 +240,20 @@ impl Store {
         self.write(actor, now, async |tx| {
             let token = tokens::find(tx, id).await?;
             if token.kind == TokenKind::Session {
-                return Err(StoreError::Conflict(
-                    "a session has no secret that could be rotated: end it, or sign in again"
-                        .into(),
-                ));
+                return StoreError::conflict(
+                    "a session has no secret that could be rotated: end it, or sign in again",
+                );
             }
             if token.owner == TokenOwner::Host && token.name == HOST_TOKEN_NAME {
-                return Err(StoreError::Conflict(
+                return StoreError::conflict(
                     "the host's token is a file in the server's data folder (admin-token), which would keep the old one: \
-                     revoke it, and the server writes a new one at its next start"
-                        .into(),
-                ));
+                     revoke it, and the server writes a new one at its next start",
+                );
             }
             if !token.is_valid(now) {
-                return Err(StoreError::Conflict(
-                    "the token is revoked or has expired, which is final: create another one".into(),
-                ));
+                return StoreError::conflict(
+                    "the token is revoked or has expired, which is final: create another one",
+                );
             }
             tokens::set_hash(tx, id, hash).await?;
             let name = token.name;

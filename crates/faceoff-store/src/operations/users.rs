@@ -67,14 +67,14 @@ impl Store {
         self.write(actor, now, async |tx| {
             let user = users::find(tx, id).await?;
             if user.left_at.is_some() {
-                return Err(StoreError::Conflict(format!("{} has left", user.name)));
+                return StoreError::conflict(format!("{} has left", user.name));
             }
             let is_last = user.team.is_none() && users::count_organisers(tx).await? == 1;
             if is_last && tokens::count_valid(tx, TokenOwner::Host, now).await? == 0 {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "{} is the last who can organise: invite another organiser first",
                     user.name
-                )));
+                ));
             }
             users::set_left(tx, id, now).await?;
             revoke_all(tx, TokenOwner::User(id), None).await?;
@@ -98,9 +98,9 @@ impl Store {
         self.write(actor, now, async |tx| {
             let newest = terms::all(tx).await?.into_iter().next();
             if newest.as_ref().is_some_and(|newest| newest.text == text) {
-                return Err(StoreError::Conflict(
-                    "the terms are the same as the current ones; nothing was changed".into(),
-                ));
+                return StoreError::conflict(
+                    "the terms are the same as the current ones; nothing was changed",
+                );
             }
             let new = Terms {
                 version: newest.map_or(0, |newest| newest.version) + 1,
@@ -128,11 +128,11 @@ impl Store {
             match terms::newest(tx).await? {
                 Some(newest) if newest == version => {}
                 Some(newest) => {
-                    return Err(StoreError::Conflict(format!(
+                    return StoreError::conflict(format!(
                         "version: expected {newest}, the newest of the terms, got {version}"
-                    )));
+                    ));
                 }
-                None => return Err(StoreError::Conflict("this season has no terms".into())),
+                None => return StoreError::conflict("this season has no terms"),
             }
             let user = users::find(tx, id).await?;
             if user.accepted_terms != Some(version) {

@@ -4,6 +4,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
+    operations::cleanup::earlier,
     store::Store,
     tables::{
         deliveries::{self, Delivery, DeliveryAttempt, DeliveryState},
@@ -153,10 +154,10 @@ impl Store {
                 None => MAX_ORGANISER_WEBHOOKS,
             };
             if webhooks::count(tx, new.team).await? >= limit {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "there are {limit} webhooks already, which is the limit: remove one (DELETE \
                      /api/v1/webhooks/ID)"
-                )));
+                ));
             }
             let webhook = Webhook {
                 id: WebhookId::new(),
@@ -315,12 +316,12 @@ impl Store {
         self.write(Actor::Server, now, async |tx| {
             let webhook = webhooks::find(tx, id).await?;
             if let Some(disabled) = webhook.disabled {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "the webhook is disabled since {} ({}): enable it first (PATCH /api/v1/webhooks/ID with \
                      {{\"state\":\"alive\"}})",
                     disabled.at.strftime("%Y-%m-%d %H:%M UTC"),
                     disabled.reason
-                )));
+                ));
             }
             let newest = deliveries::of_webhook(tx, id, MAX_PENDING_DELIVERIES).await?;
             // Only test messages have no event.
@@ -328,9 +329,9 @@ impl Store {
                 delivery.event.is_none() && matches!(delivery.state, DeliveryState::Pending { .. })
             });
             if is_pending {
-                return Err(StoreError::Conflict(
-                    "a test message is pending already: GET /api/v1/webhooks/ID/deliveries shows its result".into(),
-                ));
+                return StoreError::conflict(
+                    "a test message is pending already: GET /api/v1/webhooks/ID/deliveries shows its result",
+                );
             }
             let delivery = new_delivery(id, None, kind.to_owned(), body.to_owned(), now);
             deliveries::insert(tx, &delivery).await?;
@@ -429,9 +430,7 @@ impl Store {
     /// Deletes deliveries that ended at least [`DELIVERIES_KEPT_FOR`] ago. Returns the number of deliveries.
     #[boxed]
     pub async fn delete_old_deliveries(&self, now: Timestamp) -> Result<u64> {
-        let ended_before = now
-            .saturating_sub(DELIVERIES_KEPT_FOR)
-            .unwrap_or(Timestamp::MIN);
+        let ended_before = earlier(now, DELIVERIES_KEPT_FOR);
         self.write(Actor::Server, now, async |tx| {
             deliveries::delete_ended(tx, ended_before).await
         })

@@ -28,14 +28,14 @@ impl Store {
             season::check_open(tx).await?;
             let submission = submissions::find(tx, id).await?;
             if submission.withdrawn_at.is_some() {
-                return Err(StoreError::Conflict("it is withdrawn already".into()));
+                return StoreError::conflict("it is withdrawn already");
             }
             match submission.state {
                 SubmissionState::Valid | SubmissionState::Validating => {}
                 SubmissionState::Invalid { .. } | SubmissionState::ValidationError { .. } => {
-                    return Err(StoreError::Conflict(
-                        "it is not valid and never evaluated: there is nothing to withdraw".into(),
-                    ));
+                    return StoreError::conflict(
+                        "it is not valid and never evaluated: there is nothing to withdraw",
+                    );
                 }
             }
             submissions::set_withdrawn(tx, id, Some(now)).await?;

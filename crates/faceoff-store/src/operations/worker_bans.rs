@@ -38,9 +38,7 @@ impl Store {
         let discarded = self
             .write(actor, now, async |tx| {
                 if !worker_bans::insert(tx, &ban).await? {
-                    return Err(StoreError::Conflict(format!(
-                        "the worker {worker} is banned already"
-                    )));
+                    return StoreError::conflict(format!("the worker {worker} is banned already"));
                 }
                 // Results of these jobs that are not accepted yet are refused from now on.
                 requeue_leases_of(tx, &holder).await?;
@@ -78,9 +76,7 @@ impl Store {
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
             if !worker_bans::delete(tx, worker.as_str()).await? {
-                return Err(StoreError::Conflict(format!(
-                    "the worker {worker} is not banned"
-                )));
+                return StoreError::conflict(format!("the worker {worker} is not banned"));
             }
             let worker = worker.to_string();
             tx.record(Subject::Season, Event::WorkerReadmitted { worker });

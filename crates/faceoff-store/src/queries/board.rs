@@ -128,15 +128,13 @@ impl Store {
     /// As [`board_revision`](Self::board_revision), of the evaluations within the time limits of `scope`.
     #[boxed]
     pub async fn board_revision_within(&self, stage: &Stage, scope: &BoardScope) -> Result<u32> {
-        let (id, finished_until) = (stage.id, scope.finished_until.map(Instant));
-        let last_day = scope.last_day.map(Text);
         let newest = sqlx::query_scalar!(
             r#"SELECT MAX(revision) AS "revision: u32" FROM counting_evaluations
                WHERE stage_id = ?1 AND state = 'finished' AND voided_at IS NULL
                  AND (?2 IS NULL OR finished_at <= ?2) AND (?3 IS NULL OR day <= ?3)"#,
-            id,
-            finished_until,
-            last_day,
+            stage.id,
+            scope.finished_until.map(Instant),
+            scope.last_day.map(Text),
         );
         let newest = newest
             .fetch_one(&mut *self.database.read.acquire().await?)
@@ -153,8 +151,6 @@ impl Store {
         revision: u32,
         scope: &BoardScope,
     ) -> Result<Vec<Date>> {
-        let finished_until = scope.finished_until.map(Instant);
-        let last_day = scope.last_day.map(Text);
         let days = sqlx::query_scalar!(
             r#"SELECT DISTINCT day AS "day!" FROM counting_evaluations
              WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
@@ -162,8 +158,8 @@ impl Store {
              ORDER BY day"#,
             stage,
             revision,
-            finished_until,
-            last_day,
+            scope.finished_until.map(Instant),
+            scope.last_day.map(Text),
         );
         let days = days
             .fetch_all(&mut *self.database.read.acquire().await?)
@@ -188,9 +184,6 @@ impl Store {
         revision: u32,
         scope: &BoardScope,
     ) -> Result<Vec<BoardRecord>> {
-        let finished_until = scope.finished_until.map(Instant);
-        let excluded = Json(&scope.excluded);
-        let last_day = scope.last_day.map(Text);
         let rows = select_board!(
             "/* board */ ",
             "FROM teams t
@@ -210,9 +203,9 @@ impl Store {
              ORDER BY t.name",
             stage,
             revision,
-            finished_until,
-            excluded,
-            last_day,
+            scope.finished_until.map(Instant),
+            Json(&scope.excluded),
+            scope.last_day.map(Text),
         );
         let rows = rows
             .fetch_all(&mut *self.database.read.acquire().await?)

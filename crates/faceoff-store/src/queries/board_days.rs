@@ -38,9 +38,6 @@ impl Store {
         days: BoardDays,
         scope: &BoardScope,
     ) -> Result<Vec<BoardRecord>> {
-        let finished_until = scope.finished_until.map(Instant);
-        let excluded = Json(&scope.excluded);
-        let last_day = scope.last_day.map(Text);
         let (max_days, only_final_day) = match days {
             BoardDays::All => (u32::MAX, false),
             BoardDays::Last(days) => (days, false),
@@ -67,9 +64,9 @@ impl Store {
             revision,
             max_days,
             only_final_day,
-            finished_until,
-            excluded,
-            last_day,
+            scope.finished_until.map(Instant),
+            Json(&scope.excluded),
+            scope.last_day.map(Text),
         );
         let rows = rows
             .fetch_all(&mut *self.database.read.acquire().await?)

@@ -13,12 +13,11 @@ pub(crate) async fn of_runs(
     if runs.is_empty() {
         return Ok(HashMap::new());
     }
-    let runs = Json(runs);
     let rows = sqlx::query!(
         r#"SELECT s.run_id AS run, SUM(j.progress) AS "episodes_done!: u32"
            FROM shards s JOIN jobs j ON j.id = s.job_id
            WHERE s.run_id IN (SELECT value FROM json_each(?)) GROUP BY s.run_id"#,
-        runs,
+        Json(runs),
     )
     .fetch_all(connection)
     .await?;

@@ -361,32 +361,25 @@ fn positions(
     let (mut last_submission, mut last_evaluation, mut last_game) = (0, 0, 0);
     for (target, end) in by_end {
         let expected_at = expected_at(end);
+        let next_position = |last: &mut u32, total| {
+            *last += 1;
+            QueuePosition {
+                position: *last,
+                total,
+                expected_at,
+            }
+        };
         match target {
             GroupTarget::Submission(id) => {
-                last_submission += 1;
-                let position = QueuePosition {
-                    position: last_submission,
-                    total: submissions,
-                    expected_at,
-                };
+                let position = next_position(&mut last_submission, submissions);
                 forecast.submissions.insert(*id, position);
             }
             GroupTarget::Evaluation(id) => {
-                last_evaluation += 1;
-                let position = QueuePosition {
-                    position: last_evaluation,
-                    total: evaluations,
-                    expected_at,
-                };
+                let position = next_position(&mut last_evaluation, evaluations);
                 forecast.evaluations.insert(*id, position);
             }
             GroupTarget::Game(id) => {
-                last_game += 1;
-                let position = QueuePosition {
-                    position: last_game,
-                    total: games,
-                    expected_at,
-                };
+                let position = next_position(&mut last_game, games);
                 forecast.games.insert(*id, position);
             }
             GroupTarget::WithoutPosition => {}

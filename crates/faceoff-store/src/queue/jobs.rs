@@ -28,14 +28,13 @@ pub(crate) struct NewJob {
 /// batch are claimed in the order in which they were queued.
 pub(crate) async fn insert(tx: &mut Tx, job: NewJob, account: Account) -> Result<Uuid> {
     let id = Uuid::now_v7();
-    let (id_text, claimable_at) = (Text(id), Instant(seconds_later(tx.now, job.delay_s)));
     sqlx::query!(
         "INSERT INTO jobs (id, kind, account_no, batch, state, claimable_at) VALUES (?, ?, ?, ?, 'queued', ?)",
-        id_text,
+        Text(id),
         job.kind,
         account.0,
         job.batch,
-        claimable_at,
+        Instant(seconds_later(tx.now, job.delay_s)),
     )
     .execute(&mut **tx)
     .await?;
@@ -101,16 +100,14 @@ pub(crate) async fn claim_next(
 
 /// Removes jobs that are not done from the queue; workers that run them lose the lease.
 pub(crate) async fn drop_jobs(tx: &mut Tx, jobs: &[Uuid]) -> Result<()> {
-    let now = Instant(tx.now);
     for job in jobs {
-        let job = Text(*job);
         sqlx::query!(
             "UPDATE jobs SET state = 'dropped', nonce = NULL,
                               charged_ms = CASE state WHEN 'leased'
                                            THEN MAX(0, charged_ms + ?2 - claimable_at) ELSE 0 END
              WHERE id = ?1 AND state IN ('queued', 'leased')",
-            job,
-            now,
+            Text(*job),
+            Instant(tx.now),
         )
         .execute(&mut **tx)
         .await?;
@@ -121,12 +118,11 @@ pub(crate) async fn drop_jobs(tx: &mut Tx, jobs: &[Uuid]) -> Result<()> {
 /// Ends the leases of `worker` and of every name `worker/…`, and returns their number. The attempts stay counted. The
 /// slot time is not charged, because a process of the platform died.
 pub(crate) async fn end_leases(tx: &mut Tx, worker: &str) -> Result<u64> {
-    let now = Instant(tx.now);
     let ended = sqlx::query!(
         "UPDATE jobs SET claimable_at = ?1, charged_ms = 0
          WHERE state = 'leased' AND claimable_at > ?1
            AND (worker = ?2 OR substr(worker, 1, length(?2) + 1) = ?2 || '/')",
-        now,
+        Instant(tx.now),
         worker,
     )
     .execute(&mut **tx)
@@ -140,12 +136,11 @@ pub(crate) async fn end_leases(tx: &mut Tx, worker: &str) -> Result<u64> {
 
 /// Queues a job again that was done, because its result is rejected. Its slot time is not charged.
 pub(crate) async fn requeue(tx: &mut Tx, job: Uuid) -> Result<()> {
-    let (job, now) = (Text(job), Instant(tx.now));
     sqlx::query!(
         "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0, claimable_at = ?
          WHERE id = ? AND state = 'done'",
-        now,
-        job,
+        Instant(tx.now),
+        Text(job),
     )
     .execute(&mut **tx)
     .await?;
@@ -175,14 +170,13 @@ pub(crate) async fn gauges(
     connection: &mut SqliteConnection,
     now: Timestamp,
 ) -> Result<QueueGauges> {
-    let now = Instant(now);
     let row = sqlx::query!(
         r#"SELECT COUNT(*) FILTER (WHERE state = 'leased' AND claimable_at > ?1) AS "running!: u32",
                   COUNT(*) FILTER (WHERE claimable_at <= ?1) AS "waiting!: u32",
                   MIN(claimable_at) FILTER (WHERE claimable_at <= ?1) AS "since?: Instant",
                   COUNT(*) FILTER (WHERE without_room >= ?2) AS "without_room!: u32"
            FROM jobs WHERE state IN ('queued', 'leased')"#,
-        now,
+        Instant(now),
         MIN_OUT_OF_SPACE_COUNT,
     )
     .fetch_one(connection)

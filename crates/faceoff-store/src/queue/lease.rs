@@ -33,11 +33,10 @@ pub(crate) async fn claim_state(
     connection: &mut SqliteConnection,
     claim: &JobClaim,
 ) -> Result<ClaimState> {
-    let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let row = sqlx::query!(
         "SELECT kind, state = 'leased' AS held FROM jobs WHERE id = ? AND nonce = ?",
-        id,
-        nonce,
+        Text(claim.job),
+        Text(claim.nonce),
     )
     .fetch_optional(connection)
     .await?;
@@ -81,11 +80,10 @@ pub(crate) async fn is_leased(
     job: Uuid,
     nonce: Uuid,
 ) -> Result<bool> {
-    let (job, nonce) = (Text(job), Text(nonce));
     let leased = sqlx::query_scalar!(
         r#"SELECT state = 'leased' AS "held!: bool" FROM jobs WHERE id = ? AND nonce = ?"#,
-        job,
-        nonce,
+        Text(job),
+        Text(nonce),
     )
     .fetch_optional(connection)
     .await?;
@@ -94,12 +92,11 @@ pub(crate) async fn is_leased(
 
 /// Is `claim.worker` still the lease holder, so that the lease was not transferred?
 pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<bool> {
-    let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let is_same_worker = sqlx::query_scalar!(
         r#"SELECT worker = ? AS "is_holder!: bool" FROM jobs WHERE id = ? AND nonce = ? AND state = 'leased'"#,
         claim.worker,
-        id,
-        nonce,
+        Text(claim.job),
+        Text(claim.nonce),
     )
     .fetch_optional(connection)
     .await?;
@@ -112,11 +109,10 @@ pub(crate) async fn lease_holder(
     job: Uuid,
     nonce: Uuid,
 ) -> Result<Option<String>> {
-    let (job, nonce) = (Text(job), Text(nonce));
     Ok(sqlx::query_scalar!(
         r#"SELECT worker AS "worker!" FROM jobs WHERE id = ? AND nonce = ? AND state = 'leased'"#,
-        job,
-        nonce,
+        Text(job),
+        Text(nonce),
     )
     .fetch_optional(connection)
     .await?)
@@ -151,13 +147,12 @@ pub(crate) async fn transfer(
     claim: &JobClaim,
     new_holder: &str,
 ) -> Result<bool> {
-    let (id, nonce) = (Text(claim.job), Text(claim.nonce));
     let transferred = sqlx::query!(
         "UPDATE jobs SET worker = ?1
          WHERE id = ?2 AND nonce = ?3 AND worker IN (?4, ?1) AND state = 'leased'",
         new_holder,
-        id,
-        nonce,
+        Text(claim.job),
+        Text(claim.nonce),
         claim.worker,
     )
     .execute(connection)
@@ -167,12 +162,11 @@ pub(crate) async fn transfer(
 
 /// Extends the leases of `holder`, and of every name `holder/…`, to at least `lease_s` seconds from now.
 pub(crate) async fn renew_leases(tx: &mut Tx, holder: &str, lease_s: u32) -> Result<u64> {
-    let until = Instant(seconds_later(tx.now, lease_s));
     let renewed = sqlx::query!(
         "UPDATE jobs SET claimable_at = ?1
          WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1
            AND (worker = ?2 OR substr(worker, 1, length(?2) + 1) = ?2 || '/')",
-        until,
+        Instant(seconds_later(tx.now, lease_s)),
         holder,
     )
     .execute(&mut **tx)
@@ -183,14 +177,13 @@ pub(crate) async fn renew_leases(tx: &mut Tx, holder: &str, lease_s: u32) -> Res
 /// Completes a leased job. The unused rest of its lease is credited to its account, and time beyond the
 /// lease is charged.
 pub(crate) async fn mark_done(tx: &mut Tx, claim: &JobClaim, progress: u32) -> Result<()> {
-    let (id, now) = (Text(claim.job), Instant(tx.now));
     sqlx::query!(
         "UPDATE jobs SET state = 'done', progress = ?,
                           charged_ms = MAX(0, charged_ms + ? - claimable_at)
          WHERE id = ?",
         progress,
-        now,
-        id,
+        Instant(tx.now),
+        Text(claim.job),
     )
     .execute(&mut **tx)
     .await?;
@@ -214,10 +207,9 @@ pub(crate) async fn requeue_failed(
     )
     .fetch_one(&mut *connection)
     .await?;
-    let claimable_at = Instant(seconds_later(now, backoff_s(failures)));
     sqlx::query!(
         "UPDATE jobs SET claimable_at = ? WHERE id = ?",
-        claimable_at,
+        Instant(seconds_later(now, backoff_s(failures))),
         id
     )
     .execute(connection)
@@ -231,12 +223,11 @@ pub(crate) async fn renew_all_leases(
     lease_s: u32,
     now: Timestamp,
 ) -> Result<()> {
-    let until = Instant(seconds_later(now, lease_s));
     sqlx::query!(
         // two conditions on the state: the first one lets SQLite use the index of open jobs
         "UPDATE jobs SET claimable_at = ?1
          WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1",
-        until,
+        Instant(seconds_later(now, lease_s)),
     )
     .execute(connection)
     .await?;
@@ -251,15 +242,14 @@ pub(crate) async fn release(
     delay_s: u32,
     out_of_space: bool,
 ) -> Result<()> {
-    let (id, claimable_at) = (Text(claim.job), Instant(seconds_later(tx.now, delay_s)));
     sqlx::query!(
         "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                           charged_ms = 0, attempts = attempts - 1, claimable_at = ?,
                           without_room = without_room + ?
          WHERE id = ?",
-        claimable_at,
+        Instant(seconds_later(tx.now, delay_s)),
         out_of_space,
-        id,
+        Text(claim.job),
     )
     .execute(&mut **tx)
     .await?;
@@ -270,13 +260,12 @@ pub(crate) async fn release(
 /// Parks a job that was just claimed: it cannot be claimed until it is [unparked](unpark). Neither the attempt nor its
 /// slot time counts.
 pub(crate) async fn park(tx: &mut Tx, job: Uuid) -> Result<()> {
-    let id = Text(job);
     sqlx::query!(
         "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0,
                           attempts = attempts - 1, claimable_at = ?
          WHERE id = ?",
         PARKED_UNTIL_MS,
-        id,
+        Text(job),
     )
     .execute(&mut **tx)
     .await?;
@@ -285,11 +274,10 @@ pub(crate) async fn park(tx: &mut Tx, job: Uuid) -> Result<()> {
 
 /// Makes a parked job claimable.
 pub(crate) async fn unpark(tx: &mut Tx, job: Uuid) -> Result<()> {
-    let (id, now) = (Text(job), Instant(tx.now));
     sqlx::query!(
         "UPDATE jobs SET claimable_at = ? WHERE id = ? AND state = 'queued' AND claimable_at = ?",
-        now,
-        id,
+        Instant(tx.now),
+        Text(job),
         PARKED_UNTIL_MS,
     )
     .execute(&mut **tx)

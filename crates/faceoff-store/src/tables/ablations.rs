@@ -113,24 +113,17 @@ pub(crate) async fn insert(
     submission: SubmissionId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "INSERT INTO ablations (id, submission_id, created_at) VALUES (?, ?, ?)",
         id,
         submission,
-        now,
+        Instant(now),
     )
     .execute(connection)
     .await
-    .map_err(|error| {
-        if StoreError::is_duplicate(&error, "ablations.submission_id") {
-            StoreError::Conflict(
-                "an ablation of this submission is running: wait for its end".into(),
-            )
-        } else {
-            error.into()
-        }
-    })?;
+    .map_err(StoreError::if_duplicate("ablations.submission_id", || {
+        StoreError::Conflict("an ablation of this submission is running: wait for its end".into())
+    }))?;
     Ok(())
 }
 
@@ -156,10 +149,9 @@ pub(crate) async fn set_ended(
     reason: Option<&str>,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE ablations SET finished_at = ?, reason = ? WHERE id = ? AND finished_at IS NULL",
-        now,
+        Instant(now),
         reason,
         id,
     )

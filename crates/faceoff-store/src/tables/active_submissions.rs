@@ -13,14 +13,13 @@ pub(crate) async fn put_newest(
     submission: SubmissionId,
     uploaded_at: Timestamp,
 ) -> Result<bool> {
-    let since = Instant(uploaded_at);
     let put = sqlx::query!(
         "INSERT INTO active_submissions (team_id, submission_id, since) VALUES (?, ?, ?)
          ON CONFLICT (team_id) DO UPDATE SET submission_id = excluded.submission_id, since = excluded.since
          WHERE excluded.since >= active_submissions.since",
         team,
         submission,
-        since,
+        Instant(uploaded_at),
     )
     .execute(connection)
     .await?;
@@ -34,12 +33,11 @@ pub(crate) async fn choose(
     submission: SubmissionId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "INSERT OR REPLACE INTO active_submissions (team_id, submission_id, since) VALUES (?, ?, ?)",
         team,
         submission,
-        now,
+        Instant(now),
     )
     .execute(connection)
     .await?;

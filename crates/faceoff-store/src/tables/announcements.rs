@@ -40,11 +40,10 @@ pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     announcement: &Announcement,
 ) -> Result<()> {
-    let (id, at) = (announcement.id, Instant(announcement.at));
     sqlx::query!(
         "INSERT INTO announcements (id, at, title, text) VALUES (?, ?, ?, ?)",
-        id,
-        at,
+        announcement.id,
+        Instant(announcement.at),
         announcement.title,
         announcement.text
     )

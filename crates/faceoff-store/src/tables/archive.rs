@@ -82,16 +82,14 @@ pub(crate) async fn put(
     connection: &mut SqliteConnection,
     archived: &ArchivedSeason,
 ) -> Result<()> {
-    let (edition, made_at) = (archived.edition, Instant(archived.made_at));
-    let imported_at = archived.imported_at.map(Instant);
     sqlx::query!(
         "INSERT OR REPLACE INTO archived (id, edition, made_at, program, commitment, imported_at)
          VALUES (1, ?, ?, ?, ?, ?)",
-        edition,
-        made_at,
+        archived.edition,
+        Instant(archived.made_at),
         archived.program,
         archived.commitment,
-        imported_at
+        archived.imported_at.map(Instant)
     )
     .execute(connection)
     .await?;

@@ -78,14 +78,13 @@ pub(crate) async fn usage(
     team: TeamId,
     day_start: Timestamp,
 ) -> Result<UploadUsage> {
-    let day_start = Instant(day_start);
     let row = sqlx::query!(
         r#"SELECT COALESCE(SUM(CASE WHEN created_at >= ? AND state <> 'validation_error'
                                     THEN bundle_bytes ELSE 0 END), 0) AS "day_bytes!: i64",
                   COALESCE(SUM(CASE WHEN bundle_removed_at IS NULL
                                     THEN bundle_bytes ELSE 0 END), 0) AS "stored_bytes!: i64"
            FROM submissions WHERE team_id = ?"#,
-        day_start,
+        Instant(day_start),
         team,
     )
     .fetch_one(connection)
@@ -106,7 +105,6 @@ pub(crate) async fn refused(
     connection: &mut SqliteConnection,
     uploaded_until: Timestamp,
 ) -> Result<Vec<(SubmissionId, String)>> {
-    let uploaded_until = Instant(uploaded_until);
     let rows = sqlx::query!(
         "SELECT s.id, s.bundle_key FROM submissions s
          WHERE s.bundle_removed_at IS NULL AND s.state IN ('invalid', 'validation_error')
@@ -117,7 +115,7 @@ pub(crate) async fn refused(
            AND NOT EXISTS (SELECT 1 FROM submissions o
                            WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
                              AND o.state IN ('validating', 'valid'))",
-        uploaded_until,
+        Instant(uploaded_until),
     )
     .fetch_all(connection)
     .await?;
@@ -132,11 +130,10 @@ pub(crate) async fn set_refused_removed(
     id: SubmissionId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE submissions SET bundle_removed_at = ?, bundle_gone = 1
          WHERE id = ? AND state IN ('invalid', 'validation_error') AND bundle_removed_at IS NULL",
-        now,
+        Instant(now),
         id,
     )
     .execute(connection)
@@ -159,10 +156,9 @@ pub(crate) async fn set_removed(
     reason: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE submissions SET bundle_removed_at = ?, bundle_removed_for = ? WHERE id = ?",
-        now,
+        Instant(now),
         reason,
         id,
     )
@@ -178,10 +174,9 @@ pub(crate) async fn set_deleted(
     actor: &Actor,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE submissions SET deleted_at = ?, deleted_by = ? WHERE id = ?",
-        now,
+        Instant(now),
         actor,
         id,
     )
@@ -196,7 +191,6 @@ pub(crate) async fn deletable(
     connection: &mut SqliteConnection,
     removed_until: Timestamp,
 ) -> Result<Vec<(SubmissionId, String)>> {
-    let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
         "SELECT s.id, s.bundle_key FROM submissions s
          JOIN teams t ON t.id = s.team_id
@@ -205,7 +199,7 @@ pub(crate) async fn deletable(
            AND NOT EXISTS (SELECT 1 FROM submissions o
                            WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
                              AND o.bundle_removed_at IS NULL)",
-        removed_until
+        Instant(removed_until)
     )
     .fetch_all(connection)
     .await?;
@@ -240,11 +234,11 @@ pub(crate) async fn check_available(
     .await?;
     match removed {
         None => Ok(()),
-        Some(row) => Err(StoreError::Conflict(format!(
+        Some(row) => StoreError::conflict(format!(
             "the bundle of the submission {id} was removed on {} {}, so it cannot be evaluated again",
             row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
             row.reason.as_deref().unwrap_or(VALIDATION_FAILED),
-        ))),
+        )),
     }
 }
 

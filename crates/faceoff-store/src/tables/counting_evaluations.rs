@@ -21,14 +21,13 @@ pub(crate) async fn of_day(
     stage_day: StageDay,
     team: Option<TeamId>,
 ) -> Result<Vec<EvaluationStatus>> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_as!(
         EvaluationStatus,
         r#"SELECT id, state = 'open' AS "is_open!: bool",
                   state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
            FROM counting_evaluations WHERE stage_id = ?1 AND day = ?2 AND (?3 IS NULL OR team_id = ?3) ORDER BY created_at, id"#,
-        stage,
-        day,
+        stage_day.stage,
+        Text(stage_day.date),
         team
     )
     .fetch_all(connection)
@@ -40,11 +39,10 @@ pub(crate) async fn revision_of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<Option<u32>> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_scalar!(
         r#"SELECT MAX(revision) AS "revision: u32" FROM counting_evaluations WHERE stage_id = ? AND day = ?"#,
-        stage,
-        day
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .fetch_one(connection)
     .await?)
@@ -55,14 +53,13 @@ pub(crate) async fn incomplete_of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<Vec<EvaluationId>> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_scalar!(
         "SELECT e.id
          FROM counting_evaluations e JOIN runs r ON r.id = e.run_id
          WHERE e.stage_id = ? AND e.day = ? AND e.state = 'open' AND r.state <> 'played'
          ORDER BY e.created_at, e.id",
-        stage,
-        day
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .fetch_all(connection)
     .await?)
@@ -88,10 +85,9 @@ pub(crate) async fn set_voided(
     id: EvaluationId,
     ruling: &Ruling,
 ) -> Result<()> {
-    let at = Instant(ruling.at);
     sqlx::query!(
         "UPDATE evaluations SET voided_at = ?, voided_for = ? WHERE id = ?",
-        at,
+        Instant(ruling.at),
         ruling.reason,
         id,
     )
@@ -106,10 +102,9 @@ pub(crate) async fn set_published(
     id: EvaluationId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE evaluations SET published_at = ? WHERE id = ?",
-        now,
+        Instant(now),
         id
     )
     .execute(connection)

@@ -22,6 +22,40 @@ pub struct Day {
     pub released_at: Option<Timestamp>,
 }
 
+/// A row of a statement that reads days.
+struct DayRow {
+    stage: StageId,
+    day: Text<Date>,
+    cutoff_at: Instant,
+    deadline_at: Option<Instant>,
+    released_at: Option<Instant>,
+}
+
+impl From<DayRow> for Day {
+    fn from(row: DayRow) -> Self {
+        Self {
+            stage_day: StageDay {
+                stage: row.stage,
+                date: row.day.0,
+            },
+            cutoff_at: row.cutoff_at.0,
+            deadline_at: row.deadline_at.map(|at| at.0),
+            released_at: row.released_at.map(|at| at.0),
+        }
+    }
+}
+
+/// `SELECT` of days; the argument is the SQL after `FROM days`.
+macro_rules! select_days {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            DayRow,
+            "SELECT stage_id AS stage, day, cutoff_at, deadline_at, released_at FROM days " + $tail
+            $(, $argument)*
+        )
+    };
+}
+
 /// The days that were started later than on their date, each with the reason.
 pub(crate) async fn missed(connection: &mut SqliteConnection) -> Result<Vec<(StageDay, String)>> {
     let rows = sqlx::query!(
@@ -71,42 +105,23 @@ pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Option<Day>> {
-    let row = sqlx::query!(
-        "SELECT day, cutoff_at, deadline_at, released_at
-         FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1",
-        stage
-    )
-    .fetch_optional(connection)
-    .await?;
-    Ok(row.map(|row| Day {
-        stage_day: StageDay {
-            stage,
-            date: row.day.0,
-        },
-        cutoff_at: row.cutoff_at.0,
-        deadline_at: row.deadline_at.map(|at| at.0),
-        released_at: row.released_at.map(|at| at.0),
-    }))
+    let row = select_days!("WHERE stage_id = ? ORDER BY day DESC LIMIT 1", stage)
+        .fetch_optional(connection)
+        .await?;
+    Ok(row.map(Day::from))
 }
 
 /// The day; [`StoreError::NotFound`] if its cutoff has not passed.
 pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
-    let row = sqlx::query!(
-        "SELECT cutoff_at, deadline_at, released_at
-         FROM days WHERE stage_id = ? AND day = ?",
-        stage,
-        day
+    select_days!(
+        "WHERE stage_id = ? AND day = ?",
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .fetch_optional(connection)
     .await?
-    .ok_or(StoreError::NotFound("day"))?;
-    Ok(Day {
-        stage_day,
-        cutoff_at: row.cutoff_at.0,
-        deadline_at: row.deadline_at.map(|at| at.0),
-        released_at: row.released_at.map(|at| at.0),
-    })
+    .map(Day::from)
+    .ok_or(StoreError::NotFound("day"))
 }
 
 /// The unreleased days of a stage, the earliest cutoff first.
@@ -114,25 +129,13 @@ pub(crate) async fn unreleased(
     connection: &mut SqliteConnection,
     stage: StageId,
 ) -> Result<Vec<Day>> {
-    let rows = sqlx::query!(
-        "SELECT day, cutoff_at, deadline_at
-         FROM days WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day",
+    let rows = select_days!(
+        "WHERE stage_id = ? AND released_at IS NULL ORDER BY cutoff_at, day",
         stage
     )
     .fetch_all(connection)
     .await?;
-    Ok(rows
-        .into_iter()
-        .map(|row| Day {
-            stage_day: StageDay {
-                stage,
-                date: row.day.0,
-            },
-            cutoff_at: row.cutoff_at.0,
-            deadline_at: row.deadline_at.map(|at| at.0),
-            released_at: None,
-        })
-        .collect())
+    Ok(rows.into_iter().map(Day::from).collect())
 }
 
 /// The days with incomplete evaluations whose deadline has passed.
@@ -140,7 +143,6 @@ pub(crate) async fn overdue(
     connection: &mut SqliteConnection,
     now: Timestamp,
 ) -> Result<Vec<StageDay>> {
-    let now = Instant(now);
     let rows = sqlx::query!(
         "SELECT d.stage_id AS stage, d.day FROM days d
          WHERE d.released_at IS NULL AND d.deadline_at <= ?
@@ -148,7 +150,7 @@ pub(crate) async fn overdue(
                        WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'open'
                          AND r.state <> 'played')
          ORDER BY d.cutoff_at",
-        now
+        Instant(now)
     )
     .fetch_all(connection)
     .await?;
@@ -167,16 +169,11 @@ pub(crate) async fn set_deadline(
     stage_day: StageDay,
     deadline_at: Option<Timestamp>,
 ) -> Result<()> {
-    let (stage, day, deadline_at) = (
-        stage_day.stage,
-        Text(stage_day.date),
-        deadline_at.map(Instant),
-    );
     sqlx::query!(
         "UPDATE days SET deadline_at = ? WHERE stage_id = ? AND day = ?",
-        deadline_at,
-        stage,
-        day
+        deadline_at.map(Instant),
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .execute(connection)
     .await?;
@@ -185,11 +182,10 @@ pub(crate) async fn set_deadline(
 
 /// Has the day's cutoff passed?
 pub(crate) async fn exists(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<bool> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM days WHERE stage_id = ? AND day = ?) AS "exists!: bool""#,
-        stage,
-        day
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .fetch_one(connection)
     .await?)
@@ -211,14 +207,12 @@ pub(crate) async fn insert(
             cutoff_at: newest.cutoff_at,
         });
     }
-    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
-    let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cutoff_at, deadline_at) VALUES (?, ?, ?, ?)",
-        stage,
-        day,
-        now,
-        deadline_at
+        stage_day.stage,
+        Text(stage_day.date),
+        Instant(now),
+        deadline_at.map(Instant)
     )
     .execute(connection)
     .await?;
@@ -243,14 +237,12 @@ pub(crate) async fn insert_missed(
         }
         Err(error) => return Err(error),
     }
-    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
-    let deadline_at = deadline_at.map(Instant);
     sqlx::query!(
         "INSERT INTO days (stage_id, day, cutoff_at, deadline_at, missed_for) VALUES (?, ?, ?, ?, ?)",
-        stage,
-        day,
-        now,
-        deadline_at,
+        stage_day.stage,
+        Text(stage_day.date),
+        Instant(now),
+        deadline_at.map(Instant),
         reason,
     )
     .execute(connection)
@@ -264,12 +256,11 @@ pub(crate) async fn set_released(
     stage_day: StageDay,
     now: Timestamp,
 ) -> Result<bool> {
-    let (stage, day, now) = (stage_day.stage, Text(stage_day.date), Instant(now));
     let released = sqlx::query!(
         "UPDATE days SET released_at = ? WHERE stage_id = ? AND day = ? AND released_at IS NULL",
-        now,
-        stage,
-        day
+        Instant(now),
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .execute(connection)
     .await?;

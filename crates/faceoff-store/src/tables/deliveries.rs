@@ -126,14 +126,13 @@ pub(crate) async fn due(
     connection: &mut SqliteConnection,
     now: Timestamp,
 ) -> Result<Vec<Delivery>> {
-    let now = Instant(now);
     let rows = select_deliveries!(
         "WHERE id IN (SELECT first.id FROM (SELECT d.id, MIN(d.next_at) FROM webhook_deliveries d
                         INDEXED BY webhook_deliveries_due WHERE d.state = 'waiting' AND d.next_at <= ?1
                         GROUP BY d.webhook_id) first)
            AND webhook_id IN (SELECT id FROM webhooks WHERE dead_at IS NULL)
          ORDER BY next_at",
-        now
+        Instant(now)
     );
     parse_all(rows.fetch_all(connection).await?)
 }
@@ -171,16 +170,15 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: DeliveryId) -> R
 
 /// Adds a delivery that is due at once.
 pub(crate) async fn insert(connection: &mut SqliteConnection, delivery: &Delivery) -> Result<()> {
-    let (id, webhook, created_at) = (delivery.id, delivery.webhook, Instant(delivery.created_at));
     sqlx::query!(
         "INSERT INTO webhook_deliveries (id, webhook_id, event_id, kind, body, created_at, attempts, next_at, state)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, 0, ?6, 'waiting')",
-        id,
-        webhook,
+        delivery.id,
+        delivery.webhook,
         delivery.event,
         delivery.kind,
         delivery.body,
-        created_at,
+        Instant(delivery.created_at),
     )
     .execute(connection)
     .await?;
@@ -222,11 +220,10 @@ pub(crate) async fn give_up(
     webhook: WebhookId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE webhook_deliveries SET state = 'given_up', next_at = NULL, settled_at = ?
          WHERE webhook_id = ? AND state = 'waiting'",
-        now,
+        Instant(now),
         webhook,
     )
     .execute(connection)
@@ -239,10 +236,9 @@ pub(crate) async fn delete_ended(
     connection: &mut SqliteConnection,
     ended_before: Timestamp,
 ) -> Result<u64> {
-    let ended_before = Instant(ended_before);
     let deleted = sqlx::query!(
         "DELETE FROM webhook_deliveries WHERE state <> 'waiting' AND settled_at < ?",
-        ended_before
+        Instant(ended_before)
     )
     .execute(connection)
     .await?;

@@ -39,10 +39,9 @@ pub(crate) async fn teams_in(
     connection: &mut SqliteConnection,
     name: &DivisionName,
 ) -> Result<i64> {
-    let name = name.as_str();
     Ok(sqlx::query_scalar!(
         "SELECT COUNT(*) FROM teams WHERE division = ? COLLATE NOCASE",
-        name
+        name.as_str()
     )
     .fetch_one(connection)
     .await?)
@@ -53,11 +52,10 @@ pub(crate) async fn insert(
     name: &DivisionName,
     position: u32,
 ) -> Result<()> {
-    let name = name.as_str();
     sqlx::query!(
         "INSERT INTO divisions (name, position) VALUES (?1, ?2)
          ON CONFLICT (name) DO UPDATE SET position = ?2",
-        name,
+        name.as_str(),
         position
     )
     .execute(connection)

@@ -114,12 +114,11 @@ pub(crate) async fn put(
     team: TeamId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "INSERT OR IGNORE INTO entrants (tournament_id, team_id, entered_at) VALUES (?, ?, ?)",
         tournament,
         team,
-        now,
+        Instant(now),
     )
     .execute(connection)
     .await?;
@@ -132,14 +131,13 @@ pub(crate) async fn set_departure(
     team: TeamId,
     departure: &Departure,
 ) -> Result<()> {
-    let at = Instant(departure.at);
     let (left_as, from_round) = (label(departure.kind), departure.from_round.get());
     sqlx::query!(
         "UPDATE entrants SET left_as = ?, from_round = ?, left_at = ?, left_for = ?
          WHERE tournament_id = ? AND team_id = ?",
         left_as,
         from_round,
-        at,
+        Instant(departure.at),
         departure.reason,
         tournament,
         team,

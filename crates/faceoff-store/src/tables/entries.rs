@@ -50,16 +50,12 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) ->
 
 /// The day's place is taken: [`StoreError::Conflict`] if the team has another evaluation on that day which counts or is
 /// open.
-fn one_per_day(date: Date) -> impl Fn(sqlx::Error) -> StoreError {
-    move |error| {
-        if StoreError::is_duplicate(&error, "evaluations.day") {
-            StoreError::Conflict(format!(
-                "the team has another evaluation on {date} that counts or is running"
-            ))
-        } else {
-            error.into()
-        }
-    }
+fn one_per_day(date: Date) -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("evaluations.day", move || {
+        StoreError::Conflict(format!(
+            "the team has another evaluation on {date} that counts or is running"
+        ))
+    })
 }
 
 /// Adds a queued evaluation that counts. [`StoreError::Conflict`] if the team has another one on that day which counts or
@@ -69,22 +65,19 @@ pub(crate) async fn insert(
     entry: &Entry,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, submission, team) = (entry.id, entry.submission, entry.team);
-    let (stage, day) = (entry.stage_day.stage, Text(entry.stage_day.date));
-    let (run, now, rerun_of) = (entry.run, Instant(now), entry.rerun_of);
     sqlx::query!(
         "INSERT INTO evaluations (id, purpose, submission_id, team_id, stage_id, day, revision, run_id, created_at,
                                   state, rerun_of)
          VALUES (?, 'counting', ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
-        id,
-        submission,
-        team,
-        stage,
-        day,
+        entry.id,
+        entry.submission,
+        entry.team,
+        entry.stage_day.stage,
+        Text(entry.stage_day.date),
         entry.revision,
-        run,
-        now,
-        rerun_of,
+        entry.run,
+        Instant(now),
+        entry.rerun_of,
     )
     .execute(connection)
     .await
@@ -105,22 +98,20 @@ pub(crate) async fn insert_proposed(
         None => EvaluationPurpose::Trial,
         Some(_) => EvaluationPurpose::Reevaluation,
     };
-    let (proposal_id, stage, day) = (proposal.id, proposal.stage, proposal.kind.day().map(Text));
-    let created_at = Instant(proposal.created_at);
     sqlx::query!(
         "INSERT INTO evaluations (id, purpose, proposal_id, submission_id, team_id, stage_id, day, revision, run_id,
                                   created_at, state, rerun_of)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
         id,
         purpose,
-        proposal_id,
+        proposal.id,
         submission,
         team,
-        stage,
-        day,
+        proposal.stage,
+        proposal.kind.day().map(Text),
         proposal.revision,
         run,
-        created_at,
+        Instant(proposal.created_at),
         replaces,
     )
     .execute(connection)
@@ -136,13 +127,12 @@ pub(crate) async fn set_counting(
     date: Date,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE evaluations
          SET purpose = 'counting', finished_at = ?,
              extra_for = (SELECT o.extra_for FROM evaluations o WHERE o.id = evaluations.rerun_of)
          WHERE id = ?",
-        now,
+        Instant(now),
         id
     )
     .execute(connection)

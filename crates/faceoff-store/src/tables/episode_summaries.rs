@@ -15,12 +15,11 @@ pub(crate) async fn of_runs(
     if runs.is_empty() {
         return Ok(HashMap::new());
     }
-    let runs = Json(runs);
     let rows = sqlx::query!(
         "SELECT run_id AS run, summary FROM episode_summaries
          WHERE version = ? AND run_id IN (SELECT value FROM json_each(?))",
         version,
-        runs,
+        Json(runs),
     )
     .fetch_all(connection)
     .await?;

@@ -374,15 +374,13 @@ pub(crate) async fn of_team_after(
     (queued_at, id): (Timestamp, Option<EvaluationId>),
     limit: u32,
 ) -> Result<Vec<EvaluationRow>> {
-    let day = date.map(Text);
-    let queued_at = Instant(queued_at);
     Ok(select_evaluations!(
         "WHERE e.team_id = ?1 AND (?2 IS NULL OR e.day = ?2)
            AND e.created_at <= ?3 AND (e.created_at < ?3 OR ?4 IS NULL OR e.id < ?4)
          ORDER BY e.created_at DESC, e.id DESC LIMIT ?5",
         team,
-        day,
-        queued_at,
+        date.map(Text),
+        Instant(queued_at),
         id,
         limit
     )
@@ -398,12 +396,11 @@ pub(crate) async fn on_date_after(
     (queued_at, id): (Timestamp, Option<EvaluationId>),
     limit: u32,
 ) -> Result<Vec<EvaluationRow>> {
-    let (day, queued_at) = (Text(date), Instant(queued_at));
     Ok(select_evaluations!(
         "WHERE e.day = ?1 AND e.created_at >= ?2 AND (e.created_at > ?2 OR ?3 IS NULL OR e.id > ?3)
          ORDER BY e.created_at, e.id LIMIT ?4",
-        day,
-        queued_at,
+        Text(date),
+        Instant(queued_at),
         id,
         limit
     )
@@ -416,11 +413,10 @@ pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<Vec<EvaluationRow>> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     Ok(select_evaluations!(
         "WHERE e.stage_id = ? AND e.day = ? ORDER BY e.created_at, e.id",
-        stage,
-        day
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .fetch_all(connection)
     .await?)
@@ -490,10 +486,9 @@ pub(crate) async fn of_scoring_job(
     connection: &mut SqliteConnection,
     job: Uuid,
 ) -> Result<Option<EvaluationRun>> {
-    let job = Text(job);
     let found = select_runs!(
         "e.id = (SELECT s.evaluation_id FROM scorings s WHERE s.job_id = ?)",
-        job
+        Text(job)
     );
     Ok(found.fetch_optional(connection).await?)
 }
@@ -518,13 +513,12 @@ pub(crate) async fn count_platform_failed(
     team: TeamId,
     stage_day: StageDay,
 ) -> Result<usize> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     let count = sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM counting_evaluations
            WHERE team_id = ? AND stage_id = ? AND day = ? AND state = 'platform_failed'"#,
         team,
-        stage,
-        day,
+        stage_day.stage,
+        Text(stage_day.date),
     )
     .fetch_one(connection)
     .await?;
@@ -539,14 +533,13 @@ pub(crate) async fn set_finished(
     dataset_blake3: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let (result, now) = (Json(result), Instant(now));
     sqlx::query!(
         "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
                                 slot_ms = (SELECT SUM(j.charged_ms) FROM shards s JOIN jobs j ON j.id = s.job_id
                                            WHERE s.run_id = evaluations.run_id)
          WHERE id = ?",
-        now,
-        result,
+        Instant(now),
+        Json(result),
         dataset,
         dataset_blake3,
         id,
@@ -575,7 +568,6 @@ pub(crate) async fn set_failed(
     failure: Failure<'_>,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     let (state, reason) = match failure {
         Failure::Agent => ("agent_failed", None),
         Failure::Platform(reason) => ("platform_failed", Some(reason)),
@@ -585,7 +577,7 @@ pub(crate) async fn set_failed(
     sqlx::query!(
         "UPDATE evaluations SET state = ?, finished_at = ?, reason = ?, unplayed = ? WHERE id = ?",
         state,
-        now,
+        Instant(now),
         reason,
         unplayed,
         id,
@@ -615,12 +607,11 @@ pub(crate) async fn dropped_with_datasets(
     connection: &mut SqliteConnection,
     dropped_until: Timestamp,
 ) -> Result<Vec<(EvaluationId, String)>> {
-    let dropped_until = Instant(dropped_until);
     let rows = sqlx::query!(
         r#"SELECT e.id, e.dataset AS "dataset!"
            FROM proposals p CROSS JOIN evaluations e ON e.proposal_id = p.id
            WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND e.dataset IS NOT NULL AND e.dataset_removed_at IS NULL"#,
-        dropped_until
+        Instant(dropped_until)
     )
     .fetch_all(connection)
     .await?;

@@ -53,21 +53,26 @@ impl TryFrom<EventRow> for EventRecord {
     }
 }
 
+/// `SELECT` of events; the argument is the SQL after `FROM events`.
+macro_rules! select_events {
+    ($tail:literal $(, $argument:expr)* $(,)?) => {
+        sqlx::query_as!(
+            EventRow,
+            "SELECT id, at, actor, subject_kind, subject_id, kind, payload FROM events " + $tail
+            $(, $argument)*
+        )
+    };
+}
+
 /// The events after the one with id `after`, the oldest first, at most `limit`.
 pub(crate) async fn after(
     connection: &mut SqliteConnection,
     after: i64,
     limit: u32,
 ) -> Result<Vec<EventRecord>> {
-    let rows = sqlx::query_as!(
-        EventRow,
-        "SELECT id, at, actor, subject_kind, subject_id, kind, payload
-         FROM events WHERE id > ? ORDER BY id LIMIT ?",
-        after,
-        limit,
-    )
-    .fetch_all(connection)
-    .await?;
+    let rows = select_events!("WHERE id > ? ORDER BY id LIMIT ?", after, limit)
+        .fetch_all(connection)
+        .await?;
     rows.into_iter().map(EventRecord::try_from).collect()
 }
 
@@ -123,11 +128,8 @@ pub(crate) async fn newest(
     let rows = match subject {
         Some(subject) => {
             let (subject_kind, subject_id) = subject.columns();
-            sqlx::query_as!(
-                EventRow,
-                "SELECT id, at, actor, subject_kind, subject_id, kind, payload
-                 FROM events
-                 WHERE subject_kind = ?1 AND subject_id = ?2 AND id < ?3
+            select_events!(
+                "WHERE subject_kind = ?1 AND subject_id = ?2 AND id < ?3
                    AND (?4 IS NULL OR actor = ?4 OR substr(actor, 1, length(?4) + 1) = ?4 || ':')
                    AND (?5 IS NULL OR kind = ?5)
                  ORDER BY id DESC LIMIT ?6",
@@ -142,11 +144,8 @@ pub(crate) async fn newest(
             .await?
         }
         None => {
-            sqlx::query_as!(
-                EventRow,
-                "SELECT id, at, actor, subject_kind, subject_id, kind, payload
-                 FROM events
-                 WHERE id < ?1
+            select_events!(
+                "WHERE id < ?1
                    AND (?2 IS NULL OR actor = ?2 OR substr(actor, 1, length(?2) + 1) = ?2 || ':')
                    AND (?3 IS NULL OR kind = ?3)
                  ORDER BY id DESC LIMIT ?4",

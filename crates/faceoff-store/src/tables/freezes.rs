@@ -38,11 +38,10 @@ pub(crate) async fn insert(
     stage: StageId,
     ruling: &Ruling,
 ) -> Result<()> {
-    let at = Instant(ruling.at);
     sqlx::query!(
         "INSERT INTO frozen_boards (stage_id, frozen_at, reason) VALUES (?, ?, ?)",
         stage,
-        at,
+        Instant(ruling.at),
         ruling.reason,
     )
     .execute(connection)

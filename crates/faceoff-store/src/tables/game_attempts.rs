@@ -86,14 +86,13 @@ pub(crate) async fn begin(
     worker: &str,
     now: Timestamp,
 ) -> Result<u32> {
-    let (id, now) = (game, Instant(now));
     Ok(sqlx::query_scalar!(
         r#"INSERT INTO game_attempts (game_id, number, worker, begun_at)
            VALUES (?1, (SELECT COALESCE(MAX(number), 0) + 1 FROM game_attempts WHERE game_id = ?1), ?2, ?3)
            RETURNING number AS "number!""#,
-        id,
+        game,
         worker,
-        now,
+        Instant(now),
     )
     .fetch_one(connection)
     .await?)
@@ -123,13 +122,12 @@ pub(crate) async fn end(
     reason: Option<&str>,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (game, Instant(now));
     sqlx::query!(
         "UPDATE game_attempts SET ended_at = ?, outcome = ?, reason = ? WHERE game_id = ? AND ended_at IS NULL",
-        now,
+        Instant(now),
         outcome,
         reason,
-        id,
+        game,
     )
     .execute(connection)
     .await?;
@@ -161,7 +159,6 @@ pub(crate) async fn commit(
     commit: &GameCommit,
     now: Timestamp,
 ) -> Result<u32> {
-    let (id, now, score) = (game, Instant(now), Json(&commit.score));
     let recording = commit.recording.as_ref();
     let (key, game_blake3) = (
         recording.map(|recording| &recording.key),
@@ -175,15 +172,15 @@ pub(crate) async fn commit(
            SET ended_at = ?, outcome = 'played', score = ?, recording = ?, game_blake3 = ?, home_blake3 = ?,
                away_blake3 = ?, home_log = ?, away_log = ?
            WHERE game_id = ? AND ended_at IS NULL RETURNING number AS "number!""#,
-        now,
-        score,
+        Instant(now),
+        Json(&commit.score),
         key,
         game_blake3,
         home_blake3,
         away_blake3,
         home_log,
         away_log,
-        id,
+        game,
     )
     .fetch_optional(connection)
     .await?

@@ -12,10 +12,9 @@ pub(crate) async fn requeue(
     id: GameId,
     job: Uuid,
 ) -> Result<()> {
-    let job = Text(job);
     sqlx::query!(
         "UPDATE games SET state = 'queued', job_id = ?, attempt = NULL, ended_at = NULL, reason = NULL WHERE id = ?",
-        job,
+        Text(job),
         id,
     )
     .execute(connection)
@@ -56,11 +55,10 @@ pub(crate) async fn set_played(
     attempt: u32,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE games SET state = 'played', attempt = ?, ended_at = ? WHERE id = ?",
         attempt,
-        now,
+        Instant(now),
         id,
     )
     .execute(connection)
@@ -91,11 +89,10 @@ pub(crate) async fn set_without_result(
         NoResult::Void => "void",
         NoResult::Cancelled => "cancelled",
     };
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE games SET state = ?, attempt = NULL, ended_at = ?, reason = ? WHERE id = ?",
         state,
-        now,
+        Instant(now),
         reason,
         id,
     )

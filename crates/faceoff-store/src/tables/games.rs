@@ -245,8 +245,7 @@ pub(crate) async fn open(
 
 /// The game that a job plays.
 pub(crate) async fn of_job(connection: &mut SqliteConnection, job: Uuid) -> Result<Option<GameId>> {
-    let job = Text(job);
-    let found = sqlx::query_scalar!("SELECT id FROM games WHERE job_id = ?", job)
+    let found = sqlx::query_scalar!("SELECT id FROM games WHERE job_id = ?", Text(job))
         .fetch_optional(connection)
         .await?;
     Ok(found)
@@ -287,7 +286,6 @@ pub(crate) async fn insert(
     };
     let [home, away] = game.teams;
     let [home_submission, away_submission] = game.submissions;
-    let (seed, created_at, job) = (game.seed, Instant(game.created_at), Text(job));
     sqlx::query!(
         "INSERT INTO games (id, tournament_id, purpose, round, matchday, pairing, second_half, replay, asked_by,
                             home_team_id, away_team_id, home_submission_id, away_submission_id, seed, created_at,
@@ -306,9 +304,9 @@ pub(crate) async fn insert(
         away,
         home_submission,
         away_submission,
-        seed,
-        created_at,
-        job,
+        game.seed,
+        Instant(game.created_at),
+        Text(job),
     )
     .execute(connection)
     .await?;
@@ -322,12 +320,11 @@ pub(crate) async fn count_requested(
     team: TeamId,
     since: Timestamp,
 ) -> Result<u32> {
-    let since = Instant(since);
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM games
            WHERE asked_by = ? AND created_at >= ?"#,
         team,
-        since,
+        Instant(since),
     )
     .fetch_one(connection)
     .await?)

@@ -138,8 +138,7 @@ pub(crate) async fn by_code(
     connection: &mut SqliteConnection,
     code_hash: [u8; 32],
 ) -> Result<Option<Invitation>> {
-    let code_hash = Bytes32(code_hash);
-    let row = select_invitations!("WHERE code_hash = ?", code_hash)
+    let row = select_invitations!("WHERE code_hash = ?", Bytes32(code_hash))
         .fetch_optional(connection)
         .await?;
     row.map(Invitation::try_from).transpose()
@@ -151,12 +150,11 @@ pub(crate) async fn count_open(
     team: TeamId,
     now: Timestamp,
 ) -> Result<i64> {
-    let now = Instant(now);
     Ok(sqlx::query_scalar!(
         "SELECT COUNT(*) FROM invitations
          WHERE team_id = ? AND accepted_at IS NULL AND revoked_at IS NULL AND expires_at > ?",
         team,
-        now
+        Instant(now)
     )
     .fetch_one(connection)
     .await?)
@@ -167,21 +165,18 @@ pub(crate) async fn insert(
     invitation: &Invitation,
     code_hash: [u8; 32],
 ) -> Result<()> {
-    let (id, code_hash) = (invitation.id, Bytes32(code_hash));
     let (role, team, user) = invitation.role.columns();
-    let created_at = Instant(invitation.created_at);
-    let expires_at = Instant(invitation.expires_at);
     sqlx::query!(
         "INSERT INTO invitations (id, code_hash, role, team_id, person_id, note, created_at, expires_at)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-        id,
-        code_hash,
+        invitation.id,
+        Bytes32(code_hash),
         role,
         team,
         user,
         invitation.note,
-        created_at,
-        expires_at,
+        Instant(invitation.created_at),
+        Instant(invitation.expires_at),
     )
     .execute(connection)
     .await?;
@@ -194,10 +189,9 @@ pub(crate) async fn set_accepted(
     user: UserId,
     accepted_at: Timestamp,
 ) -> Result<()> {
-    let accepted_at = Instant(accepted_at);
     sqlx::query!(
         "UPDATE invitations SET accepted_at = ?, accepted_by = ? WHERE id = ?",
-        accepted_at,
+        Instant(accepted_at),
         user,
         id
     )
@@ -211,10 +205,9 @@ pub(crate) async fn set_revoked(
     id: InvitationId,
     revoked_at: Timestamp,
 ) -> Result<()> {
-    let revoked_at = Instant(revoked_at);
     sqlx::query!(
         "UPDATE invitations SET revoked_at = ? WHERE id = ?",
-        revoked_at,
+        Instant(revoked_at),
         id
     )
     .execute(connection)

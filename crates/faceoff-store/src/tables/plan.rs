@@ -28,14 +28,10 @@ impl RunPlan {
         let is_duplicate =
             |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
         if self.tasks.is_empty() || self.tasks.iter().any(is_duplicate) {
-            return Err(StoreError::Conflict(
-                "a plan names each task once, and at least one".into(),
-            ));
+            return StoreError::conflict("a plan names each task once, and at least one");
         }
         if self.episodes_per_task == 0 || self.episodes_per_shard == 0 {
-            return Err(StoreError::Conflict(
-                "a plan plays at least one episode".into(),
-            ));
+            return StoreError::conflict("a plan plays at least one episode");
         }
         let checked = self.variation.perturbations.check();
         checked.map_err(|error| StoreError::Conflict(format!("perturbations.{error}")))

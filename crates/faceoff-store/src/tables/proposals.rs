@@ -140,18 +140,16 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: ProposalId) -> R
 }
 
 pub(crate) async fn insert(connection: &mut SqliteConnection, proposal: &Proposal) -> Result<()> {
-    let (id, stage, kind) = (proposal.id, proposal.stage, proposal.kind.label());
-    let (day, created_at) = (proposal.kind.day().map(Text), Instant(proposal.created_at));
     sqlx::query!(
         "INSERT INTO proposals (id, stage_id, revision, kind, day, reason, created_at)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
-        id,
-        stage,
+        proposal.id,
+        proposal.stage,
         proposal.revision,
-        kind,
-        day,
+        proposal.kind.label(),
+        proposal.kind.day().map(Text),
         proposal.reason,
-        created_at,
+        Instant(proposal.created_at),
     )
     .execute(connection)
     .await?;
@@ -167,11 +165,10 @@ pub(crate) async fn set_outcome(
         ProposalOutcome::Applied(at) => ("applied", at),
         ProposalOutcome::Dropped(at) => ("dropped", at),
     };
-    let decided_at = Instant(decided_at);
     sqlx::query!(
         "UPDATE proposals SET outcome = ?, settled_at = ? WHERE id = ?",
         label,
-        decided_at,
+        Instant(decided_at),
         id,
     )
     .execute(connection)

@@ -87,12 +87,11 @@ pub(crate) async fn count_open(connection: &mut SqliteConnection, team: TeamId) 
 }
 
 pub(crate) async fn insert(connection: &mut SqliteConnection, question: &Question) -> Result<()> {
-    let (id, team, at) = (question.id, question.team, Instant(question.at));
     sqlx::query!(
         "INSERT INTO questions (id, team_id, asked_at, text) VALUES (?, ?, ?, ?)",
-        id,
-        team,
-        at,
+        question.id,
+        question.team,
+        Instant(question.at),
         question.text
     )
     .execute(connection)
@@ -105,11 +104,10 @@ pub(crate) async fn set_answer(
     id: QuestionId,
     answer: &Reply,
 ) -> Result<()> {
-    let at = Instant(answer.at);
     sqlx::query!(
         "UPDATE questions SET answer = ?, answered_at = ?, public = ? WHERE id = ?",
         answer.text,
-        at,
+        Instant(answer.at),
         answer.is_public,
         id
     )

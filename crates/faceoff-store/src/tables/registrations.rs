@@ -117,8 +117,7 @@ pub(crate) async fn by_code(
     connection: &mut SqliteConnection,
     code_hash: [u8; 32],
 ) -> Result<Option<Registration>> {
-    let code_hash = Bytes32(code_hash);
-    let row = select_registrations!("WHERE code_hash = ?", code_hash)
+    let row = select_registrations!("WHERE code_hash = ?", Bytes32(code_hash))
         .fetch_optional(connection)
         .await?;
     Ok(row.map(Registration::from))
@@ -148,11 +147,10 @@ pub(crate) async fn count_pending(connection: &mut SqliteConnection) -> Result<i
 
 /// Is a registration for this team name pending?
 pub(crate) async fn is_pending(connection: &mut SqliteConnection, name: &TeamName) -> Result<bool> {
-    let name = name.as_str();
     Ok(sqlx::query_scalar!(
         r#"SELECT EXISTS (SELECT 1 FROM registrations WHERE state = 'waiting' AND team_name = ? COLLATE NOCASE)
                   AS "waits!: bool""#,
-        name
+        name.as_str()
     )
     .fetch_one(connection)
     .await?)
@@ -163,23 +161,20 @@ pub(crate) async fn insert(
     registration: &Registration,
     code_hash: [u8; 32],
 ) -> Result<()> {
-    let (id, code_hash) = (registration.id, Bytes32(code_hash));
-    let name = registration.team_name.as_str();
     let division = registration.division.as_ref().map(DivisionName::as_str);
-    let created_at = Instant(registration.created_at);
     sqlx::query!(
         "INSERT INTO registrations (id, code_hash, team_name, affiliation, link, division, contact, accepted_terms,
                                     created_at, state)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 'waiting')",
-        id,
-        code_hash,
-        name,
+        registration.id,
+        Bytes32(code_hash),
+        registration.team_name.as_str(),
         registration.affiliation,
         registration.link,
         division,
         registration.contact,
         registration.accepted_terms,
-        created_at,
+        Instant(registration.created_at),
     )
     .execute(connection)
     .await?;
@@ -192,10 +187,9 @@ pub(crate) async fn set_approved(
     team: TeamId,
     approved_at: Timestamp,
 ) -> Result<()> {
-    let approved_at = Instant(approved_at);
     sqlx::query!(
         "UPDATE registrations SET state = 'approved', decided_at = ?, team_id = ? WHERE id = ?",
-        approved_at,
+        Instant(approved_at),
         team,
         id
     )
@@ -210,10 +204,9 @@ pub(crate) async fn set_refused(
     reason: &str,
     refused_at: Timestamp,
 ) -> Result<()> {
-    let refused_at = Instant(refused_at);
     sqlx::query!(
         "UPDATE registrations SET state = 'refused', decided_at = ?, reason = ? WHERE id = ?",
-        refused_at,
+        Instant(refused_at),
         reason,
         id
     )

@@ -42,11 +42,10 @@ pub(crate) async fn set(
     stage: StageId,
     retention: &Retention,
 ) -> Result<()> {
-    let retention = Json(retention);
     sqlx::query!(
         "INSERT OR REPLACE INTO stage_retentions (stage_id, retention) VALUES (?, ?)",
         stage,
-        retention
+        Json(retention)
     )
     .execute(connection)
     .await?;
@@ -146,7 +145,6 @@ pub(crate) async fn idle_bundles(
     stage: StageId,
     removable: &[EvaluationId],
 ) -> Result<Vec<(SubmissionId, u64)>> {
-    let removable = Json(removable);
     let rows = sqlx::query!(
         "SELECT s.id, s.bundle_bytes AS bytes
          FROM submissions s JOIN teams t ON t.id = s.team_id
@@ -171,7 +169,7 @@ pub(crate) async fn idle_bundles(
            AND NOT EXISTS (SELECT 1 FROM games g WHERE g.home_submission_id = s.id AND g.state IN ('queued', 'running'))
            AND NOT EXISTS (SELECT 1 FROM games g WHERE g.away_submission_id = s.id AND g.state IN ('queued', 'running'))",
         stage,
-        removable,
+        Json(removable),
     )
     .fetch_all(connection)
     .await?;
@@ -185,10 +183,9 @@ pub(crate) async fn set_dataset_removed(
     reason: &str,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE evaluations SET dataset_removed_at = ?, dataset_removed_for = ? WHERE id = ?",
-        now,
+        Instant(now),
         reason,
         id,
     )
@@ -203,13 +200,12 @@ pub(crate) async fn deletable_datasets(
     connection: &mut SqliteConnection,
     removed_until: Timestamp,
 ) -> Result<Vec<(EvaluationId, String)>> {
-    let removed_until = Instant(removed_until);
     let rows = sqlx::query!(
         r#"SELECT e.id, e.dataset AS "dataset!" FROM counting_evaluations e
            JOIN teams t ON t.id = e.team_id
            WHERE e.dataset_removed_at IS NOT NULL AND e.dataset_removed_at <= ? AND e.dataset_gone = 0
              AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0"#,
-        removed_until
+        Instant(removed_until)
     )
     .fetch_all(connection)
     .await?;
@@ -222,11 +218,10 @@ pub(crate) async fn set_dropped_dataset_deleted(
     id: EvaluationId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE evaluations
          SET dataset_removed_at = ?, dataset_removed_for = 'the proposal was dropped', dataset_gone = 1 WHERE id = ?",
-        now,
+        Instant(now),
         id
     )
     .execute(connection)

@@ -115,20 +115,19 @@ pub(crate) async fn insert(
     tournament: TournamentId,
     round: &TournamentRound,
 ) -> Result<()> {
-    let (id, number, started_at) = (tournament, round.number.get(), Instant(round.started_at));
+    let (id, number) = (tournament, round.number.get());
     let byes: Vec<(u32, TeamId)> = round
         .byes
         .iter()
         .map(|bye| (bye.matchday, bye.team))
         .collect();
-    let (groups, byes) = (Json(&round.groups), Json(byes));
     sqlx::query!(
         "INSERT INTO rounds (tournament_id, number, started_at, groups, byes) VALUES (?, ?, ?, ?, ?)",
         id,
         number,
-        started_at,
-        groups,
-        byes,
+        Instant(round.started_at),
+        Json(&round.groups),
+        Json(byes),
     )
     .execute(&mut *connection)
     .await?;
@@ -154,12 +153,11 @@ pub(crate) async fn set_ended(
     round: RoundNumber,
     now: Timestamp,
 ) -> Result<bool> {
-    let (id, number, now) = (tournament, round.get(), Instant(now));
     let updated = sqlx::query!(
         "UPDATE rounds SET over_at = ? WHERE tournament_id = ? AND number = ? AND over_at IS NULL",
-        now,
-        id,
-        number,
+        Instant(now),
+        tournament,
+        round.get(),
     )
     .execute(connection)
     .await?;

@@ -42,8 +42,6 @@ pub(crate) async fn insert(
     contestants: &[SubmissionId],
 ) -> Result<()> {
     let (id, plan) = (run.id, &run.plan);
-    let (profile, seed, tasks) = (plan.profile, run.seed, Json(&plan.tasks));
-    let ruleset = run.ruleset;
     let limits = (!plan.limits.is_none()).then_some(Json(&plan.limits));
     let variation = (!plan.variation.is_none()).then_some(Json(&plan.variation));
     sqlx::query!(
@@ -51,14 +49,14 @@ pub(crate) async fn insert(
                            keeps_recordings, ruleset, variation, limits, state)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
         id,
-        profile,
-        seed,
-        tasks,
+        plan.profile,
+        run.seed,
+        Json(&plan.tasks),
         plan.episodes_per_task,
         plan.episodes_per_shard,
         plan.max_faults,
         run.keeps_recordings,
-        ruleset,
+        run.ruleset,
         variation,
         limits,
     )
@@ -158,12 +156,11 @@ pub(crate) async fn with_old_recordings(
     connection: &mut SqliteConnection,
     ended_until: Timestamp,
 ) -> Result<Vec<RunId>> {
-    let ended_until = Instant(ended_until);
     let runs = sqlx::query_scalar!(
         "SELECT r.id
          FROM runs r JOIN evaluations e ON e.run_id = r.id
          WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL AND e.finished_at <= ?",
-        ended_until,
+        Instant(ended_until),
     )
     .fetch_all(connection)
     .await?;
@@ -175,10 +172,9 @@ pub(crate) async fn set_recordings_removed(
     id: RunId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
     sqlx::query!(
         "UPDATE runs SET recordings_removed_at = ? WHERE id = ?",
-        now,
+        Instant(now),
         id
     )
     .execute(connection)
@@ -193,7 +189,6 @@ pub(crate) async fn clearable(
     summary_version: u32,
     ended_until: Timestamp,
 ) -> Result<Vec<RunId>> {
-    let ended_until = Instant(ended_until);
     Ok(sqlx::query_scalar!(
         r#"SELECT r.id AS "run!"
            FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id
@@ -202,7 +197,7 @@ pub(crate) async fn clearable(
              AND (r.state <> 'played'
                   OR EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?))
            ORDER BY COALESCE(e.finished_at, a.finished_at), r.id"#,
-        ended_until,
+        Instant(ended_until),
         summary_version,
     )
     .fetch_all(connection)
@@ -233,10 +228,13 @@ pub(crate) async fn set_cleared(
     id: RunId,
     now: Timestamp,
 ) -> Result<()> {
-    let now = Instant(now);
-    sqlx::query!("UPDATE runs SET cleared_at = ? WHERE id = ?", now, id)
-        .execute(connection)
-        .await?;
+    sqlx::query!(
+        "UPDATE runs SET cleared_at = ? WHERE id = ?",
+        Instant(now),
+        id
+    )
+    .execute(connection)
+    .await?;
     Ok(())
 }
 

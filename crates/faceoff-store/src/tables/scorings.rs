@@ -10,11 +10,10 @@ pub(crate) async fn insert(
     evaluation: EvaluationId,
     job: Uuid,
 ) -> Result<()> {
-    let job = Text(job);
     sqlx::query!(
         "INSERT INTO scorings (evaluation_id, job_id) VALUES (?, ?)",
         evaluation,
-        job,
+        Text(job),
     )
     .execute(connection)
     .await?;

@@ -134,8 +134,7 @@ pub(crate) async fn set_registration_open(
 }
 
 pub(crate) async fn close(connection: &mut SqliteConnection, now: Timestamp) -> Result<()> {
-    let now = Instant(now);
-    sqlx::query!("UPDATE season SET closed_at = ?", now)
+    sqlx::query!("UPDATE season SET closed_at = ?", Instant(now))
         .execute(connection)
         .await?;
     Ok(())
@@ -146,12 +145,11 @@ pub(crate) async fn create_once(connection: &mut SqliteConnection) -> Result<()>
     let mut secret = [0; 32];
     getrandom::fill(&mut secret)
         .map_err(|error| StoreError::Database(sqlx::Error::Io(std::io::Error::other(error))))?;
-    let secret = Bytes32(secret);
     sqlx::query!(
         "INSERT INTO season (id, name, secret, created_at)
          VALUES (1, 'Season 1', ?, CAST(unixepoch('subsec') * 1000 AS INTEGER))
          ON CONFLICT (id) DO NOTHING",
-        secret,
+        Bytes32(secret),
     )
     .execute(connection)
     .await?;

@@ -56,21 +56,21 @@ impl ShardCommit {
         let is_complete = self.outcomes.len() == episodes.len()
             || (self.stopped_by_faults && self.outcomes.len() < episodes.len());
         if !(is_in_order && is_complete) {
-            return Err(StoreError::Conflict(format!(
+            return StoreError::conflict(format!(
                 "the outcomes do not cover {} episodes {} to {}",
                 shard.task,
                 shard.first_episode,
                 shard.end_episode - 1
-            )));
+            ));
         }
         match (&self.recording, keeps_recordings) {
             (Some(_), true) | (None, false) => Ok(()),
-            (None, true) => Err(StoreError::Conflict(
-                "the run keeps recordings: upload the shard's and name its key".into(),
-            )),
-            (Some(key), false) => Err(StoreError::Conflict(format!(
+            (None, true) => StoreError::conflict(
+                "the run keeps recordings: upload the shard's and name its key",
+            ),
+            (Some(key), false) => StoreError::conflict(format!(
                 "the run keeps no recordings: do not upload one (got {key})"
-            ))),
+            )),
         }
     }
 
@@ -122,8 +122,7 @@ pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
     job: Uuid,
 ) -> Result<Option<(RunId, Shard)>> {
-    let job = Text(job);
-    Ok(select_shards!("WHERE job_id = ?", job)
+    Ok(select_shards!("WHERE job_id = ?", Text(job))
         .fetch_optional(connection)
         .await?
         .map(|row| (row.run, row.into())))
@@ -200,16 +199,14 @@ pub(crate) async fn insert(
     position: u32,
     job: Uuid,
 ) -> Result<()> {
-    let job = Text(job);
-    let (id, task) = (shard.id, shard.task);
     sqlx::query!(
         "INSERT INTO shards (id, run_id, job_id, position, task, first_episode, end_episode)
          VALUES (?, ?, ?, ?, ?, ?, ?)",
-        id,
+        shard.id,
         run,
-        job,
+        Text(job),
         position,
-        task,
+        shard.task,
         shard.first_episode,
         shard.end_episode,
     )
@@ -225,17 +222,16 @@ pub(crate) async fn commit(
     commit: &ShardCommit,
     now: Timestamp,
 ) -> Result<()> {
-    let (id_text, now, outcomes) = (id, Instant(now), Json(&commit.outcomes));
     let agent_faults = commit.agent_faults();
     let stored = sqlx::query!(
         "UPDATE shards SET committed_at = ?, recording = ?, outcomes = ?, agent_faults = ?, log = ?
          WHERE id = ? AND committed_at IS NULL",
-        now,
+        Instant(now),
         commit.recording,
-        outcomes,
+        Json(&commit.outcomes),
         agent_faults,
         commit.log,
-        id_text,
+        id,
     )
     .execute(connection)
     .await?;

@@ -47,12 +47,12 @@ pub(crate) async fn check_not_signed_off(
     .await?;
     match sign_off {
         None => Ok(()),
-        Some(row) => Err(StoreError::Conflict(format!(
+        Some(row) => StoreError::conflict(format!(
             "the stage {:?} was signed off on {} by {}: it cannot be changed any more",
             row.name,
             row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
             row.by
-        ))),
+        )),
     }
 }
 
@@ -62,14 +62,13 @@ pub(crate) async fn sign_off(
     actor: &Actor,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, now) = (stage, Instant(now));
     sqlx::query!(
         "UPDATE stages SET finalised_at = ?, finalised_by = ?,
                 finalised_without = (SELECT json_group_array(id) FROM teams WHERE disqualified_at IS NOT NULL)
          WHERE id = ?",
-        now,
+        Instant(now),
         actor,
-        id,
+        stage,
     )
     .execute(connection)
     .await?;
@@ -115,11 +114,10 @@ pub(crate) async fn set_final_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
 ) -> Result<()> {
-    let (stage, day) = (stage_day.stage, Text(stage_day.date));
     sqlx::query!(
         "UPDATE days SET is_final = 1 WHERE stage_id = ? AND day = ?",
-        stage,
-        day
+        stage_day.stage,
+        Text(stage_day.date)
     )
     .execute(connection)
     .await?;

@@ -263,25 +263,22 @@ pub(crate) async fn insert(
     stage: &Stage,
     now: Timestamp,
 ) -> Result<()> {
-    let (id, name, opens_at) = (stage.id, stage.name.as_str(), Instant(stage.opens_at));
-    let (closes_at, zone) = (stage.closes_at.map(Instant), &stage.zone);
-    let (settings, now) = (Json(&stage.settings), Instant(now));
     sqlx::query!(
         "INSERT INTO stages (id, name, opens_at, closes_at, zone, settings, names_seeds, configured, created_at)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        id,
-        name,
-        opens_at,
-        closes_at,
-        zone,
-        settings,
+        stage.id,
+        stage.name.as_str(),
+        Instant(stage.opens_at),
+        stage.closes_at.map(Instant),
+        &stage.zone,
+        Json(&stage.settings),
         stage.names_seeds,
         stage.configured,
-        now,
+        Instant(now),
     )
     .execute(&mut *connection)
     .await
-    .map_err(|error| name_error(error, &stage.name))?;
+    .map_err(name_error(&stage.name))?;
     insert_revision(connection, stage.id, &stage.rules).await
 }
 
@@ -290,13 +287,12 @@ pub(crate) async fn insert_revision(
     stage: StageId,
     revision: &Revision,
 ) -> Result<()> {
-    let (since, rules) = (Instant(revision.since), Json(&revision.rules));
     sqlx::query!(
         "INSERT INTO stage_revisions (stage_id, revision, since, rules) VALUES (?, ?, ?, ?)",
         stage,
         revision.number,
-        since,
-        rules,
+        Instant(revision.since),
+        Json(&revision.rules),
     )
     .execute(connection)
     .await?;
@@ -309,11 +305,10 @@ pub(crate) async fn replace_revision(
     stage: StageId,
     revision: &Revision,
 ) -> Result<()> {
-    let (since, rules) = (Instant(revision.since), Json(&revision.rules));
     sqlx::query!(
         "UPDATE stage_revisions SET since = ?, rules = ? WHERE stage_id = ? AND revision = ?",
-        since,
-        rules,
+        Instant(revision.since),
+        Json(&revision.rules),
         stage,
         revision.number,
     )
@@ -324,32 +319,27 @@ pub(crate) async fn replace_revision(
 
 /// Stores everything of a stage except its rules. [`StoreError::StageNameTaken`] if another stage has its name.
 pub(crate) async fn update(connection: &mut SqliteConnection, stage: &Stage) -> Result<()> {
-    let (id, name, opens_at) = (stage.id, stage.name.as_str(), Instant(stage.opens_at));
-    let (closes_at, zone) = (stage.closes_at.map(Instant), &stage.zone);
-    let settings = Json(&stage.settings);
     sqlx::query!(
         "UPDATE stages SET name = ?, opens_at = ?, closes_at = ?, zone = ?, settings = ?, configured = ?
          WHERE id = ?",
-        name,
-        opens_at,
-        closes_at,
-        zone,
-        settings,
+        stage.name.as_str(),
+        Instant(stage.opens_at),
+        stage.closes_at.map(Instant),
+        &stage.zone,
+        Json(&stage.settings),
         stage.configured,
-        id,
+        stage.id,
     )
     .execute(connection)
     .await
-    .map_err(|error| name_error(error, &stage.name))?;
+    .map_err(name_error(&stage.name))?;
     Ok(())
 }
 
-fn name_error(error: sqlx::Error, name: &StageName) -> StoreError {
-    if StoreError::is_duplicate(&error, "stages.name") {
+fn name_error(name: &StageName) -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("stages.name", || {
         StoreError::StageNameTaken(name.to_string())
-    } else {
-        error.into()
-    }
+    })
 }
 
 #[cfg(test)]

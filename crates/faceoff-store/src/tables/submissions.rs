@@ -222,12 +222,11 @@ pub(crate) async fn of_team_after(
     (uploaded_at, id): (Timestamp, Option<SubmissionId>),
     limit: u32,
 ) -> Result<Vec<Submission>> {
-    let uploaded_at = Instant(uploaded_at);
     select_submissions!(
         "WHERE s.team_id = ?1 AND s.created_at <= ?2 AND (s.created_at < ?2 OR ?3 IS NULL OR s.id < ?3)
          ORDER BY s.created_at DESC, s.id DESC LIMIT ?4",
         team,
-        uploaded_at,
+        Instant(uploaded_at),
         id,
         limit
     )
@@ -273,7 +272,6 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let bytes = i64::try_from(bundle.bytes)
         .map_err(|_| StoreError::Conflict("the bundle is larger than any disk".into()))?;
-    let now = Instant(now);
     sqlx::query!(
         "INSERT INTO submissions (id, team_id, bundle_key, bundle_bytes, bundle_blake3,
                                   bundle_file_name, created_at, state)
@@ -284,7 +282,7 @@ pub(crate) async fn insert(
         bytes,
         bundle.blake3,
         bundle.file_name,
-        now,
+        Instant(now),
     )
     .execute(connection)
     .await?;
@@ -298,12 +296,11 @@ pub(crate) async fn set_valid(
     timing: &[ValidationTiming],
     log: &str,
 ) -> Result<()> {
-    let timing = Json(timing);
     sqlx::query!(
         "UPDATE submissions SET state = 'valid', agent_name = ?, runtime = ?, timing = ?, log = ? WHERE id = ?",
         agent_name,
         runtime,
-        timing,
+        Json(timing),
         log,
         id,
     )
@@ -320,14 +317,13 @@ pub(crate) async fn set_invalid(
     timing: &[ValidationTiming],
     log: &str,
 ) -> Result<()> {
-    let timing = Json(timing);
     sqlx::query!(
         "UPDATE submissions SET state = 'invalid', agent_name = ?, runtime = ?, reason = ?, timing = ?, log = ?
          WHERE id = ?",
         agent_name,
         runtime,
         reason,
-        timing,
+        Json(timing),
         log,
         id,
     )
@@ -357,10 +353,9 @@ pub(crate) async fn set_withdrawn(
     id: SubmissionId,
     withdrawn_at: Option<Timestamp>,
 ) -> Result<()> {
-    let withdrawn_at = withdrawn_at.map(Instant);
     sqlx::query!(
         "UPDATE submissions SET withdrawn_at = ? WHERE id = ?",
-        withdrawn_at,
+        withdrawn_at.map(Instant),
         id
     )
     .execute(connection)

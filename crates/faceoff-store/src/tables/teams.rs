@@ -95,21 +95,19 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: TeamId) -> Resul
 
 /// Adds a team. [`StoreError::TeamNameTaken`] if the name exists, regardless of case.
 pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Result<()> {
-    let (id, name) = (team.id, &team.name);
-    let created_at = Instant(team.created_at);
     let division = team.profile.division.as_ref().map(DivisionName::as_str);
     sqlx::query!(
         "INSERT INTO teams (id, name, created_at, affiliation, link, division) VALUES (?, ?, ?, ?, ?, ?)",
-        id,
-        name,
-        created_at,
+        team.id,
+        &team.name,
+        Instant(team.created_at),
         team.profile.affiliation,
         team.profile.link,
         division,
     )
     .execute(connection)
     .await
-    .map_err(|error| name_error(error, &team.name))?;
+    .map_err(name_error(&team.name))?;
     Ok(())
 }
 
@@ -123,7 +121,7 @@ pub(crate) async fn set_name(
     sqlx::query!("UPDATE teams SET name = ? WHERE id = ?", text, id)
         .execute(connection)
         .await
-        .map_err(|error| name_error(error, name))?;
+        .map_err(name_error(name))?;
     Ok(())
 }
 
@@ -153,10 +151,9 @@ pub(crate) async fn set_retired(
     is_by_organiser: bool,
 ) -> Result<()> {
     let is_by_organiser = is_by_organiser && retired_at.is_some();
-    let retired_at = retired_at.map(Instant);
     sqlx::query!(
         "UPDATE teams SET retired_at = ?, retired_by_organiser = ? WHERE id = ?",
-        retired_at,
+        retired_at.map(Instant),
         is_by_organiser,
         id
     )
@@ -262,10 +259,6 @@ pub(crate) async fn check_may_compete(connection: &mut SqliteConnection, id: Tea
 }
 
 /// The store's error for a failed write of a team's name.
-fn name_error(error: sqlx::Error, name: &TeamName) -> StoreError {
-    if StoreError::is_duplicate(&error, "teams.name") {
-        StoreError::TeamNameTaken(name.to_string())
-    } else {
-        error.into()
-    }
+fn name_error(name: &TeamName) -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("teams.name", || StoreError::TeamNameTaken(name.to_string()))
 }

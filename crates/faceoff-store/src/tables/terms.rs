@@ -37,11 +37,10 @@ pub(crate) async fn newest(connection: &mut SqliteConnection) -> Result<Option<u
 }
 
 pub(crate) async fn insert(connection: &mut SqliteConnection, terms: &Terms) -> Result<()> {
-    let since = Instant(terms.since);
     sqlx::query!(
         "INSERT INTO terms (version, since, text) VALUES (?, ?, ?)",
         terms.version,
-        since,
+        Instant(terms.since),
         terms.text
     )
     .execute(connection)

@@ -158,8 +158,7 @@ pub(crate) async fn by_hash(
     connection: &mut SqliteConnection,
     hash: [u8; 32],
 ) -> Result<Option<Token>> {
-    let hash = Bytes32(hash);
-    let row = select_tokens!("WHERE hash = ?", hash)
+    let row = select_tokens!("WHERE hash = ?", Bytes32(hash))
         .fetch_optional(connection)
         .await?;
     Ok(row.map(Token::from))
@@ -180,15 +179,14 @@ pub(crate) async fn count_valid(
     owner: TokenOwner,
     now: Timestamp,
 ) -> Result<i64> {
-    let (kind, team, user, now) = (owner.kind(), owner.team(), owner.user(), Instant(now));
     Ok(sqlx::query_scalar!(
         "SELECT COUNT(*) FROM tokens
          WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL
            AND (expires_at IS NULL OR expires_at > ?)",
-        kind,
-        team,
-        user,
-        now,
+        owner.kind(),
+        owner.team(),
+        owner.user(),
+        Instant(now),
     )
     .fetch_one(connection)
     .await?)
@@ -200,26 +198,23 @@ pub(crate) async fn insert(
     token: &Token,
     hash: [u8; 32],
 ) -> Result<()> {
-    let (id, hash, kind) = (token.id, Bytes32(hash), token.kind.name());
     let owner = token.owner;
-    let (owner_kind, team, user) = (owner.kind(), owner.team(), owner.user());
-    let (created_at, expires_at) = (Instant(token.created_at), token.expires_at.map(Instant));
     sqlx::query!(
         "INSERT INTO tokens (id, hash, kind, owner, team_id, person_id, name, created_at, expires_at)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        id,
-        hash,
-        kind,
-        owner_kind,
-        team,
-        user,
+        token.id,
+        Bytes32(hash),
+        token.kind.name(),
+        owner.kind(),
+        owner.team(),
+        owner.user(),
         token.name,
-        created_at,
-        expires_at,
+        Instant(token.created_at),
+        token.expires_at.map(Instant),
     )
     .execute(connection)
     .await
-    .map_err(hash_error)?;
+    .map_err(hash_error())?;
     Ok(())
 }
 
@@ -229,15 +224,14 @@ pub(crate) async fn set_hash(
     id: TokenId,
     hash: [u8; 32],
 ) -> Result<()> {
-    let hash = Bytes32(hash);
     sqlx::query!(
         "UPDATE tokens SET hash = ?, last_used_at = NULL WHERE id = ?",
-        hash,
+        Bytes32(hash),
         id
     )
     .execute(connection)
     .await
-    .map_err(hash_error)?;
+    .map_err(hash_error())?;
     Ok(())
 }
 
@@ -246,10 +240,9 @@ pub(crate) async fn set_last_used(
     id: TokenId,
     used_at: Timestamp,
 ) -> Result<()> {
-    let used_at = Instant(used_at);
     sqlx::query!(
         "UPDATE tokens SET last_used_at = ? WHERE id = ?",
-        used_at,
+        Instant(used_at),
         id
     )
     .execute(connection)
@@ -262,10 +255,9 @@ pub(crate) async fn revoke(
     id: TokenId,
     revoked_at: Timestamp,
 ) -> Result<()> {
-    let revoked_at = Instant(revoked_at);
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ? WHERE id = ? AND revoked_at IS NULL",
-        revoked_at,
+        Instant(revoked_at),
         id
     )
     .execute(connection)
@@ -280,15 +272,13 @@ pub(crate) async fn revoke_others(
     kept: Option<TokenId>,
     revoked_at: Timestamp,
 ) -> Result<()> {
-    let (kind, team, user) = (owner.kind(), owner.team(), owner.user());
-    let revoked_at = Instant(revoked_at);
     sqlx::query!(
         "UPDATE tokens SET revoked_at = ?
          WHERE owner = ? AND team_id IS ? AND person_id IS ? AND revoked_at IS NULL AND id IS NOT ?",
-        revoked_at,
-        kind,
-        team,
-        user,
+        Instant(revoked_at),
+        owner.kind(),
+        owner.team(),
+        owner.user(),
         kept,
     )
     .execute(connection)
@@ -301,10 +291,9 @@ pub(crate) async fn delete_old_sessions(
     connection: &mut SqliteConnection,
     ended_before: Timestamp,
 ) -> Result<()> {
-    let ended_before = Instant(ended_before);
     sqlx::query!(
         "DELETE FROM tokens WHERE kind = 'session' AND (expires_at < ?1 OR revoked_at < ?1)",
-        ended_before
+        Instant(ended_before)
     )
     .execute(connection)
     .await?;
@@ -312,10 +301,8 @@ pub(crate) async fn delete_old_sessions(
 }
 
 /// The store's error for a failed write of a token's hash.
-fn hash_error(error: sqlx::Error) -> StoreError {
-    if StoreError::is_duplicate(&error, "tokens.hash") {
+fn hash_error() -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("tokens.hash", || {
         StoreError::Conflict("there is such a token: draw a new one".into())
-    } else {
-        error.into()
-    }
+    })
 }

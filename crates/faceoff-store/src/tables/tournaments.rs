@@ -106,10 +106,10 @@ pub(crate) async fn find_open(
     let tournament = find(connection, id).await?;
     match tournament.closed_at {
         None => Ok(tournament),
-        Some(at) => Err(StoreError::Conflict(format!(
+        Some(at) => StoreError::conflict(format!(
             "the tournament was closed on {}: it cannot be changed any more",
             at.strftime("%Y-%m-%d at %H:%M UTC")
-        ))),
+        )),
     }
 }
 
@@ -127,22 +127,19 @@ pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
 ) -> Result<()> {
-    let (id, name) = (tournament.id, tournament.name.as_str());
-    let (created_at, stage) = (Instant(tournament.created_at), tournament.stage);
-    let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
     sqlx::query!(
         "INSERT INTO tournaments (id, number, name, created_at, stage_id, rules, settings) VALUES (?, ?, ?, ?, ?, ?, ?)",
-        id,
+        tournament.id,
         tournament.number,
-        name,
-        created_at,
-        stage,
-        rules,
-        settings,
+        tournament.name.as_str(),
+        Instant(tournament.created_at),
+        tournament.stage,
+        Json(&tournament.rules),
+        Json(&tournament.settings),
     )
     .execute(connection)
     .await
-    .map_err(|error| name_error(error, &tournament.name))?;
+    .map_err(name_error(&tournament.name))?;
     Ok(())
 }
 
@@ -151,34 +148,29 @@ pub(crate) async fn update(
     connection: &mut SqliteConnection,
     tournament: &Tournament,
 ) -> Result<()> {
-    let (id, name) = (tournament.id, tournament.name.as_str());
-    let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
-    let (baseline, closed_at) = (tournament.baseline, tournament.closed_at.map(Instant));
     let paused_at = tournament.paused.as_ref().map(|paused| Instant(paused.at));
     let paused_for = tournament.paused.as_ref().map(|paused| &paused.reason);
     sqlx::query!(
         "UPDATE tournaments SET name = ?, rules = ?, settings = ?, baseline_id = ?, paused_at = ?, paused_for = ?,
                 closed_at = ? WHERE id = ?",
-        name,
-        rules,
-        settings,
-        baseline,
+        tournament.name.as_str(),
+        Json(&tournament.rules),
+        Json(&tournament.settings),
+        tournament.baseline,
         paused_at,
         paused_for,
-        closed_at,
-        id,
+        tournament.closed_at.map(Instant),
+        tournament.id,
     )
     .execute(connection)
     .await
-    .map_err(|error| name_error(error, &tournament.name))?;
+    .map_err(name_error(&tournament.name))?;
     Ok(())
 }
 
 /// The store's error for a failed write of a tournament's name.
-fn name_error(error: sqlx::Error, name: &StageName) -> StoreError {
-    if StoreError::is_duplicate(&error, "tournaments.name") {
+fn name_error(name: &StageName) -> impl FnOnce(sqlx::Error) -> StoreError {
+    StoreError::if_duplicate("tournaments.name", || {
         StoreError::TournamentNameTaken(name.to_string())
-    } else {
-        error.into()
-    }
+    })
 }

@@ -106,26 +106,20 @@ pub(crate) async fn insert(
     user: &User,
     password: Option<&str>,
 ) -> Result<()> {
-    let (id, name) = (user.id, user.name.as_str());
-    let (team, joined_at) = (user.team, Instant(user.joined_at));
     sqlx::query!(
         "INSERT INTO people (id, name, team_id, joined_at, password, accepted_terms) VALUES (?, ?, ?, ?, ?, ?)",
-        id,
-        name,
-        team,
-        joined_at,
+        user.id,
+        user.name.as_str(),
+        user.team,
+        Instant(user.joined_at),
         password,
         user.accepted_terms,
     )
     .execute(connection)
     .await
-    .map_err(|error| {
-        if StoreError::is_duplicate(&error, "people.name") {
-            StoreError::UserNameTaken(user.name.to_string())
-        } else {
-            error.into()
-        }
-    })?;
+    .map_err(StoreError::if_duplicate("people.name", || {
+        StoreError::UserNameTaken(user.name.to_string())
+    }))?;
     Ok(())
 }
 
@@ -161,10 +155,9 @@ pub(crate) async fn set_left(
     id: UserId,
     left_at: Timestamp,
 ) -> Result<()> {
-    let left_at = Instant(left_at);
     sqlx::query!(
         "UPDATE people SET left_at = ?, password = NULL WHERE id = ?",
-        left_at,
+        Instant(left_at),
         id
     )
     .execute(connection)

@@ -10,11 +10,10 @@ pub(crate) async fn insert(
     submission: SubmissionId,
     job: Uuid,
 ) -> Result<()> {
-    let job = Text(job);
     sqlx::query!(
         "INSERT INTO validation_runs (submission_id, job_id) VALUES (?, ?)",
         submission,
-        job,
+        Text(job),
     )
     .execute(connection)
     .await?;
@@ -26,10 +25,9 @@ pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
     job: Uuid,
 ) -> Result<Option<SubmissionId>> {
-    let job = Text(job);
     let found = sqlx::query_scalar!(
         "SELECT submission_id AS id FROM validation_runs WHERE job_id = ?",
-        job
+        Text(job)
     )
     .fetch_optional(connection)
     .await?;

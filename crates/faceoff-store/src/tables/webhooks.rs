@@ -147,17 +147,15 @@ pub(crate) async fn insert(
     webhook: &Webhook,
     secret: [u8; 32],
 ) -> Result<()> {
-    let (id, team, secret) = (webhook.id, webhook.team, Bytes32(secret));
-    let (about, created_at) = (Json(&webhook.topics), Instant(webhook.created_at));
     sqlx::query!(
         "INSERT INTO webhooks (id, team_id, name, url, about, secret, created_at, seen) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-        id,
-        team,
+        webhook.id,
+        webhook.team,
         webhook.name,
         webhook.url,
-        about,
-        secret,
-        created_at,
+        Json(&webhook.topics),
+        Bytes32(secret),
+        Instant(webhook.created_at),
         webhook.seen,
     )
     .execute(connection)
@@ -167,8 +165,6 @@ pub(crate) async fn insert(
 
 /// Stores the fields that the owner can change, and the state.
 pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook) -> Result<()> {
-    let (id, about) = (webhook.id, Json(&webhook.topics));
-    let failing_since = webhook.failing_since.map(Instant);
     let (dead_at, dead_for) = match &webhook.disabled {
         Some(disabled) => (Some(Instant(disabled.at)), Some(disabled.reason.clone())),
         None => (None, None),
@@ -177,12 +173,12 @@ pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook)
         "UPDATE webhooks SET name = ?, url = ?, about = ?, seen = ?, failing_since = ?, dead_at = ?, dead_for = ? WHERE id = ?",
         webhook.name,
         webhook.url,
-        about,
+        Json(&webhook.topics),
         webhook.seen,
-        failing_since,
+        webhook.failing_since.map(Instant),
         dead_at,
         dead_for,
-        id,
+        webhook.id,
     )
     .execute(connection)
     .await?;
@@ -208,12 +204,10 @@ pub(crate) async fn set_secret(
     secret: [u8; 32],
     old_secret_until: Timestamp,
 ) -> Result<()> {
-    let secret = Bytes32(secret);
-    let old_secret_until = Instant(old_secret_until);
     sqlx::query!(
         "UPDATE webhooks SET old_secret = secret, old_secret_until = ?, secret = ? WHERE id = ?",
-        old_secret_until,
-        secret,
+        Instant(old_secret_until),
+        Bytes32(secret),
         id
     )
     .execute(connection)

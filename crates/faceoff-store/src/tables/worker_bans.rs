@@ -33,11 +33,10 @@ impl From<BanRow> for WorkerBan {
 
 /// Adds a ban; false if the worker is banned already.
 pub(crate) async fn insert(connection: &mut SqliteConnection, ban: &WorkerBan) -> Result<bool> {
-    let banned_at = Instant(ban.at);
     let inserted = sqlx::query!(
         "INSERT INTO worker_bans (worker, banned_at, reason) VALUES (?, ?, ?) ON CONFLICT DO NOTHING",
         ban.worker,
-        banned_at,
+        Instant(ban.at),
         ban.reason,
     )
     .execute(connection)

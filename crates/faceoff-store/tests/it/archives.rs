@@ -320,10 +320,7 @@ async fn public_archive_has_results_without_episodes() {
 #[tokio::test]
 async fn public_archive_omits_lifted_rulings_and_private_answers() {
     let f = TestStore::new().await;
-    let (alpha, beta) = (
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    );
+    let [alpha, beta] = f.two_valid_submissions().await;
     f.evaluate(alpha.id, &one_shard_plan()).await;
     f.run_all_with_score(1.0).await;
     for (team, reason) in [(alpha.team, "it copied"), (beta.team, "it attacked")] {

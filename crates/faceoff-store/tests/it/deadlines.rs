@@ -47,10 +47,7 @@ async fn run_shard(f: &TestStore) -> (String, TeamId) {
 #[tokio::test]
 async fn unfinished_day_runs_before_the_next_one() {
     let mut f = TestStore::new().await;
-    let [alpha, beta] = [
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    ];
+    let [alpha, beta] = f.two_valid_submissions().await;
     let stage = configure_daily_stage(&f, DayDeadline::Hours(30)).await;
     assert_eq!(start_day(&f, stage).await.len(), 2);
     // Alpha's agent is slow: since teams share the workers' time equally, Beta's evaluations would be preferred for a long time.

@@ -85,6 +85,14 @@ impl TestStore {
         self.validate().await
     }
 
+    /// Creates the teams Alpha and Beta, and a valid submission of each.
+    pub async fn two_valid_submissions(&self) -> [Submission; 2] {
+        [
+            self.valid_submission_of("Alpha").await,
+            self.valid_submission_of("Beta").await,
+        ]
+    }
+
     /// Configures the season's first stage with this plan, from now on.
     pub async fn configure_stage(&self, plan: &RunPlan) -> StageId {
         configure_first_stage(&self.store, plan, self.now).await
@@ -122,10 +130,7 @@ impl TestStore {
 
     /// A released day with a result of 1.0 for each of two teams.
     pub async fn released_day(&self) -> ([Submission; 2], StageDay) {
-        let submissions = [
-            self.valid_submission_of("Alpha").await,
-            self.valid_submission_of("Beta").await,
-        ];
+        let submissions = self.two_valid_submissions().await;
         let evaluation = self.evaluate(submissions[0].id, &one_shard_plan()).await;
         self.run_all_with_score(1.0).await;
         (submissions, evaluation.stage_day)

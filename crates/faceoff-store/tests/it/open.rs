@@ -103,8 +103,7 @@ async fn damaged_values_are_reported_without_panic() {
 #[tokio::test]
 async fn damaged_job_does_not_block_others() {
     let f = TestStore::new().await;
-    let alpha = f.valid_submission_of("Alpha").await;
-    let beta = f.valid_submission_of("Beta").await;
+    let [alpha, beta] = f.two_valid_submissions().await;
     let undamaged = f.evaluate(beta.id, &six_shard_plan()).await;
     damage(
         &f,

@@ -45,10 +45,7 @@ fn row(name: &str, score: f64) -> (String, f64) {
 #[tokio::test]
 async fn trial_runs_last_and_reaches_no_board() {
     let mut f = TestStore::new().await;
-    let submissions = [
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    ];
+    let submissions = f.two_valid_submissions().await;
     let stage = f.configure_stage(&one_shard_plan()).await;
     let trial = propose_trial(&f, stage).await.unwrap();
     assert_eq!((trial.kind, trial.outcome), (ProposalKind::Trial, None));

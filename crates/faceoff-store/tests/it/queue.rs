@@ -283,8 +283,7 @@ async fn outcomes_must_cover_their_shard() {
 #[tokio::test]
 async fn scoring_and_validation_precede_shards() {
     let f = TestStore::new().await;
-    let alpha = f.valid_submission_of("Alpha").await;
-    let beta = f.valid_submission_of("Beta").await;
+    let [alpha, beta] = f.two_valid_submissions().await;
     let one_shard = one_shard_plan();
     let first = f.evaluate(alpha.id, &one_shard).await;
     f.evaluate(beta.id, &one_shard).await;

@@ -71,10 +71,7 @@ async fn runs_started_before_upgrade_keep_their_ruleset() {
 /// Simulates an upgrade from a version with this ruleset, while an evaluation is queued.
 async fn upgrade_from(earlier: Ruleset) {
     let mut f = TestStore::new().await;
-    let [alpha, beta] = [
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    ];
+    let [alpha, beta] = f.two_valid_submissions().await;
     f.evaluate(alpha.id, &six_shard_plan()).await;
     assert_eq!(newest_board(&f).await, (1, Ruleset::CURRENT));
     set_ruleset(&f, earlier).await;

@@ -138,10 +138,7 @@ async fn paused_queue_starts_no_job_and_loses_none() {
 #[tokio::test]
 async fn voided_day_is_over_at_once() {
     let mut f = TestStore::new().await;
-    let [alpha, beta] = [
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    ];
+    let [alpha, beta] = f.two_valid_submissions().await;
     let stage_day = f.evaluate(alpha.id, &one_shard_plan()).await.stage_day;
     let open = f.evaluate(beta.id, &one_shard_plan()).await.id;
     let done = f.finish_next_evaluation().await;
@@ -191,10 +188,7 @@ async fn voided_day_is_over_at_once() {
 #[tokio::test]
 async fn disqualified_team_is_excluded_until_reinstated() {
     let mut f = TestStore::new().await;
-    let [alpha, beta] = [
-        f.valid_submission_of("Alpha").await,
-        f.valid_submission_of("Beta").await,
-    ];
+    let [alpha, beta] = f.two_valid_submissions().await;
     f.evaluate(alpha.id, &one_shard_plan()).await;
     f.run_all_with_score(1.0).await;
     f.advance_clock_s(24 * 3600);

@@ -15,12 +15,11 @@ use std::{
     },
     time::Duration,
 };
+use tokio::sync::mpsc::UnboundedReceiver;
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn shutdown_releases_jobs_for_the_next_worker() {
-    let server = Server::new().await;
-    let id = server.start_evaluation().await;
-    let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
+/// An evaluator whose shards run until they are cancelled; the channel reports their starts.
+fn hanging_evaluator() -> (Arc<Scripted>, UnboundedReceiver<()>) {
+    let (started, starts) = tokio::sync::mpsc::unbounded_channel();
     let hanging = Scripted::new(move |_, observer| {
         started.send(()).unwrap();
         while !observer.cancelled() {
@@ -28,6 +27,14 @@ async fn shutdown_releases_jobs_for_the_next_worker() {
         }
         Err(PlatformFault::Cancelled)
     });
+    (hanging, starts)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn shutdown_releases_jobs_for_the_next_worker() {
+    let server = Server::new().await;
+    let id = server.start_evaluation().await;
+    let (hanging, mut starts) = hanging_evaluator();
     let running = server.start_slots(2, &hanging);
     starts.recv().await.unwrap();
     starts.recv().await.unwrap();
@@ -45,15 +52,8 @@ async fn shutdown_releases_jobs_for_the_next_worker() {
 async fn shutdown_releases_job_before_the_slot_ends() {
     let server = Server::new().await;
     server.start_evaluation().await;
-    let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
+    let (hanging, mut starts) = hanging_evaluator();
     let (worker_ended, worker_end) = std::sync::mpsc::channel();
-    let hanging = Scripted::new(move |_, observer| {
-        started.send(()).unwrap();
-        while !observer.cancelled() {
-            std::thread::yield_now();
-        }
-        Err(PlatformFault::Cancelled)
-    });
     // Did the worker end before it had released its job?
     let (ended_early, worker_end) = (Arc::new(AtomicBool::new(false)), Mutex::new(worker_end));
     let running = server.start_intercepted_slots(1, &hanging, |local| {

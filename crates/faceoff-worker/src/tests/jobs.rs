@@ -64,6 +64,11 @@ async fn complete(server: &Server, job: &JobSpec) -> JobReport {
     }
 }
 
+async fn complete_and_commit(server: &Server, job: &JobSpec) {
+    let report = complete(server, job).await;
+    assert_eq!(commit(server, job, report).await, LeaseStatus::Held);
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn jobs_do_not_contain_the_season_secret() {
     let server = Server::new().await;
@@ -100,8 +105,7 @@ async fn jobs_do_not_contain_the_season_secret() {
                 scored += 1;
             }
         }
-        let report = complete(&server, &job).await;
-        assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
+        complete_and_commit(&server, &job).await;
     }
     // Recorded are 2 shards of each of 3 tasks; the ablation has 1 shard of each task in 6 profiles, unrecorded.
     assert_eq!((validation, recorded, unrecorded, scored), (1, 6, 18, 1));
@@ -131,8 +135,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
         .store
         .request_ablation(Actor::Organiser, submission, &plan, server.now());
     created.await.unwrap();
-    let first_report = complete(&server, &job).await;
-    assert_eq!(commit(&server, &job, first_report).await, LeaseStatus::Held);
+    complete_and_commit(&server, &job).await;
     let mut changed_jobs = 0;
     while let Some(job) = claim_next(&server).await {
         match &job.payload {
@@ -147,8 +150,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
             JobPayload::Scoring { meta, .. } => assert!(meta.variation.is_none()),
             _ => {}
         }
-        let report = complete(&server, &job).await;
-        assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
+        complete_and_commit(&server, &job).await;
     }
     assert!(changed_jobs > 0);
 }
@@ -171,8 +173,7 @@ async fn stage_limits_apply_to_validation_and_later_days() {
             JobPayload::Shard { agent, .. } => shards.push(agent.limits.clone()),
             JobPayload::Game { .. } | JobPayload::Scoring { .. } => {}
         }
-        let report = complete(&server, &job).await;
-        assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
+        complete_and_commit(&server, &job).await;
     }
     let [validation_limits] = &validation[..] else {
         panic!("expected one validation run: {validation:?}");
@@ -194,8 +195,7 @@ async fn scoring_job(server: &Server) -> JobSpec {
         if matches!(job.payload, JobPayload::Scoring { .. }) {
             return job;
         }
-        let report = complete(server, &job).await;
-        assert_eq!(commit(server, &job, report).await, LeaseStatus::Held);
+        complete_and_commit(server, &job).await;
     }
 }
 
@@ -219,8 +219,7 @@ async fn dataset_is_kept_when_its_commit_fails() {
     let server = server.reopen().await;
     server.advance(i64::from(LEASE_S) + 1);
     let job = scoring_job(&server).await;
-    let report = complete(&server, &job).await;
-    assert_eq!(commit(&server, &job, report).await, LeaseStatus::Held);
+    complete_and_commit(&server, &job).await;
     let EvaluationState::Finished {
         dataset: current, ..
     } = server.wait_for_end(id).await

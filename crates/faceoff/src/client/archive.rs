@@ -5,9 +5,10 @@ use super::{Client, with_suffix};
 use anyhow::{Context, bail};
 use faceoff_api::requests::ArchiveQuery;
 use faceoff_archive::{Edition, Manifest, check};
+use faceoff_dataset::allow_missing;
 use futures::StreamExt;
 use reqwest::Method;
-use std::{io::ErrorKind, path::Path, time::Duration};
+use std::{path::Path, time::Duration};
 use tokio::{
     fs::{self, File},
     io::AsyncWriteExt,
@@ -68,12 +69,7 @@ impl Client {
 async fn fetch(response: reqwest::Response, partial: &Path) -> anyhow::Result<u64> {
     let writing = || format!("writing {}", partial.display());
     // A download that was killed may have left a partial file.
-    match fs::remove_file(partial).await {
-        Err(error) if error.kind() != ErrorKind::NotFound => {
-            return Err(error).with_context(writing);
-        }
-        _ => {}
-    }
+    allow_missing(fs::remove_file(partial).await).with_context(writing)?;
     // The archive may contain everything that only organisers may read.
     let mut writer = File::options()
         .write(true)

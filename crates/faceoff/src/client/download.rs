@@ -3,13 +3,14 @@
 
 use super::{Client, is_refused_with, with_suffix};
 use anyhow::{Context, anyhow, bail, ensure};
+use faceoff_dataset::allow_missing;
 use futures::StreamExt;
 use indicatif::ProgressBar;
 use reqwest::{Method, Response, StatusCode, header};
 use serde::Serialize;
 use std::{
     fs::{self, File, TryLockError},
-    io::{ErrorKind, Seek, SeekFrom, Write},
+    io::{Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
@@ -218,12 +219,7 @@ impl PartialFile {
         let writing = || format!("writing {}", self.path.display());
         if length == 0 {
             // The old ETag does not describe the new file.
-            match fs::remove_file(&self.tag_path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => {
-                    return Err(error).with_context(writing);
-                }
-                _ => {}
-            }
+            allow_missing(fs::remove_file(&self.tag_path)).with_context(writing)?;
         }
         self.file.set_len(length).with_context(writing)?;
         self.file

@@ -6,7 +6,7 @@ mod watch;
 use super::{
     output::{print, print_download},
     server::ServerArgs,
-    tournament::{games, lookup::find_tournament_or_newest},
+    tournament::{games, lookup::TournamentOrNewest},
 };
 use crate::client::Client;
 use anyhow::{Context, bail};
@@ -27,23 +27,17 @@ pub struct GameCommand {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Request a test game of your active submission against the baseline, before or between rounds; it does not count
-    Test {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
-    },
+    Test(TournamentOrNewest),
     /// Request a friendly game of your active submission against another team's, before or between rounds; it does
     /// not count
     Friendly {
         /// The other team's name
         opponent: TeamName,
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
+        #[command(flatten)]
+        tournament: TournamentOrNewest,
     },
     /// List your friendly and test games, the newest first (for games that count: faceoff tournament games)
-    List {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
-    },
+    List(TournamentOrNewest),
     /// Show a game with its state and result
     Show {
         /// The game's id
@@ -101,8 +95,8 @@ impl GameCommand {
     async fn act(self) -> anyhow::Result<()> {
         let client = self.server.client_or_visitor()?;
         match self.action {
-            Action::Test { tournament } => {
-                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+            Action::Test(tournament) => {
+                let id = tournament.find(&client).await?;
                 let requested = client.request_test_games(id, None).await?;
                 print(self.server.json, &requested, games::requested_text)
             }
@@ -110,12 +104,12 @@ impl GameCommand {
                 opponent,
                 tournament,
             } => {
-                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+                let id = tournament.find(&client).await?;
                 let game = client.request_friendly_game(id, opponent).await?;
                 print(self.server.json, &game, games::game_text)
             }
-            Action::List { tournament } => {
-                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+            Action::List(tournament) => {
+                let id = tournament.find(&client).await?;
                 let games = client.uncounted_games(id).await?;
                 print(self.server.json, games.as_slice(), games::games_table)
             }

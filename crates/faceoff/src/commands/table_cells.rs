@@ -1,6 +1,17 @@
 //! Cells that several tables have.
 
-use faceoff_types::ComputationTimeSummary;
+use faceoff_types::{ComputationTimeSummary, ViolationCounts};
+
+/// Headings of the columns of [`violations`].
+pub(super) const VIOLATIONS: &str = "  ee link  pos  vel time";
+
+/// The violations of each constraint: end effector, links, joint positions, joint velocities, computation time.
+pub(super) fn violations(counts: ViolationCounts) -> String {
+    format!(
+        "{:>4} {:>4} {:>4} {:>4} {:>4}",
+        counts.ee, counts.link, counts.joint_pos, counts.joint_vel, counts.computation_time
+    )
+}
 
 /// An interval of rates between 0 and 1, in percent.
 pub(super) fn percent_interval(rates: [f64; 2]) -> String {

@@ -8,7 +8,7 @@ use super::{output::print, score::table, server::ServerArgs};
 use clap::{Args, Subcommand};
 use faceoff_api::requests::Decision;
 use faceoff_types::RoundNumber;
-use lookup::{find_tournament, find_tournament_or_newest};
+use lookup::{TournamentOrNewest, find_tournament};
 
 /// Shows tournaments: teams, games, results, standings and ratings.
 #[derive(Debug, Args)]
@@ -24,28 +24,19 @@ enum Action {
     /// List the tournaments, the oldest first
     List,
     /// Show a tournament: rules, teams, rounds, standings and next step
-    Show {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
-    },
+    Show(TournamentOrNewest),
     /// List the games: score, goals, fouls, penalty points, winner and reason
     Games {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
+        #[command(flatten)]
+        tournament: TournamentOrNewest,
         /// Only the games of this round
         #[arg(long, value_parser = parse_round)]
         round: Option<RoundNumber>,
     },
     /// Show ratings of the submissions, by results and by goals, and head-to-head records
-    Ratings {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
-    },
+    Ratings(TournamentOrNewest),
     /// Show how often each team was champion in replays of the schedule with new seeds
-    Certainty {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
-    },
+    Certainty(TournamentOrNewest),
     /// Withdraw your team from a tournament permanently; without --confirm, only list the effects
     Withdraw {
         /// The tournament's name or id
@@ -78,18 +69,18 @@ impl TournamentCommand {
                     text::tournament_list,
                 )
             }
-            Action::Show { tournament } => {
-                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+            Action::Show(tournament) => {
+                let id = tournament.find(&client).await?;
                 let tournament = client.tournament(id).await?;
                 print(self.server.json, &tournament, text::tournament_text)
             }
             Action::Games { tournament, round } => {
-                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+                let id = tournament.find(&client).await?;
                 let games = client.games(id, round).await?;
                 print(self.server.json, games.as_slice(), games::games_table)
             }
-            Action::Ratings { tournament } => {
-                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+            Action::Ratings(tournament) => {
+                let id = tournament.find(&client).await?;
                 let view = RatingsView {
                     ratings: client.ratings(id).await?,
                     head_to_head: client.head_to_head(id).await?,
@@ -98,8 +89,8 @@ impl TournamentCommand {
                     table::ratings_text(&view.ratings, &view.head_to_head)
                 })
             }
-            Action::Certainty { tournament } => {
-                let id = find_tournament_or_newest(&client, tournament.as_deref()).await?;
+            Action::Certainty(tournament) => {
+                let id = tournament.find(&client).await?;
                 let shares = client.champion_shares(id).await?;
                 print(self.server.json, &shares, text::champion_shares_text)
             }

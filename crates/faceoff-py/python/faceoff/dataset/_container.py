@@ -8,7 +8,7 @@ import struct
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any, Mapping
+from typing import Any, Mapping, Sequence
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -107,6 +107,26 @@ class Container:
             kind = type(value).__name__
             raise DatasetError(f"{self.path}: {name}: expected a JSON object, got a {kind}")
         return value
+
+    def check_manifest(
+        self, manifest: Mapping[str, Any], layouts: Sequence[str], **fields: type
+    ) -> None:
+        """Checks a manifest's layout, and that its fields have these types.
+
+        Raises:
+            DatasetError: the layout is not among `layouts`, or a field is missing or of another type.
+        """
+        if manifest.get("schema") not in layouts:
+            known = ", ".join(layouts)
+            raise DatasetError(
+                f"{self.path}: layout: expected one of {known}, got {manifest.get('schema')!r}"
+            )
+        for key, kind in fields.items():
+            if not isinstance(manifest.get(key), kind):
+                raise DatasetError(
+                    f"{self.path}: {MANIFEST}: expected {key!r} to be a {kind.__name__}, "
+                    f"got {manifest.get(key)!r}"
+                )
 
     def table(self, name: str) -> pq.ParquetFile:
         """A Parquet file; only its footer is read here.

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from faceoff.errors import ArgumentError, ArgumentTypeError
 
-from ._container import MANIFEST, Container
+from ._container import Container
 from ._episode import CONSTRAINTS, Episode
 from ._errors import DatasetError
 from ._rows import Rows, to_polars
@@ -43,17 +43,7 @@ class Dataset:
         self.path = container.path
         self.manifest = manifest
         """The content of `manifest.json`."""
-        if manifest.get("schema") not in LAYOUTS:
-            known = ", ".join(LAYOUTS)
-            raise DatasetError(
-                f"{self.path}: layout: expected one of {known}, got {manifest.get('schema')!r}"
-            )
-        for key, kind in (("agent", str), ("seed", str), ("episodes", dict), ("files", dict)):
-            if not isinstance(manifest.get(key), kind):
-                raise DatasetError(
-                    f"{self.path}: {MANIFEST}: expected {key!r} to be a {kind.__name__}, "
-                    f"got {manifest.get(key)!r}"
-                )
+        container.check_manifest(manifest, LAYOUTS, agent=str, seed=str, episodes=dict, files=dict)
 
     @property
     def layout(self) -> str:

@@ -13,9 +13,8 @@ import pyarrow as pa
 
 from faceoff.errors import ArgumentError
 
-from ._container import MANIFEST, Container
+from ._container import Container
 from ._episode import CONSTRAINTS, EE, JOINT_POS, JOINT_VEL, OBSERVATION, PUCK, action_shape
-from ._errors import DatasetError
 from ._rows import Floats, Rows, floats, lists, seconds, to_polars
 
 __all__ = ["GAME_LAYOUTS", "Game", "Rally", "SideArrays"]
@@ -138,17 +137,7 @@ class Game:
         self.path = container.path
         self.manifest = manifest
         """The content of `manifest.json`."""
-        if manifest.get("schema") not in GAME_LAYOUTS:
-            known = ", ".join(GAME_LAYOUTS)
-            raise DatasetError(
-                f"{self.path}: layout: expected one of {known}, got {manifest.get('schema')!r}"
-            )
-        for key, kind in (("agents", list), ("files", dict)):
-            if not isinstance(manifest.get(key), kind):
-                raise DatasetError(
-                    f"{self.path}: {MANIFEST}: expected {key!r} to be a {kind.__name__}, "
-                    f"got {manifest.get(key)!r}"
-                )
+        container.check_manifest(manifest, GAME_LAYOUTS, agents=list, files=dict)
 
     @property
     def layout(self) -> str:

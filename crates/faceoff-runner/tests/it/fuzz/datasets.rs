@@ -2,10 +2,10 @@
 
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use faceoff_dataset::{
-    Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble,
+    Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble, shard_arena,
     verify::{VerifyError, verify},
 };
-use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, StepSink};
+use faceoff_episode::{AnswerTiming, RunningEpisode, StepSink};
 use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed, Task};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
@@ -55,13 +55,7 @@ fn record_dataset(dir: &Path) {
     let shard = dir.join("shard");
     let folder = ShardFolder::create(&shard).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let arena = Arena::with_ruleset(
-        spec.ruleset,
-        spec.profile,
-        &spec.perturbations,
-        spec.seed,
-        spec.mismatch_seed,
-    );
+    let arena = shard_arena(&spec);
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let interpolation = Some(Interpolation::Linear);

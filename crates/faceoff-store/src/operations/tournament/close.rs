@@ -27,15 +27,15 @@ impl Store {
             let mut tournament = tournaments::find_open(tx, id).await?;
             let open = games::open(tx, id).await?.len();
             if open > 0 {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "{open} games are queued or running: wait for their end, or cancel those that do not count"
-                )));
+                ));
             }
             if let Some(pending) = games::pending(tx, id).await?.first() {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "game {} has no result: play it again, or let one of its teams leave",
                     pending.game
-                )));
+                ));
             }
             tournament.closed_at = Some(now);
             tournaments::update(tx, &tournament).await?;

@@ -34,15 +34,14 @@ pub struct DepartureRequest {
 async fn check_accepts_entrants(tx: &mut Tx, tournament: &Tournament) -> Result<()> {
     let has_rounds = rounds::count(tx, tournament.id).await? > 0;
     if has_rounds && matches!(tournament.rules.format, TournamentFormat::Groups { .. }) {
-        return Err(StoreError::Conflict(
-            "the groups are drawn, so no team can be added: open another tournament".into(),
-        ));
+        return StoreError::conflict(
+            "the groups are drawn, so no team can be added: open another tournament",
+        );
     }
     if !games::pending(tx, tournament.id).await?.is_empty() {
-        return Err(StoreError::Conflict(
-            "a round is under way: teams can be added before the first round, or between two"
-                .into(),
-        ));
+        return StoreError::conflict(
+            "a round is under way: teams can be added before the first round, or between two",
+        );
     }
     Ok(())
 }
@@ -114,7 +113,7 @@ impl Store {
                         None => "is in the tournament already",
                         Some(_) => "has left the tournament for good",
                     };
-                    return Err(StoreError::Conflict(format!("{} {obstacle}", team.name)));
+                    return StoreError::conflict(format!("{} {obstacle}", team.name));
                 }
                 entrants::put(tx, id, team.id, now).await?;
             }
@@ -160,9 +159,7 @@ pub(crate) async fn remove_entrant(
     } = *request;
     let entrants = entrants::all(tx, id).await?;
     let Some(entrant) = entrants.iter().find(|entrant| entrant.team == team) else {
-        return Err(StoreError::Conflict(
-            "the team is not in the tournament".into(),
-        ));
+        return StoreError::conflict("the team is not in the tournament");
     };
     let cancel_reason = format!("{} has left the tournament", entrant.name);
     let latest_round = match (&entrant.departure, kind) {
@@ -181,10 +178,10 @@ pub(crate) async fn remove_entrant(
             earlier.from_round
         }
         (Some(_), _) => {
-            return Err(StoreError::Conflict(format!(
+            return StoreError::conflict(format!(
                 "{} has left the tournament already",
                 entrant.name
-            )));
+            ));
         }
     };
     let from_round = from_round.unwrap_or(latest_round);
@@ -195,9 +192,7 @@ pub(crate) async fn remove_entrant(
             }
             DepartureKind::Disqualified => format!("1 to {latest_round}"),
         };
-        return Err(StoreError::Conflict(format!(
-            "from_round: expected {expected}; got {from_round}"
-        )));
+        return StoreError::conflict(format!("from_round: expected {expected}; got {from_round}"));
     }
     let departure = Departure {
         kind,

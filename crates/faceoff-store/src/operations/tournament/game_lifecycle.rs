@@ -199,10 +199,9 @@ impl Store {
             };
             let game = games::find(tx, id).await?;
             if commit.recording.is_some() != game.purpose.keeps_recording() {
-                return Err(StoreError::Conflict(
-                    "expected a recording of a game, and none of a game of a replayed schedule"
-                        .into(),
-                ));
+                return StoreError::conflict(
+                    "expected a recording of a game, and none of a game of a replayed schedule",
+                );
             }
             let attempt = game_attempts::commit(tx, id, commit, now).await?;
             game_transitions::set_played(tx, id, attempt, now).await?;

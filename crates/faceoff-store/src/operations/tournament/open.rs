@@ -56,9 +56,9 @@ fn invalid_tournament(error: InvalidTournament) -> StoreError {
 async fn check_baseline(tx: &mut Tx, id: SubmissionId) -> Result<()> {
     let baseline = submissions::find(tx, id).await?;
     if baseline.state != SubmissionState::Valid || baseline.bundle_removed.is_some() {
-        return Err(StoreError::Conflict(
-            "baseline: expected a valid submission whose bundle is still stored".into(),
-        ));
+        return StoreError::conflict(
+            "baseline: expected a valid submission whose bundle is still stored",
+        );
     }
     Ok(())
 }
@@ -147,10 +147,9 @@ impl Store {
                 return Ok(current);
             }
             if changed.rules != current.rules && rounds::count(tx, id).await? > 0 {
-                return Err(StoreError::Conflict(
-                    "rules: a round has started, and all rounds must have the same rules: open another tournament"
-                        .into(),
-                ));
+                return StoreError::conflict(
+                    "rules: a round has started, and all rounds must have the same rules: open another tournament",
+                );
             }
             tournaments::update(tx, &changed).await?;
             let event = Event::TournamentChanged {
@@ -178,9 +177,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             let mut tournament = tournaments::find_open(tx, id).await?;
             if tournament.paused.is_some() {
-                return Err(StoreError::Conflict(
-                    "the tournament is paused already: resume it first".into(),
-                ));
+                return StoreError::conflict("the tournament is paused already: resume it first");
             }
             let reason = reason.to_owned();
             tournament.paused = Some(Ruling {
@@ -205,9 +202,9 @@ impl Store {
         self.write(actor, now, async |tx| {
             let mut tournament = tournaments::find_open(tx, id).await?;
             if tournament.paused.take().is_none() {
-                return Err(StoreError::Conflict(
-                    "the tournament is not paused: its games start as slots become free".into(),
-                ));
+                return StoreError::conflict(
+                    "the tournament is not paused: its games start as slots become free",
+                );
             }
             tournaments::update(tx, &tournament).await?;
             for game in games::open(tx, id).await? {

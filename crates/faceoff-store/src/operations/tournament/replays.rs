@@ -61,31 +61,31 @@ impl Store {
             let schedule = games::of_rounds(tx, id).await?;
             let (started, rounds) = (rounds::count(tx, id).await?, tournament.rules.format.last_round());
             if started < rounds.get() {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "a schedule can be replayed once all its games are over: {started} of {rounds} rounds have started"
-                )));
+                ));
             }
             let pending = games::pending(tx, id).await?.len();
             if pending > 0 {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "a schedule can be replayed once all its games are over: {pending} games have no result yet"
-                )));
+                ));
             }
             let last = games::last_replay(tx, id).await?;
             if times == 0 || times > MAX_REPLAYS - last.min(MAX_REPLAYS) {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "times: expected 1 to {}, since {last} of {MAX_REPLAYS} replays exist; got {times}",
                     MAX_REPLAYS.saturating_sub(last)
-                )));
+                ));
             }
             let schedule = counting_games(tx, id, schedule).await?;
             let queued = u32::try_from(schedule.len()).unwrap_or(u32::MAX);
             let games = queued.saturating_mul(last.saturating_add(times));
             if games > MAX_REPLAYED_GAMES {
-                return Err(StoreError::Conflict(format!(
+                return StoreError::conflict(format!(
                     "times: {queued} games {} times are {games}; expected at most {MAX_REPLAYED_GAMES} in all",
                     last.saturating_add(times)
-                )));
+                ));
             }
             let (mut count, mut account) = (0, None);
             for replay in last + 1..=last + times {

@@ -23,10 +23,6 @@ use faceoff_types::{GameId, GameSeedLabel, SubmissionId, TeamId, TournamentForma
 use jiff::Timestamp;
 use std::collections::{BTreeMap, BTreeSet};
 
-fn conflict<T>(reason: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(reason.into()))
-}
-
 /// Does a tournament accept the runtime of a submission?
 pub(super) fn accepts_runtime(tournament: &Tournament, submission: &Submission) -> bool {
     match (&tournament.rules.runtimes, &submission.runtime) {
@@ -45,19 +41,19 @@ async fn check_is_next_round(
     let number = drawn.number;
     let started = rounds::count(tx, tournament.id).await?;
     if number.get() <= started {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "round {number} has started already: look at its progress"
         ));
     }
     if number.get() > started + 1 || number > tournament.rules.format.last_round() {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "round {number} is not the next one: {started} of {} have started",
             tournament.rules.format.last_round()
         ));
     }
     let pending = games::pending(tx, tournament.id).await?;
     if let Some(first) = pending.first() {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "{} games of earlier rounds have no result, the first is game {}: wait for them, rerun them, or let a team \
              leave",
             pending.len(),
@@ -95,10 +91,10 @@ fn check_teams(
         drawn_teams == entrant_teams
     };
     if !matches_entrants {
-        return conflict("the entrants have changed meanwhile: start the round again");
+        return StoreError::conflict("the entrants have changed meanwhile: start the round again");
     }
     if teams_with_games.is_empty() {
-        return conflict("a round needs at least two teams: add more");
+        return StoreError::conflict("a round needs at least two teams: add more");
     }
     Ok(teams_with_games)
 }
@@ -122,7 +118,7 @@ async fn select_submissions(
         .map(|entrant| entrant.name.as_str())
         .collect();
     if !names_without.is_empty() {
-        return conflict(format!(
+        return StoreError::conflict(format!(
             "these teams have no active, valid submission that the tournament accepts: {}. Wait for them, or let them \
              leave the tournament",
             names_without.join(", ")

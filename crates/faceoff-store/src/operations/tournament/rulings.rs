@@ -34,9 +34,9 @@ impl Store {
             tournaments::find_open(tx, game.tournament).await?;
             let (GamePurpose::Round(_), GameState::Played(played)) = (game.purpose, &game.state)
             else {
-                return Err(StoreError::Conflict(
-                    "only a game of a round with a result can be voided: wait for the end of one that is queued or running".into(),
-                ));
+                return StoreError::conflict(
+                    "only a game of a round with a result can be voided: wait for the end of one that is queued or running",
+                );
             };
             game_attempts::set_voided(tx, id, played.attempt, reason).await?;
             game_transitions::set_without_result(tx, id, NoResult::Void, reason, now).await?;
@@ -59,10 +59,9 @@ impl Store {
                 game.state,
                 GameState::Void { .. } | GameState::PlatformFailed { .. }
             ) {
-                return Err(StoreError::Conflict(
-                    "only a game that was voided, or that ended by a platform fault, can be rerun: void its result first"
-                        .into(),
-                ));
+                return StoreError::conflict(
+                    "only a game that was voided, or that ended by a platform fault, can be rerun: void its result first",
+                );
             }
             let job = match game.purpose {
                 GamePurpose::Round(entry) => {
@@ -72,16 +71,16 @@ impl Store {
                             && departure.is_some_and(|departure| departure.from_round <= entry.round)
                     };
                     if entrants::all(tx, game.tournament).await?.iter().any(has_left) {
-                        return Err(StoreError::Conflict(
-                            "one of its teams has left the tournament by its round, so the game does not count".into(),
-                        ));
+                        return StoreError::conflict(
+                            "one of its teams has left the tournament by its round, so the game does not count",
+                        );
                     }
                     purpose::ROUND_GAME
                 }
                 GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => {
-                    return Err(StoreError::Conflict(
-                        "a game that does not count cannot be rerun: request another one".into(),
-                    ));
+                    return StoreError::conflict(
+                        "a game that does not count cannot be rerun: request another one",
+                    );
                 }
                 GamePurpose::Replay { .. } => purpose::REPLAY_GAME,
             };

@@ -23,10 +23,6 @@ use crate::{
 use faceoff_types::{GameId, GameSeedLabel, SubmissionId, TeamId, TournamentId};
 use jiff::{Timestamp, tz::TimeZone};
 
-fn conflict<T>(reason: impl Into<String>) -> Result<T> {
-    Err(StoreError::Conflict(reason.into()))
-}
-
 /// The tournament, if test and friendly games of these teams are possible now.
 async fn find_between_rounds(
     tx: &mut Tx,
@@ -39,7 +35,7 @@ async fn find_between_rounds(
     for team in teams {
         if !entrants.iter().any(|entrant| entrant.team == *team) {
             let team = teams::find(tx, *team).await?;
-            return conflict(format!(
+            return StoreError::conflict(format!(
                 "{} is not in the tournament: ask an organiser to add it",
                 team.name
             ));
@@ -47,7 +43,7 @@ async fn find_between_rounds(
         teams::check_may_compete(tx, *team).await?;
     }
     if !games::pending(tx, id).await?.is_empty() {
-        return conflict(
+        return StoreError::conflict(
             "a round is under way; test and friendly games are possible before and between rounds: try again when it is over",
         );
     }
@@ -71,7 +67,7 @@ async fn active_submission(
         Some(submission) => Ok(submission.id),
         None => {
             let team = teams::find(tx, team).await?;
-            conflict(format!(
+            StoreError::conflict(format!(
                 "{} has no active, valid submission that the tournament accepts: upload one, or activate another",
                 team.name
             ))
@@ -112,7 +108,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             let tournament = find_between_rounds(tx, id, &[team]).await?;
             let Some(baseline) = tournament.baseline else {
-                return conflict(
+                return StoreError::conflict(
                     "the tournament has no baseline to test against: ask the organisers, or play a friendly game",
                 );
             };
@@ -159,12 +155,12 @@ impl Store {
     ) -> Result<Game> {
         self.write(actor, now, async |tx| {
             if asked_by == opponent {
-                return conflict("opponent: a team cannot play itself");
+                return StoreError::conflict("opponent: a team cannot play itself");
             }
             let tournament = find_between_rounds(tx, id, &[asked_by, opponent]).await?;
             if friendly_games_declined::declines(tx, opponent).await? {
                 let opponent = teams::find(tx, opponent).await?;
-                return conflict(format!(
+                return StoreError::conflict(format!(
                     "{} plays no friendly games: ask another team",
                     opponent.name
                 ));
@@ -207,12 +203,12 @@ impl Store {
         self.write(actor, now, async |tx| {
             let game = games::find(tx, id).await?;
             if let GamePurpose::Round(_) = game.purpose {
-                return conflict(
+                return StoreError::conflict(
                     "a game of a round cannot be cancelled: pause the tournament, void the game's result, or let a team leave",
                 );
             }
             if !game.state.is_open() {
-                return conflict("the game is over already");
+                return StoreError::conflict("the game is over already");
             }
             game_lifecycle::cancel(tx, &game, reason).await?;
             games::find(tx, id).await

@@ -158,13 +158,14 @@ fn create_file(folder: &tempfile::TempDir, bytes: u64) -> PathBuf {
     path
 }
 
-/// Reads the head of an HTTP request.
-async fn read_head(connection: &mut TcpStream) -> String {
+/// Accepts a connection and reads the head of its HTTP request.
+async fn accept(listener: &TcpListener) -> (TcpStream, String) {
+    let (mut connection, _) = listener.accept().await.unwrap();
     let mut head = Vec::new();
     while !head.ends_with(b"\r\n\r\n") {
         head.push(connection.read_u8().await.unwrap());
     }
-    String::from_utf8(head).unwrap()
+    (connection, String::from_utf8(head).unwrap())
 }
 
 /// Reads this part of the body of an HTTP request.
@@ -192,8 +193,7 @@ async fn upload_is_retried_after_transient_errors() {
             "429 Too Many Requests\r\nretry-after: 3600",
             "502 Bad Gateway",
         ] {
-            let (mut connection, _) = listener.accept().await.unwrap();
-            let head = read_head(&mut connection).await;
+            let (mut connection, head) = accept(&listener).await;
             assert!(
                 head.starts_with("PUT /work/files/steps.parquet HTTP/1.1"),
                 "{head}"
@@ -203,12 +203,10 @@ async fn upload_is_retried_after_transient_errors() {
             respond(connection, status).await;
         }
         // An interruption in the middle of the body.
-        let (mut connection, _) = listener.accept().await.unwrap();
-        read_head(&mut connection).await;
+        let (mut connection, _) = accept(&listener).await;
         read_body(&mut connection, BYTES / 2).await;
         drop(connection);
-        let (mut connection, _) = listener.accept().await.unwrap();
-        read_head(&mut connection).await;
+        let (mut connection, _) = accept(&listener).await;
         read_body(&mut connection, BYTES).await;
         respond(connection, "204 No Content").await;
     };
@@ -224,8 +222,7 @@ async fn upload_is_given_up_after_many_interruptions() {
     let (files, transfer) = (job_files(&listener), file_transfer(immediate_retries()));
     let server = async {
         for _ in 0..transfer.timeouts.max_interrupted {
-            let (mut connection, _) = listener.accept().await.unwrap();
-            read_head(&mut connection).await;
+            let (mut connection, _) = accept(&listener).await;
             read_body(&mut connection, 1000).await;
         }
     };
@@ -254,8 +251,7 @@ async fn refused_download_is_not_retried() {
             let (fetched, ()) = tokio::join!(
                 files.fetch_bundle(&transfer, &bundle, archive, never_ends),
                 async {
-                    let (mut connection, _) = listener.accept().await.unwrap();
-                    read_head(&mut connection).await;
+                    let (connection, _) = accept(&listener).await;
                     respond(connection, status).await;
                 }
             );
@@ -285,8 +281,7 @@ async fn upload_over_a_slow_link_needs_one_attempt() {
     let transfer = file_transfer(TransferTimeouts::default());
     let started_at = Instant::now();
     let server = async {
-        let (mut connection, _) = listener.accept().await.unwrap();
-        read_head(&mut connection).await;
+        let (mut connection, _) = accept(&listener).await;
         for _ in 0..PIECES {
             read_body(&mut connection, PIECE).await;
             tokio::time::advance(transfer.timeouts.stall * 2 / 3).await;

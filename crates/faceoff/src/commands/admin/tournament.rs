@@ -8,7 +8,7 @@ use crate::{
         output::print,
         tournament::{
             games,
-            lookup::{find_tournament, find_tournament_or_newest},
+            lookup::{TournamentOrNewest, find_tournament},
             parse_round, text,
         },
     },
@@ -39,10 +39,7 @@ pub(super) enum TournamentAction {
     /// List the tournaments, the oldest first
     List,
     /// Show a tournament: rules, teams, rounds, standings and next step
-    Show {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
-    },
+    Show(TournamentOrNewest),
     /// Change a tournament: its rules until the first round starts, other settings until it is closed
     Change {
         /// The tournament's name or id
@@ -120,10 +117,7 @@ pub(super) enum TournamentAction {
         teams: Option<Vec<TeamName>>,
     },
     /// List the friendly and test games of all teams, the newest first
-    FreeGames {
-        /// The tournament's name or id [default: the newest]
-        tournament: Option<String>,
-    },
+    FreeGames(TournamentOrNewest),
     /// Replay the whole schedule with new seeds, to estimate how certain the champion is; replays never count
     Replay {
         /// The tournament's name or id
@@ -177,8 +171,8 @@ pub(super) async fn act(
             let requested = client.request_test_games(id, teams).await?;
             return print(json, &requested, games::requested_text);
         }
-        TournamentAction::FreeGames { tournament } => {
-            let id = find_tournament_or_newest(client, tournament.as_deref()).await?;
+        TournamentAction::FreeGames(tournament) => {
+            let id = tournament.find(client).await?;
             let games = client.uncounted_games(id).await?;
             return print(json, games.as_slice(), games::games_table);
         }
@@ -220,8 +214,8 @@ pub(super) async fn act(
             let cancelled = client.cancel_game(game).await?;
             return print(json, &cancelled, games::game_text);
         }
-        TournamentAction::Show { tournament } => {
-            let id = find_tournament_or_newest(client, tournament.as_deref()).await?;
+        TournamentAction::Show(tournament) => {
+            let id = tournament.find(client).await?;
             client.tournament(id).await?
         }
         TournamentAction::Open {

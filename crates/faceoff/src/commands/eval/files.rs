@@ -1,8 +1,8 @@
 //! The files of `faceoff eval --out`.
 
 use anyhow::Context;
-use faceoff_dataset::ARCHIVE_FILE;
-use std::{fs, io::ErrorKind, path::Path};
+use faceoff_dataset::{ARCHIVE_FILE, allow_missing};
+use std::{fs, path::Path};
 
 pub(super) const RESULTS: &str = "results.json";
 /// The agent's log, written if the agent had faults.
@@ -13,12 +13,8 @@ pub(super) const ABLATION: &str = "ablation.json";
 /// Removes the files of an earlier run, so that they are not mistaken for results of this one.
 pub(super) fn remove_earlier(out: &Path) -> anyhow::Result<()> {
     for path in [RESULTS, ARCHIVE_FILE, LOG, ABLATION].map(|name| out.join(name)) {
-        match fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                return Err(error).with_context(|| format!("removing {}", path.display()));
-            }
-            _ => {}
-        }
+        allow_missing(fs::remove_file(&path))
+            .with_context(|| format!("removing {}", path.display()))?;
     }
     Ok(())
 }

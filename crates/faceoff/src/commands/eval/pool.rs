@@ -109,22 +109,13 @@ pub(super) fn run_shards(
             }
         }
     }
-    let mut faults = pool
-        .faults
-        .into_inner()
-        .unwrap_or_else(PoisonError::into_inner);
+    let mut faults = into_inner(pool.faults);
     faults.sort_by_key(|fault| (fault.agent_task, fault.episode));
-    let logs = pool
-        .logs
-        .into_inner()
-        .unwrap_or_else(PoisonError::into_inner);
+    let logs = into_inner(pool.logs);
     if faults.len() > max_faults as usize {
         Ok(Verdict::Failed { faults, logs })
     } else {
-        let mut outcomes = pool
-            .outcomes
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut outcomes = into_inner(pool.outcomes);
         outcomes.sort_by_key(|outcome| (outcome.task, outcome.episode));
         Ok(Verdict::Finished {
             faults,
@@ -179,4 +170,8 @@ impl Observer for PoolObserver<'_> {
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn into_inner<T>(mutex: Mutex<T>) -> T {
+    mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,6 +1,6 @@
 //! Table of an evaluation's result by task. A *tier* is the class of an agent by its penalty points.
 
-use crate::commands::table_cells::{milliseconds, percent_interval};
+use crate::commands::table_cells::{VIOLATIONS, milliseconds, percent_interval, violations};
 use faceoff_types::EvaluationResult;
 
 /// The result as text. The columns from `ee` to `time` count the violations of each constraint: end effector, links, joint
@@ -12,37 +12,20 @@ pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
         result.profile, result.ruleset, result.seed
     ));
     lines.push(format!(
-        "\n{:<8} {:>8} {:>8} {:>17} {:>8}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4}  {:>23}",
-        "task",
-        "episodes",
-        "success",
-        "95 % interval",
-        "penalty",
-        "tier",
-        "ee",
-        "link",
-        "pos",
-        "vel",
-        "time",
-        "time mean/p99/max [ms]"
+        "\n{:<8} {:>8} {:>8} {:>17} {:>8}  {:<15} {VIOLATIONS}  {:>23}",
+        "task", "episodes", "success", "95 % interval", "penalty", "tier", "time mean/p99/max [ms]"
     ));
     for (task, task_result) in &result.tasks {
-        let violations = task_result.violations;
-        let time_s = task_result.computation_time_s;
         lines.push(format!(
-                "{task:<8} {:>8} {:>6.1} % {:>17} {:>8.1}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4}  {:>23}",
-                task_result.episodes,
-                100.0 * task_result.success_rate,
-                percent_interval(task_result.success_ci95),
-                task_result.penalty_points,
-                task_result.tier.title(),
-                violations.ee,
-                violations.link,
-                violations.joint_pos,
-                violations.joint_vel,
-                violations.computation_time,
-                milliseconds(time_s),
-            ));
+            "{task:<8} {:>8} {:>6.1} % {:>17} {:>8.1}  {:<15} {}  {:>23}",
+            task_result.episodes,
+            100.0 * task_result.success_rate,
+            percent_interval(task_result.success_ci95),
+            task_result.penalty_points,
+            task_result.tier.title(),
+            violations(task_result.violations),
+            milliseconds(task_result.computation_time_s),
+        ));
     }
     lines.push(format!(
         "\nscore {:.1} %, penalty points {:.1}, tier: {}",

@@ -1,10 +1,10 @@
 //! The file `results.json` of `faceoff play`.
 
 use anyhow::Context;
+use faceoff_dataset::allow_missing;
 use serde::Serialize;
 use std::{
     fs,
-    io::ErrorKind,
     path::{Path, PathBuf},
 };
 
@@ -18,12 +18,9 @@ impl Results {
     /// The file in a folder; removes an earlier one.
     pub(super) fn clear_in(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join("results.json");
-        match fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                Err(error).with_context(|| format!("removing {}", path.display()))
-            }
-            _ => Ok(Self { path }),
-        }
+        allow_missing(fs::remove_file(&path))
+            .with_context(|| format!("removing {}", path.display()))?;
+        Ok(Self { path })
     }
 
     pub(super) fn path(&self) -> &Path {

@@ -1,7 +1,7 @@
 //! Tables of `faceoff play`: the result of a game, and of a series of games.
 
 use super::series_results::{SeriesGame, SeriesKind, SeriesResults};
-use crate::commands::table_cells::milliseconds;
+use crate::commands::table_cells::{VIOLATIONS, milliseconds, violations};
 use faceoff_scoring::tournament::GameScore;
 use faceoff_types::Side;
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ pub(super) fn game_table(game: &GameScore) -> String {
         first.agent, second.agent, game.profile, game.ruleset, game.seed
     ));
     lines.push(format!(
-        "\n{:<4} {:<20} {:>5} {:>5} {:>5} {:>8}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4} {:>6} {:>6}  {:>23}",
+        "\n{:<4} {:<20} {:>5} {:>5} {:>5} {:>8}  {:<15} {VIOLATIONS} {:>6} {:>6}  {:>23}",
         "side",
         "agent",
         "score",
@@ -24,33 +24,23 @@ pub(super) fn game_table(game: &GameScore) -> String {
         "fouls",
         "penalty",
         "tier",
-        "ee",
-        "link",
-        "pos",
-        "vel",
-        "time",
         "late",
         "faults",
         "time mean/p99/max [ms]"
     ));
     for (number, side) in (1..).zip(&game.sides) {
-        let (violations, time_s) = (side.violations, side.computation_time_s);
         lines.push(format!(
-            "{number:<4} {:<20} {:>5} {:>5} {:>5} {:>8.1}  {:<15} {:>4} {:>4} {:>4} {:>4} {:>4} {:>6} {:>6}  {:>23}",
+            "{number:<4} {:<20} {:>5} {:>5} {:>5} {:>8.1}  {:<15} {} {:>6} {:>6}  {:>23}",
             side.agent,
             side.score,
             side.goals,
             side.fouls,
             side.penalty_points,
             side.tier.title(),
-            violations.ee,
-            violations.link,
-            violations.joint_pos,
-            violations.joint_vel,
-            violations.computation_time,
+            violations(side.violations),
             side.late_answers,
             side.faults,
-            milliseconds(time_s),
+            milliseconds(side.computation_time_s),
         ));
     }
     for (number, side) in (1..).zip(&game.sides) {

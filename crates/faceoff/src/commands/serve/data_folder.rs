@@ -4,6 +4,7 @@
 use super::super::atomic_folder::create_private;
 use anyhow::{Context, bail};
 use faceoff_api::token::{Secret, SecretKind, hash_token};
+use faceoff_dataset::allow_missing;
 use faceoff_http::LinkKey;
 use faceoff_store::Store;
 use jiff::Timestamp;
@@ -109,13 +110,8 @@ fn is_alive(id: i32) -> bool {
 /// # Errors
 /// If the folder cannot be emptied or created.
 pub fn empty_folder(folder: &Path) -> anyhow::Result<()> {
-    match fs::remove_dir_all(folder) {
-        Ok(()) => {}
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => {
-            return Err(error).with_context(|| format!("emptying {}", folder.display()));
-        }
-    }
+    allow_missing(fs::remove_dir_all(folder))
+        .with_context(|| format!("emptying {}", folder.display()))?;
     create_private(folder)
 }
 

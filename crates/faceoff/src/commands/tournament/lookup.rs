@@ -2,6 +2,7 @@
 
 use crate::client::Client;
 use anyhow::{Context, bail};
+use clap::Args;
 use faceoff_types::TournamentId;
 
 /// Finds a tournament by name or id.
@@ -23,17 +24,21 @@ pub(in crate::commands) async fn find_tournament(
     }
 }
 
-/// Finds a tournament by name or id, or the newest one.
-pub(in crate::commands) async fn find_tournament_or_newest(
-    client: &Client,
-    name_or_id: Option<&str>,
-) -> anyhow::Result<TournamentId> {
-    match name_or_id {
-        Some(name_or_id) => find_tournament(client, name_or_id).await,
-        None => {
-            let tournaments = client.tournaments().await?;
-            let newest = tournaments.last().map(|tournament| tournament.id);
-            newest.context("there is no tournament yet; organisers open one with faceoff admin tournament open NAME")
+/// The tournament of a command that shows the newest one by default.
+#[derive(Debug, Args)]
+pub(in crate::commands) struct TournamentOrNewest {
+    /// The tournament's name or id [default: the newest]
+    tournament: Option<String>,
+}
+
+impl TournamentOrNewest {
+    /// Finds the tournament.
+    pub(in crate::commands) async fn find(&self, client: &Client) -> anyhow::Result<TournamentId> {
+        if let Some(name_or_id) = &self.tournament {
+            return find_tournament(client, name_or_id).await;
         }
+        let tournaments = client.tournaments().await?;
+        let newest = tournaments.last().map(|tournament| tournament.id);
+        newest.context("there is no tournament yet; organisers open one with faceoff admin tournament open NAME")
     }
 }
