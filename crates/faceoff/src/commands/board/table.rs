@@ -54,39 +54,47 @@ pub(super) fn board_text(board: &BoardView) -> String {
 
 /// The ranked rows; tiers without teams are left out.
 pub fn board_table(board: &BoardView) -> String {
-    let mut text = String::new();
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        text,
-        "{:<4} {:<24} {:>8} {:>8} {:>8} {:>12} {:>7}",
-        "rank", "team", "hit", "defend", "prepare", "penalty pts", "score"
+    let tasks: Vec<Task> = faceoff_airhockey::competition().task_names().collect();
+    let mut text = line(
+        ["rank", "team"],
+        tasks.iter().map(Task::to_string),
+        ["penalty pts", "score"],
     );
     for tier in Tier::ALL {
         let rows: Vec<_> = board.rows.iter().filter(|row| row.tier == tier).collect();
         if rows.is_empty() {
             continue;
         }
+        // Writing to a String cannot fail.
         let _ = writeln!(text, "{:─<WIDTH$}", format!("── {} ", tier.title()));
         for row in rows {
-            let _ = writeln!(text, "{}", row_line(row));
+            text.push_str(&row_line(row, &tasks));
         }
     }
     text
 }
 
-fn row_line(row: &BoardRow) -> String {
-    let rate = |task| match row.tasks.get(&task) {
+fn row_line(row: &BoardRow, tasks: &[Task]) -> String {
+    let rate = |task: &Task| match row.tasks.get(task) {
         Some(result) => format!("{:.1}%", 100.0 * result.success_rate),
         None => "–".to_owned(),
     };
-    format!(
-        "{:<4} {:<24} {:>8} {:>8} {:>8} {:>12.1} {:>7.1}",
-        row.rank,
-        row.team,
-        rate(Task::Hit),
-        rate(Task::Defend),
-        rate(Task::Prepare),
-        row.penalty_points,
-        row.score
+    line(
+        [&row.rank.to_string(), row.team.as_str()],
+        tasks.iter().map(rate),
+        [
+            &format!("{:.1}", row.penalty_points),
+            &format!("{:.1}", row.score),
+        ],
     )
+}
+
+/// A line of the table, with one column per task.
+fn line(
+    [rank, team]: [&str; 2],
+    tasks: impl Iterator<Item = String>,
+    [penalty_points, score]: [&str; 2],
+) -> String {
+    let tasks: String = tasks.map(|text| format!(" {text:>8}")).collect();
+    format!("{rank:<4} {team:<24}{tasks} {penalty_points:>12} {score:>7}\n")
 }
