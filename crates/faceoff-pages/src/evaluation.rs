@@ -26,9 +26,7 @@ use faceoff_service::{
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
-    views::{
-        ablation, clips::Clips, evaluation, season::SeasonHead, submission, visibility::Visibility,
-    },
+    views::{ablation, clips::Clips, evaluation, submission, visibility::Visibility},
 };
 use faceoff_types::{
     EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, ViolationCounts,
@@ -249,7 +247,6 @@ pub(super) async fn page(
     let view = evaluation::find(&app, &visibility, id).await?;
     let submission = submission::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
-    let season = SeasonHead::load(&app).await?;
     let scored_at = view.status.finished_at();
     let frozen = scored_at.and_then(|scored_at| visibility.hiding_freeze(view.stage, scored_at));
     let clips = Clips::find(&app, &visibility, id).await.ok();
@@ -281,7 +278,7 @@ pub(super) async fn page(
         _ => None,
     };
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         id,
         team: view.team_name.to_string(),
         agent: submission.agent_name,

@@ -19,7 +19,7 @@ use faceoff_service::{
     extract::PathParams,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{game, season::SeasonHead, tournament_state::TournamentState},
+    views::{game, tournament_state::TournamentState},
 };
 use faceoff_types::{TeamId, TeamName, TournamentId};
 use std::{fmt::Display, str::FromStr};
@@ -92,7 +92,6 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let TeamPairPath { tournament, teams } = path?;
     let viewer = viewer?;
-    let season = SeasonHead::load(&app).await?;
     let state = TournamentState::find(&app, tournament).await?;
     let is_entered = |team: &TeamId| state.entrants.iter().any(|entrant| entrant.team == *team);
     if teams[0] == teams[1] || !teams.iter().all(is_entered) {
@@ -130,7 +129,7 @@ pub(super) async fn page(
         .copied()
         .collect();
     render(&Page {
-        frame: Frame::for_app(&app, season.name, format!("/tournaments/{tournament}")),
+        frame: Frame::load(&app, format!("/tournaments/{tournament}")).await?,
         tournament,
         tournament_name: state.tournament.name.to_string(),
         ids: teams,

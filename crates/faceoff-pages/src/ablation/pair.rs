@@ -16,7 +16,6 @@ use faceoff_service::{
     viewer::Viewer,
     views::{
         ablation_clips::{AblationClips, DifferingEpisode},
-        season::SeasonHead,
         submission, team,
     },
 };
@@ -73,9 +72,8 @@ pub(crate) async fn page(
     };
     let submission = submission::find(&app, id).await?;
     let team = team::find(&app, submission.team).await?;
-    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         id,
         team: team.name.to_string(),
         profile,

@@ -15,7 +15,7 @@ use faceoff_service::{
     extract::PathParams,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{clips::Clips, comparison, season::SeasonHead, visibility::Visibility},
+    views::{clips::Clips, comparison, visibility::Visibility},
 };
 use faceoff_types::{EvaluationId, Task};
 use jiff::civil::Date;
@@ -63,9 +63,8 @@ pub(crate) async fn page(
     let solved = view.episodes.as_ref().and_then(|all| all.get(&task));
     let [previous_difference, next_difference] =
         solved.map_or([None; 2], |solved| differing_neighbours(solved, episode));
-    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         ids,
         task,
         episode,
