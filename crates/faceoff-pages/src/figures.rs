@@ -175,7 +175,7 @@ pub(super) fn percent(part: usize, whole: usize) -> String {
 }
 
 /// Symbol beside the name of a tier: colour alone must not carry the meaning.
-pub(super) const fn tier_symbol(tier: Tier) -> &'static str {
+pub(super) const fn tier_symbol(tier: &Tier) -> &'static str {
     match tier {
         Tier::Deployable => "✓",
         Tier::Improvable => "▲",
