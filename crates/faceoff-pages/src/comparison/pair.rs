@@ -4,7 +4,7 @@ use crate::{
     assets,
     frame::{Frame, PageProblem, render},
     replay::page_path,
-    side_by_side::Side,
+    side_by_side::{Side, neighbours},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -99,11 +99,8 @@ async fn side(
 
 /// The nearest episodes before and after this one that only one team solved.
 fn differing_neighbours(solved: &SolvedEpisodes, episode: u32) -> [Option<u32>; 2] {
-    let differing = || solved.only_a.iter().chain(&solved.only_b).copied();
-    [
-        differing().filter(|other| *other < episode).max(),
-        differing().filter(|other| *other > episode).min(),
-    ]
+    let differing = solved.only_a.iter().chain(&solved.only_b).copied();
+    neighbours(differing, episode)
 }
 
 #[cfg(test)]
