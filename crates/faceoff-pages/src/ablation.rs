@@ -21,7 +21,6 @@ use faceoff_service::{
     views::{
         ablation,
         ablation_clips::{AblationClips, DifferingEpisode},
-        season::SeasonHead,
         submission, team,
     },
 };
@@ -94,7 +93,6 @@ pub(super) async fn page(
         return Err(Problem::new(ProblemKind::NotFound, detail).into());
     };
     let team = team::find(&app, submission.team).await?;
-    let season = SeasonHead::load(&app).await?;
     let task_results = match &view.status {
         AblationStatus::Finished { tasks, .. } => {
             let results = tasks.iter();
@@ -107,7 +105,7 @@ pub(super) async fn page(
     let clips = AblationClips::load(&app, viewer?, id).await?;
     let outcome_changes = clips.differing_episodes(&app).await?.into_iter();
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         style: assets::EPISODES_STYLE.url(),
         id,
         outcome_changes: outcome_changes

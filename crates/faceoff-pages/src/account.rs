@@ -1,7 +1,7 @@
 //! `/account`: the signed-in user with their tokens and sessions.
 
 use super::{
-    figures::utc_minute,
+    figures::expiry_state,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;
@@ -16,8 +16,7 @@ use faceoff_api::views::{
 use faceoff_service::{
     app::App,
     auth::OptionalCaller,
-    problem::Problem,
-    views::{season::SeasonHead, token, user as user_view},
+    views::{token, user as user_view},
 };
 use faceoff_store::TokenOwner;
 use jiff::Timestamp;
@@ -33,19 +32,9 @@ struct Page {
 }
 
 impl Page {
-    fn timestamp(&self, instant: &Timestamp) -> String {
-        utc_minute(*instant)
-    }
-
     fn state(&self, token: &TokenView) -> String {
-        match (token.revoked_at, token.expires_at) {
-            (Some(revoked_at), _) => format!("revoked {}", self.timestamp(&revoked_at)),
-            (None, Some(expires_at)) if expires_at <= self.now => {
-                format!("expired {}", self.timestamp(&expires_at))
-            }
-            (None, Some(expires_at)) => format!("valid until {}", self.timestamp(&expires_at)),
-            (None, None) => "valid".into(),
-        }
+        let state = expiry_state(token.revoked_at, token.expires_at, self.now);
+        state.unwrap_or_else(|| "valid".to_owned())
     }
 }
 
@@ -60,13 +49,12 @@ pub(super) async fn page(
     }) else {
         return Ok(Redirect::to("/sign-in").into_response());
     };
-    let tokens = app.store.tokens().await.map_err(Problem::from)?;
+    let tokens = app.store.tokens().await?;
     let own = tokens
         .into_iter()
         .filter(|token| token.owner == TokenOwner::User(user.id));
-    let season = SeasonHead::load(&app).await?.name;
     render(&Page {
-        frame: Frame::for_app(&app, season, "/account"),
+        frame: Frame::load(&app, "/account").await?,
         tokens: own.map(token::view).collect(),
         account: user_view::caller(caller.principal, token::view(caller.token)),
         user: user_view::view(user),

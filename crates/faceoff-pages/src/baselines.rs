@@ -13,7 +13,6 @@ pub(super) struct Baseline {
     pub(super) evaluation: EvaluationId,
     pub(super) day: Date,
     pub(super) tier: Tier,
-    pub(super) symbol: &'static str,
     /// Success rates of the tasks that the board covers and the agent played.
     pub(super) rates: Vec<(Task, Rate)>,
     pub(super) penalty_points: String,
@@ -38,7 +37,6 @@ pub(super) fn rows(board: &BoardView) -> Vec<Baseline> {
             evaluation: row.evaluation,
             day: row.day,
             tier: row.tier,
-            symbol: figures::tier_symbol(row.tier),
             rates: tasks
                 .map(|(task, result)| (*task, Rate::new(result)))
                 .collect(),

@@ -85,7 +85,7 @@ pub(super) async fn overall(
     let season = SeasonHead::load(&app).await?;
     let mut board = board::query(&app, &visibility, query.board(), None).await?;
     sort.apply(&mut board.rows, None);
-    let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
+    let today = app.store.stage(board.stage).await?;
     let today = today.day(app.config.clock.now());
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
     let context = Context::new(&board, timeline.previous_board.as_ref(), sort.is_by_rank());

@@ -16,7 +16,7 @@ use faceoff_service::{
     extract::PathParams,
     problem::Problem,
     viewer::Viewer,
-    views::{clips::Clips, comparison, season::SeasonHead, visibility::Visibility},
+    views::{clips::Clips, comparison, visibility::Visibility},
 };
 use faceoff_types::{EvaluationId, Task};
 
@@ -109,7 +109,6 @@ pub(super) async fn page(
     for id in ids {
         has_replays &= Clips::find(&app, &visibility, id).await.is_ok();
     }
-    let season = SeasonHead::load(&app).await?;
     let names = [view.a.team.as_str(), view.b.team.as_str()];
     let rows = view
         .tasks
@@ -133,7 +132,7 @@ pub(super) async fn page(
         .collect();
     let overall = &view.overall;
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         rows,
         score_a: figures::one_decimal(overall.score_a),
         score_b: figures::one_decimal(overall.score_b),

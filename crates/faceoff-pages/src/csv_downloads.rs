@@ -51,8 +51,7 @@ pub(super) async fn episodes(
             columns.push(format!("{name}_{suffix}"));
         }
     }
-    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let mut table = Table::new(&names);
+    let mut table = Table::new(&columns);
     for line in &view.episodes {
         let mut row = vec![
             line.task.to_string(),

@@ -72,6 +72,10 @@ impl From<&Problem> for Refusal {
     }
 }
 
+/// A form without fields: its button says everything.
+#[derive(Deserialize)]
+pub(super) struct EmptyForm {}
+
 /// Query of a redirect after a successful action.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(default)]

@@ -19,7 +19,7 @@ use faceoff_service::{
     extract::{PathParam, QueryParams},
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{clips::Clips, season::SeasonHead, visibility::Visibility},
+    views::{clips::Clips, visibility::Visibility},
 };
 use faceoff_types::{EpisodeEnd, EvaluationId, Task};
 use jiff::civil::Date;
@@ -84,12 +84,7 @@ pub(super) async fn page(
     let visibility = Visibility::load(&app, viewer?).await?;
     let clips = Clips::find(&app, &visibility, id).await?;
     let view = clips.episodes().await?;
-    let team = app
-        .store
-        .team(clips.evaluation.team)
-        .await
-        .map_err(Problem::from)?;
-    let season = SeasonHead::load(&app).await?;
+    let team = app.store.team(clips.evaluation.team).await?;
 
     let task_episodes: Vec<_> = view
         .episodes
@@ -145,7 +140,7 @@ pub(super) async fn page(
         EpisodeEnd::AgentFault,
     ];
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         style: assets::EPISODES_STYLE.url(),
         id,
         team: team.name.to_string(),

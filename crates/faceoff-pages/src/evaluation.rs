@@ -26,12 +26,10 @@ use faceoff_service::{
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
-    views::{
-        ablation, clips::Clips, evaluation, season::SeasonHead, submission, visibility::Visibility,
-    },
+    views::{ablation, clips::Clips, evaluation, submission, visibility::Visibility},
 };
 use faceoff_types::{
-    EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, ViolationCounts,
+    EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, Tier, ViolationCounts,
 };
 use figures::{Rate, utc_minute};
 use jiff::{Timestamp, civil};
@@ -46,9 +44,7 @@ struct TaskFigures {
     episodes: u32,
     penalty_points: String,
     per_episode: String,
-    tier_name: &'static str,
-    tier_title: &'static str,
-    tier_symbol: &'static str,
+    tier: Tier,
     /// Probability that other episodes of the same kind would give another tier.
     tier_change: String,
     details: Option<TaskDetails>,
@@ -73,9 +69,7 @@ impl TaskFigures {
             episodes: result.episodes,
             penalty_points: figures::one_decimal(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
-            tier_name: result.tier.as_str(),
-            tier_title: result.tier.title(),
-            tier_symbol: figures::tier_symbol(result.tier),
+            tier: result.tier,
             tier_change: figures::probability(summary.tier_change_of(Some(task))),
             details: TaskDetails::new(result),
         }
@@ -132,9 +126,7 @@ impl TaskDetails {
 struct FinalResult {
     score: Rate,
     penalty_points: String,
-    tier_name: &'static str,
-    tier_title: &'static str,
-    tier_symbol: &'static str,
+    tier: Tier,
     tier_bounds: String,
     tier_change: String,
     /// Number of bootstrap resamples behind `tier_change`.
@@ -249,7 +241,6 @@ pub(super) async fn page(
     let view = evaluation::find(&app, &visibility, id).await?;
     let submission = submission::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
-    let season = SeasonHead::load(&app).await?;
     let scored_at = view.status.finished_at();
     let frozen = scored_at.and_then(|scored_at| visibility.hiding_freeze(view.stage, scored_at));
     let clips = Clips::find(&app, &visibility, id).await.ok();
@@ -281,7 +272,7 @@ pub(super) async fn page(
         _ => None,
     };
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         id,
         team: view.team_name.to_string(),
         agent: submission.agent_name,
@@ -434,9 +425,7 @@ impl FinalResult {
         Self {
             score: Rate::of_score(result.score, &result.tasks, &result.variation.weights),
             penalty_points: figures::one_decimal(result.penalty_points),
-            tier_name: result.tier.as_str(),
-            tier_title: result.tier.title(),
-            tier_symbol: figures::tier_symbol(result.tier),
+            tier: result.tier,
             tier_bounds: figures::tier_bounds(result.tier, &result.variation.tier_bounds),
             tier_change: figures::probability(summary.tier_change_of(None)),
             resamples: TIER_CHANGE_RESAMPLES,

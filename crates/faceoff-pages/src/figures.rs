@@ -85,6 +85,26 @@ pub(super) fn utc_minute(instant: Timestamp) -> String {
     instant.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
+/// [`utc_minute`] for templates, which pass references.
+pub(super) fn timestamp(instant: &Timestamp) -> String {
+    utc_minute(*instant)
+}
+
+/// The state of something that can be revoked and can expire; `None` if it is valid without an expiry.
+pub(super) fn expiry_state(
+    revoked_at: Option<Timestamp>,
+    expires_at: Option<Timestamp>,
+    now: Timestamp,
+) -> Option<String> {
+    let (state, at) = match (revoked_at, expires_at) {
+        (Some(revoked_at), _) => ("revoked", revoked_at),
+        (None, Some(expires_at)) if expires_at <= now => ("expired", expires_at),
+        (None, Some(expires_at)) => ("valid until", expires_at),
+        (None, None) => return None,
+    };
+    Some(format!("{state} {}", utc_minute(at)))
+}
+
 /// A non-negative value with two significant digits.
 pub(super) fn two_significant_digits(value: f64) -> String {
     let decimals = match value {
@@ -165,7 +185,7 @@ pub(super) fn percent(part: usize, whole: usize) -> String {
 }
 
 /// Symbol beside the name of a tier: colour alone must not carry the meaning.
-pub(super) const fn tier_symbol(tier: Tier) -> &'static str {
+pub(super) const fn tier_symbol(tier: &Tier) -> &'static str {
     match tier {
         Tier::Deployable => "✓",
         Tier::Improvable => "▲",

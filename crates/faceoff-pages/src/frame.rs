@@ -6,7 +6,9 @@ use axum::{
     http::{HeaderValue, header},
     response::{Html, IntoResponse, Response},
 };
-use faceoff_service::{app::AppState, conditions::ETag, problem::Problem};
+use faceoff_service::{
+    app::AppState, conditions::ETag, problem::Problem, views::season::SeasonHead,
+};
 use faceoff_types::RULESET;
 use std::sync::atomic::Ordering;
 
@@ -31,6 +33,12 @@ pub(super) struct Frame {
 }
 
 impl Frame {
+    /// The frame of a page that names the season.
+    pub(super) async fn load(app: &AppState, current: impl Into<String>) -> Result<Self, Problem> {
+        let season = SeasonHead::load(app).await?;
+        Ok(Self::for_app(app, season.name, current))
+    }
+
     /// The frame of a page with content from the store.
     pub(super) fn for_app(app: &AppState, season: String, current: impl Into<String>) -> Self {
         let short = app.store.free_space().is_short();
@@ -122,9 +130,9 @@ pub(super) fn render(page: &impl Template) -> Result<Response, PageProblem> {
 /// A problem, shown as a page.
 pub(super) struct PageProblem(pub(super) Problem);
 
-impl From<Problem> for PageProblem {
-    fn from(problem: Problem) -> Self {
-        Self(problem)
+impl<E: Into<Problem>> From<E> for PageProblem {
+    fn from(error: E) -> Self {
+        Self(error.into())
     }
 }
 

@@ -23,7 +23,7 @@ use faceoff_service::{
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
-    views::{game, game_clips::GameClips, live_game::LiveGameView, season::SeasonHead},
+    views::{game, game_clips::GameClips, live_game::LiveGameView},
 };
 use faceoff_types::{GameId, Side, SubmissionId, TeamId, TournamentId};
 use live::LiveGame;
@@ -118,7 +118,6 @@ pub(super) async fn page(
     let PathParam(id) = id?;
     let viewer = viewer?;
     let view = game::find(&app, viewer, id).await?;
-    let season = SeasonHead::load(&app).await?;
     let teams = view.sides.each_ref().map(|side| side.team_name.to_string());
     let is_hidden = spoilers.hides_results();
     let (mut live, mut shown_result, mut sections, mut replay) = (None, None, None, None);
@@ -149,11 +148,7 @@ pub(super) async fn page(
         _ => {}
     }
     render(&Page {
-        frame: Frame::for_app(
-            &app,
-            season.name,
-            format!("/tournaments/{}", view.tournament),
-        ),
+        frame: Frame::load(&app, format!("/tournaments/{}", view.tournament)).await?,
         id,
         tournament: view.tournament,
         tournament_name: view.tournament_name.to_string(),

@@ -16,13 +16,12 @@ use axum::{
 use faceoff_api::views::game::{GameResultView, GameStatus};
 use faceoff_service::{
     app::App,
-    extract::PathParams,
+    extract::{PathParams, parse_path_param},
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{game, season::SeasonHead, tournament_state::TournamentState},
+    views::{game, tournament_state::TournamentState},
 };
 use faceoff_types::{TeamId, TeamName, TournamentId};
-use std::{fmt::Display, str::FromStr};
 
 /// The path parameters `{id}`, `{a}` and `{b}`.
 pub(super) struct TeamPairPath {
@@ -37,16 +36,10 @@ impl<S: Send + Sync> FromRequestParts<S> for TeamPairPath {
         let PathParams([id, a, b]) =
             PathParams::<String, 3>::from_request_parts(parts, state).await?;
         Ok(Self {
-            tournament: parse_id(&id)?,
-            teams: [parse_id(&a)?, parse_id(&b)?],
+            tournament: parse_path_param(&id)?,
+            teams: [parse_path_param(&a)?, parse_path_param(&b)?],
         })
     }
-}
-
-/// Parses an id; text that is not an id is answered like an unknown one.
-fn parse_id<T: FromStr<Err: Display>>(text: &str) -> Result<T, Problem> {
-    text.parse()
-        .map_err(|error: T::Err| Problem::new(ProblemKind::NotFound, error.to_string()))
 }
 
 /// A row of the table of statistics.
@@ -92,7 +85,6 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let TeamPairPath { tournament, teams } = path?;
     let viewer = viewer?;
-    let season = SeasonHead::load(&app).await?;
     let state = TournamentState::find(&app, tournament).await?;
     let is_entered = |team: &TeamId| state.entrants.iter().any(|entrant| entrant.team == *team);
     if teams[0] == teams[1] || !teams.iter().all(is_entered) {
@@ -130,7 +122,7 @@ pub(super) async fn page(
         .copied()
         .collect();
     render(&Page {
-        frame: Frame::for_app(&app, season.name, format!("/tournaments/{tournament}")),
+        frame: Frame::load(&app, format!("/tournaments/{tournament}")).await?,
         tournament,
         tournament_name: state.tournament.name.to_string(),
         ids: teams,

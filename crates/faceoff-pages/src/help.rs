@@ -79,11 +79,7 @@ fn mebibytes(bytes: u64) -> String {
 
 pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
     let view = runtimes::build(&app).await?;
-    let season = app
-        .store
-        .season()
-        .await
-        .map_err(faceoff_service::problem::Problem::from)?;
+    let season = app.store.season().await?;
     let stages = view.stages.iter().map(|stage| Contest {
         name: match stage.phase {
             PhaseView::Upcoming => format!("{} (not open yet)", stage.name),

@@ -19,7 +19,7 @@ use faceoff_service::{
     extract::{PageForm, PathParam},
     problem::{Problem, ProblemKind},
     services::{accounts::join, sessions::session_expiry},
-    views::{announcement, season::SeasonHead},
+    views::announcement,
 };
 use faceoff_store::{CodeStatus, InvitationRole, RegistrationState, TokenKind};
 use faceoff_types::DivisionName;
@@ -116,7 +116,7 @@ async fn page_with(
 ) -> Result<Response, PageProblem> {
     let now = app.config.clock.now();
     let found = app.store.code_status(hash_token(code), now).await;
-    let offer = match found.map_err(Problem::from)? {
+    let offer = match found? {
         CodeStatus::Open(invitation, team) => match invitation.role {
             InvitationRole::Organiser => Offer::Organiser,
             InvitationRole::Member(_) => {
@@ -136,13 +136,12 @@ async fn page_with(
             Offer::RefusedRegistration(registration.team_name.to_string(), reason)
         }
     };
-    let terms = app.store.terms().await.map_err(Problem::from)?;
-    let season = SeasonHead::load(app).await?.name;
+    let terms = app.store.terms().await?;
     render(&Page {
-        frame: Frame::for_app(app, season, "/join"),
+        frame: Frame::load(app, "/join").await?,
         offer,
         terms: terms.into_iter().next().map(announcement::terms),
-        divisions: app.store.divisions().await.map_err(Problem::from)?,
+        divisions: app.store.divisions().await?,
         form: Form {
             password: String::new(),
             ..form

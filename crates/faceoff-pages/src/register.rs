@@ -15,11 +15,7 @@ use faceoff_api::{
     views::{announcement::TermsView, invitation::NewRegistrationView},
 };
 use faceoff_service::{
-    app::App,
-    extract::PageForm,
-    problem::Problem,
-    services::registrations,
-    views::{announcement, season::SeasonHead},
+    app::App, extract::PageForm, problem::Problem, services::registrations, views::announcement,
 };
 use faceoff_types::DivisionName;
 use serde::Deserialize;
@@ -54,14 +50,13 @@ async fn page_with(
     error: Option<String>,
     registered: Option<NewRegistrationView>,
 ) -> Result<Response, PageProblem> {
-    let season = app.store.season().await.map_err(Problem::from)?;
-    let terms = app.store.terms().await.map_err(Problem::from)?;
-    let name = SeasonHead::load(app).await?.name;
+    let season = app.store.season().await?;
+    let terms = app.store.terms().await?;
     render(&Page {
-        frame: Frame::for_app(app, name, "/register"),
+        frame: Frame::load(app, "/register").await?,
         is_open: season.registration_open && season.closed_at.is_none(),
         terms: terms.into_iter().next().map(announcement::terms),
-        divisions: app.store.divisions().await.map_err(Problem::from)?,
+        divisions: app.store.divisions().await?,
         form,
         error,
         registered,

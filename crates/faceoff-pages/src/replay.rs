@@ -16,7 +16,7 @@ use faceoff_service::{
     episode_path::EpisodePath,
     problem::Problem,
     viewer::Viewer,
-    views::{clips::Clips, season::SeasonHead, visibility::Visibility},
+    views::{clips::Clips, visibility::Visibility},
 };
 use faceoff_types::{EvaluationId, Task};
 use jiff::civil::Date;
@@ -60,9 +60,8 @@ pub(super) async fn page(
     path: Result<EpisodePath, Problem>,
 ) -> Result<Response, PageProblem> {
     let view = EpisodeReplay::load(&app, viewer?, path?).await?;
-    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         view,
     })
 }

@@ -84,7 +84,7 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let season = season::build(&app, viewer?).await?;
     let utc_second = |instant: Timestamp| instant.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
-    let tournaments = app.store.tournaments().await.map_err(Problem::from)?;
+    let tournaments = app.store.tournaments().await?;
     render(&Page {
         tournaments: tournaments
             .into_iter()

@@ -17,6 +17,17 @@ pub(super) struct Side {
     pub(super) replay: ReplaySection,
 }
 
+/// The nearest of these episodes before and after this one.
+pub(super) fn neighbours(
+    episodes: impl Iterator<Item = u32> + Clone,
+    episode: u32,
+) -> [Option<u32>; 2] {
+    [
+        episodes.clone().filter(|other| *other < episode).max(),
+        episodes.filter(|other| *other > episode).min(),
+    ]
+}
+
 impl Side {
     /// `api`: address of the clips. `element_id`: id of the HTML element.
     pub(super) fn new(

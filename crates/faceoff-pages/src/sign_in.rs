@@ -12,7 +12,7 @@ use axum::{
 };
 use faceoff_service::{
     app::App, auth::Caller, extract::PageForm, problem::ProblemKind, services::sessions::sign_in,
-    session, views::season::SeasonHead,
+    session,
 };
 use serde::Deserialize;
 
@@ -55,9 +55,8 @@ async fn page_with(
     error: Option<String>,
     return_path: String,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::load(app).await?.name;
     render(&Page {
-        frame: Frame::for_app(app, season, "/sign-in"),
+        frame: Frame::load(app, "/sign-in").await?,
         name,
         error,
         return_path,
@@ -116,7 +115,7 @@ pub(super) async fn sign_out(
     let now = app.config.clock.now();
     let actor = caller.actor();
     let ended = app.store.revoke_token(actor, caller.token.id, now).await;
-    ended.map_err(faceoff_service::problem::Problem::from)?;
+    ended?;
     let cookie = session::set_cookie(&app.config, None)?;
     let cookie = AppendHeaders([(header::SET_COOKIE, cookie)]);
     Ok((cookie, Redirect::to("/")).into_response())

@@ -63,42 +63,35 @@ pub(super) fn path(positions: &[Position]) -> String {
 
 /// Dots at positions: lines of zero length, of which only the round ends are visible.
 pub(super) fn dots(positions: &[Position]) -> String {
-    let mut out = String::new();
-    for position in positions {
-        let [x, y] = to_svg(*position);
-        let _written = write!(out, "M{x} {y}h0");
-    }
-    out
+    marks(positions, |x, y| format!("M{x} {y}h0"))
 }
 
 /// Crosses at positions, 28 mm wide.
 pub(super) fn crosses(positions: &[Position]) -> String {
-    let mut out = String::new();
-    for position in positions {
-        let [x, y] = to_svg(*position);
-        let _written = write!(out, "M{} {}l28 28m0 -28l-28 28", x - 14.0, y - 14.0);
-    }
-    out
+    marks(positions, |x, y| {
+        format!("M{} {}l28 28m0 -28l-28 28", x - 14.0, y - 14.0)
+    })
 }
 
 /// Squares around positions, 26 mm wide.
 pub(super) fn squares(positions: &[Position]) -> String {
-    let mut out = String::new();
-    for position in positions {
-        let [x, y] = to_svg(*position);
-        let _written = write!(out, "M{} {}h26v26h-26z", x - 13.0, y - 13.0);
-    }
-    out
+    marks(positions, |x, y| {
+        format!("M{} {}h26v26h-26z", x - 13.0, y - 13.0)
+    })
 }
 
 /// Triangles around positions, 28 mm wide.
 pub(super) fn triangles(positions: &[Position]) -> String {
-    let mut out = String::new();
-    for position in positions {
+    marks(positions, |x, y| format!("M{x} {}l14 24h-28z", y - 14.0))
+}
+
+/// The same mark at each position, as SVG path data.
+fn marks(positions: &[Position], mark: impl Fn(f64, f64) -> String) -> String {
+    let marks = positions.iter().map(|position| {
         let [x, y] = to_svg(*position);
-        let _written = write!(out, "M{x} {}l14 24h-28z", y - 14.0);
-    }
-    out
+        mark(x, y)
+    });
+    marks.collect()
 }
 
 /// A position in SVG coordinates, for attributes.

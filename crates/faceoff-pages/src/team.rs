@@ -20,8 +20,8 @@ use faceoff_service::{
     problem::Problem,
     viewer::Viewer,
     views::{
-        evaluation, history, season::SeasonHead, stage, submission, team,
-        tournament::entered_tournaments, visibility::Visibility,
+        evaluation, history, stage, submission, team, tournament::entered_tournaments,
+        visibility::Visibility,
     },
 };
 use faceoff_types::{StageDay, StageName, TeamId, TournamentId};
@@ -62,7 +62,6 @@ pub(super) async fn page(
     let (PathParam(id), QueryParams(query)) = (id?, query?);
     let viewer = viewer?;
     let visibility = Visibility::load(&app, viewer).await?;
-    let season = SeasonHead::load(&app).await?;
     let team = team::find(&app, id).await?;
     let history = HistoryQuery {
         stage: query.stage,
@@ -70,16 +69,8 @@ pub(super) async fn page(
     };
     let mut history = history::query(&app, &visibility, history).await?;
     history.rows.retain(|row| row.team_id == id);
-    let stage = app
-        .store
-        .stage(history.stage)
-        .await
-        .map_err(Problem::from)?;
-    let revisions = app
-        .store
-        .stage_revisions(stage.id)
-        .await
-        .map_err(Problem::from)?;
+    let stage = app.store.stage(history.stage).await?;
+    let revisions = app.store.stage_revisions(stage.id).await?;
     let rules = revisions
         .into_iter()
         .find(|revision| revision.number == history.revision)
@@ -103,7 +94,7 @@ pub(super) async fn page(
         .filter(|other| other.id != stage.id);
     render(&Page {
         tournaments: entered_tournaments(&app, id).await?,
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         stage: stage.name.to_string(),
         other_stages: other_stages
             .map(|other| (other.name.to_string(), format!("?stage={}", other.id)))

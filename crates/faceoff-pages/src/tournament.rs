@@ -24,7 +24,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::{
-        game, ratings::ratings, replays::champion_shares, season::SeasonHead, tournament,
+        game, ratings::ratings, replays::champion_shares, tournament,
         tournament_state::TournamentState,
     },
 };
@@ -106,7 +106,6 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
     let viewer = viewer?;
-    let season = SeasonHead::load(&app).await?;
     let state = TournamentState::find(&app, id).await?;
     let view = tournament::view(&state)?;
     let is_hidden = spoilers.hides_results();
@@ -136,7 +135,7 @@ pub(super) async fn page(
         !is_hidden && entrant.departure.is_none() && !standings.iter().any(is_listed)
     });
     let page = Page {
-        frame: Frame::for_app(&app, season.name, format!("/tournaments/{id}")),
+        frame: Frame::load(&app, format!("/tournaments/{id}")).await?,
         id,
         phase: tournament_text::phase_label(&view.head),
         format: tournament_text::describe_format(&view.rules),

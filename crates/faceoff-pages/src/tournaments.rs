@@ -8,10 +8,7 @@ use super::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::tournament::TournamentHead;
-use faceoff_service::{
-    app::App,
-    views::{season::SeasonHead, tournament},
-};
+use faceoff_service::{app::App, views::tournament};
 
 struct Row {
     head: TournamentHead,
@@ -40,11 +37,10 @@ pub(super) async fn page(
     State(app): State<App>,
     spoilers: Spoilers,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::load(&app).await?;
     let mut heads = tournament::heads(&app).await?;
     heads.reverse();
     render(&Page {
-        frame: Frame::for_app(&app, season.name, "/tournaments"),
+        frame: Frame::load(&app, "/tournaments").await?,
         rows: heads
             .into_iter()
             .map(|head| Row {

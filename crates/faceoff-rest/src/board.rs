@@ -1,6 +1,6 @@
 //! Boards, which rank the teams of a stage, overall and by task; and their history day by day. As JSON or CSV.
 
-use super::{board_csv, document::TagHeader};
+use super::{board_csv, document::TagHeader, downloads::send_tagged};
 use axum::{
     Json,
     extract::State,
@@ -90,17 +90,8 @@ pub(crate) async fn board_history(
     query.stage = Some(stage.id);
     let format = choose_format(query.format, &headers);
     let tag = tag(&app, change, viewer, format, &("history", &query))?;
-    let Some(mut not_modified) = conditions.not_modified(&tag) else {
-        let history = history::query(&app, &visibility, query).await?;
-        return Ok(build_response(
-            &tag,
-            format,
-            &history,
-            board_csv::history_table,
-        ));
-    };
-    require_revalidation(not_modified.headers_mut());
-    Ok(not_modified)
+    let history = history::query(&app, &visibility, query);
+    send(&tag, &conditions, format, history, board_csv::history_table).await
 }
 
 async fn respond(
@@ -118,12 +109,8 @@ async fn respond(
     query.stage = Some(stage.id);
     let format = choose_format(query.format, headers);
     let tag = tag(app, change, viewer, format, &(task, &query))?;
-    let Some(mut not_modified) = conditions.not_modified(&tag) else {
-        let board = board::query(app, &visibility, query, task).await?;
-        return Ok(build_response(&tag, format, &board, board_csv::board_table));
-    };
-    require_revalidation(not_modified.headers_mut());
-    Ok(not_modified)
+    let board = board::query(app, &visibility, query, task);
+    send(&tag, conditions, format, board, board_csv::board_table).await
 }
 
 /// The tag (`ETag`) of a response. It is made of the request, the viewer, and the number of the newest change of the season.
@@ -160,29 +147,26 @@ fn choose_format(requested: Option<BoardFormat>, headers: &HeaderMap) -> BoardFo
     }
 }
 
-fn build_response<T: Serialize>(
+/// Sends a view in this format, unless the client already has the response with this tag.
+async fn send<T: Serialize>(
     tag: &ETag,
+    conditions: &Conditions,
     format: BoardFormat,
-    view: &T,
-    csv: impl FnOnce(&T) -> Vec<u8>,
-) -> Response {
-    let mut response = match format {
-        BoardFormat::Json => Json(view).into_response(),
-        BoardFormat::Csv => {
-            let media_type = [(header::CONTENT_TYPE, MEDIA_TYPE)];
-            (media_type, csv(view)).into_response()
-        }
+    view: impl Future<Output = Result<T, Problem>>,
+    csv: fn(&T) -> Vec<u8>,
+) -> Result<Response, Problem> {
+    let response = async {
+        let view = view.await?;
+        Ok(match format {
+            BoardFormat::Json => Json(view).into_response(),
+            BoardFormat::Csv => {
+                let media_type = [(header::CONTENT_TYPE, MEDIA_TYPE)];
+                (media_type, csv(&view)).into_response()
+            }
+        })
     };
-    let headers = response.headers_mut();
-    headers.insert(header::ETAG, tag.header());
-    require_revalidation(headers);
-    response
-}
-
-/// Caches must revalidate the response for each caller.
-fn require_revalidation(headers: &mut HeaderMap) {
-    let cache = HeaderValue::from_static("private, no-cache");
-    headers.insert(header::CACHE_CONTROL, cache);
+    let mut response = send_tagged(tag, conditions, response).await?;
     let request_headers = HeaderValue::from_static("authorization, cookie, accept");
-    headers.insert(header::VARY, request_headers);
+    response.headers_mut().insert(header::VARY, request_headers);
+    Ok(response)
 }

@@ -5,8 +5,8 @@ use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::Task;
 use std::collections::BTreeMap;
 
-/// Columns of each task; the table prefixes them with the task's name.
-const TASK_COLUMNS: [&str; 16] = [
+/// Columns of each task; a table prefixes them with the task's name.
+pub(crate) const TASK_COLUMNS: [&str; 16] = [
     "episodes",
     "successes",
     "success_rate",
@@ -25,18 +25,20 @@ const TASK_COLUMNS: [&str; 16] = [
     "computation_time_max_s",
 ];
 
-/// An empty table with `columns`, followed by [`TASK_COLUMNS`] of each task.
-fn table_with_tasks(columns: &[&str]) -> Table {
+/// An empty table with `columns`, followed by the `task_columns` of each task.
+pub(crate) fn table_with_tasks(columns: &[&str], task_columns: &[&str]) -> Table {
     let mut names: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in Task::ALL {
-        names.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
+        names.extend(task_columns.iter().map(|column| format!("{task}_{column}")));
     }
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     Table::new(&names)
 }
 
-/// The values of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
-fn task_fields(tasks: &BTreeMap<Task, TaskView>) -> impl Iterator<Item = String> + '_ {
+/// The values of the first `columns` of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
+pub(crate) fn task_fields(
+    tasks: &BTreeMap<Task, TaskView>,
+    columns: usize,
+) -> impl Iterator<Item = String> + '_ {
     let fields = |task| match tasks.get(&task) {
         None => vec![String::new(); TASK_COLUMNS.len()],
         Some(result) => {
@@ -62,7 +64,8 @@ fn task_fields(tasks: &BTreeMap<Task, TaskView>) -> impl Iterator<Item = String>
             ]
         }
     };
-    Task::ALL.into_iter().flat_map(fields)
+    let first_fields = move |task| fields(task).into_iter().take(columns);
+    Task::ALL.into_iter().flat_map(first_fields)
 }
 
 /// The fields that ranked rows and baselines (unranked agents of the organisers) have in common, from the column `tier` on.
@@ -89,36 +92,39 @@ macro_rules! common_fields {
             or_empty(row.seed),
         ]
         .into_iter()
-        .chain(task_fields(&row.tasks))
+        .chain(task_fields(&row.tasks, TASK_COLUMNS.len()))
     }};
 }
 
 /// The ranked rows, then the baselines.
 pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
-    let mut table = table_with_tasks(&[
-        "rank",
-        "rank_group",
-        "baseline",
-        "would_rank",
-        "tier",
-        "tier_change_probability",
-        "team",
-        "team_id",
-        "agent",
-        "score",
-        "penalty_points",
-        "day",
-        "evaluation",
-        "finished_at",
-        "division",
-        "days",
-        // The reason for an extra evaluation, under the name that readers of older versions know.
-        "extra_turn",
-        "released_at",
-        "ruleset",
-        "profile",
-        "seed",
-    ]);
+    let mut table = table_with_tasks(
+        &[
+            "rank",
+            "rank_group",
+            "baseline",
+            "would_rank",
+            "tier",
+            "tier_change_probability",
+            "team",
+            "team_id",
+            "agent",
+            "score",
+            "penalty_points",
+            "day",
+            "evaluation",
+            "finished_at",
+            "division",
+            "days",
+            // The reason for an extra evaluation, under the name that readers of older versions know.
+            "extra_turn",
+            "released_at",
+            "ruleset",
+            "profile",
+            "seed",
+        ],
+        &TASK_COLUMNS,
+    );
     for row in &board.rows {
         let division = row.division.as_ref().map_or("", |name| name.as_str());
         let rank = [
@@ -143,21 +149,24 @@ pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
 
 /// One line per team and day.
 pub(crate) fn history_table(history: &HistoryView) -> Vec<u8> {
-    let mut table = table_with_tasks(&[
-        "day",
-        "team",
-        "team_id",
-        "division",
-        "baseline",
-        "rank",
-        "would_rank",
-        "tier",
-        "score",
-        "penalty_points",
-        "evaluation",
-        "finished_at",
-        "released_at",
-    ]);
+    let mut table = table_with_tasks(
+        &[
+            "day",
+            "team",
+            "team_id",
+            "division",
+            "baseline",
+            "rank",
+            "would_rank",
+            "tier",
+            "score",
+            "penalty_points",
+            "evaluation",
+            "finished_at",
+            "released_at",
+        ],
+        &TASK_COLUMNS,
+    );
     for row in &history.rows {
         let fields = [
             row.day.to_string(),
@@ -174,7 +183,8 @@ pub(crate) fn history_table(history: &HistoryView) -> Vec<u8> {
             row.finished_at.to_string(),
             or_empty(row.released_at),
         ];
-        table.row(fields.into_iter().chain(task_fields(&row.tasks)));
+        let task_fields = task_fields(&row.tasks, TASK_COLUMNS.len());
+        table.row(fields.into_iter().chain(task_fields));
     }
     table.into_bytes()
 }

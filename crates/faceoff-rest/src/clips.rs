@@ -3,12 +3,12 @@
 use super::{
     clip_response::send,
     document::{Binary, TagHeader},
-    downloads::set_private_caching,
+    downloads::send_tagged,
 };
 use axum::{
     Json,
     extract::State,
-    http::{HeaderMap, header},
+    http::HeaderMap,
     response::{IntoResponse, Response},
 };
 use faceoff_api::views::clips::EpisodesView;
@@ -55,15 +55,8 @@ pub(crate) async fn episodes(
         "episodes",
         &[&clips.file.key, detail, env!("CARGO_PKG_VERSION")],
     );
-    let mut response = match conditions.not_modified(&tag) {
-        Some(response) => response,
-        None => {
-            let view = clips.episodes().await?;
-            ([(header::ETAG, tag.header())], Json(view)).into_response()
-        }
-    };
-    set_private_caching(response.headers_mut());
-    Ok(response)
+    let episodes = async { Ok(Json(clips.episodes().await?).into_response()) };
+    send_tagged(&tag, &conditions, episodes).await
 }
 
 /// Returns the motion of table and robots in an episode, as a binary clip. Public once the day is released.

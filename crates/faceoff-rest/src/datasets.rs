@@ -3,7 +3,7 @@
 
 use super::{
     document::{Binary, FileHeaders, TagHeader},
-    downloads::{Download, download, file_stem, set_private_caching},
+    downloads::{Download, download, file_stem, send_tagged},
     proposals,
     stored_dataset::StoredDataset,
 };
@@ -11,7 +11,7 @@ use crate::links::{self, LinkOr, LinkQuery};
 use axum::{
     Json,
     extract::State,
-    http::{StatusCode, header},
+    http::StatusCode,
     response::{IntoResponse, Response},
 };
 use faceoff_api::{
@@ -131,15 +131,11 @@ pub(crate) async fn violations(
     // The response depends on the dataset and on the server's version.
     let source = stored.blake3.as_deref().unwrap_or(&stored.dataset);
     let tag = ETag::new("violations", &[source, env!("CARGO_PKG_VERSION")]);
-    let mut response = match conditions.not_modified(&tag) {
-        Some(response) => response,
-        None => {
-            let view = violations::read(&app, &stored.dataset).await?;
-            ([(header::ETAG, tag.header())], Json(view)).into_response()
-        }
+    let violations = async {
+        let view = violations::read(&app, &stored.dataset).await?;
+        Ok(Json(view).into_response())
     };
-    set_private_caching(response.headers_mut());
-    Ok(response)
+    send_tagged(&tag, &conditions, violations).await
 }
 
 /// Publishes a finished evaluation of the calling team and its dataset, before the stage publishes them. Everyone can then

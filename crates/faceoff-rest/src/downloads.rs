@@ -78,6 +78,22 @@ pub(super) async fn download(
     Ok(response)
 }
 
+/// Sends a response with this tag, unless the client already has it. `response` is awaited only if needed.
+pub(super) async fn send_tagged(
+    tag: &ETag,
+    conditions: &Conditions,
+    response: impl Future<Output = Result<Response, Problem>>,
+) -> Result<Response, Problem> {
+    let mut response = match conditions.not_modified(tag) {
+        Some(not_modified) => not_modified,
+        None => response.await?,
+    };
+    let headers = response.headers_mut();
+    headers.insert(header::ETAG, tag.header());
+    set_private_caching(headers);
+    Ok(response)
+}
+
 /// Lets only the caller's own cache store the response, and makes it revalidate each time.
 pub(super) fn set_private_caching(headers: &mut HeaderMap) {
     let cache = HeaderValue::from_static("private, no-cache");

@@ -4,14 +4,14 @@
 use super::{
     clip_response::send,
     document::{Binary, TagHeader},
-    game_files::{parse_game, parse_side},
+    game_files::parse_side,
 };
 use axum::{extract::State, http::HeaderMap, response::Response};
 use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,
     conditions::{Conditions, ETag},
-    extract::PathParams,
+    extract::{PathParams, parse_path_param},
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::game_clips::GameClips,
@@ -38,7 +38,7 @@ pub(crate) async fn game_motion(
     PathParams(path): PathParams<String, 2>,
 ) -> Result<Response, Problem> {
     let [id, chunk] = path;
-    let (id, chunk) = (parse_game(&id)?, parse_chunk(&chunk)?);
+    let (id, chunk) = (parse_path_param(&id)?, parse_chunk(&chunk)?);
     let clips = GameClips::find(&app, viewer, id).await?;
     let tag = ETag::new("motion", &[&clips.file.key, &chunk.to_string()]);
     send(

@@ -18,7 +18,7 @@ use faceoff_service::{
     archive_contents,
     auth::Caller,
     conditions::Conditions,
-    extract::{OptionalJson, PathParam, PathParams},
+    extract::{OptionalJson, PathParam, PathParams, parse_path_param},
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::{game, tournament_state::TournamentState},
@@ -169,14 +169,8 @@ pub(crate) async fn side_log(
         .into_response())
 }
 
-pub(super) fn parse_game(id: &str) -> Result<GameId, Problem> {
-    id.parse().map_err(|error: faceoff_types::ParseIdError| {
-        Problem::new(ProblemKind::NotFound, error.to_string())
-    })
-}
-
 pub(super) fn parse_side([id, side]: &[String; 2]) -> Result<(GameId, Side), Problem> {
-    let id = parse_game(id)?;
+    let id = parse_path_param(id)?;
     let side = side
         .parse::<u32>()
         .ok()

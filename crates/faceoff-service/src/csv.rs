@@ -13,9 +13,9 @@ pub struct Table(String);
 
 impl Table {
     /// A table with a header line.
-    pub fn new(columns: &[&str]) -> Self {
+    pub fn new(columns: &[impl ToString]) -> Self {
         let mut table = Self(String::new());
-        table.row(columns.iter().map(|column| (*column).to_owned()));
+        table.row(columns.iter().map(ToString::to_string));
         table
     }
 

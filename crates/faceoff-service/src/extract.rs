@@ -169,10 +169,8 @@ where
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
         let params = path_params(parts).await?;
-        let params = params.iter().map(|text| text.parse());
-        let params: Vec<T> = params
-            .collect::<Result<_, _>>()
-            .map_err(|error: T::Err| no_such_path(&error))?;
+        let params = params.iter().map(|text| parse_path_param(text));
+        let params: Vec<T> = params.collect::<Result<_, _>>()?;
         params.try_into().map(Self).map_err(|params: Vec<T>| {
             Problem::internal(format_args!(
                 "a path of {N} parameters has {}",
@@ -188,6 +186,14 @@ async fn path_params(parts: &mut Parts) -> Result<Vec<String>, Problem> {
         .await
         .map_err(|rejection| no_such_path(&rejection.body_text()))?;
     Ok(params.iter().map(|(_, text)| text.to_owned()).collect())
+}
+
+/// Parses one of the path parameters of a path that has different types of them.
+///
+/// # Errors
+/// `NotFound`, as for an unknown id.
+pub fn parse_path_param<T: FromStr<Err: Display>>(text: &str) -> Result<T, Problem> {
+    text.parse().map_err(|error: T::Err| no_such_path(&error))
 }
 
 /// The problem of a path parameter that cannot be parsed: 404, as for an unknown id.

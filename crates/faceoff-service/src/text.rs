@@ -4,36 +4,36 @@ use crate::problem::Problem;
 
 /// One line of text with 1 to `max_chars` printable characters.
 pub fn single_line(field: &str, text: &str, max_chars: usize) -> Result<String, Problem> {
-    let text = text.trim();
-    let chars = text.chars().count();
-    if !(1..=max_chars).contains(&chars) {
-        let detail = format!("expected 1 to {max_chars} characters, got {chars}");
-        return Err(Problem::invalid(field, detail));
-    }
-    match text.chars().find(|c| !faceoff_types::is_printable(*c)) {
-        Some(character) => Err(Problem::invalid(
-            field,
-            format!("expected one line of text, got the character {character:?}"),
-        )),
-        None => Ok(text.to_owned()),
-    }
+    let is_allowed = faceoff_types::is_printable;
+    checked(field, text, max_chars, "one line of text", is_allowed)
 }
 
 /// One or more lines of text with 1 to `max_chars` characters: printable ones, line breaks and tabs.
 pub fn multi_line(field: &str, text: &str, max_chars: usize) -> Result<String, Problem> {
     let text = text.replace("\r\n", "\n");
+    let is_allowed = |c: char| matches!(c, '\n' | '\t') || faceoff_types::is_printable(c);
+    checked(field, &text, max_chars, "plain text", is_allowed)
+}
+
+/// Text of a `kind` with 1 to `max_chars` characters, all of them allowed.
+fn checked(
+    field: &str,
+    text: &str,
+    max_chars: usize,
+    kind: &str,
+    is_allowed: impl Fn(char) -> bool,
+) -> Result<String, Problem> {
     let text = text.trim();
     let chars = text.chars().count();
     if !(1..=max_chars).contains(&chars) {
         let detail = format!("expected 1 to {max_chars} characters, got {chars}");
         return Err(Problem::invalid(field, detail));
     }
-    let is_allowed = |c: char| matches!(c, '\n' | '\t') || faceoff_types::is_printable(c);
     match text.chars().find(|c| !is_allowed(*c)) {
-        Some(character) => Err(Problem::invalid(
-            field,
-            format!("expected plain text, got the character {character:?}"),
-        )),
+        Some(character) => {
+            let detail = format!("expected {kind}, got the character {character:?}");
+            Err(Problem::invalid(field, detail))
+        }
         None => Ok(text.to_owned()),
     }
 }

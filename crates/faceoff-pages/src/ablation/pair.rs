@@ -4,7 +4,7 @@
 use crate::{
     assets,
     frame::{Frame, PageProblem, render},
-    side_by_side::Side,
+    side_by_side::{Side, neighbours},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -16,7 +16,6 @@ use faceoff_service::{
     viewer::Viewer,
     views::{
         ablation_clips::{AblationClips, DifferingEpisode},
-        season::SeasonHead,
         submission, team,
     },
 };
@@ -66,24 +65,22 @@ pub(crate) async fn page(
         ));
     }
     let differing = clips.differing_episodes(&app).await?;
-    let differing_episodes = || {
-        let all = differing.get(&profile).into_iter().flatten();
-        let task_episodes = all.filter(|DifferingEpisode { ideal, .. }| ideal.task == task);
-        task_episodes.map(|DifferingEpisode { ideal, .. }| ideal.episode)
-    };
+    let differing = differing.get(&profile).into_iter().flatten();
+    let differing = differing.filter(|DifferingEpisode { ideal, .. }| ideal.task == task);
+    let differing = differing.map(|DifferingEpisode { ideal, .. }| ideal.episode);
+    let [previous_difference, next_difference] = neighbours(differing, episode);
     let submission = submission::find(&app, id).await?;
     let team = team::find(&app, submission.team).await?;
-    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         id,
         team: team.name.to_string(),
         profile,
         task,
         episode,
         sides,
-        previous_difference: differing_episodes().filter(|other| *other < episode).max(),
-        next_difference: differing_episodes().filter(|other| *other > episode).min(),
+        previous_difference,
+        next_difference,
         styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
         script: assets::REPLAY_SCRIPT.url(),
     })

@@ -119,7 +119,7 @@ impl Heading {
                     }),
                     stage: stage.name.to_string(),
                     other_boards: Vec::new(),
-                    divisions: app.store.divisions().await.map_err(Problem::from)?,
+                    divisions: app.store.divisions().await?,
                     division: board.division.clone(),
                     all_teams: format!("?stage={}&revision={}", board.stage, board.revision),
                     paused: None,

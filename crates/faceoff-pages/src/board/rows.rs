@@ -37,7 +37,7 @@ pub(super) struct TeamCell {
     /// Conditions of the evaluation, where they differ between rows.
     pub(super) conditions: Option<String>,
     /// The tier, where rows are not grouped by tier.
-    pub(super) tier: Option<TierLabel>,
+    pub(super) tier: Option<Tier>,
 }
 
 /// Change of a team's rank and score since the day before.
@@ -52,9 +52,7 @@ pub(super) struct RankChange {
 }
 
 pub(super) struct TierLabel {
-    pub(super) name: &'static str,
-    pub(super) title: &'static str,
-    pub(super) symbol: &'static str,
+    pub(super) tier: Tier,
     pub(super) bounds: String,
 }
 
@@ -192,15 +190,13 @@ impl<'a> Context<'a> {
             extra_evaluation: row.extra_evaluation.clone(),
             day_count: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
             conditions: (!self.has_common_conditions).then(|| conditions(row)),
-            tier: (!self.is_by_rank).then(|| self.tier(row.tier)),
+            tier: (!self.is_by_rank).then_some(row.tier),
         }
     }
 
     fn tier(&self, tier: Tier) -> TierLabel {
         TierLabel {
-            name: tier.as_str(),
-            title: tier.title(),
-            symbol: figures::tier_symbol(tier),
+            tier,
             bounds: figures::tier_bounds(tier, &self.board.tier_bounds),
         }
     }

@@ -4,7 +4,7 @@ use crate::{
     assets,
     frame::{Frame, PageProblem, render},
     replay::page_path,
-    side_by_side::Side,
+    side_by_side::{Side, neighbours},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -15,7 +15,7 @@ use faceoff_service::{
     extract::PathParams,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
-    views::{clips::Clips, comparison, season::SeasonHead, visibility::Visibility},
+    views::{clips::Clips, comparison, visibility::Visibility},
 };
 use faceoff_types::{EvaluationId, Task};
 use jiff::civil::Date;
@@ -63,9 +63,8 @@ pub(crate) async fn page(
     let solved = view.episodes.as_ref().and_then(|all| all.get(&task));
     let [previous_difference, next_difference] =
         solved.map_or([None; 2], |solved| differing_neighbours(solved, episode));
-    let season = SeasonHead::load(&app).await?;
     render(&Page {
-        frame: Frame::for_app(&app, season.name, ""),
+        frame: Frame::load(&app, "").await?,
         ids,
         task,
         episode,
@@ -100,11 +99,8 @@ async fn side(
 
 /// The nearest episodes before and after this one that only one team solved.
 fn differing_neighbours(solved: &SolvedEpisodes, episode: u32) -> [Option<u32>; 2] {
-    let differing = || solved.only_a.iter().chain(&solved.only_b).copied();
-    [
-        differing().filter(|other| *other < episode).max(),
-        differing().filter(|other| *other > episode).min(),
-    ]
+    let differing = solved.only_a.iter().chain(&solved.only_b).copied();
+    neighbours(differing, episode)
 }
 
 #[cfg(test)]

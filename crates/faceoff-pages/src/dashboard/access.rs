@@ -1,8 +1,10 @@
 //! `/dashboard/access` and `/organiser/access`, with the same page for teams and organisers: users, invitations, tokens and sessions.
 
 use crate::{
-    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    figures::utc_minute,
+    dashboard_frame::{
+        DashboardHeader, DoneQuery, EmptyForm, Notice, redirect_done, render_dashboard,
+    },
+    figures::{expiry_state, utc_minute},
     frame::{Frame, PageProblem},
     page_auth::PageUser,
 };
@@ -24,12 +26,12 @@ use faceoff_service::{
     extract::{PageForm, PathParam},
     problem::Problem,
     services::{invitations, tokens, users},
-    views::{event, invitation, season::SeasonHead, token, user},
+    views::{event, invitation, token, user},
 };
 use faceoff_types::{InvitationId, TeamId, TeamName, TokenId, UserId};
 use jiff::{SignedDuration, Timestamp};
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, str::FromStr};
 
 /// The pages below `dashboard_path`, which is `/dashboard` or `/organiser`.
 pub(crate) fn router(dashboard_path: &str) -> Router<App> {
@@ -140,14 +142,7 @@ fn token_row(
         (None, Some(id)) => format!("team {}", name(format!("team:{id}"))),
         (None, None) => "administrator of the host".to_owned(),
     };
-    let state = match (token.revoked_at, token.expires_at) {
-        (Some(revoked_at), _) => format!("revoked {}", utc_minute(revoked_at)),
-        (None, Some(expires_at)) if expires_at <= now => {
-            format!("expired {}", utc_minute(expires_at))
-        }
-        (None, Some(expires_at)) => format!("valid until {}", utc_minute(expires_at)),
-        (None, None) => "valid, no expiry".to_owned(),
-    };
+    let state = expiry_state(token.revoked_at, token.expires_at, now);
     let last_used = token.last_used_at.map(utc_minute);
     TokenRow {
         id: token.id,
@@ -158,7 +153,7 @@ fn token_row(
         },
         created_at: utc_minute(token.created_at),
         last_used: last_used.unwrap_or_else(|| "never".to_owned()),
-        state,
+        state: state.unwrap_or_else(|| "valid, no expiry".to_owned()),
         is_current: token.id == caller.token.id,
         name: token.name,
     }
@@ -239,12 +234,11 @@ async fn page_with(
         }
     });
     let teams = match is_organiser {
-        true => app.store.teams().await.map_err(Problem::from)?,
+        true => app.store.teams().await?,
         false => Vec::new(),
     };
-    let season = SeasonHead::load(app).await?.name;
     let page = Page {
-        frame: Frame::for_app(app, season, path),
+        frame: Frame::load(app, path).await?,
         head: DashboardHeader::new(caller, path, notice),
         path,
         is_organiser,
@@ -353,9 +347,6 @@ async fn after_change<T>(
     }
 }
 
-#[derive(Deserialize)]
-struct EmptyForm {}
-
 async fn revoke_token(
     PageUser(caller): PageUser,
     State(app): State<App>,
@@ -380,6 +371,12 @@ struct InvitationForm {
     person: String,
 }
 
+/// The id of the chosen entry of a list.
+fn chosen<Id: FromStr>(field: &str, id: &str) -> Result<Id, Problem> {
+    id.parse()
+        .map_err(|_| Problem::invalid(field, "choose an entry of the list"))
+}
+
 fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvitation, Problem> {
     let role = match (caller.is_organiser(), form.role.as_str()) {
         (false, _) | (true, "member") => InvitedRole::Member,
@@ -391,19 +388,12 @@ fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvit
             return Err(Problem::invalid("role", detail));
         }
     };
-    let id = |field: &str, text: &str| {
-        let wrong = |_| Problem::invalid(field, "choose an entry of the list");
-        text.parse().map_err(wrong)
-    };
     let team = match (role, caller.is_organiser()) {
-        (InvitedRole::Member, true) => Some(id("team", &form.team)?),
+        (InvitedRole::Member, true) => Some(chosen("team", &form.team)?),
         _ => None,
     };
     let person = match role {
-        InvitedRole::Return => {
-            let wrong = |_| Problem::invalid("person", "choose an entry of the list");
-            Some(form.person.parse::<UserId>().map_err(wrong)?)
-        }
+        InvitedRole::Return => Some(chosen("person", &form.person)?),
         _ => None,
     };
     Ok(NewInvitation {

@@ -18,7 +18,7 @@ use faceoff_service::{
     extract::PageForm,
     problem::Problem,
     services::users,
-    views::{me, season::SeasonHead, submission},
+    views::{me, submission},
 };
 use faceoff_types::EvaluationId;
 use serde::Deserialize;
@@ -64,18 +64,17 @@ pub(super) async fn page_with(
     notice: Notice<'_>,
 ) -> Result<Response, PageProblem> {
     let team = &member.team.team;
-    let season = SeasonHead::load(app).await?.name;
     let me = me::build(app, team.clone()).await?;
     let submissions = submission::team_submissions(app, team.id).await?;
     let mut newest: Vec<SubmissionRow> = submissions.iter().map(SubmissionRow::from).collect();
     let older = newest.split_off(newest.len().min(MAX_LISTED));
     let active = submissions.iter().find(|submission| submission.active);
-    let terms = app.store.terms().await.map_err(Problem::from)?;
+    let terms = app.store.terms().await?;
     let newest_terms = terms.first().map(|terms| terms.version);
     let user = member.caller.user();
     let today = me.today.evaluation.zip(me.today.next.clone());
     let page = Page {
-        frame: Frame::for_app(app, season, "/dashboard"),
+        frame: Frame::load(app, "/dashboard").await?,
         head: DashboardHeader::new(&member.caller, "/dashboard", notice),
         next_cutoff: me.next_cutoff.as_ref().map(ToString::to_string),
         active: active.map(SubmissionRow::from),

@@ -2,7 +2,6 @@
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageMember,
 };
@@ -12,10 +11,7 @@ use axum::{
     response::Response,
 };
 use faceoff_api::{requests::NewQuestion, views::announcement::QuestionView};
-use faceoff_service::{
-    app::App, extract::PageForm, problem::Problem, services::announcements,
-    views::season::SeasonHead,
-};
+use faceoff_service::{app::App, extract::PageForm, problem::Problem, services::announcements};
 
 const PATH: &str = "/dashboard/questions";
 
@@ -28,21 +24,14 @@ struct Page {
     text: String,
 }
 
-impl Page {
-    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
-        utc_minute(*instant)
-    }
-}
-
 async fn page_with(
     app: &App,
     member: &PageMember,
     notice: Notice<'_>,
     text: String,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::load(app).await?.name;
     let page = Page {
-        frame: Frame::for_app(app, season, PATH),
+        frame: Frame::load(app, PATH).await?,
         head: DashboardHeader::new(&member.caller, PATH, notice),
         questions: announcements::questions(app, Some(&member.caller)).await?,
         text,

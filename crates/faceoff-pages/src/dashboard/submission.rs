@@ -1,7 +1,9 @@
 //! `/dashboard/submissions/{id}`: validation result, log and actions of a submission.
 
 use crate::{
-    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
+    dashboard_frame::{
+        DashboardHeader, DoneQuery, EmptyForm, Notice, redirect_done, render_dashboard,
+    },
     frame::{Frame, PageProblem},
     page_auth::PageMember,
     submission_row::SubmissionRow,
@@ -20,7 +22,7 @@ use faceoff_service::{
     extract::{PageForm, PathParam},
     problem::Problem,
     services::submissions,
-    views::{season::SeasonHead, submission},
+    views::submission,
 };
 use faceoff_types::{SubmissionId, ValidationTiming};
 use serde::Deserialize;
@@ -79,7 +81,6 @@ async fn page_with(
         .caller
         .visible("submission", found, |submission| submission.team)?;
     let view = submission::build(app, submission).await?;
-    let season = SeasonHead::load(app).await?.name;
     let log = match &view.status {
         SubmissionStatus::Valid { log } | SubmissionStatus::Invalid { log, .. } => log.clone(),
         SubmissionStatus::Validating | SubmissionStatus::ValidationError { .. } => None,
@@ -89,7 +90,7 @@ async fn page_with(
         note: view.note.clone().unwrap_or_default(),
     });
     let page = Page {
-        frame: Frame::for_app(app, season, ""),
+        frame: Frame::load(app, "").await?,
         head: DashboardHeader::new(&member.caller, "", notice),
         submission: SubmissionRow::from(&view),
         log: log.filter(|log| !log.trim().is_empty()),
@@ -110,9 +111,6 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     page_with(&app, &member, id?.0, Notice::Done(&notice), None).await
 }
-
-#[derive(Deserialize)]
-pub(super) struct EmptyForm {}
 
 /// Makes it the active submission.
 pub(super) async fn activate(

@@ -17,8 +17,7 @@ use faceoff_service::{
     app::App,
     problem::Problem,
     views::{
-        capacity, day, evaluation, health, queue, season::SeasonHead, stage, storage,
-        visibility::Visibility, workers,
+        capacity, day, evaluation, health, queue, stage, storage, visibility::Visibility, workers,
     },
 };
 use faceoff_store::{RegistrationState, Stage, StagePhase};
@@ -30,7 +29,6 @@ use std::collections::BTreeSet;
 struct Page {
     frame: Frame,
     head: DashboardHeader,
-    season: String,
     items: Vec<Item>,
     /// Running and queued jobs, if known.
     queue: Option<(u32, u32)>,
@@ -282,7 +280,7 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let (mut items, queue) = server_items(&app).await?;
     let mut stages = Vec::new();
-    for stage in app.store.stages().await.map_err(Problem::from)? {
+    for stage in app.store.stages().await? {
         let (found, summary) = stage_items(&app, stage).await?;
         items.extend(found);
         stages.push(summary);
@@ -290,16 +288,14 @@ pub(super) async fn page(
     items.extend(request_items(&app).await?);
     // Problems first; the sort is stable.
     items.sort_by_key(|item| item.class != "bad");
-    let season = SeasonHead::load(&app).await?.name;
     let path = "/organiser";
     let page = Page {
-        frame: Frame::for_app(&app, season.clone(), path),
+        frame: Frame::load(&app, path).await?,
         head: DashboardHeader::new(&user.caller, path, Notice::Done(&notice)),
-        season,
         items,
         queue,
         slots: queue::slots(&app),
-        teams: app.store.teams().await.map_err(Problem::from)?.len(),
+        teams: app.store.teams().await?.len(),
         stages,
     };
     render(&page)

@@ -146,11 +146,11 @@ pub(super) async fn page(
     let store = &app.store;
     let now = app.config.clock.now();
     let stage = match query.stage {
-        Some(id) => store.stage(id).await.map_err(Problem::from)?,
+        Some(id) => store.stage(id).await?,
         None => stage::current(&app).await?,
     };
     let today = stage.day(now);
-    let all_days = store.days().await.map_err(Problem::from)?;
+    let all_days = store.days().await?;
     let mut days: Vec<_> = all_days.into_iter().map(|(day, _)| day).collect();
     days.retain(|day| day.stage_day.stage == stage.id);
     let newest = days.iter().map(|day| day.stage_day.date).max();
@@ -189,13 +189,13 @@ pub(super) async fn page(
         }
     };
     let health = health::check(&app).await.ok();
-    let missed_days = store.missed_days().await.map_err(Problem::from)?;
+    let missed_days = store.missed_days().await?;
     let mut dates: Vec<Date> = days.iter().map(|day| day.stage_day.date).collect();
     dates.sort_unstable_by(|a, b| b.cmp(a));
     let is_open = stage.phase(now) == StagePhase::Open;
     let today_has_cutoff = dates.contains(&today.date);
     let season = SeasonHead::load(&app).await?;
-    let stages = store.stages().await.map_err(Problem::from)?;
+    let stages = store.stages().await?;
     let notice = DoneQuery { done: query.done };
     let page = Page {
         frame: Frame::for_app(&app, season.name, "/organiser/day"),

@@ -13,7 +13,6 @@ use faceoff_service::{
     app::App,
     extract::{PageForm, PathParam},
     problem::Problem,
-    views::season::SeasonHead,
 };
 use serde::Deserialize;
 
@@ -34,9 +33,8 @@ async fn page_with(
     notice: Notice<'_>,
 ) -> Result<Response, PageProblem> {
     let preview = decision.preview(app).await?;
-    let season = SeasonHead::load(app).await?.name;
     let page = Page {
-        frame: Frame::for_app(app, season, ""),
+        frame: Frame::load(app, "").await?,
         head: DashboardHeader::new(&user.caller, "", notice),
         preview,
         reason,

@@ -15,12 +15,7 @@ use faceoff_api::{
     requests::EventsQuery,
     views::event::{EventView, EventsView},
 };
-use faceoff_service::{
-    app::App,
-    extract::QueryParams,
-    problem::Problem,
-    views::{event, season::SeasonHead},
-};
+use faceoff_service::{app::App, extract::QueryParams, problem::Problem, views::event};
 
 const PATH: &str = "/organiser/log";
 
@@ -77,7 +72,6 @@ pub(super) async fn page(
     for field in [&mut query.actor, &mut query.subject, &mut query.kind] {
         field.take_if(|text| text.trim().is_empty());
     }
-    let season = SeasonHead::load(&app).await?.name;
     let (events, refused) = match event::page(&app, query.clone()).await {
         Ok(events) => (events, None),
         Err(problem) => {
@@ -90,7 +84,7 @@ pub(super) async fn page(
     };
     let notice = refused.as_ref().map_or(Notice::None, Notice::Refused);
     let page = Page {
-        frame: Frame::for_app(&app, season, PATH),
+        frame: Frame::load(&app, PATH).await?,
         head: DashboardHeader::new(&user.caller, PATH, notice),
         events,
         query,

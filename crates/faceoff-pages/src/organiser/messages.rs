@@ -2,7 +2,6 @@
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
 };
@@ -20,7 +19,7 @@ use faceoff_service::{
     extract::{PageForm, PathParam},
     problem::Problem,
     services::announcements,
-    views::{announcement, event, season::SeasonHead},
+    views::{announcement, event},
 };
 use faceoff_types::QuestionId;
 use serde::Deserialize;
@@ -53,10 +52,6 @@ struct FormValues {
 }
 
 impl Page {
-    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
-        utc_minute(*instant)
-    }
-
     fn team(&self, question: &QuestionView) -> &str {
         let team = question.team.map(|team| format!("team:{team}"));
         let name = team.and_then(|key| self.names.get(&key));
@@ -82,11 +77,10 @@ async fn page_with(
         .into_iter()
         .partition(|question| question.answer.is_none());
     let announcements = app.store.announcements(LISTED_ANNOUNCEMENTS).await;
-    let announcements = announcements.map_err(Problem::from)?.into_iter();
-    let terms = app.store.terms().await.map_err(Problem::from)?;
-    let season = SeasonHead::load(app).await?.name;
+    let announcements = announcements?.into_iter();
+    let terms = app.store.terms().await?;
     let page = Page {
-        frame: Frame::for_app(app, season, PATH),
+        frame: Frame::load(app, PATH).await?,
         head: DashboardHeader::new(&user.caller, PATH, notice),
         open,
         answered,

@@ -3,7 +3,6 @@
 use super::stage_form::{InputKind, StageForm};
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
 };
@@ -19,7 +18,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     services::stages,
     viewer::Viewer,
-    views::{season::SeasonHead, stage},
+    views::stage,
 };
 use faceoff_types::{CountingResult, StageId};
 
@@ -38,12 +37,6 @@ struct Page {
     has_final_day: bool,
 }
 
-impl Page {
-    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
-        utc_minute(*instant)
-    }
-}
-
 async fn page_with(
     app: &App,
     user: &PageOrganiser,
@@ -51,15 +44,14 @@ async fn page_with(
     notice: Notice<'_>,
     form: Option<StageForm>,
 ) -> Result<Response, PageProblem> {
-    let stage = app.store.stage(id).await.map_err(Problem::from)?;
+    let stage = app.store.stage(id).await?;
     let form = form.unwrap_or_else(|| StageForm::from_stage(&stage));
-    let season = SeasonHead::load(app).await?.name;
     let view = stage::build(app, stage).await?;
     let view = stage::for_viewer(view, app, Viewer::Organiser).await?;
     let needs_confirmation =
         matches!(notice, Notice::Refused(problem) if problem.kind() == ProblemKind::NotConfirmed);
     let page = Page {
-        frame: Frame::for_app(app, season, ""),
+        frame: Frame::load(app, "").await?,
         head: DashboardHeader::new(&user.caller, "/organiser/stages", notice),
         form,
         task_checkboxes: StageForm::task_checkboxes(&app.config.competition),
@@ -88,7 +80,7 @@ pub(super) async fn change(
     form: Result<PageForm<StageForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(form)) = (id?, form?);
-    let stage = app.store.stage(id).await.map_err(Problem::from)?;
+    let stage = app.store.stage(id).await?;
     let actor = user.organiser.actor();
     let changed = match form.change(&stage, &app.config.competition) {
         Ok(change) => stages::change_stage(&app, actor, id, change).await,

@@ -4,7 +4,6 @@ use super::stage_form::{InputKind, StageForm};
 use crate::{
     board_status,
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
 };
@@ -15,11 +14,7 @@ use axum::{
 };
 use faceoff_api::views::stage::StageView;
 use faceoff_service::{
-    app::App,
-    extract::PageForm,
-    problem::Problem,
-    services::stages,
-    views::{season::SeasonHead, stage},
+    app::App, extract::PageForm, problem::Problem, services::stages, views::stage,
 };
 
 #[derive(Template)]
@@ -40,10 +35,6 @@ impl Page {
     fn phase(&self, stage: &StageView) -> &'static str {
         board_status::phase_label(stage.phase, stage.finalised.is_some())
     }
-
-    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
-        utc_minute(*instant)
-    }
 }
 
 async fn page_with(
@@ -52,14 +43,13 @@ async fn page_with(
     notice: Notice<'_>,
     form: Option<StageForm>,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::load(app).await?.name;
     let path = "/organiser/stages";
     let form = match form {
         Some(form) => form,
         None => StageForm::defaults_from(&stage::current(app).await?),
     };
     let page = Page {
-        frame: Frame::for_app(app, season, path),
+        frame: Frame::load(app, path).await?,
         head: DashboardHeader::new(&user.caller, path, notice),
         stages: stage::all(app).await?,
         form,

@@ -8,11 +8,7 @@ use crate::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::storage::StorageView;
-use faceoff_service::{
-    app::App,
-    problem::Problem,
-    views::{season::SeasonHead, storage},
-};
+use faceoff_service::{app::App, views::storage};
 use faceoff_types::{StageId, StageName};
 
 #[derive(Template)]
@@ -59,20 +55,15 @@ pub(super) async fn page(
     // Monitored folders may be on the same disk.
     disks.dedup_by(|disk, other| (&disk.free, &disk.size) == (&other.free, &other.size));
     let mut stages = Vec::new();
-    for stage in app.store.stages().await.map_err(Problem::from)? {
-        let retention = app
-            .store
-            .stage_retention(stage.id)
-            .await
-            .map_err(Problem::from)?;
+    for stage in app.store.stages().await? {
+        let retention = app.store.stage_retention(stage.id).await?;
         stages.push((stage.id, stage.name, retention.to_string()));
     }
     let mut teams = storage::all(&app).await?;
     teams.sort_by_key(|team| std::cmp::Reverse(team.bundle_bytes + team.dataset_bytes));
-    let season = SeasonHead::load(&app).await?.name;
     let path = "/organiser/storage";
     let page = Page {
-        frame: Frame::for_app(&app, season, path),
+        frame: Frame::load(&app, path).await?,
         head: DashboardHeader::new(&user.caller, path, Notice::None),
         disks,
         min_free: dashboard_frame::bytes(space.min_free_bytes()),

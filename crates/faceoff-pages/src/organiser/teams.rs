@@ -2,7 +2,6 @@
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    figures::utc_minute,
     frame::{Frame, PageProblem},
     page_auth::PageOrganiser,
 };
@@ -20,7 +19,7 @@ use faceoff_service::{
     extract::{PageForm, PathParam},
     problem::Problem,
     services::teams,
-    views::{invitation, season::SeasonHead, team},
+    views::{invitation, team},
 };
 use faceoff_types::{DivisionName, TeamId};
 use serde::Deserialize;
@@ -37,12 +36,6 @@ struct Page {
     season: SeasonForm,
 }
 
-impl Page {
-    fn timestamp(&self, instant: &jiff::Timestamp) -> String {
-        utc_minute(*instant)
-    }
-}
-
 const PATH: &str = "/organiser/teams";
 
 async fn page_with(
@@ -51,12 +44,12 @@ async fn page_with(
     notice: Notice<'_>,
     form: Option<SeasonForm>,
 ) -> Result<Response, PageProblem> {
-    let registrations = app.store.registrations().await.map_err(Problem::from)?;
+    let registrations = app.store.registrations().await?;
     let registrations = registrations.into_iter().map(invitation::registration);
     let (pending, decided) =
         registrations.partition(|registration| registration.state == "waiting");
-    let divisions = app.store.divisions().await.map_err(Problem::from)?;
-    let season = app.store.season().await.map_err(Problem::from)?;
+    let divisions = app.store.divisions().await?;
+    let season = app.store.season().await?;
     let form = form.unwrap_or_else(|| SeasonForm {
         takes_registrations: match season.registration_open {
             true => "on".to_owned(),
@@ -68,9 +61,8 @@ async fn page_with(
             .collect::<Vec<_>>()
             .join("\n"),
     });
-    let name = SeasonHead::load(app).await?.name;
     let page = Page {
-        frame: Frame::for_app(app, name, PATH),
+        frame: Frame::load(app, PATH).await?,
         head: DashboardHeader::new(&user.caller, PATH, notice),
         teams: team::all(app).await?,
         pending,

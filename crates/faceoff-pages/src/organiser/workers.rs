@@ -12,11 +12,7 @@ use axum::{
     response::Response,
 };
 use faceoff_api::views::workers::{WorkerState, WorkerView, WorkersView};
-use faceoff_service::{
-    app::App,
-    views::{season::SeasonHead, workers},
-};
-use jiff::Timestamp;
+use faceoff_service::{app::App, views::workers};
 
 #[derive(Template)]
 #[template(path = "organiser_workers.html")]
@@ -36,10 +32,6 @@ impl Page {
             WorkerState::Silent => ("waiting", "silent"),
         }
     }
-
-    fn timestamp(&self, instant: &Timestamp) -> String {
-        instant.strftime("%Y-%m-%d %H:%M UTC").to_string()
-    }
 }
 
 pub(super) async fn page(
@@ -47,10 +39,9 @@ pub(super) async fn page(
     State(app): State<App>,
     Query(done): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    let season = SeasonHead::load(&app).await?.name;
     let path = "/organiser/workers";
     render(&Page {
-        frame: Frame::for_app(&app, season, path),
+        frame: Frame::load(&app, path).await?,
         head: DashboardHeader::new(&user.caller, path, Notice::Done(&done)),
         workers: workers::with_bans(&app).await?,
     })

@@ -1,69 +1,33 @@
 //! The evaluations of a day in the season archive, as CSV: one line per team, with its results in all tasks.
 
-use faceoff_api::views::{
-    evaluation::{EvaluationStatus, EvaluationView},
-    task::TaskView,
-};
-use faceoff_service::csv::{Table, escape_formula, or_empty};
-use faceoff_types::Task;
+use crate::board_csv::{TASK_COLUMNS, table_with_tasks, task_fields};
+use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView};
+use faceoff_service::csv::{escape_formula, or_empty};
 use std::collections::BTreeMap;
 
-/// Columns of each task; the table prefixes them with the task's name.
-const TASK_COLUMNS: [&str; 7] = [
-    "episodes",
-    "successes",
-    "success_rate",
-    "ci95_low",
-    "ci95_high",
-    "penalty_points",
-    "tier",
-];
-
-/// `columns`, followed by [`TASK_COLUMNS`] of each task.
-fn columns_with_tasks(columns: &[&str]) -> Vec<String> {
-    let mut names: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
-    for task in Task::ALL {
-        names.extend(TASK_COLUMNS.map(|column| format!("{task}_{column}")));
-    }
-    names
-}
-
-/// The values of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
-fn task_fields(tasks: Option<&BTreeMap<Task, TaskView>>) -> impl Iterator<Item = String> + '_ {
-    Task::ALL
-        .into_iter()
-        .flat_map(move |task| match tasks.and_then(|tasks| tasks.get(&task)) {
-            None => vec![String::new(); TASK_COLUMNS.len()],
-            Some(result) => vec![
-                result.episodes.to_string(),
-                result.successes.to_string(),
-                result.success_rate.to_string(),
-                result.success_ci95[0].to_string(),
-                result.success_ci95[1].to_string(),
-                result.penalty_points.to_string(),
-                result.tier.to_string(),
-            ],
-        })
-}
+/// As many of [`TASK_COLUMNS`] as the table has: those about scores.
+const SCORE_COLUMNS: usize = 7;
 
 /// A table with one line per evaluation.
 pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
-    let columns = columns_with_tasks(&[
-        "evaluation",
-        "team",
-        "team_id",
-        "state",
-        "voided",
-        // The reason for an extra evaluation, under the name that readers of older versions know.
-        "extra_turn",
-        "finished_at",
-        "score",
-        "penalty_points",
-        "tier",
-        "dataset_blake3",
-    ]);
-    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let mut table = Table::new(&names);
+    let mut table = table_with_tasks(
+        &[
+            "evaluation",
+            "team",
+            "team_id",
+            "state",
+            "voided",
+            // The reason for an extra evaluation, under the name that readers of older versions know.
+            "extra_turn",
+            "finished_at",
+            "score",
+            "penalty_points",
+            "tier",
+            "dataset_blake3",
+        ],
+        &TASK_COLUMNS[..SCORE_COLUMNS],
+    );
+    let no_tasks = BTreeMap::new();
     for evaluation in evaluations {
         let (state, finished_at) = match &evaluation.status {
             EvaluationStatus::Queued => ("queued", None),
@@ -105,11 +69,8 @@ pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
             or_empty(result.map(|result| result.tier)),
             hash.unwrap_or_default(),
         ];
-        table.row(
-            fields
-                .into_iter()
-                .chain(task_fields(result.map(|result| &result.tasks))),
-        );
+        let tasks = result.map_or(&no_tasks, |result| &result.tasks);
+        table.row(fields.into_iter().chain(task_fields(tasks, SCORE_COLUMNS)));
     }
     table.into_bytes()
 }

@@ -93,10 +93,7 @@ pub async fn query(
         let days = app.store.board_days(stage.id, revision, &scope).await?;
         check_has_results(day, &days)?;
     }
-    let division = match query.division {
-        Some(name) => Some(division::find(app, &name).await?),
-        None => None,
-    };
+    let division = division::find(app, query.division).await?;
     let selection = BoardSelection {
         task,
         division,

@@ -8,20 +8,27 @@ use crate::{
 };
 use faceoff_types::DivisionName;
 
-/// The division with this name, ignoring case, as the organisers spelled it.
+/// The requested division, ignoring case, as the organisers spelled it; `None` if none is requested.
 ///
 /// # Errors
 /// `NotFound`, with the names of all divisions.
 #[boxed]
-pub async fn find(app: &AppState, name: &DivisionName) -> Result<DivisionName, Problem> {
+pub async fn find(
+    app: &AppState,
+    requested: Option<DivisionName>,
+) -> Result<Option<DivisionName>, Problem> {
+    let Some(name) = requested else {
+        return Ok(None);
+    };
     let divisions = app.store.divisions().await?;
     let lowercase = name.as_str().to_lowercase();
     let division = divisions
         .iter()
         .find(|division| division.as_str().to_lowercase() == lowercase);
-    division
-        .cloned()
-        .ok_or_else(|| unknown_division(name, &divisions))
+    match division {
+        Some(division) => Ok(Some(division.clone())),
+        None => Err(unknown_division(&name, &divisions)),
+    }
 }
 
 fn unknown_division(name: &DivisionName, divisions: &[DivisionName]) -> Problem {

@@ -20,7 +20,7 @@ use faceoff_api::{
     },
 };
 use faceoff_scoring::RankedEntry;
-use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
+use faceoff_store::{BoardDays, BoardRecord, BoardScope};
 use faceoff_types::{CountingResult, Task, TeamId};
 use jiff::civil::Date;
 use std::collections::BTreeMap;
@@ -49,10 +49,7 @@ pub async fn query(
     if !revisions.iter().any(|existing| existing.number == revision) {
         return Err(Problem::not_found("revision of the stage's rules"));
     }
-    let division = match query.division {
-        Some(name) => Some(division::find(app, &name).await?),
-        None => None,
-    };
+    let division = division::find(app, query.division).await?;
     let requested_result = query.by.map(BoardBy::counting_result);
     let mut records = if visibility.is_hidden(stage.id) {
         Vec::new()
@@ -78,33 +75,19 @@ pub async fn query(
     let mut days: Vec<Date> = rows.iter().map(|row| row.day).collect();
     days.dedup();
     Ok(HistoryView {
+        stage: stage.id,
+        stage_name: stage.name,
         revision,
+        standings: stage.settings.standings,
+        blind: stage.settings.blind,
+        provisional: stage.sign_off.is_none(),
         by: requested_result,
         task: query.task,
         division,
         frozen: frozen.map(ruling::view),
         days,
         rows,
-        ..without_rows(stage)
     })
-}
-
-/// The history of a stage without its rows.
-fn without_rows(stage: Stage) -> HistoryView {
-    HistoryView {
-        stage: stage.id,
-        stage_name: stage.name,
-        revision: stage.rules.number,
-        standings: stage.settings.standings,
-        by: None,
-        blind: stage.settings.blind,
-        provisional: stage.sign_off.is_none(),
-        task: None,
-        division: None,
-        frozen: None,
-        days: Vec::new(),
-        rows: Vec::new(),
-    }
 }
 
 /// The rows of each day with the ranks of that day's board. `records` are grouped by team.

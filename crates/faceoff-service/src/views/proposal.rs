@@ -150,6 +150,18 @@ async fn outcome(
     for evaluation in proposed {
         proposed_records.extend(board_record(app, &stage, proposal, evaluation).await?);
     }
+    let build_board = async |revision: u32, scope: &BoardScope, extra: Vec<BoardRecord>| {
+        let selection = BoardSelection::default();
+        board::build(
+            app,
+            &visibility,
+            &stage,
+            revision,
+            selection,
+            (scope, extra),
+        )
+        .await
+    };
     let revision = proposal.revision;
     let old_revision = match proposal.kind {
         ProposalKind::Trial => {
@@ -158,35 +170,16 @@ async fn outcome(
                 finished_until: Some(Timestamp::MIN),
                 ..BoardScope::default()
             };
-            let trial_results = (&empty_scope, proposed_records);
-            let new_board = board::build(
-                app,
-                &visibility,
-                &stage,
-                revision,
-                BoardSelection::default(),
-                trial_results,
-            )
-            .await?;
             return Ok(OutcomeView {
                 changes: Vec::new(),
                 old_board: None,
-                new_board,
+                new_board: build_board(revision, &empty_scope, proposed_records).await?,
             });
         }
         ProposalKind::Rules(_) => app.store.board_revision(&stage).await?,
         ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
     };
-    let current_results = (&BoardScope::default(), Vec::new());
-    let old_board = board::build(
-        app,
-        &visibility,
-        &stage,
-        old_revision,
-        BoardSelection::default(),
-        current_results,
-    )
-    .await?;
+    let old_board = build_board(old_revision, &BoardScope::default(), Vec::new()).await?;
     // An evaluation that failed by a platform fault replaces no result.
     let replaced_evaluation = |evaluation: &ProposedEvaluation| match evaluation.state {
         EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => {
@@ -198,16 +191,7 @@ async fn outcome(
         excluded: proposed.iter().filter_map(replaced_evaluation).collect(),
         ..BoardScope::default()
     };
-    let new_results = (&scope, proposed_records);
-    let new_board = board::build(
-        app,
-        &visibility,
-        &stage,
-        revision,
-        BoardSelection::default(),
-        new_results,
-    )
-    .await?;
+    let new_board = build_board(revision, &scope, proposed_records).await?;
     Ok(OutcomeView {
         changes: changes(&old_board, &new_board),
         old_board: Some(old_board),

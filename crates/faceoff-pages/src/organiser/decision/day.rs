@@ -1,6 +1,6 @@
 //! Decisions about an evaluation day: start today's, make up for a missed one, or void one.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page};
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
@@ -25,12 +25,9 @@ impl DayDecision {
                 let effects = rulings::preview_void_day(app, day, None).await?;
                 Ok(DecisionPreview {
                     title: format!("Void the evaluation day {}", day.date),
-                    effects: sentence(&effects),
                     reason_readers: Some(PUBLIC_REASON),
-                    confirm_name: Some(effects.name),
                     button: "Void the day",
-                    is_grave: true,
-                    return_path: day_page(day),
+                    ..DecisionPreview::confirmed(effects, day_page(day))
                 })
             }
             Self::Missed(day) => {
@@ -43,10 +40,8 @@ impl DayDecision {
                         day.date, stage.name
                     ),
                     reason_readers: Some(PUBLIC_REASON),
-                    confirm_name: None,
                     button: "Start the missed day",
-                    is_grave: false,
-                    return_path: day_page(day),
+                    ..DecisionPreview::new(day_page(day))
                 })
             }
             Self::Start(id) => {
@@ -65,11 +60,8 @@ impl DayDecision {
                         stage.name,
                         next.map_or_else(String::new, |next| next.summary)
                     ),
-                    reason_readers: None,
-                    confirm_name: None,
                     button: "Start the day",
-                    is_grave: false,
-                    return_path: day_page(day),
+                    ..DecisionPreview::new(day_page(day))
                 })
             }
         }

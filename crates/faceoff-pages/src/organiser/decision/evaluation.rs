@@ -44,12 +44,9 @@ impl EvaluationDecision {
                 let effects = rulings::preview_void_evaluation(app, id, None).await?;
                 Ok(DecisionPreview {
                     title: format!("Void the evaluation of {} by {}", view.day, view.team_name),
-                    effects: sentence(&effects),
                     reason_readers: Some(PUBLIC_REASON),
-                    confirm_name: Some(effects.name),
                     button: "Void the evaluation",
-                    is_grave: true,
-                    return_path: day_page(day_of(&view)),
+                    ..DecisionPreview::confirmed(effects, day_page(day_of(&view)))
                 })
             }
             Self::Cancel(id) => {
@@ -65,10 +62,9 @@ impl EvaluationDecision {
                         view.progress.episodes_done, view.progress.episodes_total
                     ),
                     reason_readers: Some(TEAM_REASON),
-                    confirm_name: None,
                     button: "Cancel the evaluation",
                     is_grave: true,
-                    return_path: day_page(day_of(&view)),
+                    ..DecisionPreview::new(day_page(day_of(&view)))
                 })
             }
             Self::Rerun(id) => {
@@ -78,11 +74,8 @@ impl EvaluationDecision {
                     effects: "The submission that was active at the cutoff is evaluated again on the same episodes. The new \
                               evaluation replaces this one."
                         .to_owned(),
-                    reason_readers: None,
-                    confirm_name: None,
                     button: "Repeat the evaluation",
-                    is_grave: false,
-                    return_path: day_page(day_of(&view)),
+                    ..DecisionPreview::new(day_page(day_of(&view)))
                 })
             }
             Self::Extra(day, team) => {

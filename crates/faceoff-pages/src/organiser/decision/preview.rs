@@ -18,6 +18,31 @@ pub(in crate::organiser) struct DecisionPreview {
     pub(in crate::organiser) return_path: String,
 }
 
+impl DecisionPreview {
+    /// A decision without a reason, a confirmation and consequences, still without its texts.
+    pub(super) fn new(return_path: impl Into<String>) -> Self {
+        Self {
+            title: String::new(),
+            effects: String::new(),
+            reason_readers: None,
+            confirm_name: None,
+            button: "",
+            is_grave: false,
+            return_path: return_path.into(),
+        }
+    }
+
+    /// A decision with these effects, which the name of its subject confirms.
+    pub(super) fn confirmed(effects: Preview, return_path: impl Into<String>) -> Self {
+        Self {
+            effects: sentence(&effects),
+            confirm_name: Some(effects.name),
+            is_grave: true,
+            ..Self::new(return_path)
+        }
+    }
+}
+
 /// A decision that was carried out.
 pub(in crate::organiser) struct Done {
     /// Key of the notice that says so.

@@ -18,7 +18,6 @@ const QUEUE_PATH: &str = "/organiser/day";
 impl QueueDecision {
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         let paused = app.store.season().await?.paused.map(ruling::view);
-        let return_path = QUEUE_PATH.to_owned();
         if self == Self::Pause {
             return Ok(DecisionPreview {
                 title: "Pause the queue".to_owned(),
@@ -26,10 +25,8 @@ impl QueueDecision {
                           board shows that the queue is paused, with your reason."
                     .to_owned(),
                 reason_readers: Some(PUBLIC_REASON),
-                confirm_name: None,
                 button: "Pause",
-                is_grave: false,
-                return_path,
+                ..DecisionPreview::new(QUEUE_PATH)
             });
         }
         let since = paused.map_or_else(
@@ -45,11 +42,8 @@ impl QueueDecision {
         Ok(DecisionPreview {
             title: "Resume the queue".to_owned(),
             effects: format!("{since} Queued jobs start at once."),
-            reason_readers: None,
-            confirm_name: None,
             button: "Resume",
-            is_grave: false,
-            return_path,
+            ..DecisionPreview::new(QUEUE_PATH)
         })
     }
 

@@ -1,6 +1,6 @@
 //! Decisions about a stage and its result: freeze or unfreeze its boards, start its final day, or sign it off.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::stage_results};
 use faceoff_store::Actor;
@@ -27,15 +27,7 @@ impl StageDecision {
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         let id = self.stage();
         let name = app.store.stage(id).await?.name;
-        let preview = DecisionPreview {
-            title: String::new(),
-            effects: String::new(),
-            reason_readers: None,
-            confirm_name: None,
-            button: "",
-            is_grave: false,
-            return_path: self.return_path(),
-        };
+        let preview = DecisionPreview::new(self.return_path());
         Ok(match self {
             Self::Freeze(_) => DecisionPreview {
                 title: format!("Freeze the boards of {name}"),
@@ -63,11 +55,8 @@ impl StageDecision {
                 let effects = stage_results::preview_sign_off(app, id).await?;
                 DecisionPreview {
                     title: format!("Sign off {name}"),
-                    effects: sentence(&effects),
-                    confirm_name: Some(effects.name),
                     button: "Sign off the stage",
-                    is_grave: true,
-                    ..preview
+                    ..DecisionPreview::confirmed(effects, self.return_path())
                 }
             }
         })

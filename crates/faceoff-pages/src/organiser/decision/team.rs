@@ -1,6 +1,6 @@
 //! Decisions about teams and registrations: disqualify or reinstate a team, approve or refuse a registration.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
@@ -28,12 +28,9 @@ impl TeamDecision {
                 let effects = rulings::preview_disqualification(app, id, None).await?;
                 Ok(DecisionPreview {
                     title: format!("Disqualify {}", effects.name),
-                    effects: sentence(&effects),
                     reason_readers: Some(PUBLIC_REASON),
-                    confirm_name: Some(effects.name),
                     button: "Disqualify the team",
-                    is_grave: true,
-                    return_path: TEAMS_PATH.to_owned(),
+                    ..DecisionPreview::confirmed(effects, TEAMS_PATH)
                 })
             }
             Self::Reinstate(id) => {
@@ -42,10 +39,8 @@ impl TeamDecision {
                     title: format!("Reinstate {}", team.name),
                     effects: "The team can upload again and is evaluated and ranked. Cancelled evaluations can be repeated.".to_owned(),
                     reason_readers: Some(PUBLIC_REASON),
-                    confirm_name: None,
                     button: "Reinstate the team",
-                    is_grave: false,
-                    return_path: TEAMS_PATH.to_owned(),
+                    ..DecisionPreview::new(TEAMS_PATH)
                 })
             }
             Self::Approve(id) | Self::Refuse(id) => {
@@ -65,10 +60,9 @@ impl TeamDecision {
                             .to_owned()
                     },
                     reason_readers: (!approves).then_some("visible to the registered contact"),
-                    confirm_name: None,
                     button: if approves { "Approve" } else { "Refuse" },
                     is_grave: !approves,
-                    return_path: TEAMS_PATH.to_owned(),
+                    ..DecisionPreview::new(TEAMS_PATH)
                 })
             }
         }

@@ -17,7 +17,6 @@ const WORKERS_PATH: &str = "/organiser/workers";
 
 impl WorkerDecision {
     pub(super) fn preview(&self) -> DecisionPreview {
-        let return_path = WORKERS_PATH.to_owned();
         match self {
             Self::Ban(worker) => DecisionPreview {
                 title: format!("Ban the worker {worker}"),
@@ -25,20 +24,16 @@ impl WorkerDecision {
                           repeated on other workers. Finished results stay; the page of workers lists them, so that you can void them."
                     .to_owned(),
                 reason_readers: Some("visible to organisers and the operator of the worker"),
-                confirm_name: None,
                 button: "Ban the worker",
                 is_grave: true,
-                return_path,
+                ..DecisionPreview::new(WORKERS_PATH)
             },
             Self::Readmit(worker) => DecisionPreview {
                 title: format!("Readmit the worker {worker}"),
                 effects: "The worker gets jobs again. Check its machine first: a faulty machine fails again."
                     .to_owned(),
-                reason_readers: None,
-                confirm_name: None,
                 button: "Readmit the worker",
-                is_grave: false,
-                return_path,
+                ..DecisionPreview::new(WORKERS_PATH)
             },
         }
     }
