@@ -91,7 +91,8 @@ pub(crate) async fn board_history(
     let format = choose_format(query.format, &headers);
     let tag = tag(&app, change, viewer, format, &("history", &query))?;
     let history = history::query(&app, &visibility, query);
-    send(&tag, &conditions, format, history, board_csv::history_table).await
+    let csv = |history: &_| board_csv::history_table(&app.config.competition, history);
+    send(&tag, &conditions, format, history, csv).await
 }
 
 async fn respond(
@@ -110,7 +111,8 @@ async fn respond(
     let format = choose_format(query.format, headers);
     let tag = tag(app, change, viewer, format, &(task, &query))?;
     let board = board::query(app, &visibility, query, task);
-    send(&tag, conditions, format, board, board_csv::board_table).await
+    let csv = |board: &_| board_csv::board_table(&app.config.competition, board);
+    send(&tag, conditions, format, board, csv).await
 }
 
 /// The tag (`ETag`) of a response. It is made of the request, the viewer, and the number of the newest change of the season.
@@ -153,7 +155,7 @@ async fn send<T: Serialize>(
     conditions: &Conditions,
     format: BoardFormat,
     view: impl Future<Output = Result<T, Problem>>,
-    csv: fn(&T) -> Vec<u8>,
+    csv: impl FnOnce(&T) -> Vec<u8>,
 ) -> Result<Response, Problem> {
     let response = async {
         let view = view.await?;

@@ -2,7 +2,7 @@
 
 use faceoff_api::views::{board::BoardView, history::HistoryView, task::TaskView};
 use faceoff_service::csv::{Table, escape_formula, or_empty};
-use faceoff_types::Task;
+use faceoff_types::{Competition, Task};
 use std::collections::BTreeMap;
 
 /// Columns of each task; a table prefixes them with the task's name.
@@ -26,20 +26,25 @@ pub(crate) const TASK_COLUMNS: [&str; 16] = [
 ];
 
 /// An empty table with `columns`, followed by the `task_columns` of each task.
-pub(crate) fn table_with_tasks(columns: &[&str], task_columns: &[&str]) -> Table {
+pub(crate) fn table_with_tasks(
+    competition: &Competition,
+    columns: &[&str],
+    task_columns: &[&str],
+) -> Table {
     let mut names: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
-    for task in Task::ALL {
+    for task in competition.task_names() {
         names.extend(task_columns.iter().map(|column| format!("{task}_{column}")));
     }
     Table::new(&names)
 }
 
 /// The values of the first `columns` of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
-pub(crate) fn task_fields(
-    tasks: &BTreeMap<Task, TaskView>,
+pub(crate) fn task_fields<'a>(
+    competition: &'a Competition,
+    tasks: &'a BTreeMap<Task, TaskView>,
     columns: usize,
-) -> impl Iterator<Item = String> + '_ {
-    let fields = |task| match tasks.get(&task) {
+) -> impl Iterator<Item = String> + 'a {
+    let fields = move |task| match tasks.get(&task) {
         None => vec![String::new(); TASK_COLUMNS.len()],
         Some(result) => {
             let violations = result.violations;
@@ -65,12 +70,12 @@ pub(crate) fn task_fields(
         }
     };
     let first_fields = move |task| fields(task).into_iter().take(columns);
-    Task::ALL.into_iter().flat_map(first_fields)
+    competition.task_names().flat_map(first_fields)
 }
 
 /// The fields that ranked rows and baselines (unranked agents of the organisers) have in common, from the column `tier` on.
 macro_rules! common_fields {
-    ($row:expr, $division:expr) => {{
+    ($competition:expr, $row:expr, $division:expr) => {{
         let row = $row;
         [
             row.tier.to_string(),
@@ -92,13 +97,14 @@ macro_rules! common_fields {
             or_empty(row.seed),
         ]
         .into_iter()
-        .chain(task_fields(&row.tasks, TASK_COLUMNS.len()))
+        .chain(task_fields($competition, &row.tasks, TASK_COLUMNS.len()))
     }};
 }
 
 /// The ranked rows, then the baselines.
-pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
+pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Vec<u8> {
     let mut table = table_with_tasks(
+        competition,
         &[
             "rank",
             "rank_group",
@@ -133,7 +139,10 @@ pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
             "false".to_owned(),
             String::new(),
         ];
-        table.row(rank.into_iter().chain(common_fields!(row, division)));
+        table.row(
+            rank.into_iter()
+                .chain(common_fields!(competition, row, division)),
+        );
     }
     for row in &board.baselines {
         let rank = [
@@ -142,14 +151,15 @@ pub(crate) fn board_table(board: &BoardView) -> Vec<u8> {
             "true".to_owned(),
             row.would_rank.to_string(),
         ];
-        table.row(rank.into_iter().chain(common_fields!(row, "")));
+        table.row(rank.into_iter().chain(common_fields!(competition, row, "")));
     }
     table.into_bytes()
 }
 
 /// One line per team and day.
-pub(crate) fn history_table(history: &HistoryView) -> Vec<u8> {
+pub(crate) fn history_table(competition: &Competition, history: &HistoryView) -> Vec<u8> {
     let mut table = table_with_tasks(
+        competition,
         &[
             "day",
             "team",
@@ -183,7 +193,7 @@ pub(crate) fn history_table(history: &HistoryView) -> Vec<u8> {
             row.finished_at.to_string(),
             or_empty(row.released_at),
         ];
-        let task_fields = task_fields(&row.tasks, TASK_COLUMNS.len());
+        let task_fields = task_fields(competition, &row.tasks, TASK_COLUMNS.len());
         table.row(fields.into_iter().chain(task_fields));
     }
     table.into_bytes()

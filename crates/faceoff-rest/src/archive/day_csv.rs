@@ -3,14 +3,16 @@
 use crate::board_csv::{TASK_COLUMNS, table_with_tasks, task_fields};
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView};
 use faceoff_service::csv::{escape_formula, or_empty};
+use faceoff_types::Competition;
 use std::collections::BTreeMap;
 
 /// As many of [`TASK_COLUMNS`] as the table has: those about scores.
 const SCORE_COLUMNS: usize = 7;
 
 /// A table with one line per evaluation.
-pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
+pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView]) -> Vec<u8> {
     let mut table = table_with_tasks(
+        competition,
         &[
             "evaluation",
             "team",
@@ -70,7 +72,11 @@ pub(super) fn day_table(evaluations: &[EvaluationView]) -> Vec<u8> {
             hash.unwrap_or_default(),
         ];
         let tasks = result.map_or(&no_tasks, |result| &result.tasks);
-        table.row(fields.into_iter().chain(task_fields(tasks, SCORE_COLUMNS)));
+        table.row(
+            fields
+                .into_iter()
+                .chain(task_fields(competition, tasks, SCORE_COLUMNS)),
+        );
     }
     table.into_bytes()
 }

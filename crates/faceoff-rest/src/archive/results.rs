@@ -158,7 +158,7 @@ async fn put_boards(
     files
         .put(
             &format!("{folder}/board.csv"),
-            board_csv::board_table(&newest),
+            board_csv::board_table(&app.config.competition, &newest),
         )
         .await?;
     for task in &stage.rules.rules.tasks {
@@ -177,7 +177,10 @@ async fn put_boards(
         let name = format!("{folder}/board-revision-{}", revision.revision);
         files.put_json(&format!("{name}.json"), &board).await?;
         files
-            .put(&format!("{name}.csv"), board_csv::board_table(&board))
+            .put(
+                &format!("{name}.csv"),
+                board_csv::board_table(&app.config.competition, &board),
+            )
             .await?;
     }
     Ok(())
@@ -197,7 +200,10 @@ async fn put_day(
         .put_json(&format!("{name}.json"), &evaluations)
         .await?;
     files
-        .put(&format!("{name}.csv"), day_csv::day_table(&evaluations))
+        .put(
+            &format!("{name}.csv"),
+            day_csv::day_table(&app.config.competition, &evaluations),
+        )
         .await
 }
 
