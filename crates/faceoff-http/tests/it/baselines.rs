@@ -18,9 +18,7 @@ async fn three_teams(site: &Site) -> [TestTeam; 3] {
     for team in &teams {
         site.valid_submission(team, "a").await;
     }
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
     for rate in [0.9, 0.7, 0.5] {
         site.finish_evaluation(&result([rate; 3], 10.0)).await;
     }

@@ -24,8 +24,7 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
 
 /// Runs an evaluation day on which the teams have these success rates in all tasks.
 async fn run_day(site: &Site, rates: &[f64]) {
-    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-    started.json(200);
+    site.start_day().await;
     for rate in rates {
         site.finish_evaluation(&result([*rate; 3], 10.0)).await;
     }
@@ -161,8 +160,7 @@ async fn unchanged_board_answers_not_modified() {
     }
     // Progress without a result does not change the board.
     site.next_day();
-    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-    started.json(200);
+    site.start_day().await;
     let (claim, ..) = site.claim_shard().await;
     let before = site.get("/api/v1/board", None).await;
     let condition = [("if-none-match", before.header("etag"))];

@@ -7,7 +7,6 @@ use crate::{
 };
 use reqwest::{Method, header};
 use scraper::{Html, Selector};
-use serde_json::json;
 
 /// The attribute `name` of each element that the selector finds.
 fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
@@ -35,9 +34,7 @@ async fn two_days(site: &Site) {
 }
 
 async fn start_day(site: &Site) {
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
 }
 
 #[tokio::test]

@@ -3,6 +3,7 @@
 use crate::{
     site::{ADMIN, Answer, Site, TestTeam, result, string},
     tournament::cup::Cup,
+    users::organiser,
 };
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -42,8 +43,7 @@ async fn collect_pages(
 async fn no_change(_: usize) {}
 
 async fn run_day(site: &Site, teams: usize) {
-    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-    started.json(200);
+    site.start_day().await;
     for _ in 0..teams {
         site.finish_evaluation(&result([0.5; 3], 10.0)).await;
     }
@@ -150,14 +150,7 @@ async fn growing_lists_are_paginated() {
             .post("/api/v1/questions", Some(cup.token("A")), &question)
             .await;
         asked.json(201);
-        let invitation = json!({ "role": "organiser", "note": title });
-        let invited = site
-            .post("/api/v1/invitations", Some(ADMIN), &invitation)
-            .await;
-        let code = &invited.json(201)["code"];
-        let user = json!({ "code": code, "name": title });
-        let joined = site.post("/api/v1/invitations/accept", None, &user).await;
-        joined.json(201);
+        organiser(site, title).await;
     }
     let games = cup.games().await[0]["tournament"].clone();
     let games = format!("/api/v1/tournaments/{}/games", string(&games));

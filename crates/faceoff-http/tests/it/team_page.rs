@@ -18,9 +18,7 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
         if index > 0 {
             site.next_day();
         }
-        site.post("/api/v1/days", Some(ADMIN), &json!({}))
-            .await
-            .json(200);
+        site.start_day().await;
         site.finish_evaluation(&result([rate; 3], 700.0)).await;
         site.finish_evaluation(&result([0.65; 3], 10.0)).await;
     }
