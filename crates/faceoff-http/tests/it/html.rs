@@ -32,8 +32,13 @@ pub fn texts(html: &Html, selector: &str) -> Vec<String> {
 
 /// The target of each link that the selector finds.
 pub fn links(html: &Html, selector: &str) -> Vec<String> {
+    attributes(html, selector, "href")
+}
+
+/// The attribute `name` of each element that the selector finds.
+pub fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
     html.select(&Selector::parse(selector).unwrap())
-        .map(|element| element.attr("href").unwrap().to_owned())
+        .map(|element| element.attr(name).unwrap().to_owned())
         .collect()
 }
 
