@@ -19,12 +19,12 @@ use faceoff_service::{
     services::{
         decisions::checked_reason,
         entrants,
-        stages::{check_offered, check_robot},
+        stages::{check_offered, check_robot, parse_name},
     },
     views::{stage, tournament},
 };
 use faceoff_store::Stage;
-use faceoff_types::{Ruleset, StageName, TournamentId, TournamentRules, TournamentSettings};
+use faceoff_types::{Ruleset, TournamentId, TournamentRules, TournamentSettings};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 
@@ -221,12 +221,6 @@ pub(crate) async fn close_tournament(
         .await?;
     tracing::info!(tournament = %tournament.name, %id, "tournament closed");
     tournament::find(&app, id).await.map(Json)
-}
-
-/// Parses a tournament's name. The rules for names are those of stages.
-fn parse_name(text: &str) -> Result<StageName, Problem> {
-    text.parse()
-        .map_err(|error| Problem::invalid("name", error))
 }
 
 /// A stage by its id, or by its name, ignoring case.

@@ -9,7 +9,7 @@ use faceoff_scoring::EpisodeSummary;
 use faceoff_store::Artifacts;
 use faceoff_testkit::{shard_commit, shard_outcomes};
 use faceoff_types::{EpisodeOutcome, Profile, SubmissionId};
-use scraper::{Html, Selector};
+use scraper::Selector;
 use serde_json::json;
 
 /// Pairs of a task and a profile; an ablation has a result for each.
@@ -89,7 +89,7 @@ async fn ablation_results_are_shown_to_team_and_visitors() {
     let p_value = tracking_loss["p_value"].as_f64().unwrap();
     assert!((p_value - 2.0 / 256.0).abs() < 1e-12);
 
-    let html = Html::parse_document(&site.get(&page, None).await.body);
+    let html = site.get(&page, None).await.html(200);
     let count = |selector: &str| html.select(&Selector::parse(selector).unwrap()).count();
     assert_eq!(count("svg rect.fill"), 18);
     assert_eq!(count("svg line.whisker"), 18);
@@ -229,9 +229,7 @@ async fn perturbed_episode_is_shown_beside_the_ideal_one() {
     assert!(!answer.body.contains("/noise/"), "{}", answer.body);
 
     let answer = site.get(&pair_page, None).await;
-    assert_eq!(answer.status, 200, "{}", answer.body);
-    let html = Html::parse_document(&answer.body);
-    assert!(html.errors.is_empty(), "{:?}", html.errors);
+    let html = answer.html(200);
     let replays = Selector::parse("section.replay").unwrap();
     let motions: Vec<_> = html
         .select(&replays)

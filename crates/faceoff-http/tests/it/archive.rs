@@ -141,14 +141,14 @@ impl Season {
         let more_faults = json!({ "max_faults": 5, "confirm": "Qualifying" });
         site.change_first_stage(more_faults).await.json(200);
         site.next_day();
-        post(site, "/api/v1/days", json!({})).await;
+        site.start_day().await;
         site.run_shards(10).await;
         site.run_evaluation(|task, episode| {
             outcome(task, episode, task == Task::Hit && episode == 0)
         })
         .await;
         site.next_day();
-        post(site, "/api/v1/days", json!({})).await;
+        site.start_day().await;
         site.run_shards(10).await;
         let today = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
         let open = today
@@ -503,7 +503,7 @@ async fn public_archive_hides_blind_stages_and_frozen_results() {
     let freeze = format!("/api/v1/stages/{}/freeze", site.stage().await);
     post(&site, &freeze, json!({ "reason": "the ceremony" })).await;
     site.next_day();
-    post(&site, "/api/v1/days", json!({})).await;
+    site.start_day().await;
     let evaluation_after_freeze = site.run_evaluation(weak_outcome).await;
     let (folder, manifest) = export(&site, "public").await;
     let listed = paths(&manifest).join("\n");

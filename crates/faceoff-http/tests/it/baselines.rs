@@ -1,6 +1,6 @@
 //! Tests of baselines, the organisers' reference agents, which boards show beside the ranked teams.
 
-use crate::site::{ADMIN, Answer, Site, TestTeam, result, string};
+use crate::site::{ADMIN, Answer, Site, TestTeam, string};
 use serde_json::{Value, json};
 
 async fn change_team(site: &Site, team: &TestTeam, token: &str, change: &Value) -> Answer {
@@ -18,12 +18,7 @@ async fn three_teams(site: &Site) -> [TestTeam; 3] {
     for team in &teams {
         site.valid_submission(team, "a").await;
     }
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
-    for rate in [0.9, 0.7, 0.5] {
-        site.finish_evaluation(&result([rate; 3], 10.0)).await;
-    }
+    site.run_day_with_rates(&[0.9, 0.7, 0.5]).await;
     teams
 }
 

@@ -17,18 +17,9 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
         if index > 0 {
             site.next_day();
         }
-        run_day(site, rates).await;
+        site.run_day_with_rates(rates).await;
     }
     teams
-}
-
-/// Runs an evaluation day on which the teams have these success rates in all tasks.
-async fn run_day(site: &Site, rates: &[f64]) {
-    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-    started.json(200);
-    for rate in rates {
-        site.finish_evaluation(&result([*rate; 3], 10.0)).await;
-    }
 }
 
 /// The rows of a CSV response, by column name.
@@ -161,8 +152,7 @@ async fn unchanged_board_answers_not_modified() {
     }
     // Progress without a result does not change the board.
     site.next_day();
-    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-    started.json(200);
+    site.start_day().await;
     let (claim, ..) = site.claim_shard().await;
     let before = site.get("/api/v1/board", None).await;
     let condition = [("if-none-match", before.header("etag"))];
@@ -292,7 +282,7 @@ async fn past_days_and_history_hide_results_after_a_freeze() {
         .await
         .json(200);
     site.next_day();
-    run_day(&site, &[0.1, 0.2]).await;
+    site.run_day_with_rates(&[0.1, 0.2]).await;
     let history = "/api/v1/board/history";
     for token in [None, Some(ADMIN)] {
         let view = site.get(history, token).await.json(200);

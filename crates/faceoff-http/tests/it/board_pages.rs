@@ -2,19 +2,10 @@
 //! size.
 
 use crate::{
-    html::{page, texts},
+    html::{attributes, page, texts},
     site::{ADMIN, Site, result},
 };
 use reqwest::{Method, header};
-use scraper::{Html, Selector};
-use serde_json::json;
-
-/// The attribute `name` of each element that the selector finds.
-fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
-    html.select(&Selector::parse(selector).unwrap())
-        .map(|element| element.value().attr(name).unwrap_or_default().to_owned())
-        .collect()
-}
 
 /// Two days: Alpha falls behind Beta, and Gamma joins on the second day.
 async fn two_days(site: &Site) {
@@ -22,22 +13,16 @@ async fn two_days(site: &Site) {
     for team in &teams {
         site.valid_submission(team, "agent").await;
     }
-    start_day(site).await;
+    site.start_day().await;
     site.finish_evaluation(&result([0.6; 3], 10.0)).await;
     site.finish_evaluation(&result([0.4; 3], 20.0)).await;
     let gamma = site.team("Gamma").await;
     site.valid_submission(&gamma, "agent").await;
     site.next_day();
-    start_day(site).await;
+    site.start_day().await;
     site.finish_evaluation(&result([0.5; 3], 10.0)).await;
     site.finish_evaluation(&result([0.7; 3], 20.0)).await;
     site.finish_evaluation(&result([0.1; 3], 700.0)).await;
-}
-
-async fn start_day(site: &Site) {
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
 }
 
 #[tokio::test]
@@ -197,7 +182,7 @@ async fn unchanged_board_page_answers_not_modified() {
     }
     let tag = site.get("/", None).await.header("etag").to_owned();
     site.next_day();
-    start_day(&site).await;
+    site.start_day().await;
     let request = site.request(Method::GET, "/", None);
     let changed = request.header(header::IF_NONE_MATCH, &tag).send().await;
     assert_eq!(changed.unwrap().status(), 200);
@@ -222,7 +207,7 @@ async fn full_board_page_loads_less_than_100_kilobytes() {
         .collect();
     site.ranked_teams(&teams).await;
     site.next_day();
-    start_day(&site).await;
+    site.start_day().await;
     for result in results.iter().rev() {
         site.finish_evaluation(result).await;
     }

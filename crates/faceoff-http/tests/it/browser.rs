@@ -46,14 +46,8 @@ impl<'a> Browser<'a> {
             .iter()
             .map(|(name, value)| format!("{name}={}", encode(value)))
             .collect();
-        let request = self
-            .http
-            .post(format!("{}{path}", self.site.url))
-            .header("accept", "text/html")
-            .header("origin", &self.site.url)
-            .header("content-type", "application/x-www-form-urlencoded")
-            .body(body.join("&"));
-        self.send(request).await
+        let media_type = "application/x-www-form-urlencoded";
+        self.send_form(path, media_type, body.join("&")).await
     }
 
     /// Uploads a bundle as the upload form does.
@@ -63,12 +57,22 @@ impl<'a> Browser<'a> {
              Content-Type: application/octet-stream\r\n\r\n"
         );
         let body = [head.as_bytes(), bundle, b"\r\n--X--\r\n"].concat();
+        let media_type = "multipart/form-data; boundary=X";
+        self.send_form(path, media_type, body).await
+    }
+
+    async fn send_form(
+        &mut self,
+        path: &str,
+        media_type: &str,
+        body: impl Into<reqwest::Body>,
+    ) -> Answer {
         let request = self
             .http
             .post(format!("{}{path}", self.site.url))
             .header("accept", "text/html")
             .header("origin", &self.site.url)
-            .header("content-type", "multipart/form-data; boundary=X")
+            .header("content-type", media_type)
             .body(body);
         self.send(request).await
     }

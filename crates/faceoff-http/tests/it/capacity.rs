@@ -1,7 +1,7 @@
 //! Tests of the capacity forecast (will a day's evaluations finish before its deadline?), of queue positions and next steps,
 //! and of warnings about days that do not fit.
 
-use crate::site::{ADMIN, Site, outcome, string};
+use crate::site::{ADMIN, Site, invalid_outcome, outcome, string};
 use faceoff_store::*;
 use faceoff_testkit::{shard_commit, shard_outcomes};
 use serde_json::{Value, json};
@@ -184,13 +184,7 @@ async fn pending_jobs_show_position_time_and_next_step() {
     assert!(string(&list[1]["next"]).contains("evaluated at the next cutoff"));
     let validation = site.claim().await;
     site.advance(20);
-    let outcome = faceoff_types::ValidationOutcome::Invalid {
-        runtime: None,
-        agent_name: None,
-        reason: "no agent.toml".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    };
+    let outcome = invalid_outcome("no agent.toml", "");
     site.store
         .commit_validation(&validation.claim, outcome, site.now())
         .await

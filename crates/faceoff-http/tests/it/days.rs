@@ -87,9 +87,7 @@ async fn next_cutoff_follows_the_schedule() {
     };
     assert_eq!(next_cutoff().await, "2026-03-01T12:00:00Z");
     // The organiser starts the day before the scheduled time, so the next cutoff of the schedule is on the next day.
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
     assert_eq!(next_cutoff().await, "2026-03-02T12:00:00Z");
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
@@ -113,9 +111,7 @@ async fn day_without_submissions_can_still_be_started() {
     let season = site.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["days"], json!([]));
     site.valid_submission(&team, "a").await;
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
 }
 
 #[tokio::test]

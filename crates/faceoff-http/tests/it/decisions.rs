@@ -79,10 +79,7 @@ async fn frozen_board_hides_later_results_from_the_public() {
     .await
     .problem(409, "conflict", &["frozen already"]);
     site.next_day();
-    let started = site
-        .post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    let started = site.start_day().await;
     site.finish_evaluation(&result([0.9, 0.9, 0.9], 20.0)).await;
     site.finish_evaluation(&result([0.8, 0.8, 0.8], 30.0)).await;
 
@@ -236,9 +233,7 @@ async fn missed_day_is_evaluated_later_with_a_public_reason() {
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["day"], "2026-03-02");
     // Today's day can still be started.
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
 }
 
 #[tokio::test]

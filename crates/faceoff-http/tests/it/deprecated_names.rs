@@ -49,9 +49,7 @@ async fn response_sends_old_names_beside_new_ones() {
         (&me["today"], &me["next_cutoff"])
     );
 
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
     let refused = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
     let problem = refused.problem(409, "cutoff-passed", &[]);
     assert_ne!(problem["cutoff_at"], Value::Null);

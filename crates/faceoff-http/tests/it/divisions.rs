@@ -1,7 +1,10 @@
 //! Tests of divisions, which are groups of teams with a ranking of their own, on boards.
 
-use crate::site::{ADMIN, Site, result};
-use scraper::{Html, Selector};
+use crate::{
+    html::texts,
+    site::{ADMIN, Site, result},
+};
+use scraper::Selector;
 use serde_json::{Value, json};
 
 /// Changes a resource as an organiser. The request must succeed.
@@ -183,20 +186,7 @@ async fn board_of_a_division_ranks_its_teams() {
 #[tokio::test]
 async fn board_pages_link_to_divisions() {
     let site = season_with_divisions().await;
-    let page = async |path: &str| {
-        let answer = site.get(path, None).await;
-        assert_eq!(answer.status, 200, "{}", answer.body);
-        let html = Html::parse_document(&answer.body);
-        assert!(html.errors.is_empty(), "{path}: {:?}", html.errors);
-        html
-    };
-    let texts = |html: &Html, selector: &str| -> Vec<String> {
-        let selector = Selector::parse(selector).unwrap();
-        let texts = html
-            .select(&selector)
-            .map(|element| element.text().collect());
-        texts.collect()
-    };
+    let page = async |path: &str| site.get(path, None).await.html(200);
     for path in ["/", "/tasks/hit"] {
         let all_teams = page(path).await;
         assert_eq!(
@@ -230,8 +220,7 @@ async fn board_pages_link_to_divisions() {
     )
     .await;
     site.next_day();
-    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-    started.json(200);
+    site.start_day().await;
     let under_way = texts(&page("/?division=open").await, ".under-way p > a");
     assert_eq!(under_way, ["B"]);
     assert_eq!(texts(&page("/").await, ".under-way p > a").len(), 4);

@@ -11,13 +11,6 @@ use serde_json::{Value, json};
 
 const STREAM_PATH: &str = "/api/v1/events/stream";
 
-/// Publishes an announcement, whose event (kind `announced`) ends the events that a test reads.
-async fn announce(site: &Site) {
-    let announcement = json!({ "title": "The end", "text": "of this test" });
-    let path = "/api/v1/announcements";
-    site.post(path, Some(ADMIN), &announcement).await.json(201);
-}
-
 /// All events from the beginning of the season until the announcement.
 async fn events_until_announcement(site: &Site, query: &str, token: Option<&str>) -> Vec<Event> {
     let mut stream = Stream::open(site, &format!("{STREAM_PATH}{query}"), token, Some("0")).await;
@@ -94,7 +87,7 @@ async fn resumed_stream_has_each_event_once_in_order() {
     for id in ids_since_open {
         assert_eq!(live.next().await.unwrap().id, Some(id.to_string()));
     }
-    announce(&site).await;
+    site.announce().await;
     let announced = live.next().await.unwrap().data;
     assert_eq!(announced["kind"], "announced");
     assert_eq!(announced["at"], site.now().to_string());
@@ -113,7 +106,7 @@ async fn stream_shows_visible_events_without_scores() {
     site.post("/api/v1/questions", Some(&alpha.token), &question)
         .await
         .json(201);
-    announce(&site).await;
+    site.announce().await;
 
     let visitor_events = events_until_announcement(&site, "", None).await;
     let visitor_kinds = kinds(&visitor_events);
@@ -195,7 +188,7 @@ async fn stream_of_a_blind_stage_hides_evaluations_of_others() {
         .json(200);
     let evaluation = run_day(&site, &teams).await;
     let id = evaluation.rsplit('/').next().unwrap();
-    announce(&site).await;
+    site.announce().await;
 
     let visitor_events = events_until_announcement(&site, "", None).await;
     let evaluation_subjects = |events: &[Event]| -> Vec<Value> {
@@ -238,7 +231,7 @@ async fn stream_hides_evaluations_after_a_freeze_from_others() {
     site.post(&freeze, Some(ADMIN), &reason).await.json(200);
     site.advance(60);
     run_day(&site, &teams).await;
-    announce(&site).await;
+    site.announce().await;
     let query = "?about=evaluation_finished,announcements";
     let [alpha, beta] = &teams;
     for (token, count) in [
@@ -257,7 +250,7 @@ async fn stream_is_filtered_by_topics() {
     let site = Site::start().await;
     let teams = two_teams(&site).await;
     run_day(&site, &teams).await;
-    announce(&site).await;
+    site.announce().await;
     let board_events = events_until_announcement(&site, "?about=board,announcements", None).await;
     assert_eq!(
         kinds(&board_events),
@@ -308,7 +301,7 @@ async fn unknown_topic_or_event_id_is_refused() {
     assert_eq!(reset.name, "reset");
     let newest = site.store.newest_event().await.unwrap();
     assert_eq!(reset.data, json!({ "id": newest }));
-    announce(&site).await;
+    site.announce().await;
     let next = stream.next().await.unwrap();
     assert_eq!(next.data["kind"], "announced");
 }
@@ -348,6 +341,6 @@ async fn stream_ends_when_its_token_is_replaced() {
         None,
         "the stream ends without an error"
     );
-    announce(&site).await;
+    site.announce().await;
     assert_eq!(beta_stream.next().await.unwrap().data["kind"], "announced");
 }

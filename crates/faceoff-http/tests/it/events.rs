@@ -24,9 +24,7 @@ async fn events_are_filtered_by_actor_subject_and_kind() {
     site.post(&new_token, Some(ADMIN), &json!({}))
         .await
         .json(200);
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
 
     let whole_log = page(&site, "").await;
     assert_eq!(whole_log["next_before"], json!(null));

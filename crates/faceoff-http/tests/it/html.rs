@@ -6,20 +6,13 @@ use scraper::{Html, Selector};
 /// Fetches a page, which must be valid HTML without inline styles or scripts.
 pub async fn page(site: &Site, path: &str) -> Html {
     let answer = site.get(path, None).await;
-    assert_eq!(answer.status, 200, "{}", answer.body);
+    let html = answer.html(200);
     assert!(!answer.body.contains("style="));
     // The content security policy allows no other script.
     for (start, _) in answer.body.match_indices("<script") {
         let script = &answer.body[start..];
         assert!(script.starts_with("<script type=\"module\" src=\"/static/live.js?"));
     }
-    let html = Html::parse_document(&answer.body);
-    assert!(
-        html.errors.is_empty(),
-        "{path}: {:?}\n{}",
-        html.errors,
-        answer.body
-    );
     html
 }
 
@@ -34,6 +27,18 @@ pub fn texts(html: &Html, selector: &str) -> Vec<String> {
                 .collect::<Vec<_>>()
                 .join(" ")
         })
+        .collect()
+}
+
+/// The target of each link that the selector finds.
+pub fn links(html: &Html, selector: &str) -> Vec<String> {
+    attributes(html, selector, "href")
+}
+
+/// The attribute `name` of each element that the selector finds.
+pub fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
+    html.select(&Selector::parse(selector).unwrap())
+        .map(|element| element.attr(name).unwrap().to_owned())
         .collect()
 }
 

@@ -3,9 +3,9 @@
 
 use crate::{
     browser::{Browser, forms},
-    html::texts,
+    html::{links, texts},
     site::{ADMIN, Answer, Site, TestTeam, result, string},
-    team_dashboard::{dashboard_page, links, redirect_target},
+    team_dashboard::{dashboard_page, redirect_target},
 };
 use serde_json::{Value, json};
 
@@ -220,9 +220,7 @@ async fn platform_fault_needs_attention_until_the_rerun() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.valid_submission(&team, "agent").await;
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
     site.change_first_stage(json!({ "day_deadline": { "hours": 1 } }))
         .await
         .json(200);

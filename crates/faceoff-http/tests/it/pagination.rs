@@ -1,8 +1,9 @@
 //! Tests of paginated lists: each page links to the next, and no row is skipped or repeated while rows are added.
 
 use crate::{
-    site::{ADMIN, Answer, Site, TestTeam, result, string},
+    site::{ADMIN, Answer, Site, TestTeam, string},
     tournament::cup::Cup,
+    users::organiser,
 };
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -40,14 +41,6 @@ async fn collect_pages(
 }
 
 async fn no_change(_: usize) {}
-
-async fn run_day(site: &Site, teams: usize) {
-    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-    started.json(200);
-    for _ in 0..teams {
-        site.finish_evaluation(&result([0.5; 3], 10.0)).await;
-    }
-}
 
 #[tokio::test]
 async fn pages_list_each_row_once_while_rows_are_added() {
@@ -96,7 +89,7 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
     );
 
     for _ in 0..5 {
-        run_day(&site, 2).await;
+        site.run_day_with_rates(&[0.5; 2]).await;
         site.next_day();
     }
     let all = site.get("/api/v1/evaluations", alpha_token).await;
@@ -111,7 +104,7 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
     assert_eq!(all.len(), 5);
     let add = async |page| {
         if page == 0 {
-            run_day(&site, 2).await;
+            site.run_day_with_rates(&[0.5; 2]).await;
         }
     };
     let path = "/api/v1/evaluations?limit=2";
@@ -150,14 +143,7 @@ async fn growing_lists_are_paginated() {
             .post("/api/v1/questions", Some(cup.token("A")), &question)
             .await;
         asked.json(201);
-        let invitation = json!({ "role": "organiser", "note": title });
-        let invited = site
-            .post("/api/v1/invitations", Some(ADMIN), &invitation)
-            .await;
-        let code = &invited.json(201)["code"];
-        let user = json!({ "code": code, "name": title });
-        let joined = site.post("/api/v1/invitations/accept", None, &user).await;
-        joined.json(201);
+        organiser(site, title).await;
     }
     let games = cup.games().await[0]["tournament"].clone();
     let games = format!("/api/v1/tournaments/{}/games", string(&games));

@@ -1,7 +1,6 @@
 //! Tests of retention (a stage's rule that says which datasets and bundles are kept), of deleted submissions, and of disk usage.
 
-use crate::site::{ADMIN, Answer, DATASET, GZIP, Site, TestTeam, result, string};
-use faceoff_types::ValidationOutcome;
+use crate::site::{ADMIN, Answer, DATASET, GZIP, Site, TestTeam, invalid_outcome, result, string};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -216,14 +215,8 @@ async fn submission_without_bundle_cannot_be_deleted() {
     delete_it(&submission)
         .await
         .problem(409, "conflict", &["validation run is queued or running"]);
-    site.finish_validation(ValidationOutcome::Invalid {
-        runtime: None,
-        agent_name: None,
-        reason: "no manifest".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    })
-    .await;
+    site.finish_validation(invalid_outcome("no manifest", ""))
+        .await;
     delete_it(&submission)
         .await
         .problem(409, "conflict", &["removes its bundle automatically"]);

@@ -134,10 +134,7 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
     let capacity = format!("/api/v1/stages/{stage}/capacity");
     let capacity = site.get(&capacity, Some(ADMIN)).await.json(200);
     assert_eq!(capacity["days"][0]["teams"], 1);
-    let day = site
-        .post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    let day = site.start_day().await;
     let names = |list: &Value, key: &str| -> Vec<String> {
         list.as_array()
             .unwrap()
@@ -182,10 +179,7 @@ async fn excluded_runtime_is_not_evaluated_and_says_why() {
         &["not accepted by these rules"],
     );
     site.next_day();
-    let day = site
-        .post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    let day = site.start_day().await;
     assert_eq!(names(&day["created"], "team_name"), ["Alpha"]);
 }
 
@@ -207,10 +201,7 @@ async fn day_without_accepted_submission_can_still_be_started() {
     let log = site.get(EXCLUSIONS_IN_LOG, Some(ADMIN)).await.json(200);
     assert_eq!(log["events"], json!([]));
     set_runtimes(&site, json!(null)).await;
-    let day = site
-        .post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    let day = site.start_day().await;
     assert_eq!(day["created"].as_array().unwrap().len(), 1);
 }
 

@@ -38,9 +38,7 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
         "revision 1 has the weights of the ruleset"
     );
 
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
     // The agent solves half of the four episodes of `hit`, and exceeds the joint velocity limits in each of them.
     let outcome_fn = |task: Task, episode| EpisodeOutcome {
         success: task == Task::Hit && episode < 2,

@@ -125,22 +125,24 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
     );
 }
 
-#[tokio::test]
-async fn faults_log_and_comparison_appear_with_the_release() {
-    let site = Site::start().await;
-    let mut paths = Vec::new();
-    let teams = [
-        site.team("Failing").await,
-        site.team("Early").await,
-        site.team("Late").await,
-    ];
-    let mut submissions = Vec::new();
-    for team in &teams {
-        submissions.push(site.valid_submission(team, "agent").await);
+/// Starts an evaluation of each of these new teams. Returns also the paths of the evaluations in the API.
+async fn start_evaluations(site: &Site, names: [&str; 3]) -> (Vec<TestTeam>, Vec<String>) {
+    let (mut teams, mut submissions, mut paths) = (Vec::new(), Vec::new(), Vec::new());
+    for name in names {
+        let team = site.team(name).await;
+        submissions.push(site.valid_submission(&team, "agent").await);
+        teams.push(team);
     }
     for (team, submission) in teams.iter().zip(&submissions) {
         paths.push(site.evaluate(team, submission).await);
     }
+    (teams, paths)
+}
+
+#[tokio::test]
+async fn faults_log_and_comparison_appear_with_the_release() {
+    let site = Site::start().await;
+    let (teams, paths) = start_evaluations(&site, ["Failing", "Early", "Late"]).await;
     let [failing, early, late] = &paths[..] else {
         panic!("three evaluations")
     };
@@ -166,19 +168,7 @@ async fn faults_log_and_comparison_appear_with_the_release() {
 #[tokio::test]
 async fn comparison_is_refused_while_the_day_is_open() {
     let site = Site::start().await;
-    let mut paths = Vec::new();
-    let teams = [
-        site.team("A").await,
-        site.team("B").await,
-        site.team("C").await,
-    ];
-    let mut submissions = Vec::new();
-    for team in &teams {
-        submissions.push(site.valid_submission(team, "agent").await);
-    }
-    for (team, submission) in teams.iter().zip(&submissions) {
-        paths.push(site.evaluate(team, submission).await);
-    }
+    let (_, paths) = start_evaluations(&site, ["A", "B", "C"]).await;
     for _ in 0..2 {
         site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
             .await;

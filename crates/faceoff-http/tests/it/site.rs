@@ -18,10 +18,12 @@ use faceoff_types::*;
 use faceoff_wire::grant::GrantKey;
 use jiff::{SignedDuration, Timestamp};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
+use scraper::Html;
 use serde_json::{Value, json};
 use std::{
     collections::BTreeMap,
     fmt::Display,
+    path::PathBuf,
     sync::{Arc, Mutex},
     time::Duration,
 };
@@ -114,6 +116,15 @@ impl Answer {
         serde_json::from_str(&self.body).unwrap()
     }
 
+    /// Asserts the status, and parses the body, which must be valid HTML.
+    #[track_caller]
+    pub fn html(&self, status: u16) -> Html {
+        assert_eq!(self.status.as_u16(), status, "{}", self.body);
+        let html = Html::parse_document(&self.body);
+        assert!(html.errors.is_empty(), "{:?}\n{}", html.errors, self.body);
+        html
+    }
+
     /// Asserts that the body is a problem document of the kind `slug`, and that its detail contains all `words`.
     #[track_caller]
     pub fn problem(&self, status: u16, slug: &str, words: &[&str]) -> Value {
@@ -183,6 +194,29 @@ fn agent_resources() -> AgentResources {
     )
 }
 
+/// The configuration of a server that runs no agents.
+fn config_without_slots(upload_dir: PathBuf, clock: Clock) -> HttpConfig {
+    HttpConfig {
+        competition: Arc::new(faceoff_airhockey::competition()),
+        max_bundle_bytes: MAX_BUNDLE_BYTES,
+        public_url: None,
+        upload_dir,
+        clock,
+        limits: generous_limits(),
+        capacity: Capacity {
+            slots: 0,
+            runtimes: Vec::new(),
+            time: TimeLimits::default(),
+        },
+        agent_resources: AgentResources::none(),
+        rate_limits: RateLimits::default(),
+        link_key: LinkKey::generate().unwrap(),
+        metrics: Metrics::new("0.0.0"),
+        process: Process::default,
+        webhooks: WebhookRules::default(),
+    }
+}
+
 impl Site {
     pub async fn start() -> Self {
         Self::start_with(generous_limits()).await
@@ -232,12 +266,8 @@ impl Site {
         configure_stage(&store, &plan(), schedule, start).await;
         let now = Arc::new(Mutex::new(start));
         let clock = Arc::clone(&now);
+        let clock = Clock::new(move || *clock.lock().unwrap());
         let config = HttpConfig {
-            competition: Arc::new(faceoff_airhockey::competition()),
-            max_bundle_bytes: MAX_BUNDLE_BYTES,
-            public_url: None,
-            upload_dir,
-            clock: Clock::new(move || *clock.lock().unwrap()),
             limits,
             capacity: Capacity {
                 slots: 2,
@@ -245,20 +275,25 @@ impl Site {
                 runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
             },
             agent_resources: agent_resources(),
-            rate_limits: RateLimits::default(),
-            link_key: LinkKey::generate().unwrap(),
-            metrics: Metrics::new("0.0.0"),
-            process: Process::default,
             webhooks: WebhookRules {
                 enabled: true,
                 allow_http: true,
                 ports: Vec::new(),
                 allow_private: vec!["127.0.0.0/8".parse().unwrap()],
             },
+            ..config_without_slots(upload_dir, clock)
         };
+        Self::serve(store, folder, config, now).await
+    }
+
+    async fn serve(
+        store: Store,
+        folder: tempfile::TempDir,
+        config: HttpConfig,
+        now: Arc<Mutex<Timestamp>>,
+    ) -> Self {
         let live = LiveState::default();
         let (url, server, shutdown) = serve(&store, &live, &config).await;
-        let http = client_builder().build().unwrap();
         Self {
             url,
             store,
@@ -266,7 +301,7 @@ impl Site {
             folder,
             config,
             now,
-            http,
+            http: client_builder().build().unwrap(),
             server,
             shutdown: Some(shutdown),
         }
@@ -284,38 +319,8 @@ impl Site {
                 .await
                 .unwrap()
         );
-        let config = HttpConfig {
-            competition: Arc::new(faceoff_airhockey::competition()),
-            max_bundle_bytes: MAX_BUNDLE_BYTES,
-            public_url: None,
-            upload_dir,
-            clock: Clock::new(move || made_at),
-            limits: generous_limits(),
-            capacity: Capacity {
-                slots: 0,
-                runtimes: Vec::new(),
-                time: TimeLimits::default(),
-            },
-            agent_resources: AgentResources::none(),
-            rate_limits: RateLimits::default(),
-            link_key: LinkKey::generate().unwrap(),
-            metrics: Metrics::new("0.0.0"),
-            process: Process::default,
-            webhooks: WebhookRules::default(),
-        };
-        let live = LiveState::default();
-        let (url, server, shutdown) = serve(&store, &live, &config).await;
-        Self {
-            url,
-            store,
-            live,
-            folder,
-            config,
-            now: Arc::new(Mutex::new(made_at)),
-            http: client_builder().build().unwrap(),
-            server,
-            shutdown: Some(shutdown),
-        }
+        let config = config_without_slots(upload_dir, Clock::new(move || made_at));
+        Self::serve(store, folder, config, Arc::new(Mutex::new(made_at))).await
     }
 
     /// The metrics of the server.
@@ -628,14 +633,34 @@ impl Site {
         teams.map(|(name, _)| by_name[name])
     }
 
+    /// Publishes an announcement, which is an event of the kind `announced`.
+    pub async fn announce(&self) {
+        let announcement = json!({ "title": "News", "text": "of this test" });
+        let path = "/api/v1/announcements";
+        self.post(path, Some(ADMIN), &announcement).await.json(201);
+    }
+
+    /// Starts the evaluation day as an organiser. Returns the response.
+    pub async fn start_day(&self) -> Value {
+        let started = self.post("/api/v1/days", Some(ADMIN), &json!({})).await;
+        started.json(200)
+    }
+
+    /// Runs an evaluation day on which the teams have these success rates in all tasks.
+    pub async fn run_day_with_rates(&self, rates: &[f64]) {
+        self.start_day().await;
+        for rate in rates {
+            self.finish_evaluation(&result([*rate; 3], 10.0)).await;
+        }
+    }
+
     /// Adds these teams, and evaluates a day with these results.
     pub async fn ranked_teams(&self, teams: &[(&str, EvaluationResult)]) {
         for (name, _) in teams {
             let team = self.team(name).await;
             self.valid_submission(&team, &format!("{name}-agent")).await;
         }
-        let started = self.post("/api/v1/days", Some(ADMIN), &json!({})).await;
-        started.json(200);
+        self.start_day().await;
         for (_, result) in teams {
             self.finish_evaluation(result).await;
         }
@@ -711,6 +736,17 @@ async fn serve(
         faceoff_http::serve(listener, site, connection_limits(), shutdown_signal).await;
     });
     (url, server, shutdown_sender)
+}
+
+/// The outcome of the validation run of an agent that did not start.
+pub fn invalid_outcome(reason: &str, log: &str) -> ValidationOutcome {
+    ValidationOutcome::Invalid {
+        runtime: None,
+        agent_name: None,
+        reason: reason.into(),
+        timing: Vec::new(),
+        log: log.into(),
+    }
 }
 
 /// The text of a JSON string.

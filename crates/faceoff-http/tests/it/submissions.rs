@@ -1,6 +1,8 @@
 //! Tests of uploads, and of the submissions that they become.
 
-use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, generous_limits, string};
+use crate::site::{
+    ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, generous_limits, invalid_outcome, string,
+};
 use bytes::Bytes;
 use faceoff_http::{HttpLimits, MinTransferRate};
 use faceoff_testkit::valid_outcome;
@@ -79,13 +81,10 @@ async fn invalid_submission_shows_reason_and_log() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let id = string(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
-    let outcome = ValidationOutcome::Invalid {
-        runtime: None,
-        agent_name: None,
-        reason: "no answer within the start-up limit of 120 s".into(),
-        timing: Vec::new(),
-        log: "ImportError: torch\n".into(),
-    };
+    let outcome = invalid_outcome(
+        "no answer within the start-up limit of 120 s",
+        "ImportError: torch\n",
+    );
     site.finish_validation(outcome).await;
     let path = format!("/api/v1/submissions/{id}");
     let submission = site.get(&path, Some(&team.token)).await.json(200);

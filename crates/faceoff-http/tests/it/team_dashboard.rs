@@ -2,7 +2,7 @@
 
 use crate::{
     browser::{Browser, PASSWORD, first_text, forms},
-    html::texts,
+    html::{links, texts},
     site::{ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, TestTeam, result, string},
 };
 use faceoff_types::{Task, ValidationOutcome, ValidationTiming};
@@ -12,9 +12,7 @@ use serde_json::json;
 /// Parses a dashboard page. It must be valid, load only its two scripts, and have nothing inline.
 #[track_caller]
 pub fn dashboard_page(answer: &Answer, status: u16) -> Html {
-    assert_eq!(answer.status.as_u16(), status, "{}", answer.body);
-    let html = Html::parse_document(&answer.body);
-    assert!(html.errors.is_empty(), "{:?}\n{}", html.errors, answer.body);
+    let html = answer.html(status);
     let scripts = Selector::parse("script").unwrap();
     let scripts: Vec<_> = html.select(&scripts).collect();
     let sources: Vec<_> = scripts
@@ -37,13 +35,6 @@ pub fn dashboard_page(answer: &Answer, status: u16) -> Html {
 pub fn redirect_target(answer: &Answer) -> String {
     assert_eq!(answer.status, 303, "{}", answer.body);
     answer.header("location").to_owned()
-}
-
-/// The target of each link that the selector finds.
-pub fn links(html: &Html, selector: &str) -> Vec<String> {
-    html.select(&Selector::parse(selector).unwrap())
-        .map(|element| element.value().attr("href").unwrap().to_owned())
-        .collect()
 }
 
 /// The browser of a new member of the team.
@@ -462,9 +453,7 @@ async fn dashboard_lists_evaluations_with_their_files() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.valid_submission(&team, "agent").await;
-    site.post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    site.start_day().await;
     site.finish_evaluation(&result([0.5; 3], 100.0)).await;
     let mut ada = member(&site, &team, "Ada").await;
     let html = dashboard_page(&ada.open("/dashboard").await, 200);

@@ -1,11 +1,10 @@
 //! Tests of a team's page: its results day by day, its violations, and its submissions.
 
 use crate::{
-    html::{page, texts},
+    html::{attributes, page, texts},
     site::{ADMIN, Site, TestTeam, result},
 };
 use reqwest::Method;
-use scraper::{Html, Selector};
 use serde_json::json;
 
 /// Two teams on three days. The first team's scores rise.
@@ -18,20 +17,11 @@ async fn three_days(site: &Site) -> [TestTeam; 2] {
         if index > 0 {
             site.next_day();
         }
-        site.post("/api/v1/days", Some(ADMIN), &json!({}))
-            .await
-            .json(200);
+        site.start_day().await;
         site.finish_evaluation(&result([rate; 3], 700.0)).await;
         site.finish_evaluation(&result([0.65; 3], 10.0)).await;
     }
     teams
-}
-
-/// The attribute `name` of each element that the selector finds.
-fn attributes(html: &Html, selector: &str, name: &str) -> Vec<String> {
-    html.select(&Selector::parse(selector).unwrap())
-        .map(|element| element.value().attr(name).unwrap().to_owned())
-        .collect()
 }
 
 #[tokio::test]

@@ -1,10 +1,9 @@
 //! Tests of the limits of one team's uploads: concurrent uploads, daily quota and storage quota.
 
-use crate::site::{Answer, GZIP, Site, TestTeam, generous_limits, string};
+use crate::site::{Answer, GZIP, Site, TestTeam, generous_limits, invalid_outcome, string};
 use bytes::Bytes;
 use faceoff_http::HttpLimits;
 use faceoff_store::UploadQuota;
-use faceoff_types::ValidationOutcome;
 use reqwest::{Body, Method};
 use serde_json::json;
 use std::{convert::Infallible, time::Duration};
@@ -138,14 +137,8 @@ async fn invalid_submission_frees_its_storage_quota() {
     let full = site.upload(&team.token, bundle(6000)).await;
     let problem = full.problem(409, "stored-quota-spent", &["yours has stored 6000"]);
     assert_eq!(problem["limit_bytes"], 10_000);
-    site.finish_validation(ValidationOutcome::Invalid {
-        runtime: None,
-        agent_name: None,
-        reason: "there is no agent.toml".into(),
-        timing: Vec::new(),
-        log: String::new(),
-    })
-    .await;
+    site.finish_validation(invalid_outcome("there is no agent.toml", ""))
+        .await;
     let now = site.now();
     assert_eq!(site.store.remove_refused_bundles(now).await.unwrap(), 1);
     site.upload(&team.token, bundle(6000)).await.json(201);

@@ -49,12 +49,13 @@ pub async fn join(site: &Site, code: &str, name: &str) -> User {
     }
 }
 
-async fn member(site: &Site, team: &str, name: &str) -> User {
+/// Adds a member to a team.
+pub async fn member(site: &Site, team: &str, name: &str) -> User {
     let invitation = json!({ "role": "member", "team": team, "note": name });
     join(site, &invite(site, ADMIN, &invitation).await, name).await
 }
 
-async fn organiser(site: &Site, name: &str) -> User {
+pub async fn organiser(site: &Site, name: &str) -> User {
     let invitation = json!({ "role": "organiser", "note": name });
     join(site, &invite(site, ADMIN, &invitation).await, name).await
 }

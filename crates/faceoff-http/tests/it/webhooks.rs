@@ -1,7 +1,8 @@
 //! Tests of webhooks (URLs to which the server delivers events), with a receiver on a real port that verifies the signatures.
 
 use crate::{
-    site::{ADMIN, Answer, Site, TestTeam, result, string},
+    site::{ADMIN, Answer, Site, result, string},
+    users::member,
     webhook_receiver::{Behaviour, Receiver},
 };
 use faceoff_notify::{Deliverer, WebhookRules};
@@ -37,16 +38,6 @@ async fn deliver(site: &Site) {
         .unwrap();
 }
 
-/// Adds a member to the team. Returns the member's token.
-async fn member(site: &Site, team: &TestTeam, name: &str) -> String {
-    let invitation = json!({ "role": "member", "team": team.id, "note": name });
-    let path = "/api/v1/invitations";
-    let created = site.post(path, Some(ADMIN), &invitation).await.json(201);
-    let join = json!({ "code": created["code"], "name": name });
-    let path = "/api/v1/invitations/accept";
-    string(&site.post(path, None, &join).await.json(201)["secret"])
-}
-
 /// Creates a webhook for the events of these topics; of all topics if there are none. Returns its path and its secret.
 async fn create_webhook(site: &Site, token: &str, url: &str, topics: &[&str]) -> (String, String) {
     let webhook = json!({ "name": "test hook", "url": url, "about": topics });
@@ -56,13 +47,6 @@ async fn create_webhook(site: &Site, token: &str, url: &str, topics: &[&str]) ->
     assert!(secret.starts_with("whsec_"));
     let path = format!("/api/v1/webhooks/{}", string(&created["id"]));
     (path, secret)
-}
-
-/// Publishes an announcement, which is an event of the kind `announced`.
-async fn announce(site: &Site) {
-    let announcement = json!({ "title": "News", "text": "of this test" });
-    let path = "/api/v1/announcements";
-    site.post(path, Some(ADMIN), &announcement).await.json(201);
 }
 
 async fn patch(site: &Site, path: &str, token: &str, body: Value) -> Answer {
@@ -80,7 +64,7 @@ async fn deliveries(site: &Site, path: &str) -> Vec<Value> {
 async fn webhook_gets_the_events_visible_to_its_owner() {
     let site = Site::start().await;
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
-    let ada = member(&site, &alpha, "Ada").await;
+    let ada = member(&site, &alpha.id, "Ada").await.token;
     let (team_receiver, organiser_receiver) = (Receiver::start().await, Receiver::start().await);
     let (path, secret) = create_webhook(&site, &ada, &team_receiver.url, &[]).await;
     create_webhook(
@@ -157,7 +141,7 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
     let receiver = Receiver::start().await;
     let (path, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
     receiver.add_behaviours(&[Behaviour::Respond(500)]);
-    announce(&site).await;
+    site.announce().await;
     deliver(&site).await;
     deliver(&site).await;
     assert_eq!(receiver.requests().len(), 1, "no retry before it is due");
@@ -190,7 +174,7 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
     // A delivery that always fails is attempted seven times. The longest pause between two attempts is shorter than 13 hours.
     const ATTEMPTS: usize = 7;
     receiver.add_behaviours(&[Behaviour::Respond(404); ATTEMPTS]);
-    announce(&site).await;
+    site.announce().await;
     for _ in 0..ATTEMPTS {
         deliver(&site).await;
         site.advance(13 * 3600);
@@ -206,7 +190,7 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
 async fn rotated_secret_signs_beside_the_old_one_for_a_day() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
-    let ada = member(&site, &alpha, "Ada").await;
+    let ada = member(&site, &alpha.id, "Ada").await.token;
     let receiver = Receiver::start().await;
     let (path, old_secret) = create_webhook(&site, &ada, &receiver.url, &["announced"]).await;
     let rotate = format!("{path}/rotate");
@@ -216,12 +200,12 @@ async fn rotated_secret_signs_beside_the_old_one_for_a_day() {
     let rotated = site.post(&rotate, Some(&ada), &json!({})).await.json(200);
     let new_secret = string(&rotated["secret"]);
     assert_ne!(old_secret, new_secret);
-    announce(&site).await;
+    site.announce().await;
     deliver(&site).await;
     let first = &receiver.requests()[0];
     assert!(first.is_signed_by(&old_secret) && first.is_signed_by(&new_secret));
     site.advance(24 * 3600);
-    announce(&site).await;
+    site.announce().await;
     deliver(&site).await;
     let second = &receiver.requests()[1];
     assert!(!second.is_signed_by(&old_secret) && second.is_signed_by(&new_secret));
@@ -233,11 +217,11 @@ async fn rotated_secret_signs_beside_the_old_one_for_a_day() {
 async fn webhook_that_answers_gone_is_dead_until_revived() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
-    let ada = member(&site, &alpha, "Ada").await;
+    let ada = member(&site, &alpha.id, "Ada").await.token;
     let receiver = Receiver::start().await;
     let (path, _) = create_webhook(&site, &ada, &receiver.url, &["announced"]).await;
     receiver.add_behaviours(&[Behaviour::Respond(410)]);
-    announce(&site).await;
+    site.announce().await;
     deliver(&site).await;
     let dead = site.get(&path, Some(&ada)).await.json(200);
     assert_eq!(dead["state"], "dead");
@@ -245,7 +229,7 @@ async fn webhook_that_answers_gone_is_dead_until_revived() {
     let log = "/api/v1/events?kind=webhook_died";
     let log = site.get(log, Some(ADMIN)).await.json(200);
     assert_eq!(log["events"][0]["subject"], format!("team:{}", alpha.id));
-    announce(&site).await;
+    site.announce().await;
     site.advance(3600);
     deliver(&site).await;
     assert_eq!(receiver.requests().len(), 1);
@@ -256,7 +240,7 @@ async fn webhook_that_answers_gone_is_dead_until_revived() {
 
     let revived = patch(&site, &path, &ada, json!({ "state": "alive" })).await;
     assert_eq!(revived.json(200)["state"], "alive");
-    announce(&site).await;
+    site.announce().await;
     deliver(&site).await;
     assert_eq!(
         receiver.requests().len(),
@@ -277,7 +261,7 @@ async fn webhook_that_fails_for_three_days_is_dead() {
     // One failing delivery an hour, for three days.
     for _ in 0..72 {
         assert_eq!(site.get(&path, Some(ADMIN)).await.json(200)["id"], id);
-        announce(&site).await;
+        site.announce().await;
         deliver(&site).await;
         site.advance(3600);
         receiver.add_behaviours(&failures);
@@ -305,7 +289,7 @@ async fn redirects_are_not_followed_and_responses_not_shown() {
     let receiver = Receiver::start().await;
     let (path, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
     receiver.add_behaviours(&[Behaviour::Redirect, Behaviour::Respond(418)]);
-    announce(&site).await;
+    site.announce().await;
     deliver(&site).await;
     let redirected = &deliveries(&site, &path).await[0];
     assert_eq!(redirected["last"]["status"], 302);
@@ -337,7 +321,7 @@ async fn private_addresses_are_refused() {
     let url_with_name = format!("http://localhost:{}/hook", receiver.port);
     let (with_name, _) = create_webhook(&site, ADMIN, &url_with_name, &["announced"]).await;
     let (with_address, _) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
-    announce(&site).await;
+    site.announce().await;
     let strict_rules = WebhookRules {
         enabled: true,
         allow_private: Vec::new(),
@@ -359,7 +343,7 @@ async fn interrupted_delivery_is_repeated_with_the_same_id() {
     let receiver = Receiver::start().await;
     let (path, secret) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
     receiver.add_behaviours(&[Behaviour::Hang]);
-    announce(&site).await;
+    site.announce().await;
     let interrupted = deliverer(&site, rules_for_loopback());
     let interrupted = tokio::spawn(async move { interrupted.deliver_due().await });
     receiver.wait_for(1).await;
@@ -384,7 +368,7 @@ async fn running_deliverer_sends_at_once_and_shuts_down() {
     let (path, secret) = create_webhook(&site, ADMIN, &receiver.url, &["announced"]).await;
     let shutdown = CancellationToken::new();
     let deliverer = tokio::spawn(deliverer(&site, rules_for_loopback()).run(shutdown.clone()));
-    announce(&site).await;
+    site.announce().await;
     assert_eq!(receiver.wait_for(1).await[0].json()["type"], "announced");
     let test = format!("{path}/test");
     let queued = site.post(&test, Some(ADMIN), &json!({})).await.json(202);
@@ -394,7 +378,7 @@ async fn running_deliverer_sends_at_once_and_shuts_down() {
     assert!(requests[1].is_signed_by(&secret));
     // A receiver that never answers does not delay the shutdown.
     receiver.add_behaviours(&[Behaviour::Hang]);
-    announce(&site).await;
+    site.announce().await;
     receiver.wait_for(3).await;
     shutdown.cancel();
     deliverer.await.unwrap();
@@ -404,7 +388,7 @@ async fn running_deliverer_sends_at_once_and_shuts_down() {
 async fn webhooks_are_limited_and_created_by_members_only() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
-    let ada = member(&site, &alpha, "Ada").await;
+    let ada = member(&site, &alpha.id, "Ada").await.token;
     let new_webhook = json!({ "name": "test hook", "url": "https://example.org/faceoff" });
     let webhooks = "/api/v1/webhooks";
     site.post(webhooks, Some(&alpha.token), &new_webhook)

@@ -2,9 +2,9 @@
 
 use crate::{
     browser::Browser,
-    html::texts,
+    html::{links, texts},
     site::{ADMIN, Site},
-    team_dashboard::{dashboard_page, links, redirect_target},
+    team_dashboard::{dashboard_page, redirect_target},
 };
 use faceoff_live::{SlotReport, WorkerInfo};
 use serde_json::{Value, json};

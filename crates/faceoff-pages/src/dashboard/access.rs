@@ -35,28 +35,14 @@ use std::{collections::BTreeMap, str::FromStr};
 
 /// The pages below `dashboard_path`, which is `/dashboard` or `/organiser`.
 pub(crate) fn router(dashboard_path: &str) -> Router<App> {
+    let path = |rest: &str| format!("{dashboard_path}/access{rest}");
     Router::new()
-        .route(&format!("{dashboard_path}/access"), get(page))
-        .route(
-            &format!("{dashboard_path}/access/tokens"),
-            post(create_token),
-        )
-        .route(
-            &format!("{dashboard_path}/access/tokens/{{id}}/revoke"),
-            post(revoke_token),
-        )
-        .route(
-            &format!("{dashboard_path}/access/invitations"),
-            post(invite),
-        )
-        .route(
-            &format!("{dashboard_path}/access/invitations/{{id}}/revoke"),
-            post(revoke_invitation),
-        )
-        .route(
-            &format!("{dashboard_path}/access/people/{{id}}/remove"),
-            post(remove_user),
-        )
+        .route(&path(""), get(page))
+        .route(&path("/tokens"), post(create_token))
+        .route(&path("/tokens/{id}/revoke"), post(revoke_token))
+        .route(&path("/invitations"), post(invite))
+        .route(&path("/invitations/{id}/revoke"), post(revoke_invitation))
+        .route(&path("/people/{id}/remove"), post(remove_user))
 }
 
 #[derive(Template)]

@@ -89,13 +89,18 @@ pub(super) fn complete(operation: &mut Operation) {
     responses.insert("416".to_owned(), unsatisfiable.into());
 }
 
-fn has_header_parameter(operation: &Operation, name: &str) -> bool {
+/// The parameters of an operation that are not references.
+pub(super) fn inline_parameters(operation: &Operation) -> impl Iterator<Item = &Parameter> {
     let parameters = operation.parameters.iter().flatten();
-    let mut inline = parameters.filter_map(|parameter| match parameter {
+    parameters.filter_map(|parameter| match parameter {
         RefOr::T(parameter) => Some(parameter),
         RefOr::Ref(_) => None,
-    });
-    inline.any(|parameter| parameter.parameter_in == ParameterIn::Header && parameter.name == name)
+    })
+}
+
+fn has_header_parameter(operation: &Operation, name: &str) -> bool {
+    inline_parameters(operation)
+        .any(|parameter| parameter.parameter_in == ParameterIn::Header && parameter.name == name)
 }
 
 fn add_header(response: &mut Response, name: &str, description: &str) {

@@ -1,5 +1,6 @@
 //! Paged lists in the OpenAPI document: routes with the query parameter `after` return a link to the next page.
 
+use super::files::inline_parameters;
 use utoipa::openapi::{
     Header, Object, RefOr, Response, Type,
     path::{Operation, ParameterIn},
@@ -7,12 +8,7 @@ use utoipa::openapi::{
 
 /// Adds the header `Link` and the response 422 to the operation, if it returns a paged list.
 pub(super) fn complete(operation: &mut Operation) {
-    let parameters = operation.parameters.iter().flatten();
-    let mut inline = parameters.filter_map(|parameter| match parameter {
-        RefOr::T(parameter) => Some(parameter),
-        RefOr::Ref(_) => None,
-    });
-    let is_list = inline
+    let is_list = inline_parameters(operation)
         .any(|parameter| parameter.parameter_in == ParameterIn::Query && parameter.name == "after");
     if !is_list {
         return;

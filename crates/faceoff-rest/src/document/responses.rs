@@ -1,7 +1,10 @@
 //! Responses in the OpenAPI document that many routes share. They are derived from the routes' parameters, bodies and
 //! security; a route itself describes only its specific responses.
 
-use super::{files, lists};
+use super::{
+    files::{self, inline_parameters},
+    lists,
+};
 use axum::http::StatusCode;
 use faceoff_service::problem::{Problem, ProblemBody};
 use utoipa::{
@@ -138,12 +141,7 @@ impl OperationTraits<'_> {
     }
 
     fn has_parameter_in(&self, location: &ParameterIn) -> bool {
-        let parameters = self.operation.parameters.iter().flatten();
-        let mut inline = parameters.filter_map(|parameter| match parameter {
-            RefOr::T(parameter) => Some(parameter),
-            RefOr::Ref(_) => None,
-        });
-        inline.any(|parameter| parameter.parameter_in == *location)
+        inline_parameters(self.operation).any(|parameter| parameter.parameter_in == *location)
     }
 
     fn has_query(&self) -> bool {

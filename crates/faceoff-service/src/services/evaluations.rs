@@ -11,7 +11,7 @@ use crate::{
 use faceoff_api::requests::NewExtraEvaluation;
 use faceoff_store::{Actor, Evaluation, EvaluationState, Stage, StagePhase, StoreError};
 use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
-use jiff::{Timestamp, civil::Date};
+use jiff::Timestamp;
 
 /// Starts the evaluation day of a stage, and returns it. `None`: of the open stage.
 #[boxed]
@@ -29,10 +29,7 @@ pub async fn start_day(
         Ok(created) => tracing::info!(
             stage = %stage.name, evaluations = created.len(), "the day was started"
         ),
-        Err(StoreError::CutoffPassed { day, cutoff_at }) => {
-            return Err(cutoff_passed_problem(app, &stage, day, cutoff_at).await?);
-        }
-        Err(error) => return Err(error.into()),
+        Err(error) => return Err(start_problem(app, &stage, error).await?),
     }
     Ok(stage.day(now))
 }
@@ -55,13 +52,15 @@ async fn open_stage(app: &AppState, now: Timestamp) -> Result<Stage, Problem> {
     stage::current(app).await
 }
 
-/// The problem of a day that has already had its cutoff, with the time of the next one.
-async fn cutoff_passed_problem(
+/// The problem of a day that cannot be started; if it has already had its cutoff, with the time of the next one.
+async fn start_problem(
     app: &AppState,
     stage: &Stage,
-    day: Date,
-    cutoff_at: Timestamp,
+    error: StoreError,
 ) -> Result<Problem, Problem> {
+    let StoreError::CutoffPassed { day, cutoff_at } = error else {
+        return Ok(error.into());
+    };
     let next_cutoff = day::next_cutoff(app, stage).await?;
     let outlook = match &next_cutoff {
         Some(next) => {
@@ -100,10 +99,7 @@ pub async fn start_missed_day(
         Ok(created) => tracing::info!(
             stage = %stage.name, %day, evaluations = created.len(), reason, "a missed day was started"
         ),
-        Err(StoreError::CutoffPassed { day, cutoff_at }) => {
-            return Err(cutoff_passed_problem(app, &stage, day, cutoff_at).await?);
-        }
-        Err(error) => return Err(error.into()),
+        Err(error) => return Err(start_problem(app, &stage, error).await?),
     }
     Ok(())
 }

@@ -9,7 +9,8 @@ use faceoff_types::{
     Runtimes, StageId, StageName, StageSettings,
 };
 
-fn parse_name(text: &str) -> Result<StageName, Problem> {
+/// Parses the name of a stage, or of a tournament, whose names have the same rules.
+pub fn parse_name(text: &str) -> Result<StageName, Problem> {
     text.parse()
         .map_err(|error| Problem::invalid("name", error))
 }

@@ -4,7 +4,10 @@ use super::{
     cup::{Cup, first_by_name_wins, team_names},
     fake_slot::GameOutcome,
 };
-use crate::site::{ADMIN, string};
+use crate::{
+    site::{ADMIN, string},
+    users::member,
+};
 use faceoff_store::{Actor, TournamentChange};
 use faceoff_types::{Ruleset, TournamentRules};
 use serde_json::{Value, json};
@@ -133,19 +136,7 @@ async fn team_is_withdrawn_by_a_member_not_by_its_token() {
         .post(&path, Some(ADMIN), &body)
         .await
         .problem(403, "forbidden", &["departures"]);
-    let invitation = json!({ "role": "member", "team": cup.teams["A"].id, "note": "Ada" });
-    let created = cup
-        .site
-        .post("/api/v1/invitations", Some(ADMIN), &invitation)
-        .await
-        .json(201);
-    let join = json!({ "code": created["code"], "name": "Ada" });
-    let joined = cup
-        .site
-        .post("/api/v1/invitations/accept", None, &join)
-        .await
-        .json(201);
-    let ada = string(&joined["secret"]);
+    let ada = member(&cup.site, &cup.teams["A"].id, "Ada").await.token;
     cup.start_round().await;
     let unconfirmed = json!({ "reason": "exams" });
     cup.site

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     browser::Browser,
-    html::{page, rows, texts},
+    html::{links, page, rows, texts},
     site::{ADMIN, Answer, Site, string},
 };
 use faceoff_store::Game;
@@ -25,21 +25,12 @@ fn path(cup: &Cup) -> String {
     cup.path.replace("/api/v1", "")
 }
 
-/// The target of each link that the selector finds.
-fn links(html: &Html, selector: &str) -> Vec<String> {
-    html.select(&Selector::parse(selector).unwrap())
-        .map(|link| link.attr("href").unwrap().to_owned())
-        .collect()
-}
-
 /// Opens a page as a visitor who has chosen to hide results.
 async fn open_without_results(site: &Site, path: &str) -> Answer {
     let mut browser = Browser::new(site);
     browser.cookie = Some("spoilers=hidden".to_owned());
     let answer = browser.open(path).await;
-    assert_eq!(answer.status, 200, "{}", answer.body);
-    let html = Html::parse_document(&answer.body);
-    assert!(html.errors.is_empty(), "{:?}\n{}", html.errors, answer.body);
+    answer.html(200);
     answer
 }
 
@@ -279,7 +270,7 @@ async fn hidden_results_are_on_no_page_until_requested() {
         with_results.contains("7913") && with_results.contains("Champion"),
         "the page shows results without the setting"
     );
-    let teams = Html::parse_document(&open_without_results(&cup.site, &pages[0]).await.body);
+    let teams = open_without_results(&cup.site, &pages[0]).await.html(200);
     let team_names = texts(&teams, ".cross th[scope=row]");
     assert_eq!(
         team_names,
@@ -287,7 +278,7 @@ async fn hidden_results_are_on_no_page_until_requested() {
         "sorted by name, not by rank"
     );
 
-    let html = Html::parse_document(&open_without_results(&cup.site, &game).await.body);
+    let html = open_without_results(&cup.site, &game).await.html(200);
     let with_result = format!("{game}?show=result");
     assert!(links(&html, "#result ~ p a").contains(&with_result));
     let body = open_without_results(&cup.site, &with_result).await.body;
@@ -347,7 +338,7 @@ async fn finalists_are_hidden_like_results() {
     assert!(links(&with_results, "main a").contains(&final_game));
     let hidden_page = open_without_results(&cup.site, &path(&cup)).await;
     check_reveals_nothing(&hidden_page.body);
-    let hidden_page = Html::parse_document(&hidden_page.body);
+    let hidden_page = hidden_page.html(200);
     assert!(!links(&hidden_page, "main a").contains(&final_game));
     let rounds = texts(&hidden_page, "[data-live-region=entrants] tbody td");
     assert!(
@@ -357,7 +348,7 @@ async fn finalists_are_hidden_like_results() {
     let with_pairing = format!("{}?show=round-2", path(&cup));
     let with_pairing = open_without_results(&cup.site, &with_pairing).await;
     check_reveals_nothing(&with_pairing.body);
-    assert!(links(&Html::parse_document(&with_pairing.body), "main a").contains(&final_game));
+    assert!(links(&with_pairing.html(200), "main a").contains(&final_game));
 }
 
 #[tokio::test]
@@ -458,7 +449,7 @@ async fn running_game_page_shows_score_and_live_stream() {
     );
 
     let hidden_page = open_without_results(&cup.site, &game_path).await;
-    let hidden_page = Html::parse_document(&hidden_page.body);
+    let hidden_page = hidden_page.html(200);
     assert_eq!(
         stream(&hidden_page),
         None,

@@ -2,7 +2,10 @@
 //! and when they are allowed.
 
 use super::{cup::Cup, fake_slot::GameOutcome};
-use crate::site::{ADMIN, Answer, string};
+use crate::{
+    site::{ADMIN, Answer, string},
+    users::member,
+};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -169,19 +172,7 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
 #[tokio::test]
 async fn team_declines_and_cancels_friendly_games() {
     let cup = cup_with_baseline(&["A", "B"], json!({})).await;
-    let invitation = json!({ "role": "member", "team": cup.teams["B"].id, "note": "Bob" });
-    let created = cup
-        .site
-        .post("/api/v1/invitations", Some(ADMIN), &invitation)
-        .await
-        .json(201);
-    let join = json!({ "code": created["code"], "name": "Bob" });
-    let joined = cup
-        .site
-        .post("/api/v1/invitations/accept", None, &join)
-        .await
-        .json(201);
-    let bob = string(&joined["secret"]);
+    let bob = member(&cup.site, &cup.teams["B"].id, "Bob").await.token;
     let team = format!("/api/v1/teams/{}", cup.teams["B"].id);
     let set_declines = async |declines: bool| {
         let body = json!({ "declines_friendly_games": declines });
