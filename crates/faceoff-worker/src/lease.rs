@@ -83,6 +83,11 @@ impl Progress {
         self.stop.is_cancelled()
     }
 
+    /// Number of finished episodes of a shard, or of finished windows of a game.
+    pub(crate) fn episodes_done(&self) -> u32 {
+        self.episodes_done.load(Ordering::Relaxed)
+    }
+
     /// Reports the number of control steps of a game played so far.
     pub(crate) fn game_stepped(&self, steps: u32) {
         self.episodes_done

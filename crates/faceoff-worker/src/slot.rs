@@ -165,13 +165,20 @@ impl Slot {
         // The drop waits for a renewal in progress: if it shows that the lease is lost, the error is not a platform fault.
         drop(keeper);
         match committed {
-            // This is no fault: the job was released, or another slot has it.
-            Err(error) if progress.stopped() => {
+            // This is no fault: the job was released or cancelled, or another slot has it.
+            Err(error) if progress.stopped() || self.has_lost_lease(job, &progress) => {
                 tracing::info!(job = %job.lease.job_id, cause = format!("{error:#}"), "stopped");
                 Ok(LeaseStatus::Lost)
             }
             committed => committed,
         }
+    }
+
+    /// Asks the server after an error, which may come from the loss of the lease, before the lease keeper has asked: without it a
+    /// remote worker gets no files of the job.
+    fn has_lost_lease(&self, job: &JobSpec, progress: &Progress) -> bool {
+        let status = self.server.renew(&job.lease, progress.episodes_done());
+        matches!(status, Ok(LeaseStatus::Lost))
     }
 
     /// Records the episodes of a shard in the metrics.

@@ -69,6 +69,21 @@ async fn slots_play_each_shard_once_and_store_the_dataset() {
     running.stop().await;
 }
 
+/// The state of a submission after its validation run.
+async fn checked_state(
+    server: &Server,
+    id: SubmissionId,
+    events: &mut broadcast::Receiver<Change>,
+) -> SubmissionState {
+    loop {
+        let state = server.store.submission(id).await.unwrap().state;
+        if state.is_checked() {
+            return state;
+        }
+        let _ = events.recv().await;
+    }
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn idle_slot_validates_submissions() {
     let server = Server::new().await;
@@ -76,22 +91,18 @@ async fn idle_slot_validates_submissions() {
     let mut events = server.store.events();
     let valid_id = server.upload("Alpha", VALID_ARCHIVE).await.id;
     let invalid_id = server.upload("Beta", INVALID_ARCHIVE).await.id;
-    let checked_state = async |id, events: &mut tokio::sync::broadcast::Receiver<Change>| loop {
-        let state = server.store.submission(id).await.unwrap().state;
-        if state.is_checked() {
-            break state;
-        }
-        let _ = events.recv().await;
-    };
     assert_eq!(
-        checked_state(valid_id, &mut events).await,
+        checked_state(&server, valid_id, &mut events).await,
         SubmissionState::Valid
     );
     let log = server.store.submission_log(valid_id).await.unwrap();
     assert_eq!(log.as_deref(), Some("validated\n"));
     let reason = "agent.toml is missing".to_owned();
     let invalid = SubmissionState::Invalid { reason };
-    assert_eq!(checked_state(invalid_id, &mut events).await, invalid);
+    assert_eq!(
+        checked_state(&server, invalid_id, &mut events).await,
+        invalid
+    );
     running.stop().await;
 }
 
@@ -120,6 +131,38 @@ async fn panics_and_platform_faults_are_retried() {
     let running = server.start_slots(1, &evaluator);
     server.wait_for_result(id).await;
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn error_after_a_cancellation_is_no_platform_fault() {
+    let hour = Duration::from_secs(3600);
+    let mut server = Server::new().await;
+    server.intervals.backoff = Backoff {
+        first: hour,
+        longest: hour,
+    };
+    let id = server.start_evaluation().await;
+    let (handle, clock) = (tokio::runtime::Handle::current(), server.clock());
+    let store = server.store.clone();
+    // Ends before the lease keeper has noticed that the lease is lost.
+    let evaluator = Scripted::new(move |_, _| {
+        let cancelled = store.cancel_evaluation(Actor::Organiser, id, "a test", clock.now());
+        handle.block_on(cancelled).unwrap();
+        Err(PlatformFault::Io {
+            action: "fetching the bundle".into(),
+            source: std::io::Error::other("the lease is lost"),
+        })
+    });
+    let running = server.start_slots(1, &evaluator);
+    server.wait_for_end(id).await;
+    let mut events = server.store.events();
+    let upload = server.upload("Beta", VALID_ARCHIVE).await;
+    // The slot does not pause, as it would after a platform fault.
+    assert_eq!(
+        checked_state(&server, upload.id, &mut events).await,
+        SubmissionState::Valid
+    );
     running.stop().await;
 }
 
