@@ -6,7 +6,7 @@ use crate::{
     event::Actor,
     queue::JobClaim,
     store::Store,
-    tables::{bundles, evaluations, retentions, runs},
+    tables::{bundles, retentions, runs},
 };
 use faceoff_types::RunId;
 use jiff::{SignedDuration, Timestamp};
@@ -65,7 +65,7 @@ impl Store {
     pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
         let ended_before = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
-        let dropped = evaluations::dropped_with_datasets(&mut connection, ended_before).await?;
+        let dropped = retentions::dropped_with_datasets(&mut connection, ended_before).await?;
         drop(connection);
         for (id, key) in &dropped {
             self.artifacts().delete_dataset(key).await?;

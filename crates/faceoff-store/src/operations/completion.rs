@@ -10,7 +10,8 @@ use crate::{
     queue,
     tables::{
         ablations,
-        evaluations::{self, EvaluationRun, Failure},
+        evaluation_runs::{self, EvaluationRun},
+        evaluations::{self, Failure},
         runs as run_rows, scorings,
     },
     write::Tx,
@@ -91,7 +92,7 @@ pub(crate) async fn fail_evaluation(
     id: EvaluationId,
     failure: Failure<'_>,
 ) -> Result<()> {
-    let EvaluationRun { run, proposal, .. } = evaluations::run_of(tx, id).await?;
+    let EvaluationRun { run, proposal, .. } = evaluation_runs::run_of(tx, id).await?;
     runs::stop(tx, run).await?;
     let scoring = scorings::job_of(tx, id).await?;
     queue::drop_jobs(tx, scoring.as_slice()).await?;

@@ -12,10 +12,7 @@ use crate::{
     },
     queue::JobClaim,
     store::Store,
-    tables::{
-        evaluations::{self, EvaluationRun},
-        retentions,
-    },
+    tables::{evaluation_runs::EvaluationRun, evaluations, retentions},
 };
 use faceoff_types::EvaluationResult;
 use jiff::Timestamp;

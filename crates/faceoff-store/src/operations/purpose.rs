@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     queue::{Lane, NewJob},
     tables::{
-        evaluations::{self, EvaluationRun},
+        evaluation_runs::{self, EvaluationRun},
         games,
         shards::{self, Shard},
         validation_runs,
@@ -116,7 +116,7 @@ pub(crate) async fn of_job(
         Some(JobKind::Shard) => shards::of_job(connection, job)
             .await?
             .map(|(run, shard)| Purpose::Shard { run, shard }),
-        Some(JobKind::Scoring) => evaluations::of_scoring_job(connection, job)
+        Some(JobKind::Scoring) => evaluation_runs::of_scoring_job(connection, job)
             .await?
             .map(Purpose::Scoring),
         None => None,

@@ -7,7 +7,7 @@ use crate::{
     queue::{self, NewJob},
     tables::{
         ablations, bundles,
-        evaluations::{self, EvaluationRun},
+        evaluation_runs::{self, EvaluationRun},
         runs,
         runs::Run,
         shards::{self, Shard},
@@ -58,14 +58,14 @@ pub(crate) async fn subjects(
     run: RunId,
 ) -> Result<Vec<Subject>> {
     let mut subjects = vec![owner(connection, run).await?.subject()];
-    let proposal = evaluations::proposal_of_run(connection, run).await?;
+    let proposal = evaluation_runs::proposal_of_run(connection, run).await?;
     subjects.extend(proposal.map(Subject::Proposal));
     subjects.dedup();
     Ok(subjects)
 }
 
 pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Result<RunOwner> {
-    if let Some(evaluation) = evaluations::of_run(connection, run).await? {
+    if let Some(evaluation) = evaluation_runs::of_run(connection, run).await? {
         return Ok(evaluation.owner());
     }
     ablations::of_run(connection, run)

@@ -12,7 +12,6 @@ use faceoff_types::{
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
-use uuid::Uuid;
 
 /// An evaluation: a team's run of all tasks on an evaluation day.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,15 +70,6 @@ pub(crate) enum EvaluationPurpose {
     Trial,
     /// It repeats an evaluation of a day, and counts once its proposal is applied.
     Reevaluation,
-}
-
-/// An evaluation as its jobs need it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct EvaluationRun {
-    pub(crate) id: EvaluationId,
-    pub(crate) run: RunId,
-    /// The proposal that it belongs to, while it does not count.
-    pub(crate) proposal: Option<ProposalId>,
 }
 
 /// State of an evaluation, from the queue to its result.
@@ -448,65 +438,6 @@ pub(crate) async fn find_proposed(
         .ok_or(StoreError::NotFound("evaluation"))
 }
 
-/// `SELECT` of evaluations as their jobs need them; the arguments are the condition and its argument.
-macro_rules! select_runs {
-    ($condition:literal, $argument:expr) => {
-        sqlx::query_as!(
-            EvaluationRun,
-            r#"SELECT e.id, e.run_id AS run,
-                      CASE WHEN e.purpose <> 'counting' THEN e.proposal_id END AS "proposal: ProposalId"
-               FROM evaluations e WHERE "# + $condition,
-            $argument
-        )
-    };
-}
-
-/// The evaluation with this id as its jobs need it.
-pub(crate) async fn run_of(
-    connection: &mut SqliteConnection,
-    id: EvaluationId,
-) -> Result<EvaluationRun> {
-    select_runs!("e.id = ?", id)
-        .fetch_optional(connection)
-        .await?
-        .ok_or(StoreError::NotFound("evaluation"))
-}
-
-/// The evaluation that owns a run, if one does.
-pub(crate) async fn of_run(
-    connection: &mut SqliteConnection,
-    run: RunId,
-) -> Result<Option<EvaluationRun>> {
-    let found = select_runs!("e.run_id = ?", run).fetch_optional(connection);
-    Ok(found.await?)
-}
-
-/// The evaluation that a job scores.
-pub(crate) async fn of_scoring_job(
-    connection: &mut SqliteConnection,
-    job: Uuid,
-) -> Result<Option<EvaluationRun>> {
-    let found = select_runs!(
-        "e.id = (SELECT s.evaluation_id FROM scorings s WHERE s.job_id = ?)",
-        Text(job)
-    );
-    Ok(found.fetch_optional(connection).await?)
-}
-
-/// The proposal that the evaluation of a run was made by, whether it is applied or not.
-pub(crate) async fn proposal_of_run(
-    connection: &mut SqliteConnection,
-    run: RunId,
-) -> Result<Option<ProposalId>> {
-    let proposal = sqlx::query_scalar!(
-        "SELECT proposal_id AS proposal FROM evaluations WHERE run_id = ?",
-        run
-    )
-    .fetch_optional(connection)
-    .await?;
-    Ok(proposal.flatten())
-}
-
 /// Number of a team's evaluations on a day that ended by a platform fault.
 pub(crate) async fn count_platform_failed(
     connection: &mut SqliteConnection,
@@ -599,23 +530,6 @@ pub(crate) async fn count_open_proposed(
     )
     .fetch_one(connection)
     .await?)
-}
-
-/// Evaluations of proposals that were dropped until `dropped_until` and whose datasets are still stored, with the keys of
-/// these datasets.
-pub(crate) async fn dropped_with_datasets(
-    connection: &mut SqliteConnection,
-    dropped_until: Timestamp,
-) -> Result<Vec<(EvaluationId, String)>> {
-    let rows = sqlx::query!(
-        r#"SELECT e.id, e.dataset AS "dataset!"
-           FROM proposals p CROSS JOIN evaluations e ON e.proposal_id = p.id
-           WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND e.dataset IS NOT NULL AND e.dataset_removed_at IS NULL"#,
-        Instant(dropped_until)
-    )
-    .fetch_all(connection)
-    .await?;
-    Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
 }
 
 /// Number of open evaluations that count, of one day or of all days.

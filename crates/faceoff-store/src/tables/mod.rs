@@ -13,6 +13,7 @@ pub(crate) mod divisions;
 pub(crate) mod entrants;
 pub(crate) mod entries;
 pub(crate) mod episode_summaries;
+pub(crate) mod evaluation_runs;
 pub(crate) mod evaluations;
 pub(crate) mod events;
 pub(crate) mod freezes;

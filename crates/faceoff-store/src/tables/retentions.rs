@@ -212,6 +212,23 @@ pub(crate) async fn deletable_datasets(
     Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
 }
 
+/// Evaluations of proposals that were dropped until `dropped_until` and whose datasets are still stored, with the keys of
+/// these datasets.
+pub(crate) async fn dropped_with_datasets(
+    connection: &mut SqliteConnection,
+    dropped_until: Timestamp,
+) -> Result<Vec<(EvaluationId, String)>> {
+    let rows = sqlx::query!(
+        r#"SELECT e.id, e.dataset AS "dataset!"
+           FROM proposals p CROSS JOIN evaluations e ON e.proposal_id = p.id
+           WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND e.dataset IS NOT NULL AND e.dataset_removed_at IS NULL"#,
+        Instant(dropped_until)
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(|row| (row.id, row.dataset)).collect())
+}
+
 /// Records that the dataset of a dropped proposal's evaluation was removed with its file.
 pub(crate) async fn set_dropped_dataset_deleted(
     connection: &mut SqliteConnection,
