@@ -110,8 +110,11 @@ fn late_answer_counts_without_host_interference() {
         seconds(&steps, "computation_time_ns"),
         seconds(&steps, "host_time_ns"),
     );
-    assert!((counted[1] - host[1]).abs() < 1e-6, "{counted:?} {host:?}");
-    assert!(counted[1] + host[1] >= 0.15, "{counted:?} {host:?}");
+    let (counted_s, host_s) = (counted[1], host[1]);
+    assert!(host_s >= 0.075, "half of at least 150 ms: {host_s}");
+    // The other half counts, with the CPU time that the agent used after the answer before.
+    let early_cpu_s = counted_s - host_s;
+    assert!((-1e-9..0.05).contains(&early_cpu_s), "{counted_s} {host_s}");
     assert_eq!(
         report.outcomes[0].computation_time.max_s,
         counted.iter().copied().fold(0.0, f64::max)
