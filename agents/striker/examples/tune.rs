@@ -11,8 +11,9 @@
 use std::time::Instant;
 
 use anyhow::{Context, bail};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, EpisodeState, Interpolation, PerturbationSettings, Plant, env_info};
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Profile, Seed};
 use striker::{Agent, Policy};
 
 #[path = "../tests/support/env.rs"]
@@ -59,7 +60,7 @@ fn main() -> anyhow::Result<()> {
             .map_or(default, String::as_str)
             .to_owned()
     };
-    let tasks: Vec<Task> = argument(0, "hit,defend,prepare")
+    let tasks: Vec<AirHockeyTask> = argument(0, "hit,defend,prepare")
         .split(',')
         .map(str::parse)
         .collect::<Result<_, _>>()?;
@@ -180,7 +181,7 @@ fn speed_share(state: &EpisodeState) -> f64 {
 }
 
 fn speed_shares(state: &EpisodeState) -> Vec<f64> {
-    let limits = env_info(Task::Defend).joint_vel_limit[1];
+    let limits = env_info(AirHockeyTask::Defend).joint_vel_limit[1];
     state
         .dq_filtered
         .iter()
@@ -206,9 +207,9 @@ fn print_step(agent: &Agent, episode: &Episode, state: &EpisodeState) {
     );
 }
 
-fn new_agent(task: Task) -> anyhow::Result<Agent> {
+fn new_agent(task: AirHockeyTask) -> anyhow::Result<Agent> {
     Ok(Agent::new(
-        serde_json::from_str(&format!("{:?}", task.as_str()))?,
+        serde_json::from_str(&format!("{:?}", task.name().as_str()))?,
         &env(1, 0),
     ))
 }

@@ -1,10 +1,33 @@
-//! The Robot Air Hockey Challenge as a competition of the platform: its tasks and its violations.
+//! The Robot Air Hockey Challenge as a competition of the platform: its tasks, how their episodes end, and its violations.
 
 use faceoff_scoring::{
     COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, EE_POINTS, JOINT_POS_POINTS,
     JOINT_VEL_POINTS, LINK_POINTS,
 };
-use faceoff_types::{Competition, EPISODE_STEPS, Task, TaskInfo, TaskWeights, ViolationInfo};
+use faceoff_sim::AirHockeyTask;
+pub use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
+use faceoff_types::{
+    Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths, Task, TaskInfo, ViolationInfo,
+    ViolationName,
+};
+
+/// Score a goal.
+pub const HIT: Task = AirHockeyTask::Hit.name();
+/// Stop an incoming puck.
+pub const DEFEND: Task = AirHockeyTask::Defend.name();
+/// Move a puck to a good hitting position.
+pub const PREPARE: Task = AirHockeyTask::Prepare.name();
+/// The tasks in the order of boards.
+pub const TASKS: [Task; 3] = [HIT, DEFEND, PREPARE];
+
+/// End-effector position: over the table and at its height.
+pub const EE: ViolationName = ViolationName::new("ee");
+/// Height of elbow (link 4) and wrist (link 7).
+pub const LINK: ViolationName = ViolationName::new("link");
+/// Joint positions within 95 % of their limits.
+pub const JOINT_POS: ViolationName = ViolationName::new("joint_pos");
+/// Filtered joint velocities within 95 % of their limits.
+pub const JOINT_VEL: ViolationName = ViolationName::new("joint_vel");
 
 /// The description that boards, tables, forms and files are made from.
 #[must_use]
@@ -14,69 +37,90 @@ pub fn competition() -> Competition {
         title: "Robot Air Hockey Challenge".to_owned(),
         tasks: vec![
             task(
-                Task::Hit,
+                HIT,
                 "Hit",
+                400_000,
                 "Score a goal against an opponent that moves in a fixed pattern.",
             ),
             task(
-                Task::Defend,
+                DEFEND,
                 "Defend",
+                400_000,
                 "Stop an incoming puck on the agent’s side of the table.",
             ),
             task(
-                Task::Prepare,
+                PREPARE,
                 "Prepare",
+                200_000,
                 "Move a puck from the rim to a good hitting position.",
             ),
         ],
+        ends: [
+            (EpisodeEnd::HORIZON, "time limit reached"),
+            (LEFT_TABLE, "puck left the table"),
+            (CROSSED_MIDDLE, "puck crossed the middle"),
+            (STOPPED, "puck stopped"),
+            (REACHED_AXIS, "puck reached the long axis"),
+            (EpisodeEnd::AGENT_FAULT, "agent fault"),
+        ]
+        .map(|(end, title)| EndInfo {
+            end,
+            title: title.to_owned(),
+        })
+        .into(),
         violations: vec![
             violation(
-                "ee",
-                "end effector",
-                "end effector out of bounds",
+                EE,
+                ["end effector", "end effector out of bounds", "ee"],
                 EE_POINTS,
             ),
             violation(
-                "link",
-                "elbow, wrist",
-                "elbow or wrist too low",
+                LINK,
+                ["elbow, wrist", "elbow or wrist too low", "link"],
                 LINK_POINTS,
             ),
             violation(
-                "joint_pos",
-                "joint position",
-                "joint position",
+                JOINT_POS,
+                ["joint position", "joint position", "pos"],
                 JOINT_POS_POINTS,
             ),
             violation(
-                "joint_vel",
-                "joint velocity",
-                "joint velocity",
+                JOINT_VEL,
+                ["joint velocity", "joint velocity", "vel"],
                 JOINT_VEL_POINTS,
             ),
             ViolationInfo {
+                breach: "late answers".to_owned(),
                 points: [COMPUTATION_TIME_MIN_POINTS, COMPUTATION_TIME_MAX_POINTS],
-                ..violation("computation_time", "answer time", "late answers", 0.0)
+                ..violation(
+                    ViolationName::COMPUTATION_TIME,
+                    ["answer time", "answer time", "time"],
+                    0.0,
+                )
             },
         ],
     }
 }
 
-fn task(task: Task, title: &str, aim: &str) -> TaskInfo {
+/// `weight` in millionths.
+fn task(task: Task, title: &str, weight: u32, aim: &str) -> TaskInfo {
     TaskInfo {
         task,
         title: title.to_owned(),
         aim: aim.to_owned(),
-        weight: TaskWeights::default().weight(task),
+        weight: Millionths::new(weight),
         max_steps: EPISODE_STEPS,
     }
 }
 
-fn violation(name: &str, title: &str, breach: &str, points: f64) -> ViolationInfo {
+/// The texts are title, breach and short heading; the heading of columns is the breach.
+fn violation(name: ViolationName, [title, breach, short]: [&str; 3], points: f64) -> ViolationInfo {
     ViolationInfo {
-        name: name.to_owned(),
+        name,
         title: title.to_owned(),
+        column: breach.to_owned(),
         breach: breach.to_owned(),
+        short: short.to_owned(),
         points: [points, points],
     }
 }
@@ -127,6 +171,6 @@ mod tests {
     #[test]
     fn tasks_are_in_the_order_of_results() {
         let tasks: Vec<Task> = competition().task_names().collect();
-        assert_eq!(tasks, Task::ALL);
+        assert_eq!(tasks, TASKS);
     }
 }

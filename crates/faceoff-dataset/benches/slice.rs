@@ -3,11 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark may panic")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use faceoff_airhockey::{PREPARE, TASKS};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{AirHockeyStep, AnswerTiming, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Task, Violations,
+    ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Violations,
 };
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use std::{hint::black_box, path::Path};
@@ -31,7 +32,14 @@ fn record(spec: &ShardSpec, out: &Path) {
     for episode in spec.episodes.clone() {
         let seed = spec.seed.episode(spec.task, episode);
         let (cubic, factors) = (Interpolation::Cubic, spec.profile.factors());
-        let simulation = Episode::new(spec.task, cubic, factors, &settings, &plant, seed);
+        let simulation = Episode::new(
+            spec.task.try_into().unwrap(),
+            cubic,
+            factors,
+            &settings,
+            &plant,
+            seed,
+        );
         let (mut state, mut observation) = (simulation.state(), simulation.observation().to_vec());
         recorder.begin(EpisodeStart {
             episode,
@@ -69,7 +77,7 @@ fn record(spec: &ShardSpec, out: &Path) {
             task: spec.task,
             episode,
             steps: STEPS,
-            end: EpisodeEnd::Horizon,
+            end: EpisodeEnd::HORIZON,
             success: false,
             violations: Violations::default(),
             computation_time: ComputationTime::default(),
@@ -92,7 +100,7 @@ fn slice(criterion: &mut Criterion) {
     let dir = tempfile::tempdir().unwrap();
     let seed = Seed::from_number(1);
     let mut shards = Vec::new();
-    for task in Task::ALL {
+    for task in TASKS {
         for start in (0..EPISODES).step_by(EPISODES_PER_SHARD as usize) {
             let spec = ShardSpec {
                 ruleset: Ruleset::CURRENT,
@@ -117,6 +125,7 @@ fn slice(criterion: &mut Criterion) {
         agent: "noise".to_owned(),
         ruleset: Ruleset::CURRENT,
         variation: Default::default(),
+        task_weights: faceoff_airhockey::competition().weights(&Default::default()),
     };
     let archive = dir.path().join("dataset.zip");
     let megabytes = assemble(&meta, &shards, &archive, None)
@@ -126,7 +135,7 @@ fn slice(criterion: &mut Criterion) {
         / 1_000_000;
     let read = |columns: Option<&[String]>| {
         let dataset = Dataset::open_lazily(&archive).unwrap();
-        dataset.episode(Task::Prepare, 777, columns).unwrap()
+        dataset.episode(PREPARE, 777, columns).unwrap()
     };
     let mut group = criterion.benchmark_group(format!("an episode of {megabytes} MB"));
     group.bench_function("all columns", |bencher| {

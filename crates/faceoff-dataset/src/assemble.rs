@@ -15,14 +15,13 @@ use crate::{
     simulator::simulator_id,
     table::{ShardTable, join},
 };
-use faceoff_types::{EvaluationResult, Task};
+use faceoff_types::{EvaluationResult, Task, TaskMap};
 use faceoff_wire::{
     dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration},
     job::EvaluationMeta,
 };
 use fs_err as fs;
 use std::{
-    collections::BTreeMap,
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
@@ -59,13 +58,15 @@ pub fn assemble(
         .iter()
         .map(|dir| ShardRecording::open(dir))
         .collect::<Result<Vec<_>, _>>()?;
-    shards.sort_by_key(|shard| (shard.spec.task, shard.spec.episodes.start));
+    let order = |task: Task| meta.task_weights.tasks().position(|other| other == task);
+    shards.sort_by_key(|shard| (order(shard.spec.task), shard.spec.episodes.start));
     let episodes = check_shards(meta, &shards)?;
     let calibration = calibration(&shards);
     let scored = score(
         meta.ruleset,
         meta.profile,
         &meta.variation,
+        &meta.task_weights,
         meta.seed,
         Layout::Four,
         tally_tasks(&shards)?,
@@ -116,7 +117,7 @@ fn join_clips(shards: &[ShardRecording], path: &Path) -> Result<bool, RecordingE
 fn write_archive(
     meta: &EvaluationMeta,
     shards: &[ShardRecording],
-    episodes: BTreeMap<Task, u32>,
+    episodes: TaskMap<u32>,
     ScoredEvaluation { result, violations }: &ScoredEvaluation,
     calibration: &CalibrationFile,
     path: &Path,
@@ -160,9 +161,9 @@ fn write_archive(
 fn check_shards(
     meta: &EvaluationMeta,
     shards: &[ShardRecording],
-) -> Result<BTreeMap<Task, u32>, RecordingError> {
+) -> Result<TaskMap<u32>, RecordingError> {
     let unusable = |problem: String| Err(RecordingError::Unusable(problem));
-    let mut episodes = BTreeMap::new();
+    let mut episodes = TaskMap::new();
     for ShardRecording { spec, report, .. } in shards {
         let name = format!(
             "{} {}..{}",
@@ -228,15 +229,15 @@ fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
 }
 
 /// The numbers for the score of each task, from the outcomes and steps of all shards, which are in order.
-fn tally_tasks(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingError> {
-    let mut steps: BTreeMap<Task, u64> = BTreeMap::new();
+fn tally_tasks(shards: &[ShardRecording]) -> Result<TaskMap<Tally>, RecordingError> {
+    let mut steps: TaskMap<u64> = TaskMap::new();
     for ShardRecording { spec, report, .. } in shards {
         let outcomes = report.outcomes.iter();
         *steps.entry(spec.task).or_default() += outcomes
             .map(|outcome| u64::from(outcome.steps))
             .sum::<u64>();
     }
-    let mut tallies: BTreeMap<Task, Tally> = steps
+    let mut tallies: TaskMap<Tally> = steps
         .iter()
         .map(|(task, steps)| (*task, Tally::new(*steps, Layout::Four)))
         .collect();

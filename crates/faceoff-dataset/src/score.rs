@@ -15,7 +15,7 @@ use faceoff_episode::AnswerTiming;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed,
-    SlotTiming, Task, Variation,
+    SlotTiming, TaskMap, TaskWeights, Variation,
 };
 use faceoff_wire::dataset::{
     ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
@@ -189,15 +189,16 @@ pub(crate) fn score(
     ruleset: Ruleset,
     profile: Profile,
     variation: &Variation,
+    weights: &TaskWeights,
     seed: Seed,
     layout: Layout,
-    tallies: BTreeMap<Task, Tally>,
+    tallies: TaskMap<Tally>,
     timing: Option<SlotTiming>,
 ) -> ScoredEvaluation {
-    let mut tasks = BTreeMap::new();
+    let mut tasks = TaskMap::new();
     let mut violations = ViolationsFile {
         schema: layout.schema().to_owned(),
-        tasks: BTreeMap::new(),
+        tasks: TaskMap::new(),
     };
     for (task, tally) in tallies {
         let times = tally.times.finish();
@@ -221,7 +222,8 @@ pub(crate) fn score(
             },
         );
     }
-    let mut result = faceoff_scoring::score_evaluation(ruleset, profile, seed, variation, tasks);
+    let mut result =
+        faceoff_scoring::score_evaluation(ruleset, profile, seed, variation, weights, tasks);
     result.timing = timing;
     ScoredEvaluation { result, violations }
 }
@@ -241,7 +243,7 @@ fn slow_episode(
     // The scoring crate defines the rule: the points are the difference to an agent that answers instantly.
     let instant = EpisodeOutcome {
         computation_time: ComputationTime::default(),
-        end: EpisodeEnd::Horizon,
+        end: EpisodeEnd::HORIZON,
         fault: None,
         ..outcome.clone()
     };

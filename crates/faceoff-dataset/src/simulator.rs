@@ -1,7 +1,8 @@
 //! Identity of the simulator: a dataset can only be verified with the simulator that made it.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, EpisodeState, Interpolation, JOINTS, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Profile, Seed};
 use faceoff_wire::dataset::SimulatorId;
 use std::sync::OnceLock;
 
@@ -30,7 +31,7 @@ fn fingerprint() -> String {
     let seed = Seed::from_number(0);
     let settings = PerturbationSettings::default();
     let plant = Plant::mismatched(&settings, seed.model_mismatch());
-    for task in Task::ALL {
+    for task in AirHockeyTask::ALL {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,

@@ -22,19 +22,21 @@ pub use shard::verify_shard;
 use crate::{
     dataset::Dataset,
     error::DatasetError,
-    files::{CALIBRATION_FILE, RESULTS_FILE, VIOLATIONS_FILE},
+    files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, VIOLATIONS_FILE},
     score::{ScoredEvaluation, Tally, json_file, score},
     simulator::simulator_id,
 };
 use episode_reader::{EpisodeReader, RecordedEpisode};
 use faceoff_episode::Arena;
-use faceoff_types::{EvaluationResult, Ruleset, Task, UnknownRuleset};
+use faceoff_types::{
+    Competition, EvaluationResult, Ruleset, Task, TaskMap, TaskWeights, UnknownRuleset,
+};
 use rayon::{
     ThreadPoolBuilder,
     iter::{IntoParallelRefIterator, ParallelIterator},
 };
 use replay::{ReplayedEpisode, Replayer};
-use std::{collections::BTreeMap, num::NonZero};
+use std::num::NonZero;
 
 /// Episodes per thread that are read while others are simulated.
 const READ_AHEAD_PER_THREAD: usize = 8;
@@ -57,13 +59,17 @@ pub struct VerifiedDataset {
 /// cannot be verified.
 pub fn verify(
     dataset: &Dataset,
+    competition: &Competition,
     workers: NonZero<usize>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<VerifiedDataset, VerifyError> {
     let ruleset = check_reproducible(dataset)?;
-    let mut reader = EpisodeReader::open(dataset)?;
-    let mut totals = Totals::new(dataset, reader.steps_of_tasks());
     let manifest = dataset.manifest();
+    let tasks = competition
+        .played_tasks(&manifest.episodes)
+        .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
+    let mut reader = EpisodeReader::open(dataset, tasks.clone())?;
+    let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks());
     let arena = Arena::with_ruleset(
         ruleset,
         manifest.profile,
@@ -101,7 +107,11 @@ pub fn verify(
         }
         batch.result
     })?;
-    totals.finish(ruleset, dataset)
+    totals.finish(
+        ruleset,
+        dataset,
+        &competition.weights(&dataset.manifest().variation),
+    )
 }
 
 /// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
@@ -134,11 +144,11 @@ struct Totals {
     episodes: u32,
     steps: u64,
     host_noise_reruns: u32,
-    tallies: BTreeMap<Task, Tally>,
+    tallies: TaskMap<Tally>,
 }
 
 impl Totals {
-    fn new(dataset: &Dataset, steps: BTreeMap<Task, u64>) -> Self {
+    fn new(dataset: &Dataset, tasks: &[Task], steps: &TaskMap<u64>) -> Self {
         let tally = |task: &Task| {
             let steps = steps.get(task).copied().unwrap_or_default();
             (*task, Tally::new(steps, dataset.layout()))
@@ -147,7 +157,7 @@ impl Totals {
             episodes: 0,
             steps: 0,
             host_noise_reruns: 0,
-            tallies: dataset.manifest().episodes.keys().map(tally).collect(),
+            tallies: tasks.iter().map(tally).collect(),
         }
     }
 
@@ -163,7 +173,12 @@ impl Totals {
         }
     }
 
-    fn finish(self, ruleset: Ruleset, dataset: &Dataset) -> Result<VerifiedDataset, VerifyError> {
+    fn finish(
+        self,
+        ruleset: Ruleset,
+        dataset: &Dataset,
+        weights: &TaskWeights,
+    ) -> Result<VerifiedDataset, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();
         let recorded_reruns = timing.map_or(0, |timing| timing.host_noise_reruns);
@@ -185,6 +200,7 @@ impl Totals {
             ruleset,
             profile,
             &manifest.variation,
+            weights,
             seed,
             dataset.layout(),
             self.tallies,

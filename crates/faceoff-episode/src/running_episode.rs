@@ -6,7 +6,7 @@ use crate::{
     world::{Environment, World},
 };
 use faceoff_types::{
-    AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Phase, Task,
+    AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Phase, Task, UnknownTask,
 };
 
 /// A running episode. It provides the observations for the agent, takes its answers and computes their effects. The caller
@@ -15,9 +15,10 @@ use faceoff_types::{
 /// ```
 /// # use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, NullSink};
 /// # use faceoff_types::{Interpolation, Phase, Profile, Seed, Task};
+/// # let hit = Task::new("hit");
 /// # let seed = Seed::from_number(1);
 /// let arena = Arena::new(Profile::Ideal, seed, seed.model_mismatch());
-/// let mut running = RunningEpisode::begin(&arena, Task::Hit, 0, Some(Interpolation::Linear), NullSink);
+/// let mut running = RunningEpisode::begin(&arena, hit, 0, Some(Interpolation::Linear), NullSink)?;
 /// let outcome = loop {
 ///     let joint_positions = running.question()?.observation[6..13].to_vec();
 ///     let timing = AnswerTiming {
@@ -32,7 +33,7 @@ use faceoff_types::{
 ///     }
 /// };
 /// assert!(outcome.steps <= 500);
-/// # Ok::<(), faceoff_episode::NonFiniteObservation>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// The sink receives the start of the episode and each step. The caller reports the end to the sink, unless the try does not count
@@ -73,21 +74,24 @@ pub struct NonFiniteObservation {
 impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
     /// Starts an episode. `choice` is `None` if the agent failed before it stated one; then only its fault can follow. The
     /// initial state, which is the same for all agents, is recorded nevertheless.
+    ///
+    /// # Errors
+    /// If the environment has no such task.
     pub fn begin(
         environment: &impl Environment<World = W>,
         task: Task,
         episode: u32,
         choice: Option<W::Choice>,
         mut sink: S,
-    ) -> Self {
-        let world = environment.reset(task, episode, choice);
+    ) -> Result<Self, UnknownTask> {
+        let world = environment.reset(task, episode, choice)?;
         sink.begin(EpisodeStart {
             episode,
             seed: environment.seed(task, episode),
             choice,
             state: world.start(),
         });
-        Self {
+        Ok(Self {
             task,
             episode,
             max_steps: environment.max_steps(task),
@@ -96,7 +100,7 @@ impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
             end: None,
             diverged: None,
             sink,
-        }
+        })
     }
 
     /// Ends the episode after `max_steps` control steps, if that is before the task's horizon.
@@ -152,12 +156,12 @@ impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
             None => None,
         };
         if let Some(detail) = detail {
-            self.end = Some(EpisodeEnd::AgentFault);
+            self.end = Some(EpisodeEnd::AGENT_FAULT);
             let fault = AgentFaultKind::Diverged { detail };
             self.diverged = Some(fault.clone());
             return Err(fault);
         }
-        let horizon = (self.steps() >= self.max_steps).then_some(EpisodeEnd::Horizon);
+        let horizon = (self.steps() >= self.max_steps).then_some(EpisodeEnd::HORIZON);
         self.end = end.or(horizon);
         Ok(self.end.map(|end| self.outcome(end, None)))
     }
@@ -176,7 +180,7 @@ impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
             step: (phase == Phase::Step).then(|| self.faulty_step()),
             line,
         };
-        self.outcome(EpisodeEnd::AgentFault, Some(fault))
+        self.outcome(EpisodeEnd::AGENT_FAULT, Some(fault))
     }
 
     /// The outcome after a fault from another source, such as a recording. `None` if it cannot be a fault of this episode
@@ -200,7 +204,7 @@ impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
             None => self.end.is_none() && !matches!(fault.fault, AgentFaultKind::Diverged { .. }),
         };
         let is_possible = agrees && agent_task == AgentTask::Qualifying(self.task) && is_consistent;
-        is_possible.then(|| self.outcome(EpisodeEnd::AgentFault, Some(fault)))
+        is_possible.then(|| self.outcome(EpisodeEnd::AGENT_FAULT, Some(fault)))
     }
 
     /// The step of a fault: the one that waits for its answer, or the one whose action made the world diverge.

@@ -1,6 +1,6 @@
 //! The traits of simulated worlds. An episode is played against them, so that it is the same for every competition.
 
-use faceoff_types::{EpisodeEnd, Seed, Task, Violations};
+use faceoff_types::{EpisodeEnd, Seed, Task, UnknownTask, Violations};
 
 /// A simulated world in which an agent attempts a task, control step by control step. The same seed and actions give the same
 /// bits.
@@ -45,10 +45,13 @@ pub trait Environment {
     /// Control steps of the longest episode of a task.
     fn max_steps(&self, task: Task) -> u32;
     /// The world of an episode at its start. `choice` is `None` if the agent failed before it stated one; then no step follows.
+    ///
+    /// # Errors
+    /// If the environment has no such task.
     fn reset(
         &self,
         task: Task,
         index: u32,
         choice: Option<<Self::World as World>::Choice>,
-    ) -> Self::World;
+    ) -> Result<Self::World, UnknownTask>;
 }

@@ -83,7 +83,7 @@ struct JobLabels {
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct TaskLabels {
-    task: &'static str,
+    task: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -175,7 +175,7 @@ impl SlotMetrics {
     pub fn record_episodes(&self, slot: &str, outcomes: &[EpisodeOutcome], timing: &SlotTiming) {
         for outcome in outcomes {
             let labels = TaskLabels {
-                task: outcome.task.as_str(),
+                task: outcome.task.to_string(),
             };
             self.episodes.get_or_create(&labels).inc();
             let faults = self.faults.get_or_create_owned(&labels);

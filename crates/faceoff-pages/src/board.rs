@@ -120,6 +120,8 @@ struct TaskPage {
     conditions: Option<String>,
     comparison_day: Option<jiff::civil::Date>,
     has_ties: bool,
+    /// Headings of the columns of violations.
+    violation_columns: Vec<String>,
     groups: Vec<Group<TaskRow>>,
     baselines: Vec<Baseline>,
 }
@@ -164,7 +166,12 @@ pub(super) async fn by_task(
         conditions: common_conditions(&board.rows),
         comparison_day: timeline.previous_board.as_ref().map(|earlier| earlier.day),
         has_ties: context.has_ties(),
-        groups: context.groups(|row| TaskRow::new(row, &row.tasks[&task], &context)),
+        violation_columns: competition
+            .violations
+            .iter()
+            .map(|info| info.column.clone())
+            .collect(),
+        groups: context.groups(|row| TaskRow::new(row, &row.tasks[&task], &context, &competition)),
         baselines: baselines::rows(&board),
         sort,
     })

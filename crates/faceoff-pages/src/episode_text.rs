@@ -1,18 +1,6 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
 use faceoff_replay::{Group, ViolationSummary};
-use faceoff_types::EpisodeEnd;
-
-pub(super) const fn end_label(end: EpisodeEnd) -> &'static str {
-    match end {
-        EpisodeEnd::Horizon => "time limit reached",
-        EpisodeEnd::LeftTable => "puck left the table",
-        EpisodeEnd::CrossedMiddle => "puck crossed the middle",
-        EpisodeEnd::Stopped => "puck stopped",
-        EpisodeEnd::ReachedAxis => "puck reached the long axis",
-        EpisodeEnd::AgentFault => "agent fault",
-    }
-}
 
 pub(super) const fn group_label(group: Group) -> &'static str {
     match group {

@@ -6,7 +6,6 @@ mod rows;
 
 use super::{
     assets,
-    episode_text::end_label,
     frame::{Frame, PageProblem, render},
     table_drawing::TableOutline,
 };
@@ -21,7 +20,7 @@ use faceoff_service::{
     viewer::Viewer,
     views::{clips::Clips, visibility::Visibility},
 };
-use faceoff_types::{EpisodeEnd, EvaluationId, Task};
+use faceoff_types::{EvaluationId, Task};
 use jiff::civil::Date;
 use maps::{StartMap, ViolationMap};
 use rows::Row;
@@ -31,8 +30,8 @@ const ROWS_PER_PAGE: usize = 100;
 
 /// An option of a select box.
 struct SelectOption {
-    value: &'static str,
-    label: &'static str,
+    value: String,
+    label: String,
     is_selected: bool,
 }
 
@@ -76,11 +75,22 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
     let QueryParams(query) = query?;
-    let chosen = query.filter().map_err(|field| {
+    let invalid = |field| {
         let detail =
             format!("unknown value of {field:?}; use the filter on the page of the episodes");
         Problem::new(ProblemKind::InvalidRequest, detail)
-    })?;
+    };
+    let chosen = query.filter().map_err(invalid)?;
+    if let Some(task) = chosen.task {
+        let found = app.config.competition.find_task(task.as_str());
+        found.map_err(|_| invalid("task"))?;
+    }
+    let ends = &app.config.competition.ends;
+    if let Some(end) = chosen.end
+        && !ends.iter().any(|info| info.end == end)
+    {
+        return Err(invalid("end").into());
+    }
     let visibility = Visibility::load(&app, viewer?).await?;
     let clips = Clips::find(&app, &visibility, id).await?;
     let view = clips.episodes().await?;
@@ -114,9 +124,9 @@ pub(super) async fn page(
         let address = with_query(&format!("/evaluations/{id}/episodes"), &query);
         format!("{address}#table")
     };
-    let option = |selected: &str, value: &'static str, label: &'static str| SelectOption {
-        value,
-        label,
+    let option = |selected: &str, value: &str, label: &str| SelectOption {
+        value: value.to_owned(),
+        label: label.to_owned(),
         is_selected: selected == value,
     };
     let is_played = |task: &Task| view.episodes.iter().any(|line| line.task == *task);
@@ -131,14 +141,6 @@ pub(super) async fn page(
     let late = clips
         .can_see_observations
         .then_some(("late", "a late answer"));
-    let ends = [
-        EpisodeEnd::Horizon,
-        EpisodeEnd::LeftTable,
-        EpisodeEnd::CrossedMiddle,
-        EpisodeEnd::Stopped,
-        EpisodeEnd::ReachedAxis,
-        EpisodeEnd::AgentFault,
-    ];
     render(&Page {
         frame: Frame::load(&app, "").await?,
         style: assets::EPISODES_STYLE.url(),
@@ -167,8 +169,9 @@ pub(super) async fn page(
             .map(|(value, label)| option(&query.violated, value, label))
             .collect(),
         ends: ends
-            .map(|end| option(&query.end, end.as_str(), end_label(end)))
-            .into(),
+            .iter()
+            .map(|info| option(&query.end, info.end.as_str(), &info.title))
+            .collect(),
         table: TableOutline::new(),
         start_maps: tasks
             .filter_map(|task| StartMap::new(task, &matching))

@@ -17,10 +17,7 @@ use faceoff_api::views::{
     ruling::RulingView,
     task::TaskView,
 };
-use faceoff_scoring::{
-    EE_POINTS, EpisodeSummary, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
-    TIER_CHANGE_RESAMPLES,
-};
+use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
 use faceoff_service::{
     app::App,
     extract::PathParam,
@@ -29,12 +26,12 @@ use faceoff_service::{
     views::{ablation, clips::Clips, evaluation, submission, visibility::Visibility},
 };
 use faceoff_types::{
-    EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, Tier, ViolationCounts,
+    Competition, EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, TaskMap,
+    Tier, ViolationCounts, ViolationInfo,
 };
 use figures::{Rate, utc_minute};
 use jiff::{Timestamp, civil};
 use slow_answers::SlowAnswers;
-use std::collections::BTreeMap;
 
 /// Formatted results of a task.
 struct TaskFigures {
@@ -54,14 +51,20 @@ struct TaskFigures {
 struct TaskDetails {
     steps: u64,
     /// End effector, elbow and wrist, joint position, joint velocity, answer time.
-    violations: [ViolationFigures; 5],
+    /// In the order of the competition's kinds.
+    violations: Vec<ViolationFigures>,
     mean_ms: String,
     p99_ms: String,
     max_ms: String,
 }
 
 impl TaskFigures {
-    fn new(task: Task, result: &TaskView, summary: &EpisodeSummary) -> Self {
+    fn new(
+        task: Task,
+        result: &TaskView,
+        summary: &EpisodeSummary,
+        competition: &Competition,
+    ) -> Self {
         Self {
             task,
             rate: Rate::new(result),
@@ -71,7 +74,7 @@ impl TaskFigures {
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
             tier: result.tier,
             tier_change: figures::probability(summary.tier_change_of(Some(task))),
-            details: TaskDetails::new(result),
+            details: TaskDetails::new(result, competition),
         }
     }
 }
@@ -84,38 +87,40 @@ struct ViolationFigures {
 }
 
 impl ViolationFigures {
-    fn by_kind(result: &TaskView, violations: ViolationCounts) -> [Self; 5] {
-        let motion = [
-            (violations.ee, EE_POINTS),
-            (violations.link, LINK_POINTS),
-            (violations.joint_pos, JOINT_POS_POINTS),
-            (violations.joint_vel, JOINT_VEL_POINTS),
-        ];
-        let motion = motion.map(|(count, points)| (count, f64::from(count) * points));
+    /// In the order of the competition's kinds.
+    fn by_kind(
+        result: &TaskView,
+        violations: &ViolationCounts,
+        competition: &Competition,
+    ) -> Vec<Self> {
+        let kinds = competition.violations.iter();
+        let mut kinds: Vec<(&ViolationInfo, u32, f64)> = kinds
+            .map(|info| {
+                let count = violations.get(info.name);
+                (info, count, f64::from(count) * info.points[1])
+            })
+            .collect();
         // The cost of a late answer depends on its time, so the points of late answers are the remainder.
-        let motion_points: f64 = motion.iter().map(|(_, points)| points).sum();
-        let late = (result.penalty_points - motion_points).max(0.0);
-        let [ee, link, joint_pos, joint_vel] = motion;
-        [
-            ee,
-            link,
-            joint_pos,
-            joint_vel,
-            (violations.computation_time, late),
-        ]
-        .map(|(count, points)| Self {
+        let (late, others): (Vec<_>, Vec<_>) =
+            kinds.iter_mut().partition(|(info, ..)| info.has_range());
+        let fixed: f64 = others.iter().map(|(.., points)| *points).sum();
+        for (.., points) in late {
+            *points = (result.penalty_points - fixed).max(0.0);
+        }
+        let figures = kinds.into_iter().map(|(_, count, points)| Self {
             share: figures::count_with_share(count, result.episodes),
             points: (count > 0).then(|| figures::one_decimal(points)),
-        })
+        });
+        figures.collect()
     }
 }
 
 impl TaskDetails {
-    fn new(result: &TaskView) -> Option<Self> {
-        let (violations, time) = (result.violations?, result.computation_time_s?);
+    fn new(result: &TaskView, competition: &Competition) -> Option<Self> {
+        let (violations, time) = (result.violations.as_ref()?, result.computation_time_s?);
         Some(Self {
             steps: result.steps?,
-            violations: ViolationFigures::by_kind(result, violations),
+            violations: ViolationFigures::by_kind(result, violations, competition),
             mean_ms: figures::milliseconds(time.mean),
             p99_ms: figures::milliseconds(time.p99),
             max_ms: figures::milliseconds(time.max),
@@ -196,6 +201,8 @@ impl TimingFigures {
 #[template(path = "evaluation.html")]
 struct Page {
     frame: Frame,
+    /// Heading and points of each kind of violation.
+    violation_heads: Vec<figures::ViolationHead>,
     id: EvaluationId,
     team: String,
     agent: Option<String>,
@@ -246,7 +253,7 @@ pub(super) async fn page(
     let clips = Clips::find(&app, &visibility, id).await.ok();
     let distributions = match &clips {
         Some(clips) => clips.computation_times().await?,
-        None => BTreeMap::new(),
+        None => TaskMap::new(),
     };
     let final_result = match &view.status {
         _ if frozen.is_some() => None,
@@ -266,12 +273,13 @@ pub(super) async fn page(
                 comparable,
                 slow_answers: SlowAnswers::load(&app, &view, result).await?,
                 answer_times: answer_times(result, &distributions),
-                ..FinalResult::new(result, *finished_at, &summary)
+                ..FinalResult::new(result, *finished_at, &summary, &app.config.competition)
             })
         }
         _ => None,
     };
     render(&Page {
+        violation_heads: figures::violation_heads(&app.config.competition),
         frame: Frame::load(&app, "").await?,
         id,
         team: view.team_name.to_string(),
@@ -378,7 +386,7 @@ async fn comparable_evaluations(
 }
 
 /// Number of control steps by answer time.
-type Distributions = BTreeMap<Task, Vec<TimeBinView>>;
+type Distributions = TaskMap<Vec<TimeBinView>>;
 
 /// Answer times of all tasks, if they are public.
 fn answer_times(result: &ResultView, distributions: &Distributions) -> Option<AnswerTimeChart> {
@@ -387,7 +395,7 @@ fn answer_times(result: &ResultView, distributions: &Distributions) -> Option<An
         .filter_map(|(task, result)| {
             let time = result.computation_time_s?;
             Some(TimeSummary {
-                name: task.as_str(),
+                name: task.to_string(),
                 mean: 1e3 * time.mean,
                 p99: 1e3 * time.p99,
                 max: 1e3 * time.max,
@@ -421,9 +429,15 @@ impl FinalResult {
         kinds.any(|kind| kind.points.is_some())
     }
 
-    fn new(result: &ResultView, finished_at: Timestamp, summary: &EpisodeSummary) -> Self {
+    fn new(
+        result: &ResultView,
+        finished_at: Timestamp,
+        summary: &EpisodeSummary,
+        competition: &Competition,
+    ) -> Self {
+        let weights = competition.weights(&result.variation);
         Self {
-            score: Rate::of_score(result.score, &result.tasks, &result.variation.weights),
+            score: Rate::of_score(result.score, &result.tasks, &weights),
             penalty_points: figures::one_decimal(result.penalty_points),
             tier: result.tier,
             tier_bounds: figures::tier_bounds(result.tier, &result.variation.tier_bounds),
@@ -435,7 +449,7 @@ impl FinalResult {
             tasks: result
                 .tasks
                 .iter()
-                .map(|(task, result)| TaskFigures::new(*task, result, summary))
+                .map(|(task, result)| TaskFigures::new(*task, result, summary, competition))
                 .collect(),
             dataset_blake3: None,
             comparable: Vec::new(),

@@ -2,9 +2,8 @@
 
 use faceoff_api::views::task::TaskView;
 use faceoff_scoring::TIER_CHANGE_RESAMPLES;
-use faceoff_types::{Task, TaskWeights, Tier, TierBounds};
+use faceoff_types::{Competition, TaskMap, TaskWeights, Tier, TierBounds, ViolationInfo};
 use jiff::Timestamp;
-use std::collections::BTreeMap;
 
 /// A success rate with its interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,11 +27,7 @@ impl Rate {
     }
 
     /// The overall score with its interval.
-    pub(super) fn of_score(
-        score: f64,
-        tasks: &BTreeMap<Task, TaskView>,
-        weights: &TaskWeights,
-    ) -> Self {
+    pub(super) fn of_score(score: f64, tasks: &TaskMap<TaskView>, weights: &TaskWeights) -> Self {
         Self::of_percent(score, score_interval(score, tasks, weights))
     }
 
@@ -52,7 +47,7 @@ impl Rate {
 /// their intervals add up on each side (Zou and Donner, Statistics in Medicine 2008).
 pub(super) fn score_interval(
     score: f64,
-    tasks: &BTreeMap<Task, TaskView>,
+    tasks: &TaskMap<TaskView>,
     weights: &TaskWeights,
 ) -> [f64; 2] {
     let distances = tasks.iter().map(|(task, result)| {
@@ -203,6 +198,27 @@ pub(super) fn tier_bounds(tier: Tier, bounds: &TierBounds) -> String {
         }
         Tier::NonDeployable => format!("more than {improvable} penalty points per episode"),
     }
+}
+
+/// The head of a column of violations.
+pub(super) struct ViolationHead {
+    pub(super) title: String,
+    pub(super) points: String,
+}
+
+/// The heads of the columns of all kinds of violations.
+pub(super) fn violation_heads(competition: &Competition) -> Vec<ViolationHead> {
+    let head = |info: &ViolationInfo| ViolationHead {
+        title: capitalised(&info.column),
+        points: info.points_with_unit(),
+    };
+    competition.violations.iter().map(head).collect()
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
 }
 
 #[cfg(test)]

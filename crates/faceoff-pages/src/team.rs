@@ -45,6 +45,7 @@ struct Page {
     /// The newest first.
     days: Vec<DayResult>,
     violations: Vec<TaskViolations>,
+    violation_heads: Vec<crate::figures::ViolationHead>,
     /// Running and queued evaluations of today.
     open_evaluations: Vec<EvaluationView>,
     /// Visible to the team and organisers only.
@@ -112,6 +113,7 @@ pub(super) async fn page(
             .map(|info| info.title.clone())
             .collect(),
         day_charts: days::charts(&history.rows, &variation, &app.config.competition),
+        violation_heads: crate::figures::violation_heads(&app.config.competition),
         violations: days::violations(&history.rows, &app.config.competition),
         days: history
             .rows

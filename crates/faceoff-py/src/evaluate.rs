@@ -5,13 +5,16 @@ use crate::{
     actions::{ActionFormat, ActionMode},
     errors::{OrderError, argument_error, catch_panic, check_perturbations, simulator_error},
 };
+use faceoff_airhockey::{TASKS, competition};
 use faceoff_episode::{AirHockeyWorld, AnswerTiming, Arena, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
-use faceoff_types::{EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskResult, Variation};
+use faceoff_types::{
+    EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskMap, TaskResult, Variation,
+};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use std::collections::BTreeMap;
 
 /// No time is measured: the policy runs in this process, not in an agent's.
 const UNTIMED: AnswerTiming = AnswerTiming {
@@ -116,13 +119,8 @@ impl Evaluation {
         let task = parse_task(task)?;
         let running = catch_panic(|| {
             let interpolation = Some(interpolation);
-            Ok(RunningEpisode::begin(
-                &self.arena,
-                task,
-                episode,
-                interpolation,
-                NullSink,
-            ))
+            let begun = RunningEpisode::begin(&self.arena, task, episode, interpolation, NullSink);
+            begun.map_err(|error| simulator_error(&error.to_string()))
         })?;
         Ok(PolicyEpisode {
             running,
@@ -135,15 +133,17 @@ impl Evaluation {
 
     /// Scores outcomes, each as JSON and in any order; returns the content of `results.json`.
     fn score(&self, outcomes: Vec<String>) -> PyResult<String> {
-        let mut by_task = BTreeMap::<Task, Vec<EpisodeOutcome>>::new();
+        let mut by_task: TaskMap<Vec<EpisodeOutcome>> =
+            TASKS.into_iter().map(|task| (task, Vec::new())).collect();
         for outcome in &outcomes {
             let outcome: EpisodeOutcome = serde_json::from_str(outcome)
                 .map_err(|error| argument_error("outcomes", "outcomes of episodes", error))?;
             by_task.entry(outcome.task).or_default().push(outcome);
         }
         let result = catch_panic(|| {
-            let tasks: BTreeMap<Task, TaskResult> = by_task
+            let tasks: TaskMap<TaskResult> = by_task
                 .into_iter()
+                .filter(|(_, outcomes)| !outcomes.is_empty())
                 .map(|(task, mut outcomes)| {
                     outcomes.sort_unstable_by_key(|outcome| outcome.episode);
                     let steps = outcomes.iter().map(|outcome| u64::from(outcome.steps));
@@ -160,6 +160,7 @@ impl Evaluation {
                 self.profile,
                 self.seed,
                 &self.variation,
+                &competition().weights(&self.variation),
                 tasks,
             ))
         })?;
@@ -231,6 +232,7 @@ impl PolicyEpisode {
 }
 
 fn parse_task(name: &str) -> PyResult<Task> {
-    name.parse()
+    let task: Result<AirHockeyTask, _> = name.parse();
+    task.map(AirHockeyTask::name)
         .map_err(|_| argument_error("task", "hit, defend or prepare", name))
 }

@@ -34,7 +34,7 @@ mod _native {
         outputs::FACTS,
         world::STATE_LEN,
     };
-    use faceoff_types::{EPISODE_STEPS, EpisodeEnd};
+    use faceoff_types::EPISODE_STEPS;
     use pyo3::prelude::*;
 
     #[pymodule_export]
@@ -59,7 +59,7 @@ mod _native {
     /// Limits of the seven joints: positions ± rad, velocities ± rad/s, accelerations ± rad/s².
     #[pyfunction]
     fn joint_limits() -> [[f64; 7]; 3] {
-        let info = faceoff_sim::env_info(faceoff_types::Task::Defend);
+        let info = faceoff_sim::env_info(faceoff_sim::AirHockeyTask::Defend);
         let [_, position] = info.joint_pos_limit;
         let [_, velocity] = info.joint_vel_limit;
         let [_, acceleration] = info.joint_acc_limit;
@@ -91,16 +91,9 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        let ends = [
-            EpisodeEnd::Horizon,
-            EpisodeEnd::LeftTable,
-            EpisodeEnd::CrossedMiddle,
-            EpisodeEnd::Stopped,
-            EpisodeEnd::ReachedAxis,
-            EpisodeEnd::AgentFault,
-        ];
+        let ends = faceoff_sim::episode::ends::ALL.map(|end| end.to_string());
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        module.add("ENDS", ends.map(EpisodeEnd::as_str))?;
+        module.add("ENDS", ends)?;
         module.add("FACTS", FACTS)?;
         module.add("STATE_LEN", STATE_LEN)?;
         module.add("EPISODE_STEPS", EPISODE_STEPS)

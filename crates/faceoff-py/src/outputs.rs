@@ -6,6 +6,7 @@ use crate::{
     setup::Setup,
     world::{STATE_LEN, World},
 };
+use faceoff_sim::episode::ends;
 use rayon::prelude::*;
 
 /// Count of numbers in a world's row of facts; see [`write_facts`].
@@ -111,7 +112,11 @@ impl<'a> Outputs<'a> {
 /// values of the constraints ee, link, joint_pos and joint_vel, and whether each was violated in this episode.
 pub fn write_facts(world: &World, constraints: &[f64; 4], facts: &mut [f64]) {
     let violations = world.episode.violations();
-    facts[0] = world.end.map_or(-1.0, |end| f64::from(end as u8));
+    let code = |end| (0..).zip(ends::ALL).find(|(_, other)| *other == end);
+    facts[0] = world
+        .end
+        .and_then(code)
+        .map_or(-1.0, |(code, _): (u8, _)| f64::from(code));
     facts[1] = f64::from(u8::from(world.succeeds()));
     facts[2] = f64::from(world.origin.number);
     facts[3] = f64::from(world.episode.steps());

@@ -1,8 +1,9 @@
 //! The default reward of the environments.
 
 use faceoff_scoring::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, table::geometry::TABLE};
-use faceoff_types::{Task, Violations};
+use faceoff_types::Violations;
 
 /// Reward of a success at the episode's end.
 pub const SUCCESS: f64 = 10.0;
@@ -12,7 +13,7 @@ const PER_METRE_TO_PUCK: f64 = 0.5;
 const PER_METRE_PER_SECOND: f64 = 1.0;
 
 /// Potential of a state, in points; the reward of a step contains its change (potential-based shaping).
-pub fn potential(task: Task, episode: &Episode) -> f64 {
+pub fn potential(task: AirHockeyTask, episode: &Episode) -> f64 {
     let world = episode.world();
     let puck = world.puck();
     let [x, y, _] = puck.pose;
@@ -21,9 +22,9 @@ pub fn potential(task: Task, episode: &Episode) -> f64 {
     let distance = (dx * dx + dy * dy).sqrt();
     let distance_cost = PER_METRE_TO_PUCK * distance.min(1.0);
     let value = match task {
-        Task::Hit => x.clamp(-1.0, 1.0) - distance_cost,
-        Task::Defend => -PER_METRE_PER_SECOND * puck.speed().min(5.0) - distance_cost,
-        Task::Prepare => -y.abs().min(1.0) - distance_cost,
+        AirHockeyTask::Hit => x.clamp(-1.0, 1.0) - distance_cost,
+        AirHockeyTask::Defend => -PER_METRE_PER_SECOND * puck.speed().min(5.0) - distance_cost,
+        AirHockeyTask::Prepare => -y.abs().min(1.0) - distance_cost,
     };
     // The numbers of a diverged world are meaningless.
     if value.is_finite() { value } else { 0.0 }

@@ -7,10 +7,9 @@ use crate::{
     actions::{ActionFormat, ActionMode},
     errors::{argument_error, check_perturbations},
 };
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, Plant};
-use faceoff_types::{
-    EPISODE_STEPS, Factor, Factors, Interpolation, PerturbationSettings, Seed, Task,
-};
+use faceoff_types::{EPISODE_STEPS, Factor, Factors, Interpolation, PerturbationSettings, Seed};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +18,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Setup {
     /// The task of all episodes.
-    pub task: Task,
+    pub task: AirHockeyTask,
     /// Conversion of actions to trajectories.
     pub interpolation: Interpolation,
     /// Meaning of an action's numbers.

@@ -53,8 +53,8 @@ pub fn step(
     for ((row, world), outcome) in stepped.zip(&outcomes) {
         let result = world.apply_step(setup, outcome);
         outputs.rewards[row] = result.reward;
-        outputs.terminated[row] = !matches!(world.end, None | Some(EpisodeEnd::Horizon));
-        outputs.truncated[row] = world.end == Some(EpisodeEnd::Horizon);
+        outputs.terminated[row] = !matches!(world.end, None | Some(EpisodeEnd::HORIZON));
+        outputs.truncated[row] = world.end == Some(EpisodeEnd::HORIZON);
         let facts = &mut outputs.facts[row * FACTS..][..FACTS];
         write_facts(world, &result.constraints, facts);
         outputs.write_state(row, world);

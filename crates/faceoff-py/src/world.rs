@@ -1,8 +1,9 @@
 //! One world of an environment: a simulated table with its running episode and that episode's actions so far.
 
 use crate::{errors::argument_error, reward, setup::Setup};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, EpisodeState, JOINTS, Plant, StepOutcome, model::INITIAL_Q};
-use faceoff_types::{EpisodeEnd, Seed, Task, Violations};
+use faceoff_types::{EpisodeEnd, Seed, Violations};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
@@ -89,7 +90,7 @@ impl World {
     /// Updates the world after a step of its episode, and returns the step's results.
     pub fn apply_step(&mut self, setup: &Setup, outcome: &StepOutcome) -> StepResult {
         let is_truncated = self.episode.steps() >= setup.max_episode_steps;
-        self.end = outcome.end.or(is_truncated.then_some(EpisodeEnd::Horizon));
+        self.end = outcome.end.or(is_truncated.then_some(EpisodeEnd::HORIZON));
         let potential = reward::potential(setup.task, &self.episode);
         let violations = self.episode.violations();
         let mut reward =
@@ -108,7 +109,7 @@ impl World {
 
     /// Whether the episode has ended in success.
     pub fn succeeds(&self) -> bool {
-        self.end.is_some_and(|end| end != EpisodeEnd::AgentFault) && self.episode.success()
+        self.end.is_some_and(|end| end != EpisodeEnd::AGENT_FAULT) && self.episode.success()
     }
 
     /// The true state.
@@ -173,7 +174,7 @@ fn flatten(state: &EpisodeState) -> [f64; STATE_LEN] {
 ///
 /// # Errors
 /// If it is not on the table, too fast or not finite.
-pub fn check_puck(task: Task, puck: &[f64; 6]) -> PyResult<()> {
+pub fn check_puck(task: AirHockeyTask, puck: &[f64; 6]) -> PyResult<()> {
     use faceoff_sim::table::geometry::{PUCK, TABLE};
     let [x, y, ..] = *puck;
     // The largest |x| and |y| of the puck's centre.

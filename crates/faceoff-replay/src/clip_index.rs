@@ -3,11 +3,11 @@
 
 use crate::{error::ReplayError, group::Group};
 use faceoff_episode::describe_end;
-use faceoff_types::{EpisodeEnd, Task};
+use faceoff_types::{EpisodeEnd, Task, TaskMap};
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::HashSet,
     io::{self, Read},
 };
 
@@ -22,7 +22,7 @@ pub struct ClipIndex {
     format: String,
     pub episodes: Vec<EpisodeLine>,
     /// Histogram of computation times of all answered steps, by task.
-    pub times: BTreeMap<Task, TimeBins>,
+    pub times: TaskMap<TimeBins>,
 }
 
 impl Default for ClipIndex {
@@ -30,7 +30,7 @@ impl Default for ClipIndex {
         Self {
             format: INDEX_FORMAT.to_owned(),
             episodes: Vec::new(),
-            times: BTreeMap::new(),
+            times: TaskMap::new(),
         }
     }
 }
@@ -69,7 +69,7 @@ pub struct EpisodeLine {
 impl EpisodeLine {
     /// Removes what only those with access to the dataset may see: details of faults, and computation times.
     pub fn make_public(&mut self) {
-        if self.end == EpisodeEnd::AgentFault {
+        if self.end == EpisodeEnd::AGENT_FAULT {
             self.why = describe_end(self.task, self.end, &[0.0; 6], self.steps, None);
         }
         self.longest_s = None;
@@ -151,15 +151,23 @@ impl ClipIndex {
     /// The line of an episode; `None` if the index has no such episode.
     #[must_use]
     pub fn line(&self, task: Task, episode: u32) -> Option<&EpisodeLine> {
-        let found = self
-            .episodes
-            .binary_search_by_key(&(task, episode), |line| (line.task, line.episode));
-        found.ok().map(|index| &self.episodes[index])
+        let mut lines = &self.episodes[..];
+        // The lines of a task follow each other.
+        while let Some(first) = lines.first() {
+            let (of_task, others) =
+                lines.split_at(lines.partition_point(|line| line.task == first.task));
+            if first.task == task {
+                let found = of_task.binary_search_by_key(&episode, |line| line.episode);
+                return found.ok().map(|index| &of_task[index]);
+            }
+            lines = others;
+        }
+        None
     }
 
     /// The episodes in both indices that ended differently.
     #[must_use]
-    pub fn differing_ends(&self, other: &Self) -> BTreeSet<(Task, u32)> {
+    pub fn differing_ends(&self, other: &Self) -> HashSet<(Task, u32)> {
         let differing = self.episodes.iter().filter_map(|line| {
             let other_line = other.line(line.task, line.episode)?;
             let is_same = (line.success, line.end) == (other_line.success, other_line.end);
@@ -168,10 +176,16 @@ impl ClipIndex {
         differing.collect()
     }
 
-    /// Adds the lines of another shard (a range of episodes of one task).
+    /// Adds the lines of another shard (a range of episodes of one task). A task that is new follows the others.
     pub(crate) fn merge(&mut self, other: Self) {
         self.episodes.extend(other.episodes);
-        self.episodes.sort_by_key(|line| (line.task, line.episode));
+        let mut order = TaskMap::new();
+        for line in &self.episodes {
+            let next = order.len();
+            order.entry(line.task).or_insert(next);
+        }
+        self.episodes
+            .sort_by_key(|line| (order.get(&line.task).copied(), line.episode));
         for (task, times) in &other.times {
             self.times.entry(*task).or_default().merge(times);
         }

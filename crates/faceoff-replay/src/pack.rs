@@ -15,10 +15,11 @@
 //! | number  | the episode; in a game the chunk, which is a part of 500 control steps                     |
 
 use crate::{clip_index::ClipIndex, error::ReplayError};
+use faceoff_sim::AirHockeyTask;
 use faceoff_types::{Side, Task};
 use fs_err::File;
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeSet, HashSet},
     io::Write,
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
@@ -52,7 +53,7 @@ impl ClipKey {
 
     /// The public motion of an episode.
     #[must_use]
-    pub const fn motion(task: Task, episode: u32) -> Self {
+    pub fn motion(task: Task, episode: u32) -> Self {
         Self {
             kind: KIND_MOTION,
             contest: contest(task),
@@ -62,7 +63,7 @@ impl ClipKey {
 
     /// The agent's observations and commands in an episode.
     #[must_use]
-    pub const fn observed(task: Task, episode: u32) -> Self {
+    pub fn observed(task: Task, episode: u32) -> Self {
         Self {
             kind: KIND_OBSERVED,
             contest: contest(task),
@@ -99,11 +100,15 @@ const KIND_OBSERVED: u8 = 2;
 const KIND_OBSERVED_BY_SECOND: u8 = 3;
 const CONTEST_GAME: u8 = 3;
 
-const fn contest(task: Task) -> u8 {
-    match task {
-        Task::Hit => 0,
-        Task::Defend => 1,
-        Task::Prepare => 2,
+/// For tasks that are not in the table above; no clip has it.
+const CONTEST_NONE: u8 = u8::MAX;
+
+fn contest(task: Task) -> u8 {
+    match AirHockeyTask::try_from(task) {
+        Ok(AirHockeyTask::Hit) => 0,
+        Ok(AirHockeyTask::Defend) => 1,
+        Ok(AirHockeyTask::Prepare) => 2,
+        Err(_) => CONTEST_NONE,
     }
 }
 
@@ -331,7 +336,7 @@ pub fn join_packs<W: Write>(packs: &[PathBuf], out: W) -> Result<W, ReplayError>
 /// [`ReplayError`].
 pub fn select_episodes<W: Write>(
     packs: &[PathBuf],
-    selected: &BTreeSet<(Task, u32)>,
+    selected: &HashSet<(Task, u32)>,
     out: W,
 ) -> Result<W, ReplayError> {
     let episode_keys = |(task, episode): &(Task, u32)| {

@@ -148,6 +148,7 @@ pub(crate) async fn order_ablation(
 ) -> Result<impl IntoResponse, Problem> {
     let episodes = request.episodes_per_task.unwrap_or(DEFAULT_EPISODES);
     let plan = RunPlan {
+        tasks: app.config.competition.task_names().collect(),
         episodes_per_task: checked_episodes(episodes)?,
         ..stage::current(&app).await?.plan()
     };

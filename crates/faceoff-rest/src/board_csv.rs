@@ -2,11 +2,11 @@
 
 use faceoff_api::views::{board::BoardView, history::HistoryView, task::TaskView};
 use faceoff_service::csv::{Table, escape_formula, or_empty};
-use faceoff_types::{Competition, Task};
-use std::collections::BTreeMap;
+use faceoff_types::{Competition, TaskMap};
+use std::fmt::Display;
 
-/// Columns of each task; a table prefixes them with the task's name.
-pub(crate) const TASK_COLUMNS: [&str; 16] = [
+/// The columns of each task about its score; a table prefixes them with the task's name.
+pub(crate) const SCORE_COLUMNS: [&str; 7] = [
     "episodes",
     "successes",
     "success_rate",
@@ -14,22 +14,28 @@ pub(crate) const TASK_COLUMNS: [&str; 16] = [
     "ci95_high",
     "penalty_points",
     "tier",
-    "steps",
-    "violations_ee",
-    "violations_link",
-    "violations_joint_pos",
-    "violations_joint_vel",
-    "violations_computation_time",
-    "computation_time_mean_s",
-    "computation_time_p99_s",
-    "computation_time_max_s",
 ];
+
+/// All columns of each task.
+pub(crate) fn task_columns(competition: &Competition) -> Vec<String> {
+    let violations = competition.violations.iter();
+    let score = SCORE_COLUMNS.into_iter().chain(["steps"]);
+    let times = [
+        "computation_time_mean_s",
+        "computation_time_p99_s",
+        "computation_time_max_s",
+    ];
+    let mut columns: Vec<String> = score.map(str::to_owned).collect();
+    columns.extend(violations.map(|info| format!("violations_{}", info.name)));
+    columns.extend(times.map(str::to_owned));
+    columns
+}
 
 /// An empty table with `columns`, followed by the `task_columns` of each task.
 pub(crate) fn table_with_tasks(
     competition: &Competition,
     columns: &[&str],
-    task_columns: &[&str],
+    task_columns: &[impl Display],
 ) -> Table {
     let mut names: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
     for task in competition.task_names() {
@@ -38,18 +44,18 @@ pub(crate) fn table_with_tasks(
     Table::new(&names)
 }
 
-/// The values of the first `columns` of [`TASK_COLUMNS`] for each task; empty for tasks without a result.
+/// The values of the first `columns` of [`task_columns`] for each task; empty for tasks without a result.
 pub(crate) fn task_fields<'a>(
     competition: &'a Competition,
-    tasks: &'a BTreeMap<Task, TaskView>,
+    tasks: &'a TaskMap<TaskView>,
     columns: usize,
 ) -> impl Iterator<Item = String> + 'a {
+    let count = task_columns(competition).len();
     let fields = move |task| match tasks.get(&task) {
-        None => vec![String::new(); TASK_COLUMNS.len()],
+        None => vec![String::new(); count],
         Some(result) => {
-            let violations = result.violations;
             let time = result.computation_time_s;
-            vec![
+            let mut fields = vec![
                 result.episodes.to_string(),
                 result.successes.to_string(),
                 result.success_rate.to_string(),
@@ -58,15 +64,18 @@ pub(crate) fn task_fields<'a>(
                 result.penalty_points.to_string(),
                 result.tier.to_string(),
                 or_empty(result.steps),
-                or_empty(violations.map(|counts| counts.ee)),
-                or_empty(violations.map(|counts| counts.link)),
-                or_empty(violations.map(|counts| counts.joint_pos)),
-                or_empty(violations.map(|counts| counts.joint_vel)),
-                or_empty(violations.map(|counts| counts.computation_time)),
+            ];
+            let counts = result.violations.as_ref();
+            let violations = competition.violations.iter();
+            fields.extend(
+                violations.map(|info| or_empty(counts.map(|counts| counts.get(info.name)))),
+            );
+            fields.extend([
                 or_empty(time.map(|summary| summary.mean)),
                 or_empty(time.map(|summary| summary.p99)),
                 or_empty(time.map(|summary| summary.max)),
-            ]
+            ]);
+            fields
         }
     };
     let first_fields = move |task| fields(task).into_iter().take(columns);
@@ -97,7 +106,7 @@ macro_rules! common_fields {
             or_empty(row.seed),
         ]
         .into_iter()
-        .chain(task_fields($competition, &row.tasks, TASK_COLUMNS.len()))
+        .chain(task_fields($competition, &row.tasks, usize::MAX))
     }};
 }
 
@@ -129,7 +138,7 @@ pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Vec<u
             "profile",
             "seed",
         ],
-        &TASK_COLUMNS,
+        &task_columns(competition),
     );
     for row in &board.rows {
         let division = row.division.as_ref().map_or("", |name| name.as_str());
@@ -175,7 +184,7 @@ pub(crate) fn history_table(competition: &Competition, history: &HistoryView) ->
             "finished_at",
             "released_at",
         ],
-        &TASK_COLUMNS,
+        &task_columns(competition),
     );
     for row in &history.rows {
         let fields = [
@@ -193,7 +202,7 @@ pub(crate) fn history_table(competition: &Competition, history: &HistoryView) ->
             row.finished_at.to_string(),
             or_empty(row.released_at),
         ];
-        let task_fields = task_fields(competition, &row.tasks, TASK_COLUMNS.len());
+        let task_fields = task_fields(competition, &row.tasks, usize::MAX);
         table.row(fields.into_iter().chain(task_fields));
     }
     table.into_bytes()

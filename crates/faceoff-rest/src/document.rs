@@ -5,9 +5,11 @@ mod files;
 mod integers;
 mod lists;
 mod responses;
+mod tasks;
 mod unions;
 
 use faceoff_service::problem::ProblemBody;
+use faceoff_types::Competition;
 pub(super) use files::{FileHeaders, TagHeader};
 use serde_json::Value;
 use utoipa::{
@@ -66,12 +68,13 @@ impl Modify for SecuritySchemes {
     }
 }
 
-/// Completes the document with everything that follows from the routes and types.
-pub(super) fn complete(mut document: openapi::OpenApi) -> Value {
+/// Completes the document with everything that follows from the routes, the types and the competition.
+pub(super) fn complete(mut document: openapi::OpenApi, competition: &Competition) -> Value {
     responses::complete(&mut document);
     let components = document.components.get_or_insert_default();
     unions::flatten(&mut components.schemas);
     let mut document = serde_json::to_value(document).expect("its keys are strings");
+    tasks::describe(&mut document, competition);
     deprecated_fields::add(&mut document);
     integers::mark_unsigned(&mut document);
     document

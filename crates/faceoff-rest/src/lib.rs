@@ -64,13 +64,14 @@ use axum::{Json, Router, extract::DefaultBodyLimit, middleware, routing::get};
 use document::Document;
 use faceoff_api::paths::API_BASE;
 use faceoff_service::{app::App, extract::MAX_JSON_BYTES, timeouts};
+use faceoff_types::Competition;
 use serde_json::Value;
 use std::{sync::Arc, time::Duration};
 use utoipa::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 /// All routes, and the OpenAPI document. `timeout` limits the time of every response except uploads and archives.
-pub fn router(timeout: Duration) -> (Router<App>, Arc<Value>) {
+pub fn router(timeout: Duration, competition: &Competition) -> (Router<App>, Arc<Value>) {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
         .merge(season_routes())
         .merge(stage_routes())
@@ -93,7 +94,7 @@ pub fn router(timeout: Duration) -> (Router<App>, Arc<Value>) {
         .split_for_parts();
     document.info = Document::openapi().info;
     deprecated_routes::describe(&mut document);
-    let document = Arc::new(document::complete(document));
+    let document = Arc::new(document::complete(document, competition));
     let served = Arc::clone(&document);
     let router = router.route(
         &format!("{API_BASE}/openapi.json"),

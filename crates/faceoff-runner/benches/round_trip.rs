@@ -14,12 +14,13 @@
 mod instant;
 
 use criterion::{BatchSize, Criterion};
+use faceoff_airhockey::HIT;
 use faceoff_episode::{Arena, NullSink};
 use faceoff_runner::{
     AgentEnvironment, KernelCounters, Observer, Session, ShardSpec, play_shard, run_shard,
 };
 use faceoff_sandbox::{Isolation, affinity};
-use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Ruleset, Seed, Task};
+use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Ruleset, Seed};
 use faceoff_wire::Message;
 use instant::{ACTION, InstantAgent, environment, instant_agent};
 use std::{
@@ -106,7 +107,7 @@ fn bench_round_trips(criterion: &mut Criterion) {
         ),
         ("protocol, no sandbox", environment(Isolation::None)),
     ] {
-        let mut session = Session::start(&agent.bundle, &env, Task::Hit.into())
+        let mut session = Session::start(&agent.bundle, &env, HIT.into())
             .map_err(|(error, _)| error)
             .unwrap();
         session.reset(0).unwrap();
@@ -152,7 +153,7 @@ fn print_medians(placement: &str, evaluator_cpu: usize, agent_cpu: usize) {
         disabled_layers: Vec::new(),
     });
     env.agent_cpus = vec![agent_cpu];
-    let mut session = Session::start(&agent.bundle, &env, Task::Hit.into())
+    let mut session = Session::start(&agent.bundle, &env, HIT.into())
         .map_err(|(error, _)| error)
         .unwrap();
     session.reset(0).unwrap();
@@ -241,7 +242,7 @@ fn bench_control_steps(criterion: &mut Criterion) {
     group.sample_size(20);
     let seed = Seed::from_number(1);
     let arena = Arena::new(Profile::Evaluation, seed, seed.model_mismatch());
-    let world = || arena.episode(Task::Prepare, 0, Interpolation::Cubic);
+    let world = || arena.episode(faceoff_sim::AirHockeyTask::Prepare, 0, Interpolation::Cubic);
     group.bench_function("simulator alone", |bencher| {
         bencher.iter_batched(
             || {
@@ -270,7 +271,7 @@ fn bench_control_steps(criterion: &mut Criterion) {
     let spec = ShardSpec {
         ruleset: Ruleset::CURRENT,
         platform_retries: 0,
-        task: Task::Hit,
+        task: HIT,
         episodes: 0..20,
         profile: Profile::Evaluation,
         seed,

@@ -5,7 +5,7 @@ use crate::wait_breakdown::WaitBreakdown;
 use faceoff_dataset::RecordingError;
 use faceoff_episode::{NonFiniteObservation, RecordError};
 use faceoff_sandbox::SandboxError;
-use faceoff_types::{AgentFaultKind, is_full_disk};
+use faceoff_types::{AgentFaultKind, UnknownTask, is_full_disk};
 use std::io;
 
 /// Failure of a session with an agent.
@@ -49,6 +49,12 @@ impl From<SandboxError> for SessionError {
     }
 }
 
+impl From<UnknownTask> for SessionError {
+    fn from(error: UnknownTask) -> Self {
+        Self::Platform(error.into())
+    }
+}
+
 impl From<NonFiniteObservation> for SessionError {
     fn from(error: NonFiniteObservation) -> Self {
         Self::Platform(error.into())
@@ -77,6 +83,9 @@ pub enum PlatformFault {
     /// The simulated state became infinite or NaN.
     #[error(transparent)]
     Simulation(#[from] NonFiniteObservation),
+    /// The simulator has no such task.
+    #[error(transparent)]
+    UnknownTask(#[from] UnknownTask),
     /// Host interference repeatedly prevented an agent's answer, in a run that needs a verdict on the agent.
     #[error("host interference prevented the agent's answer ({0})")]
     HostBusy(WaitBreakdown),

@@ -205,7 +205,7 @@ impl<'a> Player<'a> {
         };
         let interpolation = session.as_ref().ok().map(Session::interpolation);
         let mut running =
-            RunningEpisode::begin(&self.arena, self.task, episode, interpolation, sink)
+            RunningEpisode::begin(&self.arena, self.task, episode, interpolation, sink)?
                 .with_max_steps(max_steps);
         let mut session = match session {
             Ok(session) => session,

@@ -262,7 +262,7 @@ fn hello(
     stated: Option<i64>,
     limit_s: f64,
 ) -> Result<(Interpolation, f64), SessionError> {
-    let hello = Message::hello(agent_task, wire_env(agent_task));
+    let hello = Message::hello(agent_task, wire_env(agent_task)?);
     // The agent's time begins when its sandbox exists; the set-up is the platform's time.
     let mut sent = exchange.send(&hello, Phase::StartUp, limit_s)?;
     let answer = exchange.wait(&mut sent)?;

@@ -120,9 +120,9 @@ pub fn validate_monitored(
 ) -> Result<ValidationReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
     let arena = Arena::new(Profile::Evaluation, spec.seed, spec.mismatch_seed);
-    let mut timing = Vec::with_capacity(Task::ALL.len());
+    let mut timing = Vec::with_capacity(spec.tasks.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
-    for task in Task::ALL {
+    for task in spec.tasks.iter().copied() {
         let plan = TaskPlan::new(spec, task);
         let mut player = Player::new(
             bundle,

@@ -1,17 +1,26 @@
 //! The field `env` of the message `hello`: the simulator's constants, as an agent gets them.
 
-use faceoff_sim::{EPISODE_STEPS, EnvInfo, env_info, env_info_for};
-use faceoff_types::{AgentTask, GAME_WINDOWS, RULESET, Task, WINDOW_STEPS};
+use faceoff_sim::{AirHockeyTask, EPISODE_STEPS, EnvInfo, env_info, env_info_for};
+use faceoff_types::{AgentTask, GAME_WINDOWS, RULESET, UnknownTask, WINDOW_STEPS};
 use faceoff_wire::{
     Env,
     message::{DiscEnv, RobotEnv, TableEnv},
 };
 
 /// The simulator's constants under the protocol's names.
-pub(crate) fn wire_env(agent_task: AgentTask) -> Env {
-    let (info, episode_steps) = match agent_task {
-        AgentTask::Qualifying(task) => (env_info(task), EPISODE_STEPS),
-        AgentTask::Game { side } => (env_info_for(2, side.index()), GAME_WINDOWS * WINDOW_STEPS),
+///
+/// # Errors
+/// If the simulator has no such task.
+pub(crate) fn wire_env(agent_task: AgentTask) -> Result<Env, UnknownTask> {
+    let (info, episode_steps, has_opponent) = match agent_task {
+        AgentTask::Qualifying(task) => {
+            let task = task.try_into()?;
+            (env_info(task), EPISODE_STEPS, task == AirHockeyTask::Hit)
+        }
+        AgentTask::Game { side } => {
+            let steps = GAME_WINDOWS * WINDOW_STEPS;
+            (env_info_for(2, side.index()), steps, true)
+        }
     };
     let EnvInfo {
         n_agents,
@@ -29,11 +38,12 @@ pub(crate) fn wire_env(agent_task: AgentTask) -> Env {
         base_frame,
         dt,
     } = info;
-    let opponent: &[usize] = match agent_task {
-        AgentTask::Qualifying(Task::Hit) | AgentTask::Game { .. } => &Env::OPPONENT_EE_IDS,
-        AgentTask::Qualifying(Task::Defend | Task::Prepare) => &[],
+    let opponent: &[usize] = if has_opponent {
+        &Env::OPPONENT_EE_IDS
+    } else {
+        &[]
     };
-    Env {
+    Ok(Env {
         dt,
         n_agents,
         puck_pos_ids: Env::PUCK_POS_IDS.to_vec(),
@@ -78,19 +88,20 @@ pub(crate) fn wire_env(agent_task: AgentTask) -> Env {
         },
         episode_steps,
         ruleset: RULESET.to_owned(),
-    }
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_airhockey::{DEFEND, HIT, PREPARE};
     use faceoff_types::Side;
     use faceoff_wire::Message;
     use serde_json::json;
 
     #[test]
     fn hello_contains_the_rules_constants() {
-        let env = serde_json::to_value(wire_env(Task::Hit.into())).unwrap();
+        let env = serde_json::to_value(wire_env(HIT.into()).unwrap()).unwrap();
         assert_eq!(env["dt"], 0.02);
         assert_eq!(env["episode_steps"], 500);
         assert_eq!(env["table"]["length"], 1.948);
@@ -107,8 +118,11 @@ mod tests {
             env["robot"]["base_frame"][0][0],
             serde_json::json!([1.0, 0.0, 0.0, -1.51])
         );
-        for task in [Task::Defend, Task::Prepare] {
-            assert_eq!(wire_env(task.into()).opponent_ee_ids, [] as [usize; 0]);
+        for task in [DEFEND, PREPARE] {
+            assert_eq!(
+                wire_env(task.into()).unwrap().opponent_ee_ids,
+                [] as [usize; 0]
+            );
         }
     }
 
@@ -116,7 +130,7 @@ mod tests {
     fn game_hello_has_the_side_and_its_own_frame_first() {
         for (side, agent_id, own_x) in [(Side::First, 1, -1.51), (Side::Second, 2, 1.51)] {
             let agent_task = AgentTask::Game { side };
-            let hello = Message::hello(agent_task, wire_env(agent_task));
+            let hello = Message::hello(agent_task, wire_env(agent_task).unwrap());
             let hello = serde_json::to_value(hello).unwrap();
             assert_eq!(hello["task"], "tournament");
             assert_eq!(hello["agent_id"], agent_id);
@@ -137,8 +151,8 @@ mod tests {
         let (_, rest) = document.split_once("```json\n").expect("a block of JSON");
         let (quoted, _) = rest.split_once("```").expect("the block's end");
         let quoted: serde_json::Value = serde_json::from_str(quoted).expect("JSON");
-        let agent_task = AgentTask::Qualifying(Task::Defend);
-        let hello = Message::hello(agent_task, wire_env(agent_task));
+        let agent_task = AgentTask::Qualifying(DEFEND);
+        let hello = Message::hello(agent_task, wire_env(agent_task).unwrap());
         assert_eq!(quoted, serde_json::to_value(hello).unwrap());
     }
 }

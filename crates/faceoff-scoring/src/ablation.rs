@@ -6,7 +6,7 @@ use crate::{
     paired::{PairedTally, PairingError},
     summary::{EpisodeSummary, TaskSummary},
 };
-use faceoff_types::{Profile, Task};
+use faceoff_types::{Profile, Task, TaskMap};
 use serde::{Deserialize, Serialize};
 use std::{borrow::Borrow, collections::BTreeMap};
 
@@ -46,9 +46,9 @@ pub struct ProfileEffect {
 /// If a profile has more or fewer episodes than the ideal one.
 pub fn ablation(
     runs: &BTreeMap<Profile, impl Borrow<EpisodeSummary>>,
-) -> Result<BTreeMap<Task, Vec<ProfileEffect>>, PairingError> {
+) -> Result<TaskMap<Vec<ProfileEffect>>, PairingError> {
     let Some(ideal) = runs.get(&Profile::Ideal) else {
-        return Ok(BTreeMap::new());
+        return Ok(TaskMap::new());
     };
     let effects_of = |(task, ideal): (&Task, &TaskSummary)| {
         let effects = runs.iter().map(|(profile, run)| {
@@ -83,10 +83,11 @@ fn effect(profile: Profile, tally: &PairedTally, penalty_points: f64) -> Profile
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
     use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
 
     fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-        EpisodeSummary::from_outcomes(outcomes, &Default::default()).unwrap()
+        EpisodeSummary::from_outcomes(outcomes, &TASKS, &Default::default()).unwrap()
     }
 
     /// Outcomes with these successes; each failed episode has the 3 penalty points of an end effector violation.
@@ -97,7 +98,7 @@ mod tests {
                 task,
                 episode,
                 steps: 1,
-                end: EpisodeEnd::Horizon,
+                end: EpisodeEnd::HORIZON,
                 success: *success,
                 violations: Violations {
                     ee: !success,
@@ -111,23 +112,17 @@ mod tests {
 
     #[test]
     fn profile_is_compared_with_ideal_on_same_episodes() {
-        let mut ideal = run(Task::Hit, &[true; 8]);
-        ideal.extend(run(Task::Prepare, &[true, false]));
-        let mut tracking_loss = run(
-            Task::Hit,
-            &[false, false, false, false, false, false, true, true],
-        );
-        tracking_loss.extend(run(Task::Prepare, &[false, true]));
+        let mut ideal = run(HIT, &[true; 8]);
+        ideal.extend(run(PREPARE, &[true, false]));
+        let mut tracking_loss = run(HIT, &[false, false, false, false, false, false, true, true]);
+        tracking_loss.extend(run(PREPARE, &[false, true]));
         let runs = BTreeMap::from([
             (Profile::TrackingLoss, summary(&tracking_loss)),
             (Profile::Ideal, summary(&ideal)),
         ]);
         let tasks = ablation(&runs).unwrap();
-        assert_eq!(
-            tasks.keys().collect::<Vec<_>>(),
-            [&Task::Hit, &Task::Prepare]
-        );
-        let [ideal, loss] = &tasks[&Task::Hit][..] else {
+        assert_eq!(tasks.keys().collect::<Vec<_>>(), [&HIT, &PREPARE]);
+        let [ideal, loss] = &tasks[&HIT][..] else {
             panic!("two profiles")
         };
         assert_eq!(
@@ -143,24 +138,24 @@ mod tests {
         assert_eq!(loss.p_value, 2.0 / 64.0);
         assert_eq!(loss.penalty_points, 18.0);
         assert_eq!(loss.success_ci95, wilson95(2, 8));
-        let prepare = &tasks[&Task::Prepare][1];
+        let prepare = &tasks[&PREPARE][1];
         assert_eq!((prepare.lost, prepare.gained, prepare.p_value), (1, 1, 1.0));
     }
 
     #[test]
     fn runs_with_different_episodes_are_refused() {
         let runs = BTreeMap::from([
-            (Profile::Ideal, summary(&run(Task::Hit, &[true, true]))),
-            (Profile::Evaluation, summary(&run(Task::Hit, &[true]))),
+            (Profile::Ideal, summary(&run(HIT, &[true, true]))),
+            (Profile::Evaluation, summary(&run(HIT, &[true]))),
         ]);
         let unpaired = |task, episode| Err(PairingError::Unpaired(task, episode));
-        assert_eq!(ablation(&runs), unpaired(Task::Hit, 1));
-        let other_task = summary(&run(Task::Defend, &[true, true]));
+        assert_eq!(ablation(&runs), unpaired(HIT, 1));
+        let other_task = summary(&run(DEFEND, &[true, true]));
         let runs = BTreeMap::from([
             (Profile::Ideal, runs[&Profile::Ideal].clone()),
             (Profile::Evaluation, other_task),
         ]);
-        assert_eq!(ablation(&runs), unpaired(Task::Hit, 0));
+        assert_eq!(ablation(&runs), unpaired(HIT, 0));
         let no_runs = BTreeMap::<_, EpisodeSummary>::new();
         assert!(ablation(&no_runs).unwrap().is_empty());
     }

@@ -7,9 +7,8 @@ use crate::{
     paired::{PairedTally, SIGNIFICANCE, overall_p_value},
     summary::EpisodeSummary,
 };
-use faceoff_types::{Profile, Seed, Task, TaskWeights, Variation, deprecated_names};
+use faceoff_types::{Profile, Seed, Task, TaskMap, TaskWeights, Variation, deprecated_names};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// An evaluation for a comparison: its rules, seeds and the results of its episodes.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +19,8 @@ pub struct ComparedEvaluation<'a> {
     pub profile: Profile,
     /// Deviations from the ruleset in perturbations and scoring.
     pub variation: &'a Variation,
+    /// Weights of the tasks under the rules of the evaluation.
+    pub weights: &'a TaskWeights,
     /// The evaluation's seed; on a server, that of the evaluation day.
     pub seed: Seed,
     /// The seed of the season's model mismatch: how the simulated robot differs from the robot model that teams have.
@@ -78,7 +79,7 @@ impl NotComparable {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// One comparison for each task.
-    pub tasks: BTreeMap<Task, TaskComparison>,
+    pub tasks: TaskMap<TaskComparison>,
     /// The overall scores.
     pub overall: OverallComparison,
 }
@@ -142,13 +143,13 @@ impl ComparedEvaluation<'_> {
     /// If the episodes are not the same: the field that differs.
     pub fn compare(&self, other: &Self) -> Result<Comparison, NotComparable> {
         let tallies = self.paired_tallies(other)?;
-        let estimates: BTreeMap<_, _> = tallies
+        let estimates: TaskMap<_> = tallies
             .iter()
             .map(|(task, tally)| (*task, paired_difference(tally)))
             .collect();
-        let overall = score_difference(&self.variation.weights, estimates.clone());
+        let overall = score_difference(self.weights, estimates.clone());
         let [score_a, score_b] = [self, other].map(Self::score);
-        let p_value = overall_p_value(&self.variation.weights, &tallies);
+        let p_value = overall_p_value(self.weights, &tallies);
         let tasks = tallies.into_iter().zip(estimates.into_values());
         Ok(Comparison {
             tasks: tasks
@@ -215,15 +216,15 @@ impl ComparedEvaluation<'_> {
     /// matter.
     fn weights_of(&self, task: Option<Task>) -> TaskWeights {
         match task {
-            None => self.variation.weights,
-            Some(_) => TaskWeights::default(),
+            None => self.weights.clone(),
+            Some(task) => TaskWeights::of(task),
         }
     }
 
     /// The overall score in percent.
     fn score(&self) -> f64 {
         overall_score(
-            &self.variation.weights,
+            self.weights,
             self.summary.tasks.iter().map(|(task, summary)| {
                 let successes = &summary.successes;
                 let n = f64::from(successes.episodes().max(1));
@@ -233,7 +234,7 @@ impl ComparedEvaluation<'_> {
     }
 
     /// Counts for each task the episodes that both, one or neither solved.
-    fn paired_tallies(&self, other: &Self) -> Result<BTreeMap<Task, PairedTally>, NotComparable> {
+    fn paired_tallies(&self, other: &Self) -> Result<TaskMap<PairedTally>, NotComparable> {
         if self.ruleset != other.ruleset {
             return Err(NotComparable::Ruleset(
                 self.ruleset.to_owned(),
@@ -257,9 +258,9 @@ impl ComparedEvaluation<'_> {
             return Err(NotComparable::MismatchSeed);
         }
         let (a, b) = (&self.summary.tasks, &other.summary.tasks);
-        let first_missing = |incomplete: &BTreeMap<Task, _>, tasks: &BTreeMap<Task, _>| {
+        let first_missing = |incomplete: &TaskMap<_>, tasks: &TaskMap<_>| {
             let mut names = tasks.keys();
-            names.find(|task| !incomplete.contains_key(task)).copied()
+            names.find(|task| !incomplete.contains_key(*task)).copied()
         };
         if let Some(task) = first_missing(b, a).or_else(|| first_missing(a, b)) {
             return Err(NotComparable::Tasks(task));

@@ -108,6 +108,7 @@ pub(crate) fn score_difference(
 mod tests {
     use super::*;
     use crate::paired::tests::tally;
+    use faceoff_airhockey::TASKS;
     use statrs::distribution::{Binomial, Discrete};
 
     /// The values come from a separate implementation of the formula in the paper.
@@ -177,8 +178,8 @@ mod tests {
             high: 0.3,
         };
         let score = score_difference(
-            &TaskWeights::default(),
-            Task::ALL.map(|task| (task, task_difference)),
+            &TaskWeights::parse("0.4,0.4,0.2", TASKS.into_iter()).unwrap(),
+            TASKS.map(|task| (task, task_difference)),
         );
         assert!((score.value - 10.0).abs() < 1e-12);
         // With the default weights 40, 40 and 20 the margins are √(40² + 40² + 20²) = 60 times those of one task.

@@ -1,7 +1,9 @@
 //! Penalty points of one episode, for violated safety limits, slow answers and agent faults (an agent that crashed or
 //! answered invalidly).
 
-use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
+use faceoff_types::{
+    ComputationTime, EpisodeEnd, EpisodeOutcome, ViolationCounts, ViolationName, Violations,
+};
 
 /// Penalty points for an end effector outside its bounds (paper §2.2).
 pub const EE_POINTS: f64 = 3.0;
@@ -52,7 +54,7 @@ pub(crate) fn time_or_fault_penalty(outcome: &EpisodeOutcome) -> f64 {
 
 /// Did an agent fault end the episode?
 pub(crate) fn has_fault(outcome: &EpisodeOutcome) -> bool {
-    outcome.fault.is_some() || outcome.end == EpisodeEnd::AgentFault
+    outcome.fault.is_some() || outcome.end == EpisodeEnd::AGENT_FAULT
 }
 
 /// Penalty points of one episode: each kind of violation counts once, regardless of its duration.
@@ -75,6 +77,22 @@ pub(crate) fn violation_points(violations: &Violations) -> f64 {
     .filter(|(violated, _)| *violated)
     .map(|(_, points)| points)
     .sum()
+}
+
+/// For each kind of violation, the number of episodes (or windows of a game) with it. Each is given by the violated constraints, and
+/// whether its answers were late.
+pub(crate) fn violation_counts<'a>(
+    episodes: impl Iterator<Item = (&'a Violations, bool)>,
+) -> ViolationCounts {
+    let late = ViolationName::COMPUTATION_TIME;
+    let names = Violations::default().by_name().map(|(name, _)| (name, 0));
+    let mut counts: ViolationCounts = names.into_iter().chain([(late, 0)]).collect();
+    for (violations, is_late) in episodes {
+        let kinds = violations.by_name().into_iter().chain([(late, is_late)]);
+        let violated = kinds.filter(|(_, is_violated)| *is_violated);
+        counts.add(&violated.map(|(name, _)| (name, 1)).collect());
+    }
+    counts
 }
 
 #[cfg(test)]

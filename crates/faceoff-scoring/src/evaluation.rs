@@ -1,9 +1,9 @@
 //! The score of an evaluation (a team's run of all tasks) from the results of its tasks.
 
 use faceoff_types::{
-    EvaluationResult, Profile, Ruleset, Seed, Task, TaskResult, TaskWeights, Tier, Variation,
+    EvaluationResult, Profile, Ruleset, Seed, Task, TaskMap, TaskResult, TaskWeights, Tier,
+    Variation,
 };
-use std::collections::BTreeMap;
 
 /// Weight of a task's success rate in the overall score, in percent.
 pub(crate) fn weight_percent(weights: &TaskWeights, task: Task) -> f64 {
@@ -26,21 +26,22 @@ pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Tas
 
 /// Scores an evaluation: weighted score, maximum of the tasks' penalty points, worst of their tiers.
 ///
-/// A missing task counts as 0 in the score. Without any task the score is 0, the penalty 0 and the tier deployable.
+/// `weights` are those of the tasks under the stage's rules. A missing task counts as 0 in the score. Without any task the score is 0, the penalty 0 and the tier deployable.
 #[must_use]
 pub fn score_evaluation(
     ruleset: Ruleset,
     profile: Profile,
     seed: Seed,
     variation: &Variation,
-    tasks: BTreeMap<Task, TaskResult>,
+    weights: &TaskWeights,
+    tasks: TaskMap<TaskResult>,
 ) -> EvaluationResult {
     EvaluationResult {
         ruleset: ruleset.to_string(),
         profile,
         seed,
         score: overall_score(
-            &variation.weights,
+            weights,
             tasks
                 .iter()
                 .map(|(task, result)| (*task, result.success_rate)),
@@ -63,25 +64,26 @@ pub fn score_evaluation(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_airhockey::{DEFEND, HIT, TASKS};
 
     #[test]
     fn perfect_agent_scores_100_for_all_weights() {
         for weights in ["0.4,0.4,0.2", "0.333333,0.333333,0.333334", "1,0,0"] {
-            let weights: TaskWeights = weights.parse().unwrap();
+            let weights = TaskWeights::parse(weights, TASKS.into_iter()).unwrap();
             assert_eq!(
-                overall_score(&weights, Task::ALL.map(|task| (task, 1.0))),
+                overall_score(&weights, TASKS.map(|task| (task, 1.0))),
                 100.0
             );
         }
-        let defend_only: TaskWeights = "0,1,0".parse().unwrap();
-        let rates = [(Task::Hit, 0.9), (Task::Defend, 0.25)];
+        let defend_only = TaskWeights::of(DEFEND);
+        let rates = [(HIT, 0.9), (DEFEND, 0.25)];
         assert_eq!(overall_score(&defend_only, rates), 25.0);
     }
 
     #[test]
     fn mathematically_equal_scores_are_equal() {
-        let score =
-            |rates| overall_score(&TaskWeights::default(), Task::ALL.into_iter().zip(rates));
+        let weights = TaskWeights::parse("0.4,0.4,0.2", TASKS.into_iter()).unwrap();
+        let score = |rates| overall_score(&weights, TASKS.into_iter().zip(rates));
         assert_eq!(score([0.1, 0.2, 0.3]), 18.0);
         assert_eq!(score([0.3, 0.1, 0.1]), 18.0);
     }

@@ -51,7 +51,8 @@ pub use interval::{wilson95, wilson95_of_rate};
 pub use mean::{joined_summary, mean_result};
 pub use paired::{PairedTally, PairingError, SIGNIFICANCE, overall_p_value};
 pub use qualifying::{
-    InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingScores, TaskRow, TaskScore,
+    InvalidTaskScore, InvalidTasks, QUALIFYING_EPISODES, QualifyingRow, QualifyingScores, TaskRow,
+    TaskScore,
 };
 pub use rank_groups::rank_groups;
 pub use solved_episodes::SolvedEpisodes;

@@ -7,10 +7,9 @@ use crate::{
     tier::tier_with_bounds,
 };
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationResult, Ruleset, Seed, Task, TaskResult, TierBounds,
-    UnknownRuleset, ViolationCounts,
+    ComputationTimeSummary, EvaluationResult, Ruleset, Seed, TaskMap, TaskResult, TaskWeights,
+    TierBounds, UnknownRuleset, ViolationCounts,
 };
-use std::collections::BTreeMap;
 
 /// Key derivation context (BLAKE3) of the hash that represents the seeds of several days.
 const SEED_CONTEXT: &str = "faceoff-scoring seeds of several days 1";
@@ -22,10 +21,13 @@ const SEED_CONTEXT: &str = "faceoff-scoring seeds of several days 1";
 /// computation time is over all steps, percentile and maximum are the worst of the days. `seed` represents the seeds of
 /// the evaluations in their sequence.
 ///
+/// `weights` are those of the tasks under the rules of the evaluations.
+///
 /// # Errors
 /// If the ruleset of the first evaluation is unknown.
 pub fn mean_result(
     results: &[&EvaluationResult],
+    weights: &TaskWeights,
 ) -> Result<Option<EvaluationResult>, UnknownRuleset> {
     let [first, ..] = results else {
         return Ok(None);
@@ -38,9 +40,10 @@ pub fn mean_result(
             .collect();
         (*task, mean_task(&days, &first.variation.tier_bounds))
     });
-    let tasks: BTreeMap<Task, TaskResult> = tasks.collect();
+    let tasks: TaskMap<TaskResult> = tasks.collect();
     let seed = joint_seed(results.iter().map(|result| result.seed));
-    let mean = score_evaluation(ruleset, first.profile, seed, &first.variation, tasks);
+    let variation = &first.variation;
+    let mean = score_evaluation(ruleset, first.profile, seed, variation, weights, tasks);
     Ok(Some(mean))
 }
 
@@ -68,13 +71,12 @@ fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
         success_rate: f64::from(successes) / f64::from(episodes.max(1)),
         success_ci95: wilson95(successes, episodes),
         penalty_points: points / days.len().max(1) as f64,
-        violations: ViolationCounts {
-            ee: sum(|day| day.violations.ee),
-            link: sum(|day| day.violations.link),
-            joint_pos: sum(|day| day.violations.joint_pos),
-            joint_vel: sum(|day| day.violations.joint_vel),
-            computation_time: sum(|day| day.violations.computation_time),
-        },
+        violations: days
+            .iter()
+            .fold(ViolationCounts::default(), |mut sum, day| {
+                sum.add(&day.violations);
+                sum
+            }),
         tier: tier_with_bounds(bounds, points, episodes),
         steps,
         computation_time_s: ComputationTimeSummary {
@@ -102,7 +104,7 @@ fn joint_seed(seeds: impl Iterator<Item = Seed>) -> Seed {
 /// would need all outcomes.
 #[must_use]
 pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
-    let mut tasks: BTreeMap<Task, Vec<&TaskSummary>> = BTreeMap::new();
+    let mut tasks: TaskMap<Vec<&TaskSummary>> = TaskMap::new();
     for summary in summaries {
         for (task, task_summary) in &summary.tasks {
             tasks.entry(*task).or_default().push(task_summary);
@@ -126,7 +128,12 @@ pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
 mod tests {
     use super::*;
     use crate::tier::tier_of;
+    use faceoff_airhockey::{EE, HIT, TASKS};
     use faceoff_types::{Profile, Tier, Variation};
+
+    fn weights() -> TaskWeights {
+        TaskWeights::parse("0.4,0.4,0.2", TASKS.into_iter()).unwrap()
+    }
 
     /// The result of an evaluation with 100 episodes of the task hit.
     fn day(seed: u64, successes: u32, penalty_points: f64) -> EvaluationResult {
@@ -136,10 +143,7 @@ mod tests {
             success_rate: f64::from(successes) / 100.0,
             success_ci95: wilson95(successes, 100),
             penalty_points,
-            violations: ViolationCounts {
-                ee: 3,
-                ..ViolationCounts::default()
-            },
+            violations: [(EE, 3)].into_iter().collect(),
             tier: tier_of(penalty_points, 100),
             steps: 1000,
             computation_time_s: ComputationTimeSummary {
@@ -153,18 +157,19 @@ mod tests {
             Profile::Evaluation,
             Seed::from_number(seed),
             &Variation::default(),
-            [(Task::Hit, task)].into(),
+            &weights(),
+            [(HIT, task)].into(),
         )
     }
 
     #[test]
     fn mean_averages_rates_and_points_and_derives_tier() {
-        assert_eq!(mean_result(&[]).unwrap(), None);
+        assert_eq!(mean_result(&[], &weights()).unwrap(), None);
         let (a, b) = (day(1, 40, 20.0), day(2, 60, 100.0));
         assert_eq!((a.tier, b.tier), (Tier::Deployable, Tier::Improvable));
-        assert_eq!(mean_result(&[&a]).unwrap().unwrap(), a);
-        let mean = mean_result(&[&a, &b]).unwrap().unwrap();
-        let hit = &mean.tasks[&Task::Hit];
+        assert_eq!(mean_result(&[&a], &weights()).unwrap().unwrap(), a);
+        let mean = mean_result(&[&a, &b], &weights()).unwrap().unwrap();
+        let hit = &mean.tasks[&HIT];
         assert_eq!(
             (hit.episodes, hit.successes, hit.success_rate),
             (200, 100, 0.5)
@@ -173,11 +178,11 @@ mod tests {
         assert_eq!((hit.penalty_points, mean.penalty_points), (60.0, 60.0));
         assert_eq!(mean.tier, Tier::Improvable, "60 points over 100 episodes");
         assert_eq!(mean.score, 20.0);
-        assert_eq!((hit.violations.ee, hit.steps), (6, 2000));
+        assert_eq!((hit.violations.get(EE), hit.steps), (6, 2000));
         assert!((hit.computation_time_s.mean - 0.05).abs() < 1e-12);
-        let repetition = mean_result(&[&a, &b]).unwrap().unwrap();
+        let repetition = mean_result(&[&a, &b], &weights()).unwrap().unwrap();
         assert_eq!(mean.seed, repetition.seed);
-        let other_order = mean_result(&[&b, &a]).unwrap().unwrap();
+        let other_order = mean_result(&[&b, &a], &weights()).unwrap().unwrap();
         assert_ne!(mean.seed, other_order.seed);
     }
 
@@ -185,7 +190,7 @@ mod tests {
     fn joined_summary_concatenates_episodes_of_days() {
         let summary = |solved: &[bool]| EpisodeSummary {
             tasks: [(
-                Task::Hit,
+                HIT,
                 TaskSummary {
                     successes: solved.iter().copied().collect(),
                     penalty_points: 1.5,
@@ -196,7 +201,7 @@ mod tests {
             tier_change: 0.5,
         };
         let joined = joined_summary(&[&summary(&[true, false]), &summary(&[false, true])]);
-        let hit = &joined.tasks[&Task::Hit];
+        let hit = &joined.tasks[&HIT];
         assert_eq!(
             hit.successes,
             [true, false, false, true].into_iter().collect()

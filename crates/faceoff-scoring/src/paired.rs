@@ -1,7 +1,7 @@
 //! Paired tests: do two teams, A and B, that played the same episodes differ by more than chance?
 
 use crate::{binomial::SymmetricBinomial, successes::Successes};
-use faceoff_types::{Task, TaskWeights};
+use faceoff_types::{Task, TaskMap, TaskWeights};
 use std::collections::BTreeMap;
 
 /// Significance level: two teams differ significantly if an equal or larger difference arises by chance with at most
@@ -67,11 +67,9 @@ impl PairedTally {
     /// equally uneven or more uneven split if both teams are equally good.
     #[must_use]
     pub fn p_value(&self) -> f64 {
-        // With a single task the weight does not matter.
-        overall_p_value(
-            &TaskWeights::default(),
-            &BTreeMap::from([(Task::Hit, *self)]),
-        )
+        // With a single task neither name nor weight matters.
+        const ONLY: Task = Task::new("only");
+        overall_p_value(&TaskWeights::of(ONLY), &TaskMap::from([(ONLY, *self)]))
     }
 }
 
@@ -82,7 +80,7 @@ impl PairedTally {
 /// equal or larger difference in either direction. With one task this is McNemar's exact test. Differences are compared
 /// as integers.
 #[must_use]
-pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTally>) -> f64 {
+pub fn overall_p_value(weights: &TaskWeights, tallies: &TaskMap<PairedTally>) -> f64 {
     // Tasks with weight 0 have no influence.
     let weighted = || {
         let has_influence = |task: &Task, tally: &PairedTally| {
@@ -164,6 +162,7 @@ fn lcm(a: i128, b: i128) -> i128 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use faceoff_airhockey::TASKS;
 
     pub(crate) fn tally(both: u32, only_a: u32, only_b: u32, neither: u32) -> PairedTally {
         PairedTally {
@@ -206,8 +205,8 @@ pub(crate) mod tests {
             .into_iter()
             .flat_map(|tallies| all_weights.map(|weights| (tallies, weights)))
         {
-            let weights: TaskWeights = weights.parse().unwrap();
-            let tallies: BTreeMap<_, _> = Task::ALL.into_iter().zip(tallies).collect();
+            let weights = TaskWeights::parse(weights, TASKS.into_iter()).unwrap();
+            let tallies: TaskMap<_> = TASKS.into_iter().zip(tallies).collect();
             let difference = |only_a: &dyn Fn(Task) -> u32| -> f64 {
                 tallies
                     .iter()
@@ -242,20 +241,15 @@ pub(crate) mod tests {
 
     #[test]
     fn clear_lead_is_significant() {
+        let weights = TaskWeights::parse("0.4,0.4,0.2", TASKS.into_iter()).unwrap();
         let lead = |task_lead: u32| tally(300, 150 + task_lead, 150, 400 - task_lead);
         let p = |hit, defend, prepare| {
             let leads = [lead(hit), lead(defend), lead(prepare)];
-            overall_p_value(
-                &TaskWeights::default(),
-                &Task::ALL.into_iter().zip(leads).collect(),
-            )
+            overall_p_value(&weights, &TASKS.into_iter().zip(leads).collect())
         };
         assert!(p(60, 60, 0) < 1e-4);
         assert!(p(5, 0, 0) > 0.5);
         assert_eq!(p(0, 0, 0), 1.0);
-        assert_eq!(
-            overall_p_value(&TaskWeights::default(), &BTreeMap::new()),
-            1.0
-        );
+        assert_eq!(overall_p_value(&weights, &TaskMap::new()), 1.0);
     }
 }

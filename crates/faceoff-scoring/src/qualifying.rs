@@ -4,12 +4,11 @@ use crate::{
     board::BoardKey, episode::MAX_EPISODE_PENALTY, evaluation::overall_score,
     interval::wilson95_of_rate, tier::tier_with_bounds, unique_map::UniqueMap,
 };
-use faceoff_types::{Task, TaskWeights, TeamName, Tier, TierBounds};
+use faceoff_types::{Task, TaskMap, TaskWeights, TeamName, Tier, TierBounds, UnknownTask};
 use serde::{
     Deserialize, Serialize,
-    de::{Deserializer, Error, IgnoredAny},
+    de::{Deserializer, IgnoredAny},
 };
-use std::collections::BTreeMap;
 
 /// Episodes of each task in the qualifying stage (paper §2.2).
 pub const QUALIFYING_EPISODES: u32 = 1000;
@@ -117,9 +116,9 @@ impl TryFrom<RawTaskScore> for TaskScore {
     }
 }
 
-/// `tasks.json`: the results of each team in the three tasks, in the sequence of the file.
+/// `tasks.json`: the results of each team in the tasks of the competition, in the sequence of the file.
 ///
-/// Deserialisation rejects duplicate teams and tasks, unknown and missing tasks, unknown fields, and numbers that are
+/// Deserialisation rejects duplicate teams and tasks, unknown fields, and numbers that are
 /// impossible under the rules.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct QualifyingScores {
@@ -127,24 +126,34 @@ pub struct QualifyingScores {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct TaskScores(BTreeMap<Task, TaskScore>);
+struct TaskScores(TaskMap<TaskScore>);
 
 impl<'de> Deserialize<'de> for TaskScores {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let scores: BTreeMap<_, _> = UniqueMap::deserialize(deserializer)?
-            .0
-            .into_iter()
-            .collect();
-        match Task::ALL
-            .into_iter()
-            .find(|task| !scores.contains_key(task))
-        {
-            Some(task) => Err(D::Error::custom(format_args!(
-                "task {task} is missing: expected hit, defend and prepare"
-            ))),
-            None => Ok(Self(scores)),
-        }
+        let scores = UniqueMap::deserialize(deserializer)?.0;
+        Ok(Self(scores.into_iter().collect()))
     }
+}
+
+/// A team whose tasks are not those of the competition.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidTasks {
+    /// A task that the competition does not have.
+    #[error("{team}: {source}")]
+    Unknown {
+        /// The team in the file.
+        team: TeamName,
+        /// The task, and those of the competition.
+        source: UnknownTask,
+    },
+    /// A task without results.
+    #[error("{team}: task {task} is missing")]
+    Missing {
+        /// The team in the file.
+        team: TeamName,
+        /// The missing task.
+        task: Task,
+    },
 }
 
 impl<'de> Deserialize<'de> for QualifyingScores {
@@ -168,8 +177,8 @@ pub struct QualifyingRow {
     pub score: f64,
     /// Overall deployability score (DS): the maximum over the tasks.
     pub penalty_points: f64,
-    /// Results of the three tasks.
-    pub tasks: BTreeMap<Task, TaskRow>,
+    /// Results of the tasks.
+    pub tasks: TaskMap<TaskRow>,
 }
 
 /// One task of a [`QualifyingRow`].
@@ -190,22 +199,27 @@ pub struct TaskRow {
 }
 
 impl QualifyingScores {
-    /// The board, best first, ranked as [`overall_board`](crate::overall_board). The position in the file replaces the
-    /// time of submission.
-    #[must_use]
-    pub fn board(&self) -> Vec<QualifyingRow> {
-        self.board_with(&TaskWeights::default(), &TierBounds::default())
-    }
-
-    /// As [`Self::board`], with weights and bounds other than those of the ruleset.
-    #[must_use]
-    pub fn board_with(&self, weights: &TaskWeights, bounds: &TierBounds) -> Vec<QualifyingRow> {
-        let task_ranks = Task::ALL.map(|task| {
+    /// The board, best first, ranked as [`overall_board`](crate::overall_board). The position in the file replaces the time of
+    /// submission. There is a weight for each task of the competition.
+    ///
+    /// # Errors
+    /// The first team with a task that the competition does not have, or without one of its tasks.
+    pub fn board(
+        &self,
+        weights: &TaskWeights,
+        bounds: &TierBounds,
+    ) -> Result<Vec<QualifyingRow>, InvalidTasks> {
+        let tasks: Vec<Task> = weights.tasks().collect();
+        for (team, scores) in &self.teams {
+            scores.check(team, &tasks)?;
+        }
+        let ranks_of_task = |task: &Task| {
             self.ranks(|scores| {
-                let score = scores.0[&task];
+                let score = scores.0[task];
                 (score.tier(bounds), score.success_rate, score.penalty_points)
             })
-        });
+        };
+        let task_ranks: Vec<Vec<u32>> = tasks.iter().map(ranks_of_task).collect();
         let ranks = self.ranks(|scores| {
             (
                 scores.tier(bounds),
@@ -221,15 +235,15 @@ impl QualifyingScores {
                 tier: scores.tier(bounds),
                 score: scores.score(weights),
                 penalty_points: scores.penalty_points(),
-                tasks: Task::ALL
-                    .into_iter()
+                tasks: tasks
+                    .iter()
                     .zip(&task_ranks)
-                    .map(|(task, ranks)| (task, scores.0[&task].row(ranks[index], bounds)))
+                    .map(|(task, ranks)| (*task, scores.0[task].row(ranks[index], bounds)))
                     .collect(),
             })
             .collect();
         rows.sort_by_key(|row| row.rank);
-        rows
+        Ok(rows)
     }
 
     /// The rank of each team, in the sequence of the file.
@@ -251,6 +265,25 @@ impl QualifyingScores {
 }
 
 impl TaskScores {
+    /// Checks that there is a score for each of `tasks`, and for no other.
+    fn check(&self, team: &TeamName, tasks: &[Task]) -> Result<(), InvalidTasks> {
+        let team = || team.clone();
+        if let Some(unknown) = self.0.keys().find(|task| !tasks.contains(task)) {
+            let source = UnknownTask::new(unknown.as_str(), tasks.iter().copied());
+            return Err(InvalidTasks::Unknown {
+                team: team(),
+                source,
+            });
+        }
+        match tasks.iter().find(|task| !self.0.contains_key(*task)) {
+            Some(task) => Err(InvalidTasks::Missing {
+                team: team(),
+                task: *task,
+            }),
+            None => Ok(()),
+        }
+    }
+
     fn tier(&self, bounds: &TierBounds) -> Tier {
         self.0
             .values()

@@ -1,9 +1,8 @@
 //! The episodes that each of two compared evaluations solved, by number.
 
 use crate::{ComparedEvaluation, NotComparable};
-use faceoff_types::Task;
+use faceoff_types::TaskMap;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// Numbers of the episodes of one task, by which of two evaluations (A and B) solved them; each list is ascending.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,10 +23,7 @@ impl ComparedEvaluation<'_> {
     ///
     /// # Errors
     /// If the episodes are not the same: the field that differs.
-    pub fn solved_episodes(
-        &self,
-        other: &Self,
-    ) -> Result<BTreeMap<Task, SolvedEpisodes>, NotComparable> {
+    pub fn solved_episodes(&self, other: &Self) -> Result<TaskMap<SolvedEpisodes>, NotComparable> {
         // Checks that the episodes are the same.
         self.compare(other)?;
         let tasks = self.summary.tasks.iter().zip(other.summary.tasks.values());

@@ -6,16 +6,15 @@ use crate::{
     successes::Successes,
     tier_change::TierChange,
 };
-use faceoff_types::{EpisodeOutcome, Task, TierBounds};
+use faceoff_types::{EpisodeOutcome, Task, TaskMap, TierBounds};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// Summary of an evaluation's episodes for boards and comparisons: some hundred bytes per task instead of all outcomes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpisodeSummary {
     /// One summary for each task of the evaluation.
-    pub tasks: BTreeMap<Task, TaskSummary>,
+    pub tasks: TaskMap<TaskSummary>,
     /// As [`TaskSummary::tier_change`], for the overall tier, which is the worst of the tasks' tiers.
     pub tier_change: f64,
 }
@@ -39,19 +38,22 @@ impl EpisodeSummary {
     /// previous one.
     pub const VERSION: u32 = 2;
 
-    /// Summarises an evaluation's episodes, given in any sequence; `bounds` decide the tiers. The same episodes give
+    /// Summarises an evaluation's episodes, given in any sequence, with the tasks in the order of `tasks`; `bounds` decide the tiers. The same episodes give
     /// bit-identical summaries.
     ///
     /// # Errors
     /// If the episodes of a task are not 0, 1, … n − 1, each once.
     pub fn from_outcomes(
         outcomes: &[EpisodeOutcome],
+        tasks: &[Task],
         bounds: &TierBounds,
     ) -> Result<Self, PairingError> {
-        let mut by_task = BTreeMap::<Task, Vec<&EpisodeOutcome>>::new();
+        let mut by_task: TaskMap<Vec<&EpisodeOutcome>> =
+            tasks.iter().map(|task| (*task, Vec::new())).collect();
         for outcome in outcomes {
             by_task.entry(outcome.task).or_default().push(outcome);
         }
+        by_task.retain(|_, episodes| !episodes.is_empty());
         for (task, episodes) in &mut by_task {
             episodes.sort_unstable_by_key(|outcome| outcome.episode);
             for (expected, outcome) in (0..).zip(episodes.iter()) {

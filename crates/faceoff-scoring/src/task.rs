@@ -1,12 +1,12 @@
 //! The result of one task from the outcomes of its episodes.
 
 use crate::{
-    episode::{episode_penalty, has_fault, time_or_fault_penalty},
+    episode::{episode_penalty, has_fault, time_or_fault_penalty, violation_counts},
     interval::wilson95,
     step_times::StepTimes,
     tier::tier_with_bounds,
 };
-use faceoff_types::{EpisodeOutcome, TaskResult, TierBounds, ViolationCounts};
+use faceoff_types::{EpisodeOutcome, TaskResult, TierBounds};
 
 /// Scores one task from its episodes; `bounds` decide the tier.
 ///
@@ -37,13 +37,10 @@ pub fn score_task(
         },
         success_ci95: wilson95(successes, episodes),
         penalty_points,
-        violations: ViolationCounts {
-            ee: count(outcomes, |outcome| outcome.violations.ee),
-            link: count(outcomes, |outcome| outcome.violations.link),
-            joint_pos: count(outcomes, |outcome| outcome.violations.joint_pos),
-            joint_vel: count(outcomes, |outcome| outcome.violations.joint_vel),
-            computation_time: count(outcomes, |outcome| time_or_fault_penalty(outcome) > 0.0),
-        },
+        violations: violation_counts(outcomes.iter().map(|outcome| {
+            let is_late = time_or_fault_penalty(outcome) > 0.0;
+            (&outcome.violations, is_late)
+        })),
         tier: tier_with_bounds(bounds, penalty_points, episodes),
         steps: outcomes
             .iter()

@@ -2,8 +2,7 @@
 //! many samples of the evaluation's own episodes, drawn with replacement.
 
 use crate::{draws::Draws, episode::MAX_EPISODE_PENALTY, tier::tier_with_bounds};
-use faceoff_types::{Task, Tier, TierBounds};
-use std::collections::BTreeMap;
+use faceoff_types::{TaskMap, Tier, TierBounds};
 
 /// Resamples of the bootstrap: the standard error of a probability of one half is 1.1 percentage points, and smaller near
 /// 0 and 1.
@@ -19,7 +18,7 @@ const MAX_HALVES: f64 = 2.0 * MAX_EPISODE_PENALTY;
 /// Probabilities of another tier on other episodes of the same kind.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TierChange {
-    pub(crate) tasks: BTreeMap<Task, f64>,
+    pub(crate) tasks: TaskMap<f64>,
     pub(crate) overall: f64,
 }
 
@@ -29,9 +28,9 @@ impl TierChange {
     /// Each resample draws the same number of episodes of each task, with replacement. The draws come from BLAKE3 keyed
     /// with the penalty points in ascending order. The same evaluation therefore always gives the same numbers,
     /// regardless of machine, time and sequence of episodes.
-    pub(crate) fn from_points(points: BTreeMap<Task, Vec<f64>>, bounds: &TierBounds) -> Self {
+    pub(crate) fn from_points(points: TaskMap<Vec<f64>>, bounds: &TierBounds) -> Self {
         let mut key = blake3::Hasher::new_derive_key(STREAM);
-        let tasks: BTreeMap<Task, TaskPoints> = points
+        let tasks: TaskMap<TaskPoints> = points
             .into_iter()
             .filter(|(_, points)| !points.is_empty())
             .map(|(task, points)| {
@@ -46,7 +45,7 @@ impl TierChange {
         let observed = worst(&mut tasks.values().map(|task| task.tier));
 
         let mut draws = Draws::new(key.finalize_xof());
-        let mut changed: BTreeMap<Task, u32> = tasks.keys().map(|task| (*task, 0)).collect();
+        let mut changed: TaskMap<u32> = tasks.keys().map(|task| (*task, 0)).collect();
         let mut changed_overall = 0;
         for _ in 0..TIER_CHANGE_RESAMPLES {
             let tiers = tasks.iter().map(|(task, task_points)| {
@@ -121,6 +120,8 @@ fn tier_of_halves(bounds: &TierBounds, halves: u64, episodes: u32) -> Tier {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_airhockey::{DEFEND, HIT};
+    use faceoff_types::Task;
     use statrs::distribution::{Binomial, DiscreteCDF};
 
     fn change(points: &[(Task, Vec<f64>)]) -> TierChange {
@@ -152,7 +153,7 @@ mod tests {
                 exact.cdf(fewest - 1)
             };
             let expected = 1.0 - (exact.cdf(most) - below);
-            let got = change(&[(Task::Hit, episodes(1000, violated, 3.0))]).tasks[&Task::Hit];
+            let got = change(&[(HIT, episodes(1000, violated, 3.0))]).tasks[&HIT];
             assert!(
                 (got - expected).abs() < 0.035,
                 "{violated} violated: {got}, exactly {expected}"
@@ -162,23 +163,23 @@ mod tests {
 
     #[test]
     fn tier_change_is_zero_for_equal_or_no_points() {
-        let clean = change(&[(Task::Hit, vec![0.0; 50]), (Task::Defend, vec![11.0; 50])]);
+        let clean = change(&[(HIT, vec![0.0; 50]), (DEFEND, vec![11.0; 50])]);
         assert_eq!(clean.overall, 0.0);
-        assert_eq!(clean.tasks[&Task::Hit], 0.0);
+        assert_eq!(clean.tasks[&HIT], 0.0);
         let empty = change(&[]);
         assert_eq!((empty.overall, empty.tasks.len()), (0.0, 0));
-        assert_eq!(change(&[(Task::Hit, Vec::new())]).overall, 0.0);
+        assert_eq!(change(&[(HIT, Vec::new())]).overall, 0.0);
     }
 
     #[test]
     fn worst_task_decides_overall_tier_change() {
         let uncertain = episodes(50, 8, 3.0); // 24 points; deployable up to 25
-        let alone = change(&[(Task::Hit, uncertain.clone())]);
+        let alone = change(&[(HIT, uncertain.clone())]);
         assert!((0.2..0.6).contains(&alone.overall), "{alone:?}");
-        assert_eq!(alone.overall, alone.tasks[&Task::Hit]);
-        let with_bad_task = change(&[(Task::Hit, uncertain), (Task::Defend, vec![11.0; 50])]);
+        assert_eq!(alone.overall, alone.tasks[&HIT]);
+        let with_bad_task = change(&[(HIT, uncertain), (DEFEND, vec![11.0; 50])]);
         assert_eq!(with_bad_task.overall, 0.0);
-        assert!(with_bad_task.tasks[&Task::Hit] > 0.2);
+        assert!(with_bad_task.tasks[&HIT] > 0.2);
     }
 
     #[test]
@@ -186,8 +187,8 @@ mod tests {
         let points = episodes(50, 8, 3.0);
         let mut reversed = points.clone();
         reversed.reverse();
-        let expected = change(&[(Task::Hit, points)]);
-        assert_eq!(change(&[(Task::Hit, reversed)]), expected);
+        let expected = change(&[(HIT, points)]);
+        assert_eq!(change(&[(HIT, reversed)]), expected);
         // pinned: published numbers must not change with the machine or the compiler
         assert_eq!(expected.overall, 0.4025);
     }

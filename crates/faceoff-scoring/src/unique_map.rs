@@ -1,7 +1,7 @@
 //! A JSON object whose keys must be unique.
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
-use std::{collections::BTreeSet, fmt, marker::PhantomData, str::FromStr};
+use std::{collections::HashSet, fmt, hash::Hash, marker::PhantomData, str::FromStr};
 
 /// A JSON object with parsed keys, in the sequence of the file. Duplicate keys are refused: JSON readers silently use the
 /// last one, and a board would lose a team.
@@ -9,7 +9,7 @@ pub(crate) struct UniqueMap<K, V>(pub(crate) Vec<(K, V)>);
 
 impl<'de, K, V> Deserialize<'de> for UniqueMap<K, V>
 where
-    K: FromStr<Err: fmt::Display> + Ord + Clone + fmt::Display,
+    K: FromStr<Err: fmt::Display> + Eq + Hash + Clone + fmt::Display,
     V: Deserialize<'de>,
 {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -21,7 +21,7 @@ struct UniqueMapVisitor<K, V>(PhantomData<(K, V)>);
 
 impl<'de, K, V> Visitor<'de> for UniqueMapVisitor<K, V>
 where
-    K: FromStr<Err: fmt::Display> + Ord + Clone + fmt::Display,
+    K: FromStr<Err: fmt::Display> + Eq + Hash + Clone + fmt::Display,
     V: Deserialize<'de>,
 {
     type Value = UniqueMap<K, V>;
@@ -32,7 +32,7 @@ where
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
         let mut entries = Vec::new();
-        let mut seen_keys = BTreeSet::new();
+        let mut seen_keys = HashSet::new();
         while let Some(text) = map.next_key::<String>()? {
             let key: K = text
                 .parse()

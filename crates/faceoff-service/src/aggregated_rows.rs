@@ -5,7 +5,7 @@
 use crate::problem::Problem;
 use faceoff_scoring::mean_result;
 use faceoff_store::BoardRecord;
-use faceoff_types::{CountingResult, EvaluationId, RunId, StageId, Task};
+use faceoff_types::{Competition, CountingResult, EvaluationId, RunId, StageId, Task};
 use jiff::{Timestamp, civil::Date};
 
 /// A team's row, aggregated from the evaluations that count on the board.
@@ -30,9 +30,16 @@ impl AggregatedRow {
     }
 
     /// The mean of a team's evaluations, which are in order of their days; `None` if there are none.
-    pub fn mean(mut records: Vec<BoardRecord>) -> Result<Option<Self>, Problem> {
+    pub fn mean(
+        mut records: Vec<BoardRecord>,
+        competition: &Competition,
+    ) -> Result<Option<Self>, Problem> {
+        let Some(first) = records.first() else {
+            return Ok(None);
+        };
+        let weights = competition.weights(&first.result.variation);
         let results: Vec<_> = records.iter().map(|record| &record.result).collect();
-        let Some(result) = mean_result(&results).map_err(Problem::internal)? else {
+        let Some(result) = mean_result(&results, &weights).map_err(Problem::internal)? else {
             return Ok(None);
         };
         let evaluations = records.iter().map(|record| record.evaluation).collect();

@@ -1,6 +1,7 @@
 //! Path parameters of URLs that identify an episode: one attempt of an agent at a task.
 
 use crate::{
+    app::App,
     extract::PathParams,
     problem::{Problem, ProblemKind},
 };
@@ -17,15 +18,15 @@ pub struct EpisodePath {
     pub episode: u32,
 }
 
-impl<S: Send + Sync> FromRequestParts<S> for EpisodePath {
+impl FromRequestParts<App> for EpisodePath {
     type Rejection = Problem;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
         let PathParams([id, task, episode]) =
-            PathParams::<String, 3>::from_request_parts(parts, state).await?;
+            PathParams::<String, 3>::from_request_parts(parts, app).await?;
         Ok(Self {
             id: parse(&id, "evaluation")?,
-            task: parse(&task, "task")?,
+            task: known_task(app, &task)?,
             episode: parse(&episode, "episode")?,
         })
     }
@@ -43,19 +44,24 @@ pub struct AblationPath {
     pub episode: u32,
 }
 
-impl<S: Send + Sync> FromRequestParts<S> for AblationPath {
+impl FromRequestParts<App> for AblationPath {
     type Rejection = Problem;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
         let PathParams([id, profile, task, episode]) =
-            PathParams::<String, 4>::from_request_parts(parts, state).await?;
+            PathParams::<String, 4>::from_request_parts(parts, app).await?;
         Ok(Self {
             submission: parse(&id, "submission")?,
             profile: parse(&profile, "profile")?,
-            task: parse(&task, "task")?,
+            task: known_task(app, &task)?,
             episode: parse(&episode, "episode")?,
         })
     }
+}
+
+fn known_task(app: &App, name: &str) -> Result<Task, Problem> {
+    let found = app.config.competition.find_task(name);
+    found.map_err(|error| Problem::new(ProblemKind::NotFound, error.to_string()))
 }
 
 /// Parses a path parameter; `name` is for the message. A parameter that cannot be parsed gives 404, as an unknown id does.

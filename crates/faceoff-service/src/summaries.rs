@@ -73,9 +73,12 @@ impl Summaries {
 
     async fn summarise(&self, run: RunId) -> Result<EpisodeSummary, Problem> {
         let outcomes = self.store.outcomes(run).await?;
-        let tier_bounds = self.store.run_variation(run).await?.tier_bounds;
+        let plan = self.store.run_plan(run).await?;
         // Takes some ten milliseconds, so it runs off the threads that handle requests.
-        tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &tier_bounds))
+        let summarise = move || {
+            EpisodeSummary::from_outcomes(&outcomes, &plan.tasks, &plan.variation.tier_bounds)
+        };
+        tokio::task::spawn_blocking(summarise)
             .await
             .map_err(Problem::internal)?
             .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))

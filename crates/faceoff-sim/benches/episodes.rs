@@ -1,11 +1,12 @@
 //! Benchmark: control steps per second while the arms hold their position, in single episodes, in a game, and in many episodes at once.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS,
     PerturbationSettings, Plant, model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Seed};
 use std::hint::black_box;
 
 /// Control steps of one measured run.
@@ -20,7 +21,7 @@ fn episode(c: &mut Criterion) {
     group.throughput(Throughput::Elements(STEPS));
     for (name, factors) in [("ideal", Factors::NONE), ("evaluation", Factors::ALL)] {
         let plant = Plant::for_factors(factors, &settings, Seed::from_number(0));
-        for task in Task::ALL {
+        for task in AirHockeyTask::ALL {
             let episode = Episode::new(
                 task,
                 Interpolation::Cubic,
@@ -75,7 +76,7 @@ fn batch(c: &mut Criterion) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let Ok(pool) = pool else { continue };
         let mut batch = Batch::new(BatchSetup {
-            task: Task::Prepare,
+            task: AirHockeyTask::Prepare,
             interpolation: Interpolation::Cubic,
             factors: Factors::NONE,
             settings: PerturbationSettings::default(),

@@ -4,6 +4,7 @@
 //! row per world. A world whose episode ends starts its next episode at once. The episodes of a world depend only on its row, not on
 //! the threads. The threads come from rayon's current pool: callers set their number with `ThreadPool::install`.
 
+use crate::AirHockeyTask;
 use crate::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     dynamics::simd_level::SimdLevel,
@@ -11,7 +12,7 @@ use crate::{
     episode_step::step_episodes_on,
     robot::plant::Plant,
 };
-use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed, Task};
+use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed};
 use rayon::prelude::*;
 
 /// Number of worlds that one thread steps at once.
@@ -20,7 +21,7 @@ const WORLDS_PER_CHUNK: usize = 4;
 /// Task, perturbations and seed of a batch.
 #[derive(Debug, Clone)]
 pub struct BatchSetup {
-    pub task: Task,
+    pub task: AirHockeyTask,
     /// How actions become trajectories.
     pub interpolation: Interpolation,
     /// The active kinds of perturbations.

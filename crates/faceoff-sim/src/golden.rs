@@ -4,6 +4,7 @@
 //! `tests/golden/simulator.txt` holds the hashes. This crate's tests compare what the library computes;
 //! `faceoff sim golden` prints the hashes of a built program, so that a release can be checked too.
 
+use crate::AirHockeyTask;
 use crate::{
     channel::Command,
     episode::Episode,
@@ -11,7 +12,7 @@ use crate::{
     model::{EE_DESIRED_HEIGHT_M, JOINTS},
     robot::{inverse_kinematics::inverse_kinematics, plant::Plant},
 };
-use faceoff_types::{Interpolation, PerturbationSettings, Profile, Seed, Task};
+use faceoff_types::{Interpolation, PerturbationSettings, Profile, Seed};
 use std::fmt;
 
 /// The perturbation profiles: without perturbations, and with those of an evaluation.
@@ -46,14 +47,14 @@ impl fmt::Display for Golden {
 pub fn all() -> impl Iterator<Item = Golden> {
     let episodes = PROFILES
         .into_iter()
-        .flat_map(|profile| Task::ALL.map(|task| play_episode(task, profile)));
+        .flat_map(|profile| AirHockeyTask::ALL.map(|task| play_episode(task, profile)));
     let games = PROFILES.into_iter().map(|profile| play_game(profile).0);
     episodes.chain(games)
 }
 
 /// Runs a golden episode to its end.
 #[must_use]
-pub fn play_episode(task: Task, profile: Profile) -> Golden {
+pub fn play_episode(task: AirHockeyTask, profile: Profile) -> Golden {
     Golden {
         name: format!("{task} {profile}"),
         hash: episode_hash(start_episode(task, profile)),
@@ -73,7 +74,7 @@ pub fn play_game(profile: Profile) -> (Golden, Game) {
 
 /// A golden episode at its start.
 #[must_use]
-pub fn start_episode(task: Task, profile: Profile) -> Episode {
+pub fn start_episode(task: AirHockeyTask, profile: Profile) -> Episode {
     let (factors, settings) = (profile.factors(), PerturbationSettings::default());
     let root = Seed::from_number(SEED);
     let plant = Plant::for_factors(factors, &settings, root.model_mismatch());

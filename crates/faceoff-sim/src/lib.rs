@@ -40,7 +40,7 @@ pub use batch::{Batch, BatchOutcome, BatchSetup};
 pub use channel::Command;
 pub use dynamics::simd_level::SimdLevel;
 pub use episode::{
-    EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
+    AirHockeyTask, EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
     constraints::ConstraintValues,
     env_info::{EnvInfo, env_info, env_info_for},
 };

@@ -3,10 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark fails by panicking")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use faceoff_airhockey::TASKS;
 use faceoff_store::Store;
 use faceoff_types::{
     ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, Ruleset, RunId, Seed,
-    ShardId, StageId, StageRules, StageSettings, SubmissionId, Task, TaskResult, TeamId, Tier,
+    ShardId, StageId, StageRules, StageSettings, SubmissionId, TaskResult, TeamId, Tier,
     ViolationCounts, Zone,
 };
 use jiff::{Timestamp, ToSpan, civil::date};
@@ -45,7 +46,7 @@ fn evaluation_result(score: f64) -> EvaluationResult {
         ruleset: RULESET.into(),
         profile: Profile::Evaluation,
         seed: Seed::from_number(1),
-        tasks: Task::ALL.map(|name| (name, task.clone())).into(),
+        tasks: TASKS.map(|name| (name, task.clone())).into(),
         score,
         penalty_points: 327.5,
         tier: Tier::Deployable,
@@ -172,7 +173,7 @@ fn board(criterion: &mut Criterion) {
             runtimes: None,
             ruleset: Ruleset::CURRENT,
             profile: Profile::Evaluation,
-            tasks: Task::ALL.to_vec(),
+            tasks: TASKS.to_vec(),
             episodes_per_task: 1000,
             max_faults: 10,
             variation: Default::default(),

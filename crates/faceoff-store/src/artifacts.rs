@@ -42,6 +42,15 @@ pub struct Artifacts {
     folder: Arc<Path>,
 }
 
+/// The clips of a shard of an ablation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AblationPart {
+    pub profile: Profile,
+    pub task: Task,
+    pub first_episode: u32,
+    pub key: String,
+}
+
 impl Artifacts {
     /// Opens the artifacts of a folder, which is created if necessary.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
@@ -158,17 +167,22 @@ impl Artifacts {
         Ok(ids.collect())
     }
 
-    /// The parts (clips of shards) of an ablation: profile and key of each.
+    /// The parts (clips of shards) of an ablation, in any order.
     #[boxed]
-    pub async fn list_ablation_parts(&self, id: AblationId) -> Result<Vec<(Profile, String)>> {
+    pub async fn list_ablation_parts(&self, id: AblationId) -> Result<Vec<AblationPart>> {
         let folder = parse_key(&Self::ablation_parts_prefix(id))?;
         let listing = self.objects.list_with_delimiter(Some(&folder));
         let parts = listing.await.map_err(artifact_error)?.objects;
-        let parts_with_profile = parts.iter().filter_map(|part| {
-            let (profile, _) = part.location.filename()?.split_once('.')?;
-            Some((profile.parse().ok()?, part.location.to_string()))
+        let parts = parts.iter().filter_map(|part| {
+            let mut name = part.location.filename()?.split('.');
+            Some(AblationPart {
+                profile: name.next()?.parse().ok()?,
+                task: name.next()?.parse().ok()?,
+                first_episode: name.next()?.parse().ok()?,
+                key: part.location.to_string(),
+            })
         });
-        Ok(parts_with_profile.collect())
+        Ok(parts.collect())
     }
 
     /// Copies an artifact to a new file and flushes it to disk.

@@ -44,7 +44,7 @@ mod write_ahead_log;
 /// does. This saves the server, the workers and every test from compiling it. A call costs one allocation.
 pub(crate) use async_recursion::async_recursion as boxed;
 
-pub use artifacts::{ArtifactStream, Artifacts};
+pub use artifacts::{AblationPart, ArtifactStream, Artifacts};
 pub use error::StoreError;
 pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
 pub use free_space::{DiskSpace, FreeSpace};

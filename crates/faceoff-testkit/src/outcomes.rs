@@ -1,5 +1,6 @@
 //! Outcomes of episodes, and their commit.
 
+use faceoff_airhockey::LEFT_TABLE;
 use faceoff_store::{Shard, ShardCommit};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Task, Violations,
@@ -19,8 +20,8 @@ pub fn outcome(task: Task, episode: u32, has_fault: bool) -> EpisodeOutcome {
         episode,
         steps: 17,
         end: match has_fault {
-            true => EpisodeEnd::AgentFault,
-            false => EpisodeEnd::LeftTable,
+            true => EpisodeEnd::AGENT_FAULT,
+            false => LEFT_TABLE,
         },
         success: !has_fault,
         violations: Violations::default(),

@@ -1,14 +1,15 @@
 //! Plans of runs, and stages that have them.
 
+use faceoff_airhockey::{DEFEND, HIT, PREPARE};
 use faceoff_store::{Actor, RunPlan, Stage, StageChange, Store, StoreError};
-use faceoff_types::{Profile, Ruleset, Schedule, StageId, StageRules, StageSettings, Task, Zone};
+use faceoff_types::{Profile, Ruleset, Schedule, StageId, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 
 /// 3 tasks of 4 episodes in shards of 2 episodes. 3 agent faults are allowed.
 pub fn six_shard_plan() -> RunPlan {
     RunPlan {
         profile: Profile::Evaluation,
-        tasks: vec![Task::Prepare, Task::Hit, Task::Defend],
+        tasks: vec![HIT, DEFEND, PREPARE],
         episodes_per_task: 4,
         episodes_per_shard: 2,
         max_faults: 3,
@@ -20,7 +21,7 @@ pub fn six_shard_plan() -> RunPlan {
 /// 4 episodes of one task in shards of 2 episodes.
 pub fn two_shard_plan() -> RunPlan {
     RunPlan {
-        tasks: vec![Task::Hit],
+        tasks: vec![HIT],
         ..six_shard_plan()
     }
 }

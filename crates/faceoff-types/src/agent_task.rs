@@ -1,5 +1,4 @@
-//! The task that an agent is given: a qualifying task (hit, defend or prepare), or one side of a game against another
-//! agent.
+//! The task that an agent is given: a task of the competition, or one side of a game against another agent.
 
 use crate::Task;
 use serde::{Deserialize, Serialize};
@@ -7,7 +6,7 @@ use std::fmt;
 
 /// The task of an agent: a qualifying task, or one side of a game. Its JSON is `{"task":"hit"}` or
 /// `{"task":"tournament","side":2}`, for use with `#[serde(flatten)]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "AgentTaskFields", into = "AgentTaskFields")]
 pub enum AgentTask {
     /// Episodes of a qualifying task.
@@ -20,6 +19,18 @@ pub enum AgentTask {
 }
 
 impl AgentTask {
+    /// The name of games where others have the name of a task. No competition has a task of this name.
+    pub const GAME: Task = Task::new("tournament");
+
+    /// The name in the protocol: that of the task, or [`Self::GAME`].
+    #[must_use]
+    pub const fn name(self) -> Task {
+        match self {
+            Self::Qualifying(task) => task,
+            Self::Game { .. } => Self::GAME,
+        }
+    }
+
     /// `agent_id` of the protocol: 1, or 2 for the second side of a game.
     #[must_use]
     pub const fn agent_id(self) -> u32 {
@@ -106,42 +117,32 @@ impl TryFrom<u32> for Side {
 /// The JSON form of [`AgentTask`].
 #[derive(Serialize, Deserialize)]
 struct AgentTaskFields {
-    task: TaskName,
+    task: Task,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     side: Option<Side>,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum TaskName {
-    Hit,
-    Defend,
-    Prepare,
-    Tournament,
-}
-
 impl From<AgentTask> for AgentTaskFields {
     fn from(agent_task: AgentTask) -> Self {
-        let (task, side) = match agent_task {
-            AgentTask::Qualifying(Task::Hit) => (TaskName::Hit, None),
-            AgentTask::Qualifying(Task::Defend) => (TaskName::Defend, None),
-            AgentTask::Qualifying(Task::Prepare) => (TaskName::Prepare, None),
-            AgentTask::Game { side } => (TaskName::Tournament, Some(side)),
+        let side = match agent_task {
+            AgentTask::Qualifying(_) => None,
+            AgentTask::Game { side } => Some(side),
         };
-        Self { task, side }
+        Self {
+            task: agent_task.name(),
+            side,
+        }
     }
 }
 
 impl TryFrom<AgentTaskFields> for AgentTask {
     type Error = &'static str;
     fn try_from(AgentTaskFields { task, side }: AgentTaskFields) -> Result<Self, Self::Error> {
-        match (task, side) {
-            (TaskName::Hit, None) => Ok(Self::Qualifying(Task::Hit)),
-            (TaskName::Defend, None) => Ok(Self::Qualifying(Task::Defend)),
-            (TaskName::Prepare, None) => Ok(Self::Qualifying(Task::Prepare)),
-            (TaskName::Tournament, Some(side)) => Ok(Self::Game { side }),
-            (TaskName::Tournament, None) => Err("a tournament needs a side, 1 or 2"),
-            (_, Some(_)) => Err("only a tournament has sides"),
+        match (task == Self::GAME, side) {
+            (false, None) => Ok(Self::Qualifying(task)),
+            (true, Some(side)) => Ok(Self::Game { side }),
+            (true, None) => Err("a tournament needs a side, 1 or 2"),
+            (false, Some(_)) => Err("only a tournament has sides"),
         }
     }
 }

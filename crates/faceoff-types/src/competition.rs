@@ -1,6 +1,9 @@
 //! A competition: what the platform has to know of it in order to run and to show it.
 
-use crate::{Millionths, Task};
+use crate::{
+    EpisodeEnd, InvalidStageRules, Millionths, StageRules, Task, TaskMap, TaskWeights, Variation,
+    ViolationCounts, ViolationName, task_weights::listed,
+};
 
 /// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,6 +14,8 @@ pub struct Competition {
     pub title: String,
     /// In the order of boards.
     pub tasks: Vec<TaskInfo>,
+    /// How episodes end, in the order of lists.
+    pub ends: Vec<EndInfo>,
     /// Kinds of violations of the agent's limits, in the order of tables.
     pub violations: Vec<ViolationInfo>,
 }
@@ -30,13 +35,26 @@ pub struct TaskInfo {
     pub max_steps: u32,
 }
 
+/// A way in which episodes end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EndInfo {
+    /// Its name in files and queries.
+    pub end: EpisodeEnd,
+    /// Its name in lists, such as "time limit reached".
+    pub title: String,
+}
+
 /// A kind of violation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViolationInfo {
     /// Its name in files and queries.
-    pub name: String,
+    pub name: ViolationName,
     /// Its name in lists, such as "end effector".
     pub title: String,
+    /// The heading of its columns, such as "joint position".
+    pub column: String,
+    /// The heading of its columns in a terminal, of at most four letters.
+    pub short: String,
     /// What has happened, such as "end effector out of bounds".
     pub breach: String,
     /// The least and the most penalty points for it in one episode.
@@ -61,10 +79,17 @@ impl Competition {
             add(&task.max_steps.to_string());
         }
         for violation in &self.violations {
-            add(&violation.name);
+            add(violation.name.as_str());
             add(&violation.points_text());
         }
         hasher.finalize().to_string()
+    }
+
+    /// The name of an end in lists; its name in files if the competition has no such end.
+    #[must_use]
+    pub fn end_title<'a>(&'a self, end: &'a EpisodeEnd) -> &'a str {
+        let found = self.ends.iter().find(|info| info.end == *end);
+        found.map_or(end.as_str(), |info| &info.title)
     }
 
     /// The tasks in the order of boards.
@@ -72,10 +97,86 @@ impl Competition {
         self.tasks.iter().map(|info| info.task)
     }
 
+    /// The weights of the tasks under a stage's rules.
+    #[must_use]
+    pub fn weights(&self, variation: &Variation) -> TaskWeights {
+        let own = || self.tasks.iter().map(|info| (info.task, info.weight));
+        let weights = variation.weights.clone();
+        weights.unwrap_or_else(|| TaskWeights::unchecked(own().collect()))
+    }
+
+    /// These counts, and 0 for all other kinds of violations.
+    #[must_use]
+    pub fn violation_counts(&self, counts: &[(ViolationName, u32)]) -> ViolationCounts {
+        let zeros = self.violations.iter().map(|info| (info.name, 0));
+        zeros.chain(counts.iter().copied()).collect()
+    }
+
+    /// A task of this competition from its name.
+    ///
+    /// # Errors
+    /// If the competition has no such task.
+    pub fn find_task(&self, name: &str) -> Result<Task, UnknownTask> {
+        let found = self.task_names().find(|task| task.as_str() == name);
+        found.ok_or_else(|| UnknownTask::new(name, self.task_names()))
+    }
+
+    /// Checks that evaluations are possible under these rules, and brings tasks and weights into the order of the competition.
+    /// Weights that are those of the competition are left out.
+    ///
+    /// # Errors
+    /// The first invalid field.
+    pub fn check_rules(&self, rules: &mut StageRules) -> Result<(), InvalidStageRules> {
+        rules.check()?;
+        for task in &rules.tasks {
+            self.find_task(task.as_str())?;
+        }
+        let order = |task: &Task| self.task_names().position(|other| other == *task);
+        rules.tasks.sort_by_key(order);
+        if let Some(weights) = &rules.variation.weights {
+            let weights = weights.in_order(self.task_names())?;
+            let is_own = weights == self.weights(&Variation::default());
+            rules.variation.weights = (!is_own).then_some(weights);
+        }
+        Ok(())
+    }
+
+    /// The tasks of a map in the order of the competition, whatever the order of the map.
+    ///
+    /// # Errors
+    /// If the competition does not have a task of the map.
+    pub fn played_tasks<V>(&self, map: &TaskMap<V>) -> Result<Vec<Task>, UnknownTask> {
+        for task in map.keys() {
+            self.find_task(task.as_str())?;
+        }
+        let is_played = |task: &Task| map.contains_key(task);
+        Ok(self.task_names().filter(is_played).collect())
+    }
+
     /// The description of a task; `None` if the competition has no such task.
     #[must_use]
     pub fn task(&self, task: Task) -> Option<&TaskInfo> {
         self.tasks.iter().find(|info| info.task == task)
+    }
+}
+
+/// A name that no task of the competition has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown task {name:?}: expected {expected}")]
+pub struct UnknownTask {
+    name: String,
+    /// The names of the competition's tasks, in words.
+    expected: String,
+}
+
+impl UnknownTask {
+    /// `expected` are the tasks that there are.
+    #[must_use]
+    pub fn new(name: &str, expected: impl IntoIterator<Item = Task>) -> Self {
+        Self {
+            name: name.to_owned(),
+            expected: listed(expected, "or"),
+        }
     }
 }
 
@@ -89,5 +190,19 @@ impl ViolationInfo {
         } else {
             format!("{least} to {most}")
         }
+    }
+
+    /// Do its penalty points depend on its size?
+    #[must_use]
+    pub fn has_range(&self) -> bool {
+        self.points[0] != self.points[1]
+    }
+
+    /// The penalty points with their unit: `1 point`, or `0.5 to 2 points`.
+    #[must_use]
+    pub fn points_with_unit(&self) -> String {
+        let points = self.points_text();
+        let unit = if points == "1" { "point" } else { "points" };
+        format!("{points} {unit}")
     }
 }

@@ -1,5 +1,6 @@
 //! Constraints on the robot's motion and on the agent's answer times, and which of them an episode violated.
 
+use crate::ViolationName;
 use serde::{Deserialize, Serialize};
 
 /// A constraint whose violation costs penalty points (RULES, "Constraints and penalty points").
@@ -30,4 +31,17 @@ pub struct Violations {
     pub joint_pos: bool,
     /// Joint velocities.
     pub joint_vel: bool,
+}
+
+impl Violations {
+    /// The names of the constraints and whether each was violated, in the order of tables.
+    #[must_use]
+    pub const fn by_name(&self) -> [(ViolationName, bool); 4] {
+        [
+            (ViolationName::new("ee"), self.ee),
+            (ViolationName::new("link"), self.link),
+            (ViolationName::new("joint_pos"), self.joint_pos),
+            (ViolationName::new("joint_vel"), self.joint_vel),
+        ]
+    }
 }

@@ -221,7 +221,7 @@ mod tests {
                 phase: Phase::StartUp,
                 limit_s: 120.0,
             },
-            agent_task: Task::Hit.into(),
+            agent_task: Task::new("hit").into(),
             episode: None,
             step: None,
             line: None,

@@ -1,7 +1,8 @@
 //! Errors in the rules and settings of a stage.
 
 use crate::{
-    InvalidLimit, InvalidPerturbation, InvalidRuntimes, MAX_DEADLINE_H, MAX_EPISODES_PER_TASK,
+    InvalidLimit, InvalidPerturbation, InvalidRuntimes, InvalidWeights, MAX_DEADLINE_H,
+    MAX_EPISODES_PER_TASK, UnknownTask,
 };
 
 /// The largest number of days in the mean of a board row.
@@ -13,6 +14,10 @@ pub enum InvalidStageRules {
     /// No task, or a repeated one.
     #[error("tasks: each task at most once, and at least one")]
     Tasks,
+    #[error("tasks: {0}")]
+    UnknownTask(#[from] UnknownTask),
+    #[error("weights: {0}")]
+    Weights(#[from] InvalidWeights),
     #[error("episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]
     Episodes(u32),
     /// No episode per shard, or more than a task can have.
@@ -40,7 +45,8 @@ impl InvalidStageRules {
     #[must_use]
     pub const fn field(&self) -> &'static str {
         match self {
-            Self::Tasks => "tasks",
+            Self::Tasks | Self::UnknownTask(_) => "tasks",
+            Self::Weights(_) => "weights",
             Self::Episodes(_) => "episodes_per_task",
             Self::Shards(_) => "episodes_per_shard",
             Self::Ablations(_) => "ablation_episodes",

@@ -39,18 +39,21 @@ mod runtimes;
 mod schedule;
 mod seed;
 mod seed_label;
+mod short_name;
 #[cfg(feature = "sqlx")]
 mod sqlite;
 mod stage;
 mod stage_limits;
 mod stage_settings;
 mod task;
+mod task_weights;
 mod tier;
 mod timing;
 mod tournament_format;
 mod tournament_rules;
 mod validation_outcome;
 mod variation;
+mod violation;
 mod worker_name;
 mod zone;
 
@@ -58,7 +61,7 @@ pub use agent_task::{AgentTask, Side};
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
 pub use clock::Clock;
-pub use competition::{Competition, TaskInfo, ViolationInfo};
+pub use competition::{Competition, EndInfo, TaskInfo, UnknownTask, ViolationInfo};
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};
@@ -87,7 +90,7 @@ pub use perturbations::{
 };
 pub use printable::{escape_unprintable, is_printable};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
-pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
+pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult};
 pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
 pub use round_number::{InvalidRoundNumber, RoundNumber};
 pub use ruleset::{
@@ -98,10 +101,12 @@ pub use runtimes::{IMAGE_RUNTIME, InvalidRuntimes, RuntimeRefused, Runtimes, Sta
 pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
+pub use short_name::InvalidShortName;
 pub use stage::{ParseStageDayError, StageDay, StageRules};
 pub use stage_limits::{InvalidLimit, StageLimits, StageUploadLimits};
 pub use stage_settings::{CountingResult, Publication, StageSettings, UnknownSetting};
-pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, ParseTaskError, Task};
+pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, Task, TaskMap};
+pub use task_weights::{InvalidWeights, TaskWeights};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};
 pub use tournament_format::TournamentFormat;
@@ -109,6 +114,7 @@ pub use tournament_rules::{
     InvalidTournament, MAX_FREE_GAMES, MAX_GAME_STEPS, TournamentRules, TournamentSettings,
 };
 pub use validation_outcome::{ValidationOutcome, ValidationTiming};
-pub use variation::{InvalidVariation, TaskWeights, TierBounds, Variation};
+pub use variation::{InvalidTierBounds, TierBounds, Variation};
+pub use violation::{ViolationCounts, ViolationName};
 pub use worker_name::{ParseWorkerNameError, WorkerName};
 pub use zone::{UnknownZone, Zone};

@@ -17,6 +17,9 @@ pub struct NotMillionths(pub f64);
 const MILLIONTHS_PER_ONE: f64 = 1e6;
 
 impl Millionths {
+    /// 1.
+    pub const ONE: Self = Self(1_000_000);
+
     /// From a count of millionths.
     #[must_use]
     pub const fn new(count: u32) -> Self {

@@ -1,40 +1,18 @@
 //! The outcome of an episode: how it ended, and what its score is computed from.
 
-use crate::{AgentFault, ComputationTime, Task, Violations};
+use crate::{AgentFault, ComputationTime, Task, Violations, short_name::short_name};
 use serde::{Deserialize, Serialize};
 
-/// Why an episode ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub enum EpisodeEnd {
-    /// All control steps were played.
-    Horizon,
-    /// The puck left the table, in a goal or elsewhere.
-    LeftTable,
-    /// `hit`, `defend`: the puck moved back across the middle line. `prepare`: it crossed the line.
-    CrossedMiddle,
-    /// `defend`: the puck became slow enough.
-    Stopped,
-    /// `prepare`: the puck reached the table's long axis.
-    ReachedAxis,
-    /// The agent violated the protocol or a limit.
-    AgentFault,
+short_name! {
+    /// Why an episode ended. A competition has others beside the constants here.
+    EpisodeEnd, "an end of an episode"
 }
 
 impl EpisodeEnd {
-    /// The name used in files and tables.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Horizon => "horizon",
-            Self::LeftTable => "left_table",
-            Self::CrossedMiddle => "crossed_middle",
-            Self::Stopped => "stopped",
-            Self::ReachedAxis => "reached_axis",
-            Self::AgentFault => "agent_fault",
-        }
-    }
+    /// All control steps were played.
+    pub const HORIZON: Self = Self::new("horizon");
+    /// The agent violated the protocol or a limit.
+    pub const AGENT_FAULT: Self = Self::new("agent_fault");
 }
 
 /// The outcome of an episode, with all that scoring needs.

@@ -1,24 +1,7 @@
 //! The score of an evaluation, overall and by task.
 
-use crate::{Profile, Seed, SlotTiming, Task, Tier, Variation};
+use crate::{Profile, Seed, SlotTiming, TaskMap, Tier, Variation, ViolationCounts};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-
-/// For each constraint, the number of episodes in which it was violated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub struct ViolationCounts {
-    /// End-effector position.
-    pub ee: u32,
-    /// Elbow and wrist height.
-    pub link: u32,
-    /// Joint position.
-    pub joint_pos: u32,
-    /// Joint velocity.
-    pub joint_vel: u32,
-    /// Computation time.
-    pub computation_time: u32,
-}
 
 /// Computation times over all steps of a task, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -67,7 +50,7 @@ pub struct EvaluationResult {
     pub variation: Variation,
     /// The evaluation's seed, 64 hexadecimal digits.
     pub seed: Seed,
-    pub tasks: BTreeMap<Task, TaskResult>,
+    pub tasks: TaskMap<TaskResult>,
     /// Overall score in percent; tasks that were not played count as 0.
     pub score: f64,
     /// Overall DS: the maximum over the tasks.

@@ -90,7 +90,8 @@ impl Seed {
     /// Evaluation seed → the seed of one episode. It does not depend on the shard, the worker or the order in which
     /// episodes run.
     #[must_use]
-    pub fn episode(&self, task: Task, episode: u32) -> Self {
+    pub fn episode(&self, task: impl Into<Task>, episode: u32) -> Self {
+        let task = task.into();
         self.derive(task.as_str(), &episode.to_le_bytes())
     }
 
@@ -163,14 +164,15 @@ mod tests {
     #[test]
     fn seeds_differ_by_every_part() {
         let root = Seed::from_number(0);
+        let [hit, defend] = ["hit", "defend"].map(Task::new);
         let all = [
-            root.episode(Task::Hit, 0),
-            root.episode(Task::Hit, 1),
-            root.episode(Task::Defend, 0),
+            root.episode(hit, 0),
+            root.episode(hit, 1),
+            root.episode(defend, 0),
             root.model_mismatch(),
             root.day(jiff::civil::date(2026, 1, 1)),
             root.day(jiff::civil::date(2026, 1, 2)),
-            Seed::from_number(1).episode(Task::Hit, 0),
+            Seed::from_number(1).episode(hit, 0),
         ];
         for (i, a) in all.iter().enumerate() {
             for b in &all[i + 1..] {

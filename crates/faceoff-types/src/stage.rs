@@ -93,6 +93,7 @@ mod tests {
 
     #[test]
     fn rules_need_distinct_tasks_and_episodes() {
+        let [hit, defend] = ["hit", "defend"].map(Task::new);
         let rules = |tasks: &[Task], episodes_per_task| StageRules {
             runtimes: None,
             ruleset: Ruleset::CURRENT,
@@ -103,12 +104,12 @@ mod tests {
             variation: Variation::default(),
             limits: Default::default(),
         };
-        assert_eq!(rules(&Task::ALL, 1).check(), Ok(()));
+        assert_eq!(rules(&[hit, defend], 1).check(), Ok(()));
         assert_eq!(rules(&[], 1).check(), Err(InvalidStageRules::Tasks));
-        let twice = [Task::Hit, Task::Hit];
+        let twice = [hit, hit];
         assert_eq!(rules(&twice, 1).check(), Err(InvalidStageRules::Tasks));
         for episodes in [0, MAX_EPISODES_PER_TASK + 1] {
-            let refused = rules(&Task::ALL, episodes).check();
+            let refused = rules(&[hit, defend], episodes).check();
             assert_eq!(refused, Err(InvalidStageRules::Episodes(episodes)));
         }
     }

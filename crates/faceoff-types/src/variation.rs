@@ -1,6 +1,6 @@
 //! Variations: a stage's deviations from the ruleset that affect scores.
 
-use crate::{Millionths, PerturbationSettings, Task, millionths::NotMillionths};
+use crate::{Millionths, PerturbationSettings, TaskWeights, millionths::NotMillionths};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
@@ -8,9 +8,9 @@ use std::{fmt, str::FromStr};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Variation {
-    /// Weights of the tasks' success rates in the overall score; absent: 0.4, 0.4 and 0.2.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub weights: TaskWeights,
+    /// Weights of the tasks' success rates in the overall score; absent: those of the competition.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<TaskWeights>,
     /// Largest penalty points per episode of the two better tiers; absent: 0.5 and 1.5.
     #[serde(default, skip_serializing_if = "is_default")]
     pub tier_bounds: TierBounds,
@@ -31,27 +31,9 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// Weights of the tasks' success rates in the overall score: fractions that sum to 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "WeightFields", into = "WeightFields")]
-pub struct TaskWeights {
-    hit: Millionths,
-    defend: Millionths,
-    prepare: Millionths,
-}
-
-/// Invalid weights or tier bounds.
+/// Invalid tier bounds.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum InvalidVariation {
-    /// Weights that do not sum to 1.
-    #[error(
-        "expected three weights that sum to 1, got {hit} (hit), {defend} (defend) and {prepare} (prepare)"
-    )]
-    Weights {
-        hit: Millionths,
-        defend: Millionths,
-        prepare: Millionths,
-    },
+pub enum InvalidTierBounds {
     /// The bounds of the tiers do not rise.
     #[error(
         "expected 0 < deployable < improvable, in points per episode, got {deployable} and {improvable}"
@@ -70,104 +52,6 @@ pub enum InvalidVariation {
     },
     #[error(transparent)]
     Number(#[from] NotMillionths),
-}
-
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-#[serde(deny_unknown_fields)]
-struct WeightFields {
-    /// From 0 to 1, with at most six decimals.
-    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.4))]
-    hit: Millionths,
-    /// From 0 to 1, with at most six decimals.
-    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.4))]
-    defend: Millionths,
-    /// From 0 to 1, with at most six decimals; the three sum to 1.
-    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.2))]
-    prepare: Millionths,
-}
-
-const MILLIONTHS_PER_ONE: u64 = 1_000_000;
-
-impl TaskWeights {
-    /// From the weights of `hit`, `defend` and `prepare`.
-    ///
-    /// # Errors
-    /// If they do not sum to 1.
-    pub fn new(
-        hit: Millionths,
-        defend: Millionths,
-        prepare: Millionths,
-    ) -> Result<Self, InvalidVariation> {
-        let sum: u64 = [hit, defend, prepare]
-            .map(|weight| u64::from(weight.count()))
-            .iter()
-            .sum();
-        if sum == MILLIONTHS_PER_ONE {
-            Ok(Self {
-                hit,
-                defend,
-                prepare,
-            })
-        } else {
-            Err(InvalidVariation::Weights {
-                hit,
-                defend,
-                prepare,
-            })
-        }
-    }
-
-    #[must_use]
-    pub const fn weight(&self, task: Task) -> Millionths {
-        match task {
-            Task::Hit => self.hit,
-            Task::Defend => self.defend,
-            Task::Prepare => self.prepare,
-        }
-    }
-}
-
-impl Default for TaskWeights {
-    fn default() -> Self {
-        Self {
-            hit: Millionths::new(400_000),
-            defend: Millionths::new(400_000),
-            prepare: Millionths::new(200_000),
-        }
-    }
-}
-
-impl TryFrom<WeightFields> for TaskWeights {
-    type Error = InvalidVariation;
-    fn try_from(fields: WeightFields) -> Result<Self, InvalidVariation> {
-        Self::new(fields.hit, fields.defend, fields.prepare)
-    }
-}
-
-impl From<TaskWeights> for WeightFields {
-    fn from(weights: TaskWeights) -> Self {
-        Self {
-            hit: weights.hit,
-            defend: weights.defend,
-            prepare: weights.prepare,
-        }
-    }
-}
-
-/// The form used on the command line: numbers in the order of the tasks.
-impl fmt::Display for TaskWeights {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{},{},{}", self.hit, self.defend, self.prepare)
-    }
-}
-
-impl FromStr for TaskWeights {
-    type Err = InvalidVariation;
-    fn from_str(text: &str) -> Result<Self, InvalidVariation> {
-        let [hit, defend, prepare] = parse_numbers(text, "0.4,0.4,0.2")?;
-        Self::new(hit, defend, prepare)
-    }
 }
 
 /// Largest penalty points per episode of the two better tiers; the bound itself belongs to the better tier.
@@ -195,14 +79,14 @@ impl TierBounds {
     ///
     /// # Errors
     /// If the first bound is 0, or the second is not above it.
-    pub fn new(deployable: Millionths, improvable: Millionths) -> Result<Self, InvalidVariation> {
+    pub fn new(deployable: Millionths, improvable: Millionths) -> Result<Self, InvalidTierBounds> {
         if deployable.count() > 0 && deployable < improvable {
             Ok(Self {
                 deployable,
                 improvable,
             })
         } else {
-            Err(InvalidVariation::Bounds {
+            Err(InvalidTierBounds::Bounds {
                 deployable,
                 improvable,
             })
@@ -232,8 +116,8 @@ impl Default for TierBounds {
 }
 
 impl TryFrom<BoundFields> for TierBounds {
-    type Error = InvalidVariation;
-    fn try_from(fields: BoundFields) -> Result<Self, InvalidVariation> {
+    type Error = InvalidTierBounds;
+    fn try_from(fields: BoundFields) -> Result<Self, InvalidTierBounds> {
         Self::new(fields.deployable, fields.improvable)
     }
 }
@@ -255,8 +139,8 @@ impl fmt::Display for TierBounds {
 }
 
 impl FromStr for TierBounds {
-    type Err = InvalidVariation;
-    fn from_str(text: &str) -> Result<Self, InvalidVariation> {
+    type Err = InvalidTierBounds;
+    fn from_str(text: &str) -> Result<Self, InvalidTierBounds> {
         let [deployable, improvable] = parse_numbers(text, "0.5,1.5")?;
         Self::new(deployable, improvable)
     }
@@ -266,8 +150,8 @@ impl FromStr for TierBounds {
 fn parse_numbers<const N: usize>(
     text: &str,
     example: &'static str,
-) -> Result<[Millionths; N], InvalidVariation> {
-    let wrong_count = || InvalidVariation::Count {
+) -> Result<[Millionths; N], InvalidTierBounds> {
+    let wrong_count = || InvalidTierBounds::Count {
         expected: N,
         example,
         got: text.to_owned(),
@@ -286,16 +170,8 @@ fn parse_numbers<const N: usize>(
 
 #[cfg(feature = "openapi")]
 mod schemas {
-    use super::{BoundFields, TaskWeights, TierBounds, WeightFields};
+    use super::{BoundFields, TierBounds};
     use utoipa::{PartialSchema, ToSchema, openapi};
-
-    impl PartialSchema for TaskWeights {
-        fn schema() -> openapi::RefOr<openapi::Schema> {
-            WeightFields::schema()
-        }
-    }
-
-    impl ToSchema for TaskWeights {}
 
     impl PartialSchema for TierBounds {
         fn schema() -> openapi::RefOr<openapi::Schema> {
@@ -329,19 +205,8 @@ mod tests {
     }
 
     #[test]
-    fn weights_sum_to_one_and_bounds_rise() {
-        assert_eq!("0.4, 0.4,0.2".parse(), Ok(TaskWeights::default()));
+    fn bounds_of_tiers_rise() {
         assert_eq!("0.5,1.5".parse(), Ok(TierBounds::default()));
-        for (wrong, words) in [
-            ("0.4,0.4,0.3", "sum to 1"),
-            ("1,1,-1", "at most six decimals"),
-            ("0.33333333,0.33333333,0.33333334", "at most six decimals"),
-            ("0.5,0.5", "3 numbers"),
-            ("a,b,c", "0.4,0.4,0.2"),
-        ] {
-            let error = wrong.parse::<TaskWeights>().unwrap_err().to_string();
-            assert!(error.contains(words), "{error}");
-        }
         for (wrong, words) in [
             ("0,1", "0 < deployable"),
             ("1.5,0.5", "deployable < improvable"),
@@ -352,7 +217,5 @@ mod tests {
             let error = wrong.parse::<TierBounds>().unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
-        let wrong = r#"{"hit":1.0,"defend":0.0}"#;
-        assert!(serde_json::from_str::<TaskWeights>(wrong).is_err());
     }
 }

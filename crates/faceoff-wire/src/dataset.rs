@@ -5,7 +5,7 @@
 //! `calibration.json`, `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
 //! [`DATASET_SCHEMA`]; `docs/dataset.md` describes every column.
 
-use faceoff_types::{Profile, Seed, SlotTiming, Task, Variation};
+use faceoff_types::{Profile, Seed, SlotTiming, Task, TaskMap, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -33,7 +33,7 @@ pub struct DatasetManifest {
     /// The agent's name.
     pub agent: String,
     /// Number of episodes of each task.
-    pub episodes: BTreeMap<Task, u32>,
+    pub episodes: TaskMap<u32>,
     /// Size and hash of every other file of the archive, by name.
     pub files: BTreeMap<String, FileDigest>,
 }
@@ -63,7 +63,7 @@ pub struct ViolationsFile {
     /// [`DATASET_SCHEMA`].
     pub schema: String,
     /// Violations by task, in the order of the episodes.
-    pub tasks: BTreeMap<Task, TaskViolations>,
+    pub tasks: TaskMap<TaskViolations>,
 }
 
 /// The violations of one task, per constraint.

@@ -7,7 +7,7 @@
 use crate::game::GameSpec;
 use faceoff_types::{
     AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId,
-    PerturbationSettings, Profile, Ruleset, Seed, StageRuntimes, SubmissionId, Task,
+    PerturbationSettings, Profile, Ruleset, Seed, StageRuntimes, SubmissionId, Task, TaskWeights,
     ValidationOutcome, Variation,
 };
 use jiff::Timestamp;
@@ -134,9 +134,11 @@ pub struct GameFiles {
     pub side_blake3: [String; 2],
 }
 
-/// Seeds of the episodes of a validation run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The episodes of a validation run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ValidationSpec {
+    /// The tasks in the order of play.
+    pub tasks: Vec<Task>,
     /// The submission's own seed.
     pub seed: Seed,
     /// Seed of the season's model mismatch (the simulated robot's deviations from the nominal one), so that the robot is the same as
@@ -186,6 +188,8 @@ pub struct EvaluationMeta {
     /// Organisers' deviations from the ruleset, in perturbations and in scoring.
     #[serde(flatten)]
     pub variation: Variation,
+    /// Weights of the tasks under these rules, in the order of the competition.
+    pub task_weights: TaskWeights,
 }
 
 fn is_default(perturbations: &PerturbationSettings) -> bool {

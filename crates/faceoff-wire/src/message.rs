@@ -6,31 +6,6 @@ use faceoff_types::{AgentTask, JOINTS, Task};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// Tasks of the agent protocol.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ProtocolTask {
-    /// Score a goal.
-    Hit,
-    /// Stop an incoming puck.
-    Defend,
-    /// Bring the puck into a good hitting position.
-    Prepare,
-    /// A game against another agent.
-    Tournament,
-}
-
-impl From<AgentTask> for ProtocolTask {
-    fn from(agent_task: AgentTask) -> Self {
-        match agent_task {
-            AgentTask::Qualifying(Task::Hit) => Self::Hit,
-            AgentTask::Qualifying(Task::Defend) => Self::Defend,
-            AgentTask::Qualifying(Task::Prepare) => Self::Prepare,
-            AgentTask::Game { .. } => Self::Tournament,
-        }
-    }
-}
-
 /// A message to the agent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
@@ -39,8 +14,8 @@ pub enum Message<'a> {
     Hello {
         /// [`PROTOCOL_VERSION`].
         protocol: u32,
-        /// The task.
-        task: ProtocolTask,
+        /// The task, or `tournament` for a game.
+        task: Task,
         /// 1, or 2 for the second side of a game.
         agent_id: u32,
         /// The constants of the simulation.
@@ -75,7 +50,7 @@ impl<'a> Message<'a> {
     pub fn hello(agent_task: AgentTask, env: Env) -> Self {
         Self::Hello {
             protocol: PROTOCOL_VERSION,
-            task: agent_task.into(),
+            task: agent_task.name(),
             agent_id: agent_task.agent_id(),
             env: Box::new(env),
         }

@@ -4,10 +4,10 @@
 
 use anyhow::Context as _;
 use faceoff_replay::{merged_index, select_episodes};
-use faceoff_store::{AblationState, Artifacts, Store, StoreError};
+use faceoff_store::{Ablation, AblationState, Artifacts, Store, StoreError};
 use faceoff_types::{AblationId, Profile, Task};
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::{BTreeMap, HashSet},
     path::PathBuf,
 };
 
@@ -32,18 +32,27 @@ pub(crate) async fn join_parts(store: &Store) {
 }
 
 async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
-    let state = match store.ablation(id).await {
-        Ok(ablation) => Some(ablation.state),
+    let ablation = match store.ablation(id).await {
+        Ok(ablation) => Some(ablation),
         // The files are newer than the database if it was restored to an earlier state.
         Err(StoreError::NotFound(_)) => None,
         Err(error) => return Err(error.into()),
     };
     let artifacts = store.artifacts();
-    match state {
-        Some(AblationState::Open { .. }) => return Ok(()),
+    match ablation {
+        Some(Ablation {
+            state: AblationState::Open { .. },
+            ..
+        }) => return Ok(()),
         // A worker that had lost its lease may add a late part: joined clips are not changed.
-        Some(AblationState::Finished { .. }) if !is_joined(artifacts, id).await? => {
-            let parts = parts_by_profile(artifacts, id).await?;
+        Some(Ablation {
+            state: AblationState::Finished { .. },
+            runs,
+            ..
+        }) if !is_joined(artifacts, id).await? => {
+            let run = runs.values().next().context("it has no runs")?;
+            let tasks = store.run_plan(*run).await?.tasks;
+            let parts = parts_by_profile(artifacts, id, &tasks).await?;
             let packs = tokio::task::spawn_blocking(move || select_clips(&parts)).await??;
             // The pack of the ideal profile comes last: its presence means that all packs are stored.
             for (profile, pack) in packs.into_iter().rev() {
@@ -51,7 +60,7 @@ async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
                 artifacts.put_bytes(&key, pack).await?;
             }
         }
-        Some(AblationState::Finished { .. } | AblationState::Failed { .. }) | None => {}
+        Some(_) | None => {}
     }
     let parts_folder = Artifacts::ablation_parts_prefix(id);
     Ok(artifacts.delete_folder(&parts_folder).await?)
@@ -62,16 +71,23 @@ async fn is_joined(artifacts: &Artifacts, id: AblationId) -> anyhow::Result<bool
     Ok(artifacts.size_bytes(&ideal).await?.is_some())
 }
 
+/// The files of the parts, in the order of tasks and episodes.
 async fn parts_by_profile(
     artifacts: &Artifacts,
     id: AblationId,
+    tasks: &[Task],
 ) -> anyhow::Result<ByProfile<Vec<PathBuf>>> {
+    let mut listed = artifacts.list_ablation_parts(id).await?;
+    listed.sort_by_key(|part| {
+        let position = tasks.iter().position(|task| *task == part.task);
+        (position, part.first_episode)
+    });
     let mut parts: ByProfile<Vec<PathBuf>> = BTreeMap::new();
-    for (profile, key) in artifacts.list_ablation_parts(id).await? {
+    for part in listed {
         parts
-            .entry(profile)
+            .entry(part.profile)
             .or_default()
-            .push(artifacts.local_path(&key)?);
+            .push(artifacts.local_path(&part.key)?);
     }
     Ok(parts)
 }
@@ -83,7 +99,7 @@ fn select_clips(parts: &ByProfile<Vec<PathBuf>>) -> anyhow::Result<ByProfile<Vec
         .get(&Profile::Ideal)
         .context("there are no clips of the ideal simulator")?;
     let ideal_index = merged_index(ideal)?;
-    let mut ideal_episodes: BTreeSet<(Task, u32)> = BTreeSet::new();
+    let mut ideal_episodes: HashSet<(Task, u32)> = HashSet::new();
     let mut packs = BTreeMap::new();
     for (profile, parts) in parts
         .iter()

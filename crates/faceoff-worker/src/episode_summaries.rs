@@ -27,10 +27,11 @@ pub(crate) async fn store_missing(store: &Store, now: Timestamp) {
 
 async fn store_summary(store: &Store, run: RunId, now: Timestamp) -> anyhow::Result<()> {
     let outcomes = store.outcomes(run).await?;
-    let bounds = store.run_variation(run).await?.tier_bounds;
+    let plan = store.run_plan(run).await?;
     // Takes some ten milliseconds, so it runs off the async threads.
-    let summary =
-        tokio::task::spawn_blocking(move || EpisodeSummary::from_outcomes(&outcomes, &bounds));
+    let summarise =
+        move || EpisodeSummary::from_outcomes(&outcomes, &plan.tasks, &plan.variation.tier_bounds);
+    let summary = tokio::task::spawn_blocking(summarise);
     let json = serde_json::to_string(&summary.await??)?;
     let stored = store.store_episode_summary(run, EpisodeSummary::VERSION, &json, now);
     Ok(stored.await?)

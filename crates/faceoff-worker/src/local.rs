@@ -12,7 +12,9 @@ use faceoff_store::{
     Artifacts, ClaimedJob, CommitOutcome, GameCommit, GameRecording, Job, JobClaim, JobFilter,
     RunOwner, ShardCommit, Store, StoreError,
 };
-use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, GameId, StageLimits};
+use faceoff_types::{
+    AgentLimits, BundleRef, Clock, Competition, EvaluationResult, GameId, StageLimits,
+};
 use faceoff_wire::{
     game::GameSpec,
     job::{
@@ -21,6 +23,7 @@ use faceoff_wire::{
     },
     remote::LiveGameUpdate,
 };
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
@@ -35,6 +38,7 @@ pub(crate) struct LocalServer {
     pub(crate) clock: Clock,
     /// Duration of a lease without renewal, seconds.
     pub(crate) lease_s: u32,
+    pub(crate) competition: Arc<Competition>,
     /// The server's limits of agents; a stage may have others.
     pub(crate) limits: AgentLimits,
     pub(crate) claim_pause: ClaimPause,
@@ -73,6 +77,7 @@ impl LocalServer {
                 submission: submission.id,
                 agent: self.agent(submission.bundle, &limits),
                 spec: ValidationSpec {
+                    tasks: self.competition.task_names().collect(),
                     seed: seeds.episodes,
                     mismatch_seed: seeds.mismatch,
                 },
@@ -153,6 +158,7 @@ impl LocalServer {
                     mismatch_seed: seeds.mismatch,
                     agent: agent_name,
                     ruleset: run.ruleset,
+                    task_weights: self.competition.weights(&run.plan.variation),
                     variation: run.plan.variation,
                 },
                 recordings,

@@ -5,7 +5,9 @@ use crate::boxed;
 use anyhow::Context as _;
 use faceoff_store::{Actor, Evaluation, RunPlan, Stage, Store};
 use faceoff_types::Clock;
+use faceoff_types::Competition;
 use jiff::Timestamp;
+use std::sync::Arc;
 use std::{num::NonZeroU32, time::Duration};
 use tokio_util::sync::CancellationToken;
 
@@ -19,13 +21,14 @@ const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 #[boxed]
 pub async fn run_schedule(
     store: Store,
+    competition: Arc<Competition>,
     clock: Clock,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     let mut failed = false;
     loop {
         let now = clock.now();
-        let next_start = match start_due(&store, now).await {
+        let next_start = match start_due(&store, &competition, now).await {
             Ok(next_start) => {
                 failed = false;
                 next_start
@@ -55,7 +58,11 @@ pub async fn run_schedule(
 /// Ends and starts all days that are due at `now`, and returns the time of the next start, if any. [`run_schedule`]
 /// calls it at the right times.
 #[boxed]
-pub async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
+pub async fn start_due(
+    store: &Store,
+    competition: &Competition,
+    now: Timestamp,
+) -> anyhow::Result<Option<Timestamp>> {
     // A failure to end a day must not prevent others from starting.
     let ended = end_overdue(store, now).await;
     let mut earliest = None;
@@ -67,7 +74,11 @@ pub async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<T
                 let started = started.with_context(|| format!("the stage {}", stage.name))?;
                 if let Some(started) = started {
                     tracing::info!(stage = %stage.name, evaluations = started.len(), "day started");
-                    create_ablations(store, &stage, &started, now).await;
+                    let plan = RunPlan {
+                        tasks: competition.task_names().collect(),
+                        ..stage.plan()
+                    };
+                    create_ablations(store, &stage, plan, &started, now).await;
                 }
                 // If the cutoff is still due, something lasting prevents the start: do not retry at once.
                 let next = next_cutoff(store, &stage, now).await?;
@@ -111,13 +122,19 @@ async fn next_cutoff(
 /// Creates an ablation (a comparison of the agent in several simulator profiles) for each submission that has none, if the
 /// stage is configured so. Failures are only logged, since
 /// counting evaluations must not depend on them; organisers can create the ablation by hand.
-async fn create_ablations(store: &Store, stage: &Stage, started: &[Evaluation], now: Timestamp) {
+async fn create_ablations(
+    store: &Store,
+    stage: &Stage,
+    plan: RunPlan,
+    started: &[Evaluation],
+    now: Timestamp,
+) {
     let Some(episodes) = NonZeroU32::new(stage.settings.ablation_episodes) else {
         return;
     };
     let plan = RunPlan {
         episodes_per_task: episodes.get(),
-        ..stage.plan()
+        ..plan
     };
     for evaluation in started {
         let submission = evaluation.submission;

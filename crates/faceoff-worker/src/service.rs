@@ -21,7 +21,7 @@ use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::{JobFilter, Store, StoreError};
-use faceoff_types::{AgentLimits, Clock};
+use faceoff_types::{AgentLimits, Clock, Competition};
 use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
 use tokio_util::sync::CancellationToken;
@@ -64,6 +64,7 @@ pub struct WorkerConfig {
     pub lease_s: u32,
     /// Limits of bundles.
     pub bundle_limits: BundleLimits,
+    pub competition: Arc<Competition>,
 }
 
 /// Configuration of slots, local or remote.
@@ -122,6 +123,7 @@ impl WorkerConfig {
                 time: self.slots.agent.time.clone(),
             },
             job_filter: self.job_filter,
+            competition: Arc::clone(&self.competition),
         }
     }
 }

@@ -3,6 +3,7 @@
 //! The defaults are the `Default` implementations of the sections and of their types. Tests compare the commented file and
 //! the documentation (`docs/configuration.md`) with them.
 
+use crate::competition::competition;
 use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, MinTransferRate};
 use faceoff_notify::WebhookRules;
@@ -144,7 +145,7 @@ impl Default for EvaluationConfig {
         let settings = StageSettings::default();
         Self {
             profile: Profile::Evaluation,
-            tasks: Task::ALL.to_vec(),
+            tasks: competition().task_names().collect(),
             episodes_per_task: 1000,
             episodes_per_shard: settings.episodes_per_shard,
             at: None,
@@ -154,7 +155,7 @@ impl Default for EvaluationConfig {
             day_deadline: settings.day_deadline,
             max_faults: 10,
             ablation_episodes: settings.ablation_episodes,
-            weights: TaskWeights::default(),
+            weights: competition().weights(&Variation::default()),
             tier_bounds: TierBounds::default(),
             perturbations: None,
             publishes: settings.publishes,
@@ -364,7 +365,7 @@ impl Config {
     #[must_use]
     pub fn rules(&self) -> StageRules {
         let evaluation = &self.evaluation;
-        StageRules {
+        let mut rules = StageRules {
             runtimes: None,
             ruleset: Ruleset::CURRENT,
             profile: evaluation.profile,
@@ -372,12 +373,15 @@ impl Config {
             episodes_per_task: evaluation.episodes_per_task,
             max_faults: evaluation.max_faults,
             variation: Variation {
-                weights: evaluation.weights,
+                weights: Some(evaluation.weights.clone()),
                 tier_bounds: evaluation.tier_bounds,
                 perturbations: evaluation.perturbations.clone().unwrap_or_default(),
             },
             limits: Default::default(),
-        }
+        };
+        // Brings valid rules into the competition's order; `check` reports invalid ones.
+        competition().check_rules(&mut rules).ok();
+        rules
     }
 
     /// The settings of the first stage, on which scores do not depend.

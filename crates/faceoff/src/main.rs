@@ -5,6 +5,7 @@ mod terminal;
 
 mod client;
 mod commands;
+mod competition;
 mod config;
 mod credentials;
 mod descriptors;

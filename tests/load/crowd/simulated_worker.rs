@@ -498,13 +498,13 @@ fn outcomes(spec: &ShardSpec, has_fault: bool) -> Vec<EpisodeOutcome> {
             line: None,
         });
         let (steps, end, computation_time) = match fault {
-            Some(_) => (0, EpisodeEnd::AgentFault, ComputationTime::default()),
+            Some(_) => (0, EpisodeEnd::AGENT_FAULT, ComputationTime::default()),
             None => {
                 let usual = ComputationTime {
                     mean_s: 0.000_512_25,
                     max_s: 0.001_953_125,
                 };
-                (EPISODE_STEPS, EpisodeEnd::Horizon, usual)
+                (EPISODE_STEPS, EpisodeEnd::HORIZON, usual)
             }
         };
         EpisodeOutcome {

@@ -1,8 +1,8 @@
 //! The baseline's successes in a few episodes of each task, which must roughly agree with the success rates in the README.
 
 use baseline::Baseline;
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_sim::{AirHockeyTask, Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::{Profile, Seed};
 use striker::Policy;
 
 use crate::support::env::env;
@@ -13,7 +13,7 @@ const SEASON_SEED: u64 = 101;
 
 /// Successes in the first episodes of a season (one draw of the arm's model mismatch). `agent_task` is the same task as `task`, in the
 /// agent's type.
-fn count_successes(task: Task, agent_task: striker::Task) -> u32 {
+fn count_successes(task: AirHockeyTask, agent_task: striker::Task) -> u32 {
     let season = Seed::from_number(SEASON_SEED);
     let settings = PerturbationSettings::default();
     let factors = Profile::Evaluation.factors();
@@ -40,18 +40,18 @@ fn count_successes(task: Task, agent_task: striker::Task) -> u32 {
 
 #[test]
 fn hit_succeeds_in_up_to_a_third() {
-    let successes = count_successes(Task::Hit, striker::Task::Hit);
+    let successes = count_successes(AirHockeyTask::Hit, striker::Task::Hit);
     assert!((1..=10).contains(&successes), "{successes} of {EPISODES}");
 }
 
 #[test]
 fn defend_stops_about_a_quarter_of_pucks() {
-    let successes = count_successes(Task::Defend, striker::Task::Defend);
+    let successes = count_successes(AirHockeyTask::Defend, striker::Task::Defend);
     assert!((3..=15).contains(&successes), "{successes} of {EPISODES}");
 }
 
 #[test]
 fn prepare_frees_most_pucks() {
-    let successes = count_successes(Task::Prepare, striker::Task::Prepare);
+    let successes = count_successes(AirHockeyTask::Prepare, striker::Task::Prepare);
     assert!((13..=25).contains(&successes), "{successes} of {EPISODES}");
 }

@@ -1,7 +1,7 @@
 //! The agent's successes and penalty points in whole simulated episodes under all perturbations, with fixed seeds.
 
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_sim::{AirHockeyTask, Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::{Profile, Seed};
 use striker::{Agent, Policy};
 
 use crate::support::env::env;
@@ -10,7 +10,7 @@ const EPISODES: u32 = 12;
 const SEASON_SEED: u64 = 2023;
 
 /// Successes and penalty points of the first episodes of a season (one draw of the arm's model mismatch).
-fn play(task: Task) -> (u32, u32) {
+fn play(task: AirHockeyTask) -> (u32, u32) {
     let season = Seed::from_number(SEASON_SEED);
     let settings = PerturbationSettings::default();
     let plant = Plant::mismatched(&settings, season.model_mismatch());
@@ -40,11 +40,11 @@ fn play(task: Task) -> (u32, u32) {
     (successes, points)
 }
 
-fn agent(task: Task) -> Agent {
+fn agent(task: AirHockeyTask) -> Agent {
     let task = match task {
-        Task::Hit => striker::Task::Hit,
-        Task::Defend => striker::Task::Defend,
-        Task::Prepare => striker::Task::Prepare,
+        AirHockeyTask::Hit => striker::Task::Hit,
+        AirHockeyTask::Defend => striker::Task::Defend,
+        AirHockeyTask::Prepare => striker::Task::Prepare,
     };
     Agent::new(task, &env(1, 0))
 }
@@ -54,7 +54,7 @@ const DEPLOYABLE_POINTS_MAX: u32 = EPISODES / 2;
 
 #[test]
 fn hit_scores_and_stays_deployable() {
-    let (successes, points) = play(Task::Hit);
+    let (successes, points) = play(AirHockeyTask::Hit);
     assert!(
         successes >= 2 && points <= DEPLOYABLE_POINTS_MAX,
         "{successes} goals, {points} points"
@@ -63,7 +63,7 @@ fn hit_scores_and_stays_deployable() {
 
 #[test]
 fn defend_scores_and_stays_deployable() {
-    let (successes, points) = play(Task::Defend);
+    let (successes, points) = play(AirHockeyTask::Defend);
     assert!(
         successes >= 6 && points <= DEPLOYABLE_POINTS_MAX,
         "{successes} stopped, {points} points"
@@ -72,7 +72,7 @@ fn defend_scores_and_stays_deployable() {
 
 #[test]
 fn prepare_scores_and_stays_deployable() {
-    let (successes, points) = play(Task::Prepare);
+    let (successes, points) = play(AirHockeyTask::Prepare);
     assert!(
         successes >= 7 && points <= DEPLOYABLE_POINTS_MAX,
         "{successes} freed, {points} points"

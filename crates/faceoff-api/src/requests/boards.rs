@@ -129,7 +129,7 @@ pub enum BoardColumn {
 
 impl BoardColumn {
     /// The column's name in a query.
-    pub const fn as_str(self) -> &'static str {
+    pub fn as_str(&self) -> &str {
         match self {
             Self::Place => "place",
             Self::Team => "team",
@@ -139,12 +139,13 @@ impl BoardColumn {
         }
     }
 
-    /// All columns, in the order in which a page shows them.
-    fn all() -> impl Iterator<Item = Self> {
-        [Self::Place, Self::Team, Self::Score]
+    /// The column with this name; others than those of every board are named like their task.
+    fn from_name(name: &str) -> Option<Self> {
+        let of_every_board = [Self::Place, Self::Team, Self::Score, Self::Points];
+        let found = of_every_board
             .into_iter()
-            .chain(Task::ALL.map(Self::Task))
-            .chain([Self::Points])
+            .find(|column| column.as_str() == name);
+        found.or_else(|| name.parse().ok().map(Self::Task))
     }
 }
 
@@ -163,11 +164,10 @@ impl TryFrom<String> for BoardSort {
             Some(name) => (name, true),
             None => (text.as_str(), false),
         };
-        let column = BoardColumn::all().find(|column| column.as_str() == name);
+        let column = BoardColumn::from_name(name);
         let unknown = || {
-            let names: Vec<_> = BoardColumn::all().map(BoardColumn::as_str).collect();
-            let names = names.join(", ");
-            format!("expected sort to be one of {names}, with a - before it to reverse the order")
+            "expected sort to be place, team, score, points or the name of a task, with a - before it to reverse the order"
+                .to_owned()
         };
         column
             .map(|column| Self {

@@ -87,14 +87,7 @@ pub struct StagePatch {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_faults: Option<u32>,
     /// Weight of each task's success rate in the overall score.
-    #[cfg_attr(
-        feature = "clap",
-        arg(
-            long,
-            value_name = "WEIGHTS",
-            help = "Weights of hit, defend and prepare in the score, e.g. 0.4,0.4,0.2"
-        )
-    )]
+    #[cfg_attr(feature = "clap", arg(skip))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<TaskWeights>,
     /// For each tier, the most penalty points per episode that it allows.
@@ -301,7 +294,10 @@ impl StagePatch {
                 self.episodes_per_task.as_ref(),
             ),
             replace(&mut rules.max_faults, self.max_faults.as_ref()),
-            replace(&mut variation.weights, self.weights.as_ref()),
+            replace(
+                &mut variation.weights,
+                self.weights.clone().map(Some).as_ref(),
+            ),
             replace(&mut variation.tier_bounds, self.tier_bounds.as_ref()),
             replace(&mut variation.perturbations, self.perturbations.as_ref()),
             replace(&mut rules.limits, self.limits.as_ref()),

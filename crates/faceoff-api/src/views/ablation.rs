@@ -3,9 +3,9 @@
 use crate::views::evaluation::Progress;
 use faceoff_scoring::ProfileEffect;
 use faceoff_types::{SubmissionId, Task};
+use indexmap::IndexMap;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// An ablation: a submission evaluated without perturbations, with each perturbation alone, and with all of them.
@@ -36,7 +36,7 @@ pub enum AblationStatus {
         /// When the last episode was stored.
         finished_at: Timestamp,
         /// By task: one entry per profile, `ideal` first.
-        tasks: BTreeMap<Task, Vec<ProfileEffect>>,
+        tasks: IndexMap<Task, Vec<ProfileEffect>>,
     },
     /// Ended without a result.
     Failed {

@@ -3,9 +3,9 @@
 
 use crate::views::task::TaskView;
 use faceoff_types::{EvaluationId, Profile, Seed, Task, TeamId, TeamName, Tier, deprecated_names};
+use indexmap::IndexMap;
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// A baseline on a board: a row without a rank of its own.
@@ -50,7 +50,7 @@ pub struct BaselineRow {
     pub released_at: Option<Timestamp>,
     /// The seed of the day's evaluations; null until the day is released, and for a mean of several days.
     pub seed: Option<Seed>,
-    /// Results by task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskView>,
+    /// Results by task.
+    pub tasks: IndexMap<Task, TaskView>,
 }
 deprecated_names!(BaselineRow { extra_turn => extra_evaluation });

@@ -10,9 +10,9 @@ use faceoff_types::{
     CountingResult, DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId,
     StageName, Task, TaskWeights, TeamId, TeamName, Tier, TierBounds, deprecated_names,
 };
+use indexmap::IndexMap;
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// A board: one row per team with finished evaluations under one revision of a stage's rules, in board order. The
@@ -122,8 +122,8 @@ pub struct BoardRow {
     pub released_at: Option<Timestamp>,
     /// The seed of the day's evaluations; null until the day is released, and for a mean of several days.
     pub seed: Option<Seed>,
-    /// Results by task: hit, defend, prepare. For a mean: episodes, successes, violations and steps are sums over the
+    /// Results by task. For a mean: episodes, successes, violations and steps are sums over the
     /// days; rates and points are means per day; the computation times `p99` and `max` are those of the worst day.
-    pub tasks: BTreeMap<Task, TaskView>,
+    pub tasks: IndexMap<Task, TaskView>,
 }
 deprecated_names!(BoardRow { extra_turn => extra_evaluation });

@@ -3,8 +3,8 @@
 
 use faceoff_replay::EpisodeLine;
 use faceoff_types::Task;
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// The episodes of an evaluation, in order of task and number.
@@ -13,8 +13,8 @@ pub struct EpisodesView {
     /// One entry per episode.
     pub episodes: Vec<EpisodeLine>,
     /// Histogram of computation times by task, shortest first; absent without access to the dataset.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub computation_times: BTreeMap<Task, Vec<TimeBinView>>,
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub computation_times: IndexMap<Task, Vec<TimeBinView>>,
 }
 
 /// A bin of the histogram of computation times.

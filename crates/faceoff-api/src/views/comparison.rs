@@ -2,9 +2,9 @@
 
 use faceoff_scoring::{OverallComparison, SolvedEpisodes, TaskComparison};
 use faceoff_types::{EvaluationId, Profile, Task, TeamName};
+use indexmap::IndexMap;
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// Two evaluations on the same episodes. Differences are A minus B.
@@ -20,13 +20,13 @@ pub struct ComparisonView {
     pub ruleset: String,
     /// Perturbation profile of both.
     pub profile: Profile,
-    /// By task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskComparison>,
+    /// By task.
+    pub tasks: IndexMap<Task, TaskComparison>,
     /// Comparison of the overall scores.
     pub overall: OverallComparison,
     /// By task, which agents solved which episodes; only if the query asks for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub episodes: Option<BTreeMap<Task, SolvedEpisodes>>,
+    pub episodes: Option<IndexMap<Task, SolvedEpisodes>>,
 }
 
 /// One side of a comparison.

@@ -5,9 +5,9 @@ use crate::views::{printable, task::TaskView};
 use faceoff_types::{
     AgentFault, EvaluationResult, Profile, Seed, SlotTiming, Task, Tier, Variation,
 };
+use indexmap::IndexMap;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// State of an evaluation.
@@ -149,8 +149,8 @@ pub struct ResultView {
     pub variation: Variation,
     /// The seed of the day's evaluations, 64 hexadecimal digits; null until the day is released.
     pub seed: Option<Seed>,
-    /// By task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskView>,
+    /// By task.
+    pub tasks: IndexMap<Task, TaskView>,
     /// Overall score in percent.
     pub score: f64,
     /// Penalty points: the maximum over the tasks.

@@ -5,9 +5,9 @@ use crate::views::{ruling::RulingView, task::TaskView};
 use faceoff_types::{
     CountingResult, DivisionName, EvaluationId, StageId, StageName, Task, TeamId, TeamName, Tier,
 };
+use indexmap::IndexMap;
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// All results of a stage that count, under one revision of its rules.
@@ -75,5 +75,5 @@ pub struct HistoryRow {
     /// Overall penalty points of the day: the maximum over the tasks.
     pub penalty_points: f64,
     /// The day's results by task.
-    pub tasks: BTreeMap<Task, TaskView>,
+    pub tasks: IndexMap<Task, TaskView>,
 }

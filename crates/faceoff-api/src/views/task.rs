@@ -1,4 +1,4 @@
-//! The result of one task (hit, defend or prepare) in an evaluation. Details are absent until the evaluation day is
+//! The result of one task in an evaluation. Details are absent until the evaluation day is
 //! *released*, that is, made public.
 
 use faceoff_types::{ComputationTimeSummary, TaskResult, Tier, ViolationCounts};
@@ -42,7 +42,7 @@ impl TaskView {
             success_ci95: result.success_ci95,
             penalty_points: result.penalty_points,
             tier: result.tier,
-            violations: is_released.then_some(result.violations),
+            violations: is_released.then(|| result.violations.clone()),
             steps: is_released.then_some(result.steps),
             computation_time_s: is_released.then_some(result.computation_time_s),
         }

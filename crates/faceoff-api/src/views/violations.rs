@@ -3,13 +3,13 @@
 
 use faceoff_types::Task;
 use faceoff_wire::dataset::TaskViolations;
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// Violations of an evaluation whose day is released (made public), by task and constraint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ViolationsView {
-    /// By task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskViolations>,
+    /// By task.
+    pub tasks: IndexMap<Task, TaskViolations>,
 }

@@ -7,7 +7,7 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, UInt32Type},
 };
-use faceoff_types::{ComputationTime, EpisodeOutcome, ParseTaskError, Violations};
+use faceoff_types::{ComputationTime, EpisodeOutcome, InvalidShortName, Violations};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Serialize;
 
@@ -116,7 +116,7 @@ impl<'a> Columns<'a> {
         let outcome = EpisodeOutcome {
             task: task
                 .parse()
-                .map_err(|error: ParseTaskError| error.to_string())?,
+                .map_err(|error: InvalidShortName| error.to_string())?,
             episode: int("episode")?,
             steps: int("steps")?,
             end: serde_json::from_value(end.into())

@@ -8,7 +8,7 @@ use crate::{
 };
 use arrow_array::{RecordBatch, RecordBatchReader};
 use arrow_schema::{DataType, Schema};
-use faceoff_types::Task;
+use faceoff_sim::AirHockeyTask;
 use parquet::{
     arrow::{
         ProjectionMask,
@@ -62,7 +62,7 @@ pub(super) fn reader<R: ChunkReader + 'static>(
 ) -> Result<ParquetRecordBatchReaderBuilder<R>, DatasetError> {
     let found = metadata.schema();
     let lacks_host_time = lacks_host_time(found);
-    let rows = StepRows::new(Task::Hit);
+    let rows = StepRows::new(AirHockeyTask::Hit.into());
     let fields = rows.schema().fields().iter();
     let fields = fields.filter(|field| !lacks_host_time || field.name() != HOST_TIME);
     let expected = Schema::new(fields.cloned().collect::<Vec<_>>());

@@ -7,9 +7,9 @@ use crate::{
 };
 use arrow_array::RecordBatch;
 use faceoff_sim::EPISODE_STEPS;
-use faceoff_types::Task;
+use faceoff_types::{Task, TaskMap};
 use faceoff_wire::job::ShardSpec;
-use std::{collections::BTreeMap, path::Path};
+use std::path::Path;
 
 /// The recording of one episode.
 pub(super) struct RecordedEpisode {
@@ -43,16 +43,17 @@ pub(super) struct EpisodeReader<'a> {
     /// The remaining rows of `episodes.parquet`.
     rows: Box<dyn Iterator<Item = RecordBatch> + Send>,
     steps: StepBatches,
-    steps_of_tasks: BTreeMap<Task, u64>,
+    steps_of_tasks: TaskMap<u64>,
 }
 
 impl<'a> EpisodeReader<'a> {
-    pub fn open(dataset: &'a Dataset) -> Result<Self, VerifyError> {
-        let expected = dataset
-            .manifest()
-            .episodes
-            .iter()
-            .flat_map(|(task, count)| (0..*count).map(|episode| (*task, episode)));
+    /// Opens a dataset, whose episodes are in the order of `tasks`.
+    pub fn open(dataset: &'a Dataset, tasks: Vec<Task>) -> Result<Self, VerifyError> {
+        let counts = &dataset.manifest().episodes;
+        let expected = tasks.into_iter().flat_map(|task| {
+            let count = counts.get(&task).copied().unwrap_or_default();
+            (0..count).map(move |episode| (task, episode))
+        });
         Ok(Self::new(
             Box::new(expected),
             dataset.episode_batches()?,
@@ -83,7 +84,7 @@ impl<'a> EpisodeReader<'a> {
         batches: Vec<RecordBatch>,
         steps: StepBatches,
     ) -> Self {
-        let mut steps_of_tasks = BTreeMap::new();
+        let mut steps_of_tasks = TaskMap::new();
         for batch in &batches {
             let columns = Columns(batch);
             for row in 0..batch.num_rows() {
@@ -105,7 +106,7 @@ impl<'a> EpisodeReader<'a> {
     }
 
     /// Number of control steps per task, as stated by the rows of its episodes.
-    pub fn steps_of_tasks(&self) -> BTreeMap<Task, u64> {
+    pub fn steps_of_tasks(&self) -> TaskMap<u64> {
         self.steps_of_tasks.clone()
     }
 

@@ -105,12 +105,21 @@ impl Replayer {
             measured: Vec::new(),
         };
         let (task, episode) = (recorded.task, recorded.episode);
+        let running = RunningEpisode::begin(&self.arena, task, episode, inputs.interpolation, rows);
+        let running = running.map_err(|unknown| {
+            row_difference(
+                recorded,
+                "task",
+                recorded.task.as_str(),
+                unknown.to_string(),
+            )
+        })?;
         let mut replay = EpisodeReplay {
             recorded,
             ruleset: self.ruleset,
             // Without an agent there are no steps to interpolate.
             interpolation: inputs.interpolation.unwrap_or(Interpolation::Cubic),
-            running: RunningEpisode::begin(&self.arena, task, episode, inputs.interpolation, rows),
+            running,
         };
         let mut outcome = None;
         for batch in &recorded.steps {

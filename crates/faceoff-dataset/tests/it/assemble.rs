@@ -2,12 +2,12 @@
 
 use crate::recordings::{Agent, Evaluation, hold_still, json, play, spec, swing_arm, table, unzip};
 use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
+use faceoff_airhockey::{HIT, PREPARE};
 use faceoff_dataset::RecordingError;
 use faceoff_scoring::StepTimes;
-use faceoff_types::{EpisodeOutcome, EvaluationResult, Ruleset, SlotTiming, Task};
+use faceoff_types::{EpisodeOutcome, EvaluationResult, Ruleset, SlotTiming, TaskMap};
 use faceoff_wire::dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, ViolationsFile};
 use std::{
-    collections::BTreeMap,
     fs::{self, File},
     io::Read,
     time::Duration,
@@ -17,10 +17,10 @@ use zip::ZipArchive;
 /// Two tasks, one of them in three shards.
 fn two_tasks(agent: Agent) -> Evaluation {
     let shards = [
-        (Task::Hit, 0..2),
-        (Task::Prepare, 0..1),
-        (Task::Prepare, 1..3),
-        (Task::Prepare, 3..4),
+        (HIT, 0..2),
+        (PREPARE, 0..1),
+        (PREPARE, 1..3),
+        (PREPARE, 3..4),
     ];
     Evaluation::play(Some(agent), &shards)
 }
@@ -83,8 +83,8 @@ fn dataset_is_complete_and_has_the_direct_score() {
 
     // Scored directly from the reports and the recorded times.
     let steps = table(&dir.join("steps.parquet"));
-    let mut tasks = BTreeMap::new();
-    for task in [Task::Hit, Task::Prepare] {
+    let mut tasks = TaskMap::new();
+    for task in [HIT, PREPARE] {
         let outcomes: Vec<EpisodeOutcome> = evaluation
             .reports
             .iter()
@@ -110,6 +110,7 @@ fn dataset_is_complete_and_has_the_direct_score() {
             meta.profile,
             meta.seed,
             &Default::default(),
+            &meta.task_weights,
             tasks,
         )
     };
@@ -117,10 +118,7 @@ fn dataset_is_complete_and_has_the_direct_score() {
 
     let manifest: DatasetManifest = json(&dir.join("manifest.json"));
     assert_eq!(manifest.schema, DATASET_SCHEMA);
-    assert_eq!(
-        manifest.episodes,
-        BTreeMap::from([(Task::Hit, 2), (Task::Prepare, 4)])
-    );
+    assert_eq!(manifest.episodes, TaskMap::from([(HIT, 2), (PREPARE, 4)]));
     assert_eq!(
         (manifest.seed, manifest.mismatch_seed),
         (meta.seed, meta.mismatch_seed)
@@ -141,7 +139,7 @@ fn dataset_is_complete_and_has_the_direct_score() {
         .iter()
         .map(|shard| (shard.task, shard.first_episode, shard.end_episode))
         .collect();
-    assert_eq!(ranges[0], (Task::Hit, 0, 2));
+    assert_eq!(ranges[0], (HIT, 0, 2));
     let worst = shards
         .iter()
         .map(|shard| shard.timing)
@@ -277,7 +275,7 @@ fn evaluation_stopped_by_faults_has_no_score() {
             .then_some([question.initial_joints, [0.0; 7]])
     };
     play(
-        &spec(Task::Prepare, 0..4),
+        &spec(PREPARE, 0..4),
         Some(faults_in_first_step),
         &evaluation.shards[1],
     );

@@ -2,17 +2,14 @@
 
 use crate::recordings::{Evaluation, swing_arm};
 use arrow_array::{Array, Int64Array, cast::AsArray, types::Float64Type};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE};
 use faceoff_dataset::{Dataset, assemble};
 use faceoff_replay::{Clip, ClipKey, ContactWith, Group, Pack};
 use faceoff_types::Task;
 use std::path::PathBuf;
 
-const SHARDS: [(Task, std::ops::Range<u32>); 4] = [
-    (Task::Hit, 0..2),
-    (Task::Defend, 0..3),
-    (Task::Defend, 3..6),
-    (Task::Prepare, 0..2),
-];
+const SHARDS: [(Task, std::ops::Range<u32>); 4] =
+    [(HIT, 0..2), (DEFEND, 0..3), (DEFEND, 3..6), (PREPARE, 0..2)];
 
 /// Distance of a robot's base from the centre of the table: observations are in the base frame, clips in the table frame.
 const BASE_X_M: f64 = 1.51;
@@ -53,7 +50,7 @@ fn samples_match_the_dataset_within_their_resolution() {
             let motion = clip(&fixture.pack, ClipKey::motion(task, episode));
             let observed = clip(&fixture.pack, ClipKey::observed(task, episode));
             assert_eq!(motion.header.samples, outcome.steps + 1);
-            assert_eq!(motion.column("opponent_q_1").is_some(), task == Task::Hit);
+            assert_eq!(motion.column("opponent_q_1").is_some(), task == HIT);
             let mut compared = 0;
             let float = |name: &str| rows[name].as_primitive::<Float64Type>().values().to_vec();
             for column in motion.columns.iter().chain(&observed.columns) {
@@ -265,14 +262,14 @@ fn truncated_or_overwritten_pack_is_refused() {
     other[16..80].fill(0);
     std::fs::write(&path, &other).unwrap();
     let pack = Pack::open(&path).unwrap();
-    let first = pack.clip(ClipKey::motion(Task::Hit, 0)).unwrap().unwrap();
+    let first = pack.clip(ClipKey::motion(HIT, 0)).unwrap().unwrap();
     let message = Clip::read(&first).unwrap_err().to_string();
     assert!(message.contains("is not a clip"), "{message}");
 }
 
 #[test]
 fn shards_of_the_previous_layout_have_no_clips() {
-    let evaluation = Evaluation::play(Some(swing_arm), &[(Task::Prepare, 0..2)]);
+    let evaluation = Evaluation::play(Some(swing_arm), &[(PREPARE, 0..2)]);
     let shard = &evaluation.shards[0];
     std::fs::remove_file(shard.join("clips")).unwrap();
     let path = shard.join("shard.json");

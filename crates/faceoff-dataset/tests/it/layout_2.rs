@@ -5,8 +5,8 @@ use crate::{
     verify::check,
 };
 use arrow_array::{RecordBatch, cast::AsArray, types::Int64Type};
+use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_dataset::{Dataset, DatasetError, Layout};
-use faceoff_types::Task;
 use faceoff_wire::job::ShardSpec;
 use parquet::{
     basic::Encoding,
@@ -35,7 +35,7 @@ fn archive_is_read_and_verified() {
             )
         })
         .collect();
-    let (hit, defend) = (Task::Hit, Task::Defend);
+    let (hit, defend) = (HIT, DEFEND);
     assert_eq!(
         steps,
         [
@@ -102,7 +102,7 @@ fn shard_of_a_running_evaluation_is_joined() {
         episodes: played.episodes.end..played.episodes.end + 1,
         ..played.clone()
     };
-    assert_eq!(next_spec.task, spec(Task::Defend, 0..1).task);
+    assert_eq!(next_spec.task, spec(DEFEND, 0..1).task);
     play(&next_spec, Some(crate::recordings::hold_still), &next);
     evaluation.shards = vec![old.clone(), next.clone()];
     let evaluation = evaluation.assembled();

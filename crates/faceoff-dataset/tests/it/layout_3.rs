@@ -4,8 +4,8 @@ use crate::{
     recordings::{fixture, table},
     verify::check,
 };
+use faceoff_airhockey::HIT;
 use faceoff_dataset::{Dataset, Layout};
-use faceoff_types::Task;
 
 const ARCHIVE: &str = "dataset-layout-3.zip";
 
@@ -16,7 +16,7 @@ fn archive_is_read_and_verified() {
     let verified = check(&fixture(ARCHIVE), 2).unwrap();
     assert_eq!(verified.episodes, 4);
     assert_eq!(verified.result, dataset.results().unwrap());
-    let steps = dataset.episode(Task::Hit, 0, None).unwrap();
+    let steps = dataset.episode(HIT, 0, None).unwrap();
     assert!(steps.column_by_name("host_time_ns").is_none());
     // Read in order, the table has the current columns.
     let mut all = dataset.steps().unwrap().read(None).unwrap();
@@ -27,11 +27,9 @@ fn archive_is_read_and_verified() {
         .iter()
         .map(|field| field.name().clone())
         .collect();
-    let current = crate::recordings::Evaluation::play(
-        Some(crate::recordings::hold_still),
-        &[(Task::Hit, 0..1)],
-    )
-    .assembled();
+    let current =
+        crate::recordings::Evaluation::play(Some(crate::recordings::hold_still), &[(HIT, 0..1)])
+            .assembled();
     let current = table(&current.folder().join("steps.parquet"));
     let current_names: Vec<String> = current
         .schema()

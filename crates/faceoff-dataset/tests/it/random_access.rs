@@ -2,16 +2,12 @@
 
 use crate::recordings::{Evaluation, hold_still, table};
 use arrow_array::{UInt32Array, cast::AsArray};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE};
 use faceoff_dataset::{Dataset, DatasetError};
-use faceoff_types::Task;
 
 #[test]
 fn episode_equals_its_rows_in_the_whole_table() {
-    let shards = [
-        (Task::Hit, 0..1),
-        (Task::Defend, 0..3),
-        (Task::Defend, 3..5),
-    ];
+    let shards = [(HIT, 0..1), (DEFEND, 0..3), (DEFEND, 3..5)];
     let evaluation = Evaluation::play(Some(hold_still), &shards).assembled();
     let whole = table(&evaluation.folder().join("steps.parquet"));
     for path in [evaluation.archive(), evaluation.folder()] {
@@ -30,7 +26,7 @@ fn episode_equals_its_rows_in_the_whole_table() {
         assert_eq!(row, whole.num_rows());
 
         let columns = ["step".to_owned(), "puck_x".to_owned()];
-        let rows = dataset.episode(Task::Defend, 4, Some(&columns)).unwrap();
+        let rows = dataset.episode(DEFEND, 4, Some(&columns)).unwrap();
         assert_eq!(rows.num_columns(), 2);
         let steps: &UInt32Array = rows["step"].as_primitive();
         assert!(steps.values().iter().copied().eq(0..rows.num_rows() as u32));
@@ -41,9 +37,9 @@ fn episode_equals_its_rows_in_the_whole_table() {
             Err(DatasetError::Absent(message)) => message,
             other => panic!("{other:?}"),
         };
-        assert!(absent(Task::Prepare, 0, None).contains("no episode of prepare"));
-        assert!(absent(Task::Defend, 5, None).contains("there are 5, from 0"));
-        let unknown_column = absent(Task::Hit, 0, Some(&["speed".to_owned()]));
+        assert!(absent(PREPARE, 0, None).contains("no episode of prepare"));
+        assert!(absent(DEFEND, 5, None).contains("there are 5, from 0"));
+        let unknown_column = absent(HIT, 0, Some(&["speed".to_owned()]));
         assert!(
             unknown_column.starts_with("there is no column \"speed\""),
             "{unknown_column}"
@@ -53,9 +49,9 @@ fn episode_equals_its_rows_in_the_whole_table() {
 
 #[test]
 fn episode_without_steps_has_columns_but_no_rows() {
-    let evaluation = Evaluation::play(None, &[(Task::Hit, 0..2)]).assembled();
+    let evaluation = Evaluation::play(None, &[(HIT, 0..2)]).assembled();
     let dataset = Dataset::open(&evaluation.archive()).unwrap();
-    let rows = dataset.episode(Task::Hit, 1, None).unwrap();
+    let rows = dataset.episode(HIT, 1, None).unwrap();
     assert_eq!(rows.num_rows(), 0);
     assert!(rows.num_columns() > 60);
 }

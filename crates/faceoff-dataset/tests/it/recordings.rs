@@ -1,6 +1,7 @@
 //! Helpers that record evaluations. Their agents are functions: no process, no clock, the same numbers on every machine.
 
 use arrow_array::RecordBatch;
+use faceoff_airhockey::HIT;
 use faceoff_dataset::{
     AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble,
 };
@@ -71,7 +72,7 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
         let seed = spec.seed.episode(spec.task, episode);
         let factors = spec.profile.factors();
         let mut simulation = Episode::new(
-            spec.task,
+            spec.task.try_into().unwrap(),
             Interpolation::Cubic,
             factors,
             &settings,
@@ -215,7 +216,7 @@ fn outcome_after_fault(
         task,
         episode,
         steps: simulation.steps(),
-        end: EpisodeEnd::AgentFault,
+        end: EpisodeEnd::AGENT_FAULT,
         success: false,
         violations: simulation.violations(),
         computation_time: summary(times_s),
@@ -255,7 +256,7 @@ impl Evaluation {
         shards: &[(Task, Range<u32>)],
     ) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let spec = spec(Task::Hit, 0..1);
+        let spec = spec(HIT, 0..1);
         let mut evaluation = Self {
             shards: Vec::new(),
             reports: Vec::new(),
@@ -265,6 +266,7 @@ impl Evaluation {
                 mismatch_seed: spec.mismatch_seed,
                 agent: "test".into(),
                 ruleset: Ruleset::CURRENT,
+                task_weights: faceoff_airhockey::competition().weights(&variation),
                 variation,
             },
             dir,

@@ -6,12 +6,13 @@ use crate::{
     recordings::{Evaluation, json, swing_arm},
     verify::check,
 };
+use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_dataset::{Dataset, can_draw_plant, verify::VerifyError};
 use faceoff_types::{PerturbationSettings, Task, Variation};
 use faceoff_wire::dataset::DatasetManifest;
 use serde_json::{Value, json};
 
-const SHARDS: [(Task, std::ops::Range<u32>); 2] = [(Task::Hit, 0..2), (Task::Defend, 0..2)];
+const SHARDS: [(Task, std::ops::Range<u32>); 2] = [(HIT, 0..2), (DEFEND, 0..2)];
 
 /// A variation that differs from the ruleset in all respects.
 fn large_variation() -> Variation {
@@ -46,7 +47,7 @@ fn dataset_records_its_variation_and_verifies_with_it() {
         );
     }
     let rate = |task| verified.result.tasks[&task].success_rate;
-    let score = 12.5 * rate(Task::Hit) + 87.5 * rate(Task::Defend);
+    let score = 12.5 * rate(HIT) + 87.5 * rate(DEFEND);
     assert!((verified.result.score - score).abs() < 1e-9);
 
     // With the ruleset's magnitudes the same agent and seeds give another evaluation, which states no variation.

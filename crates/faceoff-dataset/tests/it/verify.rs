@@ -10,11 +10,13 @@ use arrow_array::{
     cast::AsArray,
 };
 use arrow_schema::DataType;
+use faceoff_airhockey::competition;
+use faceoff_airhockey::{DEFEND, HIT, PREPARE};
 use faceoff_dataset::{
     Dataset, DatasetError, EpisodeRecord,
     verify::{Difference, SeasonClaim, VerifiedDataset, VerifyError, verify},
 };
-use faceoff_types::{EvaluationResult, Seed, Task};
+use faceoff_types::{EvaluationResult, Seed};
 use faceoff_wire::dataset::DatasetManifest;
 use std::{
     fs,
@@ -30,7 +32,7 @@ use std::{
 fn played() -> &'static Evaluation {
     static PLAYED: OnceLock<Evaluation> = OnceLock::new();
     PLAYED.get_or_init(|| {
-        let shards = [(Task::Hit, 0..1), (Task::Hit, 1..2), (Task::Defend, 0..2)];
+        let shards = [(HIT, 0..1), (HIT, 1..2), (DEFEND, 0..2)];
         Evaluation::play(Some(swing_arm), &shards).assembled()
     })
 }
@@ -43,6 +45,7 @@ fn forgery() -> Forgery {
 pub fn check(path: &Path, workers: usize) -> Result<VerifiedDataset, VerifyError> {
     verify(
         &Dataset::open(path)?,
+        &competition(),
         NonZero::new(workers).unwrap(),
         &|| (),
     )
@@ -72,7 +75,7 @@ fn recording_verifies_packed_unpacked_and_on_any_threads() {
     let played = played();
     let progress_calls = AtomicU32::new(0);
     let dataset = Dataset::open(&played.archive()).unwrap();
-    let verified = verify(&dataset, NonZero::<usize>::MIN, &|| {
+    let verified = verify(&dataset, &competition(), NonZero::<usize>::MIN, &|| {
         progress_calls.fetch_add(1, Ordering::Relaxed);
     })
     .unwrap();
@@ -106,7 +109,10 @@ fn recording_verifies_packed_unpacked_and_on_any_threads() {
 fn panic_in_a_worker_ends_the_verification() {
     let dataset = Dataset::open(&played().archive()).unwrap();
     let panic = std::panic::catch_unwind(|| {
-        verify(&dataset, NonZero::<usize>::MIN, &|| panic!("stop here")).unwrap()
+        verify(&dataset, &competition(), NonZero::<usize>::MIN, &|| {
+            panic!("stop here")
+        })
+        .unwrap()
     })
     .unwrap_err();
     assert_eq!(panic.downcast_ref::<&str>(), Some(&"stop here"));
@@ -128,7 +134,7 @@ fn flipped_bit_in_any_step_column_is_located() {
         let found = difference(forgery.update_manifest().dir.path(), 2);
         assert_eq!(
             (found.task, found.episode),
-            (Some(Task::Hit), Some(1)),
+            (Some(HIT), Some(1)),
             "{name}: {found}"
         );
         match name.as_str() {
@@ -179,7 +185,7 @@ fn changed_action_is_found_at_its_step() {
     let found = difference(forgery.dir.path(), 1);
     assert_eq!(
         (found.task, found.episode, found.step),
-        (Some(Task::Hit), Some(0), Some(5))
+        (Some(HIT), Some(0), Some(5))
     );
     assert!(
         found
@@ -208,7 +214,7 @@ fn flipped_bit_in_any_episode_column_is_found() {
         }
         assert_eq!(
             (found.task, found.episode),
-            (Some(Task::Hit), Some(1)),
+            (Some(HIT), Some(1)),
             "{name}: {found}"
         );
         match name.as_str() {
@@ -263,7 +269,7 @@ fn forged_scores_are_found() {
 
 #[test]
 fn forged_seeds_and_profiles_are_found() {
-    let seed = spec(Task::Hit, 0..1).seed;
+    let seed = spec(HIT, 0..1).seed;
     for (from, to) in [
         (seed.to_string(), Seed::from_number(8).to_string()),
         (seed.model_mismatch().to_string(), seed.to_string()),
@@ -277,7 +283,7 @@ fn forged_seeds_and_profiles_are_found() {
         let found = difference(forgery.dir.path(), 2);
         assert_eq!(
             (found.task, found.episode, found.step),
-            (Some(Task::Hit), Some(0), Some(0)),
+            (Some(HIT), Some(0), Some(0)),
             "{found}"
         );
     }
@@ -308,7 +314,7 @@ fn missing_repeated_and_surplus_rows_are_found() {
     };
     let last = table(&played().folder().join("steps.parquet")).num_rows() - 1;
     let location = |found: &Difference| (found.task, found.episode, found.step);
-    let (hit, defend) = (Some(Task::Hit), Some(Task::Defend));
+    let (hit, defend) = (Some(HIT), Some(DEFEND));
     assert_eq!(
         location(&without_row("steps.parquet", 3)),
         (hit, Some(0), Some(3))
@@ -529,12 +535,16 @@ fn datasets_with_agent_faults_verify() {
         (1, Some(4)) | (2, None) => None,
         _ => Some([question.initial_joints, [0.0; 7]]),
     };
-    let faulty = Evaluation::play(Some(agent), &[(Task::Prepare, 0..4)]).assembled();
+    let faulty = Evaluation::play(Some(agent), &[(PREPARE, 0..4)]).assembled();
     let verified = check(&faulty.archive(), 2).unwrap();
     assert_eq!(verified.episodes, 4);
-    let violations = &verified.result.tasks[&Task::Prepare].violations;
-    assert_eq!(violations.computation_time, 2, "the two faults");
-    let never_started = Evaluation::play(None, &[(Task::Hit, 0..2)]).assembled();
+    let violations = &verified.result.tasks[&PREPARE].violations;
+    assert_eq!(
+        violations.get(faceoff_types::ViolationName::COMPUTATION_TIME),
+        2,
+        "the two faults"
+    );
+    let never_started = Evaluation::play(None, &[(HIT, 0..2)]).assembled();
     assert_eq!(check(&never_started.archive(), 1).unwrap().steps, 0);
 }
 
@@ -628,7 +638,7 @@ fn actions_beyond_the_limit_of_the_ruleset_are_found() {
 
 #[test]
 fn datasets_with_extreme_commands_verify() {
-    let evaluation = Evaluation::play(Some(command_extremes), &[(Task::Prepare, 0..3)]).assembled();
+    let evaluation = Evaluation::play(Some(command_extremes), &[(PREPARE, 0..3)]).assembled();
     let verified = check(&evaluation.archive(), 2).unwrap();
     assert_eq!(verified.episodes, 3);
 }
@@ -637,7 +647,7 @@ fn datasets_with_extreme_commands_verify() {
 fn invented_divergence_is_found() {
     let faults_in_step_3: Agent =
         |question| (question.step != Some(3)).then_some([question.initial_joints, [0.0; 7]]);
-    let evaluation = Evaluation::play(Some(faults_in_step_3), &[(Task::Prepare, 0..2)]).assembled();
+    let evaluation = Evaluation::play(Some(faults_in_step_3), &[(PREPARE, 0..2)]).assembled();
     check(&evaluation.archive(), 2).unwrap();
     let forgery = Forgery::copy_of(&evaluation.folder());
     forgery.change_table("episodes.parquet", |batch| {

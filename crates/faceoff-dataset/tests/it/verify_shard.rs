@@ -4,11 +4,12 @@ use crate::{
     forgery::{Forgery, flipped},
     recordings::{play, spec, swing_arm},
 };
+use faceoff_airhockey::DEFEND;
 use faceoff_dataset::{
     ShardReport,
     verify::{VerifyError, verify_shard},
 };
-use faceoff_types::{Seed, Task};
+use faceoff_types::Seed;
 use faceoff_wire::job::ShardSpec;
 use serde_json::Value;
 use std::{fs, path::Path};
@@ -22,7 +23,7 @@ struct RecordedShard {
 
 fn record_shard() -> RecordedShard {
     let folder = tempfile::tempdir().unwrap();
-    let spec = spec(Task::Defend, 4..8);
+    let spec = spec(DEFEND, 4..8);
     let report = play(&spec, Some(swing_arm), folder.path());
     RecordedShard {
         folder,

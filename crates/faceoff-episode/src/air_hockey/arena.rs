@@ -1,6 +1,7 @@
 //! The settings that all episodes of an evaluation, or all rallies of a game, have in common. From them an [`Arena`] creates the
 //! simulations.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Bounds, Episode, Game, GameSetup, PerturbationSettings, Plant};
 use faceoff_types::{Factors, Interpolation, Profile, Ruleset, Seed, Task};
 
@@ -52,13 +53,18 @@ impl Arena {
     }
 
     /// The seed of an episode; `index` is its index within the evaluation.
-    pub(crate) fn episode_seed(&self, task: Task, index: u32) -> Seed {
+    pub(crate) fn episode_seed(&self, task: impl Into<Task>, index: u32) -> Seed {
         self.seed.episode(task, index)
     }
 
     /// An episode at its start.
     #[must_use]
-    pub fn episode(&self, task: Task, index: u32, interpolation: Interpolation) -> Episode {
+    pub fn episode(
+        &self,
+        task: AirHockeyTask,
+        index: u32,
+        interpolation: Interpolation,
+    ) -> Episode {
         Episode::new(
             task,
             interpolation,

@@ -1,10 +1,15 @@
 //! Descriptions of the ends of episodes, in words for the agent's team.
 
+use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
 use faceoff_sim::{
+    AirHockeyTask,
     episode::task::{PLAYABLE_Y_M, TASK_RULES},
     table::geometry::TABLE,
 };
 use faceoff_types::{AgentFaultKind, EpisodeEnd, Task};
+
+const HIT: Task = AirHockeyTask::Hit.name();
+const PREPARE: Task = AirHockeyTask::Prepare.name();
 
 /// Describes in one sentence, without a full stop, how the episode ended and what would have been a success.
 ///
@@ -22,46 +27,47 @@ pub fn describe_end(
     // Not `hypot`: it would make the program depend on the C library of newer systems.
     let speed = (vx * vx + vy * vy).sqrt();
     match end {
-        EpisodeEnd::AgentFault => match fault {
+        EpisodeEnd::AGENT_FAULT => match fault {
             Some(fault) => format!("the agent's fault ended the episode: {fault}"),
             None => "a fault of the agent ended the episode".to_owned(),
         },
-        EpisodeEnd::LeftTable => left_the_table(task, x, y, speed),
-        EpisodeEnd::CrossedMiddle if task == Task::Prepare => format!(
+        LEFT_TABLE => left_the_table(task, x, y, speed),
+        CROSSED_MIDDLE if task == PREPARE => format!(
             "puck crossed the middle line: x = {} m, and it had to stay at x ≤ {} m",
             relative_to(x, 0.0),
             rule_value(TASK_RULES.success_x_m[1])
         ),
-        EpisodeEnd::CrossedMiddle if task == Task::Hit => format!(
+        CROSSED_MIDDLE if task == HIT => format!(
             "puck came back without a goal: x = {} m in the opponent's half, moving back at {} m/s",
             relative_to(x, 0.0),
             relative_to(-vx, 0.0)
         ),
-        EpisodeEnd::CrossedMiddle => format!(
+        CROSSED_MIDDLE => format!(
             "puck was sent back across the middle: x = {} m, vx = {} m/s; it had to stay in the agent's half",
             relative_to(x, 0.0),
             relative_to(vx, 0.0)
         ),
-        EpisodeEnd::Stopped => format!(
+        STOPPED => format!(
             "puck stopped (below {} m/s) at {}",
             rule_value(TASK_RULES.defend_stopped_m_s),
             position_text(task, x, y, vx)
         ),
-        EpisodeEnd::ReachedAxis => format!(
+        REACHED_AXIS => format!(
             "puck reached the table's long axis (|y| < {} m) at {}",
             rule_value(TASK_RULES.prepare_axis_m),
             position_text(task, x, y, vx)
         ),
-        EpisodeEnd::Horizon if task == Task::Hit => format!(
+        EpisodeEnd::HORIZON if task == HIT => format!(
             "time was up after {steps} steps, without a goal: puck at x = {} m, y = {} m, {} m/s",
             rounded(x),
             rounded(y),
             rounded(speed)
         ),
-        EpisodeEnd::Horizon => format!(
+        EpisodeEnd::HORIZON => format!(
             "time was up after {steps} steps: puck at {}",
             position_text(task, x, y, vx)
         ),
+        other => format!("{other} at {}", position_text(task, x, y, vx)),
     }
 }
 
@@ -75,10 +81,10 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
         );
     }
     if x > TABLE.half_length_m() && y.abs() < goal_half_width {
-        let is_too_slow = task == Task::Hit && speed < TASK_RULES.hit_min_goal_speed_m_s;
+        let is_too_slow = task == HIT && speed < TASK_RULES.hit_min_goal_speed_m_s;
         let verdict = match (task, is_too_slow) {
-            (Task::Hit, false) => "goal",
-            (Task::Hit, true) => "no goal, since it was too slow",
+            (HIT, false) => "goal",
+            (HIT, true) => "no goal, since it was too slow",
             _ => "puck left through the opponent's goal",
         };
         return format!(
@@ -125,7 +131,7 @@ fn position_text(task: Task, x: f64, y: f64, vx: f64) -> String {
         rule_value(from),
         rule_value(to)
     );
-    if task == Task::Prepare && y.abs() >= PLAYABLE_Y_M {
+    if task == PREPARE && y.abs() >= PLAYABLE_Y_M {
         text += &format!(
             "; y = {} m, outside ±{} m",
             relative_to(y, PLAYABLE_Y_M.copysign(y)),

@@ -5,7 +5,7 @@ use crate::{
     world::{Environment, World},
 };
 use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact};
-use faceoff_types::{EpisodeEnd, Interpolation, Seed, Task, Violations};
+use faceoff_types::{EpisodeEnd, Interpolation, Seed, Task, UnknownTask, Violations};
 
 /// An episode of the simulator, with its state after the last step.
 #[derive(Debug, Clone)]
@@ -96,7 +96,14 @@ impl Environment for Arena {
         EPISODE_STEPS
     }
 
-    fn reset(&self, task: Task, index: u32, choice: Option<Interpolation>) -> AirHockeyWorld {
-        AirHockeyWorld::new(self.episode(task, index, choice.unwrap_or(Interpolation::Cubic)))
+    fn reset(
+        &self,
+        task: Task,
+        index: u32,
+        choice: Option<Interpolation>,
+    ) -> Result<AirHockeyWorld, UnknownTask> {
+        let interpolation = choice.unwrap_or(Interpolation::Cubic);
+        let simulation = self.episode(task.try_into()?, index, interpolation);
+        Ok(AirHockeyWorld::new(simulation))
     }
 }

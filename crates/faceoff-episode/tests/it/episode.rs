@@ -1,5 +1,6 @@
 //! Episodes from scripted answers: recordings, limits on steps, faults and divergence.
 
+use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
 use faceoff_episode::{
     AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError,
     RunningEpisode, StepRow, StepSink,
@@ -50,7 +51,7 @@ fn arena() -> Arena {
 }
 
 fn begin<S: StepSink<AirHockeyWorld>>(task: Task, sink: S) -> RunningEpisode<AirHockeyWorld, S> {
-    RunningEpisode::begin(&arena(), task, EPISODE, Some(Interpolation::Cubic), sink)
+    RunningEpisode::begin(&arena(), task, EPISODE, Some(Interpolation::Cubic), sink).unwrap()
 }
 
 /// Answers with slightly moved joint positions, and a computation time that depends on the step.
@@ -71,7 +72,7 @@ fn answer<S: StepSink<AirHockeyWorld>>(
 
 #[test]
 fn replayed_answers_give_the_same_recording() {
-    for task in Task::ALL {
+    for task in TASKS {
         let mut played = SinkLog::default();
         let mut running = begin(task, &mut played);
         let outcome = loop {
@@ -97,15 +98,15 @@ fn replayed_answers_give_the_same_recording() {
 
 #[test]
 fn episode_can_be_limited_in_steps() {
-    let mut running = begin(Task::Hit, NullSink).with_max_steps(2);
+    let mut running = begin(HIT, NullSink).with_max_steps(2);
     assert_eq!(answer(&mut running), None);
     let outcome = answer(&mut running).unwrap();
-    assert_eq!((outcome.steps, outcome.end), (2, EpisodeEnd::Horizon));
+    assert_eq!((outcome.steps, outcome.end), (2, EpisodeEnd::HORIZON));
 }
 
 #[test]
 fn fault_has_the_position_of_the_pending_answer() {
-    let mut running = begin(Task::Defend, NullSink);
+    let mut running = begin(DEFEND, NullSink);
     for (phase, episode, step) in [
         (Phase::StartUp, None, None),
         (Phase::Reset, Some(EPISODE), None),
@@ -118,8 +119,8 @@ fn fault_has_the_position_of_the_pending_answer() {
         let outcome = running.outcome_after_fault(phase, AgentFaultKind::NonFinite, line);
         let fault = outcome.fault.clone().unwrap();
         assert_eq!((fault.episode, fault.step), (episode, step));
-        assert_eq!(fault.agent_task, Task::Defend.into());
-        assert_eq!(outcome.end, EpisodeEnd::AgentFault);
+        assert_eq!(fault.agent_task, DEFEND.into());
+        assert_eq!(outcome.end, EpisodeEnd::AGENT_FAULT);
         assert!(!outcome.success);
         assert_eq!(running.outcome_after_recorded_fault(fault), Some(outcome));
     }
@@ -127,7 +128,7 @@ fn fault_has_the_position_of_the_pending_answer() {
 
 #[test]
 fn inconsistent_recorded_fault_is_refused() {
-    let mut running = begin(Task::Defend, NullSink).with_max_steps(2);
+    let mut running = begin(DEFEND, NullSink).with_max_steps(2);
     assert_eq!(answer(&mut running), None);
     let outcome = running.outcome_after_fault(Phase::Step, AgentFaultKind::NonFinite, None);
     let fault = outcome.fault.unwrap();
@@ -137,7 +138,7 @@ fn inconsistent_recorded_fault_is_refused() {
         fault
     };
     for inconsistent in [
-        fault_with(&|fault| fault.agent_task = Task::Hit.into()),
+        fault_with(&|fault| fault.agent_task = HIT.into()),
         fault_with(&|fault| fault.episode = Some(EPISODE + 1)),
         fault_with(&|fault| fault.step = Some(0)),
         fault_with(&|fault| fault.step = None),
@@ -174,7 +175,7 @@ fn begin_within<S: StepSink<AirHockeyWorld>>(
 ) -> RunningEpisode<AirHockeyWorld, S> {
     let interpolation = Some(Interpolation::Trajectory);
     let arena = arena().with_bounds(bounds);
-    RunningEpisode::begin(&arena, Task::Prepare, EPISODE, interpolation, sink)
+    RunningEpisode::begin(&arena, PREPARE, EPISODE, interpolation, sink).unwrap()
 }
 
 #[test]
@@ -212,7 +213,7 @@ fn divergence_is_an_agent_fault() {
     assert_eq!(fault.step, Some(outcome.steps - 1));
     assert_eq!(
         (outcome.end, outcome.success),
-        (EpisodeEnd::AgentFault, false)
+        (EpisodeEnd::AGENT_FAULT, false)
     );
 
     // A replay of the answers ends in the same way and accepts no other fault.

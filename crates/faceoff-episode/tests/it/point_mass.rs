@@ -1,10 +1,13 @@
 //! Episodes in a world other than air hockey: a mass on a line, which the agent pushes to the origin.
 
+use faceoff_airhockey::STOPPED;
 use faceoff_episode::{
     AnswerTiming, Environment, EpisodeStart, NullSink, RecordError, RunningEpisode, StepRow,
     StepSink, World,
 };
-use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task, Violations};
+use faceoff_types::{
+    AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task, UnknownTask, Violations,
+};
 
 /// Control steps of the longest episode.
 const MAX_STEPS: u32 = 40;
@@ -20,6 +23,7 @@ enum Action {
     HalfDisplacement,
 }
 
+#[derive(Debug)]
 struct PointMass {
     action: Action,
     position_m: [f64; 1],
@@ -45,7 +49,7 @@ impl World for PointMass {
             Action::HalfDisplacement => action[0] / 2.0,
         };
         self.steps += 1;
-        self.success().then_some(EpisodeEnd::Stopped)
+        self.success().then_some(STOPPED)
     }
 
     fn divergence(&self) -> Option<String> {
@@ -86,15 +90,26 @@ impl Environment for Line {
         MAX_STEPS
     }
 
-    fn reset(&self, task: Task, index: u32, choice: Option<Action>) -> PointMass {
+    fn reset(
+        &self,
+        task: Task,
+        index: u32,
+        choice: Option<Action>,
+    ) -> Result<PointMass, UnknownTask> {
+        if task != REACH {
+            return Err(UnknownTask::new(task.as_str(), [REACH]));
+        }
         let drawn = f64::from(self.seed(task, index).as_bytes()[0]) / 256.0 + 1.0;
-        PointMass {
+        Ok(PointMass {
             action: choice.unwrap_or(Action::Displacement),
             position_m: [self.start_m.unwrap_or(drawn)],
             steps: 0,
-        }
+        })
     }
 }
+
+/// The task of the other world.
+const REACH: Task = Task::new("reach");
 
 /// Positions that a recording has.
 #[derive(Default)]
@@ -135,7 +150,7 @@ fn play<S: StepSink<PointMass>>(
     factor: f64,
     sink: S,
 ) -> Result<EpisodeOutcome, AgentFaultKind> {
-    let mut running = RunningEpisode::begin(line, Task::Hit, 3, Some(choice), sink);
+    let mut running = RunningEpisode::begin(line, REACH, 3, Some(choice), sink).unwrap();
     loop {
         let action = [factor * running.question().unwrap().observation[0]];
         if let Some(outcome) = running.answer(&action, TIMING)? {
@@ -149,7 +164,7 @@ fn other_world_is_played_and_recorded() {
     let line = Line { start_m: None };
     let mut recorded = Positions::default();
     let outcome = play(&line, Action::HalfDisplacement, -1.0, &mut recorded).unwrap();
-    assert_eq!((outcome.end, outcome.success), (EpisodeEnd::Stopped, true));
+    assert_eq!((outcome.end, outcome.success), (STOPPED, true));
     assert_eq!(outcome.computation_time.max_s, TIMING.computation_time_s);
     assert_eq!(recorded.choice, Some(Action::HalfDisplacement));
     let steps = usize::try_from(outcome.steps).unwrap();
@@ -163,7 +178,7 @@ fn other_world_is_played_and_recorded() {
     let idle = play(&line, Action::Displacement, 0.0, NullSink).unwrap();
     assert_eq!(
         (idle.steps, idle.end, idle.success),
-        (MAX_STEPS, EpisodeEnd::Horizon, false)
+        (MAX_STEPS, EpisodeEnd::HORIZON, false)
     );
 }
 
@@ -173,7 +188,7 @@ fn other_world_that_diverges_is_an_agent_fault() {
     let fault = play(&line, Action::Displacement, 100.0, NullSink).unwrap_err();
     let detail = "the mass is lost".to_owned();
     assert_eq!(fault, AgentFaultKind::Diverged { detail });
-    let running = RunningEpisode::begin(&line, Task::Hit, 3, None, NullSink);
+    let running = RunningEpisode::begin(&line, REACH, 3, None, NullSink).unwrap();
     let outcome = running.outcome_after_fault(Phase::StartUp, fault, None);
     assert_eq!((outcome.steps, outcome.success), (0, false));
 }
@@ -183,7 +198,15 @@ fn first_observation_that_is_not_finite_is_no_agent_fault() {
     let line = Line {
         start_m: Some(f64::NAN),
     };
-    let running = RunningEpisode::begin(&line, Task::Hit, 3, None, NullSink);
+    let running = RunningEpisode::begin(&line, REACH, 3, None, NullSink).unwrap();
     let error = running.question().unwrap_err();
     assert_eq!(error.episode, 3);
+}
+
+#[test]
+fn world_refuses_tasks_of_other_worlds() {
+    let line = Line { start_m: None };
+    let refused = RunningEpisode::begin(&line, Task::new("hit"), 3, None, NullSink);
+    let error = refused.unwrap_err().to_string();
+    assert_eq!(error, "unknown task \"hit\": expected reach");
 }

@@ -2,6 +2,7 @@
 //! edition has what visitors can see; the organiser's edition has everything except passwords and tokens.
 
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, outcome, string};
+use faceoff_airhockey::HIT;
 use faceoff_archive::{Entry, Manifest, unpack};
 use faceoff_store::{Edition, Store};
 use faceoff_types::{EpisodeOutcome, EvaluationId, Task};
@@ -143,10 +144,8 @@ impl Season {
         site.next_day();
         site.start_day().await;
         site.run_shards(10).await;
-        site.run_evaluation(|task, episode| {
-            outcome(task, episode, task == Task::Hit && episode == 0)
-        })
-        .await;
+        site.run_evaluation(|task, episode| outcome(task, episode, task == HIT && episode == 0))
+            .await;
         site.next_day();
         site.start_day().await;
         site.run_shards(10).await;

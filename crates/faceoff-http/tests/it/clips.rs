@@ -4,9 +4,10 @@ use crate::{
     html::texts,
     site::{ADMIN, Answer, Site, TestTeam, result},
 };
+use faceoff_airhockey::PREPARE;
 use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, StepSink};
 use faceoff_replay::{Clip, ClipRecorder, join_packs};
-use faceoff_types::{AgentFaultKind, Interpolation, Phase, Profile, Seed, Task};
+use faceoff_types::{AgentFaultKind, Interpolation, Phase, Profile, Seed};
 use flate2::read::GzDecoder;
 use reqwest::Method;
 use scraper::{Html, Selector};
@@ -34,11 +35,11 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
     let seed = Seed::from_number(3);
     let arena = Arena::new(Profile::Evaluation, seed, seed.model_mismatch());
     let part = folder.join("part");
-    let mut clips = ClipRecorder::new(Task::Prepare, File::create(&part).unwrap()).unwrap();
+    let mut clips = ClipRecorder::new(PREPARE, File::create(&part).unwrap()).unwrap();
     for episode in 0..EPISODES {
         let interpolation = Some(Interpolation::Cubic);
         let mut running =
-            RunningEpisode::begin(&arena, Task::Prepare, episode, interpolation, &mut clips);
+            RunningEpisode::begin(&arena, PREPARE, episode, interpolation, &mut clips).unwrap();
         // Entries 6 to 12 of an observation are the joint positions.
         let joint_positions = running.question().unwrap().observation[6..13].to_vec();
         let outcome = loop {

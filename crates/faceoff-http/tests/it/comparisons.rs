@@ -6,6 +6,7 @@ use crate::{
     html::texts,
     site::{OutcomeFn, Site, outcome},
 };
+use faceoff_airhockey::{HIT, PREPARE};
 use faceoff_store::{Artifacts, EvaluationState};
 use faceoff_types::{EpisodeOutcome, EvaluationId, Task, Violations};
 use serde_json::json;
@@ -30,8 +31,7 @@ fn comparison_path(a: EvaluationId, b: EvaluationId) -> String {
 async fn evaluations_of_a_day_are_compared_by_episode() {
     let site = Site::start().await;
     let alpha = |task, e| episode_outcome(task, e, e < 60, false);
-    let beta =
-        |task, e| episode_outcome(task, e, e < if task == Task::Hit { 40 } else { 60 }, false);
+    let beta = |task, e| episode_outcome(task, e, e < if task == HIT { 40 } else { 60 }, false);
     let [a, b] = site
         .run_day(100, [("Alpha", &alpha), ("Beta", &beta)])
         .await;
@@ -191,11 +191,11 @@ async fn statistically_tied_teams_share_a_rank_group() {
     // tier by chance: its 36 violations cost 108 points, and the bound is 100.
     let best = |task, e| episode_outcome(task, e, e < 150, false);
     let close = |task, e| {
-        let solved = if task == Task::Prepare { 3 } else { 2 }..150;
+        let solved = if task == PREPARE { 3 } else { 2 }..150;
         episode_outcome(task, e, solved.contains(&e), false)
     };
     let behind = |task, e| episode_outcome(task, e, e < 100, false);
-    let careless = |task, e| episode_outcome(task, e, e < 150, task == Task::Hit && e < 36);
+    let careless = |task, e| episode_outcome(task, e, e < 150, task == HIT && e < 36);
     let teams: [(&str, OutcomeFn<'_>); 4] = [
         ("Best", &best),
         ("Close", &close),

@@ -2,6 +2,7 @@
 //! the simulator's perturbations.
 
 use crate::site::{ADMIN, Site, outcome};
+use faceoff_airhockey::HIT;
 use faceoff_types::{EpisodeOutcome, Task, Violations};
 use serde_json::json;
 
@@ -41,9 +42,9 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
     site.start_day().await;
     // The agent solves half of the four episodes of `hit`, and exceeds the joint velocity limits in each of them.
     let outcome_fn = |task: Task, episode| EpisodeOutcome {
-        success: task == Task::Hit && episode < 2,
+        success: task == HIT && episode < 2,
         violations: Violations {
-            joint_vel: task == Task::Hit,
+            joint_vel: task == HIT,
             ..Violations::default()
         },
         ..outcome(task, episode, false)

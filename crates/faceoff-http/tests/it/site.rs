@@ -1,6 +1,7 @@
 //! A running server for tests: axum on a loopback port, SQLite in a temporary folder, a clock that tests set, and helpers that
 //! take the steps of a worker (a process that runs jobs): they claim a job and commit its outcome.
 
+use faceoff_airhockey::{HIT, TASKS};
 use faceoff_api::token::hash_token;
 use faceoff_http::{
     AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, LinkKey,
@@ -482,7 +483,7 @@ impl Site {
 
     /// Runs the shards of the next evaluation (one of each task), with `faults` agent faults in each.
     pub async fn run_shards(&self, faults: usize) {
-        for _ in Task::ALL {
+        for _ in TASKS {
             let (claim, run, shard) = self.claim_shard().await;
             let outcomes = shard_outcomes(&shard, |task, episode| {
                 outcome(task, episode, (episode as usize) < faults)
@@ -687,6 +688,7 @@ pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> Eva
         plan.profile,
         seed,
         &plan.variation,
+        &faceoff_airhockey::competition().weights(&plan.variation),
         tasks.collect(),
     )
 }
@@ -694,7 +696,7 @@ pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> Eva
 /// The run plan of the first stage: one shard for each task, and one agent fault is allowed.
 fn plan() -> RunPlan {
     RunPlan {
-        tasks: Task::ALL.to_vec(),
+        tasks: TASKS.to_vec(),
         episodes_per_shard: 4,
         max_faults: 1,
         ..six_shard_plan()
@@ -765,21 +767,19 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
         points if points <= 1500.0 => Tier::Improvable,
         _ => Tier::NonDeployable,
     };
-    let tasks = Task::ALL
+    let tasks = TASKS
         .into_iter()
         .zip(rates)
         .map(|(task, rate)| {
-            let is_hit = task == Task::Hit;
+            let is_hit = task == HIT;
             let result = TaskResult {
                 episodes: 1000,
                 successes: (1000.0 * rate) as u32,
                 success_rate: rate,
                 success_ci95: [(rate - 0.03).max(0.0), (rate + 0.03).min(1.0)],
                 penalty_points: if is_hit { penalty_points } else { 0.0 },
-                violations: ViolationCounts {
-                    ee: 7,
-                    ..ViolationCounts::default()
-                },
+                violations: faceoff_airhockey::competition()
+                    .violation_counts(&[(faceoff_airhockey::EE, 7)]),
                 tier: if is_hit { tier } else { Tier::Deployable },
                 steps: 123_456,
                 computation_time_s: ComputationTimeSummary {

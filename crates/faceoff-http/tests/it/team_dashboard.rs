@@ -5,7 +5,8 @@ use crate::{
     html::{links, texts},
     site::{ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, TestTeam, result, string},
 };
-use faceoff_types::{Task, ValidationOutcome, ValidationTiming};
+use faceoff_airhockey::HIT;
+use faceoff_types::{ValidationOutcome, ValidationTiming};
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -49,7 +50,7 @@ fn valid_outcome(log: &str) -> ValidationOutcome {
         runtime: "native".into(),
         agent_name: "<b>striker</b>".into(),
         timing: vec![ValidationTiming {
-            task: Task::Hit,
+            task: HIT,
             steps: 321,
             mean_s: 0.0005,
             p99_s: 0.00123,

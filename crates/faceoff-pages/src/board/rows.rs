@@ -6,9 +6,7 @@ use faceoff_api::views::{
     task::TaskView,
 };
 use faceoff_service::views::board_timeline::EarlierBoard;
-use faceoff_types::{
-    Competition, DivisionName, EvaluationId, Task, TaskWeights, TeamId, Tier, ViolationCounts,
-};
+use faceoff_types::{Competition, DivisionName, EvaluationId, Task, TaskWeights, TeamId, Tier};
 use jiff::civil;
 use std::{cmp::Ordering, collections::BTreeMap};
 
@@ -266,17 +264,22 @@ pub(super) struct TaskRow {
 
 /// Details that are public once the day is released.
 pub(super) struct TaskDetails {
-    pub(super) violations: ViolationCounts,
+    /// Heading and number of episodes of each kind of violation.
+    pub(super) violations: Vec<(String, u32)>,
     pub(super) mean_ms: String,
     pub(super) p99_ms: String,
     pub(super) max_ms: String,
 }
 
 impl TaskDetails {
-    fn new(result: &TaskView) -> Option<Self> {
+    fn new(result: &TaskView, competition: &Competition) -> Option<Self> {
         let time = result.computation_time_s?;
+        let counts = result.violations.as_ref()?;
+        let kinds = competition.violations.iter();
         Some(Self {
-            violations: result.violations?,
+            violations: kinds
+                .map(|info| (info.column.clone(), counts.get(info.name)))
+                .collect(),
             mean_ms: figures::milliseconds(time.mean),
             p99_ms: figures::milliseconds(time.p99),
             max_ms: figures::milliseconds(time.max),
@@ -285,13 +288,18 @@ impl TaskDetails {
 }
 
 impl TaskRow {
-    pub(super) fn new(row: &BoardRow, result: &TaskView, context: &Context) -> Self {
+    pub(super) fn new(
+        row: &BoardRow,
+        result: &TaskView,
+        context: &Context,
+        competition: &Competition,
+    ) -> Self {
         Self {
             team: context.team_cell(row),
             rate: Rate::new(result),
             penalty_points: figures::one_decimal(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, per_day(row, result.episodes)),
-            details: TaskDetails::new(result),
+            details: TaskDetails::new(result, competition),
         }
     }
 }

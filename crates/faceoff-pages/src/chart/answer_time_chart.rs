@@ -20,7 +20,7 @@ const STEP_MS: f64 = 20.0;
 /// Answer times of a task, in milliseconds.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TimeSummary {
-    pub(crate) name: &'static str,
+    pub(crate) name: String,
     pub(crate) mean: f64,
     pub(crate) p99: f64,
     pub(crate) max: f64,
@@ -68,7 +68,7 @@ pub(crate) struct CountRow {
 /// Positions of the times of a task.
 #[derive(Debug)]
 pub(crate) struct AnswerTimeRow {
-    pub(crate) name: &'static str,
+    pub(crate) name: String,
     pub(crate) y: u32,
     pub(crate) mean: String,
     pub(crate) p99: String,
@@ -91,7 +91,7 @@ impl AnswerTimeChart {
             let [mean, p99, max] =
                 [summary.mean, summary.p99, summary.max].map(|ms| figures::one_decimal(x(ms)));
             AnswerTimeRow {
-                name: summary.name,
+                name: summary.name.clone(),
                 y,
                 mean,
                 p99,
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn times_are_placed_logarithmically_inside_the_plot() {
         let summary = TimeSummary {
-            name: "hit",
+            name: "hit".to_owned(),
             mean: 0.1,
             p99: 10.0,
             max: 5000.0,

@@ -19,7 +19,7 @@ pub(crate) struct LabelledRate {
 /// Rates as bars, in the form that `chart.html` draws.
 #[derive(Debug)]
 pub(crate) struct RateChart {
-    pub(crate) title: &'static str,
+    pub(crate) title: String,
     pub(crate) grid: Vec<Tick>,
     pub(crate) bars: Vec<Bar>,
     /// Text alternative for screen readers.
@@ -43,7 +43,7 @@ pub(crate) struct Bar {
 }
 
 impl RateChart {
-    pub(crate) fn new(title: &'static str, rates: &[LabelledRate]) -> Self {
+    pub(crate) fn new(title: &str, rates: &[LabelledRate]) -> Self {
         let scale = Scale { max: 100.0 };
         let step = (RIGHT - LEFT) / rates.len().max(1) as f64;
         let middles = (0..).map(|index| LEFT + step * (f64::from(index) + 0.5));
@@ -52,7 +52,7 @@ impl RateChart {
             .map(|rate| format!("{} {:.0}", rate.name, rate.percent))
             .collect();
         Self {
-            title,
+            title: title.to_owned(),
             grid: scale.grid(),
             bars: rates
                 .iter()

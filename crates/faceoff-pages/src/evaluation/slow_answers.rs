@@ -9,6 +9,7 @@ use faceoff_api::views::{
 use faceoff_service::{app::App, archive_contents, problem::Problem, views::violations};
 use faceoff_store::EvaluationState;
 use faceoff_types::Task;
+use faceoff_types::ViolationName;
 use faceoff_wire::dataset::SlowEpisode;
 
 /// Slow answers, most costly first; once the day is released.
@@ -54,8 +55,8 @@ impl SlowAnswers {
         result: &ResultView,
     ) -> Result<Self, Problem> {
         let has_slow_answers = |task: &TaskView| {
-            task.violations
-                .is_some_and(|violations| violations.computation_time > 0)
+            let counts = task.violations.as_ref();
+            counts.is_some_and(|violations| violations.get(ViolationName::COMPUTATION_TIME) > 0)
         };
         if !result.tasks.values().any(has_slow_answers) {
             return Ok(Self::default());

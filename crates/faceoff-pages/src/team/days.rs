@@ -53,7 +53,8 @@ pub(super) struct DayResult {
 
 impl DayResult {
     pub(super) fn new(row: &HistoryRow, variation: &Variation, competition: &Competition) -> Self {
-        let [low, high] = figures::score_interval(row.score, &row.tasks, &variation.weights);
+        let weights = competition.weights(variation);
+        let [low, high] = figures::score_interval(row.score, &row.tasks, &weights);
         Self {
             day: row.day,
             evaluation: row.evaluation,
@@ -91,8 +92,9 @@ pub(super) fn charts(
         value,
         interval,
     };
+    let weights = competition.weights(variation);
     let score = rows.iter().map(|row| {
-        let interval = figures::score_interval(row.score, &row.tasks, &variation.weights);
+        let interval = figures::score_interval(row.score, &row.tasks, &weights);
         day_value(row, row.score, Some(interval))
     });
     let points = rows
@@ -136,35 +138,33 @@ pub(super) fn charts(
 pub(super) struct TaskViolations {
     pub(super) task: Task,
     pub(super) episodes: u32,
-    /// In the order of the columns: end effector, elbow and wrist, joint position, joint velocity, answer time.
-    pub(super) kinds: [String; 5],
+    /// In the order of the competition's kinds.
+    pub(super) kinds: Vec<String>,
 }
 
 /// Violations by task; tasks without violations are omitted.
 pub(super) fn violations(rows: &[HistoryRow], competition: &Competition) -> Vec<TaskViolations> {
     let task_violations = |task: Task| {
         let results = rows.iter().filter_map(|row| row.tasks.get(&task));
-        let released: Vec<(u32, ViolationCounts)> = results
-            .filter_map(|result| Some((result.episodes, result.violations?)))
-            .collect();
-        let episodes = released.iter().map(|(episodes, _)| episodes).sum();
-        let sum = |kind: fn(&ViolationCounts) -> u32| -> u32 {
-            released.iter().map(|(_, counts)| kind(counts)).sum()
-        };
-        let kinds = [
-            sum(|counts| counts.ee),
-            sum(|counts| counts.link),
-            sum(|counts| counts.joint_pos),
-            sum(|counts| counts.joint_vel),
-            sum(|counts| counts.computation_time),
-        ];
+        let mut episodes = 0;
+        let mut counts = ViolationCounts::default();
+        for result in results {
+            if let Some(violations) = &result.violations {
+                episodes += result.episodes;
+                counts.add(violations);
+            }
+        }
+        let kinds = competition.violations.iter();
+        let kinds = kinds.map(|info| counts.get(info.name));
         kinds
-            .iter()
-            .any(|count| *count > 0)
+            .clone()
+            .any(|count| count > 0)
             .then(|| TaskViolations {
                 task,
                 episodes,
-                kinds: kinds.map(|count| figures::count_with_share(count, episodes)),
+                kinds: kinds
+                    .map(|count| figures::count_with_share(count, episodes))
+                    .collect(),
             })
     };
     competition

@@ -1,13 +1,9 @@
 //! The evaluations of a day in the season archive, as CSV: one line per team, with its results in all tasks.
 
-use crate::board_csv::{TASK_COLUMNS, table_with_tasks, task_fields};
+use crate::board_csv::{SCORE_COLUMNS, table_with_tasks, task_fields};
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView};
 use faceoff_service::csv::{escape_formula, or_empty};
 use faceoff_types::Competition;
-use std::collections::BTreeMap;
-
-/// As many of [`TASK_COLUMNS`] as the table has: those about scores.
-const SCORE_COLUMNS: usize = 7;
 
 /// A table with one line per evaluation.
 pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView]) -> Vec<u8> {
@@ -27,9 +23,9 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
             "tier",
             "dataset_blake3",
         ],
-        &TASK_COLUMNS[..SCORE_COLUMNS],
+        &SCORE_COLUMNS,
     );
-    let no_tasks = BTreeMap::new();
+    let no_tasks = Default::default();
     for evaluation in evaluations {
         let (state, finished_at) = match &evaluation.status {
             EvaluationStatus::Queued => ("queued", None),
@@ -75,7 +71,7 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
         table.row(
             fields
                 .into_iter()
-                .chain(task_fields(competition, tasks, SCORE_COLUMNS)),
+                .chain(task_fields(competition, tasks, SCORE_COLUMNS.len())),
         );
     }
     table.into_bytes()

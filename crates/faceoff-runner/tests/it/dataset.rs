@@ -5,11 +5,13 @@ use crate::{
     recording::{moving_agent, read_table},
     shard::{run, spec},
 };
+use faceoff_airhockey::competition;
+use faceoff_airhockey::{DEFEND, HIT, PREPARE};
 use faceoff_dataset::{
     Dataset, assemble,
     verify::{VerifiedDataset, verify},
 };
-use faceoff_types::{AgentFaultKind, Ruleset, Task};
+use faceoff_types::{AgentFaultKind, Ruleset, Task, ViolationName};
 use faceoff_wire::job::EvaluationMeta;
 use std::{
     fs::File,
@@ -58,7 +60,7 @@ fn recordings_of_one_and_three_workers_are_equal() {
                             break;
                         };
                         run(
-                            &spec(Task::Defend, *start..*end),
+                            &spec(DEFEND, *start..*end),
                             &agent,
                             &sandboxed(),
                             &dirs[index],
@@ -74,9 +76,9 @@ fn recordings_of_one_and_three_workers_are_equal() {
         let mut zip = ZipArchive::new(File::open(&archive).unwrap()).unwrap();
         zip.extract(&out).unwrap();
         // Only measured values may differ.
-        let task = result.tasks.get_mut(&Task::Defend).unwrap();
+        let task = result.tasks.get_mut(&DEFEND).unwrap();
         task.computation_time_s = Default::default();
-        task.violations.computation_time = 0;
+        task.violations.set(ViolationName::COMPUTATION_TIME, 0);
         (out, task.clone())
     };
     let (one, result_one) = play("one", &[(0, 6)], 1);
@@ -95,7 +97,7 @@ fn recordings_of_one_and_three_workers_are_equal() {
 }
 
 fn meta() -> EvaluationMeta {
-    let spec = spec(Task::Defend, 0..1);
+    let spec = spec(DEFEND, 0..1);
     EvaluationMeta {
         profile: spec.profile,
         seed: spec.seed,
@@ -103,6 +105,7 @@ fn meta() -> EvaluationMeta {
         agent: "test".into(),
         ruleset: Ruleset::CURRENT,
         variation: Default::default(),
+        task_weights: faceoff_airhockey::competition().weights(&Default::default()),
     }
 }
 
@@ -114,12 +117,18 @@ fn play_and_verify(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset 
     let archive = dir.path().join("dataset.zip");
     assemble(&meta(), &[shard], &archive, None).unwrap();
     let workers = NonZero::new(2).unwrap();
-    verify(&Dataset::open(&archive).unwrap(), workers, &|| ()).unwrap()
+    verify(
+        &Dataset::open(&archive).unwrap(),
+        &competition(),
+        workers,
+        &|| (),
+    )
+    .unwrap()
 }
 
 #[test]
 fn recordings_with_faults_verify() {
-    assert_eq!(play_and_verify(&moving_agent(), Task::Hit, 2).episodes, 2);
+    assert_eq!(play_and_verify(&moving_agent(), HIT, 2).episodes, 2);
     let agent = Agent::with(
         "now = 0\n\
          def on_reset(episode):\n    global now; now = episode\n    \
@@ -127,9 +136,9 @@ fn recordings_with_faults_verify() {
          def on_step(step, answer):\n    \
          return 'oops' if (now, step) == (1, 4) else json.dumps(answer)",
     );
-    assert_eq!(play_and_verify(&agent, Task::Prepare, 4).episodes, 4);
+    assert_eq!(play_and_verify(&agent, PREPARE, 4).episodes, 4);
     let failing = Agent::script("import sys\nsys.exit('no model')");
-    assert_eq!(play_and_verify(&failing, Task::Hit, 2).steps, 0);
+    assert_eq!(play_and_verify(&failing, HIT, 2).steps, 0);
 }
 
 #[test]
@@ -145,7 +154,7 @@ fn diverged_world_is_an_agent_fault_and_verifies() {
          answer['action'] = [[push, push, push]] * 20\n    \
          return json.dumps(answer)",
     );
-    let report = run(&spec(Task::Prepare, 0..2), &agent, &sandboxed(), &shard).unwrap();
+    let report = run(&spec(PREPARE, 0..2), &agent, &sandboxed(), &shard).unwrap();
     let faults: Vec<_> = report.outcomes.iter().map(|o| o.fault.clone()).collect();
     // The first world diverges; the second has extreme motion but stays finite.
     let [Some(fault), None] = &faults[..] else {
@@ -163,6 +172,11 @@ fn diverged_world_is_an_agent_fault_and_verifies() {
     assemble(&meta(), &[shard], &archive, None).unwrap();
     let dataset = Dataset::open(&archive).unwrap();
     let workers = NonZero::new(2).unwrap();
-    assert_eq!(verify(&dataset, workers, &|| ()).unwrap().episodes, 2);
+    assert_eq!(
+        verify(&dataset, &competition(), workers, &|| ())
+            .unwrap()
+            .episodes,
+        2
+    );
     assert_eq!(dataset.episodes().unwrap()[0].outcome, report.outcomes[0]);
 }

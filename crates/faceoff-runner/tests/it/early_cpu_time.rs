@@ -6,9 +6,9 @@ use crate::{
     recording::{read_table, seconds},
     shard::{run, spec},
 };
+use faceoff_airhockey::HIT;
 use faceoff_runner::{AgentEnvironment, GameObserver, run_game};
 use faceoff_sandbox::affinity;
-use faceoff_types::Task;
 
 /// The agent and the evaluator share one CPU.
 fn on_last_cpu() -> AgentEnvironment {
@@ -27,7 +27,7 @@ const SPINS: &str = "import threading\n\
 fn cpu_time_between_answer_and_question_counts() {
     let out = tempfile::tempdir().unwrap();
     let report = run(
-        &spec(Task::Hit, 0..1),
+        &spec(HIT, 0..1),
         &Agent::with(SPINS),
         &on_last_cpu(),
         out.path(),

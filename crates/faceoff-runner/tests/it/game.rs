@@ -7,7 +7,7 @@ use faceoff_runner::{
 };
 use faceoff_types::{
     AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Profile, Ruleset, Seed,
-    Side, SideOutcome,
+    Side, SideOutcome, ViolationName,
 };
 use std::{cell::Cell, fs, path::Path};
 
@@ -204,7 +204,7 @@ fn late_answers_are_dropped_and_cost_only_their_side() {
     assert!(late.faults.is_empty());
     assert_eq!((other.late_answers, other.answers), (0, 60));
     let [late, other] = &report.archives.score.sides;
-    assert_eq!(late.violations.computation_time, 1);
+    assert_eq!(late.violations.get(ViolationName::COMPUTATION_TIME), 1);
     assert!(late.computation_time_s.max > 2.0);
     assert!(other.computation_time_s.max < 2.0);
 }
@@ -257,7 +257,7 @@ fn silent_side_holds_its_arm_and_is_restarted_next_rally() {
     assert_eq!(report.archives.outcome.rallies, 2);
     // Each window with a fault is penalised.
     let score = &report.archives.score.sides[1];
-    assert_eq!(score.violations.computation_time, 2);
+    assert_eq!(score.violations.get(ViolationName::COMPUTATION_TIME), 2);
     assert_eq!(score.penalty_points, 4.0);
     assert!(report.logs[1].contains("no answer within the step limit"));
 }

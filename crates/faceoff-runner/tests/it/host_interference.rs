@@ -7,11 +7,12 @@ use crate::{
     shard::{RecordingObserver, run, spec, without_times},
 };
 use arrow_array::Array;
+use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_runner::{
     AgentEnvironment, InterferenceMonitor, ShardReport, ShardSpec, run_shard, run_shard_monitored,
 };
 use faceoff_sandbox::affinity;
-use faceoff_types::{AgentFaultKind, Task};
+use faceoff_types::AgentFaultKind;
 use std::{
     fs,
     path::Path,
@@ -75,13 +76,7 @@ fn sleeping_agent_is_not_excused() {
     let out = tempfile::tempdir().unwrap();
     let env = with_reruns(sandboxed(), 2, 100);
     let agent = Agent::with(SLEEPS);
-    let report = run_monitored(
-        &spec(Task::Hit, 0..2),
-        &agent,
-        &env,
-        &FixedShare(0.0),
-        out.path(),
-    );
+    let report = run_monitored(&spec(HIT, 0..2), &agent, &env, &FixedShare(0.0), out.path());
     assert_eq!(report.timing.host_noise_reruns, 0);
     for outcome in &report.outcomes {
         assert!(outcome.computation_time.max_s >= 0.15, "{outcome:?}");
@@ -97,13 +92,7 @@ fn late_answer_counts_without_host_interference() {
     let out = tempfile::tempdir().unwrap();
     let env = with_reruns(sandboxed(), 2, 100);
     let agent = Agent::with(SLEEPS);
-    let report = run_monitored(
-        &spec(Task::Hit, 0..1),
-        &agent,
-        &env,
-        &FixedShare(0.5),
-        out.path(),
-    );
+    let report = run_monitored(&spec(HIT, 0..1), &agent, &env, &FixedShare(0.5), out.path());
     assert_eq!(report.timing.host_noise_reruns, 0);
     let steps = read_table(&out.path().join("steps.parquet"));
     let (counted, host) = (
@@ -128,7 +117,7 @@ fn late_answer_counts_without_host_interference() {
 #[test]
 fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
     let out = tempfile::tempdir().unwrap();
-    let spec = spec(Task::Defend, 0..2);
+    let spec = spec(DEFEND, 0..2);
     // Without a sandbox the second process can detect that it is not the first.
     let mark = out.path().join("mark of the first process");
     let agent = Agent::with(&format!(
@@ -184,7 +173,7 @@ fn reruns_are_bounded_and_the_last_try_counts() {
         [(0, 100, [0, 0, 0]), (2, 100, [2, 1, 0]), (2, 5, [1, 0, 0])]
     {
         let env = with_reruns(with_step_limit(0.1), per_episode, per_100);
-        let mut spec = spec(Task::Hit, 0..3);
+        let mut spec = spec(HIT, 0..3);
         spec.max_faults = 10;
         let report = run_monitored(
             &spec,
@@ -224,7 +213,7 @@ fn hard_limit_is_extended_only_by_host_interference() {
     let agent = Agent::with(late);
     let play = |share| {
         run_monitored(
-            &spec(Task::Hit, 0..1),
+            &spec(HIT, 0..1),
             &agent,
             &env,
             &FixedShare(share),
@@ -333,7 +322,7 @@ fn event_storms_of_the_agent_are_not_host_interference() {
         env.limits.pids = 40;
         let before_s = busy_s(cpu);
         let report = run_shard(
-            &spec(Task::Hit, 0..1),
+            &spec(HIT, 0..1),
             &agent.bundle,
             &env,
             out.path(),
@@ -366,7 +355,7 @@ fn event_storms_of_the_agent_are_not_host_interference() {
 fn missing_cgroup_yields_no_host_interference() {
     let out = tempfile::tempdir().unwrap();
     let report = run_shard(
-        &spec(Task::Hit, 0..1),
+        &spec(HIT, 0..1),
         &Agent::with(SLEEPS).bundle,
         &with_reruns(unconfined(), 2, 100),
         out.path(),
@@ -427,7 +416,7 @@ fn other_load_on_the_agents_cpu_is_measured() {
          while step in range(1, 6) and time.thread_time() < until: pass\n    \
          return json.dumps(answer)",
     );
-    let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path());
+    let report = run(&spec(HIT, 0..1), &agent, &env, out.path());
     drop(busy_loops);
     report.unwrap();
     let steps = read_table(&out.path().join("steps.parquet"));
@@ -480,7 +469,7 @@ fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
         env.agent_cpus = vec![cpu];
         let out = tempfile::tempdir().unwrap();
         let busy_loops = BusyLoops::on(cpu);
-        let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path());
+        let report = run(&spec(HIT, 0..1), &agent, &env, out.path());
         drop(busy_loops);
         let report = report.unwrap();
         assert_eq!(report.outcomes[0].fault, None, "{name}: {}", report.log);
@@ -504,7 +493,7 @@ fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
 fn noise_floor_is_measured_before_and_between_episodes() {
     let out = tempfile::tempdir().unwrap();
     let report = run(
-        &spec(Task::Hit, 0..2),
+        &spec(HIT, 0..2),
         &Agent::behaving(),
         &sandboxed(),
         out.path(),
@@ -531,7 +520,7 @@ fn cpu_time_without_a_sandbox_includes_children() {
          child.stdout.readline()\n    \
          return json.dumps(answer)",
     );
-    run(&spec(Task::Hit, 0..1), &agent, &unconfined(), out.path()).unwrap();
+    run(&spec(HIT, 0..1), &agent, &unconfined(), out.path()).unwrap();
     let steps = read_table(&out.path().join("steps.parquet"));
     let column = steps.column_by_name("cpu_time_ns").unwrap();
     assert_eq!(column.null_count(), 0);

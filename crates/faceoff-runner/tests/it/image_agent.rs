@@ -22,6 +22,7 @@ fn report_in(env: &AgentEnvironment) -> ValidationReport {
     let bundle = unpack(&archive, &dir.path().join("bundle"), &limits, &|| false).unwrap();
     let seed = Seed::from_number(0);
     let spec = ValidationSpec {
+        tasks: faceoff_airhockey::TASKS.to_vec(),
         seed,
         mismatch_seed: seed.model_mismatch(),
     };

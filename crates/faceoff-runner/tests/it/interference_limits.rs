@@ -6,11 +6,12 @@ use crate::{
     agents::{Agent, assert_timed_out, sandboxed},
     shard::{RecordingObserver, spec},
 };
+use faceoff_airhockey::HIT;
 use faceoff_runner::{
     AgentEnvironment, InterferenceMonitor, PlatformFault, ValidationFailure, ValidationReport,
     ValidationSpec, run_shard_monitored, validate_monitored,
 };
-use faceoff_types::{AgentFaultKind, Phase, Seed, Task};
+use faceoff_types::{AgentFaultKind, Phase, Seed};
 use std::time::{Duration, Instant};
 
 /// Attributes a fixed share (0 to 1) of every wait to the host.
@@ -33,6 +34,7 @@ fn run_validation(
 ) -> Result<ValidationReport, PlatformFault> {
     let seed = Seed::from_number(0);
     let spec = ValidationSpec {
+        tasks: faceoff_airhockey::TASKS.to_vec(),
         seed,
         mismatch_seed: seed.model_mismatch(),
     };
@@ -129,7 +131,7 @@ fn reset_budget_excludes_host_interference() {
     let mut env = sandboxed();
     (env.time.resets_extra_s, env.time.reset_mean_s) = (0.5, 1e-9);
     let play = |monitor| {
-        let spec = spec(Task::Hit, 0..3);
+        let spec = spec(HIT, 0..3);
         let report = run_shard_monitored(
             &spec,
             &agent.bundle,

@@ -1,16 +1,18 @@
 //! Misbehaving agents in a validation: each misbehaviour is an agent fault with its own verdict.
 
 use crate::agents::{Agent, sandboxed, with_short_step_limit};
+use faceoff_airhockey::{HIT, TASKS};
 use faceoff_runner::{
     AgentEnvironment, PlatformFault, VALIDATION_STEPS, ValidationFailure, ValidationReport,
     ValidationSpec, validate,
 };
-use faceoff_types::{AgentFault, AgentFaultKind, Phase, Seed, Task};
+use faceoff_types::{AgentFault, AgentFaultKind, Phase, Seed};
 
 /// A validation with the seed of this number.
 fn spec(number: u64) -> ValidationSpec {
     let seed = Seed::from_number(number);
     ValidationSpec {
+        tasks: faceoff_airhockey::TASKS.to_vec(),
         seed,
         mismatch_seed: seed.model_mismatch(),
     }
@@ -43,7 +45,7 @@ fn behaving_agent_passes_the_validation() {
     let report = report_in(&Agent::behaving(), &sandboxed());
     assert_eq!(report.failure, None);
     assert_eq!(report.log, "goodbye\n".repeat(3));
-    for (timing, task) in report.timing.iter().zip(Task::ALL) {
+    for (timing, task) in report.timing.iter().zip(TASKS) {
         assert_eq!(timing.task, task);
         assert!(timing.steps >= VALIDATION_STEPS, "{timing:?}");
         assert!(
@@ -84,7 +86,7 @@ fn slow_mean_answer_fails_the_validation() {
     let Some(failure @ ValidationFailure::TooSlow { timing, .. }) = &report.failure else {
         panic!("{:?}", report.failure)
     };
-    assert_eq!((timing.task, report.timing.len()), (Task::Hit, 1));
+    assert_eq!((timing.task, report.timing.len()), (HIT, 1));
     assert!(failure.to_string().contains("too slow"), "{failure}");
 }
 

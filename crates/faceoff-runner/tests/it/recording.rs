@@ -8,8 +8,8 @@ use arrow_array::{
     Array, Float64Array, Int64Array, ListArray, RecordBatch, StringArray, UInt32Array,
     cast::AsArray,
 };
+use faceoff_airhockey::{HIT, TASKS};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::Task;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::{fs::File, path::Path, time::Duration};
 
@@ -73,7 +73,7 @@ pub fn moving_agent() -> Agent {
 #[test]
 fn recording_matches_the_simulation() {
     let out = tempfile::tempdir().unwrap();
-    for task in Task::ALL {
+    for task in TASKS {
         let spec = spec(task, 4..6);
         let dir = out.path().join(task.as_str());
         let report = run(&spec, &moving_agent(), &sandboxed(), &dir).unwrap();
@@ -93,7 +93,7 @@ fn recording_matches_the_simulation() {
             assert_eq!(texts(&episodes, "interpolation").value(index), "3");
             assert_eq!(ints(&episodes, "steps").value(index), outcome.steps);
             let mut world = Episode::new(
-                task,
+                task.try_into().unwrap(),
                 Interpolation::Cubic,
                 spec.profile.factors(),
                 &settings,
@@ -228,7 +228,7 @@ fn times_and_faults_are_recorded() {
     let out = tempfile::tempdir().unwrap();
     let agent =
         Agent::with("def on_step(step, answer): return 'no' if step == 3 else json.dumps(answer)");
-    let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(&spec(HIT, 0..1), &agent, &sandboxed(), out.path()).unwrap();
     let steps = read_table(&out.path().join("steps.parquet"));
     assert_eq!(
         steps.num_rows(),

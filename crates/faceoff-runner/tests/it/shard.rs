@@ -1,6 +1,7 @@
 //! Shards: ranges of episodes of one task, played by one agent, with their outcomes, faults and logs.
 
 use crate::agents::{Agent, sandboxed};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE};
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
 };
@@ -77,11 +78,7 @@ pub fn without_times(outcomes: &[EpisodeOutcome]) -> Vec<EpisodeOutcome> {
 #[test]
 fn agent_plays_all_tasks_with_its_interpolation() {
     let out = tempfile::tempdir().unwrap();
-    for (task, hooks) in [
-        (Task::Hit, ""),
-        (Task::Defend, "INTERPOLATION = 1"),
-        (Task::Prepare, ""),
-    ] {
+    for (task, hooks) in [(HIT, ""), (DEFEND, "INTERPOLATION = 1"), (PREPARE, "")] {
         let agent = Agent::with(hooks);
         let dir = out.path().join(task.as_str());
         let report = run(&spec(task, 0..2), &agent, &sandboxed(), &dir).unwrap();
@@ -109,18 +106,12 @@ fn results_do_not_depend_on_the_division_into_shards() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::behaving();
     let env = sandboxed();
-    let whole = run(
-        &spec(Task::Defend, 0..5),
-        &agent,
-        &env,
-        &out.path().join("whole"),
-    )
-    .unwrap();
+    let whole = run(&spec(DEFEND, 0..5), &agent, &env, &out.path().join("whole")).unwrap();
     let mut parts = Vec::new();
     for range in [3..5, 0..1, 1..3] {
         let dir = out.path().join(format!("from-{}", range.start));
         parts.extend(
-            run(&spec(Task::Defend, range), &agent, &env, &dir)
+            run(&spec(DEFEND, range), &agent, &env, &dir)
                 .unwrap()
                 .outcomes,
         );
@@ -139,14 +130,14 @@ fn fault_ends_its_episode_and_restarts_the_agent() {
          def on_step(step, answer):\n    \
          return 'oops' if (now, step) == (1, 2) else json.dumps(answer)",
     );
-    let report = run(&spec(Task::Prepare, 0..3), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(&spec(PREPARE, 0..3), &agent, &sandboxed(), out.path()).unwrap();
     let [first, second, third] = &report.outcomes[..] else {
         panic!("three episodes: {report:?}");
     };
     assert_eq!((&first.fault, &third.fault), (&None, &None));
     assert_eq!(
         (second.end, second.success, second.steps),
-        (EpisodeEnd::AgentFault, false, 2)
+        (EpisodeEnd::AGENT_FAULT, false, 2)
     );
     let fault = second.fault.as_ref().unwrap();
     assert!(
@@ -155,7 +146,7 @@ fn fault_ends_its_episode_and_restarts_the_agent() {
     );
     assert_eq!(
         (fault.agent_task, fault.episode, fault.step),
-        (Task::Prepare.into(), Some(1), Some(2))
+        (PREPARE.into(), Some(1), Some(2))
     );
     assert_eq!(fault.line.as_deref(), Some("oops"));
     // The counter shows the new process, and the log line shows the reason.
@@ -171,7 +162,7 @@ fn fault_ends_its_episode_and_restarts_the_agent() {
     );
     // The other episodes are the same as without the fault.
     let undisturbed = run(
-        &spec(Task::Prepare, 2..3),
+        &spec(PREPARE, 2..3),
         &Agent::behaving(),
         &sandboxed(),
         &out.path().join("undisturbed"),
@@ -186,7 +177,7 @@ fn fault_ends_its_episode_and_restarts_the_agent() {
 fn too_many_faults_stop_the_shard() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::with("def on_step(step, answer): sys.exit(3)");
-    let report = run(&spec(Task::Hit, 0..9), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(&spec(HIT, 0..9), &agent, &sandboxed(), out.path()).unwrap();
     assert!(report.stopped_by_faults);
     assert_eq!(
         report.outcomes.len(),
@@ -203,7 +194,7 @@ fn too_many_faults_stop_the_shard() {
 fn failed_start_is_a_fault_without_an_episode() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::script("import sys\nsys.exit('no model')");
-    let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(&spec(HIT, 0..1), &agent, &sandboxed(), out.path()).unwrap();
     let fault = report.outcomes[0].fault.as_ref().unwrap();
     assert_eq!(fault.fault, AgentFaultKind::Exited { code: 1 });
     assert_eq!((fault.episode, fault.step), (None, None));
@@ -221,7 +212,7 @@ fn cancelled_shard_leaves_no_recording() {
     };
     let dir = out.path().join("shard");
     let result = run_shard(
-        &spec(Task::Defend, 0..3),
+        &spec(DEFEND, 0..3),
         &agent.bundle,
         &sandboxed(),
         &dir,
@@ -235,7 +226,7 @@ fn cancelled_shard_leaves_no_recording() {
     assert_eq!(observer.logs, ["started\n"]);
     assert!(!dir.join("shard.json").exists());
     // The same folder can be used again.
-    run(&spec(Task::Defend, 0..1), &agent, &sandboxed(), &dir).unwrap();
+    run(&spec(DEFEND, 0..1), &agent, &sandboxed(), &dir).unwrap();
     let mut names: Vec<_> = dir
         .read_dir()
         .unwrap()

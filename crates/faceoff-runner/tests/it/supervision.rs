@@ -5,11 +5,12 @@ use crate::{
     agents::{Agent, assert_timed_out, sandboxed},
     shard::{RecordingObserver, spec},
 };
+use faceoff_airhockey::HIT;
 use faceoff_runner::{
     AgentEnvironment, InterferenceMonitor, PlatformFault, Supervision, run_shard,
     run_shard_monitored, stuck_threads,
 };
-use faceoff_types::{Phase, Task};
+use faceoff_types::Phase;
 use std::{
     fs,
     sync::{
@@ -71,7 +72,7 @@ fn agent_that_blocks_its_evaluator_is_killed_and_blamed() {
     const NAME: &str = "blocks-thread";
     let agent = silent_agent(NAME);
     let out = tempfile::tempdir().unwrap();
-    let mut spec = spec(Task::Hit, 0..2);
+    let mut spec = spec(HIT, 0..2);
     spec.max_faults = 10;
     let report = run_shard_monitored(
         &spec,
@@ -106,7 +107,7 @@ fn cancelled_job_does_not_wait_for_its_agent() {
     let played = thread::scope(|scope| {
         let played = scope.spawn(|| {
             run_shard(
-                &spec(Task::Hit, 0..1),
+                &spec(HIT, 0..1),
                 &agent.bundle,
                 &env,
                 out.path(),

@@ -6,7 +6,8 @@ use crate::{
     recording::{read_table, seconds},
     shard::{run, spec},
 };
-use faceoff_types::{AgentFaultKind, Task};
+use faceoff_airhockey::{HIT, PREPARE};
+use faceoff_types::AgentFaultKind;
 use std::path::Path;
 
 /// An agent that answers without reading the questions, until the next question does not fit into its input. Then it uses
@@ -127,7 +128,7 @@ fn question_that_does_not_fit_costs_the_agents_time() {
     ] {
         let out = tempfile::tempdir().unwrap();
         let agent = leaves_unread(mode);
-        let report = run(&spec(Task::Prepare, 0..1), &agent, &env, out.path()).unwrap();
+        let report = run(&spec(PREPARE, 0..1), &agent, &env, out.path()).unwrap();
         assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
         let uses_of_time = report.log.matches("used time").count();
         let slow = slow_answers(out.path());
@@ -148,7 +149,7 @@ fn agent_cannot_shrink_its_channel() {
          except OSError as error: print('refused', error.errno, file=sys.stderr)",
     );
     for env in [sandboxed(), unconfined()] {
-        let report = run(&spec(Task::Hit, 0..1), &shrinks, &env, out.path()).unwrap();
+        let report = run(&spec(HIT, 0..1), &shrinks, &env, out.path()).unwrap();
         assert_eq!(report.outcomes[0].fault, None);
         assert_eq!(report.log.matches("refused").count(), 3, "{}", report.log);
     }
@@ -158,7 +159,7 @@ fn agent_cannot_shrink_its_channel() {
 fn slow_read_of_a_question_costs_the_agents_time() {
     let out = tempfile::tempdir().unwrap();
     let agent = leaves_unread("reads slowly");
-    let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(&spec(HIT, 0..1), &agent, &sandboxed(), out.path()).unwrap();
     assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
     assert_eq!(report.log.matches("used time").count(), 6);
     // The agent takes a millisecond for each of the few hundred bytes of a question.
@@ -169,7 +170,7 @@ fn slow_read_of_a_question_costs_the_agents_time() {
 fn answer_before_reading_the_question_is_a_fault() {
     let out = tempfile::tempdir().unwrap();
     let agent = leaves_unread("answers");
-    let report = run(&spec(Task::Prepare, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(&spec(PREPARE, 0..1), &agent, &sandboxed(), out.path()).unwrap();
     let fault = &report.outcomes[0].fault.as_ref().unwrap();
     assert!(
         matches!(&fault.fault, AgentFaultKind::WrongMessage { got, .. } if got.contains("not asked for")),

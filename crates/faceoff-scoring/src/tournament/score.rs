@@ -8,7 +8,9 @@ use super::{
     side::Side,
 };
 use crate::{
-    episode::{COMPUTATION_TIME_MAX_POINTS, computation_time_penalty, violation_points},
+    episode::{
+        COMPUTATION_TIME_MAX_POINTS, computation_time_penalty, violation_counts, violation_points,
+    },
     step_times::StepTimes,
     tier::tier_of,
 };
@@ -220,15 +222,10 @@ fn total_penalty(side: &SideOutcome) -> f64 {
 }
 
 fn count_violations(windows: &[GameWindow]) -> ViolationCounts {
-    let windows_with =
-        |test: fn(&GameWindow) -> bool| count(windows.iter().filter(|w| test(w)).count());
-    ViolationCounts {
-        ee: windows_with(|window| window.violations.ee),
-        link: windows_with(|window| window.violations.link),
-        joint_pos: windows_with(|window| window.violations.joint_pos),
-        joint_vel: windows_with(|window| window.violations.joint_vel),
-        computation_time: windows_with(|window| time_or_fault_points(window) > 0.0),
-    }
+    violation_counts(windows.iter().map(|window| {
+        let is_late = time_or_fault_points(window) > 0.0;
+        (&window.violations, is_late)
+    }))
 }
 
 fn summarize_times(side: &SideOutcome, times_s: &[f64]) -> ComputationTimeSummary {

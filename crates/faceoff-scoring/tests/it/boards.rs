@@ -1,21 +1,23 @@
 //! Tests of boards, which rank evaluations, and of their groups of statistically tied rows.
 
-use crate::support::task_result;
+use crate::support::{task_result, weights};
+use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_scoring::{
     BoardEntry, RankedEntry, overall_board, rank_groups, score_evaluation, task_board,
 };
-use faceoff_types::{Profile, Ruleset, Seed, Task, Tier};
+use faceoff_types::{Profile, Ruleset, Seed, TaskMap, Tier};
 use proptest::prelude::*;
-use std::{collections::BTreeMap, convert::Infallible};
+use std::convert::Infallible;
 
 /// An entry with 50 episodes of the task hit only. Up to 25 penalty points it is deployable, up to 75 improvable.
 fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -> BoardEntry<K> {
-    let tasks = BTreeMap::from([(Task::Hit, task_result(50, successes, penalty_points))]);
+    let tasks = TaskMap::from([(HIT, task_result(50, successes, penalty_points))]);
     let result = score_evaluation(
         Ruleset::CURRENT,
         Profile::Evaluation,
         Seed::from_number(0),
         &Default::default(),
+        &weights(),
         tasks,
     );
     BoardEntry {
@@ -54,8 +56,8 @@ fn board_sorts_by_tier_score_penalty_and_submission_time() {
         [1, 2, 3, 4, 5, 6]
     );
     assert_eq!(board[4].tier, Tier::Improvable);
-    assert_eq!(keys(&task_board(Task::Hit, entries.clone())), expected);
-    assert_eq!(task_board(Task::Defend, entries), []);
+    assert_eq!(keys(&task_board(HIT, entries.clone())), expected);
+    assert_eq!(task_board(DEFEND, entries), []);
     assert_eq!(overall_board(Vec::<BoardEntry<u8>>::new()), []);
 }
 
@@ -65,9 +67,9 @@ fn task_board_ignores_other_tasks() {
     all_rounder
         .result
         .tasks
-        .insert(Task::Defend, task_result(50, 40, 60.0));
+        .insert(DEFEND, task_result(50, 40, 60.0));
     all_rounder.result.tier = Tier::Improvable;
-    let board = task_board(Task::Hit, vec![entry("hitter", 10, 0.0, 0), all_rounder]);
+    let board = task_board(HIT, vec![entry("hitter", 10, 0.0, 0), all_rounder]);
     assert_eq!(keys(&board), ["all-rounder", "hitter"]);
     assert_eq!(board[0].tier, Tier::Deployable, "its tier in this task");
 }

@@ -1,20 +1,22 @@
 //! Tests of comparisons of two evaluations, and of the summaries that they need.
 
-use crate::support::episode;
+use crate::support::{episode, weights};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
 use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
     overall_p_value, overall_score, score_task,
 };
 use faceoff_types::{
-    EpisodeOutcome, Profile, RULESET, Seed, Task, TierBounds, Variation, Violations,
+    EpisodeOutcome, Profile, RULESET, Seed, Task, TaskMap, TaskWeights, TierBounds, Variation,
+    Violations,
 };
 use proptest::prelude::*;
-use std::{collections::BTreeMap, sync::LazyLock};
+use std::sync::LazyLock;
 
 /// `episodes` outcomes for each task; `solved` selects the successes.
 fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOutcome> {
     let solved = &solved;
-    Task::ALL
+    TASKS
         .into_iter()
         .flat_map(|task| {
             (0..episodes).map(move |index| EpisodeOutcome {
@@ -26,7 +28,7 @@ fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOut
 }
 
 fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-    EpisodeSummary::from_outcomes(outcomes, &Default::default()).unwrap()
+    EpisodeSummary::from_outcomes(outcomes, &TASKS, &Default::default()).unwrap()
 }
 
 fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
@@ -34,32 +36,37 @@ fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
         ruleset: RULESET,
         profile: Profile::Evaluation,
         variation: &NO_VARIATION,
+        weights: &WEIGHTS,
         seed: Seed::from_number(1),
         mismatch_seed: Seed::from_number(2),
         summary,
     }
 }
 
+/// The weights of the ruleset.
+static WEIGHTS: LazyLock<TaskWeights> = LazyLock::new(weights);
 /// No deviation from the ruleset.
 static NO_VARIATION: LazyLock<Variation> = LazyLock::new(Variation::default);
 
 #[test]
 fn comparison_uses_variation_and_refuses_different_ones() {
     let a = summary(&outcomes(100, |task, episode| match task {
-        Task::Hit => episode < 80,
+        HIT => episode < 80,
         _ => episode < 50,
     }));
     let b = summary(&outcomes(100, |task, episode| match task {
-        Task::Prepare => episode < 99,
+        PREPARE => episode < 99,
         _ => episode < 50,
     }));
     let with_weights = |weights: &str| Variation {
-        weights: weights.parse().unwrap(),
+        weights: Some(TaskWeights::parse(weights, TASKS.into_iter()).unwrap()),
         ..Variation::default()
     };
     let score = |variation: &Variation| {
+        let weights = faceoff_airhockey::competition().weights(variation);
         let evaluation_of = |summary| ComparedEvaluation {
             variation,
+            weights: &weights,
             ..evaluation(summary)
         };
         let compared = evaluation_of(&a).compare(&evaluation_of(&b)).unwrap();
@@ -74,11 +81,13 @@ fn comparison_uses_variation_and_refuses_different_ones() {
     assert_eq!(score(&with_weights("0,1,0")), (50.0, 50.0, false));
     // A task with weight 0 has its own board, too.
     let no_hit = with_weights("0,1,0");
+    let no_hit_weights = TaskWeights::of(DEFEND);
     let evaluation_of = |summary| ComparedEvaluation {
         variation: &no_hit,
+        weights: &no_hit_weights,
         ..evaluation(summary)
     };
-    assert!(evaluation_of(&a).differs_significantly(&evaluation_of(&b), Some(Task::Hit)));
+    assert!(evaluation_of(&a).differs_significantly(&evaluation_of(&b), Some(HIT)));
     assert!(!evaluation_of(&a).differs_significantly(&evaluation_of(&b), None));
 
     let mut without_losses = Variation::default();
@@ -116,12 +125,13 @@ fn tier_change_depends_on_bounds() {
             ..outcome
         })
         .collect();
-    let clear = EpisodeSummary::from_outcomes(&costly, &TierBounds::default()).unwrap();
+    let clear = EpisodeSummary::from_outcomes(&costly, &TASKS, &TierBounds::default()).unwrap();
     assert_eq!(
         clear.tier_change, 0.0,
         "10 points in each task, deployable up to 50"
     );
-    let tight = EpisodeSummary::from_outcomes(&costly, &"0.1,0.5".parse().unwrap()).unwrap();
+    let tight =
+        EpisodeSummary::from_outcomes(&costly, &TASKS, &"0.1,0.5".parse().unwrap()).unwrap();
     assert!(
         tight.tier_change > 0.5,
         "10 points in each of three tasks, deployable up to 10: {}",
@@ -132,17 +142,17 @@ fn tier_change_depends_on_bounds() {
 #[test]
 fn comparison_has_counts_intervals_and_p_values() {
     let a = summary(&outcomes(100, |task, episode| match task {
-        Task::Hit => episode < 60,
-        Task::Defend => episode % 2 == 0,
-        Task::Prepare => true,
+        HIT => episode < 60,
+        DEFEND => episode % 2 == 0,
+        _ => true,
     }));
     let b = summary(&outcomes(100, |task, episode| match task {
-        Task::Hit => (20..50).contains(&episode),
-        Task::Defend => episode % 2 == 0,
-        Task::Prepare => episode > 0,
+        HIT => (20..50).contains(&episode),
+        DEFEND => episode % 2 == 0,
+        _ => episode > 0,
     }));
     let comparison = evaluation(&a).compare(&evaluation(&b)).unwrap();
-    let hit = &comparison.tasks[&Task::Hit];
+    let hit = &comparison.tasks[&HIT];
     assert_eq!(
         (hit.both, hit.only_a, hit.only_b, hit.neither),
         (30, 30, 0, 40)
@@ -155,10 +165,10 @@ fn comparison_has_counts_intervals_and_p_values() {
         0.2 < low && low < 0.3 && 0.3 < high && high < 0.4,
         "{hit:?}"
     );
-    let defend = &comparison.tasks[&Task::Defend];
+    let defend = &comparison.tasks[&DEFEND];
     assert_eq!((defend.difference, defend.p_value), (0.0, 1.0));
     assert!(defend.difference_ci95[0] < 0.0 && defend.difference_ci95[1] > 0.0);
-    assert!(!comparison.tasks[&Task::Prepare].significant);
+    assert!(!comparison.tasks[&PREPARE].significant);
     let overall = &comparison.overall;
     assert_eq!((overall.score_a, overall.score_b), (64.0, 51.8));
     assert!((overall.difference - 12.2).abs() < 1e-9);
@@ -170,7 +180,7 @@ fn comparison_error_names_differing_field() {
     let all = summary(&outcomes(4, |_, _| true));
     let longer = summary(&outcomes(5, |_, _| true));
     let mut hit_alone = outcomes(4, |_, _| true);
-    hit_alone.retain(|outcome| outcome.task == Task::Hit);
+    hit_alone.retain(|outcome| outcome.task == HIT);
     let hit_alone = summary(&hit_alone);
     let a = evaluation(&all);
     let refused = [
@@ -216,7 +226,7 @@ fn comparison_error_names_differing_field() {
     }
     assert_eq!(
         a.compare(&evaluation(&hit_alone)),
-        Err(NotComparable::Tasks(Task::Defend))
+        Err(NotComparable::Tasks(DEFEND))
     );
 }
 
@@ -224,27 +234,27 @@ fn comparison_error_names_differing_field() {
 fn unpaired_evaluations_are_compared_by_rates() {
     // Paired, 20 episodes that only one solved are significant; unpaired, 48 % and 50 % of 1000 are not.
     let a = summary(&outcomes(1000, |task, episode| {
-        task == Task::Hit && episode < 500
+        task == HIT && episode < 500
     }));
     let b = summary(&outcomes(1000, |task, episode| {
-        task == Task::Hit && episode < 480
+        task == HIT && episode < 480
     }));
     let c = summary(&outcomes(1000, |task, episode| {
-        task == Task::Hit && episode < 400
+        task == HIT && episode < 400
     }));
     let (first, second) = (evaluation(&a), evaluation(&b));
     assert!(
         first.differs_significantly(&second, None)
-            && first.differs_significantly(&second, Some(Task::Hit))
+            && first.differs_significantly(&second, Some(HIT))
     );
-    assert!(!first.differs_significantly(&second, Some(Task::Defend)));
+    assert!(!first.differs_significantly(&second, Some(DEFEND)));
     let another_day = |summary| ComparedEvaluation {
         seed: Seed::from_number(9),
         ..evaluation(summary)
     };
     assert!(!first.differs_significantly(&another_day(&b), None));
     assert!(first.differs_significantly(&another_day(&c), None));
-    assert!(first.differs_significantly(&another_day(&c), Some(Task::Hit)));
+    assert!(first.differs_significantly(&another_day(&c), Some(HIT)));
     let other_rules = ComparedEvaluation {
         ruleset: "other",
         ..first
@@ -259,16 +269,16 @@ fn unpaired_evaluations_are_compared_by_rates() {
 fn summary_needs_each_episode_once() {
     let mut outcomes = outcomes(3, |_, _| true);
     outcomes.reverse();
-    EpisodeSummary::from_outcomes(&outcomes, &Default::default()).unwrap();
+    EpisodeSummary::from_outcomes(&outcomes, &TASKS, &Default::default()).unwrap();
     let first = outcomes.remove(2); // prepare 0
     assert_eq!(
-        EpisodeSummary::from_outcomes(&outcomes, &Default::default()),
-        Err(PairingError::Missing(Task::Prepare, 0))
+        EpisodeSummary::from_outcomes(&outcomes, &TASKS, &Default::default()),
+        Err(PairingError::Missing(PREPARE, 0))
     );
     outcomes.extend([first.clone(), first]);
     assert_eq!(
-        EpisodeSummary::from_outcomes(&outcomes, &Default::default()),
-        Err(PairingError::Repeated(Task::Prepare, 0))
+        EpisodeSummary::from_outcomes(&outcomes, &TASKS, &Default::default()),
+        Err(PairingError::Repeated(PREPARE, 0))
     );
     assert_eq!(summary(&[]).tier_change, 0.0);
 }
@@ -283,8 +293,8 @@ fn summary_round_trips_as_json() {
         };
     }
     let summary = summary(&outcomes);
-    assert!(summary.tasks[&Task::Hit].tier_change > 0.2);
-    assert_eq!(summary.tasks[&Task::Defend].tier_change, 0.0);
+    assert!(summary.tasks[&HIT].tier_change > 0.2);
+    assert_eq!(summary.tasks[&DEFEND].tier_change, 0.0);
     let json = serde_json::to_string(&summary).unwrap();
     assert_eq!(
         serde_json::from_str::<EpisodeSummary>(&json).unwrap(),
@@ -302,9 +312,9 @@ proptest! {
         let episodes = a.len() as u32;
         let outcomes_a = outcomes(episodes, |_, episode| a[episode as usize]);
         // The bits of the seed decide which episodes B solves.
-        let outcomes_b = outcomes(episodes, |task, episode| (seed >> (episode % 61)) & 1 == u64::from(task == Task::Hit));
+        let outcomes_b = outcomes(episodes, |task, episode| (seed >> (episode % 61)) & 1 == u64::from(task == HIT));
         let comparison = evaluation(&summary(&outcomes_a)).compare(&evaluation(&summary(&outcomes_b))).unwrap();
-        let tallies: BTreeMap<Task, PairedTally> = Task::ALL
+        let tallies: TaskMap<PairedTally> = TASKS
             .into_iter()
             .map(|task| {
                 let mut tally = PairedTally::default();
@@ -328,8 +338,8 @@ proptest! {
             prop_assert!(-1.0 <= low && low <= got.difference + 1e-12);
             prop_assert!(got.difference <= high + 1e-12 && high <= 1.0);
         }
-        prop_assert_eq!(comparison.overall.p_value, overall_p_value(&Default::default(), &tallies));
-        let score = |all: &[EpisodeOutcome]| overall_score(&Default::default(), Task::ALL.map(|task| {
+        prop_assert_eq!(comparison.overall.p_value, overall_p_value(&WEIGHTS, &tallies));
+        let score = |all: &[EpisodeOutcome]| overall_score(&WEIGHTS, TASKS.map(|task| {
             let task_outcomes: Vec<_> = all.iter().filter(|outcome| outcome.task == task).cloned().collect();
             (task, score_task(&task_outcomes, &StepTimes::default(), &Default::default()).success_rate)
         }));

@@ -1,16 +1,16 @@
 //! Tests of the scores of episodes, tasks and evaluations (an evaluation is one agent's run of all tasks).
 
-use crate::support::{episode, task_result};
+use crate::support::{episode, task_result, weights};
+use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, Ruleset, Seed, Task, Tier,
-    Violations,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, Ruleset, Seed, TaskMap, Tier,
+    ViolationName, Violations,
 };
-use std::collections::BTreeMap;
 
 #[test]
 fn violations_have_own_points_and_count_once() {
-    let clean = episode(Task::Hit, 0);
+    let clean = episode(HIT, 0);
     assert_eq!(episode_penalty(&clean), 0.0);
     let penalty = |ee, link, joint_pos, joint_vel| {
         let violations = Violations {
@@ -33,8 +33,8 @@ fn violations_have_own_points_and_count_once() {
 
 #[test]
 fn agent_fault_is_failure_with_full_time_penalty() {
-    let mut faulty = episode(Task::Defend, 0);
-    faulty.end = EpisodeEnd::AgentFault;
+    let mut faulty = episode(DEFEND, 0);
+    faulty.end = EpisodeEnd::AGENT_FAULT;
     faulty.success = true; // must not count after a fault
     faulty.violations.ee = true;
     faulty.computation_time = ComputationTime {
@@ -43,7 +43,7 @@ fn agent_fault_is_failure_with_full_time_penalty() {
     };
     faulty.fault = Some(AgentFault {
         fault: AgentFaultKind::NonFinite,
-        agent_task: Task::Defend.into(),
+        agent_task: DEFEND.into(),
         episode: Some(0),
         step: Some(3),
         line: None,
@@ -55,14 +55,17 @@ fn agent_fault_is_failure_with_full_time_penalty() {
     );
     let result = score_task(&[faulty], &StepTimes::default(), &Default::default());
     assert_eq!(
-        (result.successes, result.violations.computation_time),
+        (
+            result.successes,
+            result.violations.get(ViolationName::COMPUTATION_TIME)
+        ),
         (0, 1)
     );
 }
 
 #[test]
 fn task_result_does_not_depend_on_episode_order() {
-    let mut outcomes: Vec<_> = (0..50).map(|index| episode(Task::Prepare, index)).collect();
+    let mut outcomes: Vec<_> = (0..50).map(|index| episode(PREPARE, index)).collect();
     for outcome in &mut outcomes[..20] {
         outcome.success = true;
         outcome.steps = 100;
@@ -91,14 +94,17 @@ fn task_result_does_not_depend_on_episode_order() {
         "over 50 episodes: deployable up to 25 points, improvable up to 75"
     );
     assert_eq!(
-        (result.violations.ee, result.violations.joint_vel),
+        (result.violations.get(EE), result.violations.get(JOINT_VEL)),
         (10, 10)
     );
     assert_eq!(
-        (result.violations.link, result.violations.joint_pos),
+        (
+            result.violations.get(LINK),
+            result.violations.get(JOINT_POS)
+        ),
         (0, 0)
     );
-    assert_eq!(result.violations.computation_time, 1);
+    assert_eq!(result.violations.get(ViolationName::COMPUTATION_TIME), 1);
     assert_eq!(result.steps, 20 * 100 + 30 * 500);
 
     outcomes.reverse();
@@ -108,16 +114,17 @@ fn task_result_does_not_depend_on_episode_order() {
 #[test]
 fn evaluation_has_worst_tier_and_weighted_score() {
     let seed = Seed::from_number(7);
-    let tasks = BTreeMap::from([
-        (Task::Hit, task_result(50, 25, 10.0)),
-        (Task::Defend, task_result(50, 40, 60.0)),
-        (Task::Prepare, task_result(50, 5, 0.0)),
+    let tasks = TaskMap::from([
+        (HIT, task_result(50, 25, 10.0)),
+        (DEFEND, task_result(50, 40, 60.0)),
+        (PREPARE, task_result(50, 5, 0.0)),
     ]);
     let result = score_evaluation(
         Ruleset::CURRENT,
         Profile::Evaluation,
         seed,
         &Default::default(),
+        &weights(),
         tasks.clone(),
     );
     assert_eq!((result.score, result.penalty_points), (54.0, 60.0));
@@ -129,12 +136,13 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     assert_eq!((result.seed, result.tasks), (seed, tasks.clone()));
 
     let mut hit_alone = tasks;
-    hit_alone.retain(|task, _| *task == Task::Hit);
+    hit_alone.retain(|task, _| *task == HIT);
     let result = score_evaluation(
         Ruleset::CURRENT,
         Profile::Ideal,
         seed,
         &Default::default(),
+        &weights(),
         hit_alone,
     );
     assert_eq!((result.score, result.tier), (20.0, Tier::Deployable));
@@ -143,19 +151,21 @@ fn evaluation_has_worst_tier_and_weighted_score() {
         Profile::Ideal,
         seed,
         &Default::default(),
-        BTreeMap::new(),
+        &weights(),
+        TaskMap::new(),
     );
     assert_eq!((empty.score, empty.penalty_points), (0.0, 0.0));
 }
 
 #[test]
 fn results_round_trip_as_json() {
-    let tasks = BTreeMap::from([(Task::Hit, task_result(30, 7, 12.5))]);
+    let tasks = TaskMap::from([(HIT, task_result(30, 7, 12.5))]);
     let result = score_evaluation(
         Ruleset::CURRENT,
         Profile::Evaluation,
         Seed::from_number(1),
         &Default::default(),
+        &weights(),
         tasks,
     );
     let json = serde_json::to_string(&result).unwrap();

@@ -1,8 +1,8 @@
 //! Tests of the input files `tasks.json` and `games.json`: valid input, and errors that name the wrong value.
 
-use crate::support::{read, team};
+use crate::support::{read, team, weights};
 use faceoff_scoring::{
-    QualifyingScores,
+    QualifyingRow, QualifyingScores,
     tournament::{PlayedGame, score_tournament},
 };
 use serde_json::{Value, json};
@@ -14,10 +14,17 @@ const TASKS: &str = r#"{
     "prepare": {"success_rate": 0.5, "penalty_points": 10}
 }"#;
 
+/// The board of a `tasks.json`, or the error.
+fn board(file: &str) -> Result<Vec<QualifyingRow>, String> {
+    let scores = read::<QualifyingScores>(file)?;
+    let board = scores.board(&weights(), &Default::default());
+    board.map_err(|error| error.to_string())
+}
+
 /// Asserts that the file is refused with an error that contains all `words`.
 #[track_caller]
 fn assert_refused(file: &str, words: &[&str]) {
-    let error = read::<QualifyingScores>(file).unwrap_err();
+    let error = board(file).unwrap_err();
     for word in words {
         assert!(error.contains(word), "{word:?} is not in: {error}");
     }
@@ -105,7 +112,7 @@ fn duplicate_and_unknown_teams_and_tasks_are_refused() {
 
 #[test]
 fn empty_file_gives_empty_board() {
-    assert_eq!(read::<QualifyingScores>("{}").unwrap().board(), []);
+    assert_eq!(board("{}").unwrap(), []);
     let empty = score_tournament(&read::<Vec<PlayedGame>>("[]").unwrap());
     assert_eq!(
         serde_json::to_value(&empty).unwrap(),
@@ -116,7 +123,7 @@ fn empty_file_gives_empty_board() {
 #[test]
 fn tied_teams_keep_order_of_the_file() {
     let file = format!(r#"{{"Zulu": {TASKS}, "Alpha": {TASKS}}}"#);
-    let board = read::<QualifyingScores>(&file).unwrap().board();
+    let board = board(&file).unwrap();
     let ranking: Vec<_> = board
         .iter()
         .map(|row| (row.rank, row.team.as_str()))
@@ -133,7 +140,7 @@ fn tasks_of_results_json_are_valid_input() {
         "computation_time_s": {"mean": 0.001, "p99": 0.002, "max": 0.003},
     });
     let file = json!({"Alpha": {"hit": results, "defend": results, "prepare": results}});
-    let row = &read::<QualifyingScores>(&file.to_string()).unwrap().board()[0];
+    let row = &board(&file.to_string()).unwrap()[0];
     let row = serde_json::to_value(row).unwrap();
     assert_eq!(
         (&row["score"], &row["penalty_points"]),

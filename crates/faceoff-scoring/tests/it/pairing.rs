@@ -1,28 +1,28 @@
 //! Tests of paired tests: two teams on the same episodes.
 
-use crate::support::episode;
+use crate::support::{episode, weights};
+use faceoff_airhockey::{HIT, TASKS};
 use faceoff_scoring::{EpisodeSummary, PairedTally, PairingError, Successes, overall_p_value};
-use faceoff_types::{EpisodeEnd, EpisodeOutcome, Task};
+use faceoff_types::{EpisodeEnd, EpisodeOutcome, TaskMap};
 use proptest::prelude::*;
-use std::collections::BTreeMap;
 
 fn outcomes(successes: &[bool]) -> Vec<EpisodeOutcome> {
     (0..)
         .zip(successes)
         .map(|(index, success)| EpisodeOutcome {
             success: *success,
-            ..episode(Task::Hit, index)
+            ..episode(HIT, index)
         })
         .collect()
 }
 
 fn tally(a: &[EpisodeOutcome], b: &[EpisodeOutcome]) -> Result<PairedTally, PairingError> {
     let solved = |outcomes: &[EpisodeOutcome]| -> Result<Successes, PairingError> {
-        let mut summary = EpisodeSummary::from_outcomes(outcomes, &Default::default())?;
-        let hit = summary.tasks.remove(&Task::Hit);
+        let mut summary = EpisodeSummary::from_outcomes(outcomes, &TASKS, &Default::default())?;
+        let hit = summary.tasks.swap_remove(&HIT);
         Ok(hit.map_or_else(|| [].into_iter().collect(), |hit| hit.successes))
     };
-    PairedTally::from_successes(Task::Hit, &solved(a)?, &solved(b)?)
+    PairedTally::from_successes(HIT, &solved(a)?, &solved(b)?)
 }
 
 #[test]
@@ -47,20 +47,20 @@ fn episodes_are_paired_by_their_number() {
 fn episode_with_fault_is_no_success() {
     let a = outcomes(&[true]);
     let mut b = outcomes(&[true]);
-    b[0].end = EpisodeEnd::AgentFault;
+    b[0].end = EpisodeEnd::AGENT_FAULT;
     assert_eq!(tally(&a, &b).unwrap().only_a, 1);
 }
 
 #[test]
 fn unpairable_episodes_are_refused() {
     let (short, long) = (outcomes(&[true; 3]), outcomes(&[true; 4]));
-    let unpaired = Err(PairingError::Unpaired(Task::Hit, 3));
+    let unpaired = Err(PairingError::Unpaired(HIT, 3));
     assert_eq!(tally(&short, &long), unpaired);
     assert_eq!(tally(&long, &short), unpaired);
     let repeated = [short[0].clone(), short[1].clone(), short[1].clone()];
     assert_eq!(
         tally(&short, &repeated),
-        Err(PairingError::Repeated(Task::Hit, 1))
+        Err(PairingError::Repeated(HIT, 1))
     );
     assert_eq!(tally(&[], &[]).unwrap().p_value(), 1.0);
 }
@@ -70,8 +70,8 @@ proptest! {
     fn p_value_is_a_symmetric_probability(
         counts in prop::array::uniform3((0u32..40, 0u32..40, 0u32..40, 1u32..40))
     ) {
-        let tally = |swap: bool| -> BTreeMap<Task, PairedTally> {
-            Task::ALL
+        let tally = |swap: bool| -> TaskMap<PairedTally> {
+            TASKS
                 .into_iter()
                 .zip(counts)
                 .map(|(task, (both, only_a, only_b, neither))| {
@@ -80,9 +80,9 @@ proptest! {
                 })
                 .collect()
         };
-        let p = overall_p_value(&Default::default(), &tally(false));
+        let p = overall_p_value(&weights(), &tally(false));
         prop_assert!(0.0 < p && p <= 1.0, "{}", p);
-        prop_assert_eq!(p, overall_p_value(&Default::default(), &tally(true)));
+        prop_assert_eq!(p, overall_p_value(&weights(), &tally(true)));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use faceoff_types::{
     ComputationTime, ComputationTimeSummary, EpisodeEnd, EpisodeOutcome, Task, TaskResult,
-    TeamName, ViolationCounts, Violations,
+    TaskWeights, TeamName, ViolationCounts, Violations,
 };
 use serde_json::Value;
 
@@ -27,7 +27,7 @@ pub fn episode(task: Task, episode: u32) -> EpisodeOutcome {
         task,
         episode,
         steps: 500,
-        end: EpisodeEnd::Horizon,
+        end: EpisodeEnd::HORIZON,
         success: false,
         violations: Violations::default(),
         computation_time: ComputationTime {
@@ -51,4 +51,9 @@ pub fn task_result(episodes: u32, successes: u32, penalty_points: f64) -> TaskRe
         steps: 0,
         computation_time_s: ComputationTimeSummary::default(),
     }
+}
+
+/// The weights of the tasks in the ruleset.
+pub fn weights() -> TaskWeights {
+    faceoff_airhockey::competition().weights(&Default::default())
 }

@@ -91,6 +91,7 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
     };
     patch
         .apply(&mut rules, &mut settings)
+        .and_then(|()| app.config.competition.check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(patch.retention)?.unwrap_or_default();
     check_robot(app, &rules.variation.perturbations).await?;
@@ -127,6 +128,7 @@ pub async fn change_stage(
     let mut settings = stage.settings.clone();
     change
         .apply(&mut rules, &mut settings)
+        .and_then(|()| app.config.competition.check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != current_rules.variation.perturbations {

@@ -8,7 +8,7 @@ use faceoff_api::views::{
 };
 use faceoff_scoring::ProfileEffect;
 use faceoff_store::{Ablation, AblationState};
-use faceoff_types::{Profile, RunId, SubmissionId, Task};
+use faceoff_types::{Profile, RunId, SubmissionId, TaskMap};
 use std::collections::BTreeMap;
 
 /// The newest ablation of a submission, if it has one.
@@ -66,7 +66,7 @@ pub async fn exists(app: &AppState, submission: SubmissionId) -> Result<bool, Pr
 async fn effects(
     app: &AppState,
     runs: BTreeMap<Profile, RunId>,
-) -> Result<BTreeMap<Task, Vec<ProfileEffect>>, Problem> {
+) -> Result<TaskMap<Vec<ProfileEffect>>, Problem> {
     let run_ids: Vec<_> = runs.values().copied().collect();
     let summaries = app.summaries.load(&run_ids).await?;
     let summaries_by_profile: BTreeMap<_, _> = runs

@@ -24,7 +24,10 @@ use faceoff_scoring::{
     joined_summary, rank_groups,
 };
 use faceoff_store::{BoardRecord, BoardScope, Stage};
-use faceoff_types::{CountingResult, DivisionName, PerturbationSettings, Seed, StageId, Task};
+use faceoff_types::{
+    Competition, CountingResult, DivisionName, PerturbationSettings, Seed, StageId, Task,
+    TaskWeights,
+};
 use jiff::civil::Date;
 use std::sync::Arc;
 
@@ -73,6 +76,10 @@ pub async fn query(
     query: BoardQuery,
     task: Option<Task>,
 ) -> Result<BoardView, Problem> {
+    if let Some(task) = task {
+        let found = app.config.competition.find_task(task.as_str());
+        found.map_err(|error| Problem::new(ProblemKind::NotFound, error.to_string()))?;
+    }
     let stage = requested_stage(app, visibility, (query.stage, query.live)).await?;
     let frozen = visibility.frozen(stage.id).cloned();
     let scope = BoardScope {
@@ -161,7 +168,7 @@ pub async fn build(
         revision: revision_number,
         since: revision.since,
         ruleset: revision.rules.ruleset.to_string(),
-        weights: variation.weights,
+        weights: app.config.competition.weights(&variation),
         tier_bounds: variation.tier_bounds,
         perturbations: (*variation.perturbations != PerturbationSettings::default())
             .then_some(variation.perturbations),
@@ -217,7 +224,7 @@ async fn ranked_rows(
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
     let rows: Vec<Row> = rows
         .into_iter()
-        .map(|aggregated| Row::new(aggregated, &summaries))
+        .map(|aggregated| Row::new(aggregated, &summaries, &app.config.competition))
         .collect::<Result<_, _>>()?;
     let all_ranked = board_rows::rank(rows, task, |row| &row.aggregated.record);
     let (ranked, baselines) = board_rows::split_baselines(all_ranked, |row: &Row| {
@@ -239,11 +246,16 @@ async fn ranked_rows(
 /// A row with the summary of its episodes.
 struct Row {
     aggregated: AggregatedRow,
+    weights: TaskWeights,
     summary: Arc<EpisodeSummary>,
 }
 
 impl Row {
-    fn new(aggregated: AggregatedRow, summaries: &RunSummaries) -> Result<Self, Problem> {
+    fn new(
+        aggregated: AggregatedRow,
+        summaries: &RunSummaries,
+        competition: &Competition,
+    ) -> Result<Self, Problem> {
         let day_summaries = aggregated.runs.iter().map(|run| {
             let summary = summaries.get(run);
             summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
@@ -258,6 +270,7 @@ impl Row {
             }
         };
         Ok(Self {
+            weights: competition.weights(&aggregated.record.result.variation),
             aggregated,
             summary,
         })
@@ -270,6 +283,7 @@ impl Row {
             ruleset: &result.ruleset,
             profile: result.profile,
             variation: &result.variation,
+            weights: &self.weights,
             seed: result.seed,
             mismatch_seed,
             summary: &self.summary,

@@ -8,7 +8,7 @@ use crate::{
 };
 use faceoff_scoring::{BoardEntry, RankedEntry, overall_board, task_board};
 use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
-use faceoff_types::{CountingResult, Task};
+use faceoff_types::{Competition, CountingResult, Task};
 use jiff::civil::Date;
 use std::sync::Arc;
 
@@ -108,7 +108,7 @@ async fn load(
         final_day: None,
         task,
     };
-    aggregate(records, rule)
+    aggregate(records, rule, &app.config.competition)
 }
 
 /// Which of a team's results count.
@@ -124,6 +124,7 @@ pub(super) struct CountingRule {
 pub(super) fn aggregate(
     records: Vec<BoardRecord>,
     rule: CountingRule,
+    competition: &Competition,
 ) -> Result<Vec<AggregatedRow>, Problem> {
     let teams = group_by_team(records);
     match rule.counting_result {
@@ -149,7 +150,7 @@ pub(super) fn aggregate(
             .filter_map(|mut records| {
                 let older_count = records.len().saturating_sub(count as usize);
                 records.drain(..older_count);
-                AggregatedRow::mean(records).transpose()
+                AggregatedRow::mean(records, competition).transpose()
             })
             .collect(),
     }

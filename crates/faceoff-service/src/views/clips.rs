@@ -14,8 +14,7 @@ use crate::{
 use faceoff_api::views::clips::{EpisodesView, TimeBinView};
 use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, Pack};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
-use faceoff_types::{EvaluationId, Task};
-use std::collections::BTreeMap;
+use faceoff_types::{EvaluationId, Task, TaskMap};
 
 /// The recorded clips of an evaluation, for a viewer.
 #[derive(Debug)]
@@ -95,10 +94,10 @@ impl Clips {
     /// # Errors
     /// `Internal` if the file cannot be read.
     #[boxed]
-    pub async fn computation_times(&self) -> Result<BTreeMap<Task, Vec<TimeBinView>>, Problem> {
+    pub async fn computation_times(&self) -> Result<TaskMap<Vec<TimeBinView>>, Problem> {
         match self.can_see_observations {
             true => Ok(self.episodes().await?.computation_times),
-            false => Ok(BTreeMap::new()),
+            false => Ok(TaskMap::new()),
         }
     }
 
@@ -131,7 +130,7 @@ impl Clips {
             episodes,
             computation_times: match self.can_see_observations {
                 true => times.into_iter().map(bins).collect(),
-                false => BTreeMap::new(),
+                false => TaskMap::new(),
             },
         })
     }

@@ -13,13 +13,14 @@ use faceoff_api::{
 };
 use faceoff_scoring::{ComparedEvaluation, Comparison, EpisodeSummary, NotComparable};
 use faceoff_store::{Evaluation, EvaluationState, StoreError};
-use faceoff_types::{EvaluationId, EvaluationResult, Seed};
+use faceoff_types::{EvaluationId, EvaluationResult, Seed, TaskWeights};
 use std::sync::Arc;
 
 /// One of the two evaluations, which are both finished, with the data for the comparison.
 struct Side {
     evaluation: Evaluation,
     result: Box<EvaluationResult>,
+    weights: TaskWeights,
     summary: Arc<EpisodeSummary>,
 }
 
@@ -49,6 +50,7 @@ impl Side {
         };
         let result = result.clone();
         Ok(Self {
+            weights: app.config.competition.weights(&result.variation),
             summary: app.summaries.load_run(evaluation.run).await?,
             evaluation,
             result,
@@ -61,6 +63,7 @@ impl Side {
             ruleset: &self.result.ruleset,
             profile: self.result.profile,
             variation: &self.result.variation,
+            weights: &self.weights,
             seed: self.result.seed,
             mismatch_seed,
             summary: &self.summary,

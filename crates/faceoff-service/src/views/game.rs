@@ -203,7 +203,7 @@ fn result_view(
         fouls: sides.map(|side| side.fouls),
         penalty_points: played.penalty_points(),
         tiers: sides.map(|side| side.tier),
-        violations: sides.map(|side| side.violations),
+        violations: sides.map(|side| side.violations.clone()),
         faults: sides.map(|side| side.faults),
         late_answers: sides.map(|side| side.late_answers),
         computation_time_s: sides.map(|side| side.computation_time_s),

@@ -4,7 +4,7 @@ use crate::{
     aggregated_rows::AggregatedRow,
     app::AppState,
     boxed,
-    problem::Problem,
+    problem::{Problem, ProblemKind},
     views::{
         board,
         board_rows::{self, CountingRule},
@@ -21,7 +21,7 @@ use faceoff_api::{
 };
 use faceoff_scoring::RankedEntry;
 use faceoff_store::{BoardDays, BoardRecord, BoardScope};
-use faceoff_types::{CountingResult, Task, TeamId};
+use faceoff_types::{Competition, CountingResult, Task, TeamId};
 use jiff::civil::Date;
 use std::collections::BTreeMap;
 
@@ -32,6 +32,11 @@ pub async fn query(
     visibility: &Visibility,
     query: HistoryQuery,
 ) -> Result<HistoryView, Problem> {
+    if let Some(task) = query.task {
+        let found = app.config.competition.find_task(task.as_str());
+        found
+            .map_err(|error| Problem::new(ProblemKind::InvalidRequest, format!("task: {error}")))?;
+    }
     let stage = board::requested_stage(app, visibility, (query.stage, query.live)).await?;
     let frozen = visibility.frozen(stage.id).cloned();
     let scope = BoardScope {
@@ -71,7 +76,13 @@ pub async fn query(
         }
         (None, standings) => standings,
     };
-    let rows = rows(records, rows_by, final_day, query.task)?;
+    let rows = rows(
+        records,
+        rows_by,
+        final_day,
+        query.task,
+        &app.config.competition,
+    )?;
     let mut days: Vec<Date> = rows.iter().map(|row| row.day).collect();
     days.dedup();
     Ok(HistoryView {
@@ -96,6 +107,7 @@ fn rows(
     rows_by: impl Fn(Date) -> CountingResult,
     final_day: Option<Date>,
     task: Option<Task>,
+    competition: &Competition,
 ) -> Result<Vec<HistoryRow>, Problem> {
     // Index of each team, in the order of the records.
     let mut team_index = BTreeMap::new();
@@ -120,7 +132,7 @@ fn rows(
             team_records.push(record.clone());
             board_rows::drop_superseded(team_records, rule);
         }
-        let aggregated = board_rows::aggregate(counting_records.concat(), rule)?;
+        let aggregated = board_rows::aggregate(counting_records.concat(), rule, competition)?;
         let all_ranked = board_rows::rank(aggregated, task, |row| &row.record);
         let (ranked, baselines) =
             board_rows::split_baselines(all_ranked, |row| row.record.team.is_baseline);

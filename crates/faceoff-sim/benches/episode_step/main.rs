@@ -9,11 +9,12 @@
 
 mod recorded;
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Batch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant, SUBSTEPS, SimdLevel,
     model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Seed};
 use recorded::{RecordedEpisode, ReplayingWorlds, hold_still, record_striker};
 use rustix::time::{ClockId, clock_gettime};
 use std::time::{Duration, Instant};
@@ -32,7 +33,7 @@ fn main() {
     let is_wanted = |name: &str| filter.as_ref().is_none_or(|filter| name.contains(filter));
     println!("control steps/s (physics steps/s) of one core; speed-up over one by one");
     for (profile, factors) in [("ideal", Factors::NONE), ("evaluation", Factors::ALL)] {
-        for task in Task::ALL {
+        for task in AirHockeyTask::ALL {
             let name = format!("held/{task}/{profile}");
             if is_wanted(&name) {
                 compare(
@@ -97,7 +98,7 @@ fn batch() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let pool = pool.build().expect("a machine that has threads");
             let mut batch = Batch::new(BatchSetup {
-                task: Task::Prepare,
+                task: AirHockeyTask::Prepare,
                 interpolation: Interpolation::Cubic,
                 factors: Factors::NONE,
                 settings: PerturbationSettings::default(),

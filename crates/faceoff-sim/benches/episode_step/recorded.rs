@@ -1,10 +1,11 @@
 //! Recorded actions of the agent `striker`, or of one that holds still, in whole episodes, and worlds that replay them.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Episode, Interpolation, PerturbationSettings, Plant, SimdLevel, StepOutcome, env_info,
     model::INITIAL_Q, step_episodes_on,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Seed};
 use striker::{Agent, Policy};
 
 /// An episode at its start, and the action of each of its control steps.
@@ -15,7 +16,11 @@ pub struct RecordedEpisode {
 }
 
 /// Records episodes that `striker` plays to their ends.
-pub fn record_striker(task: Task, factors: Factors, episodes: u32) -> Vec<RecordedEpisode> {
+pub fn record_striker(
+    task: AirHockeyTask,
+    factors: Factors,
+    episodes: u32,
+) -> Vec<RecordedEpisode> {
     (0..episodes)
         .map(|number| {
             let start = start_episode(task, factors, number);
@@ -34,7 +39,12 @@ pub fn record_striker(task: Task, factors: Factors, episodes: u32) -> Vec<Record
 }
 
 /// Records episodes in which the arm holds still, for at most `steps` control steps.
-pub fn hold_still(task: Task, factors: Factors, steps: u32, episodes: u32) -> Vec<RecordedEpisode> {
+pub fn hold_still(
+    task: AirHockeyTask,
+    factors: Factors,
+    steps: u32,
+    episodes: u32,
+) -> Vec<RecordedEpisode> {
     let held = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let action = held[..Interpolation::Cubic.len()].to_vec();
     (0..episodes)
@@ -54,7 +64,7 @@ pub fn hold_still(task: Task, factors: Factors, steps: u32, episodes: u32) -> Ve
 }
 
 /// The episode with this index, at its start.
-fn start_episode(task: Task, factors: Factors, number: u32) -> Episode {
+fn start_episode(task: AirHockeyTask, factors: Factors, number: u32) -> Episode {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(0);
     let plant = Plant::for_factors(factors, &settings, seed.model_mismatch());
@@ -63,13 +73,13 @@ fn start_episode(task: Task, factors: Factors, number: u32) -> Episode {
 }
 
 /// The agent `striker` at the start of an episode of a task.
-fn striker_for(task: Task) -> Agent {
+fn striker_for(task: AirHockeyTask) -> Agent {
     let env = env_info(task);
     let radius = |radius: f64| striker::RadiusInfo { radius };
     let task = match task {
-        Task::Hit => striker::Task::Hit,
-        Task::Defend => striker::Task::Defend,
-        Task::Prepare => striker::Task::Prepare,
+        AirHockeyTask::Hit => striker::Task::Hit,
+        AirHockeyTask::Defend => striker::Task::Defend,
+        AirHockeyTask::Prepare => striker::Task::Prepare,
     };
     let env = striker::Env {
         dt: env.dt,

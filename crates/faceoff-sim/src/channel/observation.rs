@@ -1,11 +1,11 @@
 //! An agent's observation: puck pose and velocity (x, y, yaw and their rates), seven joint positions, seven joint velocities and, with an
 //! opponent, the position of its end effector; in the robot's base frame (`docs/protocol.md`, "Observations").
 
+use crate::AirHockeyTask;
 use crate::{
     table::{geometry::TABLE, puck::Puck},
     world::World,
 };
-use faceoff_types::Task;
 use std::f64::consts::{PI, TAU};
 
 /// Numbers in an observation without an opponent.
@@ -15,10 +15,10 @@ pub const OBSERVATION_WITH_OPPONENT_LEN: usize = 23;
 
 /// Numbers in the observation of a task. Only `hit` has an opponent.
 #[must_use]
-pub const fn len(task: Task) -> usize {
+pub const fn len(task: AirHockeyTask) -> usize {
     match task {
-        Task::Hit => OBSERVATION_WITH_OPPONENT_LEN,
-        Task::Defend | Task::Prepare => OBSERVATION_LEN,
+        AirHockeyTask::Hit => OBSERVATION_WITH_OPPONENT_LEN,
+        AirHockeyTask::Defend | AirHockeyTask::Prepare => OBSERVATION_LEN,
     }
 }
 

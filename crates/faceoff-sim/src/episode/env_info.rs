@@ -1,5 +1,6 @@
 //! The description of table and robot that an agent receives in the protocol's first message, `hello` (`docs/protocol.md`, "`env`").
 
+use crate::AirHockeyTask;
 use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
     table::{
@@ -7,7 +8,6 @@ use crate::{
         geometry::{PUCK, TABLE},
     },
 };
-use faceoff_types::Task;
 
 /// The content of `env` in `hello`, as plain data. SI units, radians. The robot is always the nominal one, without model mismatch.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,8 +47,8 @@ const ACCELERATION_PER_VELOCITY: f64 = 10.0;
 
 /// The environment of a task, as seen by robot 1.
 #[must_use]
-pub fn env_info(task: Task) -> EnvInfo {
-    env_info_for(if task == Task::Hit { 2 } else { 1 }, 0)
+pub fn env_info(task: AirHockeyTask) -> EnvInfo {
+    env_info_for(if task == AirHockeyTask::Hit { 2 } else { 1 }, 0)
 }
 
 /// The environment of `robots` robots (1 or 2), as seen by the robot `own_robot` (0 or 1).

@@ -1,10 +1,13 @@
 //! *Episodes*: attempts of one agent at one of the qualifying tasks (`hit`, `defend`, `prepare`), in control steps of 20 ms.
 
+mod air_hockey_task;
 pub mod constraints;
+pub mod ends;
 pub mod env_info;
 pub mod opponent;
 pub mod task;
 
+pub use air_hockey_task::AirHockeyTask;
 pub use task::EPISODE_STEPS;
 
 use crate::{
@@ -17,15 +20,13 @@ use crate::{
     world::{Bounds, Divergence, World},
 };
 use constraints::ConstraintValues;
-use faceoff_types::{
-    EpisodeEnd, Factors, Interpolation, PerturbationSettings, Seed, Task, Violations,
-};
+use faceoff_types::{EpisodeEnd, Factors, Interpolation, PerturbationSettings, Seed, Violations};
 use opponent::Opponent;
 
 /// A running episode. It is deterministic: it reads no clock and does no I/O. A clone continues with the same bits.
 #[derive(Debug, Clone)]
 pub struct Episode {
-    task: Task,
+    task: AirHockeyTask,
     world: World,
     opponent: Option<Opponent>,
     channel: AgentChannel,
@@ -43,7 +44,7 @@ impl Episode {
     /// [`Plant::mismatched`]. The initial state and each factor have their own random stream, derived from `seed` by name.
     #[must_use]
     pub fn new(
-        task: Task,
+        task: AirHockeyTask,
         interpolation: Interpolation,
         factors: Factors,
         settings: &PerturbationSettings,
@@ -57,7 +58,7 @@ impl Episode {
     /// As [`Episode::new`], with a given initial state of the puck: [x, y, yaw, vx, vy, yaw rate], table frame.
     #[must_use]
     pub fn with_initial_puck(
-        task: Task,
+        task: AirHockeyTask,
         interpolation: Interpolation,
         factors: Factors,
         settings: &PerturbationSettings,
@@ -65,7 +66,7 @@ impl Episode {
         seed: Seed,
         puck: [f64; 6],
     ) -> Self {
-        let opponent = (task == Task::Hit).then(Opponent::new);
+        let opponent = (task == AirHockeyTask::Hit).then(Opponent::new);
         let mut world = World::with_robots(plant, if opponent.is_some() { 2 } else { 1 }, puck);
         let table = TableFactors::new(factors, settings, &seed, &mut world);
         Self {
@@ -95,7 +96,7 @@ impl Episode {
 
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
     /// be called after an end. If the world diverges (its state would leave the bounds of the simulation), the episode ends with
-    /// [`EpisodeEnd::AgentFault`], since only the agent's commands can cause it.
+    /// [`EpisodeEnd::AGENT_FAULT`], since only the agent's commands can cause it.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
         self.command(action);
         let (world, air_force) = self.world_and_air_force();
@@ -127,7 +128,7 @@ impl Episode {
         let constraints = self.constraints();
         constraints.mark(&mut self.violations);
         let end = match self.divergence() {
-            Some(_) => Some(EpisodeEnd::AgentFault),
+            Some(_) => Some(EpisodeEnd::AGENT_FAULT),
             None => task::end(self.task, self.world.puck(), self.steps),
         };
         StepOutcome { end, constraints }

@@ -1,6 +1,8 @@
 //! The three qualifying tasks: the puck's initial state, the end of an episode, and success (`docs/rules.md`, "What is played"). In `hit`
 //! the agent scores a goal, in `defend` it stops an incoming puck, in `prepare` it moves a resting puck into a good position.
 
+use crate::AirHockeyTask;
+use crate::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
 use crate::{
     model::TOOL,
     stream::RandomStream,
@@ -9,7 +11,7 @@ use crate::{
         puck::Puck,
     },
 };
-use faceoff_types::{EpisodeEnd, Task};
+use faceoff_types::EpisodeEnd;
 use std::f64::consts::FRAC_PI_2;
 
 pub use faceoff_types::EPISODE_STEPS;
@@ -83,7 +85,7 @@ const STRIP_Y_M: f64 = TABLE.half_width_m() - PUCK.radius_m - 0.002;
 
 /// Draws the puck's initial state [x, y, yaw, vx, vy, yaw rate]. It always makes six draws, so that the draws of one quantity do not
 /// depend on the task.
-pub fn initial_puck(task: Task, stream: &mut RandomStream) -> [f64; 6] {
+pub fn initial_puck(task: AirHockeyTask, stream: &mut RandomStream) -> [f64; 6] {
     // Uniform in [0, 1).
     let u: [f64; 6] = std::array::from_fn(|_| stream.unit());
     let between = |[low, high]: [f64; 2], u: f64| low + (high - low) * u;
@@ -94,21 +96,21 @@ pub fn initial_puck(task: Task, stream: &mut RandomStream) -> [f64; 6] {
         [x, y, 0.0, -cos * speed, sin * speed, yaw_rate]
     };
     match task {
-        Task::Hit => moving(
+        AirHockeyTask::Hit => moving(
             between(TASK_RULES.hit_x_m, u[0]),
             around(PLAYABLE_Y_M, u[1]),
             between(TASK_RULES.hit_speed_m_s, u[2]),
             around(TASK_RULES.hit_angle_rad, u[3]),
             around(TASK_RULES.hit_yaw_rate_rad_s, u[4]),
         ),
-        Task::Defend => moving(
+        AirHockeyTask::Defend => moving(
             between(TASK_RULES.defend_x_m, u[0]),
             around(TASK_RULES.defend_y_m, u[1]),
             between(TASK_RULES.defend_speed_m_s, u[2]),
             around(TASK_RULES.defend_angle_rad, u[3]),
             around(TASK_RULES.defend_yaw_rate_rad_s, u[4]),
         ),
-        Task::Prepare => {
+        AirHockeyTask::Prepare => {
             // Ranges of x and |y|; a strip is drawn with a probability in proportion to its area.
             let side = (TASK_RULES.prepare_side_x_m, [PLAYABLE_Y_M, STRIP_Y_M]);
             let corner = (
@@ -136,12 +138,12 @@ pub fn initial_puck(task: Task, stream: &mut RandomStream) -> [f64; 6] {
 
 /// The reason if an episode ends in this true state, `steps` control steps after its start.
 #[must_use]
-pub fn end(task: Task, puck: &Puck, steps: u32) -> Option<EpisodeEnd> {
-    end_by_puck(task, puck).or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon))
+pub fn end(task: AirHockeyTask, puck: &Puck, steps: u32) -> Option<EpisodeEnd> {
+    end_by_puck(task, puck).or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::HORIZON))
 }
 
 /// The reason if the puck's state ends the episode, regardless of time.
-fn end_by_puck(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
+fn end_by_puck(task: AirHockeyTask, puck: &Puck) -> Option<EpisodeEnd> {
     let [x, y, _] = puck.pose;
     let vx = puck.velocity[0];
     let speed = puck.speed();
@@ -150,32 +152,32 @@ fn end_by_puck(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
         && y.abs() <= TABLE.half_width_m()
         && speed <= TASK_RULES.lost_speed_m_s;
     if !is_on_table {
-        return Some(EpisodeEnd::LeftTable);
+        return Some(LEFT_TABLE);
     }
     match task {
-        Task::Hit if x > 0.0 && vx < 0.0 => Some(EpisodeEnd::CrossedMiddle),
-        Task::Defend if x > 0.0 && vx > 0.0 => Some(EpisodeEnd::CrossedMiddle),
-        Task::Defend if speed < TASK_RULES.defend_stopped_m_s => Some(EpisodeEnd::Stopped),
-        Task::Prepare if x > 0.0 => Some(EpisodeEnd::CrossedMiddle),
-        Task::Prepare if y.abs() < TASK_RULES.prepare_axis_m => Some(EpisodeEnd::ReachedAxis),
+        AirHockeyTask::Hit if x > 0.0 && vx < 0.0 => Some(CROSSED_MIDDLE),
+        AirHockeyTask::Defend if x > 0.0 && vx > 0.0 => Some(CROSSED_MIDDLE),
+        AirHockeyTask::Defend if speed < TASK_RULES.defend_stopped_m_s => Some(STOPPED),
+        AirHockeyTask::Prepare if x > 0.0 => Some(CROSSED_MIDDLE),
+        AirHockeyTask::Prepare if y.abs() < TASK_RULES.prepare_axis_m => Some(REACHED_AXIS),
         _ => None,
     }
 }
 
 /// Is this true state of the puck, the last of an episode, a success?
 #[must_use]
-pub fn success(task: Task, puck: &Puck) -> bool {
+pub fn success(task: AirHockeyTask, puck: &Puck) -> bool {
     let [x, y, _] = puck.pose;
     let is_in_place = TASK_RULES.success_x_m[0] < x
         && x <= TASK_RULES.success_x_m[1]
         && puck.velocity[0] < TASK_RULES.success_vx_m_s;
     match task {
-        Task::Hit => {
+        AirHockeyTask::Hit => {
             x > TABLE.half_length_m()
                 && y.abs() < TABLE.goal_width_m / 2.0
                 && puck.speed() >= TASK_RULES.hit_min_goal_speed_m_s
         }
-        Task::Defend => is_in_place,
-        Task::Prepare => is_in_place && y.abs() < PLAYABLE_Y_M,
+        AirHockeyTask::Defend => is_in_place,
+        AirHockeyTask::Prepare => is_in_place && y.abs() < PLAYABLE_Y_M,
     }
 }

@@ -1,17 +1,18 @@
 //! Control steps allocate no memory: it is allocated when an episode, or a rally of a game, is created.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, golden::strike,
     model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Seed};
 
 #[test]
 fn control_steps_allocate_nothing() {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(1);
     let plant = Plant::mismatched(&settings, seed.model_mismatch());
-    for task in Task::ALL {
+    for task in AirHockeyTask::ALL {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,

@@ -1,9 +1,10 @@
 //! A batch (many worlds of one task, stepped at once) plays the same episodes as worlds that are stepped alone.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Batch, BatchSetup, Episode, Interpolation, PerturbationSettings, Plant, golden::strike,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Seed};
 
 const WORLDS: u32 = 10;
 
@@ -11,7 +12,7 @@ const WORLDS: u32 = 10;
 const ACTION_LEN: usize = 14;
 
 /// A batch with all perturbations.
-fn setup(task: Task) -> BatchSetup {
+fn setup(task: AirHockeyTask) -> BatchSetup {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(4); // arbitrary
     BatchSetup {
@@ -49,7 +50,7 @@ fn play(setup: BatchSetup, threads: usize, steps: u32) -> Vec<String> {
 
 #[test]
 fn worlds_run_the_episodes_of_the_evaluation_in_order() {
-    for task in Task::ALL {
+    for task in AirHockeyTask::ALL {
         let setup = setup(task);
         let mut batch = Batch::new(setup.clone());
         let start = |number: u32| {
@@ -92,10 +93,10 @@ fn worlds_run_the_episodes_of_the_evaluation_in_order() {
 
 #[test]
 fn batch_is_the_same_on_any_number_of_threads() {
-    let alone = play(setup(Task::Hit), 1, 120);
+    let alone = play(setup(AirHockeyTask::Hit), 1, 120);
     for threads in [2, 5] {
         assert!(
-            play(setup(Task::Hit), threads, 120) == alone,
+            play(setup(AirHockeyTask::Hit), threads, 120) == alone,
             "{threads} threads"
         );
     }
@@ -104,5 +105,5 @@ fn batch_is_the_same_on_any_number_of_threads() {
 #[test]
 #[should_panic(expected = "expected an action of 14 numbers for each of 10 worlds")]
 fn missing_action_panics() {
-    Batch::new(setup(Task::Defend)).step(&[0.0; 13]);
+    Batch::new(setup(AirHockeyTask::Defend)).step(&[0.0; 13]);
 }

@@ -2,11 +2,12 @@
 //! table is tilted and damps the puck differently (`docs/rules.md`, "Perturbations").
 
 use crate::held_arm::{episode, hold};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Episode, Interpolation, PerturbationSettings, Plant, World,
     perturbation::rehearsal_table::RehearsalTable, stream::RandomStream,
 };
-use faceoff_types::{Factor, Factors, Seed, Task};
+use faceoff_types::{Factor, Factors, Seed};
 
 /// Distance of the robot's base from the table's centre along x, m.
 const BASE_X_M: f64 = 1.51;
@@ -16,7 +17,7 @@ fn puck_is_observed_one_or_two_control_steps_late() {
     // Number of observations with a delay of 0, 1 and 2 control steps.
     let (mut lag_counts, mut total) = ([0; 3], 0);
     for seed in 0..40 {
-        let mut episode = episode(Task::Hit, Factors::only(Factor::Delay), seed);
+        let mut episode = episode(AirHockeyTask::Hit, Factors::only(Factor::Delay), seed);
         let mut pucks = vec![episode.state().puck];
         for _ in 0..60 {
             let end = episode.step(&hold()).end;
@@ -45,7 +46,7 @@ fn puck_is_observed_one_or_two_control_steps_late() {
 
 #[test]
 fn joints_are_observed_without_delay() {
-    let mut episode = episode(Task::Defend, Factors::only(Factor::Delay), 1);
+    let mut episode = episode(AirHockeyTask::Defend, Factors::only(Factor::Delay), 1);
     let mut moving = hold();
     moving[0] = 0.02;
     for _ in 0..5 {
@@ -56,8 +57,8 @@ fn joints_are_observed_without_delay() {
 
 #[test]
 fn actions_are_applied_one_control_step_late() {
-    let mut delayed = episode(Task::Defend, Factors::only(Factor::Delay), 2);
-    let mut prompt = episode(Task::Defend, Factors::NONE, 2);
+    let mut delayed = episode(AirHockeyTask::Defend, Factors::only(Factor::Delay), 2);
+    let mut prompt = episode(AirHockeyTask::Defend, Factors::NONE, 2);
     let mut moving = hold();
     (moving[0], moving[7]) = (0.01, 0.3);
     prompt.step(&hold());
@@ -153,7 +154,7 @@ fn tilt_and_air_cushion_act_on_the_puck() {
     let table = RehearsalTable::draw(&settings.delay, RandomStream::new(&seed, "delay, table"));
     let start = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
     let mut episode = Episode::with_initial_puck(
-        Task::Hit,
+        AirHockeyTask::Hit,
         Interpolation::Cubic,
         Factors::only(Factor::Delay),
         &settings,
@@ -178,9 +179,13 @@ fn tilt_and_air_cushion_act_on_the_puck() {
 
 #[test]
 fn delay_does_not_change_draws_of_other_factors() {
-    let alone = episode(Task::Defend, Factors::only(Factor::ObservationNoise), 3);
+    let alone = episode(
+        AirHockeyTask::Defend,
+        Factors::only(Factor::ObservationNoise),
+        3,
+    );
     let both = episode(
-        Task::Defend,
+        AirHockeyTask::Defend,
         Factors::only(Factor::ObservationNoise).with(Factor::Delay),
         3,
     );

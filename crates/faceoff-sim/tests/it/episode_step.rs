@@ -1,11 +1,13 @@
 //! Episodes that are stepped at once, with SIMD instructions, have the same bits as those that are stepped alone, with every instruction
 //! set. `Factors` are the perturbations of an episode, such as noise. The *universal joint* is the two hinges on which the mallet hangs.
 
+use faceoff_sim::AirHockeyTask;
+use faceoff_sim::episode::ends::CROSSED_MIDDLE;
 use faceoff_sim::{
     Bounds, Episode, Interpolation, JOINTS, PerturbationSettings, Plant, SimdLevel, StepOutcome,
     golden::strike, model::INITIAL_Q, step_episodes, step_episodes_on,
 };
-use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factor, Factors, Seed, Task};
+use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factor, Factors, Seed};
 
 /// All instruction sets of this machine.
 fn simd_levels() -> Vec<SimdLevel> {
@@ -45,7 +47,7 @@ struct EpisodeWithAgent {
 
 impl EpisodeWithAgent {
     /// `number` is both the seed and the index of the episode.
-    fn new(task: Task, number: u32, factors: Factors, habit: Habit) -> Self {
+    fn new(task: AirHockeyTask, number: u32, factors: Factors, habit: Habit) -> Self {
         let settings = PerturbationSettings::default();
         let seed = Seed::from_number(u64::from(number));
         let plant = Plant::for_factors(factors, &settings, seed.model_mismatch());
@@ -163,14 +165,11 @@ fn episodes_with_contacts_are_the_same_at_once() {
         for factors in [Factors::NONE, Factors::ALL].into_iter().chain(singles) {
             // 13 episodes fill some groups of lanes, and the last ones partly.
             let plays = (0..13).map(|number| {
-                let task = Task::ALL[number as usize % 3];
+                let task = AirHockeyTask::ALL[number as usize % 3];
                 EpisodeWithAgent::new(task, number, factors, Habit::Strikes)
             });
             let ends = compare_with_alone(simd_level, plays.collect());
-            assert!(
-                ends.contains(&EpisodeEnd::CrossedMiddle),
-                "{factors:?}: {ends:?}"
-            );
+            assert!(ends.contains(&CROSSED_MIDDLE), "{factors:?}: {ends:?}");
         }
     }
 }
@@ -187,12 +186,12 @@ fn diverging_world_does_not_change_the_others() {
         ];
         let plays = (0..15).map(|number| {
             let habit = habits[number as usize % habits.len()];
-            let task = Task::ALL[number as usize / habits.len()];
+            let task = AirHockeyTask::ALL[number as usize / habits.len()];
             EpisodeWithAgent::new(task, number, Factors::ALL, habit)
         });
         let ends = compare_with_alone(simd_level, plays.collect());
-        assert!(ends.contains(&EpisodeEnd::AgentFault), "{ends:?}");
-        assert!(ends.contains(&EpisodeEnd::Horizon), "{ends:?}");
+        assert!(ends.contains(&EpisodeEnd::AGENT_FAULT), "{ends:?}");
+        assert!(ends.contains(&EpisodeEnd::HORIZON), "{ends:?}");
     }
 }
 
@@ -202,7 +201,8 @@ fn step_accepts_any_number_of_worlds() {
         let held = Interpolation::Quintic.hold_position(&INITIAL_Q);
         let action = &held[..Interpolation::Quintic.len()];
         let holding = |number| {
-            EpisodeWithAgent::new(Task::Prepare, number, Factors::NONE, Habit::Holds).episode
+            EpisodeWithAgent::new(AirHockeyTask::Prepare, number, Factors::NONE, Habit::Holds)
+                .episode
         };
         let mut episodes: Vec<Episode> = (0..count).map(holding).collect();
         let mut outcomes = vec![holding(0).step(action); count as usize];
@@ -215,6 +215,7 @@ fn step_accepts_any_number_of_worlds() {
 #[test]
 #[should_panic(expected = "expected an action for each episode")]
 fn missing_action_panics() {
-    let mut episode = EpisodeWithAgent::new(Task::Defend, 0, Factors::NONE, Habit::Holds).episode;
+    let mut episode =
+        EpisodeWithAgent::new(AirHockeyTask::Defend, 0, Factors::NONE, Habit::Holds).episode;
     step_episodes(&mut [&mut episode], &[], &mut []);
 }

@@ -1,10 +1,11 @@
 //! Episodes in which the arm holds its initial position.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Seed};
 
 /// An episode of the nominal plant, with the rules' perturbation settings.
-pub fn episode(task: Task, factors: Factors, seed: u64) -> Episode {
+pub fn episode(task: AirHockeyTask, factors: Factors, seed: u64) -> Episode {
     Episode::new(
         task,
         Interpolation::Cubic,

@@ -1,11 +1,12 @@
 //! *Hostile* agents, which try to break the simulation by extreme commands: all numbers stay finite, and if the world *diverges* (its state
 //! would leave the bounds of the simulation), the hostile agent is at fault.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Bounds, Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
     RallyEnd, model::INITIAL_Q, stream::RandomStream,
 };
-use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed, Task};
+use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed};
 
 /// Pattern of the numbers in an agent's actions.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +94,7 @@ fn assert_finite(label: &str, numbers: &[f64]) {
 fn play_diverges(
     bounds: Bounds,
     plant: &Plant,
-    task: Task,
+    task: AirHockeyTask,
     interpolation: Interpolation,
     habit: Habit,
     size: f64,
@@ -127,7 +128,7 @@ fn play_diverges(
         let divergence = episode.divergence();
         assert_eq!(
             divergence.is_some(),
-            outcome.end == Some(EpisodeEnd::AgentFault),
+            outcome.end == Some(EpisodeEnd::AGENT_FAULT),
             "{label}"
         );
         if let Some(divergence) = divergence {
@@ -157,7 +158,7 @@ fn episodes_stay_finite_for_hostile_commands() {
     let plant = Plant::for_factors(Factors::ALL, &settings, mismatch_seed);
     let count = |bounds: Bounds| {
         let (mut diverged, mut played) = (0, 0);
-        for task in Task::ALL {
+        for task in AirHockeyTask::ALL {
             for interpolation in interpolations() {
                 for habit in HABITS {
                     // The protocol's limit, and a size near the limits of joint positions and velocities.
@@ -238,7 +239,7 @@ fn diverged_world_stops() {
     let seed = Seed::from_number(13);
     let interpolation = Interpolation::Trajectory;
     let mut episode = Episode::new(
-        Task::Prepare,
+        AirHockeyTask::Prepare,
         interpolation,
         Factors::NONE,
         &settings,
@@ -282,7 +283,7 @@ fn non_finite_commands_leave_a_finite_state() {
             f64::MIN,
         ] {
             let mut episode = Episode::new(
-                Task::Hit,
+                AirHockeyTask::Hit,
                 interpolation,
                 Factors::NONE,
                 &settings,

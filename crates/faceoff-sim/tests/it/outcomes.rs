@@ -1,10 +1,11 @@
 //! The success rate of an agent that holds still agrees with that in the *reference*, the challenge's own simulator.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
-use faceoff_types::{Factors, Seed, Task, Violations};
+use faceoff_types::{Factors, Seed, Violations};
 
 /// Plays episodes with an arm that holds still. Returns the number of successes and the number of episodes with a violated constraint.
-fn play_holding(task: Task, episodes: u32) -> (u32, u32) {
+fn play_holding(task: AirHockeyTask, episodes: u32) -> (u32, u32) {
     let action = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let (mut successes, mut violations) = (0, 0);
     for index in 0..episodes {
@@ -26,10 +27,10 @@ fn play_holding(task: Task, episodes: u32) -> (u32, u32) {
 #[test]
 fn holding_agent_has_the_success_rate_of_the_reference() {
     // In the reference 26.4 % of 500 episodes of `defend` succeed, that is 132. Both rates have a standard error of 2 %.
-    let (successes, violations) = play_holding(Task::Defend, 500);
+    let (successes, violations) = play_holding(AirHockeyTask::Defend, 500);
     println!("defend: {successes} of 500");
     assert!((102..=162).contains(&successes), "{successes}");
     assert_eq!(violations, 0);
-    assert_eq!(play_holding(Task::Prepare, 60), (0, 0));
-    assert_eq!(play_holding(Task::Hit, 60), (0, 0));
+    assert_eq!(play_holding(AirHockeyTask::Prepare, 60), (0, 0));
+    assert_eq!(play_holding(AirHockeyTask::Hit, 60), (0, 0));
 }

@@ -2,6 +2,7 @@
 //! perturbation) changes the random numbers of another.
 
 use crate::held_arm::{episode, hold};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     PerturbationSettings, Plant,
     perturbation::{
@@ -10,7 +11,7 @@ use faceoff_sim::{
     stream::RandomStream,
     table::puck::Puck,
 };
-use faceoff_types::{Factor, Factors, Seed, Task};
+use faceoff_types::{Factor, Factors, Seed};
 
 /// A stream of random numbers with an arbitrary seed.
 fn stream(label: &str) -> RandomStream {
@@ -130,7 +131,7 @@ fn lost_puck_is_reported_frozen_and_at_rest() {
     let factors = Factors::only(Factor::TrackingLoss).with(Factor::ObservationNoise);
     let mut frozen = 0;
     for seed in 0..8 {
-        let mut episode = episode(Task::Prepare, factors, seed);
+        let mut episode = episode(AirHockeyTask::Prepare, factors, seed);
         let mut last = episode.observation()[..3].to_vec();
         assert_ne!(episode.observation()[3], 0.0, "tracked at first");
         for _ in 0..60 {
@@ -153,10 +154,14 @@ fn factor_does_not_change_draws_of_other_factors() {
     // Noise and tracking loss do not act on the world, so that noise can be compared while the puck is tracked.
     let noise = Factors::only(Factor::ObservationNoise);
     let both = noise.with(Factor::TrackingLoss);
-    let mut ideal = episode(Task::Prepare, Factors::NONE, 5);
-    let mut alone = episode(Task::Prepare, noise, 5);
-    let mut together = episode(Task::Prepare, both, 5);
-    let mut loss = episode(Task::Prepare, Factors::only(Factor::TrackingLoss), 5);
+    let mut ideal = episode(AirHockeyTask::Prepare, Factors::NONE, 5);
+    let mut alone = episode(AirHockeyTask::Prepare, noise, 5);
+    let mut together = episode(AirHockeyTask::Prepare, both, 5);
+    let mut loss = episode(
+        AirHockeyTask::Prepare,
+        Factors::only(Factor::TrackingLoss),
+        5,
+    );
     for _ in 0..200 {
         for episode in [&mut ideal, &mut alone, &mut together, &mut loss] {
             episode.step(&hold());
@@ -171,8 +176,8 @@ fn factor_does_not_change_draws_of_other_factors() {
     }
     // The air flow's draws do not depend on the other factors: the worlds agree bit for bit.
     let air = Factors::only(Factor::Disturbance);
-    let mut alone = episode(Task::Defend, air, 5);
-    let mut together = episode(Task::Defend, Factors::ALL, 5);
+    let mut alone = episode(AirHockeyTask::Defend, air, 5);
+    let mut together = episode(AirHockeyTask::Defend, Factors::ALL, 5);
     for _ in 0..30 {
         alone.step(&hold());
         together.step(&hold());
@@ -180,8 +185,8 @@ fn factor_does_not_change_draws_of_other_factors() {
     }
     // The initial state depends on no factor.
     assert_eq!(
-        episode(Task::Hit, Factors::NONE, 9).state(),
-        episode(Task::Hit, Factors::ALL, 9).state()
+        episode(AirHockeyTask::Hit, Factors::NONE, 9).state(),
+        episode(AirHockeyTask::Hit, Factors::ALL, 9).state()
     );
 }
 
@@ -222,34 +227,46 @@ fn initial_states_fill_the_ranges_of_the_rules() {
         );
     };
     assert_fills(
-        range(states(Task::Hit).map(|p| p[0]).collect()),
+        range(states(AirHockeyTask::Hit).map(|p| p[0]).collect()),
         [-0.7, -0.2],
     );
     assert_fills(
-        range(states(Task::Hit).map(|p| p[1]).collect()),
+        range(states(AirHockeyTask::Hit).map(|p| p[1]).collect()),
         [-0.39105, 0.39105],
     );
     assert_fills(
-        range(states(Task::Hit).map(|p| p[3].hypot(p[4])).collect()),
+        range(
+            states(AirHockeyTask::Hit)
+                .map(|p| p[3].hypot(p[4]))
+                .collect(),
+        ),
         [0.0, 0.5],
     );
     assert_fills(
-        range(states(Task::Hit).map(|p| p[5]).collect()),
+        range(states(AirHockeyTask::Hit).map(|p| p[5]).collect()),
         [-2.0, 2.0],
     );
     assert_fills(
-        range(states(Task::Defend).map(|p| p[0]).collect()),
+        range(states(AirHockeyTask::Defend).map(|p| p[0]).collect()),
         [0.29, 0.65],
     );
     assert_fills(
-        range(states(Task::Defend).map(|p| p[3].hypot(p[4])).collect()),
+        range(
+            states(AirHockeyTask::Defend)
+                .map(|p| p[3].hypot(p[4]))
+                .collect(),
+        ),
         [1.0, 3.0],
     );
     assert_fills(
-        range(states(Task::Defend).map(|p| (p[4]).atan2(-p[3])).collect()),
+        range(
+            states(AirHockeyTask::Defend)
+                .map(|p| (p[4]).atan2(-p[3]))
+                .collect(),
+        ),
         [-0.5, 0.5],
     );
-    let prepare: Vec<[f64; 6]> = states(Task::Prepare).collect();
+    let prepare: Vec<[f64; 6]> = states(AirHockeyTask::Prepare).collect();
     // Share of the pucks that start in the strip along the side.
     let side_share = prepare.iter().filter(|p| p[0] >= -0.8).count() as f64 / 2_000.0;
     // The areas of the strips: 0.6 m × 0.0943 m along the side, 0.14 m × 0.36035 m in the corner.

@@ -3,10 +3,11 @@
 //! recordings. States of the puck are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
 
 use crate::reference::{array, cases, flat, max_difference, recording, rows};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Episode, Interpolation, MalletState, PerturbationSettings, Plant, SUBSTEPS, World,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Seed};
 
 const PUCK_RADIUS_M: f64 = 0.03165;
 const MALLET_RADIUS_M: f64 = 0.04815;
@@ -188,7 +189,7 @@ impl Replay {
 
 /// Replays the episodes of all tasks.
 pub fn episodes() -> Vec<Replay> {
-    let replays_of_task = |task: Task| {
+    let replays_of_task = |task: AirHockeyTask| {
         let recording = recording(&format!("episodes_{task}"));
         let cases = recording["episodes"].as_array().unwrap().clone();
         cases
@@ -196,10 +197,13 @@ pub fn episodes() -> Vec<Replay> {
             .enumerate()
             .map(move |(index, case)| replay_episode(task, index, &case))
     };
-    Task::ALL.into_iter().flat_map(replays_of_task).collect()
+    AirHockeyTask::ALL
+        .into_iter()
+        .flat_map(replays_of_task)
+        .collect()
 }
 
-fn replay_episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
+fn replay_episode(task: AirHockeyTask, index: usize, case: &serde_json::Value) -> Replay {
     let init: [f64; 6] = array(&case["puck_init"]);
     let puck: Vec<[f64; 6]> = rows(&case["puck"]);
     let q_dq: Vec<[f64; 14]> = rows(&case["q_dq"]);

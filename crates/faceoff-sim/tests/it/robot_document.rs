@@ -1,5 +1,6 @@
 //! Checks the numbers that `docs/robot.md` quotes from the model, in tables and sentences.
 
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Interpolation, JOINTS, Plant, SUBSTEPS, World, env_info,
     model::{
@@ -7,7 +8,6 @@ use faceoff_sim::{
     },
     table::geometry::{PUCK, TABLE},
 };
-use faceoff_types::Task;
 
 const DOCUMENT: &str = include_str!("../../../../docs/robot.md");
 
@@ -60,7 +60,7 @@ fn link_table_matches_the_model() {
 
 #[test]
 fn joint_tables_match_the_model() {
-    let acceleration = env_info(Task::Defend).joint_acc_limit[1];
+    let acceleration = env_info(AirHockeyTask::Defend).joint_acc_limit[1];
     for (i, link) in LINKS.iter().enumerate() {
         let (range, speed) = (link.range_rad, link.velocity_limit_rad_s);
         assert_documented(&format!(

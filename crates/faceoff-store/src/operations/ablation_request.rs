@@ -16,11 +16,11 @@ use crate::{
         submissions::{self, SubmissionState},
     },
 };
-use faceoff_types::{AblationId, Profile, Ruleset, RunId, SeedLabel, SubmissionId, Task};
+use faceoff_types::{AblationId, Profile, Ruleset, RunId, SeedLabel, SubmissionId};
 use jiff::Timestamp;
 
 impl Store {
-    /// Queues an ablation of a valid submission: every task in every ablation profile. `plan` gives everything else.
+    /// Queues an ablation of a valid submission: the plan's tasks in every ablation profile.
     /// [`StoreError::Conflict`] if the submission is not valid, or has an open ablation;
     /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
@@ -31,10 +31,6 @@ impl Store {
         plan: &RunPlan,
         now: Timestamp,
     ) -> Result<Ablation> {
-        let plan = RunPlan {
-            tasks: Task::ALL.to_vec(),
-            ..plan.clone()
-        };
         plan.check()?;
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;

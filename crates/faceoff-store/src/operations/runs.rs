@@ -88,10 +88,8 @@ pub(crate) async fn queue_run(
     }
     runs::insert(tx, run, contestants).await?;
     let account = queue::account(tx, job.lane, &team.to_string()).await?;
-    let mut tasks = run.plan.tasks.clone();
-    tasks.sort_unstable();
     let mut position = 0;
-    for task in tasks {
+    for task in run.plan.tasks.iter().copied() {
         let mut first_episode = 0;
         while first_episode < run.plan.episodes_per_task {
             let end_episode = run

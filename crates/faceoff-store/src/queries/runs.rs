@@ -1,5 +1,6 @@
 //! Queries of runs: their shards (parts of the episodes), outcomes and agent faults.
 
+use crate::tables::plan::RunPlan;
 use crate::{
     boxed,
     error::{Result, StoreError},
@@ -9,7 +10,7 @@ use crate::{
         shards::{self, Shard},
     },
 };
-use faceoff_types::{AgentFault, EpisodeOutcome, RunId, Variation};
+use faceoff_types::{AgentFault, EpisodeOutcome, RunId};
 
 /// How much of the agent's standard error is shown for a failed run, in bytes: the protocol's limit
 /// for one shard.
@@ -31,11 +32,11 @@ impl Store {
         shards::of_run(&mut *self.database.read.acquire().await?, run).await
     }
 
-    /// The deviations of a run's rules from its ruleset.
+    /// How a run is played.
     #[boxed]
-    pub async fn run_variation(&self, run: RunId) -> Result<Variation> {
+    pub async fn run_plan(&self, run: RunId) -> Result<RunPlan> {
         let row = run_rows::find(&mut *self.database.read.acquire().await?, run).await?;
-        Ok(row.plan.variation)
+        Ok(row.plan)
     }
 
     /// The outcomes of the episodes in a run's committed shards, by task and episode. Scoring needs nothing else, in

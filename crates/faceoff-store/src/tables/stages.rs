@@ -345,7 +345,8 @@ fn name_error(name: &StageName) -> impl FnOnce(sqlx::Error) -> StoreError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_types::{Profile, Ruleset, Schedule, Task};
+    use faceoff_airhockey::TASKS;
+    use faceoff_types::{Profile, Ruleset, Schedule};
     use jiff::civil::date;
 
     fn time(text: &str) -> Timestamp {
@@ -371,7 +372,7 @@ mod tests {
                     runtimes: None,
                     ruleset: Ruleset::CURRENT,
                     profile: Profile::Evaluation,
-                    tasks: Task::ALL.to_vec(),
+                    tasks: TASKS.to_vec(),
                     episodes_per_task: 1,
                     max_faults: 1,
                     variation: Default::default(),

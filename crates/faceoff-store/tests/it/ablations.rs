@@ -2,6 +2,7 @@
 //! cost it points. They count for no board, so that workers run them after all other jobs.
 
 use crate::fixture::{TestStore, shard_commit, six_shard_plan};
+use faceoff_airhockey::TASKS;
 use faceoff_store::*;
 use faceoff_types::*;
 
@@ -97,7 +98,7 @@ async fn ablation_runs_each_profile_and_task_once() {
     }
     let expected: Vec<_> = Profile::ABLATION
         .into_iter()
-        .flat_map(|profile| Task::ALL.map(|task| [(profile, task, 0), (profile, task, 2)]))
+        .flat_map(|profile| TASKS.map(|task| [(profile, task, 0), (profile, task, 2)]))
         .flatten()
         .collect();
     assert_eq!(played, expected);
@@ -109,7 +110,7 @@ async fn ablation_runs_each_profile_and_task_once() {
         let episodes = outcomes
             .iter()
             .map(|outcome| (outcome.task, outcome.episode));
-        let in_order = Task::ALL
+        let in_order = TASKS
             .into_iter()
             .flat_map(|task| (0..4).map(move |episode| (task, episode)));
         assert!(episodes.eq(in_order));

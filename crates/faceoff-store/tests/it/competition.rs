@@ -1,8 +1,8 @@
 //! A submission's way from the upload to the board, with the operations that the HTTP server and the workers use.
 
 use crate::fixture::*;
+use faceoff_airhockey::TASKS;
 use faceoff_store::*;
-use faceoff_types::*;
 
 /// Shards of [`six_shard_plan`].
 const SHARDS: u32 = 6;
@@ -64,7 +64,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
         );
         played.push((shard.task, shard.first_episode, shard.end_episode));
     }
-    let in_order = Task::ALL
+    let in_order = TASKS
         .into_iter()
         .flat_map(|task| [(task, 0, 2), (task, 2, 4)]);
     assert!(
@@ -72,7 +72,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
         "shards are claimed in the order of task and first episode"
     );
     let outcomes = f.store.outcomes(evaluation.run).await.unwrap();
-    let expected = Task::ALL
+    let expected = TASKS
         .into_iter()
         .flat_map(|task| (0..4).map(move |episode| outcome(task, episode, false)));
     assert!(

@@ -12,10 +12,7 @@ use faceoff_testkit::{bundle_ref, shard_outcomes};
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
 use sqlx::{Connection, SqliteConnection};
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 /// Duration of the lease of a claimed job.
 pub const LEASE_S: u32 = 15;
@@ -367,7 +364,7 @@ pub fn result(score: f64) -> EvaluationResult {
         ruleset: RULESET.into(),
         profile: Profile::Evaluation,
         seed: Seed::from_number(1),
-        tasks: BTreeMap::new(),
+        tasks: Default::default(),
         score,
         penalty_points: 0.1 + 0.2,
         tier: Tier::Improvable,

@@ -7,6 +7,7 @@
 //! number) of a job's lease has the job's number + 50000.
 
 use crate::fixture::*;
+use faceoff_airhockey::TASKS;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::civil::date;
@@ -213,9 +214,7 @@ impl OldDatabase {
             id_text(team),
         ))
         .await;
-        let ranges = Task::ALL
-            .into_iter()
-            .flat_map(|task| [(task, 0), (task, 2)]);
+        let ranges = TASKS.into_iter().flat_map(|task| [(task, 0), (task, 2)]);
         for (position, (task, first)) in (0_u32..).zip(ranges) {
             let shard = Shard {
                 id: id(number + 1 + position),
@@ -292,7 +291,7 @@ impl OldDatabase {
         .await;
         let runs = Profile::ABLATION
             .into_iter()
-            .flat_map(|profile| Task::ALL.map(|task| (profile, task)));
+            .flat_map(|profile| TASKS.map(|task| (profile, task)));
         for (index, (profile, task)) in (0_u32..).zip(runs) {
             let job = first.get(index as usize).copied().unwrap_or(rest);
             let outcomes = match job {
@@ -684,7 +683,7 @@ async fn migration_splits_old_ablations_into_runs() {
             .iter()
             .map(|outcome| (outcome.task, outcome.episode))
             .collect();
-        let expected: Vec<_> = Task::ALL
+        let expected: Vec<_> = TASKS
             .into_iter()
             .flat_map(|task| [(task, 0), (task, 1)])
             .collect();

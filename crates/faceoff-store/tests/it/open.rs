@@ -1,8 +1,9 @@
 //! The opening of a store, and its behaviour when values in its database are damaged.
 
 use crate::fixture::*;
+use faceoff_airhockey::HIT;
 use faceoff_store::*;
-use faceoff_types::{Competition, Millionths, Task, TaskInfo};
+use faceoff_types::{Competition, Millionths, TaskInfo};
 use sqlx::Connection;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
@@ -162,12 +163,13 @@ async fn season_belongs_to_one_competition() {
         id: id.to_owned(),
         title: "A competition".to_owned(),
         tasks: vec![TaskInfo {
-            task: Task::Hit,
+            task: HIT,
             title: "A task".to_owned(),
             aim: "An aim.".to_owned(),
             weight: Millionths::new(1_000_000),
             max_steps,
         }],
+        ends: Vec::new(),
         violations: Vec::new(),
     };
     let stored = async || -> (Option<String>, Option<String>) {

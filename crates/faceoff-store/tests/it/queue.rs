@@ -2,8 +2,9 @@
 //! platform fault, for example a full disk, the job is run again.
 
 use crate::fixture::*;
+use faceoff_airhockey::{HIT, PREPARE};
 use faceoff_store::*;
-use faceoff_types::{SeedLabel, Task};
+use faceoff_types::SeedLabel;
 use std::collections::HashSet;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
@@ -268,7 +269,7 @@ async fn outcomes_must_cover_their_shard() {
     let mut swapped = complete.clone();
     swapped.outcomes.swap(0, 1);
     let mut of_other_task = complete.clone();
-    of_other_task.outcomes[0].task = Task::Prepare;
+    of_other_task.outcomes[0].task = PREPARE;
     for bad in [without_last, swapped, of_other_task] {
         let error = f.store.commit_shard(&claim, bad, f.now).await.unwrap_err();
         assert!(matches!(error, StoreError::Conflict(_)), "{error}");
@@ -365,7 +366,7 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
         (run.plan, run.seed),
         (six_shard_plan(), SeedLabel::StageDay(evaluation.stage_day))
     );
-    assert_eq!((first.task, first.first_episode), (Task::Hit, 0));
+    assert_eq!((first.task, first.first_episode), (HIT, 0));
 }
 
 #[tokio::test]

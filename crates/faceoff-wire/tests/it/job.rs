@@ -1,10 +1,12 @@
 //! Jobs and reports survive a round trip through JSON.
 
+use faceoff_airhockey::TASKS;
+use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_types::*;
 use faceoff_wire::game::GameSpec;
 use faceoff_wire::job::*;
 use serde::{Serialize, de::DeserializeOwned};
-use std::{collections::BTreeMap, fmt::Debug};
+use std::fmt::Debug;
 use uuid::Uuid;
 
 fn assert_round_trips<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
@@ -51,7 +53,7 @@ fn shard(recording: Option<&str>) -> JobPayload {
         spec: ShardSpec {
             ruleset: Ruleset::CURRENT,
             platform_retries: 1,
-            task: Task::Defend,
+            task: DEFEND,
             episodes: 100..u32::MAX,
             profile: Profile::TrackingLoss,
             seed: Seed::from_number(4),
@@ -84,6 +86,10 @@ fn game(recording: Option<&str>) -> JobPayload {
     }
 }
 
+fn weights() -> TaskWeights {
+    TaskWeights::parse("0.1,0.2,0.7", TASKS.into_iter()).expect("they sum to 1")
+}
+
 #[test]
 fn all_jobs_round_trip() {
     let scoring = JobPayload::Scoring {
@@ -95,6 +101,7 @@ fn all_jobs_round_trip() {
             agent: "striker".into(),
             ruleset: Ruleset::CURRENT,
             variation: Default::default(),
+            task_weights: weights(),
         },
         recordings: vec!["recordings/a".into(), "recordings/b".into()],
         dataset: "datasets/c.zip".into(),
@@ -103,6 +110,7 @@ fn all_jobs_round_trip() {
         submission: SubmissionId::new(),
         agent: agent(),
         spec: ValidationSpec {
+            tasks: TASKS.to_vec(),
             seed: Seed::from_number(3),
             mismatch_seed: Seed::from_number(4),
         },
@@ -126,10 +134,10 @@ fn all_jobs_round_trip() {
 #[test]
 fn all_reports_round_trip() {
     let outcome = EpisodeOutcome {
-        task: Task::Hit,
+        task: HIT,
         episode: 1,
         steps: 499,
-        end: EpisodeEnd::AgentFault,
+        end: EpisodeEnd::AGENT_FAULT,
         success: false,
         violations: Violations::default(),
         computation_time: ComputationTime {
@@ -138,7 +146,7 @@ fn all_reports_round_trip() {
         },
         fault: Some(AgentFault {
             fault: AgentFaultKind::Exited { code: 3 },
-            agent_task: Task::Hit.into(),
+            agent_task: HIT.into(),
             episode: Some(1),
             step: None,
             line: Some("\u{fffd}".into()),
@@ -148,7 +156,7 @@ fn all_reports_round_trip() {
         ruleset: RULESET.into(),
         profile: Profile::Evaluation,
         seed: Seed::from_number(1),
-        tasks: BTreeMap::new(),
+        tasks: Default::default(),
         score: 54.9,
         penalty_points: 327.5,
         tier: Tier::Deployable,
@@ -230,13 +238,14 @@ fn jobs_without_variation_round_trip_unchanged() {
         agent: "a".into(),
         ruleset: Ruleset::CURRENT,
         variation: Variation::default(),
+        task_weights: weights(),
     };
     let text = serde_json::to_string(&meta).expect("it is JSON");
-    for key in ["weights", "tier_bounds", "perturbations", "variation"] {
+    for key in ["\"weights", "tier_bounds", "perturbations", "variation"] {
         assert!(!text.contains(key), "{text}");
     }
     let mut changed = meta;
-    changed.variation.weights = "0.1,0.2,0.7".parse().expect("they sum to 1");
+    changed.variation.weights = Some(weights());
     changed.variation.perturbations.tracking_loss.steps = [1, 2];
     assert_round_trips(&changed);
 }

@@ -10,6 +10,7 @@ use crate::{
     slot::Backoff,
     slot_threads::SlotThreads,
 };
+use faceoff_airhockey::TASKS;
 use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, PackWriter};
@@ -113,7 +114,7 @@ pub(super) fn outcome(task: Task, episode: u32) -> EpisodeOutcome {
         task,
         episode,
         steps: 1,
-        end: EpisodeEnd::Horizon,
+        end: EpisodeEnd::HORIZON,
         success: true,
         violations: Violations::default(),
         computation_time: ComputationTime::default(),
@@ -134,7 +135,7 @@ fn clips(spec: &ShardSpec) -> Vec<u8> {
             episode,
             steps: 10,
             success: spec.profile == Profile::Ideal || episode != 1,
-            end: EpisodeEnd::Horizon,
+            end: EpisodeEnd::HORIZON,
             why: text,
             start: [0.0; 4],
             last: [0.0; 4],
@@ -270,7 +271,7 @@ pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
         ruleset: meta.ruleset.to_string(),
         profile: meta.profile,
         seed: meta.seed,
-        tasks: BTreeMap::new(),
+        tasks: Default::default(),
         score: 50.0,
         penalty_points: 0.0,
         tier: Tier::Deployable,
@@ -378,7 +379,7 @@ impl Server {
     pub(super) async fn start_evaluation(&self) -> EvaluationId {
         let submission = self.upload_valid("Alpha").await;
         let plan = RunPlan {
-            tasks: Task::ALL.to_vec(),
+            tasks: TASKS.to_vec(),
             max_faults: 10,
             ..six_shard_plan()
         };
@@ -425,6 +426,7 @@ impl Server {
 
     fn config(&self, slots: usize) -> WorkerConfig {
         WorkerConfig {
+            competition: Arc::new(faceoff_airhockey::competition()),
             slots: SlotsConfig {
                 cpus: CpuLayout::with_agents_on(&[0], &[0], slots),
                 threads: SlotThreads::from_caller(),

@@ -4,10 +4,10 @@ use super::{
     fixture::*,
     intercepted_server::{InterceptedServer, Interception},
 };
+use faceoff_airhockey::HIT;
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
 use faceoff_testkit::shard_commit;
-use faceoff_types::Task;
 use std::{
     sync::{
         Arc, Mutex,
@@ -78,7 +78,7 @@ async fn shutdown_releases_job_before_the_slot_ends() {
     let Some(Job::Shard { shard, .. }) = claimed.unwrap().map(|claimed| claimed.job) else {
         panic!("the slot did not release its shard")
     };
-    assert_eq!((shard.task, shard.first_episode), (Task::Hit, 0));
+    assert_eq!((shard.task, shard.first_episode), (HIT, 0));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -5,9 +5,9 @@ use super::{
     intercepted_server::{InterceptedServer, Interception},
 };
 use crate::server::{ClaimResult, JobServer as _, LeaseStatus};
+use faceoff_airhockey::TASKS;
 use faceoff_store::*;
 use faceoff_testkit::{change_rules, six_shard_plan, valid_outcome};
-use faceoff_types::Task;
 use faceoff_wire::job::{JobPayload, JobReport, JobSpec, OutputFiles};
 
 /// Claims the next job.
@@ -76,7 +76,7 @@ async fn jobs_do_not_contain_the_season_secret() {
     let submission = server.store.evaluation(id).await.unwrap().submission;
     server.upload("Beta", VALID_ARCHIVE).await;
     let plan = RunPlan {
-        tasks: Task::ALL.to_vec(),
+        tasks: TASKS.to_vec(),
         episodes_per_task: 3,
         episodes_per_shard: 3,
         max_faults: 0,
@@ -118,7 +118,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     // Jobs of the started day keep the old rules.
     let stage = server.store.stages().await.unwrap()[0].clone();
     let mut changed_variation = stage.rules.rules.variation.clone();
-    changed_variation.weights = "1,0,0".parse().unwrap();
+    changed_variation.weights = Some(faceoff_types::TaskWeights::of(faceoff_airhockey::HIT));
     changed_variation.perturbations.tracking_loss.probability = 0.25;
     let changed = change_rules(&server.store, stage.id, server.now(), |rules| {
         rules.variation = changed_variation.clone();

@@ -2,6 +2,7 @@
 
 use super::fixture::*;
 use crate::{cleanup, slot::Backoff};
+use faceoff_airhockey::{HIT, TASKS};
 use faceoff_replay::{ClipKey, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_scoring::EpisodeSummary;
@@ -39,9 +40,9 @@ async fn slots_play_each_shard_once_and_store_the_dataset() {
         panic!("the evaluation finishes")
     };
     let mut played = evaluator.played.lock().unwrap().clone();
-    played.sort_unstable();
+    played.sort_by_key(|(task, first)| (TASKS.iter().position(|other| other == task), *first));
     // Task and first episode of each shard of two episodes.
-    let all: Vec<_> = Task::ALL
+    let all: Vec<_> = TASKS
         .into_iter()
         .flat_map(|task| [(task, 0), (task, 2)])
         .collect();
@@ -272,7 +273,12 @@ async fn missed_day_is_started_once() {
     for is_first_start in [true, false] {
         let mut events = server.store.events();
         let shutdown = CancellationToken::new();
-        let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
+        let schedule = crate::run_schedule(
+            server.store.clone(),
+            server.local().competition,
+            server.clock(),
+            shutdown.clone(),
+        );
         let schedule = tokio::spawn(schedule);
         if is_first_start {
             let kinds = next_schedule_events(&mut events, 3).await;
@@ -320,7 +326,12 @@ async fn overdue_day_ends_before_the_next_one_starts() {
     server.advance(24 * 3600);
     let mut events = server.store.events();
     let shutdown = CancellationToken::new();
-    let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
+    let schedule = crate::run_schedule(
+        server.store.clone(),
+        server.local().competition,
+        server.clock(),
+        shutdown.clone(),
+    );
     let schedule = tokio::spawn(schedule);
     let kinds = next_schedule_events(&mut events, 5).await;
     assert!(
@@ -398,7 +409,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     // The evaluation has 6 shards; the ablation has one for each of 6 profiles and 3 tasks.
     assert_eq!((specs.len(), ablation_specs.len()), (6 + 18, 18));
     for (run, profile) in ablation_specs.chunks(3).zip(Profile::ABLATION) {
-        for (spec, task) in run.iter().zip(Task::ALL) {
+        for (spec, task) in run.iter().zip(TASKS) {
             assert_eq!(
                 (spec.profile, spec.task, &spec.episodes),
                 (profile, task, &(0..3))
@@ -417,16 +428,16 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
             let pack = Pack::open(&artifacts.local_path(&key).unwrap()).unwrap();
             let lines = pack.clip_index().unwrap().episodes;
             let lines = lines.iter().map(|line| (line.task, line.episode));
-            let expected = Task::ALL.map(|task| (task, 1));
+            let expected = TASKS.map(|task| (task, 1));
             assert_eq!(lines.collect::<Vec<_>>(), expected, "{profile}");
-            for task in Task::ALL {
+            for task in TASKS {
                 let clip = format!("{profile} 1").into_bytes();
                 assert_eq!(pack.clip(ClipKey::motion(task, 1)).unwrap(), Some(clip));
                 assert_eq!(pack.clip(ClipKey::motion(task, 0)).unwrap(), None);
             }
         }
         // A part that arrives late has no effect.
-        let late = Artifacts::ablation_part_key(ablation.id, Profile::Ideal, Task::Hit, 0);
+        let late = Artifacts::ablation_part_key(ablation.id, Profile::Ideal, HIT, 0);
         server.put_artifact(&late, b"late").await;
     }
     for run in ablation.runs.into_values() {

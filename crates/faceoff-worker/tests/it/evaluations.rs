@@ -1,6 +1,7 @@
 //! Evaluations on a real server: their outcomes do not depend on shards, slots and restarts, and failures are reported.
 
 use crate::server::Server;
+use faceoff_airhockey::{DEFEND, TASKS};
 use faceoff_store::*;
 use faceoff_testkit::{configure_stage, six_shard_plan};
 use faceoff_types::*;
@@ -9,7 +10,7 @@ use jiff::Timestamp;
 /// A plan of two episodes of each task.
 pub fn plan(episodes_per_shard: u32) -> RunPlan {
     RunPlan {
-        tasks: Task::ALL.to_vec(),
+        tasks: TASKS.to_vec(),
         episodes_per_task: 2,
         episodes_per_shard,
         max_faults: 2,
@@ -112,7 +113,7 @@ async fn failing_agent_gets_reason_and_log() {
         SubmissionState::Valid
     ));
     let plan = RunPlan {
-        tasks: vec![Task::Defend],
+        tasks: vec![DEFEND],
         episodes_per_task: 60,
         ..plan(20)
     };

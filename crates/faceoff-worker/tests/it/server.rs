@@ -69,6 +69,7 @@ impl Server {
             Runtime::python3().expect("this machine has Python"),
         )]);
         let config = WorkerConfig {
+            competition: std::sync::Arc::new(faceoff_airhockey::competition()),
             slots: SlotsConfig {
                 cpus: CpuLayout::for_server(slots, &[]),
                 threads: SlotThreads::from_caller(),

@@ -1,6 +1,7 @@
 //! The client against a real server on a loopback port.
 
 use super::*;
+use crate::competition::{competition, parse_weights};
 use faceoff_api::{
     requests::{ComparisonQuery, DeleteSubmission, NewStage, OrNull, StagePatch},
     token::hash_token,
@@ -60,7 +61,7 @@ async fn start_site(max_bundle_bytes: u64) -> Site {
     };
     configure_stage(&store, &plan, None, now()).await;
     let config = HttpConfig {
-        competition: Arc::new(faceoff_airhockey::competition()),
+        competition: Arc::clone(competition()),
         max_bundle_bytes,
         public_url: None,
         upload_dir: folder.path().to_owned(),
@@ -295,7 +296,7 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
         settings: StagePatch {
             closes_at: Some(OrNull(Some("2026-03-09T08:00:00Z".parse().unwrap()))),
             zone: Some("Europe/Berlin".parse().unwrap()),
-            weights: Some("0.5,0.5,0".parse().unwrap()),
+            weights: Some(parse_weights("0.5,0.5,0").unwrap()),
             schedule: Some(OrNull(Some(
                 faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap(),
             ))),

@@ -4,15 +4,16 @@
 mod table;
 
 use super::{ca_file::CaFile, output::print_json, server::Connection};
+use crate::competition::competition;
 use anyhow::Context;
 use clap::Args;
 use faceoff_api::requests::ComparisonQuery;
 use faceoff_dataset::Dataset;
 use faceoff_scoring::{ComparedEvaluation, Comparison, EpisodeSummary, SolvedEpisodes};
-use faceoff_types::{EpisodeOutcome, EvaluationId, Profile, Task};
+use faceoff_types::{EpisodeOutcome, EvaluationId, Profile, TaskMap, TaskWeights};
 use faceoff_wire::dataset::DatasetManifest;
 use serde::Serialize;
-use std::{collections::BTreeMap, path::Path};
+use std::path::Path;
 
 /// Compares two evaluations on the same episodes: solved episodes, McNemar's exact test, and the difference
 /// with its 95 % interval, by task and overall.
@@ -46,7 +47,7 @@ struct LocalView<'a> {
     #[serde(flatten)]
     comparison: &'a Comparison,
     #[serde(skip_serializing_if = "Option::is_none")]
-    episodes: Option<BTreeMap<Task, SolvedEpisodes>>,
+    episodes: Option<TaskMap<SolvedEpisodes>>,
 }
 
 #[derive(Serialize)]
@@ -133,6 +134,7 @@ impl CompareCommand {
 /// The parts of a dataset that a comparison needs.
 struct Evaluation {
     manifest: DatasetManifest,
+    weights: TaskWeights,
     summary: EpisodeSummary,
 }
 
@@ -141,9 +143,12 @@ fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
         let dataset = Dataset::open_lazily(Path::new(path))?;
         let episodes = dataset.episodes()?.into_iter();
         let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
+        let tasks = competition().played_tasks(&dataset.manifest().episodes)?;
         Ok(Evaluation {
+            weights: competition().weights(&dataset.manifest().variation),
             summary: EpisodeSummary::from_outcomes(
                 &outcomes,
+                &tasks,
                 &dataset.manifest().variation.tier_bounds,
             )?,
             manifest: dataset.manifest().clone(),
@@ -154,11 +159,17 @@ fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
 
 /// An evaluation with everything that has to be equal in both. `seed` draws the episodes, `mismatch_seed` the robot's deviation
 /// from its model.
-fn comparison_input(Evaluation { manifest, summary }: &Evaluation) -> ComparedEvaluation<'_> {
+fn comparison_input(evaluation: &Evaluation) -> ComparedEvaluation<'_> {
+    let Evaluation {
+        manifest,
+        weights,
+        summary,
+    } = evaluation;
     ComparedEvaluation {
         ruleset: &manifest.ruleset,
         profile: manifest.profile,
         variation: &manifest.variation,
+        weights,
         seed: manifest.seed,
         mismatch_seed: manifest.mismatch_seed,
         summary,

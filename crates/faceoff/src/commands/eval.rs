@@ -12,6 +12,7 @@ mod server_stage;
 mod table;
 
 use super::{ca_file::CaFile, local_bundle, output::print};
+use crate::competition::{competition, parse_task};
 use crate::config::Config;
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -36,7 +37,7 @@ pub struct EvalCommand {
     /// The agent: a folder with agent.toml, a .tar.gz, .tar.zst or .zip, or a container image written by docker save
     bundle: PathBuf,
     /// Tasks to evaluate [default: hit,defend,prepare, or the stage's with --like-server]
-    #[arg(long = "task", value_name = "TASKS", value_delimiter = ',')]
+    #[arg(long = "task", value_name = "TASKS", value_delimiter = ',', value_parser = parse_task)]
     tasks: Vec<Task>,
     /// Episodes per task
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
@@ -122,15 +123,15 @@ impl EvalCommand {
             }
             None => StageRules {
                 profile: Profile::Evaluation,
-                tasks: Task::ALL.to_vec(),
+                tasks: competition().task_names().collect(),
                 ..config.rules()
             },
         };
         if self.tasks.is_empty() {
             self.tasks = rules.tasks;
         }
-        self.tasks.sort_unstable();
-        self.tasks.dedup();
+        let is_chosen = |task: &Task| self.tasks.contains(task);
+        self.tasks = competition().task_names().filter(is_chosen).collect();
         fs::create_dir_all(&self.out)
             .with_context(|| format!("creating {}", self.out.display()))?;
         files::remove_earlier(&self.out)?;

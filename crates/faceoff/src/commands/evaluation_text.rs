@@ -5,8 +5,7 @@ use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     task::TaskView,
 };
-use faceoff_types::Task;
-use std::collections::BTreeMap;
+use faceoff_types::TaskMap;
 
 /// Status of an evaluation in a few words.
 pub(super) fn status_text(evaluation: &EvaluationView) -> String {
@@ -45,7 +44,7 @@ pub(super) fn status_text(evaluation: &EvaluationView) -> String {
 }
 
 /// Table of the results by task.
-pub(super) fn task_table(tasks: &BTreeMap<Task, TaskView>) -> String {
+pub(super) fn task_table(tasks: &TaskMap<TaskView>) -> String {
     let mut lines = vec![format!(
         "{:<8} {:>8} {:>9} {:>19} {:>8}  tier",
         "task", "episodes", "success", "95 % interval", "penalty"

@@ -6,6 +6,7 @@ mod scored_tournament;
 pub(super) mod table;
 mod tournament;
 
+use crate::competition::{competition, parse_weights};
 use crate::terminal;
 use anyhow::{Context as _, bail, ensure};
 use clap::{Args, Subcommand};
@@ -35,7 +36,7 @@ enum Kind {
     /// results.json can be used unchanged. Teams with equal results keep the sequence of the file.
     Qualifying {
         /// Weights of hit, defend and prepare [default: 0.4,0.4,0.2]
-        #[arg(long, value_name = "WEIGHTS")]
+        #[arg(long, value_name = "WEIGHTS", value_parser = parse_weights)]
         weights: Option<TaskWeights>,
         /// Penalty points per episode up to which a team is deployable and improvable [default: 0.5,1.5]
         #[arg(long, value_name = "BOUNDS")]
@@ -102,10 +103,9 @@ impl Kind {
                 tier_bounds,
             } => {
                 let scores: QualifyingScores = parse(&input, file)?;
-                for row in scores.board_with(
-                    &weights.unwrap_or_default(),
-                    &tier_bounds.unwrap_or_default(),
-                ) {
+                let weights = weights.unwrap_or_else(|| competition().weights(&Default::default()));
+                let board = scores.board(&weights, &tier_bounds.unwrap_or_default());
+                for row in board.with_context(|| file)? {
                     write_line(out, &row)?;
                 }
             }
@@ -214,7 +214,7 @@ mod tests {
     fn custom_weights_and_bounds_apply() {
         let input = json!({"A": tasks(0.9, 501.0), "B": tasks(0.1, 0.0)}).to_string();
         let kind = Kind::Qualifying {
-            weights: Some("1,0,0".parse().unwrap()),
+            weights: Some(parse_weights("1,0,0").unwrap()),
             tier_bounds: Some("0.6,0.7".parse().unwrap()),
         };
         let (outcome, rows, _) = score(kind, &input);

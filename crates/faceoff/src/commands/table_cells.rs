@@ -1,16 +1,27 @@
 //! Cells that several tables have.
 
+use crate::competition::competition;
 use faceoff_types::{ComputationTimeSummary, ViolationCounts};
+use std::fmt::Display;
 
 /// Headings of the columns of [`violations`].
-pub(super) const VIOLATIONS: &str = "  ee link  pos  vel time";
+pub(super) fn violation_heads() -> String {
+    columns(competition().violations.iter().map(|info| &info.short))
+}
 
-/// The violations of each constraint: end effector, links, joint positions, joint velocities, computation time.
-pub(super) fn violations(counts: ViolationCounts) -> String {
-    format!(
-        "{:>4} {:>4} {:>4} {:>4} {:>4}",
-        counts.ee, counts.link, counts.joint_pos, counts.joint_vel, counts.computation_time
+/// The number of episodes with each kind of violation.
+pub(super) fn violations(counts: &ViolationCounts) -> String {
+    columns(
+        competition()
+            .violations
+            .iter()
+            .map(|info| counts.get(info.name)),
     )
+}
+
+fn columns(cells: impl Iterator<Item = impl Display>) -> String {
+    let cells: Vec<String> = cells.map(|cell| format!("{cell:>4}")).collect();
+    cells.join(" ")
 }
 
 /// An interval of rates between 0 and 1, in percent.

@@ -5,6 +5,7 @@ mod failure;
 mod game;
 mod hash_text;
 
+use crate::competition::competition;
 use crate::exit::Exit;
 use anyhow::Context;
 use clap::Args;
@@ -207,7 +208,7 @@ fn verify_with_progress(
             .map_err(Failure::Local)?,
     );
     let start = Instant::now();
-    let verified = verify(dataset, workers, &|| bar.inc(1));
+    let verified = verify(dataset, competition(), workers, &|| bar.inc(1));
     bar.finish_and_clear();
     Ok((verified?, start.elapsed()))
 }

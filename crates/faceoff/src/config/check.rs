@@ -1,11 +1,12 @@
 //! Checks of values that are invalid on any server or on this host.
 
 use super::Config;
+use crate::competition::competition;
 use anyhow::{Context as _, anyhow, bail, ensure};
 use faceoff_dataset::can_draw_plant;
 use faceoff_sandbox::affinity;
 use faceoff_types::{IMAGE_RUNTIME, MismatchSettings, Seed};
-use std::collections::BTreeSet;
+use std::collections::HashSet;
 
 /// More slots per CPU than this would make no progress.
 const MAX_SLOTS_PER_CPU: usize = 4;
@@ -122,17 +123,18 @@ impl Config {
             !evaluation.tasks.is_empty(),
             "evaluation.tasks: expected at least one task"
         );
-        let rules = self.rules();
+        let mut rules = self.rules();
         rules
             .variation
             .perturbations
             .check()
             .context("evaluation.perturbations")?;
-        let mut unique = BTreeSet::new();
+        let mut unique = HashSet::new();
         if let Some(duplicate) = evaluation.tasks.iter().find(|task| !unique.insert(**task)) {
             bail!("evaluation.tasks: {duplicate} is listed twice");
         }
-        let checked = rules.check().and_then(|()| settings.check());
+        let checked = competition().check_rules(&mut rules);
+        let checked = checked.and_then(|()| settings.check());
         checked.map_err(|error| anyhow!("evaluation.{error}"))
     }
 

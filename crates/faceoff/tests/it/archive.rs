@@ -1,6 +1,7 @@
 //! The season's archive: exported from a server, imported, and served read-only.
 
 use crate::program::{command, faceoff_in};
+use faceoff_airhockey::HIT;
 use faceoff_api::token::hash_token;
 use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
 use faceoff_http::{
@@ -13,11 +14,10 @@ use faceoff_testkit::{
     bundle_ref, create_team, new_store, one_shard_plan, outcome, rules_and_settings, shard_commit,
     shard_outcomes, submit, valid_outcome,
 };
-use faceoff_types::{Clock, EvaluationId, EvaluationResult, StageSettings, Task, TimeLimits, Zone};
+use faceoff_types::{Clock, EvaluationId, EvaluationResult, StageSettings, TimeLimits, Zone};
 use jiff::Timestamp;
 use serde_json::Value;
 use std::{
-    collections::BTreeMap,
     fs,
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
@@ -179,7 +179,8 @@ async fn run_day(store: &Store) -> EvaluationId {
                     run.plan.profile,
                     seeds.episodes,
                     &run.plan.variation,
-                    BTreeMap::from([(Task::Hit, task)]),
+                    &faceoff_airhockey::competition().weights(&run.plan.variation),
+                    [(HIT, task)].into(),
                 );
                 let dataset = fixture("dataset-layout-3.zip");
                 let key = format!("datasets/{evaluation}.zip");

@@ -3,6 +3,7 @@
 use super::*;
 use crate::table::{ShardTable, StepRows, TableWriter, join};
 use bytes::Bytes;
+use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_episode::{AirHockeyStep, AnswerTiming, StepRow};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed};
@@ -87,7 +88,14 @@ fn write_shards(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) 
     let settings = PerturbationSettings::default();
     let (seed, plant) = (Seed::from_number(3), Plant::nominal());
     let factors = Profile::Ideal.factors();
-    let simulation = Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed);
+    let simulation = Episode::new(
+        task.try_into().unwrap(),
+        Interpolation::Cubic,
+        factors,
+        &settings,
+        &plant,
+        seed,
+    );
     let mut state = simulation.state();
     (0..shards)
         .map(|shard| {
@@ -134,8 +142,8 @@ fn join_shards(dir: &Path, tables: &[ShardTable]) -> RecordingTable {
 #[test]
 fn read_accesses_one_row_group_of_many() {
     let dir = tempfile::tempdir().unwrap();
-    let mut tables = write_shards(dir.path(), Task::Hit, 40, 2, 60);
-    tables.extend(write_shards(dir.path(), Task::Defend, 40, 2, 60));
+    let mut tables = write_shards(dir.path(), HIT, 40, 2, 60);
+    tables.extend(write_shards(dir.path(), DEFEND, 40, 2, 60));
     let table = join_shards(dir.path(), &tables);
     let metadata = ParquetMetaDataReader::new()
         .parse_and_finish(&table)
@@ -150,7 +158,7 @@ fn read_accesses_one_row_group_of_many() {
     };
     table.ranges.lock().unwrap().clear();
     // Two episodes per shard: episode 33 is in the 17th shard of the second task.
-    let rows = episode(table.clone(), Task::Defend, 33, None).unwrap();
+    let rows = episode(table.clone(), DEFEND, 33, None).unwrap();
     assert_eq!(rows.num_rows(), 60);
     let accessed: Vec<usize> = (0..80)
         .filter(|group| {
@@ -165,7 +173,7 @@ fn read_accesses_one_row_group_of_many() {
 #[test]
 fn read_accesses_few_pages_of_a_row_group() {
     let dir = tempfile::tempdir().unwrap();
-    let tables = write_shards(dir.path(), Task::Hit, 1, 60, 500);
+    let tables = write_shards(dir.path(), HIT, 1, 60, 500);
     let table = join_shards(dir.path(), &tables);
     let metadata = ParquetMetaDataReader::new()
         .parse_and_finish(&table)
@@ -176,7 +184,7 @@ fn read_accesses_few_pages_of_a_row_group() {
         "30,000 rows are one row group"
     );
     table.bytes_read.store(0, Ordering::Relaxed);
-    let rows = episode(table.clone(), Task::Hit, 31, None).unwrap();
+    let rows = episode(table.clone(), HIT, 31, None).unwrap();
     assert_eq!(rows.num_rows(), 500);
     let (read, all) = (table.bytes_read.load(Ordering::Relaxed), table.len());
     assert!(read < all / 8, "{read} of {all} bytes");

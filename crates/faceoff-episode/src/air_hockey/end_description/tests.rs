@@ -1,19 +1,21 @@
 //! Each kind of end is described in the words that a team reads. States are x, y (m), vx, vy (m/s) of the puck in the table frame.
 
 use super::*;
-use Task::{Defend, Hit, Prepare};
+
+const DEFEND: Task = AirHockeyTask::Defend.name();
 use faceoff_sim::{episode::task, table::puck::Puck};
 
 /// Success and description of an episode that ends in this state; if the state does not end it, the limit of 500 steps does.
 fn describe(task: Task, x: f64, y: f64, vx: f64, vy: f64) -> (bool, String) {
     let state = [x, y, 0.0, vx, vy, 0.0];
+    let simulated = task.try_into().expect("a task of air hockey");
     let puck = Puck {
         pose: [x, y, 0.0],
         velocity: [vx, vy, 0.0],
     };
-    let end = task::end(task, &puck, 500).expect("an episode is over after 500 steps");
+    let end = task::end(simulated, &puck, 500).expect("an episode is over after 500 steps");
     (
-        task::success(task, &puck),
+        task::success(simulated, &puck),
         describe_end(task, end, &state, 500, None),
     )
 }
@@ -63,7 +65,7 @@ fn ends_of_hit_are_described() {
         ),
     ] {
         let [x, y, vx, vy] = state;
-        assert_eq!(describe(Hit, x, y, vx, vy), (success, expected.to_owned()));
+        assert_eq!(describe(HIT, x, y, vx, vy), (success, expected.to_owned()));
     }
 }
 
@@ -112,7 +114,7 @@ fn ends_of_defend_are_described() {
         ),
     ] {
         let [x, y, vx, vy] = state;
-        let (is_success, description) = describe(Defend, x, y, vx, vy);
+        let (is_success, description) = describe(DEFEND, x, y, vx, vy);
         assert_eq!((is_success, description), (success, expected.to_owned()));
     }
 }
@@ -157,14 +159,14 @@ fn ends_of_prepare_are_described() {
         ),
     ] {
         let [x, y, vx, vy] = state;
-        let (is_success, description) = describe(Prepare, x, y, vx, vy);
+        let (is_success, description) = describe(PREPARE, x, y, vx, vy);
         assert_eq!((is_success, description), (success, expected.to_owned()));
     }
 }
 
 #[test]
 fn fault_description_contains_the_fault() {
-    let description = |fault| describe_end(Hit, EpisodeEnd::AgentFault, &[0.0; 6], 3, fault);
+    let description = |fault| describe_end(HIT, EpisodeEnd::AGENT_FAULT, &[0.0; 6], 3, fault);
     assert_eq!(
         description(Some(&AgentFaultKind::NonFinite)),
         "the agent's fault ended the episode: the action holds a number that is not finite"
@@ -176,7 +178,7 @@ fn fault_description_contains_the_fault() {
 fn described_position_agrees_with_success() {
     for millimetre in -960..0 {
         let x = f64::from(millimetre) / 1000.0;
-        let (success, description) = describe(Defend, x, 0.2, 0.0, 0.0);
+        let (success, description) = describe(DEFEND, x, 0.2, 0.0, 0.0);
         assert_eq!(success, description.contains("inside"), "{description}");
     }
 }

@@ -2,6 +2,7 @@
 //! without running agents.
 
 use crate::site::{LEASE_S, Site};
+use faceoff_airhockey::{EE, competition};
 use faceoff_scoring::{
     tier_of,
     tournament::{Forfeit, GameScore, GameTally, SideScore, final_score, judge},
@@ -9,9 +10,7 @@ use faceoff_scoring::{
 use faceoff_store::{
     ClaimedJob, CommitOutcome, Game, GameCommit, GamePurpose, GameRecording, Job, JobClaim,
 };
-use faceoff_types::{
-    ComputationTimeSummary, ForfeitCause, GameLimits, Profile, Ruleset, Seed, ViolationCounts,
-};
+use faceoff_types::{ComputationTimeSummary, ForfeitCause, GameLimits, Profile, Ruleset, Seed};
 use serde_json::Value;
 
 /// The outcome of a game. In pairs the home side is first.
@@ -69,10 +68,7 @@ impl GameOutcome {
             fouls: self.fouls[side],
             score: score[side],
             penalty_points: self.penalty_points[side],
-            violations: ViolationCounts {
-                ee: 3,
-                ..ViolationCounts::default()
-            },
+            violations: competition().violation_counts(&[(EE, 3)]),
             tier: tier_of(self.penalty_points[side], windows),
             faults: if self.forfeits[side] { 11 } else { 0 },
             late_answers: 2,

@@ -2,6 +2,7 @@
 //! like a real worker: it claims jobs, commits results and scores evaluations.
 
 use crate::site::{LEASE_S, Site, score_outcomes};
+use faceoff_airhockey::LEFT_TABLE;
 use faceoff_store::{ClaimedJob, Job, RunOwner};
 use faceoff_testkit::{shard_commit, shard_outcomes, valid_outcome};
 use faceoff_types::{
@@ -40,9 +41,9 @@ fn random_outcome(
         episode,
         steps: 40 + random.below(460) as u32,
         end: if success {
-            EpisodeEnd::LeftTable
+            LEFT_TABLE
         } else {
-            EpisodeEnd::Horizon
+            EpisodeEnd::HORIZON
         },
         success,
         violations: Violations {

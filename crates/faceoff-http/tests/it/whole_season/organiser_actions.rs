@@ -222,7 +222,13 @@ impl Season {
         );
         self.site
             .set_time(local_time(day + 1, 18) - jiff::SignedDuration::from_millis(1));
-        start_due(&self.site.store, self.site.now()).await.unwrap();
+        start_due(
+            &self.site.store,
+            &faceoff_airhockey::competition(),
+            self.site.now(),
+        )
+        .await
+        .unwrap();
         assert_eq!(states(self).await, (FINISHED_BEFORE_DEADLINE, 0, all));
         // The next cutoff ends the overfull day. The clock goes back to the morning before it.
         self.site.set_time(local_time(day + 1, 10));
@@ -337,7 +343,13 @@ impl Season {
     /// After the last day: reveals the blind stage, signs off each stage, and closes the season.
     pub async fn sign_off(&mut self) {
         self.site.set_time(local_time(DAYS + 1, 12));
-        start_due(&self.site.store, self.site.now()).await.unwrap();
+        start_due(
+            &self.site.store,
+            &faceoff_airhockey::competition(),
+            self.site.now(),
+        )
+        .await
+        .unwrap();
         let last_stage = self.stage_of(DAYS - 1);
         let hidden = self.board(DAYS - 1).await;
         assert_eq!(

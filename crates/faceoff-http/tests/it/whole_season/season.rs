@@ -191,13 +191,21 @@ impl Season {
             (local_time(day, 18), &json!(date(day)))
         );
         self.site.set_time(cutoff - SignedDuration::from_millis(1));
-        start_due(&self.site.store, self.site.now()).await.unwrap();
+        start_due(
+            &self.site.store,
+            &faceoff_airhockey::competition(),
+            self.site.now(),
+        )
+        .await
+        .unwrap();
         assert_eq!(self.evaluations(day).await.len(), 0, "day {day}");
         if super::organiser_actions::is_down_at_cutoff(day) {
             return 0;
         }
         self.site.set_time(cutoff);
-        start_due(&self.site.store, cutoff).await.unwrap();
+        start_due(&self.site.store, &faceoff_airhockey::competition(), cutoff)
+            .await
+            .unwrap();
         let started = self.evaluations(day).await.len();
         assert_eq!(started, self.active_teams(), "day {day}");
         let scored_before = self.worker.scored;

@@ -1,12 +1,14 @@
 //! Fuzz test of datasets: each is read, or refused as differing, altered or unreadable.
 
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
+use faceoff_airhockey::competition;
+use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_dataset::{
     Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble, shard_arena,
     verify::{VerifyError, verify},
 };
 use faceoff_episode::{AnswerTiming, RunningEpisode, StepSink};
-use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed, Task};
+use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
 use std::{
@@ -44,7 +46,7 @@ fn record_dataset(dir: &Path) {
     let spec = ShardSpec {
         ruleset: Ruleset::CURRENT,
         platform_retries: 0,
-        task: Task::Defend,
+        task: DEFEND,
         episodes: 0..2,
         profile: Profile::Evaluation,
         seed,
@@ -60,7 +62,8 @@ fn record_dataset(dir: &Path) {
     for episode in spec.episodes.clone() {
         let interpolation = Some(Interpolation::Linear);
         let mut running =
-            RunningEpisode::begin(&arena, spec.task, episode, interpolation, &mut recorder);
+            RunningEpisode::begin(&arena, spec.task, episode, interpolation, &mut recorder)
+                .unwrap();
         let outcome = loop {
             let question = running.question().unwrap();
             if question.step == 30 {
@@ -96,6 +99,7 @@ fn record_dataset(dir: &Path) {
         agent: "test".into(),
         ruleset: spec.ruleset,
         variation: Default::default(),
+        task_weights: faceoff_airhockey::competition().weights(&Default::default()),
     };
     assemble(&meta, &[shard], &dir.join("dataset.zip"), None).unwrap();
 }
@@ -196,8 +200,8 @@ fn read(path: &Path, rng: &mut Rng) -> Result<(), VerifyError> {
     dataset.calibration()?;
     dataset.episodes()?;
     let episode = *rng.pick(&[0, 1, 7]);
-    dataset.episode(*rng.pick(&[Task::Defend, Task::Hit]), episode, None)?;
-    verify(&dataset, NonZero::<usize>::MIN, &|| ()).map(drop)
+    dataset.episode(*rng.pick(&[DEFEND, HIT]), episode, None)?;
+    verify(&dataset, &competition(), NonZero::<usize>::MIN, &|| ()).map(drop)
 }
 
 #[test]

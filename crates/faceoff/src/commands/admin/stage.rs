@@ -1,6 +1,7 @@
 //! `faceoff admin stage`: creates, changes and lists the season's *stages*, periods with their own rules, cutoffs and board.
 //! The *ruleset* is the simulator's version, from which a stage's rules may deviate.
 
+use crate::competition::{competition, parse_weights};
 use crate::{
     client::Client,
     commands::{
@@ -17,7 +18,7 @@ use faceoff_api::{
         stage::{PhaseView, StageView},
     },
 };
-use faceoff_types::{PerturbationSettings, Publication, Zone};
+use faceoff_types::{PerturbationSettings, Publication, TaskWeights, Zone};
 use jiff::{Timestamp, Zoned, civil::DateTime};
 
 #[derive(Debug, Subcommand)]
@@ -79,6 +80,9 @@ pub(super) struct StageOptions {
     /// Closing time [default of a new stage: open end]
     #[arg(long, value_name = "TIME")]
     closes: Option<String>,
+    /// Weights of hit, defend and prepare in the score, e.g. 0.4,0.4,0.2
+    #[arg(long, value_name = "WEIGHTS", value_parser = parse_weights)]
+    weights: Option<TaskWeights>,
     #[command(flatten)]
     settings: StagePatch,
 }
@@ -94,6 +98,7 @@ impl StageOptions {
         Ok(StagePatch {
             opens_at: parse(self.opens)?,
             closes_at: parse(self.closes)?.map(|at| OrNull(Some(at))),
+            weights: self.weights,
             ..self.settings
         })
     }
@@ -270,7 +275,7 @@ fn stage_text(stage: &StageView) -> String {
         rules.episodes_per_task,
         tasks.join(", "),
         rules.max_faults,
-        rules.variation.weights,
+        competition().weights(&rules.variation),
         rules.variation.tier_bounds,
         if *rules.variation.perturbations == PerturbationSettings::default() {
             "of the ruleset"

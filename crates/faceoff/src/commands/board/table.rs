@@ -2,6 +2,7 @@
 //! paper of the Robot Air Hockey Challenge 2023.
 
 use crate::commands::output::time_text;
+use crate::competition::competition;
 use faceoff_api::views::board::{BoardRow, BoardView};
 use faceoff_types::{Task, Tier};
 use std::fmt::Write as _;
@@ -54,7 +55,7 @@ pub(super) fn board_text(board: &BoardView) -> String {
 
 /// The ranked rows; tiers without teams are left out.
 pub fn board_table(board: &BoardView) -> String {
-    let tasks: Vec<Task> = faceoff_airhockey::competition().task_names().collect();
+    let tasks: Vec<Task> = competition().task_names().collect();
     let mut text = line(
         ["rank", "team"],
         tasks.iter().map(Task::to_string),

@@ -1,8 +1,8 @@
 //! Tables of `faceoff compare`: the paired results of two evaluations A and B, and the episodes that each solved.
 
 use faceoff_scoring::{Comparison, SolvedEpisodes};
-use faceoff_types::Task;
-use std::{collections::BTreeMap, fmt::Write as _};
+use faceoff_types::TaskMap;
+use std::fmt::Write as _;
 
 /// The comparison as text.
 pub(super) fn comparison_table(comparison: &Comparison) -> String {
@@ -56,7 +56,7 @@ fn write_table(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
 }
 
 /// The episodes that only A, only B, both or neither solved.
-pub(super) fn episode_lists(episodes: &BTreeMap<Task, SolvedEpisodes>) -> String {
+pub(super) fn episode_lists(episodes: &TaskMap<SolvedEpisodes>) -> String {
     let mut out = String::new();
     for (task, solved) in episodes {
         for (label, list) in [

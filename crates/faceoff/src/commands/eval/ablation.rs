@@ -7,7 +7,7 @@ use super::{
 use crate::commands::{output::print, table_cells::percent_interval};
 use anyhow::Context;
 use faceoff_scoring::{EpisodeSummary, ProfileEffect};
-use faceoff_types::{Profile, RULESET, Seed, Task};
+use faceoff_types::{Profile, RULESET, Seed, TaskMap};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
@@ -17,7 +17,7 @@ struct AblationFile {
     ruleset: &'static str,
     seed: Seed,
     agent: String,
-    tasks: BTreeMap<Task, Vec<ProfileEffect>>,
+    tasks: TaskMap<Vec<ProfileEffect>>,
 }
 
 /// Runs every profile into a folder of its name and compares them. Returns the number of agent faults.
@@ -28,8 +28,11 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
         let outcome = run_profile(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
         faults += outcome.faults.len();
-        let summary =
-            EpisodeSummary::from_outcomes(&outcome.outcomes, &setup.variation.tier_bounds);
+        let summary = EpisodeSummary::from_outcomes(
+            &outcome.outcomes,
+            &setup.tasks,
+            &setup.variation.tier_bounds,
+        );
         runs.insert(profile, summary.context("comparing the profiles")?);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
@@ -48,7 +51,7 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
 }
 
 /// The comparison as text.
-fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) -> String {
+fn table(agent: &str, seed: Seed, tasks: &TaskMap<Vec<ProfileEffect>>) -> String {
     let mut lines = vec![format!("{agent}: ablation ({RULESET}), seed {seed}\n")];
     lines.push(format!(
         "{:<8} {:<17} {:>8} {:>8} {:>17} {:>9} {:>5} {:>6} {:>7} {:>8}",

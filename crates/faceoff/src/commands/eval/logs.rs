@@ -46,13 +46,14 @@ impl Logs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_types::{AgentFaultKind, Task};
+    use faceoff_airhockey::HIT;
+    use faceoff_types::AgentFaultKind;
 
     #[test]
     fn fault_has_the_output_of_its_own_process() {
         let fault = |episode| AgentFault {
             fault: AgentFaultKind::Exited { code: 1 },
-            agent_task: Task::Hit.into(),
+            agent_task: HIT.into(),
             episode: Some(episode),
             step: Some(7),
             line: None,

@@ -5,7 +5,7 @@ use anyhow::Context;
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardSpec, bundle::Bundle, run_shard,
 };
-use faceoff_types::{AgentFault, EpisodeOutcome};
+use faceoff_types::{AgentFault, EpisodeOutcome, Task};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     collections::VecDeque,
@@ -59,6 +59,8 @@ pub(super) fn run_shards(
 ) -> anyhow::Result<Verdict> {
     let episodes: u64 = jobs.iter().map(|job| job.spec.episodes.len() as u64).sum();
     let max_faults = jobs.first().map_or(0, |job| job.spec.max_faults);
+    // The jobs are in the order of the tasks.
+    let tasks: Vec<Task> = jobs.iter().map(|job| job.spec.task).collect();
     // indicatif draws nothing if standard error is no terminal.
     let bar = ProgressBar::new(episodes).with_style(
         ProgressStyle::with_template(
@@ -110,13 +112,14 @@ pub(super) fn run_shards(
         }
     }
     let mut faults = into_inner(pool.faults);
-    faults.sort_by_key(|fault| (fault.agent_task, fault.episode));
+    let order = |task: Task| tasks.iter().position(|other| *other == task);
+    faults.sort_by_key(|fault| (order(fault.agent_task.name()), fault.episode));
     let logs = into_inner(pool.logs);
     if faults.len() > max_faults as usize {
         Ok(Verdict::Failed { faults, logs })
     } else {
         let mut outcomes = into_inner(pool.outcomes);
-        outcomes.sort_by_key(|outcome| (outcome.task, outcome.episode));
+        outcomes.sort_by_key(|outcome| (order(outcome.task), outcome.episode));
         Ok(Verdict::Finished {
             faults,
             outcomes,
@@ -135,7 +138,7 @@ impl Pool {
             // The limit applies to the evaluation, not to the shard.
             let faults_so_far = self.fault_count.load(Ordering::Relaxed);
             spec.max_faults = self.max_faults.saturating_sub(faults_so_far);
-            self.bar.set_message(spec.task.as_str());
+            self.bar.set_message(spec.task.to_string());
             if let Err(fault) = run_shard(&spec, bundle, env, &out, &mut PoolObserver(self)) {
                 self.stop.store(true, Ordering::Relaxed);
                 return Err(fault);

@@ -6,6 +6,7 @@ use super::{
     notes::Notes,
     pool::{Job, Verdict, run_shards},
 };
+use crate::competition::competition;
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, AssembledDataset, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
@@ -88,6 +89,7 @@ pub(super) fn run_profile(
         agent: setup.bundle.manifest.name.clone(),
         ruleset: Ruleset::CURRENT,
         variation: setup.variation.clone(),
+        task_weights: competition().weights(&setup.variation),
     };
     let AssembledDataset {
         result, archive, ..

@@ -1,6 +1,7 @@
 //! `--like-server`: rules, limits and runtimes of a server's stage, and how this machine differs.
 
 use super::differences;
+use crate::competition::competition;
 use crate::{client::Client, commands::block_on, config::Config, machine};
 use anyhow::{Context, bail, ensure};
 use faceoff_api::views::{
@@ -86,7 +87,7 @@ impl ServerStage {
         config.time = limits.time.clone();
         let rules = &self.stage.rules.rules;
         config.evaluation.max_faults = rules.max_faults;
-        config.evaluation.weights = rules.variation.weights;
+        config.evaluation.weights = competition().weights(&rules.variation);
         config.evaluation.tier_bounds = rules.variation.tier_bounds;
         config.evaluation.perturbations = Some(rules.variation.perturbations.clone());
     }

@@ -1,6 +1,6 @@
 //! Table of an evaluation's result by task. A *tier* is the class of an agent by its penalty points.
 
-use crate::commands::table_cells::{VIOLATIONS, milliseconds, percent_interval, violations};
+use crate::commands::table_cells::{milliseconds, percent_interval, violation_heads, violations};
 use faceoff_types::EvaluationResult;
 
 /// The result as text. The columns from `ee` to `time` count the violations of each constraint: end effector, links, joint
@@ -12,8 +12,15 @@ pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
         result.profile, result.ruleset, result.seed
     ));
     lines.push(format!(
-        "\n{:<8} {:>8} {:>8} {:>17} {:>8}  {:<15} {VIOLATIONS}  {:>23}",
-        "task", "episodes", "success", "95 % interval", "penalty", "tier", "time mean/p99/max [ms]"
+        "\n{:<8} {:>8} {:>8} {:>17} {:>8}  {:<15} {}  {:>23}",
+        "task",
+        "episodes",
+        "success",
+        "95 % interval",
+        "penalty",
+        "tier",
+        violation_heads(),
+        "time mean/p99/max [ms]"
     ));
     for (task, task_result) in &result.tasks {
         lines.push(format!(
@@ -23,7 +30,7 @@ pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
             percent_interval(task_result.success_ci95),
             task_result.penalty_points,
             task_result.tier.title(),
-            violations(task_result.violations),
+            violations(&task_result.violations),
             milliseconds(task_result.computation_time_s),
         ));
     }

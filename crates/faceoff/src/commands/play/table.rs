@@ -1,7 +1,7 @@
 //! Tables of `faceoff play`: the result of a game, and of a series of games.
 
 use super::series_results::{SeriesGame, SeriesKind, SeriesResults};
-use crate::commands::table_cells::{VIOLATIONS, milliseconds, violations};
+use crate::commands::table_cells::{milliseconds, violation_heads, violations};
 use faceoff_scoring::tournament::GameScore;
 use faceoff_types::Side;
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ pub(super) fn game_table(game: &GameScore) -> String {
         first.agent, second.agent, game.profile, game.ruleset, game.seed
     ));
     lines.push(format!(
-        "\n{:<4} {:<20} {:>5} {:>5} {:>5} {:>8}  {:<15} {VIOLATIONS} {:>6} {:>6}  {:>23}",
+        "\n{:<4} {:<20} {:>5} {:>5} {:>5} {:>8}  {:<15} {} {:>6} {:>6}  {:>23}",
         "side",
         "agent",
         "score",
@@ -24,6 +24,7 @@ pub(super) fn game_table(game: &GameScore) -> String {
         "fouls",
         "penalty",
         "tier",
+        violation_heads(),
         "late",
         "faults",
         "time mean/p99/max [ms]"
@@ -37,7 +38,7 @@ pub(super) fn game_table(game: &GameScore) -> String {
             side.fouls,
             side.penalty_points,
             side.tier.title(),
-            violations(side.violations),
+            violations(&side.violations),
             side.late_answers,
             side.faults,
             milliseconds(side.computation_time_s),

@@ -1,6 +1,7 @@
 //! The picture of the table from above, with the paths of puck and mallets.
 
 use super::recording::{CONSTRAINTS, EpisodeRecording};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     episode::task::{PLAYABLE_Y_M, TASK_RULES},
     model::TOOL,
@@ -86,10 +87,10 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
 
 /// The zone in which the puck should end.
 fn target_zone(task: Task) -> String {
-    let half_width = match task {
-        Task::Hit => return String::new(),
-        Task::Defend => TABLE.half_width_m(),
-        Task::Prepare => PLAYABLE_Y_M,
+    let half_width = match AirHockeyTask::try_from(task) {
+        Ok(AirHockeyTask::Defend) => TABLE.half_width_m(),
+        Ok(AirHockeyTask::Prepare) => PLAYABLE_Y_M,
+        Ok(AirHockeyTask::Hit) | Err(_) => return String::new(),
     };
     let [from, to] = TASK_RULES.success_x_m;
     format!(

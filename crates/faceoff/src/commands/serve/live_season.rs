@@ -9,6 +9,7 @@ use super::{
     site::{Site, announce},
     tasks::ServerTasks,
 };
+use crate::competition::competition;
 use crate::{client, commands::atomic_folder::create_private, config::Config};
 use anyhow::{Context, bail};
 use faceoff_http::{AgentResources, Capacity, CapacityMonitor, ConnectionLimits};
@@ -19,6 +20,7 @@ use faceoff_store::{Actor, JobFilter, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{CpuLayout, SlotThreads, SlotsConfig, WorkerConfig};
 use jiff::Timestamp;
+use std::sync::Arc;
 use std::thread;
 use tokio_util::sync::CancellationToken;
 
@@ -92,6 +94,7 @@ async fn serve(
     // Kept as long as agents run.
     let _image = hold_in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
+        competition: Arc::clone(competition()),
         slots: SlotsConfig {
             cpus: slots.cpus,
             threads: slots.threads,
@@ -131,7 +134,9 @@ async fn serve(
             shutdown,
         )
     });
-    tasks.spawn(|shutdown| faceoff_worker::run_schedule(store.clone(), clock, shutdown));
+    tasks.spawn(|shutdown| {
+        faceoff_worker::run_schedule(store.clone(), Arc::clone(competition()), clock, shutdown)
+    });
     tasks.spawn(|shutdown| async move {
         capacity_monitor.run(shutdown.cancelled_owned()).await;
         Ok(())

@@ -1,6 +1,7 @@
 //! What serving a season needs, whether it runs or is archived: the opened data folder, the address and the HTTP settings.
 
 use super::data_folder::{empty_folder, load_or_create_link_key, lock, set_admin_token};
+use crate::competition::competition;
 use crate::{config::Config, machine};
 use anyhow::Context;
 use faceoff_http::{AgentResources, Capacity, HttpConfig, LinkKey};
@@ -44,7 +45,7 @@ impl Site {
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
-        let competition = Arc::new(faceoff_airhockey::competition());
+        let competition = Arc::clone(competition());
         let bound = store.bind_competition(&competition, Timestamp::now()).await;
         bound.with_context(|| format!("opening the data folder {}", data_dir.display()))?;
         set_admin_token(&store, data_dir, Timestamp::now()).await?;

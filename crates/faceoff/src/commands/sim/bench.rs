@@ -4,11 +4,12 @@
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use faceoff_episode::Arena;
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
     model::INITIAL_Q,
 };
-use faceoff_types::{Profile, Seed, Task, WINDOW_STEPS};
+use faceoff_types::{Profile, Seed, WINDOW_STEPS};
 use serde::Serialize;
 use std::{
     hint::black_box,
@@ -49,15 +50,20 @@ enum BenchTask {
 }
 
 impl BenchTask {
-    fn name(self) -> &'static str {
-        self.task().map_or("tournament", Task::as_str)
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Hit => "hit",
+            Self::Defend => "defend",
+            Self::Prepare => "prepare",
+            Self::Tournament => "tournament",
+        }
     }
 
-    fn task(self) -> Option<Task> {
+    fn task(self) -> Option<AirHockeyTask> {
         match self {
-            Self::Hit => Some(Task::Hit),
-            Self::Defend => Some(Task::Defend),
-            Self::Prepare => Some(Task::Prepare),
+            Self::Hit => Some(AirHockeyTask::Hit),
+            Self::Defend => Some(AirHockeyTask::Defend),
+            Self::Prepare => Some(AirHockeyTask::Prepare),
             Self::Tournament => None,
         }
     }
@@ -111,7 +117,7 @@ impl BenchArgs {
     }
 
     /// Runs the episodes of a task; returns the number of control steps and the time they took.
-    fn play_episodes(&self, task: Task) -> (u64, Duration) {
+    fn play_episodes(&self, task: AirHockeyTask) -> (u64, Duration) {
         let arena = Arena::new(self.profile, self.seed, self.seed.model_mismatch());
         let action = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
         let action = &action[..HOLD_INTERPOLATION.len()];

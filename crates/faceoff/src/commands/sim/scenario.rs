@@ -2,8 +2,9 @@
 //! the robots or the motion of a mallet.
 
 use anyhow::{Context as _, Result, bail, ensure};
+use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Interpolation, JOINTS, MalletState, model::INITIAL_Q};
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Profile, Seed};
 use serde::Deserialize;
 use serde_json::Value;
 use std::io::Read;
@@ -21,7 +22,7 @@ const NUMBER_LIMIT: f64 = 1e4;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawScenario {
-    task: Option<Task>,
+    task: Option<AirHockeyTask>,
     profile: Option<Profile>,
     seed: Option<Value>,
     robots: Option<u32>,
@@ -37,7 +38,7 @@ struct RawScenario {
 #[derive(Debug)]
 pub struct Scenario {
     /// Adds the task's opponent, terminations and success.
-    pub task: Option<Task>,
+    pub task: Option<AirHockeyTask>,
     /// Perturbations of the world.
     pub profile: Profile,
     /// Used as evaluation seed and as episode seed.
@@ -83,8 +84,8 @@ impl Scenario {
 
     fn check(raw: RawScenario) -> Result<Self> {
         let robots = match (raw.task, raw.robots) {
-            (Some(Task::Hit), None | Some(2)) | (None, Some(2)) => 2,
-            (Some(Task::Hit), Some(other)) => {
+            (Some(AirHockeyTask::Hit), None | Some(2)) | (None, Some(2)) => 2,
+            (Some(AirHockeyTask::Hit), Some(other)) => {
                 bail!("robots: expected 2, as hit has an opponent, got {other}")
             }
             (Some(_) | None, None | Some(1)) => 1,
@@ -92,7 +93,7 @@ impl Scenario {
             (None, Some(other)) => bail!("robots: expected 1 or 2, got {other}"),
         };
         // The simulator commands the opponent of hit.
-        let robots_with_actions = if raw.task == Some(Task::Hit) {
+        let robots_with_actions = if raw.task == Some(AirHockeyTask::Hit) {
             1
         } else {
             robots

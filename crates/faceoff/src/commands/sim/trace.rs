@@ -64,7 +64,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     let plant = Plant::for_factors(factors, &settings, scenario.seed.model_mismatch());
     let mut world = World::new(&plant, &scenario.joints, scenario.puck);
     let mut table = TableFactors::new(factors, &settings, &scenario.seed, &mut world);
-    let mut opponent = (scenario.task == Some(faceoff_types::Task::Hit)).then(Opponent::new);
+    let mut opponent = (scenario.task == Some(faceoff_sim::AirHockeyTask::Hit)).then(Opponent::new);
     let mut steps = 0;
     let mut end = None;
     impose_mallet(&mut world, scenario, 0);

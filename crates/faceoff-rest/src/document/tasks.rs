@@ -1,0 +1,78 @@
+//! Schemas that list the tasks of the competition and how their episodes end.
+
+use faceoff_types::{Competition, EpisodeEnd, Task, TaskWeights, ViolationCounts};
+use serde_json::{Map, Value, json};
+use utoipa::ToSchema;
+
+/// Replaces the schemas of tasks, of their weights and of ends by those of the competition.
+pub(super) fn describe(document: &mut Value, competition: &Competition) {
+    let names: Vec<&str> = competition
+        .tasks
+        .iter()
+        .map(|info| info.task.as_str())
+        .collect();
+    let aims = competition
+        .tasks
+        .iter()
+        .map(|info| format!("\n- `{}`: {}", info.task, info.aim));
+    let schemas = &mut document["components"]["schemas"];
+    schemas[&*Task::name()] = json!({
+        "type": "string",
+        "description": format!("A task of the competition.\n{}", aims.collect::<String>()),
+        "enum": names,
+    });
+    let ends = competition
+        .ends
+        .iter()
+        .map(|info| format!("\n- `{}`: {}", info.end, info.title));
+    schemas[&*EpisodeEnd::name()] = json!({
+        "type": "string",
+        "description": format!("Why an episode ended.\n{}", ends.collect::<String>()),
+        "enum": competition.ends.iter().map(|info| info.end.as_str()).collect::<Vec<_>>(),
+    });
+    let kinds = competition.violations.iter();
+    let kinds = kinds.map(|info| {
+        let schema =
+            json!({"type": "integer", "format": "int32", "minimum": 0, "description": info.breach});
+        (info.name.to_string(), schema)
+    });
+    let violations: Map<String, Value> = kinds.collect();
+    schemas[&*ViolationCounts::name()] = json!({
+        "type": "object",
+        "description": "For each kind of violation, the number of episodes with it.",
+        "required": violations.keys().collect::<Vec<_>>(),
+        "properties": violations,
+    });
+    let weight = |info: &faceoff_types::TaskInfo| {
+        let schema = json!({
+            "type": "number",
+            "description": "From 0 to 1, with at most six decimals. All weights sum to 1.",
+            "example": info.weight.as_f64(),
+            "minimum": 0,
+            "maximum": 1,
+        });
+        (info.task.to_string(), schema)
+    };
+    schemas[&*TaskWeights::name()] = json!({
+        "type": "object",
+        "properties": competition.tasks.iter().map(weight).collect::<Map<String, Value>>(),
+        "required": names,
+        "additionalProperties": false,
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tasks_of_the_competition_are_the_values() {
+        let mut document = json!({"components": {"schemas": {"Task": {"type": "string"}}}});
+        describe(&mut document, &faceoff_airhockey::competition());
+        let schemas = &document["components"]["schemas"];
+        assert_eq!(schemas["Task"]["enum"], json!(["hit", "defend", "prepare"]));
+        let weights = &schemas["TaskWeights"];
+        assert_eq!(weights["required"], schemas["Task"]["enum"]);
+        assert_eq!(weights["properties"]["prepare"]["example"], 0.2);
+    }
+}

@@ -1,0 +1,22 @@
+//! How episodes end, beside [`EpisodeEnd::HORIZON`] and [`EpisodeEnd::AGENT_FAULT`].
+
+use faceoff_types::EpisodeEnd;
+
+/// The puck left the table, in a goal or elsewhere.
+pub const LEFT_TABLE: EpisodeEnd = EpisodeEnd::new("left_table");
+/// `hit`, `defend`: the puck moved back across the middle line. `prepare`: it crossed the line.
+pub const CROSSED_MIDDLE: EpisodeEnd = EpisodeEnd::new("crossed_middle");
+/// `defend`: the puck became slow enough.
+pub const STOPPED: EpisodeEnd = EpisodeEnd::new("stopped");
+/// `prepare`: the puck reached the table's long axis.
+pub const REACHED_AXIS: EpisodeEnd = EpisodeEnd::new("reached_axis");
+
+/// All ends, in the order of lists.
+pub const ALL: [EpisodeEnd; 6] = [
+    EpisodeEnd::HORIZON,
+    LEFT_TABLE,
+    CROSSED_MIDDLE,
+    STOPPED,
+    REACHED_AXIS,
+    EpisodeEnd::AGENT_FAULT,
+];

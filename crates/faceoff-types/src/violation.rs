@@ -1,0 +1,89 @@
+//! Kinds of violations of an agent's limits, by their names.
+
+use crate::short_name::short_name;
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+short_name! {
+    /// The name of a kind of violation. Which there are, and what they cost, is known to [`Competition`](crate::Competition).
+    ViolationName, "a violation"
+}
+
+impl ViolationName {
+    /// The agent took too long to answer a step. In every competition.
+    pub const COMPUTATION_TIME: Self = Self::new("computation_time");
+}
+
+/// For each kind of violation, the number of episodes (or of windows of a game) with it, in the order of the competition.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ViolationCounts(IndexMap<ViolationName, u32>);
+
+impl ViolationCounts {
+    /// The count of a kind; 0 if there is none of it.
+    #[must_use]
+    pub fn get(&self, name: ViolationName) -> u32 {
+        self.0.get(&name).copied().unwrap_or_default()
+    }
+
+    /// Sets the count of a kind. A kind that is new follows the others.
+    pub fn set(&mut self, name: ViolationName, count: u32) {
+        self.0.insert(name, count);
+    }
+
+    /// All kinds with their counts.
+    pub fn iter(&self) -> impl Iterator<Item = (ViolationName, u32)> + '_ {
+        self.0.iter().map(|(name, count)| (*name, *count))
+    }
+
+    /// Adds the counts of others.
+    pub fn add(&mut self, others: &Self) {
+        for (name, count) in others.iter() {
+            let sum = self.0.entry(name).or_default();
+            *sum = sum.saturating_add(count);
+        }
+    }
+}
+
+impl FromIterator<(ViolationName, u32)> for ViolationCounts {
+    fn from_iter<I: IntoIterator<Item = (ViolationName, u32)>>(counts: I) -> Self {
+        Self(counts.into_iter().collect())
+    }
+}
+
+#[cfg(feature = "openapi")]
+mod schema {
+    use super::ViolationCounts;
+    use utoipa::{
+        PartialSchema, ToSchema,
+        openapi::{ObjectBuilder, RefOr, Schema, Type},
+    };
+
+    impl PartialSchema for ViolationCounts {
+        fn schema() -> RefOr<Schema> {
+            let count = ObjectBuilder::new().schema_type(Type::Integer);
+            ObjectBuilder::new()
+                .schema_type(Type::Object)
+                .additional_properties(Some(count))
+                .into()
+        }
+    }
+
+    impl ToSchema for ViolationCounts {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_added_by_kind() {
+        let mut counts: ViolationCounts = serde_json::from_str(r#"{"fall":2,"speed":1}"#).unwrap();
+        let other = serde_json::from_str(r#"{"speed":3,"heat":4}"#).unwrap();
+        counts.add(&other);
+        let text = serde_json::to_string(&counts).unwrap();
+        assert_eq!(text, r#"{"fall":2,"speed":4,"heat":4}"#);
+        assert_eq!(counts.get(ViolationName::new("speed")), 4);
+        assert_eq!(counts.get(ViolationName::COMPUTATION_TIME), 0);
+    }
+}

@@ -1,0 +1,28 @@
+//! The competition that this program runs.
+
+use faceoff_types::{Competition, InvalidWeights, Task, TaskWeights, UnknownTask};
+use std::sync::{Arc, LazyLock};
+
+static COMPETITION: LazyLock<Arc<Competition>> =
+    LazyLock::new(|| Arc::new(faceoff_airhockey::competition()));
+
+/// The only competition that is compiled in.
+pub fn competition() -> &'static Arc<Competition> {
+    &COMPETITION
+}
+
+/// Parses a task on the command line.
+///
+/// # Errors
+/// If the competition has no such task.
+pub fn parse_task(name: &str) -> Result<Task, UnknownTask> {
+    competition().find_task(name)
+}
+
+/// Parses weights on the command line: numbers in the order of the tasks.
+///
+/// # Errors
+/// If there is not a number for each task, or they do not sum to 1.
+pub fn parse_weights(text: &str) -> Result<TaskWeights, InvalidWeights> {
+    TaskWeights::parse(text, competition().task_names())
+}
