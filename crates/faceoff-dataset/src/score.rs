@@ -15,7 +15,7 @@ use faceoff_episode::AnswerTiming;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed,
-    SlotTiming, TaskMap, TaskWeights, Variation,
+    SlotTiming, TaskMap, TaskWeights, Variation, Violations,
 };
 use faceoff_wire::dataset::{
     ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
@@ -205,6 +205,7 @@ pub(crate) fn score(
         let result = faceoff_scoring::score_task(&tally.outcomes, &times, &variation.tier_bounds);
         tasks.insert(task, result);
         let [joint_pos, joint_vel, ee, link] = tally.violations;
+        let names = Violations::default().by_name().map(|(name, _)| name);
         let slowest = tally.slowest.unwrap_or_default();
         let computation_time = tally
             .outcomes
@@ -214,10 +215,10 @@ pub(crate) fn score(
         violations.tasks.insert(
             task,
             TaskViolations {
-                ee,
-                link,
-                joint_pos,
-                joint_vel,
+                constraints: names
+                    .into_iter()
+                    .zip([ee, link, joint_pos, joint_vel])
+                    .collect(),
                 computation_time,
             },
         );

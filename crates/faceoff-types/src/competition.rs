@@ -23,7 +23,8 @@ pub struct Competition {
 /// A task of a competition.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TaskInfo {
-    /// Its name in files, in the API and on the command line.
+    /// Its name in files, in the API and on the command line. Not `tournament`, which is the name of games, nor a column of all boards
+    /// (`place`, `team`, `score`, `points`).
     pub task: Task,
     /// The heading of its board and of its columns.
     pub title: String,
@@ -83,13 +84,6 @@ impl Competition {
             add(&violation.points_text());
         }
         hasher.finalize().to_string()
-    }
-
-    /// The name of an end in lists; its name in files if the competition has no such end.
-    #[must_use]
-    pub fn end_title<'a>(&'a self, end: &'a EpisodeEnd) -> &'a str {
-        let found = self.ends.iter().find(|info| info.end == *end);
-        found.map_or(end.as_str(), |info| &info.title)
     }
 
     /// The tasks in the order of boards.

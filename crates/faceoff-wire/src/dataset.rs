@@ -5,7 +5,8 @@
 //! `calibration.json`, `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
 //! [`DATASET_SCHEMA`]; `docs/dataset.md` describes every column.
 
-use faceoff_types::{Profile, Seed, SlotTiming, Task, TaskMap, Variation};
+use faceoff_types::{Profile, Seed, SlotTiming, Task, TaskMap, Variation, ViolationName};
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -66,18 +67,13 @@ pub struct ViolationsFile {
     pub tasks: TaskMap<TaskViolations>,
 }
 
-/// The violations of one task, per constraint.
+/// The violations of one task.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TaskViolations {
-    /// End-effector position, metres beyond the bound.
-    pub ee: Vec<ConstraintViolation>,
-    /// Height of elbow and wrist, metres beyond the bound.
-    pub link: Vec<ConstraintViolation>,
-    /// Joint position, rad beyond 95 % of the limit.
-    pub joint_pos: Vec<ConstraintViolation>,
-    /// Joint velocity, rad/s beyond 95 % of the limit.
-    pub joint_vel: Vec<ConstraintViolation>,
+    /// For each constraint of the world, the episodes in which it was violated.
+    #[serde(flatten)]
+    pub constraints: IndexMap<ViolationName, Vec<ConstraintViolation>>,
     /// Computation time: the episodes with penalty points for it.
     pub computation_time: Vec<SlowEpisode>,
 }

@@ -2,7 +2,7 @@
 
 use crate::recordings::{Agent, Evaluation, hold_still, json, play, spec, swing_arm, table, unzip};
 use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
-use faceoff_airhockey::{HIT, PREPARE};
+use faceoff_airhockey::{EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
 use faceoff_dataset::RecordingError;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{EpisodeOutcome, EvaluationResult, Ruleset, SlotTiming, TaskMap};
@@ -177,12 +177,13 @@ fn violations_name_episode_and_step() {
                 .map(|o| o.episode)
                 .collect()
         };
-        for (listed, flagged) in [
-            (&violations.ee, flagged(|o| o.violations.ee)),
-            (&violations.link, flagged(|o| o.violations.link)),
-            (&violations.joint_pos, flagged(|o| o.violations.joint_pos)),
-            (&violations.joint_vel, flagged(|o| o.violations.joint_vel)),
+        for (name, flagged) in [
+            (EE, flagged(|o| o.violations.ee)),
+            (LINK, flagged(|o| o.violations.link)),
+            (JOINT_POS, flagged(|o| o.violations.joint_pos)),
+            (JOINT_VEL, flagged(|o| o.violations.joint_vel)),
         ] {
+            let listed = &violations.constraints[&name];
             assert_eq!(
                 listed.iter().map(|v| v.episode).collect::<Vec<_>>(),
                 flagged,
@@ -191,14 +192,16 @@ fn violations_name_episode_and_step() {
             assert!(listed.iter().all(|v| v.max > 0.0 && v.steps > 0));
         }
         assert_eq!(
-            violations.joint_vel.len(),
+            violations.constraints[&JOINT_VEL].len(),
             outcomes.len(),
             "the swing is too fast in every episode"
         );
         assert!(
-            violations.joint_vel.iter().all(|v| v.first_step < 20),
+            violations.constraints[&JOINT_VEL]
+                .iter()
+                .all(|v| v.first_step < 20),
             "{:?}",
-            violations.joint_vel
+            violations.constraints[&JOINT_VEL]
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::recordings::{Evaluation, swing_arm};
 use arrow_array::{Array, Int64Array, cast::AsArray, types::Float64Type};
-use faceoff_airhockey::{DEFEND, HIT, PREPARE};
+use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
 use faceoff_dataset::{Dataset, assemble};
 use faceoff_replay::{Clip, ClipKey, ContactWith, Group, Pack};
 use faceoff_types::Task;
@@ -166,13 +166,13 @@ fn clip_index_matches_the_dataset_for_each_episode() {
         );
         assert_eq!(motion.header.end.unwrap().why, line.why);
         let task_violations = &violations.tasks[&outcome.task];
-        for (group, recorded) in [
-            (Group::Ee, &task_violations.ee),
-            (Group::Link, &task_violations.link),
-            (Group::JointPos, &task_violations.joint_pos),
-            (Group::JointVel, &task_violations.joint_vel),
+        for (group, name) in [
+            (Group::Ee, EE),
+            (Group::Link, LINK),
+            (Group::JointPos, JOINT_POS),
+            (Group::JointVel, JOINT_VEL),
         ] {
-            let recorded = recorded
+            let recorded = task_violations.constraints[&name]
                 .iter()
                 .find(|violation| violation.episode == outcome.episode);
             let found = line

@@ -1,6 +1,6 @@
 //! Schemas that list the tasks of the competition and how their episodes end.
 
-use faceoff_types::{Competition, EpisodeEnd, Task, TaskWeights, ViolationCounts};
+use faceoff_types::{Competition, EpisodeEnd, Task, TaskWeights, ViolationCounts, ViolationName};
 use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
@@ -41,7 +41,25 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "type": "object",
         "description": "For each kind of violation, the number of episodes with it.",
         "required": violations.keys().collect::<Vec<_>>(),
-        "properties": violations,
+        "properties": &violations,
+    });
+    let episodes = |of: &str| json!({"type": "array", "items": {"$ref": format!("#/components/schemas/{of}")}});
+    let lists = competition.violations.iter().map(|info| {
+        let is_late = info.name == ViolationName::COMPUTATION_TIME;
+        let of = if is_late {
+            "SlowEpisode"
+        } else {
+            "ConstraintViolation"
+        };
+        let mut schema = episodes(of);
+        schema["description"] = info.breach.clone().into();
+        (info.name.to_string(), schema)
+    });
+    schemas["TaskViolations"] = json!({
+        "type": "object",
+        "description": "The violations of one task: for each kind, the episodes with it.",
+        "required": violations.keys().collect::<Vec<_>>(),
+        "properties": lists.collect::<Map<String, Value>>(),
     });
     let weight = |info: &faceoff_types::TaskInfo| {
         let schema = json!({

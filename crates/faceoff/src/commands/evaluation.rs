@@ -98,12 +98,7 @@ fn evaluation_text(evaluation: &EvaluationView) -> String {
 fn violations_text(violations: &ViolationsView) -> String {
     let mut lines = Vec::new();
     for (task, by_constraint) in &violations.tasks {
-        for (name, list) in [
-            ("ee", &by_constraint.ee),
-            ("link", &by_constraint.link),
-            ("joint_pos", &by_constraint.joint_pos),
-            ("joint_vel", &by_constraint.joint_vel),
-        ] {
+        for (name, list) in &by_constraint.constraints {
             lines.extend(list.iter().map(|violation| {
                 format!(
                     "{task:<8} episode {:>5}  {name:<10} first at step {}, in {} steps, by at most {:.4}",
