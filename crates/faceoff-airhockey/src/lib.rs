@@ -71,22 +71,42 @@ pub fn competition() -> Competition {
         violations: vec![
             violation(
                 EE,
-                ["end effector", "end effector out of bounds", "ee"],
+                [
+                    "end effector",
+                    "end effector out of bounds",
+                    "ee",
+                    "End-effector position, metres beyond the bound.",
+                ],
                 EE_POINTS,
             ),
             violation(
                 LINK,
-                ["elbow, wrist", "elbow or wrist too low", "link"],
+                [
+                    "elbow, wrist",
+                    "elbow or wrist too low",
+                    "link",
+                    "Height of elbow and wrist, metres beyond the bound.",
+                ],
                 LINK_POINTS,
             ),
             violation(
                 JOINT_POS,
-                ["joint position", "joint position", "pos"],
+                [
+                    "joint position",
+                    "joint position",
+                    "pos",
+                    "Joint position, rad beyond 95 % of the limit.",
+                ],
                 JOINT_POS_POINTS,
             ),
             violation(
                 JOINT_VEL,
-                ["joint velocity", "joint velocity", "vel"],
+                [
+                    "joint velocity",
+                    "joint velocity",
+                    "vel",
+                    "Joint velocity, rad/s beyond 95 % of the limit.",
+                ],
                 JOINT_VEL_POINTS,
             ),
             ViolationInfo {
@@ -94,7 +114,12 @@ pub fn competition() -> Competition {
                 points: [COMPUTATION_TIME_MIN_POINTS, COMPUTATION_TIME_MAX_POINTS],
                 ..violation(
                     ViolationName::COMPUTATION_TIME,
-                    ["answer time", "answer time", "time"],
+                    [
+                        "answer time",
+                        "answer time",
+                        "time",
+                        "Computation time: the episodes with penalty points for it.",
+                    ],
                     0.0,
                 )
             },
@@ -113,14 +138,19 @@ fn task(task: Task, title: &str, weight: u32, aim: &str) -> TaskInfo {
     }
 }
 
-/// The texts are title, breach and short heading; the heading of columns is the breach.
-fn violation(name: ViolationName, [title, breach, short]: [&str; 3], points: f64) -> ViolationInfo {
+/// The texts are title, breach, short heading and measure; the heading of columns is the breach.
+fn violation(
+    name: ViolationName,
+    [title, breach, short, measure]: [&str; 4],
+    points: f64,
+) -> ViolationInfo {
     ViolationInfo {
         name,
         title: title.to_owned(),
         column: breach.to_owned(),
         breach: breach.to_owned(),
         short: short.to_owned(),
+        measure: measure.to_owned(),
         points: [points, points],
     }
 }

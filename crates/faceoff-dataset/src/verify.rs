@@ -68,6 +68,11 @@ pub fn verify(
     let tasks = competition
         .played_tasks(&manifest.episodes)
         .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
+    if let Some(weights) = &manifest.variation.weights {
+        let checked = weights.in_order(competition.task_names());
+        checked
+            .map_err(|error| DatasetError::Foreign(format!("{MANIFEST_FILE}: weights: {error}")))?;
+    }
     let mut reader = EpisodeReader::open(dataset, tasks.clone())?;
     let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks());
     let arena = Arena::with_ruleset(

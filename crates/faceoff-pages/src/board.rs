@@ -148,7 +148,7 @@ pub(super) async fn by_task(
     let sort = Sort::new(&query, Some(task), &address, &competition)?;
     let info = competition
         .task(task)
-        .ok_or_else(|| Problem::not_found("task"))?;
+        .ok_or_else(|| board::unknown_task(&competition, task))?;
     let visibility = Visibility::load(&app, viewer?).await?;
     let season = SeasonHead::load(&app).await?;
     let mut board = board::query(&app, &visibility, query.board(), Some(task)).await?;

@@ -50,7 +50,6 @@ struct TaskFigures {
 /// Details of a task that are public once the day is released.
 struct TaskDetails {
     steps: u64,
-    /// End effector, elbow and wrist, joint position, joint velocity, answer time.
     /// In the order of the competition's kinds.
     violations: Vec<ViolationFigures>,
     mean_ms: String,

@@ -138,7 +138,8 @@ impl Evaluation {
         for outcome in &outcomes {
             let outcome: EpisodeOutcome = serde_json::from_str(outcome)
                 .map_err(|error| argument_error("outcomes", "outcomes of episodes", error))?;
-            by_task.entry(outcome.task).or_default().push(outcome);
+            let task = parse_task(outcome.task.as_str())?;
+            by_task.entry(task).or_default().push(outcome);
         }
         let result = catch_panic(|| {
             let tasks: TaskMap<TaskResult> = by_task

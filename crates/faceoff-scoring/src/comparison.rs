@@ -212,8 +212,7 @@ impl ComparedEvaluation<'_> {
         }
     }
 
-    /// The weights for a test. The default weights serve for a single task: they are not zero, and their size does not
-    /// matter.
+    /// The weights for a test. For a single task the size of its weight does not matter.
     fn weights_of(&self, task: Option<Task>) -> TaskWeights {
         match task {
             None => self.weights.clone(),
@@ -269,8 +268,8 @@ impl ComparedEvaluation<'_> {
             return Err(NotComparable::Seed);
         }
         a.iter()
-            .zip(b.values())
-            .map(|((task, a), b)| {
+            .filter_map(|(task, a)| Some((task, a, b.get(task)?)))
+            .map(|(task, a, b)| {
                 let (a, b) = (&a.successes, &b.successes);
                 let tally = PairedTally::from_successes(*task, a, b)
                     .map_err(|_| NotComparable::Episodes(*task, a.episodes(), b.episodes()))?;

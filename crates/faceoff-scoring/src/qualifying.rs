@@ -139,12 +139,12 @@ impl<'de> Deserialize<'de> for TaskScores {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidTasks {
     /// A task that the competition does not have.
-    #[error("{team}: {source}")]
+    #[error("{team}: {unknown}")]
     Unknown {
         /// The team in the file.
         team: TeamName,
         /// The task, and those of the competition.
-        source: UnknownTask,
+        unknown: UnknownTask,
     },
     /// A task without results.
     #[error("{team}: task {task} is missing")]
@@ -269,10 +269,10 @@ impl TaskScores {
     fn check(&self, team: &TeamName, tasks: &[Task]) -> Result<(), InvalidTasks> {
         let team = || team.clone();
         if let Some(unknown) = self.0.keys().find(|task| !tasks.contains(task)) {
-            let source = UnknownTask::new(unknown.as_str(), tasks.iter().copied());
+            let unknown = UnknownTask::new(unknown.as_str(), tasks.iter().copied());
             return Err(InvalidTasks::Unknown {
                 team: team(),
-                source,
+                unknown,
             });
         }
         match tasks.iter().find(|task| !self.0.contains_key(*task)) {

@@ -26,9 +26,11 @@ impl ComparedEvaluation<'_> {
     pub fn solved_episodes(&self, other: &Self) -> Result<TaskMap<SolvedEpisodes>, NotComparable> {
         // Checks that the episodes are the same.
         self.compare(other)?;
-        let tasks = self.summary.tasks.iter().zip(other.summary.tasks.values());
+        let others = &other.summary.tasks;
+        let tasks = self.summary.tasks.iter();
+        let tasks = tasks.filter_map(|(task, a)| Some((task, a, others.get(task)?)));
         Ok(tasks
-            .map(|((task, a), b)| {
+            .map(|(task, a, b)| {
                 let mut lists = SolvedEpisodes::default();
                 let solved = a.successes.iter().zip(b.successes.iter());
                 for (episode, solved) in (0..).zip(solved) {

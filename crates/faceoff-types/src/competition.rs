@@ -1,8 +1,8 @@
 //! A competition: what the platform has to know of it in order to run and to show it.
 
 use crate::{
-    EpisodeEnd, InvalidStageRules, Millionths, StageRules, Task, TaskMap, TaskWeights, Variation,
-    ViolationCounts, ViolationName, task_weights::listed,
+    EpisodeEnd, InvalidStageRules, Millionths, StageRules, Task, TaskMap, TaskWeights, UnknownTask,
+    Variation, ViolationCounts, ViolationName,
 };
 
 /// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
@@ -58,6 +58,8 @@ pub struct ViolationInfo {
     pub short: String,
     /// What has happened, such as "end effector out of bounds".
     pub breach: String,
+    /// What its size is in files, such as "metres beyond the bound".
+    pub measure: String,
     /// The least and the most penalty points for it in one episode.
     pub points: [f64; 2],
 }
@@ -95,8 +97,13 @@ impl Competition {
     #[must_use]
     pub fn weights(&self, variation: &Variation) -> TaskWeights {
         let own = || self.tasks.iter().map(|info| (info.task, info.weight));
-        let weights = variation.weights.clone();
-        weights.unwrap_or_else(|| TaskWeights::unchecked(own().collect()))
+        match &variation.weights {
+            // The order in JSON has no meaning.
+            Some(weights) => weights
+                .in_order(self.task_names())
+                .unwrap_or_else(|_| weights.clone()),
+            None => TaskWeights::unchecked(own().collect()),
+        }
     }
 
     /// These counts, and 0 for all other kinds of violations.
@@ -151,26 +158,6 @@ impl Competition {
     #[must_use]
     pub fn task(&self, task: Task) -> Option<&TaskInfo> {
         self.tasks.iter().find(|info| info.task == task)
-    }
-}
-
-/// A name that no task of the competition has.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown task {name:?}: expected {expected}")]
-pub struct UnknownTask {
-    name: String,
-    /// The names of the competition's tasks, in words.
-    expected: String,
-}
-
-impl UnknownTask {
-    /// `expected` are the tasks that there are.
-    #[must_use]
-    pub fn new(name: &str, expected: impl IntoIterator<Item = Task>) -> Self {
-        Self {
-            name: name.to_owned(),
-            expected: listed(expected, "or"),
-        }
     }
 }
 

@@ -51,6 +51,7 @@ mod tier;
 mod timing;
 mod tournament_format;
 mod tournament_rules;
+mod unknown_task;
 mod validation_outcome;
 mod variation;
 mod violation;
@@ -61,7 +62,7 @@ pub use agent_task::{AgentTask, Side};
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
 pub use clock::Clock;
-pub use competition::{Competition, EndInfo, TaskInfo, UnknownTask, ViolationInfo};
+pub use competition::{Competition, EndInfo, TaskInfo, ViolationInfo};
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};
@@ -113,6 +114,7 @@ pub use tournament_format::TournamentFormat;
 pub use tournament_rules::{
     InvalidTournament, MAX_FREE_GAMES, MAX_GAME_STEPS, TournamentRules, TournamentSettings,
 };
+pub use unknown_task::UnknownTask;
 pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use variation::{InvalidTierBounds, TierBounds, Variation};
 pub use violation::{ViolationCounts, ViolationName};

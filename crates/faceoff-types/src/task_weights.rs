@@ -1,13 +1,16 @@
 //! Weights of the tasks' success rates in the overall score.
 
 use crate::{Millionths, Task, TaskMap, millionths::NotMillionths};
-use serde::{Deserialize, Serialize};
+use serde::{
+    Deserialize, Serialize,
+    de::{Deserializer, Error as _, MapAccess, Visitor},
+};
 use std::fmt::{self, Write as _};
 
 /// Weights of the tasks' success rates in the overall score: fractions that sum to 1. Their text is the numbers with commas
 /// between them.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "TaskMap<Millionths>", into = "TaskMap<Millionths>")]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
 pub struct TaskWeights(TaskMap<Millionths>);
 
 /// Invalid weights of tasks.
@@ -125,16 +128,25 @@ impl TaskWeights {
     }
 }
 
-impl TryFrom<TaskMap<Millionths>> for TaskWeights {
-    type Error = InvalidWeights;
-    fn try_from(weights: TaskMap<Millionths>) -> Result<Self, InvalidWeights> {
-        Self::new(weights)
-    }
-}
-
-impl From<TaskWeights> for TaskMap<Millionths> {
-    fn from(weights: TaskWeights) -> Self {
-        weights.0
+impl<'de> Deserialize<'de> for TaskWeights {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Weights;
+        impl<'de> Visitor<'de> for Weights {
+            type Value = TaskWeights;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the weight of each task")
+            }
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<TaskWeights, A::Error> {
+                let mut weights = TaskMap::new();
+                while let Some((task, weight)) = map.next_entry::<Task, Millionths>()? {
+                    if weights.insert(task, weight).is_some() {
+                        return Err(A::Error::custom(format_args!("{task} occurs twice")));
+                    }
+                }
+                TaskWeights::new(weights).map_err(A::Error::custom)
+            }
+        }
+        deserializer.deserialize_map(Weights)
     }
 }
 
@@ -222,6 +234,15 @@ mod tests {
             let error = TaskWeights::parse(wrong, tasks()).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
+    }
+
+    #[test]
+    fn repeated_task_is_refused() {
+        let twice = r#"{"push":0.4,"catch":0.5,"push":0.5}"#;
+        let error = serde_json::from_str::<TaskWeights>(twice)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("push occurs twice"), "{error}");
     }
 
     #[test]

@@ -10,6 +10,7 @@ use std::{fmt, str::FromStr};
 pub struct Variation {
     /// Weights of the tasks' success rates in the overall score; absent: those of the competition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub weights: Option<TaskWeights>,
     /// Largest penalty points per episode of the two better tiers; absent: 0.5 and 1.5.
     #[serde(default, skip_serializing_if = "is_default")]

@@ -53,16 +53,8 @@ pub struct StagePatch {
     #[cfg_attr(feature = "clap", arg(long, help = "Perturbation profile"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
-    /// Tasks in the order in which they run; at least one, without duplicates.
-    #[cfg_attr(
-        feature = "clap",
-        arg(
-            long,
-            value_delimiter = ',',
-            value_name = "TASKS",
-            help = "Tasks, e.g. hit,defend"
-        )
-    )]
+    /// Tasks, at least one, without duplicates. They run in the order of the competition.
+    #[cfg_attr(feature = "clap", arg(skip))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tasks: Option<Vec<Task>>,
     /// Episodes of each task per evaluation.

@@ -11,6 +11,7 @@ use crate::{
     shard_folder::ShardRecording,
 };
 use arrow_array::RecordBatch;
+use faceoff_sim::episode::ends;
 use faceoff_types::EpisodeOutcome;
 use faceoff_wire::job::ShardSpec;
 use std::path::Path;
@@ -44,6 +45,10 @@ pub fn verify_shard(
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
     let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps)?;
     for outcome in outcomes {
+        if !ends::ALL.contains(&outcome.end) {
+            let problem = format!("the report has the unknown end {:?}", outcome.end);
+            return Err(unusable(&problem).into());
+        }
         // One at a time: the steps of a whole shard need not be in memory.
         let batch = reader.next_episodes(1);
         batch.result?;

@@ -1,10 +1,10 @@
-//! Schemas that list the tasks of the competition and how their episodes end.
+//! Schemas that list the tasks of the competition, how their episodes end, and the kinds of violations.
 
 use faceoff_types::{Competition, EpisodeEnd, Task, TaskWeights, ViolationCounts, ViolationName};
 use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
 
-/// Replaces the schemas of tasks, of their weights and of ends by those of the competition.
+/// Replaces the schemas of tasks, of their weights, of ends and of violations by those of the competition.
 pub(super) fn describe(document: &mut Value, competition: &Competition) {
     let names: Vec<&str> = competition
         .tasks
@@ -15,6 +15,7 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         .tasks
         .iter()
         .map(|info| format!("\n- `{}`: {}", info.task, info.aim));
+    name_keys(document);
     let schemas = &mut document["components"]["schemas"];
     schemas[&*Task::name()] = json!({
         "type": "string",
@@ -52,7 +53,7 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
             "ConstraintViolation"
         };
         let mut schema = episodes(of);
-        schema["description"] = info.breach.clone().into();
+        schema["description"] = info.measure.clone().into();
         (info.name.to_string(), schema)
     });
     schemas["TaskViolations"] = json!({
@@ -79,16 +80,35 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
     });
 }
 
+/// Keys of maps by task have the schema of tasks.
+fn name_keys(value: &mut Value) {
+    match value {
+        Value::Object(object) => {
+            if object.contains_key("propertyNames") {
+                let of_tasks = json!({"$ref": format!("#/components/schemas/{}", Task::name())});
+                object.insert("propertyNames".to_owned(), of_tasks);
+            }
+            object.values_mut().for_each(name_keys);
+        }
+        Value::Array(items) => items.iter_mut().for_each(name_keys),
+        _ => {}
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn tasks_of_the_competition_are_the_values() {
-        let mut document = json!({"components": {"schemas": {"Task": {"type": "string"}}}});
+        let by_task = json!({"type": "object", "propertyNames": {"type": "string"}});
+        let mut document =
+            json!({"components": {"schemas": {"Task": {"type": "string"}, "ByTask": by_task}}});
         describe(&mut document, &faceoff_airhockey::competition());
         let schemas = &document["components"]["schemas"];
         assert_eq!(schemas["Task"]["enum"], json!(["hit", "defend", "prepare"]));
+        let keys = &schemas["ByTask"]["propertyNames"];
+        assert_eq!(*keys, json!({"$ref": "#/components/schemas/Task"}));
         let weights = &schemas["TaskWeights"];
         assert_eq!(weights["required"], schemas["Task"]["enum"]);
         assert_eq!(weights["properties"]["prepare"]["example"], 0.2);

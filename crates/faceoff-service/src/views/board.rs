@@ -26,7 +26,7 @@ use faceoff_scoring::{
 use faceoff_store::{BoardRecord, BoardScope, Stage};
 use faceoff_types::{
     Competition, CountingResult, DivisionName, PerturbationSettings, Seed, StageId, Task,
-    TaskWeights,
+    TaskWeights, UnknownTask,
 };
 use jiff::civil::Date;
 use std::sync::Arc;
@@ -68,6 +68,13 @@ pub async fn requested_stage(
     }
 }
 
+/// There is no board of this task.
+#[must_use]
+pub fn unknown_task(competition: &Competition, task: Task) -> Problem {
+    let error = UnknownTask::new(task.as_str(), competition.task_names());
+    Problem::new(ProblemKind::NotFound, error.to_string())
+}
+
 /// The requested board: the overall one, or that of one task.
 #[boxed]
 pub async fn query(
@@ -76,9 +83,9 @@ pub async fn query(
     query: BoardQuery,
     task: Option<Task>,
 ) -> Result<BoardView, Problem> {
-    if let Some(task) = task {
-        let found = app.config.competition.find_task(task.as_str());
-        found.map_err(|error| Problem::new(ProblemKind::NotFound, error.to_string()))?;
+    let competition = &app.config.competition;
+    if let Some(task) = task.filter(|task| competition.task(*task).is_none()) {
+        return Err(unknown_task(competition, task));
     }
     let stage = requested_stage(app, visibility, (query.stage, query.live)).await?;
     let frozen = visibility.frozen(stage.id).cloned();

@@ -4,6 +4,7 @@
 pub(super) mod table;
 
 use super::{output::print, server::ServerArgs, stage_lookup::find_stage};
+use crate::competition::parse_task;
 use clap::{Args, ValueEnum};
 use faceoff_api::requests::{BoardBy, BoardQuery};
 use faceoff_types::{DivisionName, Task};
@@ -13,6 +14,7 @@ use jiff::civil::Date;
 #[derive(Debug, Args)]
 pub struct BoardCommand {
     /// hit, defend or prepare [default: overall]
+    #[arg(value_parser = parse_task)]
     task: Option<Task>,
     /// The stage's name or id [default: the open stage, or the nearest]
     #[arg(long)]

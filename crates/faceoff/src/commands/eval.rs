@@ -130,6 +130,9 @@ impl EvalCommand {
         if self.tasks.is_empty() {
             self.tasks = rules.tasks;
         }
+        for task in &self.tasks {
+            competition().find_task(task.as_str())?;
+        }
         let is_chosen = |task: &Task| self.tasks.contains(task);
         self.tasks = competition().task_names().filter(is_chosen).collect();
         fs::create_dir_all(&self.out)

@@ -1,6 +1,7 @@
 //! Text of an evaluation's status and of its results by task. A *tier* is the class of an agent by its penalty points.
 
 use super::{queue::queue_text, table_cells::percent_interval};
+use crate::competition::competition;
 use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     task::TaskView,
@@ -49,7 +50,11 @@ pub(super) fn task_table(tasks: &TaskMap<TaskView>) -> String {
         "{:<8} {:>8} {:>9} {:>19} {:>8}  tier",
         "task", "episodes", "success", "95 % interval", "penalty"
     )];
-    lines.extend(tasks.iter().map(|(task, result)| {
+    // The order in JSON has no meaning.
+    let tasks = competition()
+        .task_names()
+        .filter_map(|task| Some((task, tasks.get(&task)?)));
+    lines.extend(tasks.map(|(task, result)| {
         format!(
             "{task:<8} {:>8} {:>7.1} % {:>19} {:>8.1}  {}",
             result.episodes,

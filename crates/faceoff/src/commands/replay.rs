@@ -6,6 +6,7 @@ mod recording;
 mod table_view;
 
 use super::output::print;
+use crate::competition::parse_task;
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_types::Task;
@@ -23,7 +24,7 @@ pub struct ReplayCommand {
     /// dataset.zip, the folder it was unpacked to, or the folder of `faceoff eval --out`
     dataset: PathBuf,
     /// The task
-    #[arg(long)]
+    #[arg(long, value_parser = parse_task)]
     task: Task,
     /// The episode, from 0
     #[arg(long, value_name = "N")]

@@ -1,7 +1,7 @@
 //! `faceoff admin stage`: creates, changes and lists the season's *stages*, periods with their own rules, cutoffs and board.
 //! The *ruleset* is the simulator's version, from which a stage's rules may deviate.
 
-use crate::competition::{competition, parse_weights};
+use crate::competition::{competition, parse_task, parse_weights};
 use crate::{
     client::Client,
     commands::{
@@ -18,7 +18,7 @@ use faceoff_api::{
         stage::{PhaseView, StageView},
     },
 };
-use faceoff_types::{PerturbationSettings, Publication, TaskWeights, Zone};
+use faceoff_types::{PerturbationSettings, Publication, Task, TaskWeights, Zone};
 use jiff::{Timestamp, Zoned, civil::DateTime};
 
 #[derive(Debug, Subcommand)]
@@ -80,6 +80,9 @@ pub(super) struct StageOptions {
     /// Closing time [default of a new stage: open end]
     #[arg(long, value_name = "TIME")]
     closes: Option<String>,
+    /// Tasks, e.g. hit,defend
+    #[arg(long, value_name = "TASKS", value_delimiter = ',', value_parser = parse_task)]
+    tasks: Option<Vec<Task>>,
     /// Weights of hit, defend and prepare in the score, e.g. 0.4,0.4,0.2
     #[arg(long, value_name = "WEIGHTS", value_parser = parse_weights)]
     weights: Option<TaskWeights>,
@@ -98,6 +101,7 @@ impl StageOptions {
         Ok(StagePatch {
             opens_at: parse(self.opens)?,
             closes_at: parse(self.closes)?.map(|at| OrNull(Some(at))),
+            tasks: self.tasks,
             weights: self.weights,
             ..self.settings
         })

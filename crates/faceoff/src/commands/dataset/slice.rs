@@ -1,5 +1,6 @@
 //! `faceoff dataset slice`: the control steps of one episode as CSV or JSON lines.
 
+use crate::competition::parse_task;
 use crate::terminal;
 use anyhow::Context;
 use arrow_array::{
@@ -26,7 +27,7 @@ pub struct SliceArgs {
     /// dataset.zip, the folder it was unpacked to, or the folder of `faceoff eval --out`
     dataset: PathBuf,
     /// The task
-    #[arg(long)]
+    #[arg(long, value_parser = parse_task)]
     task: Task,
     /// The episode, from 0
     #[arg(long, value_name = "N")]
