@@ -2,7 +2,7 @@
 
 use faceoff_types::{Competition, EpisodeEnd, Task, TaskWeights, ViolationCounts, ViolationName};
 use serde_json::{Map, Value, json};
-use utoipa::ToSchema;
+use utoipa::{PartialSchema, ToSchema};
 
 /// Replaces the schemas of tasks, of their weights, of ends and of violations by those of the competition.
 pub(super) fn describe(document: &mut Value, competition: &Competition) {
@@ -84,7 +84,9 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
 fn name_keys(value: &mut Value) {
     match value {
         Value::Object(object) => {
-            if object.contains_key("propertyNames") {
+            // The keys of these maps have the schema of tasks before it is replaced.
+            let of_any_task = serde_json::to_value(Task::schema()).ok();
+            if object.get("propertyNames") == of_any_task.as_ref() && of_any_task.is_some() {
                 let of_tasks = json!({"$ref": format!("#/components/schemas/{}", Task::name())});
                 object.insert("propertyNames".to_owned(), of_tasks);
             }
@@ -101,14 +103,18 @@ mod tests {
 
     #[test]
     fn tasks_of_the_competition_are_the_values() {
-        let by_task = json!({"type": "object", "propertyNames": {"type": "string"}});
-        let mut document =
-            json!({"components": {"schemas": {"Task": {"type": "string"}, "ByTask": by_task}}});
+        let by_task = json!({"type": "object", "propertyNames": Task::schema()});
+        let by_name = json!({"type": "object", "propertyNames": {"type": "string"}});
+        let mut document = json!({"components": {"schemas": {"Task": {"type": "string"}, "ByTask": by_task, "ByName": by_name}}});
         describe(&mut document, &faceoff_airhockey::competition());
         let schemas = &document["components"]["schemas"];
         assert_eq!(schemas["Task"]["enum"], json!(["hit", "defend", "prepare"]));
         let keys = &schemas["ByTask"]["propertyNames"];
         assert_eq!(*keys, json!({"$ref": "#/components/schemas/Task"}));
+        assert_eq!(
+            schemas["ByName"]["propertyNames"],
+            json!({"type": "string"})
+        );
         let weights = &schemas["TaskWeights"];
         assert_eq!(weights["required"], schemas["Task"]["enum"]);
         assert_eq!(weights["properties"]["prepare"]["example"], 0.2);
