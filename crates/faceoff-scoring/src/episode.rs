@@ -89,8 +89,9 @@ pub(crate) fn violation_counts<'a>(
     let mut counts: ViolationCounts = names.into_iter().chain([(late, 0)]).collect();
     for (violations, is_late) in episodes {
         let kinds = violations.by_name().into_iter().chain([(late, is_late)]);
-        let violated = kinds.filter(|(_, is_violated)| *is_violated);
-        counts.add(&violated.map(|(name, _)| (name, 1)).collect());
+        for (name, _) in kinds.filter(|(_, is_violated)| *is_violated) {
+            counts.set(name, counts.get(name) + 1);
+        }
     }
     counts
 }

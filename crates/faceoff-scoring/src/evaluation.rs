@@ -26,7 +26,8 @@ pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Tas
 
 /// Scores an evaluation: weighted score, maximum of the tasks' penalty points, worst of their tiers.
 ///
-/// `weights` are those of the tasks under the stage's rules. A missing task counts as 0 in the score. Without any task the score is 0, the penalty 0 and the tier deployable.
+/// `weights` are those of the tasks under the stage's rules. A missing task counts as 0 in the score. Without any task the
+/// score is 0, the penalty 0 and the tier deployable.
 #[must_use]
 pub fn score_evaluation(
     ruleset: Ruleset,
