@@ -1,10 +1,17 @@
 //! The Robot Air Hockey Challenge as a competition of the platform: its tasks, how their episodes end, and its violations.
 
+mod env;
+mod simulator;
+
+pub use simulator::{AirHockey, simulator};
+
+use faceoff_episode::{action_space, recording_columns};
 use faceoff_scoring::{
-    COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, EE_POINTS, JOINT_POS_POINTS,
-    JOINT_VEL_POINTS, LINK_POINTS,
+    COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS,
+    tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},
 };
 use faceoff_sim::AirHockeyTask;
+pub use faceoff_sim::episode::constraints::{EE, JOINT_POS, JOINT_VEL, LINK};
 pub use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
 use faceoff_types::{
     Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths, Task, TaskInfo, ViolationInfo,
@@ -19,15 +26,6 @@ pub const DEFEND: Task = AirHockeyTask::Defend.name();
 pub const PREPARE: Task = AirHockeyTask::Prepare.name();
 /// The tasks in the order of boards.
 pub const TASKS: [Task; 3] = [HIT, DEFEND, PREPARE];
-
-/// End-effector position: over the table and at its height.
-pub const EE: ViolationName = ViolationName::new("ee");
-/// Height of elbow (link 4) and wrist (link 7).
-pub const LINK: ViolationName = ViolationName::new("link");
-/// Joint positions within 95 % of their limits.
-pub const JOINT_POS: ViolationName = ViolationName::new("joint_pos");
-/// Filtered joint velocities within 95 % of their limits.
-pub const JOINT_VEL: ViolationName = ViolationName::new("joint_vel");
 
 /// The description that boards, tables, forms and files are made from.
 #[must_use]
@@ -124,6 +122,8 @@ pub fn competition() -> Competition {
                 )
             },
         ],
+        actions: action_space(),
+        recording: recording_columns(),
     }
 }
 
@@ -158,7 +158,7 @@ fn violation(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_scoring::MAX_EPISODE_PENALTY;
+    use faceoff_scoring::tournament::MAX_EPISODE_PENALTY;
 
     #[test]
     fn weights_and_points_sum_to_those_of_the_rules() {

@@ -3,74 +3,105 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark may panic")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use faceoff_airhockey::{PREPARE, TASKS};
+use faceoff_airhockey::{PREPARE, TASKS, simulator};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
-use faceoff_episode::{AirHockeyStep, AnswerTiming, EpisodeStart, StepRow, StepSink};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_episode::{AnswerTiming, EpisodeStart, StateColumns, StepRow, StepSink, World};
+use faceoff_sim::Interpolation;
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Violations,
 };
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
-use std::{hint::black_box, path::Path};
+use std::{any::Any, hint::black_box, path::Path};
 
 const EPISODES: u32 = 1000;
 const EPISODES_PER_SHARD: u32 = 100;
 /// Control steps of each episode.
 const STEPS: u32 = 230;
 
-/// A number that rarely repeats, like a measurement.
-fn noise(number: f64) -> f64 {
-    (number * 1e3 + 0.37).sin()
+/// A world whose numbers rarely repeat, so that they compress as badly as measurements.
+struct NoisyWorld {
+    /// Observation, state and limits.
+    numbers: Vec<f64>,
+}
+
+/// Numbers of an observation.
+const OBSERVED: usize = 20;
+/// Numbers of a state that are in every row.
+const STATE: usize = 25;
+/// Numbers of a state in episodes with an opponent.
+const OPPONENT: usize = 10;
+
+impl NoisyWorld {
+    fn new() -> Self {
+        let numbers = (0..OBSERVED + STATE + 4).map(|index| f64::from(index as u32));
+        let mut world = Self {
+            numbers: numbers.collect(),
+        };
+        world.step(&[]);
+        world
+    }
+}
+
+impl World for NoisyWorld {
+    fn steps(&self) -> u32 {
+        0
+    }
+    fn observation(&self) -> &[f64] {
+        &self.numbers[..OBSERVED]
+    }
+    fn step(&mut self, _: &[f64]) -> Option<EpisodeEnd> {
+        for number in &mut self.numbers {
+            *number = (*number * 1e3 + 0.37).sin();
+        }
+        None
+    }
+    fn divergence(&self) -> Option<String> {
+        None
+    }
+    fn success(&self) -> bool {
+        false
+    }
+    fn violations(&self) -> Violations {
+        Violations::default()
+    }
+    fn record_state(&self, columns: &mut dyn StateColumns) {
+        columns.put(&self.numbers[OBSERVED..][..STATE]);
+        columns.put_absent(OPPONENT);
+    }
+    fn limits(&self) -> &[f64] {
+        &self.numbers[OBSERVED + STATE..]
+    }
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
 }
 
 /// Records a shard of noise in the folder `out`.
 fn record(spec: &ShardSpec, out: &Path) {
     let folder = ShardFolder::create(out).unwrap();
-    let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let (settings, plant) = (PerturbationSettings::default(), Plant::nominal());
+    let mut recorder = Recorder::create(&folder, spec.task, simulator().competition()).unwrap();
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
-        let seed = spec.seed.episode(spec.task, episode);
-        let (cubic, factors) = (Interpolation::Cubic, spec.profile.factors());
-        let simulation = Episode::new(
-            spec.task.try_into().unwrap(),
-            cubic,
-            factors,
-            &settings,
-            &plant,
-            seed,
-        );
-        let (mut state, mut observation) = (simulation.state(), simulation.observation().to_vec());
+        let mut world = NoisyWorld::new();
         recorder.begin(EpisodeStart {
             episode,
-            seed,
-            choice: Some(Interpolation::Cubic),
-            state: &state,
+            seed: spec.seed.episode(spec.task, episode),
+            layout: Some(Interpolation::Cubic.into()),
+            world: &world,
         });
         for step in 0..STEPS {
-            observation
-                .iter_mut()
-                .for_each(|number| *number = noise(*number));
-            recorder.observe(&observation);
-            state.puck = state.puck.map(noise);
-            state.q = state.q.map(noise);
-            state.dq = state.dq.map(noise);
-            state.ee = state.ee.map(noise);
+            recorder.observe(world.observation());
+            world.step(&[]);
             recorder.step(&StepRow {
                 step,
-                action: &[state.q, state.dq].concat(),
+                action: &world.numbers[..14],
                 timing: AnswerTiming {
                     computation_time_s: 1e-3,
                     host_time_s: 0.0,
                     cpu_time_s: Some(5e-4),
                 },
-                next_observation: &observation,
-                world: AirHockeyStep {
-                    state: &state,
-                    constraints: Default::default(),
-                    puck_lost: false,
-                    impacts: &[],
-                },
+                next_observation: world.observation(),
+                world: &world,
             });
         }
         let outcome = EpisodeOutcome {
@@ -93,7 +124,7 @@ fn record(spec: &ShardSpec, out: &Path) {
         stopped_by_faults: false,
         timing: Default::default(),
     };
-    folder.commit(spec, &report).unwrap();
+    folder.commit(spec, &report, simulator().as_ref()).unwrap();
 }
 
 fn slice(criterion: &mut Criterion) {
@@ -128,13 +159,13 @@ fn slice(criterion: &mut Criterion) {
         task_weights: faceoff_airhockey::competition().weights(&Default::default()),
     };
     let archive = dir.path().join("dataset.zip");
-    let megabytes = assemble(&meta, &shards, &archive, None)
+    let megabytes = assemble(&meta, &shards, &archive, None, simulator().as_ref())
         .unwrap()
         .archive
         .bytes
         / 1_000_000;
     let read = |columns: Option<&[String]>| {
-        let dataset = Dataset::open_lazily(&archive).unwrap();
+        let dataset = Dataset::open_lazily(&archive, simulator().competition()).unwrap();
         dataset.episode(PREPARE, 777, columns).unwrap()
     };
     let mut group = criterion.benchmark_group(format!("an episode of {megabytes} MB"));

@@ -10,20 +10,24 @@ use crate::{
         CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE,
         VIOLATIONS_FILE,
     },
-    score::{ScoredEvaluation, Tally, score},
+    score::{ScoreRules, ScoredEvaluation, Tally, score},
     shard_folder::ShardRecording,
     simulator::simulator_id,
     table::{ShardTable, join},
 };
-use faceoff_types::{EvaluationResult, Task, TaskMap};
+use faceoff_episode::Simulator;
+use faceoff_types::{Competition, EvaluationResult, Task, TaskMap};
 use faceoff_wire::{
-    dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration},
+    dataset::{
+        CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration, SimulatorId,
+    },
     job::EvaluationMeta,
 };
 use fs_err as fs;
 use std::{
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 /// The result of assembling a dataset.
@@ -53,33 +57,47 @@ pub fn assemble(
     shard_dirs: &[PathBuf],
     archive: &Path,
     clips: Option<&Path>,
+    simulator: &dyn Simulator,
 ) -> Result<AssembledDataset, RecordingError> {
     let mut shards = shard_dirs
         .iter()
-        .map(|dir| ShardRecording::open(dir))
+        .map(|dir| ShardRecording::open(dir, simulator))
         .collect::<Result<Vec<_>, _>>()?;
     let order = |task: Task| meta.task_weights.tasks().position(|other| other == task);
     shards.sort_by_key(|shard| (order(shard.spec.task), shard.spec.episodes.start));
     let episodes = check_shards(meta, &shards)?;
     let calibration = calibration(&shards);
+    let competition = simulator.competition();
+    let rules = ScoreRules {
+        competition,
+        ruleset: meta.ruleset,
+        profile: meta.profile,
+        variation: &meta.variation,
+        weights: &meta.task_weights,
+        seed: meta.seed,
+        layout: Layout::Four,
+    };
     let scored = score(
-        meta.ruleset,
-        meta.profile,
-        &meta.variation,
-        &meta.task_weights,
-        meta.seed,
-        Layout::Four,
-        tally_tasks(&shards)?,
+        &rules,
+        tally_tasks(&shards, competition)?,
         calibration.worst(),
     );
 
     let partial = archive.with_extension("zip.partial");
-    let written = write_archive(meta, &shards, episodes, &scored, &calibration, &partial)
-        .and_then(|()| Ok(digest::of_file(&partial)?))
-        .and_then(|digest| {
-            fs::rename(&partial, archive)?;
-            Ok(digest)
-        });
+    let written = write_archive(
+        meta,
+        &shards,
+        episodes,
+        &scored,
+        &calibration,
+        simulator_id(simulator),
+        &partial,
+    )
+    .and_then(|()| Ok(digest::of_file(&partial)?))
+    .and_then(|digest| {
+        fs::rename(&partial, archive)?;
+        Ok(digest)
+    });
     match written {
         Ok(archive) => Ok(AssembledDataset {
             result: scored.result,
@@ -120,6 +138,7 @@ fn write_archive(
     episodes: TaskMap<u32>,
     ScoredEvaluation { result, violations }: &ScoredEvaluation,
     calibration: &CalibrationFile,
+    simulator: SimulatorId,
     path: &Path,
 ) -> Result<(), RecordingError> {
     let temporary_dir = match path.parent() {
@@ -143,7 +162,7 @@ fn write_archive(
     let manifest = DatasetManifest {
         schema: DATASET_SCHEMA.to_owned(),
         ruleset: meta.ruleset.to_string(),
-        simulator: simulator_id().clone(),
+        simulator,
         profile: meta.profile,
         variation: meta.variation.clone(),
         seed: meta.seed,
@@ -229,7 +248,10 @@ fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
 }
 
 /// The numbers for the score of each task, from the outcomes and steps of all shards, which are in order.
-fn tally_tasks(shards: &[ShardRecording]) -> Result<TaskMap<Tally>, RecordingError> {
+fn tally_tasks(
+    shards: &[ShardRecording],
+    competition: &Arc<Competition>,
+) -> Result<TaskMap<Tally>, RecordingError> {
     let mut steps: TaskMap<u64> = TaskMap::new();
     for ShardRecording { spec, report, .. } in shards {
         let outcomes = report.outcomes.iter();
@@ -239,14 +261,14 @@ fn tally_tasks(shards: &[ShardRecording]) -> Result<TaskMap<Tally>, RecordingErr
     }
     let mut tallies: TaskMap<Tally> = steps
         .iter()
-        .map(|(task, steps)| (*task, Tally::new(*steps, Layout::Four)))
+        .map(|(task, steps)| (*task, Tally::new(*steps, Layout::Four, competition)))
         .collect();
     for shard in shards {
         if let Some(tally) = tallies.get_mut(&shard.spec.task) {
             for outcome in &shard.report.outcomes {
                 tally.add_episode(outcome.clone());
             }
-            tally.add_table(shard.steps.path())?;
+            tally.add_table(shard.steps.path(), competition)?;
         }
     }
     for (task, tally) in &tallies {

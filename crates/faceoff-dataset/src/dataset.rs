@@ -30,7 +30,7 @@ use crate::{
     table::HOST_TIME,
 };
 use arrow_array::RecordBatch;
-use faceoff_types::{EvaluationResult, Task};
+use faceoff_types::{Competition, EvaluationResult, Task};
 use faceoff_wire::dataset::{CalibrationFile, DatasetManifest, FileDigest, ViolationsFile};
 use fs_err as fs;
 use serde::Deserialize;
@@ -38,6 +38,7 @@ use std::{
     collections::BTreeSet,
     io,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 /// All files of a dataset except its manifest.
@@ -58,6 +59,7 @@ pub struct Dataset {
     layout: Layout,
     manifest: DatasetManifest,
     hash_check: HashCheck,
+    competition: Arc<Competition>,
 }
 
 /// When the dataset's files are compared with their hashes.
@@ -76,13 +78,13 @@ struct ManifestSchema {
 }
 
 impl Dataset {
-    /// Opens `dataset.zip`, an unpacked folder, or a folder with a `dataset.zip`, and compares every
+    /// Opens a dataset of this competition: `dataset.zip`, an unpacked folder, or a folder with a `dataset.zip`, and compares every
     /// file with its hash, so that a damaged or truncated dataset is never partly read.
     ///
     /// # Errors
     /// [`DatasetError`].
-    pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        let mut dataset = Self::open_lazily(path)?;
+    pub fn open(path: &Path, competition: &Arc<Competition>) -> Result<Self, DatasetError> {
+        let mut dataset = Self::open_lazily(path, competition)?;
         if dataset.layout == Layout::Two {
             dataset.container.check_seal()?;
         }
@@ -96,7 +98,7 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError`].
-    pub fn open_lazily(path: &Path) -> Result<Self, DatasetError> {
+    pub fn open_lazily(path: &Path, competition: &Arc<Competition>) -> Result<Self, DatasetError> {
         let (path, container) = if !fs::metadata(path)?.is_dir() {
             (path.to_owned(), Container::archive(path)?)
         } else if path.join(MANIFEST_FILE).exists() {
@@ -127,6 +129,7 @@ impl Dataset {
             layout,
             manifest,
             hash_check: HashCheck::OnRead,
+            competition: competition.clone(),
         })
     }
 
@@ -186,7 +189,7 @@ impl Dataset {
     /// [`DatasetError::Unreadable`] if `episodes.parquet` is not a table of episodes, or does not have the number of
     /// episodes in the manifest.
     pub fn episodes(&self) -> Result<Vec<EpisodeRecord>, DatasetError> {
-        let records = episodes::records(&self.episode_batches()?)?;
+        let records = episodes::records(&self.episode_batches()?, &self.competition)?;
         for (task, expected) in &self.manifest.episodes {
             let found = records.iter().filter(|record| record.outcome.task == *task);
             let found = found.count();
@@ -202,7 +205,7 @@ impl Dataset {
 
     /// The table of episodes as Arrow batches.
     pub(crate) fn episode_batches(&self) -> Result<Vec<RecordBatch>, DatasetError> {
-        episodes::batches(self.table(EPISODES_FILE)?)
+        episodes::batches(self.table(EPISODES_FILE)?, &self.competition)
     }
 
     /// The table of control steps.
@@ -210,7 +213,7 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError::Unreadable`] if `steps.parquet` is not a table of control steps.
     pub fn steps(&self) -> Result<StepTable, DatasetError> {
-        let table = StepTable::open(self.table(STEPS_FILE)?)?;
+        let table = StepTable::open(self.table(STEPS_FILE)?, &self.competition)?;
         if self.layout == Layout::Four && !table.has_host_time() {
             return Err(DatasetError::Unreadable(format!(
                 "{STEPS_FILE} has no column {HOST_TIME}"
@@ -244,7 +247,8 @@ impl Dataset {
             }
             Some(_) => {}
         }
-        random_access::episode(self.range(STEPS_FILE)?, task, episode, columns)
+        let range = self.range(STEPS_FILE)?;
+        random_access::episode(range, task, episode, columns, &self.competition)
     }
 
     /// A small file's bytes.

@@ -13,15 +13,14 @@
 )]
 
 mod archive_writer;
-mod arena;
 mod assemble;
+mod conditions;
 mod dataset;
 mod digest;
 mod error;
 mod files;
 pub mod game;
 mod granted_files;
-mod interpolation_text;
 mod recorder;
 mod score;
 mod shard;
@@ -31,8 +30,8 @@ mod table;
 mod times;
 pub mod verify;
 
-pub use arena::{game_arena, shard_arena};
 pub use assemble::{AssembledDataset, assemble};
+pub use conditions::{game_arena, shard_conditions};
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
 pub use files::{ARCHIVE_FILE, CLIPS_FILE, allow_missing};

@@ -7,11 +7,11 @@ use crate::{
     shard_folder::ShardFolder,
     table::{EpisodeRows, StepRows, TableWriter},
 };
-use faceoff_episode::{AirHockeyWorld, EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_replay::ClipRecorder;
-use faceoff_types::{EpisodeOutcome, Task};
+use faceoff_types::{Competition, EpisodeOutcome, Task};
 use fs_err::File;
-use std::io::BufWriter;
+use std::{io::BufWriter, sync::Arc};
 
 /// Writes both tables and the clips of a shard while it is played. Memory is bounded by one episode and one row
 /// group.
@@ -31,8 +31,13 @@ impl Recorder {
     ///
     /// # Errors
     /// [`RecordingError::Io`].
-    pub fn create(folder: &ShardFolder, task: Task) -> Result<Self, RecordingError> {
-        let (steps, episodes) = (StepRows::new(task), EpisodeRows::new());
+    pub fn create(
+        folder: &ShardFolder,
+        task: Task,
+        competition: &Arc<Competition>,
+    ) -> Result<Self, RecordingError> {
+        let steps = StepRows::new(task, &competition.recording);
+        let episodes = EpisodeRows::new(competition);
         let clips = File::create(folder.partial(CLIPS_FILE))?;
         Ok(Self {
             steps_file: TableWriter::create(&folder.partial(STEPS_FILE), steps.schema())?,
@@ -80,8 +85,8 @@ impl std::fmt::Debug for Recorder {
     }
 }
 
-impl StepSink<AirHockeyWorld> for Recorder {
-    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
+impl StepSink for Recorder {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
         self.steps.begin(start.episode);
         self.episodes.begin(&start);
         self.clips.begin(start);
@@ -92,7 +97,7 @@ impl StepSink<AirHockeyWorld> for Recorder {
         self.clips.observe(observation);
     }
 
-    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
+    fn step(&mut self, row: &StepRow<'_>) {
         self.steps.push(row);
         self.episodes.step(row);
         self.clips.step(row);

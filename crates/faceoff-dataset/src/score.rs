@@ -3,7 +3,7 @@
 use crate::{
     dataset::{FileRange, Layout, StepTable},
     error::{DatasetError, RecordingError},
-    table::{CONSTRAINTS, HOST_TIME},
+    table::{HOST_TIME, constraint_columns},
     times::seconds,
 };
 use arrow_array::{
@@ -14,21 +14,21 @@ use arrow_array::{
 use faceoff_episode::AnswerTiming;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed,
-    SlotTiming, TaskMap, TaskWeights, Variation, Violations,
+    Competition, ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset,
+    Seed, SlotTiming, TaskMap, TaskWeights, Variation, ViolationName,
 };
 use faceoff_wire::dataset::{
     ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
 };
 use serde::Serialize;
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 /// Data of one answered step for scoring.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct StepMeasurement {
     pub timing: AnswerTiming,
-    /// How far each constraint is exceeded: joint position, joint velocity, end effector, link height. Violated if above 0.
-    pub constraints: [f64; 4],
+    /// How far each limit is exceeded, in the order of the recording's columns. Violated if above 0.
+    pub limits: Vec<f64>,
 }
 
 /// Collects the data of a task for scoring, in order of play.
@@ -36,8 +36,8 @@ pub(crate) struct StepMeasurement {
 pub(crate) struct Tally {
     outcomes: Vec<EpisodeOutcome>,
     times: Times,
-    /// Violations of each constraint, in the order of [`StepMeasurement::constraints`].
-    violations: [Vec<ConstraintViolation>; 4],
+    /// The violations of each limit, in the order of the recording's columns.
+    violations: Vec<(ViolationName, Vec<ConstraintViolation>)>,
     /// By number of episode: computation time (s) and step of the slowest answer. `None` for layouts that do not record
     /// host interference, the time that other programs on the evaluator's machine took.
     slowest: Option<BTreeMap<u32, (f64, SlowStep)>>,
@@ -53,14 +53,15 @@ enum Times {
 
 impl Tally {
     /// A tally of a task whose episodes have `steps` steps in total.
-    pub fn new(steps: u64, layout: Layout) -> Self {
+    pub fn new(steps: u64, layout: Layout, competition: &Competition) -> Self {
+        let limits = competition.recording.limits.iter();
         Self {
             outcomes: Vec::new(),
             times: match layout {
                 Layout::Two => Times::Ascending(Vec::new()),
                 Layout::Three | Layout::Four => Times::PlayOrder(StepTimes::for_steps(steps)),
             },
-            violations: Default::default(),
+            violations: limits.map(|name| (*name, Vec::new())).collect(),
             slowest: (layout == Layout::Four).then(BTreeMap::new),
         }
     }
@@ -69,12 +70,12 @@ impl Tally {
         self.outcomes.push(outcome);
     }
 
-    pub fn add_step(&mut self, episode: u32, step: u32, measured: &StepMeasurement) {
+    pub fn add_step(&mut self, episode: u32, step: u32, timing: AnswerTiming, limits: &[f64]) {
         let AnswerTiming {
             computation_time_s,
             host_time_s,
             cpu_time_s,
-        } = measured.timing;
+        } = timing;
         match &mut self.times {
             Times::PlayOrder(times) => times.add(computation_time_s),
             Times::Ascending(times) => times.push(computation_time_s),
@@ -92,7 +93,7 @@ impl Tally {
             };
             slowest.insert(episode, (computation_time_s, slow));
         }
-        for (violations, value) in self.violations.iter_mut().zip(measured.constraints) {
+        for ((_, violations), &value) in self.violations.iter_mut().zip(limits) {
             if value.is_nan() || value <= 0.0 {
                 continue;
             }
@@ -112,7 +113,12 @@ impl Tally {
     }
 
     /// Adds the steps of a shard's table.
-    pub fn add_table(&mut self, path: &Path) -> Result<(), RecordingError> {
+    pub fn add_table(
+        &mut self,
+        path: &Path,
+        competition: &Arc<Competition>,
+    ) -> Result<(), RecordingError> {
+        let constraints = constraint_columns(&competition.recording);
         let names = [
             "episode",
             "step",
@@ -121,38 +127,44 @@ impl Tally {
             "cpu_time_ns",
         ]
         .into_iter();
-        let names: Vec<String> = names.chain(CONSTRAINTS).map(str::to_owned).collect();
+        let names: Vec<String> = names
+            .map(str::to_owned)
+            .chain(constraints.iter().cloned())
+            .collect();
         let recording_error = |error: DatasetError| match error {
             DatasetError::Io(error) => RecordingError::Io(error),
             other => RecordingError::unusable(path.display())(other),
         };
         let range = FileRange::whole(path).map_err(recording_error)?;
-        let table = StepTable::open(range).map_err(recording_error)?;
+        let table = StepTable::open(range, competition).map_err(recording_error)?;
         let mut batches = table.read(Some(&names)).map_err(recording_error)?;
         while let Some(batch) = batches.next_batch().map_err(recording_error)? {
-            self.add_batch(&batch);
+            self.add_batch(&batch, &constraints);
         }
         Ok(())
     }
 
-    fn add_batch(&mut self, batch: &RecordBatch) {
+    fn add_batch(&mut self, batch: &RecordBatch, constraints: &[String]) {
         let episodes = batch["episode"].as_primitive::<UInt32Type>();
         let steps = batch["step"].as_primitive::<UInt32Type>();
         let [times, host_times, cpu_times] = ["computation_time_ns", HOST_TIME, "cpu_time_ns"]
             .map(|name| batch[name].as_primitive::<Int64Type>());
-        let constraints = CONSTRAINTS.map(|name| batch[name].as_primitive::<Float64Type>());
+        let constraints: Vec<_> = constraints
+            .iter()
+            .map(|name| batch[name.as_str()].as_primitive::<Float64Type>())
+            .collect();
+        let mut limits = Vec::with_capacity(constraints.len());
         for row in 0..batch.num_rows() {
-            let measured = StepMeasurement {
-                timing: AnswerTiming {
-                    computation_time_s: seconds(times.value(row)),
-                    host_time_s: seconds(host_times.value(row)),
-                    cpu_time_s: cpu_times
-                        .is_valid(row)
-                        .then(|| seconds(cpu_times.value(row))),
-                },
-                constraints: constraints.map(|column| column.value(row)),
+            let timing = AnswerTiming {
+                computation_time_s: seconds(times.value(row)),
+                host_time_s: seconds(host_times.value(row)),
+                cpu_time_s: cpu_times
+                    .is_valid(row)
+                    .then(|| seconds(cpu_times.value(row))),
             };
-            self.add_step(episodes.value(row), steps.value(row), &measured);
+            limits.clear();
+            limits.extend(constraints.iter().map(|column| column.value(row)));
+            self.add_step(episodes.value(row), steps.value(row), timing, &limits);
         }
     }
 
@@ -184,21 +196,33 @@ pub(crate) struct ScoredEvaluation {
     pub violations: ViolationsFile,
 }
 
-/// Scores an evaluation; `layout` is the one that `violations.json` names.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the rules of a score, one by one: a dataset and an evaluation have them in different places"
-)]
+/// The rules of a score: a dataset and an evaluation have them in different places.
+pub(crate) struct ScoreRules<'a> {
+    pub competition: &'a Competition,
+    pub ruleset: Ruleset,
+    pub profile: Profile,
+    pub variation: &'a Variation,
+    pub weights: &'a TaskWeights,
+    pub seed: Seed,
+    /// The layout that `violations.json` names.
+    pub layout: Layout,
+}
+
+/// Scores an evaluation.
 pub(crate) fn score(
-    ruleset: Ruleset,
-    profile: Profile,
-    variation: &Variation,
-    weights: &TaskWeights,
-    seed: Seed,
-    layout: Layout,
+    rules: &ScoreRules<'_>,
     tallies: TaskMap<Tally>,
     timing: Option<SlotTiming>,
 ) -> ScoredEvaluation {
+    let ScoreRules {
+        competition,
+        ruleset,
+        profile,
+        variation,
+        weights,
+        seed,
+        layout,
+    } = *rules;
     let mut tasks = TaskMap::new();
     let mut violations = ViolationsFile {
         schema: layout.schema().to_owned(),
@@ -206,23 +230,33 @@ pub(crate) fn score(
     };
     for (task, tally) in tallies {
         let times = tally.times.finish();
-        let result = faceoff_scoring::score_task(&tally.outcomes, &times, &variation.tier_bounds);
+        let result = faceoff_scoring::score_task(
+            competition,
+            &tally.outcomes,
+            &times,
+            &variation.tier_bounds,
+        );
         tasks.insert(task, result);
-        let [joint_pos, joint_vel, ee, link] = tally.violations;
-        let names = Violations::default().by_name().map(|(name, _)| name);
+        let mut found = tally.violations;
+        let mut constraints_of = |name: ViolationName| {
+            let index = found.iter().position(|(other, _)| *other == name);
+            (
+                name,
+                index.map_or_else(Vec::new, |index| found.swap_remove(index).1),
+            )
+        };
+        let constraints = competition.world_violations().map(&mut constraints_of);
+        let constraints = constraints.collect();
         let slowest = tally.slowest.unwrap_or_default();
         let computation_time = tally
             .outcomes
             .iter()
-            .filter_map(|outcome| slow_episode(outcome, &slowest))
+            .filter_map(|outcome| slow_episode(competition, outcome, &slowest))
             .collect();
         violations.tasks.insert(
             task,
             TaskViolations {
-                constraints: names
-                    .into_iter()
-                    .zip([ee, link, joint_pos, joint_vel])
-                    .collect(),
+                constraints,
                 computation_time,
             },
         );
@@ -242,6 +276,7 @@ pub(crate) fn json_file<T: Serialize>(value: &T) -> serde_json::Result<Vec<u8>> 
 
 /// The episode as `violations.json` lists it, if it has penalty points for computation time.
 fn slow_episode(
+    competition: &Competition,
     outcome: &EpisodeOutcome,
     slowest: &BTreeMap<u32, (f64, SlowStep)>,
 ) -> Option<SlowEpisode> {
@@ -252,8 +287,8 @@ fn slow_episode(
         fault: None,
         ..outcome.clone()
     };
-    let points =
-        faceoff_scoring::episode_penalty(outcome) - faceoff_scoring::episode_penalty(&instant);
+    let points = faceoff_scoring::episode_penalty(competition, outcome)
+        - faceoff_scoring::episode_penalty(competition, &instant);
     let ComputationTime { mean_s, max_s } = outcome.computation_time;
     (points > 0.0).then_some(SlowEpisode {
         episode: outcome.episode,

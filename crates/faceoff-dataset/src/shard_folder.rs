@@ -9,6 +9,7 @@ use crate::{
     simulator::simulator_id,
     table::ShardTable,
 };
+use faceoff_episode::Simulator;
 use faceoff_types::Ruleset;
 use faceoff_wire::{
     dataset::{FileDigest, SimulatorId},
@@ -90,7 +91,12 @@ impl ShardFolder {
     ///
     /// # Errors
     /// [`RecordingError::Io`].
-    pub fn commit(&self, spec: &ShardSpec, report: &ShardReport) -> Result<(), RecordingError> {
+    pub fn commit(
+        &self,
+        spec: &ShardSpec,
+        report: &ShardReport,
+        simulator: &dyn Simulator,
+    ) -> Result<(), RecordingError> {
         self.write(LOG_FILE, report.log.as_bytes())?;
         self.write(REPORT_FILE, &json(report)?)?;
         let mut files = BTreeMap::new();
@@ -101,7 +107,7 @@ impl ShardFolder {
         let shard = ShardFile {
             schema: SHARD_SCHEMA.to_owned(),
             ruleset: spec.ruleset,
-            simulator: simulator_id().clone(),
+            simulator: simulator_id(simulator),
             spec: spec.clone(),
             files,
         };
@@ -139,7 +145,7 @@ pub(crate) struct ShardRecording {
 
 impl ShardRecording {
     /// Opens a folder and checks every file's size and hash.
-    pub fn open(dir: &Path) -> Result<Self, RecordingError> {
+    pub fn open(dir: &Path, simulator: &dyn Simulator) -> Result<Self, RecordingError> {
         let damaged = |problem: String| {
             RecordingError::Unusable(format!(
                 "{} is damaged or incomplete: {problem}",
@@ -172,7 +178,7 @@ impl ShardRecording {
                 shard.ruleset, shard.spec.ruleset
             )));
         }
-        if &shard.simulator != simulator_id() {
+        if shard.simulator != simulator_id(simulator) {
             return Err(damaged(format!(
                 "it was played by another build of the simulator, {}",
                 shard.simulator.version

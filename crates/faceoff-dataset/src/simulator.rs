@@ -1,22 +1,25 @@
 //! Identity of the simulator: a dataset can only be verified with the simulator that made it.
 
-use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, EpisodeState, Interpolation, JOINTS, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed};
+use faceoff_episode::Simulator;
+use faceoff_sim::{PerturbationSettings, Plant};
+use faceoff_types::Seed;
 use faceoff_wire::dataset::SimulatorId;
-use std::sync::OnceLock;
 
-/// Control steps of each episode of the fingerprint: enough for contacts of the puck with rim and mallet.
-const STEPS: u32 = 60;
+/// Version and fingerprint of a simulator in this program.
+pub(crate) fn simulator_id(simulator: &dyn Simulator) -> SimulatorId {
+    id(simulator.fingerprint())
+}
 
-/// Version and fingerprint of this simulator. The fingerprint is a hash of the motion in a short episode of each task with
-/// all perturbations.
-pub(crate) fn simulator_id() -> &'static SimulatorId {
-    static ID: OnceLock<SimulatorId> = OnceLock::new();
-    ID.get_or_init(|| SimulatorId {
+/// Version and fingerprint of the simulator of games.
+pub(crate) fn game_simulator_id() -> SimulatorId {
+    id(faceoff_sim::fingerprint())
+}
+
+fn id(fingerprint: &str) -> SimulatorId {
+    SimulatorId {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        fingerprint: fingerprint(),
-    })
+        fingerprint: fingerprint.to_owned(),
+    }
 }
 
 /// Can a plant (the simulated robot and table) be drawn within these magnitudes of the perturbations? See
@@ -24,62 +27,4 @@ pub(crate) fn simulator_id() -> &'static SimulatorId {
 #[must_use]
 pub fn can_draw_plant(settings: &PerturbationSettings, mismatch_seed: Seed) -> bool {
     Plant::can_be_drawn(settings, mismatch_seed)
-}
-
-fn fingerprint() -> String {
-    let mut hasher = blake3::Hasher::new();
-    let seed = Seed::from_number(0);
-    let settings = PerturbationSettings::default();
-    let plant = Plant::mismatched(&settings, seed.model_mismatch());
-    for task in AirHockeyTask::ALL {
-        let mut episode = Episode::new(
-            task,
-            Interpolation::Cubic,
-            Profile::Evaluation.factors(),
-            &settings,
-            &plant,
-            seed.episode(task, 0),
-        );
-        let initial_joints = episode.state().q;
-        for step in 0..STEPS {
-            add(&mut hasher, episode.observation());
-            let mut action = [0.0; 2 * JOINTS];
-            action[..JOINTS].copy_from_slice(&initial_joints);
-            // A slow swing of the base joint, so that the fingerprint covers the arm's dynamics.
-            action[0] += 0.005 * f64::from(step);
-            let outcome = episode.step(&action);
-            let constraints = outcome.constraints;
-            add(
-                &mut hasher,
-                &[
-                    constraints.joint_pos,
-                    constraints.joint_vel,
-                    constraints.ee,
-                    constraints.link,
-                ],
-            );
-            add_state(&mut hasher, &episode.state());
-            if outcome.end.is_some() {
-                break;
-            }
-        }
-    }
-    hasher.finalize().to_hex().to_string()
-}
-
-fn add(hasher: &mut blake3::Hasher, numbers: &[f64]) {
-    for number in numbers {
-        hasher.update(&number.to_le_bytes());
-    }
-}
-
-fn add_state(hasher: &mut blake3::Hasher, state: &EpisodeState) {
-    add(hasher, &state.puck);
-    add(hasher, &state.q);
-    add(hasher, &state.dq);
-    add(hasher, &state.dq_filtered);
-    add(hasher, &state.universal);
-    add(hasher, &state.ee);
-    add(hasher, state.opponent_q.as_ref().map_or(&[], |q| q));
-    add(hasher, state.opponent_ee.as_ref().map_or(&[], |ee| ee));
 }

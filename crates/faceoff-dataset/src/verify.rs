@@ -23,14 +23,12 @@ use crate::{
     dataset::Dataset,
     error::DatasetError,
     files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, VIOLATIONS_FILE},
-    score::{ScoredEvaluation, Tally, json_file, score},
+    score::{ScoreRules, ScoredEvaluation, Tally, json_file, score},
     simulator::simulator_id,
 };
 use episode_reader::{EpisodeReader, RecordedEpisode};
-use faceoff_episode::Arena;
-use faceoff_types::{
-    Competition, EvaluationResult, Ruleset, Task, TaskMap, TaskWeights, UnknownRuleset,
-};
+use faceoff_episode::{Conditions, Simulator};
+use faceoff_types::{Competition, EvaluationResult, Ruleset, Task, TaskMap, UnknownRuleset};
 use rayon::{
     ThreadPoolBuilder,
     iter::{IntoParallelRefIterator, ParallelIterator},
@@ -59,12 +57,13 @@ pub struct VerifiedDataset {
 /// cannot be verified.
 pub fn verify(
     dataset: &Dataset,
-    competition: &Competition,
+    simulator: &dyn Simulator,
     workers: NonZero<usize>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<VerifiedDataset, VerifyError> {
-    let ruleset = check_reproducible(dataset)?;
+    let ruleset = check_reproducible(dataset, simulator)?;
     let manifest = dataset.manifest();
+    let competition = simulator.competition();
     let tasks = competition
         .played_tasks(&manifest.episodes)
         .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
@@ -73,16 +72,16 @@ pub fn verify(
         checked
             .map_err(|error| DatasetError::Foreign(format!("{MANIFEST_FILE}: weights: {error}")))?;
     }
-    let mut reader = EpisodeReader::open(dataset, tasks.clone())?;
-    let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks());
-    let arena = Arena::with_ruleset(
+    let mut reader = EpisodeReader::open(dataset, tasks.clone(), competition)?;
+    let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks(), competition);
+    let environment = simulator.environment(&Conditions {
         ruleset,
-        manifest.profile,
-        &manifest.variation.perturbations,
-        manifest.seed,
-        manifest.mismatch_seed,
-    );
-    let replayer = Replayer::new(ruleset, arena);
+        profile: manifest.profile,
+        perturbations: &manifest.variation.perturbations,
+        seed: manifest.seed,
+        mismatch_seed: manifest.mismatch_seed,
+    });
+    let replayer = Replayer::new(ruleset, environment, competition);
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
         .thread_name(|index| format!("verify-{index}"))
@@ -112,16 +111,15 @@ pub fn verify(
         }
         batch.result
     })?;
-    totals.finish(
-        ruleset,
-        dataset,
-        &competition.weights(&dataset.manifest().variation),
-    )
+    totals.finish(ruleset, dataset, competition)
 }
 
 /// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
-fn check_reproducible(dataset: &Dataset) -> Result<Ruleset, DatasetError> {
-    let (manifest, current) = (dataset.manifest(), simulator_id());
+fn check_reproducible(
+    dataset: &Dataset,
+    simulator: &dyn Simulator,
+) -> Result<Ruleset, DatasetError> {
+    let (manifest, current) = (dataset.manifest(), simulator_id(simulator));
     let ruleset = manifest
         .ruleset
         .parse()
@@ -131,7 +129,7 @@ fn check_reproducible(dataset: &Dataset) -> Result<Ruleset, DatasetError> {
         .perturbations
         .check()
         .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
-    if &manifest.simulator != current {
+    if manifest.simulator != current {
         return Err(DatasetError::Foreign(format!(
             "the dataset was simulated by version {} (fingerprint {}), this is version {} \
              (fingerprint {}): verify it with the version that made it",
@@ -153,10 +151,15 @@ struct Totals {
 }
 
 impl Totals {
-    fn new(dataset: &Dataset, tasks: &[Task], steps: &TaskMap<u64>) -> Self {
+    fn new(
+        dataset: &Dataset,
+        tasks: &[Task],
+        steps: &TaskMap<u64>,
+        competition: &Competition,
+    ) -> Self {
         let tally = |task: &Task| {
             let steps = steps.get(task).copied().unwrap_or_default();
-            (*task, Tally::new(steps, dataset.layout()))
+            (*task, Tally::new(steps, dataset.layout(), competition))
         };
         Self {
             episodes: 0,
@@ -172,7 +175,7 @@ impl Totals {
         self.host_noise_reruns += replayed.host_noise_reruns;
         if let Some(tally) = self.tallies.get_mut(&recorded.task) {
             for (step, measured) in (0..).zip(&replayed.steps) {
-                tally.add_step(recorded.episode, step, measured);
+                tally.add_step(recorded.episode, step, measured.timing, &measured.limits);
             }
             tally.add_episode(replayed.outcome);
         }
@@ -182,7 +185,7 @@ impl Totals {
         self,
         ruleset: Ruleset,
         dataset: &Dataset,
-        weights: &TaskWeights,
+        competition: &Competition,
     ) -> Result<VerifiedDataset, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();
@@ -200,17 +203,17 @@ impl Totals {
             }
             .into());
         }
-        let (profile, seed) = (manifest.profile, manifest.seed);
-        let ScoredEvaluation { result, violations } = score(
+        let weights = competition.weights(&manifest.variation);
+        let rules = ScoreRules {
+            competition,
             ruleset,
-            profile,
-            &manifest.variation,
-            weights,
-            seed,
-            dataset.layout(),
-            self.tallies,
-            timing,
-        );
+            profile: manifest.profile,
+            variation: &manifest.variation,
+            weights: &weights,
+            seed: manifest.seed,
+            layout: dataset.layout(),
+        };
+        let ScoredEvaluation { result, violations } = score(&rules, self.tallies, timing);
         for (name, expected) in [
             (VIOLATIONS_FILE, json_file(&violations)),
             (RESULTS_FILE, json_file(&result)),

@@ -11,10 +11,11 @@ mod time_sum;
 mod world;
 
 pub use air_hockey::{
-    AirHockeyStep, AirHockeyWorld, Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding,
-    RallyEntry, RallyRow, RallyStart, Response, RunningGame, SideFault, SideStep, describe_end,
+    AirHockeyWorld, Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry,
+    RallyRow, RallyStart, Response, RunningGame, SideFault, SideStep, action_space, describe_end,
+    recording_columns,
 };
 pub use record::{AnswerTiming, EpisodeStart, NullSink, RecordError, StepRow, StepSink};
 pub use running_episode::{NonFiniteObservation, Question, RunningEpisode};
 pub use time_sum::TimeSum;
-pub use world::{Environment, World};
+pub use world::{Conditions, Environment, Simulator, StateColumns, World};

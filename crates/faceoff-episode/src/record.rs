@@ -2,7 +2,7 @@
 //! plays many episodes of each task.
 
 use crate::world::World;
-use faceoff_types::{EpisodeOutcome, Seed};
+use faceoff_types::{ActionLayout, EpisodeOutcome, Seed};
 
 /// Measured times of one answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,21 +17,21 @@ pub struct AnswerTiming {
 }
 
 /// The start of an episode.
-#[derive(Debug, Clone, Copy)]
-pub struct EpisodeStart<'a, W: World + 'a> {
+#[derive(Clone, Copy)]
+pub struct EpisodeStart<'a> {
     /// Index within the evaluation.
     pub episode: u32,
     /// The episode's own seed.
     pub seed: Seed,
-    /// What the agent has chosen; `None` if it failed before it stated that.
-    pub choice: Option<W::Choice>,
-    /// The true initial state.
-    pub state: W::Start<'a>,
+    /// The layout of the agent's actions; `None` if it failed before it stated one.
+    pub layout: Option<ActionLayout>,
+    /// The world in its initial state.
+    pub world: &'a dyn World,
 }
 
 /// An answered control step. Its observation was passed to [`StepSink::observe`] before.
-#[derive(Debug, Clone, Copy)]
-pub struct StepRow<'a, W: World + 'a> {
+#[derive(Clone, Copy)]
+pub struct StepRow<'a> {
     /// The control step, from 0.
     pub step: u32,
     /// The agent's action, row-major.
@@ -40,8 +40,8 @@ pub struct StepRow<'a, W: World + 'a> {
     pub timing: AnswerTiming,
     /// The observation after the step.
     pub next_observation: &'a [f64],
-    /// What else is recorded of the step.
-    pub world: W::Step<'a>,
+    /// The world after the step.
+    pub world: &'a dyn World,
 }
 
 /// A failure to write a recording; never an agent fault.
@@ -53,14 +53,14 @@ pub struct RecordError {
     pub source: Box<dyn std::error::Error + Send + Sync>,
 }
 
-/// Receives the start, the steps and the end of episodes in a kind of world, e.g. to record them.
-pub trait StepSink<W: World> {
+/// Receives the start, the steps and the end of episodes, e.g. to record them.
+pub trait StepSink {
     /// Starts an episode. If the previous episode has not ended, its recording is discarded, since the caller repeats it.
-    fn begin(&mut self, start: EpisodeStart<'_, W>);
+    fn begin(&mut self, start: EpisodeStart<'_>);
     /// The observation for the agent, before the step.
     fn observe(&mut self, observation: &[f64]);
     /// The step after the observation.
-    fn step(&mut self, row: &StepRow<'_, W>);
+    fn step(&mut self, row: &StepRow<'_>);
     /// Ends the episode. `host_noise_reruns` is the number of earlier tries that were discarded because of host interference.
     ///
     /// # Errors
@@ -68,14 +68,14 @@ pub trait StepSink<W: World> {
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError>;
 }
 
-impl<W: World, S: StepSink<W> + ?Sized> StepSink<W> for &mut S {
-    fn begin(&mut self, start: EpisodeStart<'_, W>) {
+impl<S: StepSink + ?Sized> StepSink for &mut S {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
         (**self).begin(start);
     }
     fn observe(&mut self, observation: &[f64]) {
         (**self).observe(observation);
     }
-    fn step(&mut self, row: &StepRow<'_, W>) {
+    fn step(&mut self, row: &StepRow<'_>) {
         (**self).step(row);
     }
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
@@ -87,10 +87,10 @@ impl<W: World, S: StepSink<W> + ?Sized> StepSink<W> for &mut S {
 #[derive(Debug, Clone, Copy)]
 pub struct NullSink;
 
-impl<W: World> StepSink<W> for NullSink {
-    fn begin(&mut self, _: EpisodeStart<'_, W>) {}
+impl StepSink for NullSink {
+    fn begin(&mut self, _: EpisodeStart<'_>) {}
     fn observe(&mut self, _: &[f64]) {}
-    fn step(&mut self, _: &StepRow<'_, W>) {}
+    fn step(&mut self, _: &StepRow<'_>) {}
     fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
         Ok(())
     }

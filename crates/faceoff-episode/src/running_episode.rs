@@ -6,8 +6,10 @@ use crate::{
     world::{Environment, World},
 };
 use faceoff_types::{
-    AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Phase, Task, UnknownTask,
+    ActionLayout, AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Phase, Task,
+    UnknownTask,
 };
+use std::fmt;
 
 /// A running episode. It provides the observations for the agent, takes its answers and computes their effects. The caller
 /// provides the answers, from a process, a recording or a function:
@@ -18,7 +20,7 @@ use faceoff_types::{
 /// # let hit = Task::new("hit");
 /// # let seed = Seed::from_number(1);
 /// let arena = Arena::new(Profile::Ideal, seed, seed.model_mismatch());
-/// let mut running = RunningEpisode::begin(&arena, hit, 0, Some(Interpolation::Linear), NullSink)?;
+/// let mut running = RunningEpisode::begin(&arena, hit, 0, Some(Interpolation::Linear.into()), NullSink)?;
 /// let outcome = loop {
 ///     let joint_positions = running.question()?.observation[6..13].to_vec();
 ///     let timing = AnswerTiming {
@@ -38,17 +40,28 @@ use faceoff_types::{
 ///
 /// The sink receives the start of the episode and each step. The caller reports the end to the sink, unless the try does not count
 /// and is repeated.
-#[derive(Debug)]
-pub struct RunningEpisode<W, S> {
+pub struct RunningEpisode<S> {
     task: Task,
     episode: u32,
     max_steps: u32,
-    world: W,
+    world: Box<dyn World>,
     times: TimeSum,
     end: Option<EpisodeEnd>,
     /// The fault, if the last answer made the world diverge.
     diverged: Option<AgentFaultKind>,
     sink: S,
+}
+
+impl<S: fmt::Debug> fmt::Debug for RunningEpisode<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RunningEpisode")
+            .field("task", &self.task)
+            .field("episode", &self.episode)
+            .field("steps", &self.world.steps())
+            .field("end", &self.end)
+            .field("sink", &self.sink)
+            .finish_non_exhaustive()
+    }
 }
 
 /// The next observation, which the agent has to answer with an action.
@@ -71,25 +84,25 @@ pub struct NonFiniteObservation {
     pub episode: u32,
 }
 
-impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
-    /// Starts an episode. `choice` is `None` if the agent failed before it stated one; then only its fault can follow. The
+impl<S: StepSink> RunningEpisode<S> {
+    /// Starts an episode. `layout` is that of the agent's actions, `None` if the agent failed before it stated one; then only its fault can follow. The
     /// initial state, which is the same for all agents, is recorded nevertheless.
     ///
     /// # Errors
     /// If the environment has no such task.
     pub fn begin(
-        environment: &impl Environment<World = W>,
+        environment: &dyn Environment,
         task: Task,
         episode: u32,
-        choice: Option<W::Choice>,
+        layout: Option<ActionLayout>,
         mut sink: S,
     ) -> Result<Self, UnknownTask> {
-        let world = environment.reset(task, episode, choice)?;
+        let world = environment.reset(task, episode, layout)?;
         sink.begin(EpisodeStart {
             episode,
             seed: environment.seed(task, episode),
-            choice,
-            state: world.start(),
+            layout,
+            world: world.as_ref(),
         });
         Ok(Self {
             task,
@@ -125,7 +138,7 @@ impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
         Ok(Question { step, observation })
     }
 
-    /// Simulates one control step. `action` is row-major, finite, and has the length of the interpolation. Returns the outcome
+    /// Simulates one control step. `action` is row-major, finite, and has the length of the agent's layout. Returns the outcome
     /// at the end of the episode, after which this must not be called again.
     ///
     /// # Errors
@@ -146,7 +159,7 @@ impl<W: World, S: StepSink<W>> RunningEpisode<W, S> {
             action,
             timing,
             next_observation: self.world.observation(),
-            world: self.world.last_step(),
+            world: self.world.as_ref(),
         });
         let detail = match self.world.divergence() {
             Some(cause) => Some(cause),

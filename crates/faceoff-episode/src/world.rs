@@ -1,50 +1,52 @@
 //! The traits of simulated worlds. An episode is played against them, so that it is the same for every competition.
 
-use faceoff_types::{EpisodeEnd, Seed, Task, UnknownTask, Violations};
+use faceoff_types::{
+    ActionLayout, AgentTask, Competition, EpisodeEnd, PerturbationSettings, Profile, Ruleset, Seed,
+    Task, UnknownTask, Violations,
+};
+use std::{any::Any, fmt, sync::Arc};
 
 /// A simulated world in which an agent attempts a task, control step by control step. The same seed and actions give the same
 /// bits.
-pub trait World {
-    /// What an agent chooses before its first action, such as the layout of its actions.
-    type Choice: Copy;
-    /// The initial state, as recordings have it.
-    type Start<'a>: Copy
-    where
-        Self: 'a;
-    /// What recordings have of a step beside observation, action and times.
-    type Step<'a>: Copy
-    where
-        Self: 'a;
-
+pub trait World: Send + Sync {
     /// Control steps so far.
     fn steps(&self) -> u32;
     /// The observation for the agent, of the same length in all steps.
     fn observation(&self) -> &[f64];
-    /// Simulates one control step. `action` is finite, and has the length that the agent has chosen. Returns the end of the episode, if
-    /// this step is its last. Must not be called after an end.
+    /// Simulates one control step. `action` is finite, and has the length of the layout that the agent has chosen. Returns the end of
+    /// the episode, if this step is its last. Must not be called after an end.
     fn step(&mut self, action: &[f64]) -> Option<EpisodeEnd>;
     /// Why the world has left the bounds of the simulation, if it has: the agent's fault.
     fn divergence(&self) -> Option<String>;
     /// Is the present state a success of the task?
     fn success(&self) -> bool;
-    /// Constraints violated so far.
+    /// Limits violated so far: all that the competition has, in its order.
     fn violations(&self) -> Violations;
-    /// The initial state; before the first step.
-    fn start(&self) -> Self::Start<'_>;
-    /// The last step.
-    fn last_step(&self) -> Self::Step<'_>;
+    /// Writes the present true state, in the order of the competition's columns
+    /// ([`RecordingColumns::state`](faceoff_types::RecordingColumns::state)).
+    fn record_state(&self, columns: &mut dyn StateColumns);
+    /// How far the limits are exceeded after the last step, in the order of
+    /// [`RecordingColumns::limits`](faceoff_types::RecordingColumns::limits). Violated if above 0.
+    fn limits(&self) -> &[f64];
+    /// The world itself, for sinks that know its type.
+    fn as_any(&self) -> &dyn Any;
+}
+
+/// Receives the values of the columns of a state, from left to right.
+pub trait StateColumns {
+    /// The values of the next columns.
+    fn put(&mut self, values: &[f64]);
+    /// The next `count` columns have no value.
+    fn put_absent(&mut self, count: usize);
 }
 
 /// What all episodes of an evaluation have in common. It makes the world of each episode.
-pub trait Environment {
-    /// The world of an episode.
-    type World: World;
-
+pub trait Environment: Send + Sync {
     /// The seed of an episode; `index` is its index within the evaluation.
     fn seed(&self, task: Task, index: u32) -> Seed;
     /// Control steps of the longest episode of a task.
     fn max_steps(&self, task: Task) -> u32;
-    /// The world of an episode at its start. `choice` is `None` if the agent failed before it stated one; then no step follows.
+    /// The world of an episode at its start. `layout` is `None` if the agent failed before it stated one; then no step follows.
     ///
     /// # Errors
     /// If the environment has no such task.
@@ -52,6 +54,33 @@ pub trait Environment {
         &self,
         task: Task,
         index: u32,
-        choice: Option<<Self::World as World>::Choice>,
-    ) -> Result<Self::World, UnknownTask>;
+        layout: Option<ActionLayout>,
+    ) -> Result<Box<dyn World>, UnknownTask>;
+}
+
+/// The conditions under which the episodes of an evaluation are played.
+#[derive(Debug, Clone, Copy)]
+pub struct Conditions<'a> {
+    pub ruleset: Ruleset,
+    pub profile: Profile,
+    /// Magnitudes of the profile's perturbations.
+    pub perturbations: &'a PerturbationSettings,
+    /// The seed from which the seeds of the episodes are derived.
+    pub seed: Seed,
+    /// The seed from which the season's deviations of the model are drawn.
+    pub mismatch_seed: Seed,
+}
+
+/// A competition with its simulator: slots play episodes in it, and verification plays recorded ones again.
+pub trait Simulator: fmt::Debug + Send + Sync {
+    fn competition(&self) -> &Arc<Competition>;
+    /// A hash of what the simulator computes, as 64 hexadecimal digits: recordings of a simulator with another one cannot be verified.
+    fn fingerprint(&self) -> &str;
+    /// The field `env` of the message `hello`, as JSON: what agents of the task are told before the first episode.
+    ///
+    /// # Errors
+    /// If the simulator has no such task.
+    fn env(&self, agent_task: AgentTask) -> Result<String, UnknownTask>;
+    /// The environment of an evaluation. It may take milliseconds, so use one for many episodes.
+    fn environment(&self, conditions: &Conditions<'_>) -> Box<dyn Environment>;
 }

@@ -6,7 +6,7 @@ use crate::{
     errors::{OrderError, argument_error, catch_panic, check_perturbations, simulator_error},
 };
 use faceoff_airhockey::{TASKS, competition};
-use faceoff_episode::{AirHockeyWorld, AnswerTiming, Arena, NullSink, RunningEpisode};
+use faceoff_episode::{AnswerTiming, Arena, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
@@ -118,8 +118,8 @@ impl Evaluation {
         };
         let task = parse_task(task)?;
         let running = catch_panic(|| {
-            let interpolation = Some(interpolation);
-            let begun = RunningEpisode::begin(&self.arena, task, episode, interpolation, NullSink);
+            let layout = Some(interpolation.into());
+            let begun = RunningEpisode::begin(&self.arena, task, episode, layout, NullSink);
             begun.map_err(|error| simulator_error(&error.to_string()))
         })?;
         Ok(PolicyEpisode {
@@ -141,6 +141,7 @@ impl Evaluation {
             let task = parse_task(outcome.task.as_str())?;
             by_task.entry(task).or_default().push(outcome);
         }
+        let competition = competition();
         let result = catch_panic(|| {
             let tasks: TaskMap<TaskResult> = by_task
                 .into_iter()
@@ -152,7 +153,7 @@ impl Evaluation {
                     let mut times = StepTimes::for_steps(steps);
                     (0..steps).for_each(|_| times.add(0.0));
                     let bounds = &self.variation.tier_bounds;
-                    (task, score_task(&outcomes, &times, bounds))
+                    (task, score_task(&competition, &outcomes, &times, bounds))
                 })
                 .collect();
             let ruleset = Ruleset::CURRENT;
@@ -161,7 +162,7 @@ impl Evaluation {
                 self.profile,
                 self.seed,
                 &self.variation,
-                &competition().weights(&self.variation),
+                &competition.weights(&self.variation),
                 tasks,
             ))
         })?;
@@ -172,7 +173,7 @@ impl Evaluation {
 /// A running episode of a policy.
 #[pyclass(module = "faceoff._native")]
 pub struct PolicyEpisode {
-    running: RunningEpisode<AirHockeyWorld, NullSink>,
+    running: RunningEpisode<NullSink>,
     action_format: ActionFormat,
     /// Last commanded joint positions, rad.
     commanded: [f64; JOINTS],

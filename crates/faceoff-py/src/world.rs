@@ -2,8 +2,10 @@
 
 use crate::{errors::argument_error, reward, setup::Setup};
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, EpisodeState, JOINTS, Plant, StepOutcome, model::INITIAL_Q};
-use faceoff_types::{EpisodeEnd, Seed, Violations};
+use faceoff_sim::{
+    Episode, EpisodeState, JOINTS, Plant, StepOutcome, ViolatedGroups, model::INITIAL_Q,
+};
+use faceoff_types::{EpisodeEnd, Seed};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
@@ -39,7 +41,7 @@ pub struct World {
     plant: Arc<Plant>,
     /// The reward's potential of the present state, points; the next reward contains its change.
     potential: f64,
-    violations: Violations,
+    violations: ViolatedGroups,
 }
 
 /// Results of a world's step.

@@ -12,7 +12,7 @@ use crate::{
     motion::Motion,
     violations::ViolationTracker,
 };
-use faceoff_episode::{AirHockeyWorld, EpisodeStart, StepRow, describe_end};
+use faceoff_episode::{AirHockeyWorld, EpisodeStart, StepRow, World, describe_end};
 use faceoff_sim::{EpisodeState, JOINTS, model::LINKS, table::frames::table_from_robot};
 use faceoff_types::{EpisodeOutcome, Task, escape_unprintable};
 
@@ -41,19 +41,21 @@ pub(crate) struct EpisodeClips {
 }
 
 impl Recording {
-    pub fn begin(start: &EpisodeStart<'_, AirHockeyWorld>) -> Self {
-        let mut motion = Motion::new(start.state.opponent_q.is_some());
-        motion.push(start.state);
-        Self {
+    /// `None` if the world is not one of air hockey, whose clips these are.
+    pub fn begin(start: &EpisodeStart<'_>) -> Option<Self> {
+        let state = world(start.world)?.state();
+        let mut motion = Motion::new(state.opponent_q.is_some());
+        motion.push(state);
+        Some(Self {
             episode: start.episode,
-            start: start.state.puck,
-            last: start.state.puck,
+            start: state.puck,
+            last: state.puck,
             motion,
             agent_view: AgentView::new(0),
             tracker: ViolationTracker::default(),
             violations: Vec::new(),
             times_s: Vec::new(),
-        }
+        })
     }
 
     /// Records the first observation; later ones come with the steps.
@@ -63,22 +65,26 @@ impl Recording {
         }
     }
 
-    pub fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
+    pub fn step(&mut self, row: &StepRow<'_>) {
+        let Some(world) = world(row.world) else {
+            return;
+        };
+        let (state, constraints) = (world.state(), world.constraints());
         let sample = row.step + 1;
-        self.motion.push(row.world.state);
-        self.motion.add_contacts(row.step, row.world.impacts);
+        self.motion.push(state);
+        self.motion.add_contacts(row.step, world.impacts());
         self.agent_view.observe(row.next_observation);
         self.agent_view
-            .answer(sample, row.action, &row.timing, row.world.puck_lost);
-        self.tracker.update(0, sample, &row.world.constraints);
+            .answer(sample, row.action, &row.timing, world.is_puck_lost());
+        self.tracker.update(0, sample, constraints);
         for group in Group::ALL {
-            let value = group.value(&row.world.constraints);
+            let value = group.value(constraints);
             if value > 0.0 {
-                self.add_violation(group, sample, value, row.world.state);
+                self.add_violation(group, sample, value, state);
             }
         }
         self.times_s.push(row.timing.computation_time_s);
-        self.last = row.world.state.puck;
+        self.last = state.puck;
     }
 
     fn add_violation(&mut self, group: Group, sample: u32, value: f64, state: &EpisodeState) {
@@ -194,6 +200,11 @@ impl EpisodeClips {
             self.observed.compressed(gzip)?,
         ])
     }
+}
+
+/// The world of air hockey behind the trait.
+fn world(world: &dyn World) -> Option<&AirHockeyWorld> {
+    world.as_any().downcast_ref()
 }
 
 /// The contest in a clip's header: the task's name.

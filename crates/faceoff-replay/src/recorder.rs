@@ -7,7 +7,7 @@ use crate::{
     gzip::Gzip,
     pack::{ClipKey, PackWriter},
 };
-use faceoff_episode::{AirHockeyWorld, EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{EpisodeOutcome, Task};
 use std::io::Write;
 
@@ -71,9 +71,9 @@ impl<W: Write> ClipRecorder<W> {
     }
 }
 
-impl<W: Write> StepSink<AirHockeyWorld> for ClipRecorder<W> {
-    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
-        self.current = Some(Recording::begin(&start));
+impl<W: Write> StepSink for ClipRecorder<W> {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
+        self.current = Recording::begin(&start);
     }
 
     fn observe(&mut self, observation: &[f64]) {
@@ -82,7 +82,7 @@ impl<W: Write> StepSink<AirHockeyWorld> for ClipRecorder<W> {
         }
     }
 
-    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
+    fn step(&mut self, row: &StepRow<'_>) {
         if let Some(recording) = &mut self.current {
             recording.step(row);
         }

@@ -1,9 +1,10 @@
 //! The settings under which agents run on this host: limits, isolation, runtimes and CPUs.
 
 use crate::supervisor::Supervision;
+use faceoff_episode::Simulator;
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_types::{IMAGE_RUNTIME, TimeLimits};
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 /// The environment of agents on this host.
 #[derive(Debug, Clone)]
@@ -21,6 +22,8 @@ pub struct AgentEnvironment {
     pub agent_cpus: Vec<usize>,
     /// Kills an agent that blocks its evaluator, or whose job was cancelled.
     pub supervision: Supervision,
+    /// The competition, and the worlds in which agents act.
+    pub simulator: Arc<dyn Simulator>,
 }
 
 impl AgentEnvironment {

@@ -83,6 +83,9 @@ pub enum PlatformFault {
     /// The simulated state became infinite or NaN.
     #[error(transparent)]
     Simulation(#[from] NonFiniteObservation),
+    /// The competition's simulator does not keep to its contract.
+    #[error("simulator: {0}")]
+    Simulator(String),
     /// The simulator has no such task.
     #[error(transparent)]
     UnknownTask(#[from] UnknownTask),

@@ -25,7 +25,6 @@ mod shard;
 mod supervisor;
 mod validation;
 mod wait_breakdown;
-mod wire_env;
 
 pub use config::AgentEnvironment;
 pub use faceoff_dataset::{

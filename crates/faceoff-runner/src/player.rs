@@ -11,7 +11,7 @@ use crate::{
     session::Session,
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{AirHockeyWorld, Arena, Question, RunningEpisode, StepSink};
+use faceoff_episode::{Environment, Question, RunningEpisode, StepSink};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ pub(crate) struct Player<'a> {
     bundle: &'a Bundle,
     env: &'a AgentEnvironment,
     task: Task,
-    arena: Arena,
+    environment: &'a dyn Environment,
     /// `None` before the first episode and after a fault.
     session: Option<Session<'a>>,
     log: Log,
@@ -97,7 +97,7 @@ struct StartUpFault {
 }
 
 /// A running episode with a sink of any type.
-type DynEpisode<'a> = RunningEpisode<AirHockeyWorld, &'a mut dyn StepSink<AirHockeyWorld>>;
+type DynEpisode<'a> = RunningEpisode<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
     /// The first episode starts the agent. `episodes` determines how many tries may be repeated because of host
@@ -107,7 +107,7 @@ impl<'a> Player<'a> {
         env: &'a AgentEnvironment,
         task: Task,
         episodes: u32,
-        arena: Arena,
+        environment: &'a dyn Environment,
         monitor: &'a dyn InterferenceMonitor,
         on_host_interference: OnHostInterference,
     ) -> Self {
@@ -115,7 +115,7 @@ impl<'a> Player<'a> {
             bundle,
             env,
             task,
-            arena,
+            environment,
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
             reset_budget: ResetBudget::new(&env.time, episodes),
@@ -155,7 +155,7 @@ impl<'a> Player<'a> {
         &mut self,
         episode: u32,
         max_steps: u32,
-        sink: &mut dyn StepSink<AirHockeyWorld>,
+        sink: &mut dyn StepSink,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, PlatformFault> {
         let mut reruns = 0;
@@ -196,16 +196,16 @@ impl<'a> Player<'a> {
         &mut self,
         episode: u32,
         max_steps: u32,
-        sink: &mut dyn StepSink<AirHockeyWorld>,
+        sink: &mut dyn StepSink,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<Try, PlatformFault> {
         let session = match self.session.take() {
             Some(session) => Ok(session),
             None => self.start()?,
         };
-        let interpolation = session.as_ref().ok().map(Session::interpolation);
+        let layout = session.as_ref().ok().map(Session::layout);
         let mut running =
-            RunningEpisode::begin(&self.arena, self.task, episode, interpolation, sink)?
+            RunningEpisode::begin(self.environment, self.task, episode, layout, sink)?
                 .with_max_steps(max_steps);
         let mut session = match session {
             Ok(session) => session,

@@ -6,11 +6,11 @@ use crate::{
     exchange::{Answer, Exchange, PendingQuestion},
     fault::{PlatformFault, SessionError},
     host_interference::{InterferenceMonitor, KernelCounters},
-    wire_env::wire_env,
 };
 use faceoff_episode::AnswerTiming;
-use faceoff_types::{AgentFaultKind, AgentTask, Interpolation, Phase, TimeLimits};
+use faceoff_types::{ActionLayout, AgentFaultKind, AgentTask, Phase, TimeLimits};
 use faceoff_wire::{Message, answer};
+use serde_json::value::RawValue;
 use std::time::{Duration, Instant};
 
 /// An agent process and the protocol session with it. Every wait has a deadline. Dropping it kills
@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 pub struct Session<'w> {
     exchange: Exchange<'w>,
     time: TimeLimits,
-    interpolation: Interpolation,
+    layout: ActionLayout,
     startup_s: f64,
     pending: Option<PendingAnswer>,
     /// The last action; its memory is reused.
@@ -67,11 +67,11 @@ impl<'w> Session<'w> {
         let mut exchange =
             Exchange::start(bundle, env, monitor).map_err(|error| (error, String::new()))?;
         let stated = bundle.manifest.interpolation;
-        match hello(&mut exchange, agent_task, stated, env.time.startup_s) {
-            Ok((interpolation, startup_s)) => Ok(Self {
+        match hello(&mut exchange, agent_task, stated, env) {
+            Ok((layout, startup_s)) => Ok(Self {
                 exchange,
                 time: env.time.clone(),
-                interpolation,
+                layout,
                 startup_s,
                 pending: None,
                 action: Vec::new(),
@@ -80,10 +80,10 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Interpolation of the agent's actions.
+    /// Layout of the agent's actions.
     #[must_use]
-    pub const fn interpolation(&self) -> Interpolation {
-        self.interpolation
+    pub const fn layout(&self) -> ActionLayout {
+        self.layout
     }
 
     /// Start-up time of the agent, without host interference, in seconds.
@@ -110,7 +110,7 @@ impl<'w> Session<'w> {
         self.wait()
     }
 
-    /// The last action, row-major, with the length that the interpolation requires.
+    /// The last action, row-major, with the length that the layout requires.
     #[must_use]
     pub fn action(&self) -> &[f64] {
         &self.action
@@ -217,7 +217,7 @@ impl<'w> Session<'w> {
         match question {
             Question::Reset { episode } => answer::parse_reset_ready(&answer.bytes, episode),
             Question::Step { step } => {
-                answer::parse_act(&answer.bytes, step, self.interpolation, &mut self.action)
+                answer::parse_act(&answer.bytes, step, self.layout, &mut self.action)
             }
         }
         .map_err(|fault| answer.to_error(fault))?;
@@ -254,27 +254,31 @@ impl<'w> Session<'w> {
     }
 }
 
-/// Exchanges `hello` and `ready`; returns the interpolation and the start-up time in seconds. `stated`: the
+/// Exchanges `hello` and `ready`; returns the layout of the agent's actions and the start-up time in seconds. `stated`: the
 /// interpolation in `agent.toml`.
 fn hello(
     exchange: &mut Exchange<'_>,
     agent_task: AgentTask,
     stated: Option<i64>,
-    limit_s: f64,
-) -> Result<(Interpolation, f64), SessionError> {
-    let hello = Message::hello(agent_task, wire_env(agent_task)?);
+    env: &AgentEnvironment,
+) -> Result<(ActionLayout, f64), SessionError> {
+    let constants = RawValue::from_string(env.simulator.env(agent_task)?)
+        .map_err(|error| PlatformFault::Simulator(format!("env is not JSON: {error}")))?;
+    let hello = Message::hello(agent_task, &constants);
     // The agent's time begins when its sandbox exists; the set-up is the platform's time.
-    let mut sent = exchange.send(&hello, Phase::StartUp, limit_s)?;
+    let mut sent = exchange.send(&hello, Phase::StartUp, env.time.startup_s)?;
     let answer = exchange.wait(&mut sent)?;
-    let ready = answer::parse_ready(&answer.bytes).map_err(|fault| answer.to_error(fault))?;
+    let actions = &env.simulator.competition().actions;
+    let ready =
+        answer::parse_ready(&answer.bytes, actions).map_err(|fault| answer.to_error(fault))?;
     match stated {
-        Some(stated) if ready.interpolation.code() != Some(stated) => {
+        Some(stated) if ready.layout.code() != Some(stated) => {
             Err(answer.to_error(AgentFaultKind::WrongMessage {
                 expected: format!("ready with interpolation {stated}, as agent.toml says"),
-                got: format!("ready with interpolation {}", ready.interpolation),
+                got: format!("ready with interpolation {}", ready.layout),
             }))
         }
-        _ => Ok((ready.interpolation, answer.wait.charged().as_secs_f64())),
+        _ => Ok((ready.layout, answer.wait.charged().as_secs_f64())),
     }
 }
 

@@ -8,8 +8,8 @@ use crate::{
     host_interference::{InterferenceMonitor, KernelCounters},
     player::{OnHostInterference, Player},
 };
-use faceoff_dataset::{Recorder, ShardFolder, ShardReport, shard_arena};
-use faceoff_episode::{AirHockeyWorld, StepSink};
+use faceoff_dataset::{Recorder, ShardFolder, ShardReport, shard_conditions};
+use faceoff_episode::StepSink;
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::EpisodeOutcome;
 use faceoff_wire::job::ShardSpec;
@@ -56,10 +56,10 @@ pub fn run_shard_monitored(
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
     let folder = ShardFolder::create(out)?;
-    let mut recorder = Recorder::create(&folder, spec.task)?;
+    let mut recorder = Recorder::create(&folder, spec.task, env.simulator.competition())?;
     let report = play_shard(spec, bundle, env, &mut recorder, observer, monitor)?;
     recorder.finish()?;
-    folder.commit(spec, &report)?;
+    folder.commit(spec, &report, env.simulator.as_ref())?;
     Ok(report)
 }
 
@@ -71,22 +71,31 @@ pub fn play_shard(
     spec: &ShardSpec,
     bundle: &Bundle,
     env: &AgentEnvironment,
-    sink: &mut dyn StepSink<AirHockeyWorld>,
+    sink: &mut dyn StepSink,
     observer: &mut dyn Observer,
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
+    let environment = env.simulator.environment(&shard_conditions(spec));
     let mut calibration = Calibration::start(&env.agent_cpus)?;
     let mut player = Player::new(
         bundle,
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        shard_arena(spec),
+        environment.as_ref(),
         monitor,
         OnHostInterference::KeepLastTry,
     );
-    let played = play(spec, &mut player, sink, observer, &mut calibration);
+    let max_steps = environment.max_steps(spec.task);
+    let played = play(
+        spec,
+        max_steps,
+        &mut player,
+        sink,
+        observer,
+        &mut calibration,
+    );
     let (outcomes, stopped_by_faults) = match played {
         Ok(played) => played,
         Err(fault) => {
@@ -112,8 +121,9 @@ pub fn play_shard(
 /// Runs the episodes; also returns whether faults stopped the shard early.
 fn play(
     spec: &ShardSpec,
+    max_steps: u32,
     player: &mut Player<'_>,
-    sink: &mut dyn StepSink<AirHockeyWorld>,
+    sink: &mut dyn StepSink,
     observer: &mut dyn Observer,
     calibration: &mut Calibration,
 ) -> Result<(Vec<EpisodeOutcome>, bool), PlatformFault> {
@@ -123,9 +133,7 @@ fn play(
         if observer.cancelled() {
             return Err(PlatformFault::Cancelled);
         }
-        let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, sink, &|| {
-            observer.cancelled()
-        })?;
+        let outcome = player.play(episode, max_steps, sink, &|| observer.cancelled())?;
         calibration.measure_between_episodes()?;
         observer.on_episode_end(&outcome);
         faults += u32::from(outcome.fault.is_some());

@@ -10,13 +10,12 @@ use crate::{
     player::{OnHostInterference, Player},
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{
-    AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, RecordError, StepRow, StepSink,
-};
+use faceoff_episode::{AnswerTiming, Conditions, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
-use faceoff_sim::EPISODE_STEPS;
-use faceoff_types::{AgentFault, EpisodeOutcome, Profile, Task, ValidationTiming};
+use faceoff_types::{
+    AgentFault, EpisodeOutcome, PerturbationSettings, Profile, Ruleset, Task, ValidationTiming,
+};
 use faceoff_wire::job::ValidationSpec;
 use std::fmt;
 
@@ -119,7 +118,13 @@ pub fn validate_monitored(
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ValidationReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
-    let arena = Arena::new(Profile::Evaluation, spec.seed, spec.mismatch_seed);
+    let environment = env.simulator.environment(&Conditions {
+        ruleset: Ruleset::CURRENT,
+        profile: Profile::Evaluation,
+        perturbations: &PerturbationSettings::default(),
+        seed: spec.seed,
+        mismatch_seed: spec.mismatch_seed,
+    });
     let mut timing = Vec::with_capacity(spec.tasks.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in spec.tasks.iter().copied() {
@@ -129,7 +134,7 @@ pub fn validate_monitored(
             env,
             task,
             plan.episodes,
-            arena.clone(),
+            environment.as_ref(),
             monitor,
             OnHostInterference::PlatformFault,
         );
@@ -137,7 +142,12 @@ pub fn validate_monitored(
         let mut outcomes = Vec::new();
         while answers.timings.len() < plan.steps as usize {
             let episode = plan.first_episode + outcomes.len() as u32;
-            let outcome = player.play(episode, EPISODE_STEPS, &mut answers, cancelled)?;
+            let outcome = player.play(
+                episode,
+                environment.max_steps(task),
+                &mut answers,
+                cancelled,
+            )?;
             let has_fault = outcome.fault.is_some();
             outcomes.push(outcome);
             if has_fault {
@@ -251,14 +261,14 @@ impl Answers {
     }
 }
 
-impl StepSink<AirHockeyWorld> for Answers {
-    fn begin(&mut self, _: EpisodeStart<'_, AirHockeyWorld>) {
+impl StepSink for Answers {
+    fn begin(&mut self, _: EpisodeStart<'_>) {
         self.timings.truncate(self.completed);
     }
 
     fn observe(&mut self, _: &[f64]) {}
 
-    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
+    fn step(&mut self, row: &StepRow<'_>) {
         self.timings.push(row.timing);
     }
 

@@ -83,11 +83,17 @@ fn effect(profile: Profile, tally: &PairedTally, penalty_points: f64) -> Profile
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
-    use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
+    use faceoff_airhockey::{DEFEND, EE, HIT, PREPARE, TASKS};
+    use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome};
 
     fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-        EpisodeSummary::from_outcomes(outcomes, &TASKS, &Default::default()).unwrap()
+        EpisodeSummary::from_outcomes(
+            &faceoff_airhockey::competition(),
+            outcomes,
+            &TASKS,
+            &Default::default(),
+        )
+        .unwrap()
     }
 
     /// Outcomes with these successes; each failed episode has the 3 penalty points of an end effector violation.
@@ -100,10 +106,7 @@ mod tests {
                 steps: 1,
                 end: EpisodeEnd::HORIZON,
                 success: *success,
-                violations: Violations {
-                    ee: !success,
-                    ..Violations::default()
-                },
+                violations: [(EE, !success)].into_iter().collect(),
                 computation_time: ComputationTime::default(),
                 fault: None,
             })

@@ -2,25 +2,14 @@
 //! answered invalidly).
 
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, ViolationCounts, ViolationName, Violations,
+    Competition, ComputationTime, EpisodeEnd, EpisodeOutcome, ViolationCounts, ViolationName,
+    Violations,
 };
 
-/// Penalty points for an end effector outside its bounds (paper §2.2).
-pub const EE_POINTS: f64 = 3.0;
-/// Penalty points for an elbow or wrist that is too low (reference implementation; not in the paper).
-pub const LINK_POINTS: f64 = 3.0;
-/// Penalty points for a joint beyond its position limits (paper §2.2).
-pub const JOINT_POS_POINTS: f64 = 2.0;
-/// Penalty points for a joint beyond its velocity limits (paper §2.2).
-pub const JOINT_VEL_POINTS: f64 = 1.0;
 /// Lowest penalty for computation time in one episode that is not 0 (paper §2.2).
 pub const COMPUTATION_TIME_MIN_POINTS: f64 = 0.5;
 /// Highest penalty for computation time in one episode (paper §2.2), and the penalty for an agent fault.
 pub const COMPUTATION_TIME_MAX_POINTS: f64 = 2.0;
-/// Highest penalty of one episode.
-pub const MAX_EPISODE_PENALTY: f64 =
-    EE_POINTS + LINK_POINTS + JOINT_POS_POINTS + JOINT_VEL_POINTS + COMPUTATION_TIME_MAX_POINTS;
-
 /// One control step in seconds, the time limit of an answer.
 const STEP_S: f64 = 0.02;
 
@@ -43,9 +32,12 @@ pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
     }
 }
 
-/// Penalty points for the computation times of an episode, or for its agent fault.
-pub(crate) fn time_or_fault_penalty(outcome: &EpisodeOutcome) -> f64 {
-    if has_fault(outcome) {
+/// Penalty points for the computation times of an episode, or for its agent fault; none if the competition has no limit on them.
+pub(crate) fn time_or_fault_penalty(competition: &Competition, outcome: &EpisodeOutcome) -> f64 {
+    let limit = competition.violation(ViolationName::COMPUTATION_TIME);
+    if limit.is_none() {
+        0.0
+    } else if has_fault(outcome) {
         COMPUTATION_TIME_MAX_POINTS
     } else {
         computation_time_penalty(&outcome.computation_time)
@@ -61,35 +53,20 @@ pub(crate) fn has_fault(outcome: &EpisodeOutcome) -> bool {
 ///
 /// An agent fault gives the full penalty for computation time, regardless of the earlier steps.
 #[must_use]
-pub fn episode_penalty(outcome: &EpisodeOutcome) -> f64 {
-    violation_points(&outcome.violations) + time_or_fault_penalty(outcome)
+pub fn episode_penalty(competition: &Competition, outcome: &EpisodeOutcome) -> f64 {
+    competition.violation_points(&outcome.violations) + time_or_fault_penalty(competition, outcome)
 }
 
-/// Penalty points for constraints that the robot's motion violated.
-pub(crate) fn violation_points(violations: &Violations) -> f64 {
-    [
-        (violations.ee, EE_POINTS),
-        (violations.link, LINK_POINTS),
-        (violations.joint_pos, JOINT_POS_POINTS),
-        (violations.joint_vel, JOINT_VEL_POINTS),
-    ]
-    .into_iter()
-    .filter(|(violated, _)| *violated)
-    .map(|(_, points)| points)
-    .sum()
-}
-
-/// For each kind of violation, the number of episodes (or windows of a game) with it. Each is given by the violated constraints, and
+/// For each kind of violation in `names`, the number of episodes (or windows of a game) with it. Each is given by its violated limits, and
 /// whether its answers were late.
 pub(crate) fn violation_counts<'a>(
+    names: impl Iterator<Item = ViolationName>,
     episodes: impl Iterator<Item = (&'a Violations, bool)>,
 ) -> ViolationCounts {
-    let late = ViolationName::COMPUTATION_TIME;
-    let names = Violations::default().by_name().map(|(name, _)| (name, 0));
-    let mut counts: ViolationCounts = names.into_iter().chain([(late, 0)]).collect();
+    let mut counts: ViolationCounts = names.map(|name| (name, 0)).collect();
     for (violations, is_late) in episodes {
-        let kinds = violations.by_name().into_iter().chain([(late, is_late)]);
-        for (name, _) in kinds.filter(|(_, is_violated)| *is_violated) {
+        let late = is_late.then_some(ViolationName::COMPUTATION_TIME);
+        for name in violations.violated().chain(late) {
             counts.set(name, counts.get(name) + 1);
         }
     }
@@ -114,10 +91,5 @@ mod tests {
         assert_eq!(penalty(0.02, 0.2), 1.0);
         assert_eq!(penalty(0.001, 0.200_000_1), 2.0);
         assert_eq!(penalty(0.020_000_1, 0.021), 2.0, "late on average");
-    }
-
-    #[test]
-    fn maximum_penalty_is_sum_of_all() {
-        assert_eq!(MAX_EPISODE_PENALTY, 11.0);
     }
 }

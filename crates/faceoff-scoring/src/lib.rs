@@ -42,9 +42,8 @@ pub use comparison::{
     ComparedEvaluation, Comparison, NotComparable, OverallComparison, TaskComparison,
 };
 pub use episode::{
-    COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, EE_POINTS,
-    JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY, computation_time_penalty,
-    episode_penalty,
+    COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS,
+    computation_time_penalty, episode_penalty,
 };
 pub use evaluation::{overall_score, score_evaluation};
 pub use interval::{wilson95, wilson95_of_rate};

@@ -1,8 +1,8 @@
 //! The board of the qualifying stage from a file of published results, `tasks.json`, without the episodes themselves.
 
 use crate::{
-    board::BoardKey, episode::MAX_EPISODE_PENALTY, evaluation::overall_score,
-    interval::wilson95_of_rate, tier::tier_with_bounds, unique_map::UniqueMap,
+    board::BoardKey, evaluation::overall_score, interval::wilson95_of_rate, tier::tier_with_bounds,
+    tournament::MAX_EPISODE_PENALTY, unique_map::UniqueMap,
 };
 use faceoff_types::{Task, TaskMap, TaskWeights, TeamName, Tier, TierBounds, UnknownTask};
 use serde::{

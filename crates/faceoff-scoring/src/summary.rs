@@ -6,7 +6,7 @@ use crate::{
     successes::Successes,
     tier_change::TierChange,
 };
-use faceoff_types::{EpisodeOutcome, Task, TaskMap, TierBounds};
+use faceoff_types::{Competition, EpisodeOutcome, Task, TaskMap, TierBounds};
 use serde::{Deserialize, Serialize};
 
 /// Summary of an evaluation's episodes for boards and comparisons: some hundred bytes per task instead of all outcomes.
@@ -44,6 +44,7 @@ impl EpisodeSummary {
     /// # Errors
     /// If the episodes of a task are not 0, 1, … n − 1, each once.
     pub fn from_outcomes(
+        competition: &Competition,
         outcomes: &[EpisodeOutcome],
         tasks: &[Task],
         bounds: &TierBounds,
@@ -69,7 +70,9 @@ impl EpisodeSummary {
             }
         }
         let points = by_task.iter().map(|(task, episodes)| {
-            let points = episodes.iter().map(|outcome| episode_penalty(outcome));
+            let points = episodes
+                .iter()
+                .map(|outcome| episode_penalty(competition, outcome));
             (*task, points.collect())
         });
         let change = TierChange::from_points(points.collect(), bounds);
@@ -82,7 +85,7 @@ impl EpisodeSummary {
                 // Points are multiples of one half: the sum is exact in any order.
                 penalty_points: episodes
                     .iter()
-                    .map(|outcome| episode_penalty(outcome))
+                    .map(|outcome| episode_penalty(competition, outcome))
                     .sum(),
                 tier_change: change.tasks.get(&task).copied().unwrap_or_default(),
             };

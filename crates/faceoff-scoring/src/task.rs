@@ -6,7 +6,7 @@ use crate::{
     step_times::StepTimes,
     tier::tier_with_bounds,
 };
-use faceoff_types::{EpisodeOutcome, TaskResult, TierBounds};
+use faceoff_types::{Competition, EpisodeOutcome, TaskResult, TierBounds};
 
 /// Scores one task from its episodes; `bounds` decide the tier.
 ///
@@ -19,6 +19,7 @@ use faceoff_types::{EpisodeOutcome, TaskResult, TierBounds};
 /// If `step_times` has more or fewer times than expected.
 #[must_use]
 pub fn score_task(
+    competition: &Competition,
     outcomes: &[EpisodeOutcome],
     step_times: &StepTimes,
     bounds: &TierBounds,
@@ -26,7 +27,10 @@ pub fn score_task(
     let episodes = count(outcomes, |_| true);
     let successes = count(outcomes, |outcome| outcome.success && !has_fault(outcome));
     // Points are multiples of one half: the sum is exact in any order.
-    let penalty_points = outcomes.iter().map(episode_penalty).sum();
+    let penalty_points = outcomes
+        .iter()
+        .map(|outcome| episode_penalty(competition, outcome))
+        .sum();
     TaskResult {
         episodes,
         successes,
@@ -37,10 +41,13 @@ pub fn score_task(
         },
         success_ci95: wilson95(successes, episodes),
         penalty_points,
-        violations: violation_counts(outcomes.iter().map(|outcome| {
-            let is_late = time_or_fault_penalty(outcome) > 0.0;
-            (&outcome.violations, is_late)
-        })),
+        violations: violation_counts(
+            competition.violations.iter().map(|info| info.name),
+            outcomes.iter().map(|outcome| {
+                let is_late = time_or_fault_penalty(competition, outcome) > 0.0;
+                (&outcome.violations, is_late)
+            }),
+        ),
         tier: tier_with_bounds(bounds, penalty_points, episodes),
         steps: outcomes
             .iter()

@@ -1,7 +1,7 @@
 //! The probability that an agent would get another tier on other episodes of the same kind, estimated by a bootstrap:
 //! many samples of the evaluation's own episodes, drawn with replacement.
 
-use crate::{draws::Draws, episode::MAX_EPISODE_PENALTY, tier::tier_with_bounds};
+use crate::{draws::Draws, tier::tier_with_bounds};
 use faceoff_types::{TaskMap, Tier, TierBounds};
 
 /// Resamples of the bootstrap: the standard error of a probability of one half is 1.1 percentage points, and smaller near
@@ -13,7 +13,7 @@ const STREAM: &str = "faceoff-scoring tier change bootstrap 1";
 
 /// Highest penalty of an episode in half points. Penalties are multiples of half a point, so in this unit they are small
 /// integers.
-const MAX_HALVES: f64 = 2.0 * MAX_EPISODE_PENALTY;
+const MAX_HALVES: f64 = u8::MAX as f64;
 
 /// Probabilities of another tier on other episodes of the same kind.
 #[derive(Debug, Clone, PartialEq)]

@@ -24,6 +24,7 @@ pub mod channel;
 pub mod dynamics;
 pub mod episode;
 mod episode_step;
+mod fingerprint;
 // The robot model in formats of other simulators.
 pub mod export;
 pub mod game;
@@ -41,11 +42,12 @@ pub use channel::Command;
 pub use dynamics::simd_level::SimdLevel;
 pub use episode::{
     AirHockeyTask, EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
-    constraints::ConstraintValues,
+    constraints::{ConstraintValues, ViolatedGroups},
     env_info::{EnvInfo, env_info, env_info_for},
 };
 pub use episode_step::{step_episodes, step_episodes_on};
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
+pub use fingerprint::fingerprint;
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
 pub use robot::plant::Plant;
 // `Runaway`: the part of a world that left its bounds, so that the world stopped (*diverged*).

@@ -1,8 +1,8 @@
 //! A competition: what the platform has to know of it in order to run and to show it.
 
 use crate::{
-    EpisodeEnd, InvalidStageRules, Millionths, StageRules, Task, TaskMap, TaskWeights, UnknownTask,
-    Variation, ViolationCounts, ViolationName,
+    ActionSpace, EpisodeEnd, InvalidStageRules, Millionths, RecordingColumns, StageRules, Task,
+    TaskMap, TaskWeights, UnknownTask, Variation, ViolationCounts, ViolationName, Violations,
 };
 
 /// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
@@ -18,6 +18,8 @@ pub struct Competition {
     pub ends: Vec<EndInfo>,
     /// Kinds of violations of the agent's limits, in the order of tables.
     pub violations: Vec<ViolationInfo>,
+    pub actions: ActionSpace,
+    pub recording: RecordingColumns,
 }
 
 /// A task of a competition.
@@ -60,7 +62,7 @@ pub struct ViolationInfo {
     pub breach: String,
     /// What its size is in files, such as "metres beyond the bound".
     pub measure: String,
-    /// The least and the most penalty points for it in one episode.
+    /// The least and the most penalty points for it in one episode: multiples of one half. Only those of the computation time differ.
     pub points: [f64; 2],
 }
 
@@ -113,6 +115,28 @@ impl Competition {
         zeros.chain(counts.iter().copied()).collect()
     }
 
+    /// The kinds of violations that worlds report: all but the computation time, which the platform measures.
+    pub fn world_violations(&self) -> impl Iterator<Item = ViolationName> + Clone + '_ {
+        let is_of_world = |name: &ViolationName| *name != ViolationName::COMPUTATION_TIME;
+        self.violations
+            .iter()
+            .map(|info| info.name)
+            .filter(is_of_world)
+    }
+
+    /// The description of a kind of violation; `None` if the competition has no such kind.
+    #[must_use]
+    pub fn violation(&self, name: ViolationName) -> Option<&ViolationInfo> {
+        self.violations.iter().find(|info| info.name == name)
+    }
+
+    /// Penalty points for the limits that an episode violated, without those for its computation times.
+    #[must_use]
+    pub fn violation_points(&self, violations: &Violations) -> f64 {
+        let points = |name| self.violation(name).map_or(0.0, |info| info.points[1]);
+        violations.violated().map(points).sum()
+    }
+
     /// A task of this competition from its name.
     ///
     /// # Errors
@@ -152,6 +176,19 @@ impl Competition {
         }
         let is_played = |task: &Task| map.contains_key(task);
         Ok(self.task_names().filter(is_played).collect())
+    }
+
+    /// Control steps of the longest episode of a task; 0 if the competition has no such task.
+    #[must_use]
+    pub fn max_steps(&self, task: Task) -> u32 {
+        self.task(task).map_or(0, |info| info.max_steps)
+    }
+
+    /// Control steps of the longest episode.
+    #[must_use]
+    pub fn longest_episode(&self) -> u32 {
+        let steps = self.tasks.iter().map(|info| info.max_steps);
+        steps.max().unwrap_or_default()
     }
 
     /// The description of a task; `None` if the competition has no such task.

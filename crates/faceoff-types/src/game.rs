@@ -118,7 +118,7 @@ pub struct SideOutcome {
 }
 
 /// One window of one side: the game's equivalent of an episode.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct GameWindow {
     /// Control steps of the window.
     pub steps: u32,

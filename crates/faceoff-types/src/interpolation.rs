@@ -1,5 +1,6 @@
 //! Interpolations: how the numbers of an agent's action become a trajectory of the robot's joints.
 
+use crate::ActionLayout;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -40,6 +41,17 @@ pub enum Interpolation {
 pub struct UnknownInterpolation(pub i64);
 
 impl Interpolation {
+    /// All interpolations, in the order of error messages.
+    pub const ALL: [Self; 7] = [
+        Self::Linear,
+        Self::Quadratic,
+        Self::Cubic,
+        Self::Quartic,
+        Self::Quintic,
+        Self::LinearBoth,
+        Self::Trajectory,
+    ];
+
     /// The interpolation of a code; `None` is the protocol's null.
     ///
     /// # Errors
@@ -107,6 +119,12 @@ impl Interpolation {
             point[..JOINTS].copy_from_slice(position);
         }
         action
+    }
+}
+
+impl From<Interpolation> for ActionLayout {
+    fn from(interpolation: Interpolation) -> Self {
+        Self::new(interpolation.code(), interpolation.shape())
     }
 }
 

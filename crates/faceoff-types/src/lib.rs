@@ -4,13 +4,13 @@
 //! This crate does no I/O, reads no clock and holds no policy: rules live in `faceoff-scoring`,
 //! physics in `faceoff-sim`.
 
+mod action_space;
 mod agent_task;
 mod archive_format;
 mod bundle_ref;
 mod clock;
 mod competition;
 mod computation_time;
-mod constraint;
 mod day_deadline;
 mod departure_kind;
 pub mod deprecated_names;
@@ -30,6 +30,7 @@ mod outcome;
 mod perturbations;
 mod printable;
 mod profile;
+mod recording;
 mod result;
 mod retention;
 mod round_number;
@@ -58,13 +59,13 @@ mod violation;
 mod worker_name;
 mod zone;
 
+pub use action_space::{ActionLayout, ActionSpace};
 pub use agent_task::{AgentTask, Side};
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
 pub use clock::Clock;
 pub use competition::{Competition, EndInfo, TaskInfo, ViolationInfo};
 pub use computation_time::ComputationTime;
-pub use constraint::{Constraint, Violations};
 pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};
 pub use departure_kind::DepartureKind;
 pub use deprecated_names::DeprecatedNames;
@@ -91,6 +92,7 @@ pub use perturbations::{
 };
 pub use printable::{escape_unprintable, is_printable};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
+pub use recording::{RecordingColumn, RecordingColumns};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult};
 pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
 pub use round_number::{InvalidRoundNumber, RoundNumber};
@@ -117,6 +119,6 @@ pub use tournament_rules::{
 pub use unknown_task::UnknownTask;
 pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use variation::{InvalidTierBounds, TierBounds, Variation};
-pub use violation::{ViolationCounts, ViolationName};
+pub use violation::{ViolationCounts, ViolationName, Violations};
 pub use worker_name::{ParseWorkerNameError, WorkerName};
 pub use zone::{UnknownZone, Zone};

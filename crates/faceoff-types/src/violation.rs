@@ -14,6 +14,52 @@ impl ViolationName {
     pub const COMPUTATION_TIME: Self = Self::new("computation_time");
 }
 
+/// Which limits an episode violated at least once, in the order of the competition. Two are equal if the same limits are violated.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Violations(IndexMap<ViolationName, bool>);
+
+impl Violations {
+    /// The names of the limits and whether each was violated.
+    pub fn iter(&self) -> impl Iterator<Item = (ViolationName, bool)> + '_ {
+        self.0.iter().map(|(name, violated)| (*name, *violated))
+    }
+
+    /// The violated limits.
+    pub fn violated(&self) -> impl Iterator<Item = ViolationName> + '_ {
+        self.iter()
+            .filter_map(|(name, violated)| violated.then_some(name))
+    }
+
+    /// Was the limit violated?
+    #[must_use]
+    pub fn contains(&self, name: ViolationName) -> bool {
+        self.0.get(&name).copied().unwrap_or_default()
+    }
+}
+
+impl PartialEq for Violations {
+    fn eq(&self, other: &Self) -> bool {
+        self.violated().count() == other.violated().count()
+            && self.violated().all(|name| other.contains(name))
+    }
+}
+
+impl Eq for Violations {}
+
+impl FromIterator<(ViolationName, bool)> for Violations {
+    fn from_iter<I: IntoIterator<Item = (ViolationName, bool)>>(violated: I) -> Self {
+        Self(violated.into_iter().collect())
+    }
+}
+
+/// These limits are violated, and no other.
+impl<const N: usize> From<[ViolationName; N]> for Violations {
+    fn from(violated: [ViolationName; N]) -> Self {
+        violated.into_iter().map(|name| (name, true)).collect()
+    }
+}
+
 /// For each kind of violation, the number of episodes (or of windows of a game) with it, in the order of the competition.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]

@@ -6,7 +6,7 @@
 //! known fields refuse nested values, so no line can exhaust the stack.
 
 use crate::protocol::PROTOCOL_VERSION;
-use faceoff_types::{AgentFaultKind, Interpolation};
+use faceoff_types::{ActionLayout, ActionSpace, AgentFaultKind};
 use fields::Fields;
 
 mod action;
@@ -25,44 +25,62 @@ const MAX_LABEL_CHARS: usize = 100;
 /// The answer to `hello`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ready {
-    /// How the agent's actions become a trajectory.
-    pub interpolation: Interpolation,
+    /// The layout of the agent's actions.
+    pub layout: ActionLayout,
     /// The agent's name for itself, if it gave one as a string.
     pub name: Option<String>,
     /// The agent's version, if it gave one as a string.
     pub version: Option<String>,
 }
 
-/// Parses the answer to `hello`. `line` is without the newline.
+/// Parses the answer to `hello` in a competition with these actions. `line` is without the newline.
 ///
 /// # Errors
 /// An agent fault, if the line is not a JSON object or not `ready`, has another protocol version, an unknown or no
-/// interpolation, or a repeated key.
-pub fn parse_ready(line: &[u8]) -> Result<Ready, AgentFaultKind> {
-    const EXPECTED: &str = "ready with protocol 1 and an interpolation";
+/// layout of actions where one must be stated, or a repeated key.
+pub fn parse_ready(line: &[u8], actions: &ActionSpace) -> Result<Ready, AgentFaultKind> {
+    let expected = if actions.is_stated {
+        "ready with protocol 1 and an interpolation"
+    } else {
+        "ready with protocol 1"
+    };
     let fields = Fields::parse(line, None)?;
-    fields.require_type("ready", EXPECTED)?;
-    fields.require_integer("protocol", &fields.protocol, PROTOCOL_VERSION, EXPECTED)?;
-    let wrong = |got: String| AgentFaultKind::WrongMessage {
-        expected: format!("{EXPECTED} (1, 2, 3, 4, 5, -1 or null)"),
-        got,
+    fields.require_type("ready", expected)?;
+    fields.require_integer("protocol", &fields.protocol, PROTOCOL_VERSION, expected)?;
+    let layout = match actions.only_layout() {
+        Some(layout) => layout,
+        None => stated_layout(actions, fields.interpolation.as_ref(), expected)?,
     };
-    let code = match &fields.interpolation {
-        None => return Err(wrong("ready without interpolation".to_owned())),
-        Some(Scalar::Null) => None,
-        Some(Scalar::Integer(code)) => Some(*code),
-        Some(other) => return Err(wrong(format!("ready with interpolation {other}"))),
-    };
-    let interpolation = Interpolation::from_code(code)
-        .map_err(|unknown| wrong(format!("ready with interpolation {}", unknown.0)))?;
     let label = |field: &Option<Scalar<'_>>| match field {
         Some(Scalar::Text(text)) => Some(text.chars().take(MAX_LABEL_CHARS).collect()),
         _ => None,
     };
     Ok(Ready {
-        interpolation,
+        layout,
         name: label(&fields.name),
         version: label(&fields.version),
+    })
+}
+
+/// The layout that an agent states.
+fn stated_layout(
+    actions: &ActionSpace,
+    stated: Option<&Scalar<'_>>,
+    expected: &str,
+) -> Result<ActionLayout, AgentFaultKind> {
+    let wrong = |got: String| AgentFaultKind::WrongMessage {
+        expected: format!("{expected} ({})", actions.codes_text()),
+        got,
+    };
+    let code = match stated {
+        None => return Err(wrong("ready without interpolation".to_owned())),
+        Some(Scalar::Null) => None,
+        Some(Scalar::Integer(code)) => Some(*code),
+        Some(other) => return Err(wrong(format!("ready with interpolation {other}"))),
+    };
+    actions.find(code).ok_or_else(|| {
+        let code = code.map_or_else(|| "null".to_owned(), |code| code.to_string());
+        wrong(format!("ready with interpolation {code}"))
     })
 }
 
@@ -79,7 +97,7 @@ pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind
 
 /// Parses the answer to `step` into `action`, row-major. `line` is without the newline.
 ///
-/// On success `action` holds exactly [`Interpolation::len`] numbers of at most
+/// On success `action` holds exactly [`ActionLayout::len`] numbers of at most
 /// [`ACTION_LIMIT`](faceoff_types::ACTION_LIMIT) in magnitude; after an error its content is undefined.
 ///
 /// # Errors
@@ -88,11 +106,11 @@ pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind
 pub fn parse_act(
     line: &[u8],
     step: u32,
-    interpolation: Interpolation,
+    layout: ActionLayout,
     action: &mut Vec<f64>,
 ) -> Result<(), AgentFaultKind> {
     action.clear();
-    let fields = Fields::parse(line, Some((interpolation, &mut *action)))?;
+    let fields = Fields::parse(line, Some((layout, &mut *action)))?;
     if !fields.is_act(step) {
         let expected = format!("act with step {step}");
         fields.require_type("act", &expected)?;

@@ -28,6 +28,6 @@ mod quote;
 pub mod remote;
 
 pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError};
-pub use message::{Env, Message};
+pub use message::Message;
 pub use protocol::{MAX_LINE_BYTES, PROTOCOL_VERSION};
 pub use quote::quote_line;

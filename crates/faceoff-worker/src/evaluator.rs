@@ -1,13 +1,17 @@
 //! The evaluator: what a slot calls to unpack bundles and to run validations, shards, games and scorings. A *shard* is a
 //! range of episodes of one task; an evaluation is played in shards.
 
+use faceoff_episode::Simulator;
 use faceoff_runner::{
     AgentEnvironment, AssembledDataset, EvaluationMeta, GameReport, GameSpec, LiveFeed,
     LiveFeedSink, Observer, POSITION_INTERVAL, PlatformFault, ShardReport, ShardSpec,
     ValidationReport, ValidationSpec,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 /// Runs the jobs of a slot. The only implementation is the runner; tests replace it to inject platform faults, which a
 /// healthy machine does not have.
@@ -62,7 +66,10 @@ pub(crate) trait Evaluator: Send + Sync {
 
 /// The evaluator of `faceoff-runner`, which `faceoff eval` also uses.
 #[derive(Debug)]
-pub(crate) struct Runner;
+pub(crate) struct Runner {
+    /// The simulator of the recordings that are merged.
+    pub(crate) simulator: Arc<dyn Simulator>,
+}
 
 impl Evaluator for Runner {
     fn unpack(
@@ -117,7 +124,9 @@ impl Evaluator for Runner {
         archive: &Path,
         clips: &Path,
     ) -> Result<AssembledDataset, PlatformFault> {
-        let assembled = faceoff_runner::assemble(meta, recordings, archive, Some(clips))?;
+        let simulator = self.simulator.as_ref();
+        let assembled =
+            faceoff_runner::assemble(meta, recordings, archive, Some(clips), simulator)?;
         Ok(assembled)
     }
 }

@@ -11,6 +11,7 @@ use crate::{
     server::JobServer,
 };
 use anyhow::Context as _;
+use faceoff_episode::Simulator;
 use faceoff_runner::{AgentEnvironment, CLIPS_FILE, GameSpec, Supervision, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentLimits, GameId, SlotTiming, StageRuntimes, ValidationOutcome};
@@ -45,6 +46,7 @@ pub(crate) struct AgentHost {
     /// May agents be container images?
     pub(crate) images: bool,
     pub(crate) cpus: SlotCpus,
+    pub(crate) simulator: Arc<dyn Simulator>,
 }
 
 impl AgentHost {
@@ -68,6 +70,7 @@ impl AgentHost {
             images: self.images,
             agent_cpus,
             supervision: Supervision::new(move || progress.stopped()),
+            simulator: Arc::clone(&self.simulator),
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::{
     local_files::LocalFiles,
     server::{ClaimResult, JobServer, LeaseStatus, QueueVersion, ReleaseReason},
 };
+use faceoff_episode::Simulator;
 use faceoff_live::LiveState;
 use faceoff_store::{
     Artifacts, ClaimedJob, CommitOutcome, GameCommit, GameRecording, Job, JobClaim, JobFilter,
@@ -38,7 +39,7 @@ pub(crate) struct LocalServer {
     pub(crate) clock: Clock,
     /// Duration of a lease without renewal, seconds.
     pub(crate) lease_s: u32,
-    pub(crate) competition: Arc<Competition>,
+    pub(crate) simulator: Arc<dyn Simulator>,
     /// The server's limits of agents; a stage may have others.
     pub(crate) limits: AgentLimits,
     pub(crate) claim_pause: ClaimPause,
@@ -47,6 +48,11 @@ pub(crate) struct LocalServer {
 }
 
 impl LocalServer {
+    /// The competition whose jobs it hands out.
+    pub(crate) fn competition(&self) -> &Arc<Competition> {
+        self.simulator.competition()
+    }
+
     /// Ends the leases of a worker whose process has ended, so that its jobs need not wait for their expiry.
     pub(crate) async fn end_leases_of(&self, worker: &str) -> Result<u64, StoreError> {
         self.store.end_leases_of(worker, self.clock.now()).await
@@ -77,7 +83,7 @@ impl LocalServer {
                 submission: submission.id,
                 agent: self.agent(submission.bundle, &limits),
                 spec: ValidationSpec {
-                    tasks: self.competition.task_names().collect(),
+                    tasks: self.competition().task_names().collect(),
                     seed: seeds.episodes,
                     mismatch_seed: seeds.mismatch,
                 },
@@ -158,7 +164,7 @@ impl LocalServer {
                     mismatch_seed: seeds.mismatch,
                     agent: agent_name,
                     ruleset: run.ruleset,
-                    task_weights: self.competition.weights(&run.plan.variation),
+                    task_weights: self.competition().weights(&run.plan.variation),
                     variation: run.plan.variation,
                 },
                 recordings,
@@ -193,7 +199,7 @@ impl LocalServer {
         let status = lease_status(self.store.commit_shard(claim, commit, now).await?);
         // Runs with recordings are scored; the others end with their last shard.
         if status == LeaseStatus::Held && recording.is_none() {
-            episode_summaries::store_missing(&self.store, now).await;
+            episode_summaries::store_missing(&self.store, self.competition(), now).await;
         }
         if status == LeaseStatus::Lost
             && let Some(recording) = recording
@@ -249,7 +255,7 @@ impl LocalServer {
             .finish_evaluation(claim, result, dataset, blake3, now);
         let status = lease_status(finished.await?);
         if status == LeaseStatus::Held {
-            episode_summaries::store_missing(&self.store, now).await;
+            episode_summaries::store_missing(&self.store, self.competition(), now).await;
         }
         let artifacts = self.store.artifacts();
         let cleaned = match (status, dataset.rsplit_once('/')) {

@@ -21,7 +21,7 @@ use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::{JobFilter, Store, StoreError};
-use faceoff_types::{AgentLimits, Clock, Competition};
+use faceoff_types::{AgentLimits, Clock};
 use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
 use tokio_util::sync::CancellationToken;
@@ -64,7 +64,6 @@ pub struct WorkerConfig {
     pub lease_s: u32,
     /// Limits of bundles.
     pub bundle_limits: BundleLimits,
-    pub competition: Arc<Competition>,
 }
 
 /// Configuration of slots, local or remote.
@@ -95,7 +94,9 @@ pub async fn run(
 ) -> anyhow::Result<()> {
     let server = config.local_server(store, live, clock);
     let slots_server = Arc::new(server.clone());
-    let evaluator = Arc::new(Runner);
+    let evaluator = Arc::new(Runner {
+        simulator: config.slots.agent.simulator.clone(),
+    });
     run_with(
         server,
         slots_server,
@@ -123,7 +124,7 @@ impl WorkerConfig {
                 time: self.slots.agent.time.clone(),
             },
             job_filter: self.job_filter,
-            competition: Arc::clone(&self.competition),
+            simulator: Arc::clone(&self.slots.agent.simulator),
         }
     }
 }
@@ -231,6 +232,7 @@ pub(crate) async fn run_slots(
                     runtimes: config.agent.runtimes.clone(),
                     images: config.agent.images,
                     cpus,
+                    simulator: config.agent.simulator.clone(),
                 },
                 bundles: BundleCache::new(&folder),
                 folder,
@@ -308,7 +310,7 @@ async fn report_stalled_slots(metrics: Metrics, stop: CancellationToken) {
 /// Removes obsolete data periodically.
 async fn run_cleanup(server: LocalServer, interval: Duration, shutdown: CancellationToken) {
     loop {
-        cleanup::clean_up(&server.store, server.clock.now()).await;
+        cleanup::clean_up(&server.store, server.competition(), server.clock.now()).await;
         tokio::select! {
             () = shutdown.cancelled() => return,
             () = tokio::time::sleep(interval) => {}

@@ -1,14 +1,20 @@
 //! The competition that this program runs.
 
+use faceoff_airhockey::AirHockey;
+use faceoff_episode::Simulator;
 use faceoff_types::{Competition, InvalidWeights, Task, TaskWeights, UnknownTask};
 use std::sync::{Arc, LazyLock};
 
-static COMPETITION: LazyLock<Arc<Competition>> =
-    LazyLock::new(|| Arc::new(faceoff_airhockey::competition()));
+static SIMULATOR: LazyLock<Arc<AirHockey>> = LazyLock::new(faceoff_airhockey::simulator);
 
 /// The only competition that is compiled in.
 pub fn competition() -> &'static Arc<Competition> {
-    &COMPETITION
+    SIMULATOR.competition()
+}
+
+/// Its simulator.
+pub fn simulator() -> Arc<dyn Simulator> {
+    SIMULATOR.clone()
 }
 
 /// Parses a task on the command line.

@@ -3,7 +3,7 @@
 //! The defaults are the `Default` implementations of the sections and of their types. Tests compare the commented file and
 //! the documentation (`docs/configuration.md`) with them.
 
-use crate::competition::competition;
+use crate::competition::{competition, simulator};
 use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, MinTransferRate};
 use faceoff_notify::WebhookRules;
@@ -425,6 +425,7 @@ impl Config {
             images: self.sandbox.images,
             agent_cpus: self.workers.agent_cpus.clone(),
             supervision: Supervision::default(),
+            simulator: simulator(),
         }
     }
 

@@ -1,8 +1,8 @@
 //! Plays games of two robots in this process, without pipes, clocks and sandbox.
 
 use faceoff_sim::{Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
-use faceoff_sim::{PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed, Violations};
+use faceoff_sim::{PerturbationSettings, Plant, ViolatedGroups};
+use faceoff_types::{Profile, Seed};
 use striker::{Env, Policy, Task};
 
 use super::env::env;
@@ -67,7 +67,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    fn count_window(&mut self, violations: &[Violations; 2]) {
+    fn count_window(&mut self, violations: &[ViolatedGroups; 2]) {
         for (robot, v) in violations.iter().enumerate() {
             let violated = [v.ee, v.link, v.joint_pos, v.joint_vel];
             for (k, (is_violated, points)) in violated.into_iter().zip(POINTS).enumerate() {

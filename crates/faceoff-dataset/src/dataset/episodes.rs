@@ -7,9 +7,10 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, UInt32Type},
 };
-use faceoff_types::{ComputationTime, EpisodeOutcome, InvalidShortName, Violations};
+use faceoff_types::{Competition, ComputationTime, EpisodeOutcome, InvalidShortName};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// One row of `episodes.parquet`, without the states and hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,20 +24,20 @@ pub struct EpisodeRecord {
     pub interpolation: Option<String>,
     /// Penalty points, including those for computation time.
     pub penalty_points: f64,
-    /// The observation after the last answered step: 23 numbers for `hit`, 20 otherwise; empty if no step was
-    /// answered.
+    /// The observation after the last answered step; empty if no step was answered.
     #[serde(skip)]
     pub last_observation: Vec<f64>,
-    /// The puck's true state before the first step, table frame: x, y, yaw, vx, vy, yaw rate.
+    /// The true state before the first step, in the order of the competition's columns
+    /// ([`RecordingColumns::state`](faceoff_types::RecordingColumns::state)).
     #[serde(skip)]
-    pub initial_puck: [f64; 6],
-    /// The end effector before the first step, in the robot's own base frame: x, y, z.
-    #[serde(skip)]
-    pub initial_ee: [f64; 3],
+    pub initial_state: Vec<Option<f64>>,
 }
 
 /// The table as Arrow batches, after a check of its columns.
-pub(crate) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError> {
+pub(crate) fn batches(
+    table: FileRange,
+    competition: &Arc<Competition>,
+) -> Result<Vec<RecordBatch>, DatasetError> {
     let bytes = table.bytes;
     let builder = ParquetRecordBatchReaderBuilder::try_new(table)
         .and_then(|builder| {
@@ -44,7 +45,11 @@ pub(crate) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError
             Ok(builder)
         })
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;
-    check_columns(EPISODES_FILE, builder.schema(), EpisodeRows::new().schema())?;
+    check_columns(
+        EPISODES_FILE,
+        builder.schema(),
+        EpisodeRows::new(competition).schema(),
+    )?;
     let reader = builder
         .build()
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;
@@ -53,12 +58,15 @@ pub(crate) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError
         .map_err(DatasetError::unreadable(EPISODES_FILE))
 }
 
-pub(super) fn records(batches: &[RecordBatch]) -> Result<Vec<EpisodeRecord>, DatasetError> {
+pub(super) fn records(
+    batches: &[RecordBatch],
+    competition: &Competition,
+) -> Result<Vec<EpisodeRecord>, DatasetError> {
     let mut records = Vec::new();
     for batch in batches {
         let columns = Columns(batch);
         for row in 0..batch.num_rows() {
-            let record = columns.record(row);
+            let record = columns.record(row, competition);
             records.push(record.map_err(DatasetError::unreadable(format!(
                 "{EPISODES_FILE}, row {}",
                 records.len()
@@ -93,6 +101,11 @@ impl<'a> Columns<'a> {
         column.value(row)
     }
 
+    fn optional_float(&self, name: &str, row: usize) -> Option<f64> {
+        let is_valid = self.column(name).is_valid(row);
+        is_valid.then(|| self.float(name, row))
+    }
+
     fn flag(&self, name: &str, row: usize) -> bool {
         let column: &BooleanArray = self.column(name).as_boolean();
         column.is_valid(row) && column.value(row)
@@ -107,7 +120,7 @@ impl<'a> Columns<'a> {
             .collect()
     }
 
-    pub fn record(&self, row: usize) -> Result<EpisodeRecord, String> {
+    pub fn record(&self, row: usize, competition: &Competition) -> Result<EpisodeRecord, String> {
         let absent = |name: &str| format!("{name} is absent");
         let text = |name| self.text(name, row).ok_or_else(|| absent(name));
         let int = |name| self.int(name, row).ok_or_else(|| absent(name));
@@ -122,12 +135,10 @@ impl<'a> Columns<'a> {
             end: serde_json::from_value(end.into())
                 .map_err(|_| format!("the end {end:?} is unknown"))?,
             success: self.flag("success", row),
-            violations: Violations {
-                ee: self.flag("violated_ee", row),
-                link: self.flag("violated_link", row),
-                joint_pos: self.flag("violated_joint_pos", row),
-                joint_vel: self.flag("violated_joint_vel", row),
-            },
+            violations: competition
+                .world_violations()
+                .map(|name| (name, self.flag(&format!("violated_{name}"), row)))
+                .collect(),
             computation_time: ComputationTime {
                 mean_s: self.float("computation_time_mean_s", row),
                 max_s: self.float("computation_time_max_s", row),
@@ -142,9 +153,12 @@ impl<'a> Columns<'a> {
             interpolation: self.text("interpolation", row).map(str::to_owned),
             penalty_points: self.float("penalty_points", row),
             last_observation: self.last_observation(row),
-            initial_puck: ["x", "y", "yaw", "vx", "vy", "yaw_rate"]
-                .map(|name| self.float(&format!("initial_puck_{name}"), row)),
-            initial_ee: ["x", "y", "z"].map(|name| self.float(&format!("initial_ee_{name}"), row)),
+            initial_state: competition
+                .recording
+                .state
+                .iter()
+                .map(|column| self.optional_float(&format!("initial_{}", column.name), row))
+                .collect(),
         })
     }
 }

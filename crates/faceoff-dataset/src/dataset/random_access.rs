@@ -9,8 +9,7 @@ use crate::{error::DatasetError, files::STEPS_FILE};
 use arrow_array::{
     BooleanArray, RecordBatch, RecordBatchReader, StringArray, UInt32Array, cast::AsArray,
 };
-use faceoff_sim::EPISODE_STEPS;
-use faceoff_types::Task;
+use faceoff_types::{Competition, Task};
 use parquet::{
     arrow::arrow_reader::{ArrowReaderMetadata, RowSelection},
     errors::{ParquetError, Result},
@@ -31,12 +30,13 @@ pub(super) fn episode<R: ChunkReader + Clone + 'static>(
     task: Task,
     episode: u32,
     columns: Option<&[String]>,
+    competition: &Competition,
 ) -> std::result::Result<RecordBatch, DatasetError> {
     let unreadable = || DatasetError::unreadable::<ParquetError>(STEPS_FILE);
     let (metadata, groups) = row_groups(&table, task, episode).map_err(unreadable())?;
 
     let key_columns = ["task".to_owned(), "episode".to_owned()];
-    let keys = reader(table.clone(), &metadata, Some(&key_columns))?
+    let keys = reader(table.clone(), &metadata, Some(&key_columns), competition)?
         .with_row_groups(groups.clone())
         .build()
         .map_err(unreadable())?;
@@ -45,14 +45,15 @@ pub(super) fn episode<R: ChunkReader + Clone + 'static>(
         .collect::<Result<Vec<BooleanArray>>>()
         .map_err(unreadable())?;
     let count: usize = filters.iter().map(BooleanArray::true_count).sum();
-    if count > EPISODE_STEPS as usize {
+    let longest = competition.max_steps(task);
+    if count > longest as usize {
         return Err(DatasetError::Unreadable(format!(
-            "{STEPS_FILE} has {count} steps of {task}, episode {episode}; at most {EPISODE_STEPS} \
+            "{STEPS_FILE} has {count} steps of {task}, episode {episode}; at most {longest} \
              are possible"
         )));
     }
 
-    let mut batches = reader(table, &metadata, columns)?
+    let mut batches = reader(table, &metadata, columns, competition)?
         .with_row_groups(groups)
         .with_row_selection(RowSelection::from_filters(&filters))
         .build()

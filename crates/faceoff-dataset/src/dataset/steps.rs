@@ -4,11 +4,11 @@ use super::{file_range::FileRange, footer};
 use crate::{
     error::DatasetError,
     files::STEPS_FILE,
-    table::{HOST_TIME, StepRows, with_zero_host_time},
+    table::{HOST_TIME, step_schema, with_zero_host_time},
 };
 use arrow_array::{RecordBatch, RecordBatchReader};
 use arrow_schema::{DataType, Schema};
-use faceoff_sim::AirHockeyTask;
+use faceoff_types::Competition;
 use parquet::{
     arrow::{
         ProjectionMask,
@@ -18,7 +18,7 @@ use parquet::{
     },
     file::reader::ChunkReader,
 };
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 /// Number of rows in a decoded batch.
 pub(crate) const BATCH_ROWS: usize = 1024;
@@ -59,11 +59,12 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     table: R,
     metadata: &ArrowReaderMetadata,
     columns: Option<&[String]>,
+    competition: &Competition,
 ) -> Result<ParquetRecordBatchReaderBuilder<R>, DatasetError> {
     let found = metadata.schema();
     let lacks_host_time = lacks_host_time(found);
-    let rows = StepRows::new(AirHockeyTask::Hit.into());
-    let fields = rows.schema().fields().iter();
+    let all = step_schema(&competition.recording);
+    let fields = all.fields().iter();
     let fields = fields.filter(|field| !lacks_host_time || field.name() != HOST_TIME);
     let expected = Schema::new(fields.cloned().collect::<Vec<_>>());
     check_columns(STEPS_FILE, found, &expected)?;
@@ -96,7 +97,7 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     Ok(
         ParquetRecordBatchReaderBuilder::new_with_metadata(table, metadata.clone())
             .with_projection(mask)
-            .with_batch_size(BATCH_ROWS),
+            .with_batch_size(BATCH_ROWS.max(competition.longest_episode() as usize)),
     )
 }
 
@@ -105,17 +106,25 @@ pub(super) fn reader<R: ChunkReader + 'static>(
 pub struct StepTable {
     table: FileRange,
     metadata: ArrowReaderMetadata,
+    competition: Arc<Competition>,
 }
 
 impl StepTable {
-    pub(crate) fn open(table: FileRange) -> Result<Self, DatasetError> {
+    pub(crate) fn open(
+        table: FileRange,
+        competition: &Arc<Competition>,
+    ) -> Result<Self, DatasetError> {
         let metadata = ArrowReaderMetadata::load(&table, Default::default())
             .and_then(|metadata| {
                 footer::check(metadata.metadata(), table.bytes)?;
                 Ok(metadata)
             })
             .map_err(DatasetError::unreadable(STEPS_FILE))?;
-        Ok(Self { table, metadata })
+        Ok(Self {
+            table,
+            metadata,
+            competition: competition.clone(),
+        })
     }
 
     /// Does the table record host interference? Tables since layout 4 do.
@@ -137,7 +146,8 @@ impl StepTable {
             let exists = |name: &&String| !(adds_host_time && is_host_time(name));
             names.iter().filter(exists).cloned().collect()
         });
-        let reader = reader(self.table, &self.metadata, columns.as_deref())?
+        let columns = columns.as_deref();
+        let reader = reader(self.table, &self.metadata, columns, &self.competition)?
             .build()
             .map_err(DatasetError::unreadable(STEPS_FILE))?;
         Ok(StepBatches {

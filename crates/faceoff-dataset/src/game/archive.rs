@@ -12,7 +12,7 @@ use crate::{
     digest,
     error::RecordingError,
     files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, allow_missing},
-    simulator::simulator_id,
+    simulator::game_simulator_id,
 };
 use faceoff_episode::FinishedGame;
 use faceoff_scoring::tournament::{GameScore, GameSettings, score_game};
@@ -162,7 +162,7 @@ impl ArchiveContents<'_> {
         archive.add_json(CALIBRATION_FILE, self.calibration)?;
         let manifest = GameManifest {
             schema: GAME_SCHEMA.to_owned(),
-            simulator: simulator_id().clone(),
+            simulator: game_simulator_id(),
             spec: self.spec.clone(),
             agents: self.agents.clone(),
             files: archive.files().clone(),

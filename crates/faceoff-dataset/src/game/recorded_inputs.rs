@@ -1,15 +1,13 @@
 //! Inputs of a game that cannot be simulated and are read from its recording: answers, their times, faults, and the
 //! start and reset of each side.
 
-use crate::{
-    dataset::Columns, interpolation_text, table::SIDE_TIMES, times::seconds, verify::Difference,
-};
+use crate::{dataset::Columns, table::SIDE_TIMES, times::seconds, verify::Difference};
 use arrow_array::{
     Array, Float64Array, Int64Array, ListArray, RecordBatch,
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_episode::{AnswerTiming, Effect, RallyEntry, Response, SideFault};
+use faceoff_episode::{AnswerTiming, Effect, RallyEntry, Response, SideFault, action_space};
 use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, AgentTask, Interpolation, Side};
 
 /// Location of a row in a recording.
@@ -87,7 +85,7 @@ impl RecordedEntry {
         let interpolation = columns
             .text("interpolation", 0)
             .map(|text| {
-                interpolation_text::parse(text)
+                parse_interpolation(text)
                     .ok_or_else(|| location.difference("interpolation", text, "1 to 5, -1 or null"))
             })
             .transpose()?;
@@ -283,4 +281,10 @@ fn read_time(
         negative @ ..0 => Err(location.difference(name, negative.to_string(), "at least 0")),
         time => Ok(Some(seconds(time))),
     }
+}
+
+/// Parses the code of an interpolation: `1` … `5`, `-1` or `null`.
+fn parse_interpolation(text: &str) -> Option<Interpolation> {
+    let layout = action_space().parse(text)?;
+    Interpolation::from_code(layout.code()).ok()
 }

@@ -9,7 +9,7 @@ use super::{
     table::GameTable,
 };
 use crate::{
-    arena::game_arena,
+    conditions::game_arena,
     dataset::Columns,
     error::DatasetError,
     verify::{Difference, VerifyError, compare},

@@ -7,7 +7,7 @@ use crate::{
     error::DatasetError,
     files::RESULTS_FILE,
     score::json_file,
-    simulator::simulator_id,
+    simulator::game_simulator_id,
     verify::{VerifyError, compare},
 };
 use faceoff_scoring::tournament::{GameScore, score_game};
@@ -60,7 +60,7 @@ pub fn verify_game(
 
 /// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
 fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
-    let (manifest, current) = (recording.manifest(), simulator_id());
+    let (manifest, current) = (recording.manifest(), game_simulator_id());
     let ruleset = manifest.spec.ruleset;
     if !ruleset.has_games() {
         let with_games = Ruleset::ALL
@@ -77,7 +77,7 @@ fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
         .perturbations
         .check()
         .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
-    if &manifest.simulator != current {
+    if manifest.simulator != current {
         return Err(DatasetError::Foreign(format!(
             "the game was simulated by version {} (fingerprint {}), this is version {} (fingerprint {}): \
              verify it with the version that made it",

@@ -2,7 +2,8 @@
 
 use arrow_array::{ArrayRef, builder::Float64Builder};
 use arrow_schema::{DataType, Field};
-use faceoff_sim::EpisodeState;
+use faceoff_episode::StateColumns;
+use faceoff_types::RecordingColumn;
 use std::sync::Arc;
 
 /// Columns of numbers that are filled row by row, from left to right.
@@ -25,24 +26,18 @@ impl FloatColumns {
         self
     }
 
-    /// Adds the columns of the simulation's true state (without observation noise) to the right; `prefix` begins their
-    /// names. The filtered velocities are left out: they follow from the other columns, and would add a tenth to the size
-    /// of a dataset.
-    pub fn with_state(self, prefix: &str) -> Self {
-        let name = |suffix: &str| format!("{prefix}{suffix}");
-        self.with(
-            ["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|c| name(&format!("puck_{c}"))),
-            false,
-        )
-        .with(joints(&name("q")), false)
-        .with(joints(&name("dq")), false)
-        .with([name("universal_1"), name("universal_2")], false)
-        .with(["x", "y", "z"].map(|c| name(&format!("ee_{c}"))), false)
-        .with(joints(&name("opponent_q")), true)
-        .with(
-            ["x", "y", "z"].map(|c| name(&format!("opponent_ee_{c}"))),
-            true,
-        )
+    /// Adds columns of a competition's recordings to the right, with names after `prefix`. `nullable`: rows may have no values at all.
+    pub fn with_recorded(
+        mut self,
+        prefix: &str,
+        columns: &[RecordingColumn],
+        nullable: bool,
+    ) -> Self {
+        for column in columns {
+            let name = format!("{prefix}{}", column.name);
+            self = self.with([name], nullable || column.optional);
+        }
+        self
     }
 
     /// The columns' names and types.
@@ -50,49 +45,18 @@ impl FloatColumns {
         &self.fields
     }
 
-    /// Appends values to the row.
-    pub fn put(&mut self, values: &[f64]) {
-        for value in values {
-            self.builders[self.next].append_value(*value);
-            self.next += 1;
-        }
+    /// Ends the row with nulls in the columns that are left.
+    pub fn end_short_row(&mut self) {
+        self.put_absent(self.builders.len().saturating_sub(self.next));
+        self.end_row();
     }
 
     /// Appends values to the row, null for `None`.
-    pub fn put_optional<const N: usize>(&mut self, values: Option<[f64; N]>) {
-        match values {
-            Some(values) => self.put(&values),
-            None => self.put_absent(N),
-        }
-    }
-
-    /// Appends `count` nulls to the row.
-    pub fn put_absent(&mut self, count: usize) {
-        for _ in 0..count {
-            self.builders[self.next].append_null();
+    pub fn put_optional(&mut self, values: &[Option<f64>]) {
+        for value in values {
+            self.builders[self.next].append_option(*value);
             self.next += 1;
         }
-    }
-
-    /// Appends the values of the columns of [`FloatColumns::with_state`].
-    pub fn put_state(&mut self, state: &EpisodeState) {
-        let EpisodeState {
-            puck,
-            q,
-            dq,
-            dq_filtered: _,
-            universal,
-            ee,
-            opponent_q,
-            opponent_ee,
-        } = state;
-        self.put(puck);
-        self.put(q);
-        self.put(dq);
-        self.put(universal);
-        self.put(ee);
-        self.put_optional(*opponent_q);
-        self.put_optional(*opponent_ee);
     }
 
     /// Ends the row. Panics if the row is incomplete, which is a bug of this crate.
@@ -111,6 +75,36 @@ impl FloatColumns {
             .iter_mut()
             .map(|builder| Arc::new(builder.finish()) as ArrayRef)
             .collect()
+    }
+}
+
+impl StateColumns for FloatColumns {
+    fn put(&mut self, values: &[f64]) {
+        for value in values {
+            self.builders[self.next].append_value(*value);
+            self.next += 1;
+        }
+    }
+
+    fn put_absent(&mut self, count: usize) {
+        for _ in 0..count {
+            self.builders[self.next].append_null();
+            self.next += 1;
+        }
+    }
+}
+
+/// Values of a state that is written later.
+#[derive(Debug, Default)]
+pub(super) struct StateValues(pub Vec<Option<f64>>);
+
+impl StateColumns for StateValues {
+    fn put(&mut self, values: &[f64]) {
+        self.0.extend(values.iter().copied().map(Some));
+    }
+
+    fn put_absent(&mut self, count: usize) {
+        self.0.extend(std::iter::repeat_n(None, count));
     }
 }
 

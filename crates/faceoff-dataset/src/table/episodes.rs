@@ -1,18 +1,14 @@
 //! Rows of `episodes.parquet`, the table with one row per episode.
 
-use super::{
-    columns::FloatColumns,
-    steps::{observation_columns, put_observation},
-};
+use super::columns::{FloatColumns, StateValues};
 use crate::{digest::StepDigests, error::RecordingError};
 use arrow_array::{
     ArrayRef,
     builder::{ArrayBuilder, BooleanBuilder, StringBuilder, UInt32Builder},
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use faceoff_episode::{AirHockeyWorld, EpisodeStart, StepRow};
-use faceoff_sim::EpisodeState;
-use faceoff_types::EpisodeOutcome;
+use faceoff_episode::{EpisodeStart, StateColumns, StepRow};
+use faceoff_types::{Competition, EpisodeOutcome, ViolationName};
 use std::sync::Arc;
 
 /// Rows of the table of episodes.
@@ -30,7 +26,9 @@ pub(crate) struct EpisodeRows {
     steps: UInt32Builder,
     ends: StringBuilder,
     successes: BooleanBuilder,
-    violations: [BooleanBuilder; 4],
+    /// The kinds of violations that the world reports, and their columns.
+    violations: Vec<(ViolationName, BooleanBuilder)>,
+    competition: Arc<Competition>,
     /// Penalty points and computation times.
     times: FloatColumns,
     faults: StringBuilder,
@@ -47,11 +45,12 @@ pub(crate) struct EpisodeRows {
 struct StartedEpisode {
     seed: String,
     interpolation: Option<String>,
-    initial: EpisodeState,
+    initial: Vec<Option<f64>>,
 }
 
 impl EpisodeRows {
-    pub fn new() -> Self {
+    pub fn new(competition: &Arc<Competition>) -> Self {
+        let recording = &competition.recording;
         let times = FloatColumns::default().with(
             [
                 "penalty_points",
@@ -61,8 +60,9 @@ impl EpisodeRows {
             .map(str::to_owned),
             false,
         );
-        let initial = FloatColumns::default().with_state("initial_");
-        let last = observation_columns("last_obs_", true);
+        let initial = FloatColumns::default().with_recorded("initial_", &recording.state, false);
+        let last = FloatColumns::default().with_recorded("last_obs_", &recording.observation, true);
+        let violations = competition.world_violations();
         let text = |name: &str, nullable| Field::new(name, DataType::Utf8, nullable);
         let flag = |name: &str| Field::new(name, DataType::Boolean, false);
         let mut fields = vec![
@@ -73,11 +73,12 @@ impl EpisodeRows {
             Field::new("steps", DataType::UInt32, false),
             text("end", false),
             flag("success"),
-            flag("violated_ee"),
-            flag("violated_link"),
-            flag("violated_joint_pos"),
-            flag("violated_joint_vel"),
         ];
+        fields.extend(
+            violations
+                .clone()
+                .map(|name| flag(&format!("violated_{name}"))),
+        );
         fields.extend_from_slice(times.fields());
         fields.push(text("fault", true));
         fields.push(text("actions_blake3", false));
@@ -97,7 +98,10 @@ impl EpisodeRows {
             steps: UInt32Builder::new(),
             ends: StringBuilder::new(),
             successes: BooleanBuilder::new(),
-            violations: Default::default(),
+            violations: violations
+                .map(|name| (name, BooleanBuilder::new()))
+                .collect(),
+            competition: competition.clone(),
             times,
             faults: StringBuilder::new(),
             actions_blake3: StringBuilder::new(),
@@ -118,17 +122,20 @@ impl EpisodeRows {
     }
 
     /// Begins an episode; drops one that has not ended.
-    pub fn begin(&mut self, start: &EpisodeStart<'_, AirHockeyWorld>) {
+    pub fn begin(&mut self, start: &EpisodeStart<'_>) {
+        let mut initial = StateValues::default();
+        start.world.record_state(&mut initial);
+        let stated = start.layout.filter(|_| self.competition.actions.is_stated);
         self.started = Some(StartedEpisode {
             seed: start.seed.to_string(),
-            interpolation: start.choice.map(|code| code.to_string()),
-            initial: start.state.clone(),
+            interpolation: stated.map(|layout| layout.to_string()),
+            initial: initial.0,
         });
         self.digests = StepDigests::default();
         self.last_observation.clear();
     }
 
-    pub fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
+    pub fn step(&mut self, row: &StepRow<'_>) {
         self.digests.add(row.action, &row.timing);
         self.last_observation.clear();
         self.last_observation
@@ -145,24 +152,18 @@ impl EpisodeRows {
         })?;
         self.seeds.append_value(started.seed);
         self.interpolations.append_option(started.interpolation);
-        self.initial.put_state(&started.initial);
+        self.initial.put_optional(&started.initial);
         self.initial.end_row();
         self.tasks.append_value(outcome.task.as_str());
         self.episodes.append_value(outcome.episode);
         self.steps.append_value(outcome.steps);
         self.ends.append_value(outcome.end.as_str());
         self.successes.append_value(outcome.success);
-        let violations = outcome.violations;
-        for (column, violated) in self.violations.iter_mut().zip([
-            violations.ee,
-            violations.link,
-            violations.joint_pos,
-            violations.joint_vel,
-        ]) {
-            column.append_value(violated);
+        for (name, column) in &mut self.violations {
+            column.append_value(outcome.violations.contains(*name));
         }
         self.times.put(&[
-            faceoff_scoring::episode_penalty(outcome),
+            faceoff_scoring::episode_penalty(&self.competition, outcome),
             outcome.computation_time.mean_s,
             outcome.computation_time.max_s,
         ]);
@@ -178,8 +179,8 @@ impl EpisodeRows {
         self.actions_blake3.append_value(actions);
         self.times_blake3.append_value(times);
         self.host_noise_reruns.append_value(host_noise_reruns);
-        put_observation(&mut self.last, &self.last_observation);
-        self.last.end_row();
+        self.last.put(&self.last_observation);
+        self.last.end_short_row();
         Ok(())
     }
 
@@ -197,7 +198,7 @@ impl EpisodeRows {
         columns.extend(
             self.violations
                 .iter_mut()
-                .map(|column| Arc::new(column.finish()) as ArrayRef),
+                .map(|(_, column)| Arc::new(column.finish()) as ArrayRef),
         );
         columns.extend(self.times.take());
         columns.push(Arc::new(self.faults.finish()));

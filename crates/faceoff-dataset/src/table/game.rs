@@ -3,7 +3,7 @@
 
 use super::{
     columns::{FloatColumns, joints},
-    steps::{CONSTRAINTS, observation_columns, put_observation},
+    steps::constraint_columns,
 };
 use crate::{error::RecordingError, times::nanoseconds};
 use arrow_array::{
@@ -13,7 +13,9 @@ use arrow_array::{
     },
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use faceoff_episode::{GameStepRow, RallyEntry, RallyRow, RallyStart};
+use faceoff_episode::{
+    GameStepRow, RallyEntry, RallyRow, RallyStart, StateColumns, recording_columns,
+};
 use faceoff_types::{AgentFault, Side};
 use std::sync::Arc;
 
@@ -122,8 +124,10 @@ pub(crate) const SIDE_TIMES: [&str; 3] = ["computation_time_ns", "host_time_ns",
 
 impl SideRows {
     pub fn new(side: Side) -> Self {
-        let observations = observation_columns("obs_", false);
-        let constraints = FloatColumns::default().with(CONSTRAINTS.map(str::to_owned), false);
+        let recording = recording_columns();
+        let observations =
+            FloatColumns::default().with_recorded("obs_", &recording.observation, false);
+        let constraints = FloatColumns::default().with(constraint_columns(&recording), false);
         let item = Arc::new(Field::new_list_field(DataType::Float64, false));
         let mut fields = StepNumbers::fields().to_vec();
         fields.extend_from_slice(observations.fields());
@@ -148,8 +152,8 @@ impl SideRows {
     }
 
     pub fn observe(&mut self, observation: &[f64]) {
-        put_observation(&mut self.observations, observation);
-        self.observations.end_row();
+        self.observations.put(observation);
+        self.observations.end_short_row();
     }
 
     pub fn push(&mut self, row: &GameStepRow<'_>) {

@@ -1,38 +1,47 @@
 //! Rows of `steps.parquet`, the table with one row per answered control step.
 
-use super::columns::{FloatColumns, joints};
+use super::columns::FloatColumns;
 use crate::times::nanoseconds;
 use arrow_array::{
     ArrayRef, Int64Array, RecordBatch, StringArray,
     builder::{Float64Builder, Int64Builder, ListBuilder, UInt32Builder},
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
-use faceoff_episode::{AirHockeyWorld, StepRow};
-use faceoff_types::Task;
+use faceoff_episode::{StateColumns, StepRow};
+use faceoff_types::{RecordingColumns, Task};
 use std::sync::Arc;
 
-/// Length of the longest observation, which includes the position of an opponent.
-const MAX_OBSERVATION_NUMBERS: usize = 23;
-
-/// Columns of an observation in the protocol's order, with names after `prefix`; absent numbers are null.
-pub(super) fn observation_columns(prefix: &str, nullable: bool) -> FloatColumns {
-    FloatColumns::default()
-        .with(
-            ["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|c| format!("{prefix}puck_{c}")),
-            nullable,
-        )
-        .with(joints(&format!("{prefix}q")), nullable)
-        .with(joints(&format!("{prefix}dq")), nullable)
-        .with(
-            ["x", "y", "z"].map(|c| format!("{prefix}opponent_ee_{c}")),
-            true,
-        )
+/// The columns of a competition's recordings: those of observations, and those of states and limits.
+fn recorded_columns(recording: &RecordingColumns) -> [FloatColumns; 2] {
+    let columns = FloatColumns::default;
+    [
+        columns().with_recorded("obs_", &recording.observation, false),
+        columns()
+            .with_recorded("", &recording.state, false)
+            .with(constraint_columns(recording), false),
+    ]
 }
 
-/// Appends an observation to its columns; an empty observation gives nulls.
-pub(super) fn put_observation(columns: &mut FloatColumns, observation: &[f64]) {
-    columns.put(observation);
-    columns.put_absent(MAX_OBSERVATION_NUMBERS - observation.len());
+fn action_item() -> Field {
+    Field::new_list_field(DataType::Float64, false)
+}
+
+/// The columns of the table and their types.
+pub(crate) fn step_schema(recording: &RecordingColumns) -> Schema {
+    let [observations, state_and_constraints] = recorded_columns(recording);
+    let mut fields = vec![
+        Field::new("task", DataType::Utf8, false),
+        Field::new("episode", DataType::UInt32, false),
+        Field::new("step", DataType::UInt32, false),
+    ];
+    fields.extend_from_slice(observations.fields());
+    let action = DataType::List(Arc::new(action_item()));
+    fields.push(Field::new("action", action, false));
+    fields.push(Field::new(COMPUTATION_TIME, DataType::Int64, false));
+    fields.push(Field::new(HOST_TIME, DataType::Int64, false));
+    fields.push(Field::new("cpu_time_ns", DataType::Int64, true));
+    fields.extend_from_slice(state_and_constraints.fields());
+    Schema::new(fields)
 }
 
 /// Rows of the table of control steps: one per answered step.
@@ -51,31 +60,16 @@ pub(crate) struct StepRows {
 }
 
 impl StepRows {
-    pub fn new(task: Task) -> Self {
-        let observations = observation_columns("obs_", false);
-        let state_and_constraints = FloatColumns::default()
-            .with_state("")
-            .with(CONSTRAINTS.map(str::to_owned), false);
-        let item = Arc::new(Field::new_list_field(DataType::Float64, false));
-        let mut fields = vec![
-            Field::new("task", DataType::Utf8, false),
-            Field::new("episode", DataType::UInt32, false),
-            Field::new("step", DataType::UInt32, false),
-        ];
-        fields.extend_from_slice(observations.fields());
-        fields.push(Field::new("action", DataType::List(item.clone()), false));
-        fields.push(Field::new(COMPUTATION_TIME, DataType::Int64, false));
-        fields.push(Field::new(HOST_TIME, DataType::Int64, false));
-        fields.push(Field::new("cpu_time_ns", DataType::Int64, true));
-        fields.extend_from_slice(state_and_constraints.fields());
+    pub fn new(task: Task, recording: &RecordingColumns) -> Self {
+        let [observations, state_and_constraints] = recorded_columns(recording);
         Self {
-            schema: Arc::new(Schema::new(fields)),
+            schema: Arc::new(step_schema(recording)),
             task,
             episode: 0,
             episodes: UInt32Builder::new(),
             steps: UInt32Builder::new(),
             observations,
-            actions: ListBuilder::new(Float64Builder::new()).with_field(item),
+            actions: ListBuilder::new(Float64Builder::new()).with_field(action_item()),
             computation_times: Int64Builder::new(),
             host_times: Int64Builder::new(),
             cpu_times: Int64Builder::new(),
@@ -104,11 +98,11 @@ impl StepRows {
     }
 
     pub fn observe(&mut self, observation: &[f64]) {
-        put_observation(&mut self.observations, observation);
-        self.observations.end_row();
+        self.observations.put(observation);
+        self.observations.end_short_row();
     }
 
-    pub fn push(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
+    pub fn push(&mut self, row: &StepRow<'_>) {
         self.episodes.append_value(self.episode);
         self.steps.append_value(row.step);
         self.actions.values().append_slice(row.action);
@@ -120,14 +114,8 @@ impl StepRows {
         self.cpu_times
             .append_option(row.timing.cpu_time_s.map(nanoseconds));
         let state_and_constraints = &mut self.state_and_constraints;
-        state_and_constraints.put_state(row.world.state);
-        let constraints = row.world.constraints;
-        state_and_constraints.put(&[
-            constraints.joint_pos,
-            constraints.joint_vel,
-            constraints.ee,
-            constraints.link,
-        ]);
+        row.world.record_state(state_and_constraints);
+        state_and_constraints.put(row.world.limits());
         state_and_constraints.end_row();
     }
 
@@ -179,9 +167,7 @@ fn host_time_index(schema: &Schema) -> usize {
 }
 
 /// Columns of the constraint values, in their order in the table. A constraint is violated if its value is above 0.
-pub(crate) const CONSTRAINTS: [&str; 4] = [
-    "constraint_joint_pos",
-    "constraint_joint_vel",
-    "constraint_ee",
-    "constraint_link",
-];
+pub(crate) fn constraint_columns(recording: &RecordingColumns) -> Vec<String> {
+    let limits = recording.limits.iter();
+    limits.map(|name| format!("constraint_{name}")).collect()
+}

@@ -6,10 +6,9 @@ use crate::{
     files::{EPISODES_FILE, STEPS_FILE},
 };
 use arrow_array::RecordBatch;
-use faceoff_sim::EPISODE_STEPS;
-use faceoff_types::{Task, TaskMap};
+use faceoff_types::{Competition, Task, TaskMap};
 use faceoff_wire::job::ShardSpec;
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 /// The recording of one episode.
 pub(super) struct RecordedEpisode {
@@ -44,11 +43,16 @@ pub(super) struct EpisodeReader<'a> {
     rows: Box<dyn Iterator<Item = RecordBatch> + Send>,
     steps: StepBatches,
     steps_of_tasks: TaskMap<u64>,
+    competition: Arc<Competition>,
 }
 
 impl<'a> EpisodeReader<'a> {
     /// Opens a dataset, whose episodes are in the order of `tasks`.
-    pub fn open(dataset: &'a Dataset, tasks: Vec<Task>) -> Result<Self, VerifyError> {
+    pub fn open(
+        dataset: &'a Dataset,
+        tasks: Vec<Task>,
+        competition: &Arc<Competition>,
+    ) -> Result<Self, VerifyError> {
         let counts = &dataset.manifest().episodes;
         let expected = tasks.into_iter().flat_map(|task| {
             let count = counts.get(&task).copied().unwrap_or_default();
@@ -58,6 +62,7 @@ impl<'a> EpisodeReader<'a> {
             Box::new(expected),
             dataset.episode_batches()?,
             dataset.steps()?.read(None)?,
+            competition,
         ))
     }
 
@@ -68,14 +73,16 @@ impl<'a> EpisodeReader<'a> {
         played: usize,
         episodes: &Path,
         steps: &Path,
+        competition: &Arc<Competition>,
     ) -> Result<Self, VerifyError> {
         let task = spec.task;
         let expected = spec.episodes.clone().take(played);
-        let steps = StepTable::open(FileRange::whole(steps)?)?;
+        let steps = StepTable::open(FileRange::whole(steps)?, competition)?;
         Ok(Self::new(
             Box::new(expected.map(move |episode| (task, episode))),
-            episode_batches(FileRange::whole(episodes)?)?,
+            episode_batches(FileRange::whole(episodes)?, competition)?,
             steps.read(None)?,
+            competition,
         ))
     }
 
@@ -83,6 +90,7 @@ impl<'a> EpisodeReader<'a> {
         expected: Box<dyn Iterator<Item = (Task, u32)> + Send + 'a>,
         batches: Vec<RecordBatch>,
         steps: StepBatches,
+        competition: &Arc<Competition>,
     ) -> Self {
         let mut steps_of_tasks = TaskMap::new();
         for batch in &batches {
@@ -102,6 +110,7 @@ impl<'a> EpisodeReader<'a> {
             rows: Box::new(rows),
             steps,
             steps_of_tasks,
+            competition: competition.clone(),
         }
     }
 
@@ -176,10 +185,11 @@ impl<'a> EpisodeReader<'a> {
                 episode,
             ));
         }
+        let longest = self.competition.max_steps(task);
         let count = match columns.int("steps", 0) {
-            Some(count) if count <= EPISODE_STEPS => count as usize,
+            Some(count) if count <= longest => count as usize,
             found => {
-                let expected = format!("at most {EPISODE_STEPS}");
+                let expected = format!("at most {longest}");
                 return Err(difference(
                     task,
                     episode,

@@ -4,7 +4,6 @@ use super::{compare, difference::Difference, episode_reader::RecordedEpisode};
 use crate::{
     dataset::Columns,
     files::{EPISODES_FILE, STEPS_FILE},
-    interpolation_text,
     score::StepMeasurement,
     table::{EpisodeRows, HOST_TIME, StepRows},
     times::seconds,
@@ -15,15 +14,18 @@ use arrow_array::{
     types::{Float64Type, Int64Type},
 };
 use faceoff_episode::{
-    AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, RecordError, RunningEpisode, StepRow,
-    StepSink,
+    AnswerTiming, Environment, EpisodeStart, RecordError, RunningEpisode, StepRow, StepSink,
 };
-use faceoff_types::{ACTION_LIMIT, AgentFault, EpisodeOutcome, Interpolation, Ruleset};
+use faceoff_types::{
+    ACTION_LIMIT, ActionLayout, ActionSpace, AgentFault, Competition, EpisodeOutcome, Ruleset,
+};
+use std::sync::Arc;
 
 /// Simulates the episodes of an evaluation again.
 pub(super) struct Replayer {
     ruleset: Ruleset,
-    arena: Arena,
+    environment: Box<dyn Environment>,
+    competition: Arc<Competition>,
 }
 
 /// A replayed episode without differences.
@@ -39,8 +41,9 @@ pub(super) struct ReplayedEpisode {
 struct EpisodeReplay<'a> {
     recorded: &'a RecordedEpisode,
     ruleset: Ruleset,
-    interpolation: Interpolation,
-    running: RunningEpisode<AirHockeyWorld, ReplayRows>,
+    /// Numbers in an action; 0 if the agent failed before it could give any.
+    action_len: usize,
+    running: RunningEpisode<ReplayRows>,
 }
 
 /// The rows that the simulation gives, which the recording must equal.
@@ -50,8 +53,8 @@ struct ReplayRows {
     measured: Vec<StepMeasurement>,
 }
 
-impl StepSink<AirHockeyWorld> for ReplayRows {
-    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
+impl StepSink for ReplayRows {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
         self.steps.begin(start.episode);
         self.episodes.begin(&start);
     }
@@ -60,18 +63,12 @@ impl StepSink<AirHockeyWorld> for ReplayRows {
         self.steps.observe(observation);
     }
 
-    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
+    fn step(&mut self, row: &StepRow<'_>) {
         self.steps.push(row);
         self.episodes.step(row);
-        let constraints = row.world.constraints;
         self.measured.push(StepMeasurement {
             timing: row.timing,
-            constraints: [
-                constraints.joint_pos,
-                constraints.joint_vel,
-                constraints.ee,
-                constraints.link,
-            ],
+            limits: row.world.limits().to_vec(),
         });
     }
 
@@ -87,25 +84,34 @@ impl StepSink<AirHockeyWorld> for ReplayRows {
 
 /// Inputs from the agent that are read from the recording.
 struct RecordedInputs {
-    interpolation: Option<Interpolation>,
+    layout: Option<ActionLayout>,
     fault: Option<AgentFault>,
 }
 
 impl Replayer {
-    pub const fn new(ruleset: Ruleset, arena: Arena) -> Self {
-        Self { ruleset, arena }
+    pub fn new(
+        ruleset: Ruleset,
+        environment: Box<dyn Environment>,
+        competition: &Arc<Competition>,
+    ) -> Self {
+        Self {
+            ruleset,
+            environment,
+            competition: competition.clone(),
+        }
     }
 
     /// Simulates an episode again and compares all its numbers.
     pub fn episode(&self, recorded: &RecordedEpisode) -> Result<ReplayedEpisode, Difference> {
-        let inputs = read_inputs(recorded)?;
+        let inputs = read_inputs(recorded, &self.competition.actions)?;
         let rows = ReplayRows {
-            steps: StepRows::new(recorded.task),
-            episodes: EpisodeRows::new(),
+            steps: StepRows::new(recorded.task, &self.competition.recording),
+            episodes: EpisodeRows::new(&self.competition),
             measured: Vec::new(),
         };
         let (task, episode) = (recorded.task, recorded.episode);
-        let running = RunningEpisode::begin(&self.arena, task, episode, inputs.interpolation, rows);
+        let environment = self.environment.as_ref();
+        let running = RunningEpisode::begin(environment, task, episode, inputs.layout, rows);
         let running = running.map_err(|unknown| {
             row_difference(
                 recorded,
@@ -117,8 +123,7 @@ impl Replayer {
         let mut replay = EpisodeReplay {
             recorded,
             ruleset: self.ruleset,
-            // Without an agent there are no steps to interpolate.
-            interpolation: inputs.interpolation.unwrap_or(Interpolation::Cubic),
+            action_len: inputs.layout.map_or(0, |layout| layout.len()),
             running,
         };
         let mut outcome = None;
@@ -181,10 +186,10 @@ impl EpisodeReplay<'_> {
         let actions: &ListArray = batch["action"].as_list();
         let wrong = |recorded: String| {
             let expected = match self.ruleset {
-                Ruleset::First => format!("{} finite numbers", self.interpolation.len()),
+                Ruleset::First => format!("{} finite numbers", self.action_len),
                 Ruleset::Second | Ruleset::Third => format!(
                     "{} numbers of at most {ACTION_LIMIT} in magnitude",
-                    self.interpolation.len()
+                    self.action_len
                 ),
             };
             self.step_difference(step, "action", recorded, expected)
@@ -194,7 +199,7 @@ impl EpisodeReplay<'_> {
         }
         let values = actions.value(row);
         let action: &Float64Array = values.as_primitive::<Float64Type>();
-        if action.len() != self.interpolation.len() || action.null_count() > 0 {
+        if action.len() != self.action_len || action.null_count() > 0 {
             return Err(wrong(format!(
                 "{} numbers",
                 action.len() - action.null_count()
@@ -339,38 +344,39 @@ impl EpisodeReplay<'_> {
     }
 }
 
-/// Reads interpolation and fault of the agent from the episode's row.
-fn read_inputs(recorded: &RecordedEpisode) -> Result<RecordedInputs, Difference> {
+/// Reads the layout of the agent's actions and its fault from the episode's row.
+fn read_inputs(
+    recorded: &RecordedEpisode,
+    actions: &ActionSpace,
+) -> Result<RecordedInputs, Difference> {
     let columns = Columns(&recorded.row);
     let fault = columns
         .text("fault", 0)
         .map(serde_json::from_str::<AgentFault>)
         .transpose()
         .map_err(|error| row_difference(recorded, "fault", error.to_string(), "a fault as JSON"))?;
-    let interpolation = match columns.text("interpolation", 0) {
-        None => None,
-        Some(text) => {
-            let expected = "1 to 5, -1 or null";
-            Some(
-                interpolation_text::parse(text)
-                    .ok_or_else(|| row_difference(recorded, "interpolation", text, expected))?,
-            )
+    let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
+    let text = columns.text("interpolation", 0);
+    let wrong = |expected: &str| {
+        let text = text.unwrap_or("nothing");
+        row_difference(recorded, "interpolation", text, expected)
+    };
+    let layout = match (text, actions.only_layout()) {
+        (None, only) => only.filter(|_| started),
+        (Some(_), Some(_)) => return Err(wrong("nothing: agents do not state it")),
+        (Some(text), None) => {
+            let expected = || wrong(&actions.codes_text());
+            Some(actions.parse(text).ok_or_else(expected)?)
         }
     };
-    let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
-    if started != interpolation.is_some() {
-        let expected = if started {
+    if started != layout.is_some() {
+        return Err(wrong(if started {
             "the agent's interpolation: the agent had started"
         } else {
             "nothing: the agent had not started"
-        };
-        let text = columns.text("interpolation", 0).unwrap_or("nothing");
-        return Err(row_difference(recorded, "interpolation", text, expected));
+        }));
     }
-    Ok(RecordedInputs {
-        interpolation,
-        fault,
-    })
+    Ok(RecordedInputs { layout, fault })
 }
 
 fn row_difference(

@@ -4,15 +4,15 @@ use super::{
     difference::Difference, episode_reader::EpisodeReader, error::VerifyError, replay::Replayer,
 };
 use crate::{
-    arena::shard_arena,
+    conditions::shard_conditions,
     dataset::Columns,
     error::{DatasetError, RecordingError},
     files::EPISODES_FILE,
     shard_folder::ShardRecording,
 };
 use arrow_array::RecordBatch;
-use faceoff_sim::episode::ends;
-use faceoff_types::EpisodeOutcome;
+use faceoff_episode::Simulator;
+use faceoff_types::{Competition, EpisodeOutcome};
 use faceoff_wire::job::ShardSpec;
 use std::path::Path;
 
@@ -31,8 +31,9 @@ pub fn verify_shard(
     spec: &ShardSpec,
     outcomes: &[EpisodeOutcome],
     sample: &[u32],
+    simulator: &dyn Simulator,
 ) -> Result<(), VerifyError> {
-    let recording = ShardRecording::open(dir)?;
+    let recording = ShardRecording::open(dir, simulator)?;
     let unusable = |problem: &str| RecordingError::Unusable(problem.to_owned());
     if recording.spec != *spec {
         return Err(unusable("the recording has other episodes than the job").into());
@@ -40,12 +41,13 @@ pub fn verify_shard(
     if recording.report.outcomes != outcomes {
         return Err(unusable("the recording and the report have different outcomes").into());
     }
-    let arena = shard_arena(spec);
-    let replayer = Replayer::new(spec.ruleset, arena);
+    let competition = simulator.competition();
+    let environment = simulator.environment(&shard_conditions(spec));
+    let replayer = Replayer::new(spec.ruleset, environment, competition);
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
-    let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps)?;
+    let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps, competition)?;
     for outcome in outcomes {
-        if !ends::ALL.contains(&outcome.end) {
+        if competition.ends.iter().all(|info| info.end != outcome.end) {
             let problem = format!("the report has the unknown end {:?}", outcome.end);
             return Err(unusable(&problem).into());
         }
@@ -55,7 +57,7 @@ pub fn verify_shard(
         let Some(recorded) = batch.episodes.first() else {
             return Err(unusable("the recording lacks an episode").into());
         };
-        check_outcome(&recorded.row, outcome)?;
+        check_outcome(&recorded.row, outcome, competition)?;
         if sample.contains(&outcome.episode) {
             replayer.episode(recorded)?;
         }
@@ -65,8 +67,12 @@ pub fn verify_shard(
 }
 
 /// Compares an episode's row with the reported outcome, without its times, which follow from the steps.
-fn check_outcome(row: &RecordBatch, outcome: &EpisodeOutcome) -> Result<(), VerifyError> {
-    let recorded = Columns(row).record(0);
+fn check_outcome(
+    row: &RecordBatch,
+    outcome: &EpisodeOutcome,
+    competition: &Competition,
+) -> Result<(), VerifyError> {
+    let recorded = Columns(row).record(0, competition);
     let mut recorded = recorded
         .map_err(DatasetError::unreadable(EPISODES_FILE))?
         .outcome;

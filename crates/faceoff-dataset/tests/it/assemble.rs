@@ -99,7 +99,12 @@ fn dataset_is_complete_and_has_the_direct_score() {
         }
         tasks.insert(
             task,
-            faceoff_scoring::score_task(&outcomes, &times, &Default::default()),
+            faceoff_scoring::score_task(
+                &faceoff_airhockey::competition(),
+                &outcomes,
+                &times,
+                &Default::default(),
+            ),
         );
     }
     let meta = &evaluation.meta;
@@ -178,10 +183,10 @@ fn violations_name_episode_and_step() {
                 .collect()
         };
         for (name, flagged) in [
-            (EE, flagged(|o| o.violations.ee)),
-            (LINK, flagged(|o| o.violations.link)),
-            (JOINT_POS, flagged(|o| o.violations.joint_pos)),
-            (JOINT_VEL, flagged(|o| o.violations.joint_vel)),
+            (EE, flagged(|o| o.violations.contains(EE))),
+            (LINK, flagged(|o| o.violations.contains(LINK))),
+            (JOINT_POS, flagged(|o| o.violations.contains(JOINT_POS))),
+            (JOINT_VEL, flagged(|o| o.violations.contains(JOINT_VEL))),
         ] {
             let listed = &violations.constraints[&name];
             assert_eq!(

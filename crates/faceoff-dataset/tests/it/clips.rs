@@ -2,7 +2,7 @@
 
 use crate::recordings::{Evaluation, swing_arm};
 use arrow_array::{Array, Int64Array, cast::AsArray, types::Float64Type};
-use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
+use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE, simulator};
 use faceoff_dataset::{Dataset, assemble};
 use faceoff_replay::{Clip, ClipKey, ContactWith, Group, Pack};
 use faceoff_types::Task;
@@ -26,10 +26,16 @@ fn fixture(name: &str) -> Fixture {
     let evaluation = Evaluation::play(Some(swing_arm), &SHARDS);
     let clips = evaluation.dir.path().join(name);
     let archive = evaluation.archive();
-    let assembled = assemble(&evaluation.meta, &evaluation.shards, &archive, Some(&clips));
+    let assembled = assemble(
+        &evaluation.meta,
+        &evaluation.shards,
+        &archive,
+        Some(&clips),
+        simulator().as_ref(),
+    );
     assert!(assembled.unwrap().clips);
     Fixture {
-        dataset: Dataset::open(&archive).unwrap(),
+        dataset: Dataset::open(&archive, simulator().competition()).unwrap(),
         pack: Pack::open(&clips).unwrap(),
         evaluation,
         clips,
@@ -226,6 +232,7 @@ fn clips_are_the_same_bytes_for_any_order_of_shards() {
         &fixture.evaluation.shards,
         &fixture.evaluation.archive(),
         Some(&second_pack),
+        simulator().as_ref(),
     )
     .unwrap();
     assert!(std::fs::read(&fixture.clips).unwrap() == std::fs::read(second_pack).unwrap());
@@ -284,6 +291,7 @@ fn shards_of_the_previous_layout_have_no_clips() {
         &evaluation.shards,
         &evaluation.archive(),
         Some(&clips),
+        simulator().as_ref(),
     )
     .unwrap();
     assert!(!assembled.clips);

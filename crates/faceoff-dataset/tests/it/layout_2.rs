@@ -5,7 +5,7 @@ use crate::{
     verify::check,
 };
 use arrow_array::{RecordBatch, cast::AsArray, types::Int64Type};
-use faceoff_airhockey::{DEFEND, HIT};
+use faceoff_airhockey::{DEFEND, HIT, simulator};
 use faceoff_dataset::{Dataset, DatasetError, Layout};
 use faceoff_wire::job::ShardSpec;
 use parquet::{
@@ -18,7 +18,7 @@ const ARCHIVE: &str = "dataset-layout-2.zip";
 
 #[test]
 fn archive_is_read_and_verified() {
-    let dataset = Dataset::open(&fixture(ARCHIVE)).unwrap();
+    let dataset = Dataset::open(&fixture(ARCHIVE), simulator().competition()).unwrap();
     assert_eq!(dataset.layout(), Layout::Two);
     let verified = check(&fixture(ARCHIVE), 2).unwrap();
     assert_eq!((verified.episodes, verified.steps), (4, 548));
@@ -45,7 +45,7 @@ fn archive_is_read_and_verified() {
             (defend, 1, 53)
         ]
     );
-    let lazy_dataset = Dataset::open_lazily(&fixture(ARCHIVE)).unwrap();
+    let lazy_dataset = Dataset::open_lazily(&fixture(ARCHIVE), simulator().competition()).unwrap();
     for (task, episode, steps) in steps {
         let rows = lazy_dataset.episode(task, episode, None).unwrap();
         assert_eq!(rows.num_rows(), steps as usize);
@@ -71,7 +71,7 @@ fn broken_seal_is_refused() {
     let longer = [&intact[..], b"x"].concat();
     for (index, bytes) in flipped.chain(truncated).chain([longer]).enumerate() {
         fs::write(&path, bytes).unwrap();
-        let opened = Dataset::open(&path);
+        let opened = Dataset::open(&path, simulator().competition());
         assert!(
             matches!(
                 opened,
@@ -81,7 +81,7 @@ fn broken_seal_is_refused() {
         );
     }
     fs::write(&path, &intact).unwrap();
-    Dataset::open(&path).unwrap();
+    Dataset::open(&path, simulator().competition()).unwrap();
 }
 
 #[test]

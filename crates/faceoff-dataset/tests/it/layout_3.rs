@@ -4,14 +4,14 @@ use crate::{
     recordings::{fixture, table},
     verify::check,
 };
-use faceoff_airhockey::HIT;
+use faceoff_airhockey::{HIT, simulator};
 use faceoff_dataset::{Dataset, Layout};
 
 const ARCHIVE: &str = "dataset-layout-3.zip";
 
 #[test]
 fn archive_is_read_and_verified() {
-    let dataset = Dataset::open(&fixture(ARCHIVE)).unwrap();
+    let dataset = Dataset::open(&fixture(ARCHIVE), simulator().competition()).unwrap();
     assert_eq!(dataset.layout(), Layout::Three);
     let verified = check(&fixture(ARCHIVE), 2).unwrap();
     assert_eq!(verified.episodes, 4);

@@ -2,7 +2,7 @@
 
 use crate::recordings::{Evaluation, hold_still, table};
 use arrow_array::{UInt32Array, cast::AsArray};
-use faceoff_airhockey::{DEFEND, HIT, PREPARE};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE, simulator};
 use faceoff_dataset::{Dataset, DatasetError};
 
 #[test]
@@ -11,7 +11,7 @@ fn episode_equals_its_rows_in_the_whole_table() {
     let evaluation = Evaluation::play(Some(hold_still), &shards).assembled();
     let whole = table(&evaluation.folder().join("steps.parquet"));
     for path in [evaluation.archive(), evaluation.folder()] {
-        let dataset = Dataset::open_lazily(&path).unwrap();
+        let dataset = Dataset::open_lazily(&path, simulator().competition()).unwrap();
         let mut row = 0;
         for report in &evaluation.reports {
             for outcome in &report.outcomes {
@@ -50,7 +50,7 @@ fn episode_equals_its_rows_in_the_whole_table() {
 #[test]
 fn episode_without_steps_has_columns_but_no_rows() {
     let evaluation = Evaluation::play(None, &[(HIT, 0..2)]).assembled();
-    let dataset = Dataset::open(&evaluation.archive()).unwrap();
+    let dataset = Dataset::open(&evaluation.archive(), simulator().competition()).unwrap();
     let rows = dataset.episode(HIT, 1, None).unwrap();
     assert_eq!(rows.num_rows(), 0);
     assert!(rows.num_columns() > 60);

@@ -1,12 +1,13 @@
 //! Helpers that record evaluations. Their agents are functions: no process, no clock, the same numbers on every machine.
 
 use arrow_array::RecordBatch;
-use faceoff_airhockey::HIT;
+use faceoff_airhockey::{HIT, simulator};
 use faceoff_dataset::{
     AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble,
+    shard_conditions,
 };
-use faceoff_episode::{AirHockeyStep, AnswerTiming, EpisodeStart, StepRow, StepSink};
-use faceoff_sim::{Episode, Interpolation, Plant};
+use faceoff_episode::{AnswerTiming, EpisodeStart, Simulator, StepRow, StepSink, World};
+use faceoff_sim::{EPISODE_STEPS, Interpolation};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
     Ruleset, Seed, SlotTiming, Task, Variation,
@@ -64,30 +65,21 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
 /// Records a shard; an agent that is `None` fails to start.
 pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
     let folder = ShardFolder::create(out).unwrap();
-    let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let settings = (*spec.perturbations).clone();
-    let plant = Plant::mismatched(&settings, spec.mismatch_seed);
+    let mut recorder = Recorder::create(&folder, spec.task, simulator().competition()).unwrap();
+    let environment = simulator().environment(&shard_conditions(spec));
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
-        let seed = spec.seed.episode(spec.task, episode);
-        let factors = spec.profile.factors();
-        let mut simulation = Episode::new(
-            spec.task.try_into().unwrap(),
-            Interpolation::Cubic,
-            factors,
-            &settings,
-            &plant,
-            seed,
-        );
+        let layout = agent.map(|_| Interpolation::Cubic.into());
+        let mut world = environment.reset(spec.task, episode, layout).unwrap();
         recorder.begin(EpisodeStart {
             episode,
-            seed,
-            choice: agent.map(|_| Interpolation::Cubic),
-            state: &simulation.state(),
+            seed: environment.seed(spec.task, episode),
+            layout,
+            world: world.as_ref(),
         });
         let outcome = match agent {
-            Some(agent) => play_episode(spec.task, episode, agent, &mut simulation, &mut recorder),
-            None => outcome_after_fault(spec.task, None, None, episode, &simulation, &[]),
+            Some(agent) => play_episode(spec.task, episode, agent, world.as_mut(), &mut recorder),
+            None => outcome_after_fault(spec.task, None, None, episode, world.as_ref(), &[]),
         };
         recorder.end(&outcome, 0).unwrap();
         outcomes.push(outcome);
@@ -115,7 +107,7 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
             platform_retries: spec.platform_retries,
         },
     };
-    folder.commit(spec, &report).unwrap();
+    folder.commit(spec, &report, simulator().as_ref()).unwrap();
     report
 }
 
@@ -123,12 +115,12 @@ fn play_episode(
     task: Task,
     episode: u32,
     agent: Agent,
-    simulation: &mut Episode,
+    world: &mut dyn World,
     recorder: &mut Recorder,
 ) -> EpisodeOutcome {
     let mut initial_joints = [0.0; 7];
     // Joint positions follow the puck's six numbers.
-    initial_joints.copy_from_slice(&simulation.observation()[6..13]);
+    initial_joints.copy_from_slice(&world.observation()[6..13]);
     let ask = |step| {
         agent(&Question {
             episode,
@@ -137,26 +129,19 @@ fn play_episode(
         })
     };
     if ask(None).is_none() {
-        return outcome_after_fault(task, Some(episode), None, episode, simulation, &[]);
+        return outcome_after_fault(task, Some(episode), None, episode, world, &[]);
     }
     let mut times_s = Vec::new();
     loop {
-        let step = simulation.steps();
+        let step = world.steps();
         let Some(action) = ask(Some(step)) else {
-            return outcome_after_fault(
-                task,
-                Some(episode),
-                Some(step),
-                episode,
-                simulation,
-                &times_s,
-            );
+            return outcome_after_fault(task, Some(episode), Some(step), episode, world, &times_s);
         };
         // Times around 0.1 ms that differ from step to step: two primes make them look irregular.
         let time = Duration::from_nanos(100_000 + u64::from(step) * 7919 % 977);
         times_s.push(time.as_secs_f64());
-        recorder.observe(simulation.observation());
-        let outcome = simulation.step(action.as_flattened());
+        recorder.observe(world.observation());
+        let end = world.step(action.as_flattened());
         recorder.step(&StepRow {
             step,
             action: action.as_flattened(),
@@ -165,41 +150,34 @@ fn play_episode(
                 host_time_s: 0.0,
                 cpu_time_s: (!step.is_multiple_of(5)).then(|| (time / 2).as_secs_f64()),
             },
-            next_observation: simulation.observation(),
-            world: AirHockeyStep {
-                state: &simulation.state(),
-                constraints: outcome.constraints,
-                puck_lost: simulation.is_puck_lost(),
-                impacts: simulation.world().impacts(),
-            },
+            next_observation: world.observation(),
+            world: &*world,
         });
-        if let Some(divergence) = simulation.divergence() {
-            let mut outcome = outcome_after_fault(
-                task,
-                Some(episode),
-                Some(step),
-                episode,
-                simulation,
-                &times_s,
-            );
-            let detail = divergence.cause.to_string();
+        if let Some(detail) = world.divergence() {
+            let mut outcome =
+                outcome_after_fault(task, Some(episode), Some(step), episode, world, &times_s);
             let fault = AgentFaultKind::Diverged { detail };
             outcome.fault.as_mut().unwrap().fault = fault;
             return outcome;
         }
-        if let Some(end) = outcome.end {
+        if let Some(end) = end.or_else(|| horizon(world)) {
             return EpisodeOutcome {
                 task,
                 episode,
-                steps: simulation.steps(),
+                steps: world.steps(),
                 end,
-                success: simulation.success(),
-                violations: simulation.violations(),
+                success: world.success(),
+                violations: world.violations(),
                 computation_time: summary(&times_s),
                 fault: None,
             };
         }
     }
+}
+
+/// The end of an episode after its last control step.
+fn horizon(world: &dyn World) -> Option<EpisodeEnd> {
+    (world.steps() >= EPISODE_STEPS).then_some(EpisodeEnd::HORIZON)
 }
 
 /// The outcome of an episode that an agent fault ended. `fault_episode` and `fault_step` are those of the fault: `None` for a
@@ -209,16 +187,16 @@ fn outcome_after_fault(
     fault_episode: Option<u32>,
     fault_step: Option<u32>,
     episode: u32,
-    simulation: &Episode,
+    world: &dyn World,
     times_s: &[f64],
 ) -> EpisodeOutcome {
     EpisodeOutcome {
         task,
         episode,
-        steps: simulation.steps(),
+        steps: world.steps(),
         end: EpisodeEnd::AGENT_FAULT,
         success: false,
-        violations: simulation.violations(),
+        violations: world.violations(),
         computation_time: summary(times_s),
         fault: Some(AgentFault {
             fault: AgentFaultKind::NonFinite,
@@ -289,7 +267,14 @@ impl Evaluation {
 
     pub fn assemble(&self, name: &str) -> Result<(AssembledDataset, PathBuf), RecordingError> {
         let archive = self.dir.path().join(name);
-        assemble(&self.meta, &self.shards, &archive, None).map(|assembled| (assembled, archive))
+        assemble(
+            &self.meta,
+            &self.shards,
+            &archive,
+            None,
+            simulator().as_ref(),
+        )
+        .map(|assembled| (assembled, archive))
     }
 
     /// Assembles `dataset.zip` and unpacks it to `dataset`.

@@ -6,7 +6,7 @@ use crate::{
     recordings::{Evaluation, json, swing_arm},
     verify::check,
 };
-use faceoff_airhockey::{DEFEND, HIT};
+use faceoff_airhockey::{DEFEND, HIT, simulator};
 use faceoff_dataset::{Dataset, can_draw_plant, verify::VerifyError};
 use faceoff_types::{PerturbationSettings, Task, Variation};
 use faceoff_wire::dataset::DatasetManifest;
@@ -35,7 +35,7 @@ fn dataset_records_its_variation_and_verifies_with_it() {
         Evaluation::play_with_variation(large_variation(), Some(swing_arm), &SHARDS).assembled();
     let verified = check(&played.archive(), 2).unwrap();
     assert_eq!(verified.result.variation, large_variation());
-    let dataset = Dataset::open(&played.archive()).unwrap();
+    let dataset = Dataset::open(&played.archive(), simulator().competition()).unwrap();
     assert_eq!(dataset.manifest().variation, large_variation());
     for name in ["manifest.json", "results.json"] {
         let file: Value = json(&played.folder().join(name));

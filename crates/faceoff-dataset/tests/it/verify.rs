@@ -10,8 +10,7 @@ use arrow_array::{
     cast::AsArray,
 };
 use arrow_schema::DataType;
-use faceoff_airhockey::competition;
-use faceoff_airhockey::{DEFEND, HIT, PREPARE};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE, simulator};
 use faceoff_dataset::{
     Dataset, DatasetError, EpisodeRecord,
     verify::{Difference, SeasonClaim, VerifiedDataset, VerifyError, verify},
@@ -44,8 +43,8 @@ fn forgery() -> Forgery {
 /// Opens and verifies a dataset on `workers` threads.
 pub fn check(path: &Path, workers: usize) -> Result<VerifiedDataset, VerifyError> {
     verify(
-        &Dataset::open(path)?,
-        &competition(),
+        &Dataset::open(path, simulator().competition())?,
+        simulator().as_ref(),
         NonZero::new(workers).unwrap(),
         &|| (),
     )
@@ -74,10 +73,15 @@ fn column_names(file: &str) -> Vec<String> {
 fn recording_verifies_packed_unpacked_and_on_any_threads() {
     let played = played();
     let progress_calls = AtomicU32::new(0);
-    let dataset = Dataset::open(&played.archive()).unwrap();
-    let verified = verify(&dataset, &competition(), NonZero::<usize>::MIN, &|| {
-        progress_calls.fetch_add(1, Ordering::Relaxed);
-    })
+    let dataset = Dataset::open(&played.archive(), simulator().competition()).unwrap();
+    let verified = verify(
+        &dataset,
+        simulator().as_ref(),
+        NonZero::<usize>::MIN,
+        &|| {
+            progress_calls.fetch_add(1, Ordering::Relaxed);
+        },
+    )
     .unwrap();
     assert_eq!((verified.episodes, progress_calls.into_inner()), (4, 4));
     assert_eq!(verified.result, dataset.results().unwrap());
@@ -107,11 +111,14 @@ fn recording_verifies_packed_unpacked_and_on_any_threads() {
 
 #[test]
 fn panic_in_a_worker_ends_the_verification() {
-    let dataset = Dataset::open(&played().archive()).unwrap();
+    let dataset = Dataset::open(&played().archive(), simulator().competition()).unwrap();
     let panic = std::panic::catch_unwind(|| {
-        verify(&dataset, &competition(), NonZero::<usize>::MIN, &|| {
-            panic!("stop here")
-        })
+        verify(
+            &dataset,
+            simulator().as_ref(),
+            NonZero::<usize>::MIN,
+            &|| panic!("stop here"),
+        )
         .unwrap()
     })
     .unwrap_err();
@@ -257,7 +264,7 @@ fn forged_scores_are_found() {
         let forgery = forgery();
         forgery.replace_text(name, from, to);
         // The hash shows the change; with updated hashes, the simulation does.
-        match Dataset::open(forgery.dir.path()) {
+        match Dataset::open(forgery.dir.path(), simulator().competition()) {
             Err(DatasetError::Altered(message)) => assert!(message.starts_with(name), "{message}"),
             other => panic!("{other:?}"),
         }
@@ -367,7 +374,7 @@ fn damaged_archive_is_refused_or_has_intact_files() {
     let intact = fs::read(played().archive()).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("dataset.zip");
-    let whole = Dataset::open(&played().archive()).unwrap();
+    let whole = Dataset::open(&played().archive(), simulator().competition()).unwrap();
     let hash = whole.archive().unwrap().unwrap().blake3;
     let whole = contents(&whole);
     // Every byte at both ends, where the archive's structure is, and some of the rest.
@@ -379,7 +386,7 @@ fn damaged_archive_is_refused_or_has_intact_files() {
         let mut bytes = intact.clone();
         bytes[offset] ^= 1 << (offset % 8);
         fs::write(&path, &bytes).unwrap();
-        match Dataset::open(&path) {
+        match Dataset::open(&path, simulator().competition()) {
             Err(DatasetError::Altered(_) | DatasetError::Unreadable(_)) => {}
             Err(other) => panic!("byte {offset} flipped: {other:?}"),
             Ok(dataset) => {
@@ -397,7 +404,7 @@ fn damaged_archive_is_refused_or_has_intact_files() {
         intact.len() - 1,
     ] {
         fs::write(&path, &intact[..length]).unwrap();
-        let refused = Dataset::open(&path);
+        let refused = Dataset::open(&path, simulator().competition());
         assert!(
             matches!(
                 refused,
@@ -421,7 +428,7 @@ fn lazily_opened_files_are_checked_when_read() {
         let mut bytes = intact.clone();
         bytes[intact.len() / 2] ^= 1;
         fs::write(forgery.path(name), &bytes).unwrap();
-        let dataset = Dataset::open_lazily(forgery.dir.path()).unwrap();
+        let dataset = Dataset::open_lazily(forgery.dir.path(), simulator().competition()).unwrap();
         let read = [
             ("steps.parquet", dataset.steps().map(|_| ())),
             ("episodes.parquet", dataset.episodes().map(|_| ())),
@@ -454,14 +461,14 @@ fn damaged_files_in_a_folder_are_refused() {
             let mut bytes = intact.clone();
             bytes[offset] ^= 0x10;
             fs::write(forgery.path(name), &bytes).unwrap();
-            match Dataset::open(forgery.dir.path()) {
+            match Dataset::open(forgery.dir.path(), simulator().competition()) {
                 Err(DatasetError::Altered(text)) => assert!(text.starts_with(name), "{text}"),
                 other => panic!("{name}, byte {offset}: {other:?}"),
             }
         }
         fs::remove_file(forgery.path(name)).unwrap();
         assert!(
-            Dataset::open(forgery.dir.path()).is_err(),
+            Dataset::open(forgery.dir.path(), simulator().competition()).is_err(),
             "{name} is missing"
         );
     }
@@ -481,7 +488,7 @@ fn damaged_files_in_a_folder_are_refused() {
 
 #[test]
 fn foreign_layouts_rulesets_and_simulators_are_named() {
-    let fingerprint = Dataset::open(&played().archive())
+    let fingerprint = Dataset::open(&played().archive(), simulator().competition())
         .unwrap()
         .manifest()
         .simulator
@@ -552,7 +559,7 @@ fn datasets_with_agent_faults_verify() {
 fn seeds_follow_from_the_revealed_secret() {
     let day = "2026-11-21".parse().unwrap();
     let secret = Seed::from_number(42);
-    let mut manifest = Dataset::open(&played().archive())
+    let mut manifest = Dataset::open(&played().archive(), simulator().competition())
         .unwrap()
         .manifest()
         .clone();

@@ -4,7 +4,7 @@ use crate::{
     forgery::{Forgery, flipped},
     recordings::{play, spec, swing_arm},
 };
-use faceoff_airhockey::DEFEND;
+use faceoff_airhockey::{DEFEND, simulator};
 use faceoff_dataset::{
     ShardReport,
     verify::{VerifyError, verify_shard},
@@ -57,6 +57,7 @@ fn genuine_recording_verifies_with_any_sample() {
             &recorded.spec,
             &recorded.report.outcomes,
             sample,
+            simulator().as_ref(),
         )
         .unwrap();
     }
@@ -78,6 +79,7 @@ fn changed_number_in_a_sampled_episode_is_found() {
             &recorded.spec,
             &recorded.report.outcomes,
             sample,
+            simulator().as_ref(),
         )
     };
     let found = error_text(verify(&[4, 5]));
@@ -94,8 +96,15 @@ fn outcomes_that_differ_from_the_rows_are_found() {
     let recorded = record_shard();
     let mut claimed = recorded.report.outcomes.clone();
     claimed[3].success = !claimed[3].success;
-    let verify =
-        |folder: &Path, outcomes| error_text(verify_shard(folder, &recorded.spec, outcomes, &[]));
+    let verify = |folder: &Path, outcomes| {
+        error_text(verify_shard(
+            folder,
+            &recorded.spec,
+            outcomes,
+            &[],
+            simulator().as_ref(),
+        ))
+    };
     assert!(verify(recorded.folder.path(), &claimed).contains("different outcomes"));
     // With the same claim in the recording's report.
     let forged = Forgery::copy_of(recorded.folder.path());
@@ -117,6 +126,7 @@ fn outcomes_that_differ_from_the_rows_are_found() {
         &recorded.spec,
         &recorded.report.outcomes[..3],
         &[],
+        simulator().as_ref(),
     ));
     assert!(fewer.contains("different outcomes"), "{fewer}");
 }
@@ -140,6 +150,7 @@ fn recording_of_another_job_is_refused() {
             &other,
             &recorded.report.outcomes,
             &[],
+            simulator().as_ref(),
         );
         assert!(error_text(found).contains("other episodes than the job"));
     }
@@ -149,6 +160,7 @@ fn recording_of_another_job_is_refused() {
         &recorded.spec,
         &recorded.report.outcomes,
         &[4],
+        simulator().as_ref(),
     );
     assert!(error_text(found).contains("damaged or incomplete"));
 }

@@ -6,7 +6,7 @@ use crate::{
     record::AnswerTiming,
     time_sum::TimeSum,
 };
-use faceoff_sim::ConstraintValues;
+use faceoff_sim::{ConstraintValues, ViolatedGroups};
 use faceoff_types::{
     AgentFault, AgentTask, ForfeitCause, GameFault, GameLimits, GameWindow, Phase, Side,
     SideOutcome,
@@ -22,6 +22,8 @@ pub(crate) struct RunningSide {
     needs_start: bool,
     /// The current window.
     window: GameWindow,
+    /// Constraints violated in the current window.
+    violated: ViolatedGroups,
     window_times: TimeSum,
     /// The windows before the current one.
     windows: Vec<GameWindow>,
@@ -40,6 +42,7 @@ impl RunningSide {
             fault: None,
             needs_start: true,
             window: GameWindow::default(),
+            violated: ViolatedGroups::default(),
             window_times: TimeSum::default(),
             windows: Vec::new(),
             faults: Vec::new(),
@@ -107,7 +110,7 @@ impl RunningSide {
     /// Adds a control step.
     pub fn step(&mut self, constraints: &ConstraintValues) {
         self.window.steps += 1;
-        constraints.mark(&mut self.window.violations);
+        constraints.mark(&mut self.violated);
     }
 
     /// Ends the current window.
@@ -116,6 +119,7 @@ impl RunningSide {
         let times = std::mem::take(&mut self.window_times);
         self.windows.push(GameWindow {
             computation_time: times.summary(),
+            violations: std::mem::take(&mut self.violated).into(),
             ..window
         });
     }

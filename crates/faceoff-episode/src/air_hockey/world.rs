@@ -2,10 +2,11 @@
 
 use crate::{
     air_hockey::arena::Arena,
-    world::{Environment, World},
+    world::{Environment, StateColumns, World},
 };
 use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact};
-use faceoff_types::{EpisodeEnd, Interpolation, Seed, Task, UnknownTask, Violations};
+use faceoff_types::{ActionLayout, EpisodeEnd, Interpolation, Seed, Task, UnknownTask, Violations};
+use std::any::Any;
 
 /// An episode of the simulator, with its state after the last step.
 #[derive(Debug, Clone)]
@@ -13,36 +14,57 @@ pub struct AirHockeyWorld {
     simulation: Episode,
     state: EpisodeState,
     constraints: ConstraintValues,
-}
-
-/// What recordings have of a step beside observation, action and times.
-#[derive(Debug, Clone, Copy)]
-pub struct AirHockeyStep<'a> {
-    /// The true state after the step.
-    pub state: &'a EpisodeState,
-    /// Constraint values after the step; a constraint is violated if its value is above 0.
-    pub constraints: ConstraintValues,
-    /// Had the (simulated) puck tracking lost the puck after the step? Then the observation repeats an earlier pose.
-    pub puck_lost: bool,
-    /// Contacts of the puck that began in the step.
-    pub impacts: &'a [Impact],
+    /// The constraint values in the order of the recordings' columns.
+    limits: [f64; 4],
 }
 
 impl AirHockeyWorld {
     fn new(simulation: Episode) -> Self {
+        let constraints = simulation.constraints();
         Self {
             state: simulation.state(),
-            constraints: simulation.constraints(),
+            constraints,
+            limits: limits(&constraints),
             simulation,
         }
     }
+
+    /// The true state now.
+    #[must_use]
+    pub const fn state(&self) -> &EpisodeState {
+        &self.state
+    }
+
+    /// Constraint values now; a constraint is violated if its value is above 0.
+    #[must_use]
+    pub const fn constraints(&self) -> &ConstraintValues {
+        &self.constraints
+    }
+
+    /// Has the (simulated) puck tracking lost the puck? Then the observation repeats an earlier pose.
+    #[must_use]
+    pub fn is_puck_lost(&self) -> bool {
+        self.simulation.is_puck_lost()
+    }
+
+    /// Contacts of the puck that began in the last step.
+    #[must_use]
+    pub fn impacts(&self) -> &[Impact] {
+        self.simulation.world().impacts()
+    }
+}
+
+/// In the order of the recordings' columns.
+const fn limits(constraints: &ConstraintValues) -> [f64; 4] {
+    [
+        constraints.joint_pos,
+        constraints.joint_vel,
+        constraints.ee,
+        constraints.link,
+    ]
 }
 
 impl World for AirHockeyWorld {
-    type Choice = Interpolation;
-    type Start<'a> = &'a EpisodeState;
-    type Step<'a> = AirHockeyStep<'a>;
-
     fn steps(&self) -> u32 {
         self.simulation.steps()
     }
@@ -54,6 +76,7 @@ impl World for AirHockeyWorld {
     fn step(&mut self, action: &[f64]) -> Option<EpisodeEnd> {
         let outcome = self.simulation.step(action);
         self.constraints = outcome.constraints;
+        self.limits = limits(&outcome.constraints);
         self.state = self.simulation.state();
         outcome.end
     }
@@ -68,26 +91,51 @@ impl World for AirHockeyWorld {
     }
 
     fn violations(&self) -> Violations {
-        self.simulation.violations()
+        self.simulation.violations().into()
     }
 
-    fn start(&self) -> &EpisodeState {
-        &self.state
+    fn record_state(&self, columns: &mut dyn StateColumns) {
+        record_state(&self.state, columns);
     }
 
-    fn last_step(&self) -> AirHockeyStep<'_> {
-        AirHockeyStep {
-            state: &self.state,
-            constraints: self.constraints,
-            puck_lost: self.simulation.is_puck_lost(),
-            impacts: self.simulation.world().impacts(),
-        }
+    fn limits(&self) -> &[f64] {
+        &self.limits
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
+/// Writes the columns of a state.
+fn record_state(state: &EpisodeState, columns: &mut dyn StateColumns) {
+    let EpisodeState {
+        puck,
+        q,
+        dq,
+        dq_filtered: _,
+        universal,
+        ee,
+        opponent_q,
+        opponent_ee,
+    } = state;
+    columns.put(puck);
+    columns.put(q);
+    columns.put(dq);
+    columns.put(universal);
+    columns.put(ee);
+    put_optional(columns, opponent_q.as_ref());
+    put_optional(columns, opponent_ee.as_ref());
+}
+
+fn put_optional<const N: usize>(columns: &mut dyn StateColumns, values: Option<&[f64; N]>) {
+    match values {
+        Some(values) => columns.put(values),
+        None => columns.put_absent(N),
     }
 }
 
 impl Environment for Arena {
-    type World = AirHockeyWorld;
-
     fn seed(&self, task: Task, index: u32) -> Seed {
         self.episode_seed(task, index)
     }
@@ -100,10 +148,12 @@ impl Environment for Arena {
         &self,
         task: Task,
         index: u32,
-        choice: Option<Interpolation>,
-    ) -> Result<AirHockeyWorld, UnknownTask> {
-        let interpolation = choice.unwrap_or(Interpolation::Cubic);
+        layout: Option<ActionLayout>,
+    ) -> Result<Box<dyn World>, UnknownTask> {
+        // Without a layout no step follows.
+        let interpolation = layout.and_then(|layout| Interpolation::from_code(layout.code()).ok());
+        let interpolation = interpolation.unwrap_or(Interpolation::Cubic);
         let simulation = self.episode(task.try_into()?, index, interpolation);
-        Ok(AirHockeyWorld::new(simulation))
+        Ok(Box::new(AirHockeyWorld::new(simulation)))
     }
 }

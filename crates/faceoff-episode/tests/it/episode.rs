@@ -2,8 +2,8 @@
 
 use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
 use faceoff_episode::{
-    AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError,
-    RunningEpisode, StepRow, StepSink,
+    AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError, RunningEpisode,
+    StateColumns, StepRow, StepSink, World, recording_columns,
 };
 use faceoff_sim::Bounds;
 use faceoff_types::{
@@ -20,15 +20,43 @@ struct SinkLog {
     times: Vec<AnswerTiming>,
 }
 
-impl StepSink<AirHockeyWorld> for SinkLog {
-    fn begin(&mut self, start: EpisodeStart<'_, AirHockeyWorld>) {
-        self.lines.push(format!("{start:?}"));
+/// The values of a state's columns.
+#[derive(Debug, Default)]
+struct State(Vec<Option<f64>>);
+
+impl StateColumns for State {
+    fn put(&mut self, values: &[f64]) {
+        self.0.extend(values.iter().copied().map(Some));
+    }
+    fn put_absent(&mut self, count: usize) {
+        self.0.extend(std::iter::repeat_n(None, count));
+    }
+}
+
+impl SinkLog {
+    fn state(&mut self, world: &dyn World) {
+        let mut state = State::default();
+        world.record_state(&mut state);
+        assert_eq!(state.0.len(), recording_columns().state.len());
+        self.lines.push(format!("{state:?} {:?}", world.limits()));
+    }
+}
+
+impl StepSink for SinkLog {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
+        let (episode, seed, layout) = (start.episode, start.seed, start.layout);
+        self.lines.push(format!("{episode} {seed} {layout:?}"));
+        self.state(start.world);
     }
     fn observe(&mut self, observation: &[f64]) {
         self.lines.push(format!("{observation:?}"));
     }
-    fn step(&mut self, row: &StepRow<'_, AirHockeyWorld>) {
-        self.lines.push(format!("{row:?}"));
+    fn step(&mut self, row: &StepRow<'_>) {
+        self.lines.push(format!(
+            "{} {:?} {:?} {:?}",
+            row.step, row.action, row.timing, row.next_observation
+        ));
+        self.state(row.world);
         self.actions.push(row.action.to_vec());
         self.times.push(row.timing);
     }
@@ -50,14 +78,19 @@ fn arena() -> Arena {
     Arena::new(Profile::Evaluation, seed, seed.model_mismatch())
 }
 
-fn begin<S: StepSink<AirHockeyWorld>>(task: Task, sink: S) -> RunningEpisode<AirHockeyWorld, S> {
-    RunningEpisode::begin(&arena(), task, EPISODE, Some(Interpolation::Cubic), sink).unwrap()
+fn begin<S: StepSink>(task: Task, sink: S) -> RunningEpisode<S> {
+    RunningEpisode::begin(
+        &arena(),
+        task,
+        EPISODE,
+        Some(Interpolation::Cubic.into()),
+        sink,
+    )
+    .unwrap()
 }
 
 /// Answers with slightly moved joint positions, and a computation time that depends on the step.
-fn answer<S: StepSink<AirHockeyWorld>>(
-    running: &mut RunningEpisode<AirHockeyWorld, S>,
-) -> Option<EpisodeOutcome> {
+fn answer<S: StepSink>(running: &mut RunningEpisode<S>) -> Option<EpisodeOutcome> {
     let question = running.question().unwrap();
     let mut action = question.observation[JOINT_POSITIONS].to_vec();
     action[0] += 0.01;
@@ -169,13 +202,10 @@ fn extreme_action(observation: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn begin_within<S: StepSink<AirHockeyWorld>>(
-    bounds: Bounds,
-    sink: S,
-) -> RunningEpisode<AirHockeyWorld, S> {
-    let interpolation = Some(Interpolation::Trajectory);
+fn begin_within<S: StepSink>(bounds: Bounds, sink: S) -> RunningEpisode<S> {
+    let layout = Some(Interpolation::Trajectory.into());
     let arena = arena().with_bounds(bounds);
-    RunningEpisode::begin(&arena, PREPARE, EPISODE, interpolation, sink).unwrap()
+    RunningEpisode::begin(&arena, PREPARE, EPISODE, layout, sink).unwrap()
 }
 
 #[test]

@@ -2,39 +2,34 @@
 
 use faceoff_airhockey::STOPPED;
 use faceoff_episode::{
-    AnswerTiming, Environment, EpisodeStart, NullSink, RecordError, RunningEpisode, StepRow,
-    StepSink, World,
+    AnswerTiming, Environment, EpisodeStart, NullSink, RecordError, RunningEpisode, StateColumns,
+    StepRow, StepSink, World,
 };
 use faceoff_types::{
-    AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task, UnknownTask, Violations,
+    ActionLayout, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task, UnknownTask,
+    Violations,
 };
+use std::any::Any;
 
 /// Control steps of the longest episode.
 const MAX_STEPS: u32 = 40;
 /// Beyond this distance from the origin, m, the mass is lost.
 const BOUND_M: f64 = 10.0;
 
-/// What the agent's action is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Action {
-    /// A displacement, m.
-    Displacement,
-    /// Half of a displacement, m.
-    HalfDisplacement,
-}
+/// The agent's action is a displacement, m.
+const DISPLACEMENT: ActionLayout = ActionLayout::new(Some(1), &[1]);
+/// The agent's action is half of a displacement, m.
+const HALF_DISPLACEMENT: ActionLayout = ActionLayout::new(Some(2), &[1]);
 
 #[derive(Debug)]
 struct PointMass {
-    action: Action,
+    /// Is an action half of a displacement?
+    halves: bool,
     position_m: [f64; 1],
     steps: u32,
 }
 
 impl World for PointMass {
-    type Choice = Action;
-    type Start<'a> = f64;
-    type Step<'a> = f64;
-
     fn steps(&self) -> u32 {
         self.steps
     }
@@ -44,9 +39,9 @@ impl World for PointMass {
     }
 
     fn step(&mut self, action: &[f64]) -> Option<EpisodeEnd> {
-        self.position_m[0] += match self.action {
-            Action::Displacement => action[0],
-            Action::HalfDisplacement => action[0] / 2.0,
+        self.position_m[0] += match self.halves {
+            false => action[0],
+            true => action[0] / 2.0,
         };
         self.steps += 1;
         self.success().then_some(STOPPED)
@@ -65,12 +60,16 @@ impl World for PointMass {
         Violations::default()
     }
 
-    fn start(&self) -> f64 {
-        self.position_m[0]
+    fn record_state(&self, columns: &mut dyn StateColumns) {
+        columns.put(&self.position_m);
     }
 
-    fn last_step(&self) -> f64 {
-        self.position_m[0]
+    fn limits(&self) -> &[f64] {
+        &[]
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
     }
 }
 
@@ -80,8 +79,6 @@ struct Line {
 }
 
 impl Environment for Line {
-    type World = PointMass;
-
     fn seed(&self, task: Task, index: u32) -> Seed {
         Seed::from_number(5).episode(task, index)
     }
@@ -94,17 +91,17 @@ impl Environment for Line {
         &self,
         task: Task,
         index: u32,
-        choice: Option<Action>,
-    ) -> Result<PointMass, UnknownTask> {
+        layout: Option<ActionLayout>,
+    ) -> Result<Box<dyn World>, UnknownTask> {
         if task != REACH {
             return Err(UnknownTask::new(task.as_str(), [REACH]));
         }
         let drawn = f64::from(self.seed(task, index).as_bytes()[0]) / 256.0 + 1.0;
-        Ok(PointMass {
-            action: choice.unwrap_or(Action::Displacement),
+        Ok(Box::new(PointMass {
+            halves: layout == Some(HALF_DISPLACEMENT),
             position_m: [self.start_m.unwrap_or(drawn)],
             steps: 0,
-        })
+        }))
     }
 }
 
@@ -114,22 +111,28 @@ const REACH: Task = Task::new("reach");
 /// Positions that a recording has.
 #[derive(Default)]
 struct Positions {
-    choice: Option<Action>,
+    layout: Option<ActionLayout>,
     true_m: Vec<f64>,
     observed_m: Vec<f64>,
     next_observed_m: Vec<f64>,
 }
 
-impl StepSink<PointMass> for Positions {
-    fn begin(&mut self, start: EpisodeStart<'_, PointMass>) {
-        self.choice = start.choice;
-        self.true_m.push(start.state);
+/// The true position, as recordings have it.
+fn position(world: &dyn World) -> f64 {
+    let mass: &PointMass = world.as_any().downcast_ref().unwrap();
+    mass.position_m[0]
+}
+
+impl StepSink for Positions {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
+        self.layout = start.layout;
+        self.true_m.push(position(start.world));
     }
     fn observe(&mut self, observation: &[f64]) {
         self.observed_m.push(observation[0]);
     }
-    fn step(&mut self, row: &StepRow<'_, PointMass>) {
-        self.true_m.push(row.world);
+    fn step(&mut self, row: &StepRow<'_>) {
+        self.true_m.push(position(row.world));
         self.next_observed_m.push(row.next_observation[0]);
     }
     fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
@@ -144,13 +147,13 @@ const TIMING: AnswerTiming = AnswerTiming {
 };
 
 /// Plays an episode with an agent that answers with `factor` times the observed position.
-fn play<S: StepSink<PointMass>>(
+fn play<S: StepSink>(
     line: &Line,
-    choice: Action,
+    layout: ActionLayout,
     factor: f64,
     sink: S,
 ) -> Result<EpisodeOutcome, AgentFaultKind> {
-    let mut running = RunningEpisode::begin(line, REACH, 3, Some(choice), sink).unwrap();
+    let mut running = RunningEpisode::begin(line, REACH, 3, Some(layout), sink).unwrap();
     loop {
         let action = [factor * running.question().unwrap().observation[0]];
         if let Some(outcome) = running.answer(&action, TIMING)? {
@@ -163,19 +166,19 @@ fn play<S: StepSink<PointMass>>(
 fn other_world_is_played_and_recorded() {
     let line = Line { start_m: None };
     let mut recorded = Positions::default();
-    let outcome = play(&line, Action::HalfDisplacement, -1.0, &mut recorded).unwrap();
+    let outcome = play(&line, HALF_DISPLACEMENT, -1.0, &mut recorded).unwrap();
     assert_eq!((outcome.end, outcome.success), (STOPPED, true));
     assert_eq!(outcome.computation_time.max_s, TIMING.computation_time_s);
-    assert_eq!(recorded.choice, Some(Action::HalfDisplacement));
+    assert_eq!(recorded.layout, Some(HALF_DISPLACEMENT));
     let steps = usize::try_from(outcome.steps).unwrap();
     assert_eq!(recorded.true_m.len(), 1 + steps);
     assert_eq!(recorded.observed_m, recorded.true_m[..steps]);
     assert_eq!(recorded.next_observed_m, recorded.true_m[1..]);
     assert_eq!(recorded.true_m[1], recorded.true_m[0] / 2.0);
 
-    let again = play(&line, Action::HalfDisplacement, -1.0, NullSink).unwrap();
+    let again = play(&line, HALF_DISPLACEMENT, -1.0, NullSink).unwrap();
     assert_eq!(again, outcome, "the same seed gives the same episode");
-    let idle = play(&line, Action::Displacement, 0.0, NullSink).unwrap();
+    let idle = play(&line, DISPLACEMENT, 0.0, NullSink).unwrap();
     assert_eq!(
         (idle.steps, idle.end, idle.success),
         (MAX_STEPS, EpisodeEnd::HORIZON, false)
@@ -185,7 +188,7 @@ fn other_world_is_played_and_recorded() {
 #[test]
 fn other_world_that_diverges_is_an_agent_fault() {
     let line = Line { start_m: Some(1.0) };
-    let fault = play(&line, Action::Displacement, 100.0, NullSink).unwrap_err();
+    let fault = play(&line, DISPLACEMENT, 100.0, NullSink).unwrap_err();
     let detail = "the mass is lost".to_owned();
     assert_eq!(fault, AgentFaultKind::Diverged { detail });
     let running = RunningEpisode::begin(&line, REACH, 3, None, NullSink).unwrap();

@@ -5,7 +5,8 @@ use crate::{
     site::{LEASE_S, Site, result},
 };
 use faceoff_scoring::{
-    COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
+    COMPUTATION_TIME_MAX_POINTS,
+    tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},
 };
 use scraper::Selector;
 use serde_json::json;

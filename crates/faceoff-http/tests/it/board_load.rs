@@ -2,7 +2,8 @@
 //! `cargo nextest run --release -p faceoff-http --run-ignored only board_load --no-capture`
 
 use crate::site::{OutcomeFn, Site, outcome};
-use faceoff_types::{EpisodeOutcome, Task, Violations};
+use faceoff_airhockey::{EE, JOINT_VEL};
+use faceoff_types::{EpisodeOutcome, Task};
 use std::time::Instant;
 
 const TEAMS: usize = 50;
@@ -28,11 +29,12 @@ async fn boards_of_fifty_teams_are_measured() {
     let outcome_fn = |team: u64| {
         move |task: Task, episode: u32| EpisodeOutcome {
             success: pseudo_random(team, task, episode, 0) < 200 + 12 * team,
-            violations: Violations {
-                ee: pseudo_random(team, task, episode, 1) < 4 * team,
-                joint_vel: pseudo_random(team, task, episode, 2) < 6 * team,
-                ..Violations::default()
-            },
+            violations: [
+                (EE, pseudo_random(team, task, episode, 1) < 4 * team),
+                (JOINT_VEL, pseudo_random(team, task, episode, 2) < 6 * team),
+            ]
+            .into_iter()
+            .collect(),
             ..outcome(task, episode, false)
         }
     };

@@ -37,9 +37,9 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
     let part = folder.join("part");
     let mut clips = ClipRecorder::new(PREPARE, File::create(&part).unwrap()).unwrap();
     for episode in 0..EPISODES {
-        let interpolation = Some(Interpolation::Cubic);
+        let layout = Some(Interpolation::Cubic.into());
         let mut running =
-            RunningEpisode::begin(&arena, PREPARE, episode, interpolation, &mut clips).unwrap();
+            RunningEpisode::begin(&arena, PREPARE, episode, layout, &mut clips).unwrap();
         // Entries 6 to 12 of an observation are the joint positions.
         let joint_positions = running.question().unwrap().observation[6..13].to_vec();
         let outcome = loop {

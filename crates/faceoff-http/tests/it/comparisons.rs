@@ -6,19 +6,16 @@ use crate::{
     html::texts,
     site::{OutcomeFn, Site, outcome},
 };
-use faceoff_airhockey::{HIT, PREPARE};
+use faceoff_airhockey::{EE, HIT, PREPARE};
 use faceoff_store::{Artifacts, EvaluationState};
-use faceoff_types::{EpisodeOutcome, EvaluationId, Task, Violations};
+use faceoff_types::{EpisodeOutcome, EvaluationId, Task};
 use serde_json::json;
 
 /// The outcome of an episode: solved or not, and with or without a violation of the end effector's bounds.
 fn episode_outcome(task: Task, episode: u32, solved: bool, has_violation: bool) -> EpisodeOutcome {
     EpisodeOutcome {
         success: solved,
-        violations: Violations {
-            ee: has_violation,
-            ..Violations::default()
-        },
+        violations: [(EE, has_violation)].into_iter().collect(),
         ..outcome(task, episode, false)
     }
 }

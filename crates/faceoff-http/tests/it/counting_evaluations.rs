@@ -2,7 +2,8 @@
 //! mean of several days, or that of a final day.
 
 use crate::site::{ADMIN, Site, outcome};
-use faceoff_types::{EpisodeOutcome, Task, Violations};
+use faceoff_airhockey::EE;
+use faceoff_types::{EpisodeOutcome, Task};
 use serde_json::{Value, json};
 
 /// Sets which evaluations count, in an open stage.
@@ -17,10 +18,7 @@ async fn set_counting(site: &Site, standings: Value) {
 fn agent(solved: u32, violated: u32) -> impl Fn(Task, u32) -> EpisodeOutcome {
     move |task, episode| EpisodeOutcome {
         success: episode < solved,
-        violations: Violations {
-            ee: episode < violated,
-            ..Violations::default()
-        },
+        violations: [(EE, episode < violated)].into_iter().collect(),
         ..outcome(task, episode, false)
     }
 }

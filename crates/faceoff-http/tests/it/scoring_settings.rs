@@ -2,8 +2,8 @@
 //! the simulator's perturbations.
 
 use crate::site::{ADMIN, Site, outcome};
-use faceoff_airhockey::HIT;
-use faceoff_types::{EpisodeOutcome, Task, Violations};
+use faceoff_airhockey::{HIT, JOINT_VEL};
+use faceoff_types::{EpisodeOutcome, Task};
 use serde_json::json;
 
 #[tokio::test]
@@ -43,10 +43,7 @@ async fn scoring_settings_are_rules_and_apply_to_the_board() {
     // The agent solves half of the four episodes of `hit`, and exceeds the joint velocity limits in each of them.
     let outcome_fn = |task: Task, episode| EpisodeOutcome {
         success: task == HIT && episode < 2,
-        violations: Violations {
-            joint_vel: task == HIT,
-            ..Violations::default()
-        },
+        violations: [(JOINT_VEL, task == HIT)].into_iter().collect(),
         ..outcome(task, episode, false)
     };
     let id = site.run_evaluation(outcome_fn).await;

@@ -680,7 +680,12 @@ pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> Eva
         let bounds = &plan.variation.tier_bounds;
         (
             *task,
-            faceoff_scoring::score_task(&task_outcomes, &Default::default(), bounds),
+            faceoff_scoring::score_task(
+                &faceoff_airhockey::competition(),
+                &task_outcomes,
+                &Default::default(),
+                bounds,
+            ),
         )
     });
     faceoff_scoring::score_evaluation(

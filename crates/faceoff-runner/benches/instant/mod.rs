@@ -86,5 +86,6 @@ pub fn environment(isolation: Isolation) -> AgentEnvironment {
         images: false,
         agent_cpus: Vec::new(),
         supervision: Supervision::default(),
+        simulator: faceoff_airhockey::simulator(),
     }
 }

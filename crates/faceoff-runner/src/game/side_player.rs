@@ -10,7 +10,7 @@ use crate::{
     wait_breakdown::WaitBreakdown,
 };
 use faceoff_episode::{AnswerTiming, RallyEntry, Response, SideFault};
-use faceoff_types::{AgentFault, AgentTask, Side, TimeLimits};
+use faceoff_types::{AgentFault, AgentTask, Interpolation, Side, TimeLimits};
 use std::time::{Duration, Instant};
 
 /// One side of a game: its agent's process, which is restarted after a fault, and its current question.
@@ -215,8 +215,8 @@ impl<'a> SidePlayer<'a> {
         let interpolation = self
             .session
             .as_ref()
-            .map(Session::interpolation)
-            .expect("an agent that is ready runs");
+            .and_then(|session| Interpolation::from_code(session.layout().code()).ok())
+            .expect("an agent that is ready runs, with a layout of the competition");
         match self.result.take().expect("the reset has a result") {
             Ok(timing) => RallyEntry::Ready {
                 startup_s,

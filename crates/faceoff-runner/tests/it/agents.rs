@@ -123,6 +123,7 @@ pub fn sandboxed() -> AgentEnvironment {
         images: true,
         agent_cpus: Vec::new(),
         supervision: Supervision::default(),
+        simulator: faceoff_airhockey::simulator(),
     }
 }
 

@@ -5,8 +5,7 @@ use crate::{
     recording::{moving_agent, read_table},
     shard::{run, spec},
 };
-use faceoff_airhockey::competition;
-use faceoff_airhockey::{DEFEND, HIT, PREPARE};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE, simulator};
 use faceoff_dataset::{
     Dataset, assemble,
     verify::{VerifiedDataset, verify},
@@ -71,7 +70,9 @@ fn recordings_of_one_and_three_workers_are_equal() {
             }
         });
         let archive = dir.path().join(format!("{name}.zip"));
-        let mut result = assemble(&meta(), &dirs, &archive, None).unwrap().result;
+        let mut result = assemble(&meta(), &dirs, &archive, None, simulator().as_ref())
+            .unwrap()
+            .result;
         let out = dir.path().join(name);
         let mut zip = ZipArchive::new(File::open(&archive).unwrap()).unwrap();
         zip.extract(&out).unwrap();
@@ -115,11 +116,11 @@ fn play_and_verify(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset 
     let shard = dir.path().join("shard");
     run(&spec(task, 0..episodes), agent, &sandboxed(), &shard).unwrap();
     let archive = dir.path().join("dataset.zip");
-    assemble(&meta(), &[shard], &archive, None).unwrap();
+    assemble(&meta(), &[shard], &archive, None, simulator().as_ref()).unwrap();
     let workers = NonZero::new(2).unwrap();
     verify(
-        &Dataset::open(&archive).unwrap(),
-        &competition(),
+        &Dataset::open(&archive, simulator().competition()).unwrap(),
+        simulator().as_ref(),
         workers,
         &|| (),
     )
@@ -169,11 +170,11 @@ fn diverged_world_is_an_agent_fault_and_verifies() {
     assert!(report.log.contains("made the simulated world diverge"));
 
     let archive = dir.path().join("dataset.zip");
-    assemble(&meta(), &[shard], &archive, None).unwrap();
-    let dataset = Dataset::open(&archive).unwrap();
+    assemble(&meta(), &[shard], &archive, None, simulator().as_ref()).unwrap();
+    let dataset = Dataset::open(&archive, simulator().competition()).unwrap();
     let workers = NonZero::new(2).unwrap();
     assert_eq!(
-        verify(&dataset, &competition(), workers, &|| ())
+        verify(&dataset, simulator().as_ref(), workers, &|| ())
             .unwrap()
             .episodes,
         2

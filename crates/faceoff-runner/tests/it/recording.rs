@@ -10,6 +10,7 @@ use arrow_array::{
 };
 use faceoff_airhockey::{HIT, TASKS};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::Violations;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::{fs::File, path::Path, time::Duration};
 
@@ -127,7 +128,7 @@ fn recording_matches_the_simulation() {
                 .collect();
             assert_eq!(last, world.observation(), "after the last step");
             assert_eq!(world.success(), outcome.success);
-            assert_eq!(world.violations(), outcome.violations);
+            assert_eq!(Violations::from(world.violations()), outcome.violations);
         }
     }
 }
@@ -254,6 +255,6 @@ fn times_and_faults_are_recorded() {
     assert_eq!(Some(&fault), report.outcomes[0].fault.as_ref());
     assert_eq!(
         floats(&episodes, "penalty_points").value(0),
-        faceoff_scoring::episode_penalty(&report.outcomes[0])
+        faceoff_scoring::episode_penalty(&faceoff_airhockey::competition(), &report.outcomes[0])
     );
 }

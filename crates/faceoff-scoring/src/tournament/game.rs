@@ -1,12 +1,12 @@
 //! A played game as in the file `games.json`: validation of the entry, and the game with its result.
 
+use super::points::MAX_EPISODE_PENALTY;
 use super::{
     result::{Forfeit, GameResult, ResultReason},
     rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
     submission_label::SubmissionLabel,
 };
-use crate::episode::MAX_EPISODE_PENALTY;
 use faceoff_types::{FOULS_PER_POINT, GAME_WINDOWS, RoundNumber, TeamName, WINDOW_STEPS};
 use serde::{Deserialize, Serialize};
 

@@ -10,6 +10,7 @@ mod game;
 mod goal_difference;
 mod head_to_head;
 mod mirrored;
+mod points;
 pub mod rating;
 mod result;
 mod rules;
@@ -27,6 +28,7 @@ pub use game::{GameEntry, InvalidGame, PlayedGame, ScoredGame};
 pub use goal_difference::{GoalDifference, MIN_FOR_INTERVAL};
 pub use head_to_head::{HeadToHead, head_to_head};
 pub use mirrored::{MirroredPairs, SubmissionPairing, VarianceComparison, find_mirrored_pairs};
+pub use points::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY};
 pub use result::{DrawReason, Forfeit, GameResult, ResultReason, WinReason};
 pub use rules::{
     FORFEIT_GOALS, GameTally, POINTS_DRAW, POINTS_LOSS, POINTS_WIN, final_score, forfeit_score,

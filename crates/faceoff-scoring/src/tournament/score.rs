@@ -3,14 +3,13 @@
 
 use super::{
     game::GameEntry,
+    points::{violation_names, violation_points},
     result::{Forfeit, GameResult, ResultReason},
     rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
 };
 use crate::{
-    episode::{
-        COMPUTATION_TIME_MAX_POINTS, computation_time_penalty, violation_counts, violation_points,
-    },
+    episode::{COMPUTATION_TIME_MAX_POINTS, computation_time_penalty, violation_counts},
     step_times::StepTimes,
     tier::tier_of,
 };
@@ -222,10 +221,11 @@ fn total_penalty(side: &SideOutcome) -> f64 {
 }
 
 fn count_violations(windows: &[GameWindow]) -> ViolationCounts {
-    violation_counts(windows.iter().map(|window| {
+    let windows = windows.iter().map(|window| {
         let is_late = time_or_fault_points(window) > 0.0;
         (&window.violations, is_late)
-    }))
+    });
+    violation_counts(violation_names(), windows)
 }
 
 fn summarize_times(side: &SideOutcome, times_s: &[f64]) -> ComputationTimeSummary {
@@ -276,15 +276,13 @@ mod side_index {
 #[cfg(test)]
 mod tests {
     use super::{super::game::PlayedGame, *};
-    use faceoff_types::{ComputationTime, GameEnd, Violations};
+    use faceoff_airhockey::EE;
+    use faceoff_types::{ComputationTime, GameEnd};
 
     fn window(ee: bool, max_s: f64, faults: u32) -> GameWindow {
         GameWindow {
             steps: WINDOW_STEPS,
-            violations: Violations {
-                ee,
-                ..Violations::default()
-            },
+            violations: [(EE, ee)].into_iter().collect(),
             computation_time: ComputationTime { mean_s: 0.0, max_s },
             faults,
         }

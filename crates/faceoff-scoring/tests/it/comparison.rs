@@ -1,14 +1,13 @@
 //! Tests of comparisons of two evaluations, and of the summaries that they need.
 
 use crate::support::{episode, weights};
-use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
+use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_VEL, PREPARE, TASKS, competition};
 use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
     overall_p_value, overall_score, score_task,
 };
 use faceoff_types::{
     EpisodeOutcome, Profile, RULESET, Seed, Task, TaskMap, TaskWeights, TierBounds, Variation,
-    Violations,
 };
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -28,7 +27,7 @@ fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOut
 }
 
 fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-    EpisodeSummary::from_outcomes(outcomes, &TASKS, &Default::default()).unwrap()
+    EpisodeSummary::from_outcomes(&competition(), outcomes, &TASKS, &Default::default()).unwrap()
 }
 
 fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
@@ -118,20 +117,20 @@ fn tier_change_depends_on_bounds() {
     let costly: Vec<_> = all
         .into_iter()
         .map(|outcome| EpisodeOutcome {
-            violations: Violations {
-                joint_vel: outcome.episode < 10,
-                ..Violations::default()
-            },
+            violations: [(JOINT_VEL, outcome.episode < 10)].into_iter().collect(),
             ..outcome
         })
         .collect();
-    let clear = EpisodeSummary::from_outcomes(&costly, &TASKS, &TierBounds::default()).unwrap();
+    let clear =
+        EpisodeSummary::from_outcomes(&competition(), &costly, &TASKS, &TierBounds::default())
+            .unwrap();
     assert_eq!(
         clear.tier_change, 0.0,
         "10 points in each task, deployable up to 50"
     );
     let tight =
-        EpisodeSummary::from_outcomes(&costly, &TASKS, &"0.1,0.5".parse().unwrap()).unwrap();
+        EpisodeSummary::from_outcomes(&competition(), &costly, &TASKS, &"0.1,0.5".parse().unwrap())
+            .unwrap();
     assert!(
         tight.tier_change > 0.5,
         "10 points in each of three tasks, deployable up to 10: {}",
@@ -269,15 +268,15 @@ fn unpaired_evaluations_are_compared_by_rates() {
 fn summary_needs_each_episode_once() {
     let mut outcomes = outcomes(3, |_, _| true);
     outcomes.reverse();
-    EpisodeSummary::from_outcomes(&outcomes, &TASKS, &Default::default()).unwrap();
+    EpisodeSummary::from_outcomes(&competition(), &outcomes, &TASKS, &Default::default()).unwrap();
     let first = outcomes.remove(2); // prepare 0
     assert_eq!(
-        EpisodeSummary::from_outcomes(&outcomes, &TASKS, &Default::default()),
+        EpisodeSummary::from_outcomes(&competition(), &outcomes, &TASKS, &Default::default()),
         Err(PairingError::Missing(PREPARE, 0))
     );
     outcomes.extend([first.clone(), first]);
     assert_eq!(
-        EpisodeSummary::from_outcomes(&outcomes, &TASKS, &Default::default()),
+        EpisodeSummary::from_outcomes(&competition(), &outcomes, &TASKS, &Default::default()),
         Err(PairingError::Repeated(PREPARE, 0))
     );
     assert_eq!(summary(&[]).tier_change, 0.0);
@@ -287,10 +286,7 @@ fn summary_needs_each_episode_once() {
 fn summary_round_trips_as_json() {
     let mut outcomes = outcomes(50, |_, episode| episode % 3 == 0);
     for outcome in &mut outcomes[..8] {
-        outcome.violations = Violations {
-            ee: true,
-            ..Violations::default()
-        };
+        outcome.violations = [(EE, true)].into_iter().collect();
     }
     let summary = summary(&outcomes);
     assert!(summary.tasks[&HIT].tier_change > 0.2);
@@ -341,7 +337,7 @@ proptest! {
         prop_assert_eq!(comparison.overall.p_value, overall_p_value(&WEIGHTS, &tallies));
         let score = |all: &[EpisodeOutcome]| overall_score(&WEIGHTS, TASKS.map(|task| {
             let task_outcomes: Vec<_> = all.iter().filter(|outcome| outcome.task == task).cloned().collect();
-            (task, score_task(&task_outcomes, &StepTimes::default(), &Default::default()).success_rate)
+            (task, score_task(&competition(), &task_outcomes, &StepTimes::default(), &Default::default()).success_rate)
         }));
         prop_assert_eq!(comparison.overall.score_a, score(&outcomes_a));
         prop_assert_eq!(comparison.overall.score_b, score(&outcomes_b));

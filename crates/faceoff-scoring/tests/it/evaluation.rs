@@ -1,28 +1,33 @@
 //! Tests of the scores of episodes, tasks and evaluations (an evaluation is one agent's run of all tasks).
 
 use crate::support::{episode, task_result, weights};
-use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
+use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE, competition};
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, Ruleset, Seed, TaskMap, Tier,
-    ViolationName, Violations,
+    ViolationName,
 };
 
 #[test]
 fn violations_have_own_points_and_count_once() {
     let clean = episode(HIT, 0);
-    assert_eq!(episode_penalty(&clean), 0.0);
+    assert_eq!(episode_penalty(&competition(), &clean), 0.0);
     let penalty = |ee, link, joint_pos, joint_vel| {
-        let violations = Violations {
-            ee,
-            link,
-            joint_pos,
-            joint_vel,
-        };
-        episode_penalty(&faceoff_types::EpisodeOutcome {
-            violations,
-            ..clean.clone()
-        })
+        let violations = [
+            (EE, ee),
+            (LINK, link),
+            (JOINT_POS, joint_pos),
+            (JOINT_VEL, joint_vel),
+        ]
+        .into_iter()
+        .collect();
+        episode_penalty(
+            &competition(),
+            &faceoff_types::EpisodeOutcome {
+                violations,
+                ..clean.clone()
+            },
+        )
     };
     assert_eq!(penalty(true, false, false, false), 3.0);
     assert_eq!(penalty(false, true, false, false), 3.0);
@@ -36,7 +41,7 @@ fn agent_fault_is_failure_with_full_time_penalty() {
     let mut faulty = episode(DEFEND, 0);
     faulty.end = EpisodeEnd::AGENT_FAULT;
     faulty.success = true; // must not count after a fault
-    faulty.violations.ee = true;
+    faulty.violations = [EE].into();
     faulty.computation_time = ComputationTime {
         mean_s: 0.03,
         max_s: 0.03,
@@ -49,11 +54,16 @@ fn agent_fault_is_failure_with_full_time_penalty() {
         line: None,
     });
     assert_eq!(
-        episode_penalty(&faulty),
+        episode_penalty(&competition(), &faulty),
         5.0,
         "2 points once, not per cause"
     );
-    let result = score_task(&[faulty], &StepTimes::default(), &Default::default());
+    let result = score_task(
+        &competition(),
+        &[faulty],
+        &StepTimes::default(),
+        &Default::default(),
+    );
     assert_eq!(
         (
             result.successes,
@@ -71,8 +81,7 @@ fn task_result_does_not_depend_on_episode_order() {
         outcome.steps = 100;
     }
     for outcome in &mut outcomes[10..20] {
-        outcome.violations.ee = true;
-        outcome.violations.joint_vel = true;
+        outcome.violations = [EE, JOINT_VEL].into();
     }
     outcomes[3].computation_time = ComputationTime {
         mean_s: 0.001,
@@ -82,7 +91,7 @@ fn task_result_does_not_depend_on_episode_order() {
     for time_s in [0.1, 0.2, 0.3] {
         times.add(time_s);
     }
-    let result = score_task(&outcomes, &times, &Default::default());
+    let result = score_task(&competition(), &outcomes, &times, &Default::default());
     assert_eq!(
         (result.episodes, result.successes, result.success_rate),
         (50, 20, 0.4)
@@ -108,7 +117,10 @@ fn task_result_does_not_depend_on_episode_order() {
     assert_eq!(result.steps, 20 * 100 + 30 * 500);
 
     outcomes.reverse();
-    assert_eq!(score_task(&outcomes, &times, &Default::default()), result);
+    assert_eq!(
+        score_task(&competition(), &outcomes, &times, &Default::default()),
+        result
+    );
 }
 
 #[test]

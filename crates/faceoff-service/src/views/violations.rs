@@ -4,6 +4,7 @@
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::violations::ViolationsView;
 use faceoff_dataset::Dataset;
+use std::sync::Arc;
 
 /// Reads the violations from a finished evaluation's dataset, given its artifact key. The caller checks that the day is
 /// released.
@@ -17,7 +18,8 @@ pub async fn read(app: &AppState, dataset: &str) -> Result<ViolationsView, Probl
         .artifacts()
         .local_path(dataset)
         .map_err(Problem::internal)?;
-    let read = move || Dataset::open_lazily(&path)?.violations();
+    let competition = Arc::clone(&app.config.competition);
+    let read = move || Dataset::open_lazily(&path, &competition)?.violations();
     let violations = tokio::task::spawn_blocking(read)
         .await
         .map_err(Problem::internal)?

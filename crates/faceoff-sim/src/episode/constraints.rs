@@ -7,7 +7,16 @@ use crate::{
     table::geometry::TABLE,
     world::World,
 };
-use faceoff_types::Violations;
+use faceoff_types::{ViolationName, Violations};
+
+/// End-effector position: over the table and at its height.
+pub const EE: ViolationName = ViolationName::new("ee");
+/// Height of elbow (link 4) and wrist (link 7).
+pub const LINK: ViolationName = ViolationName::new("link");
+/// Joint positions within 95 % of their limits.
+pub const JOINT_POS: ViolationName = ViolationName::new("joint_pos");
+/// Filtered joint velocities within 95 % of their limits.
+pub const JOINT_VEL: ViolationName = ViolationName::new("joint_vel");
 
 /// Tolerance ± of the end effector's height, m.
 pub const HEIGHT_TOLERANCE_M: f64 = 0.02;
@@ -81,10 +90,42 @@ impl ConstraintValues {
     }
 
     /// Sets the flags of the violated groups in `violations`; other flags are kept.
-    pub fn mark(&self, violations: &mut Violations) {
+    pub fn mark(&self, violations: &mut ViolatedGroups) {
         violations.ee |= self.ee > 0.0;
         violations.link |= self.link > 0.0;
         violations.joint_pos |= self.joint_pos > 0.0;
         violations.joint_vel |= self.joint_vel > 0.0;
+    }
+}
+
+/// Which groups of constraints the robot's motion violated at least once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct ViolatedGroups {
+    /// End-effector position.
+    pub ee: bool,
+    /// Elbow and wrist height.
+    pub link: bool,
+    /// Joint positions.
+    pub joint_pos: bool,
+    /// Joint velocities.
+    pub joint_vel: bool,
+}
+
+/// Under the names of the competition, in the order of its tables.
+impl From<ViolatedGroups> for Violations {
+    fn from(groups: ViolatedGroups) -> Self {
+        let ViolatedGroups {
+            ee,
+            link,
+            joint_pos,
+            joint_vel,
+        } = groups;
+        let named = [
+            (EE, ee),
+            (LINK, link),
+            (JOINT_POS, joint_pos),
+            (JOINT_VEL, joint_vel),
+        ];
+        named.into_iter().collect()
     }
 }

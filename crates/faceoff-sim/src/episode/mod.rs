@@ -19,8 +19,8 @@ use crate::{
     table::puck::Puck,
     world::{Bounds, Divergence, World},
 };
-use constraints::ConstraintValues;
-use faceoff_types::{EpisodeEnd, Factors, Interpolation, PerturbationSettings, Seed, Violations};
+use constraints::{ConstraintValues, ViolatedGroups};
+use faceoff_types::{EpisodeEnd, Factors, Interpolation, PerturbationSettings, Seed};
 use opponent::Opponent;
 
 /// A running episode. It is deterministic: it reads no clock and does no I/O. A clone continues with the same bits.
@@ -35,7 +35,7 @@ pub struct Episode {
     steps: u32,
     puck_lost: bool,
     /// Constraints violated so far.
-    violations: Violations,
+    violations: ViolatedGroups,
 }
 
 impl Episode {
@@ -77,7 +77,7 @@ impl Episode {
             table,
             steps: 0,
             puck_lost: false,
-            violations: Violations::default(),
+            violations: ViolatedGroups::default(),
         }
     }
 
@@ -160,7 +160,7 @@ impl Episode {
 
     /// Constraints violated so far.
     #[must_use]
-    pub fn violations(&self) -> Violations {
+    pub fn violations(&self) -> ViolatedGroups {
         self.violations
     }
 

@@ -8,15 +8,16 @@ pub use state::GameState;
 
 use crate::{
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
-    episode::{constraints::ConstraintValues, task::PLAYABLE_Y_M},
+    episode::{
+        constraints::{ConstraintValues, ViolatedGroups},
+        task::PLAYABLE_Y_M,
+    },
     perturbation::table_factors::TableFactors,
     robot::plant::Plant,
     stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
 };
-use faceoff_types::{
-    Factors, Interpolation, PerturbationSettings, Ruleset, Seed, Violations, WINDOW_STEPS,
-};
+use faceoff_types::{Factors, Interpolation, PerturbationSettings, Ruleset, Seed, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// Settings of a game.
@@ -45,7 +46,7 @@ pub struct Game {
     /// Control steps so far.
     steps: u32,
     /// Constraints that each robot violated in the current window.
-    violations: [Violations; 2],
+    violations: [ViolatedGroups; 2],
 }
 
 /// State that is created for each rally.
@@ -66,7 +67,7 @@ pub struct GameStep {
     /// Constraint values after this step; if it ended the rally, still those of the ended rally.
     pub constraints: [ConstraintValues; 2],
     /// The constraints that each robot violated in the window that ends with this step; `None` if no window ends.
-    pub window: Option<[Violations; 2]>,
+    pub window: Option<[ViolatedGroups; 2]>,
     /// The true state after this step; if it ended the rally, still that of the ended rally.
     pub state: GameState,
     /// Set if this step ended the rally by divergence (the world's state would have left the bounds of the simulation).
@@ -90,7 +91,7 @@ impl Game {
             referee: Referee::new(serving_robot),
             rally,
             steps: 0,
-            violations: [Violations::default(); 2],
+            violations: [ViolatedGroups::default(); 2],
         }
     }
 

@@ -4,12 +4,13 @@
 
 use crate::reference::{array, cases, max_difference};
 use faceoff_sim::{
-    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, World,
+    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, ViolatedGroups,
+    World,
     game::referee::Referee,
     golden::game_hash,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
 };
-use faceoff_types::{Factors, Seed, Violations, WINDOW_STEPS};
+use faceoff_types::{Factors, Seed, WINDOW_STEPS};
 use serde_json::Value;
 
 /// Control steps after which a puck that rests on one side is a foul: the first step, and 751 more, which exceed 15 s.
@@ -201,10 +202,10 @@ fn window_counts_a_violation_once() {
     }
     assert_eq!(windows.len(), 2);
     for [first, second] in windows {
-        assert_eq!(first, Violations::default());
-        let lifted = Violations {
+        assert_eq!(first, ViolatedGroups::default());
+        let lifted = ViolatedGroups {
             ee: true,
-            ..Violations::default()
+            ..ViolatedGroups::default()
         };
         assert_eq!(second, lifted);
     }

@@ -1,8 +1,10 @@
 //! The success rate of an agent that holds still agrees with that in the *reference*, the challenge's own simulator.
 
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
-use faceoff_types::{Factors, Seed, Violations};
+use faceoff_sim::{
+    Episode, Interpolation, PerturbationSettings, Plant, ViolatedGroups, model::INITIAL_Q,
+};
+use faceoff_types::{Factors, Seed};
 
 /// Plays episodes with an arm that holds still. Returns the number of successes and the number of episodes with a violated constraint.
 fn play_holding(task: AirHockeyTask, episodes: u32) -> (u32, u32) {
@@ -19,7 +21,7 @@ fn play_holding(task: AirHockeyTask, episodes: u32) -> (u32, u32) {
         );
         while episode.step(&action[..14]).end.is_none() {}
         successes += u32::from(episode.success());
-        violations += u32::from(episode.violations() != Violations::default());
+        violations += u32::from(episode.violations() != ViolatedGroups::default());
     }
     (successes, violations)
 }

@@ -3,6 +3,7 @@
 //! A team submits an agent. A *validation run* checks it, and on each day it is evaluated: workers claim (lease) jobs from
 //! the queue, which are the *shards* of a run (episodes that are run together), and a scoring job at the end.
 
+use faceoff_airhockey::EE;
 use faceoff_store::*;
 pub use faceoff_testkit::{
     assert_conflict, assert_contains, one_shard_plan, rules_and_settings, six_shard_plan,
@@ -346,10 +347,7 @@ pub fn shard_commit(shard: &Shard, faults: u32) -> ShardCommit {
 /// Outcome of an episode that ended by an agent fault, or in success. Its times are no short decimals.
 pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
     EpisodeOutcome {
-        violations: Violations {
-            ee: true,
-            ..Violations::default()
-        },
+        violations: [EE].into(),
         computation_time: ComputationTime {
             mean_s: 0.1 + 0.2,
             max_s: 1e-3 / 3.0,

@@ -3,7 +3,7 @@
 use crate::fixture::*;
 use faceoff_airhockey::HIT;
 use faceoff_store::*;
-use faceoff_types::{Competition, Millionths, TaskInfo};
+use faceoff_types::{ActionSpace, Competition, Millionths, RecordingColumns, TaskInfo};
 use sqlx::Connection;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
@@ -171,6 +171,11 @@ async fn season_belongs_to_one_competition() {
         }],
         ends: Vec::new(),
         violations: Vec::new(),
+        actions: ActionSpace {
+            is_stated: false,
+            layouts: Vec::new(),
+        },
+        recording: RecordingColumns::default(),
     };
     let stored = async || -> (Option<String>, Option<String>) {
         sqlx::query_as("SELECT competition_id, competition_hash FROM season")

@@ -1,4 +1,4 @@
-//! Reads the `action` of an `act` line: nested arrays of numbers, whose shape depends on the agent's interpolation.
+//! Reads the `action` of an `act` line: nested arrays of numbers, whose shape depends on the agent's layout.
 
 use super::error_markers;
 use faceoff_types::ACTION_LIMIT;
@@ -10,7 +10,7 @@ use std::fmt;
 ///
 /// The shape bounds the recursion: an array in place of a number is refused before it is entered.
 pub(super) struct ActionSeed<'s> {
-    pub shape: &'static [usize],
+    pub shape: &'s [usize],
     pub numbers: &'s mut Vec<f64>,
 }
 

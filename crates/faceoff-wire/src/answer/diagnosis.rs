@@ -2,7 +2,7 @@
 
 use super::error_markers;
 use crate::protocol::MAX_LINE_BYTES;
-use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation};
+use faceoff_types::{ACTION_LIMIT, ActionLayout, AgentFaultKind};
 use serde_json::Value;
 
 /// Maximum number of characters of a repeated key in a message.
@@ -21,22 +21,22 @@ pub const fn too_long() -> AgentFaultKind {
     }
 }
 
-/// The fault behind a parser error. `interpolation` is the one from the agent's `ready` if the line should contain an action.
+/// The fault behind a parser error. `layout` is the one from the agent's `ready` if the line should contain an action.
 pub(super) fn diagnose(
     text: &str,
     error: &serde_json::Error,
-    interpolation: Option<Interpolation>,
+    layout: Option<ActionLayout>,
 ) -> AgentFaultKind {
     let message = error.to_string();
     if let Some(rest) = message.strip_prefix(error_markers::REPEATED_KEY) {
         return repeated_key(rest.split(' ').next().unwrap_or_default());
     }
-    if let Some(interpolation) = interpolation {
+    if let Some(layout) = layout {
         if let Some(index_and_value) = message.strip_prefix(error_markers::TOO_LARGE) {
-            return too_large(index_and_value, interpolation);
+            return too_large(index_and_value, layout);
         }
         if message.contains(error_markers::SHAPE) {
-            return wrong_shape(text, interpolation);
+            return wrong_shape(text, layout);
         }
     }
     if message.starts_with("number out of range") || has_non_finite_word(text) {
@@ -76,12 +76,12 @@ fn shorten(detail: &str) -> String {
 
 /// The fault for a number beyond [`ACTION_LIMIT`]. `index_and_value` is its row-major index in the action and its value,
 /// separated by a space.
-fn too_large(index_and_value: &str, interpolation: Interpolation) -> AgentFaultKind {
+fn too_large(index_and_value: &str, layout: ActionLayout) -> AgentFaultKind {
     let mut words = index_and_value.split(' ');
     let mut index: usize = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
     let value = words.next().and_then(|word| word.parse().ok());
     let mut indices = Vec::new();
-    for len in interpolation.shape().iter().rev() {
+    for len in layout.shape().iter().rev() {
         indices.push(index % len);
         index /= len;
     }
@@ -93,7 +93,7 @@ fn too_large(index_and_value: &str, interpolation: Interpolation) -> AgentFaultK
     }
 }
 
-fn wrong_shape(text: &str, interpolation: Interpolation) -> AgentFaultKind {
+fn wrong_shape(text: &str, layout: ActionLayout) -> AgentFaultKind {
     let got = match serde_json::from_str::<Value>(text) {
         Ok(value) => describe_action(&value["action"]),
         Err(error) if error.to_string().starts_with("number out of range") => {
@@ -103,7 +103,7 @@ fn wrong_shape(text: &str, interpolation: Interpolation) -> AgentFaultKind {
         Err(_) => "arrays nested too deep, or cut off".to_owned(),
     };
     AgentFaultKind::WrongShape {
-        expected: shape_text(interpolation.shape()),
+        expected: shape_text(layout.shape()),
         got,
     }
 }

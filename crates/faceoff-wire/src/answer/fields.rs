@@ -2,7 +2,7 @@
 
 use super::{action::ActionSeed, diagnosis, error_markers, repeated_keys, scalar::Scalar};
 use crate::protocol::MAX_LINE_BYTES;
-use faceoff_types::{AgentFaultKind, Interpolation, escape_unprintable};
+use faceoff_types::{ActionLayout, AgentFaultKind, escape_unprintable};
 use serde::{
     Deserializer as _,
     de::{Error as _, IgnoredAny, MapAccess, Visitor},
@@ -29,8 +29,8 @@ pub(super) struct Fields<'a> {
     has_skipped_values: bool,
 }
 
-/// The interpolation from the agent's `ready` and the buffer for its action; `None` if no action is expected.
-pub(super) type ActionSink<'s> = Option<(Interpolation, &'s mut Vec<f64>)>;
+/// The layout from the agent's `ready` and the buffer for its action; `None` if no action is expected.
+pub(super) type ActionSink<'s> = Option<(ActionLayout, &'s mut Vec<f64>)>;
 
 impl<'a> Fields<'a> {
     /// Parses one line. Without a sink an `action` is skipped like any unknown field.
@@ -41,12 +41,12 @@ impl<'a> Fields<'a> {
         let text = std::str::from_utf8(line).map_err(|error| AgentFaultKind::NotJson {
             detail: format!("not UTF-8 after byte {}", error.valid_up_to()),
         })?;
-        let interpolation = sink.as_ref().map(|(interpolation, _)| *interpolation);
+        let layout = sink.as_ref().map(|(layout, _)| *layout);
         let mut json = serde_json::Deserializer::from_str(text);
         let fields = json
             .deserialize_map(FieldsVisitor { sink })
             .and_then(|fields| json.end().map(|()| fields))
-            .map_err(|error| diagnosis::diagnose(text, &error, interpolation))?;
+            .map_err(|error| diagnosis::diagnose(text, &error, layout))?;
         if fields.has_skipped_values {
             repeated_keys::refuse(text)?;
         }
@@ -129,9 +129,9 @@ impl<'de> Visitor<'de> for FieldsVisitor<'_> {
                             error_markers::REPEATED_KEY
                         )));
                     }
-                    Some((interpolation, numbers)) => {
+                    Some((layout, numbers)) => {
                         map.next_value_seed(ActionSeed {
-                            shape: interpolation.shape(),
+                            shape: layout.shape(),
                             numbers,
                         })?;
                         fields.has_action = true;

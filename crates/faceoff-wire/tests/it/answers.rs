@@ -1,7 +1,7 @@
 //! Valid and invalid lines of an agent. Unless a test says otherwise, the line answers step 4 and the interpolation is cubic, so that
 //! an action has 2 rows of 7 numbers.
 
-use faceoff_types::{AgentFaultKind, Interpolation};
+use faceoff_types::{ActionLayout, ActionSpace, AgentFaultKind, Interpolation};
 use faceoff_wire::{
     MAX_LINE_BYTES,
     answer::{parse_act, parse_ready, parse_reset_ready},
@@ -12,6 +12,10 @@ const STEP: u32 = 4;
 const STEP_TEXT: &str = "4";
 
 /// One number for each of the 7 joints.
+fn actions() -> ActionSpace {
+    faceoff_airhockey::competition().actions
+}
+
 fn row(value: &str) -> String {
     format!("[{}]", [value; 7].join(","))
 }
@@ -26,7 +30,13 @@ fn valid_act() -> String {
 
 fn parse(line: &str) -> Result<Vec<f64>, AgentFaultKind> {
     let mut action = vec![9.0; 3]; // content that parsing must replace
-    parse_act(line.as_bytes(), STEP, Interpolation::Cubic, &mut action).map(|()| action)
+    parse_act(
+        line.as_bytes(),
+        STEP,
+        Interpolation::Cubic.into(),
+        &mut action,
+    )
+    .map(|()| action)
 }
 
 #[track_caller]
@@ -97,7 +107,13 @@ fn all_action_shapes_are_read() {
     ] {
         let interpolation = Interpolation::from_code(code).unwrap();
         let mut action = Vec::new();
-        parse_act(act("0", &text).as_bytes(), 0, interpolation, &mut action).unwrap();
+        parse_act(
+            act("0", &text).as_bytes(),
+            0,
+            interpolation.into(),
+            &mut action,
+        )
+        .unwrap();
         assert_eq!(action.len(), interpolation.len(), "{interpolation}");
     }
 }
@@ -217,7 +233,7 @@ fn too_large_number_is_refused_with_its_place() {
     let fault = parse_act(
         line.as_bytes(),
         STEP,
-        trajectory_interpolation,
+        trajectory_interpolation.into(),
         &mut Vec::new(),
     )
     .unwrap_err();
@@ -265,8 +281,13 @@ fn invalid_json_is_refused_with_a_reason() {
         assert!(detail.chars().count() < 260, "{detail}");
     }
     let mut action = Vec::new();
-    let fault =
-        parse_act(b"{\"type\":\"\xff\"}", 0, Interpolation::Cubic, &mut action).unwrap_err();
+    let fault = parse_act(
+        b"{\"type\":\"\xff\"}",
+        0,
+        Interpolation::Cubic.into(),
+        &mut action,
+    )
+    .unwrap_err();
     assert_eq!(
         fault,
         AgentFaultKind::NotJson {
@@ -310,7 +331,7 @@ fn repeated_key_is_refused_at_any_depth() {
         let line = valid_act().replacen('{', &format!("{{{extra},"), 1);
         assert_not_json(&line, &format!("the key {key:?} is given twice"));
         let ready = format!(r#"{{"type":"ready","protocol":1,"interpolation":3,{extra}}}"#);
-        let fault = parse_ready(ready.as_bytes());
+        let fault = parse_ready(ready.as_bytes(), &actions());
         assert!(
             matches!(fault, Err(AgentFaultKind::NotJson { .. })),
             "{ready}"
@@ -359,7 +380,7 @@ fn deep_nesting_does_not_exhaust_the_stack() {
         for field in ["x", "type", "step", "action", "name"] {
             let line = format!("{{\"{field}\":{nested}");
             assert!(parse(&line).is_err(), "{field}");
-            assert!(parse_ready(line.as_bytes()).is_err(), "{field}");
+            assert!(parse_ready(line.as_bytes(), &actions()).is_err(), "{field}");
         }
     }
     let closed = format!(
@@ -378,20 +399,17 @@ fn deep_nesting_does_not_exhaust_the_stack() {
 
 #[test]
 fn ready_to_hello_is_parsed_and_checked() {
-    let parse = |text: &str| parse_ready(text.as_bytes());
+    let parse = |text: &str| parse_ready(text.as_bytes(), &actions());
     let full = r#"{"type":"ready","protocol":1,"interpolation":3,"name":"x","version":"2"}"#;
     let parsed = parse(full).unwrap();
-    assert_eq!(parsed.interpolation, Interpolation::Cubic);
+    assert_eq!(parsed.layout, Interpolation::Cubic.into());
     assert_eq!(
         (parsed.name.as_deref(), parsed.version.as_deref()),
         (Some("x"), Some("2"))
     );
     let with_null =
         parse(r#"{"type":"ready","protocol":1,"interpolation":null,"name":7}"#).unwrap();
-    assert_eq!(
-        (with_null.interpolation.code(), with_null.name),
-        (None, None)
-    );
+    assert_eq!((with_null.layout.code(), with_null.name), (None, None));
 
     for (line, expected_got) in [
         (full.replace("ready", "act"), "act"),
@@ -436,4 +454,23 @@ fn ready_to_reset_must_name_the_episode() {
     );
     assert_eq!(got(r#"{"type":"ready"}"#), "ready without episode");
     assert_eq!(got(&valid_act()), "act");
+}
+
+#[test]
+fn only_layout_need_not_be_stated() {
+    let single = ActionSpace {
+        is_stated: false,
+        layouts: vec![ActionLayout::new(None, &[2])],
+    };
+    let ready = parse_ready(br#"{"type":"ready","protocol":1}"#, &single).unwrap();
+    assert_eq!(ready.layout.shape(), [2]);
+    let mut action = Vec::new();
+    parse_act(act("0", "[1,-1]").as_bytes(), 0, ready.layout, &mut action).unwrap();
+    assert_eq!(action, [1.0, -1.0]);
+    let other_type = parse_ready(br#"{"type":"act","protocol":1}"#, &single).unwrap_err();
+    let text = other_type.to_string();
+    assert!(
+        text.contains("ready with protocol 1") && !text.contains("interpolation"),
+        "{text}"
+    );
 }

@@ -262,7 +262,7 @@ impl Dispatcher {
     ) -> anyhow::Result<Acceptance> {
         let (server, checks, lease) = (
             self.server.clone(),
-            self.remote.checks(),
+            self.remote.checks(self.server.simulator.clone()),
             result.lease.clone(),
         );
         let (episodes_done, bucket) = (grant.episodes(), self.bucket.clone());

@@ -23,6 +23,7 @@ use async_nats::{
     Client,
     jetstream::{self, stream::Stream},
 };
+use faceoff_episode::Simulator;
 use faceoff_live::{LiveState, Workers};
 use faceoff_store::{JobFilter, Store, StoreError};
 use faceoff_types::{Clock, WorkerName};
@@ -68,10 +69,11 @@ pub struct RemoteConfig {
 }
 
 impl RemoteConfig {
-    pub(super) fn checks(&self) -> ResultChecks {
+    pub(super) fn checks(&self, simulator: Arc<dyn Simulator>) -> ResultChecks {
         ResultChecks {
             checked_episodes: self.checked_episodes,
             key: self.key.clone(),
+            simulator,
         }
     }
 }

@@ -8,13 +8,14 @@ use faceoff_dataset::{
     game::{GAME_FILE, GameRecording, side_file, verify_game},
     verify::{VerifyError, verify_shard},
 };
+use faceoff_episode::Simulator;
 use faceoff_store::Artifacts;
 use faceoff_types::{EpisodeOutcome, Side};
 use faceoff_wire::{
     grant::{ExpectedRecording, Grant, GrantKey},
     job::{GameFiles, JobReport},
 };
-use std::{ops::Range, path::Path};
+use std::{ops::Range, path::Path, sync::Arc};
 use uuid::Uuid;
 
 /// Configuration of the checks.
@@ -24,6 +25,7 @@ pub(super) struct ResultChecks {
     pub(super) checked_episodes: u32,
     /// The server's secret, from which the sample is drawn.
     pub(super) key: GrantKey,
+    pub(super) simulator: Arc<dyn Simulator>,
 }
 
 impl ResultChecks {
@@ -51,7 +53,9 @@ impl ResultChecks {
                 ExpectedRecording::Shard(spec),
             ) => {
                 let sample = self.sample(grant.nonce, played_episodes(&spec.episodes, outcomes));
-                verify_shard(&artifacts.local_path(key)?, spec, outcomes, &sample).map(|()| None)
+                let folder = artifacts.local_path(key)?;
+                verify_shard(&folder, spec, outcomes, &sample, self.simulator.as_ref())
+                    .map(|()| None)
             }
             (
                 JobReport::Game {
@@ -190,6 +194,7 @@ mod tests {
             let checks = ResultChecks {
                 checked_episodes,
                 key,
+                simulator: faceoff_airhockey::simulator(),
             };
             checks.sample(Uuid::from_u128(nonce), range)
         };

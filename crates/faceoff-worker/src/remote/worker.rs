@@ -100,11 +100,14 @@ pub async fn run_remote_worker(
         }
     });
     let servers = servers.collect();
+    let evaluator = Arc::new(Runner {
+        simulator: config.slots.agent.simulator.clone(),
+    });
     let running = run_slots(
         config.slots,
         &scratch,
         servers,
-        Arc::new(Runner),
+        evaluator,
         Intervals::default(),
         shutdown,
     );

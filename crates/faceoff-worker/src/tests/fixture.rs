@@ -426,7 +426,6 @@ impl Server {
 
     fn config(&self, slots: usize) -> WorkerConfig {
         WorkerConfig {
-            competition: Arc::new(faceoff_airhockey::competition()),
             slots: SlotsConfig {
                 cpus: CpuLayout::with_agents_on(&[0], &[0], slots),
                 threads: SlotThreads::from_caller(),
@@ -446,6 +445,7 @@ impl Server {
                     images: false,
                     agent_cpus: Vec::new(),
                     supervision: faceoff_runner::Supervision::default(),
+                    simulator: faceoff_airhockey::simulator(),
                 },
                 metrics: Metrics::new("0.0.0"),
             },

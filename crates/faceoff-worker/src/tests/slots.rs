@@ -275,7 +275,7 @@ async fn missed_day_is_started_once() {
         let shutdown = CancellationToken::new();
         let schedule = crate::run_schedule(
             server.store.clone(),
-            server.local().competition,
+            server.local().competition().clone(),
             server.clock(),
             shutdown.clone(),
         );
@@ -328,7 +328,7 @@ async fn overdue_day_ends_before_the_next_one_starts() {
     let shutdown = CancellationToken::new();
     let schedule = crate::run_schedule(
         server.store.clone(),
-        server.local().competition,
+        server.local().competition().clone(),
         server.clock(),
         shutdown.clone(),
     );
@@ -421,7 +421,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     // scripted clips these are the episodes 1.
     let artifacts = server.store.artifacts();
     for _ in 0..2 {
-        cleanup::clean_up(&server.store, server.now()).await;
+        cleanup::clean_up(&server.store, server.local().competition(), server.now()).await;
         assert_eq!(artifacts.ablations_with_parts().await.unwrap(), []);
         for profile in Profile::ABLATION {
             let key = Artifacts::ablation_clips_key(ablation.id, profile);

@@ -69,7 +69,6 @@ impl Server {
             Runtime::python3().expect("this machine has Python"),
         )]);
         let config = WorkerConfig {
-            competition: std::sync::Arc::new(faceoff_airhockey::competition()),
             slots: SlotsConfig {
                 cpus: CpuLayout::for_server(slots, &[]),
                 threads: SlotThreads::from_caller(),
@@ -94,6 +93,7 @@ impl Server {
                     images: false,
                     agent_cpus: Vec::new(),
                     supervision: faceoff_runner::Supervision::default(),
+                    simulator: faceoff_airhockey::simulator(),
                 },
                 metrics: Metrics::new("0.0.0"),
             },

@@ -140,13 +140,14 @@ struct Evaluation {
 
 fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
     let read = || -> anyhow::Result<Evaluation> {
-        let dataset = Dataset::open_lazily(Path::new(path))?;
+        let dataset = Dataset::open_lazily(Path::new(path), competition())?;
         let episodes = dataset.episodes()?.into_iter();
         let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
         let tasks = competition().played_tasks(&dataset.manifest().episodes)?;
         Ok(Evaluation {
             weights: competition().weights(&dataset.manifest().variation),
             summary: EpisodeSummary::from_outcomes(
+                competition(),
                 &outcomes,
                 &tasks,
                 &dataset.manifest().variation.tier_bounds,

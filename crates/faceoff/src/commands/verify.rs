@@ -5,7 +5,7 @@ mod failure;
 mod game;
 mod hash_text;
 
-use crate::competition::competition;
+use crate::competition::{competition, simulator};
 use crate::exit::Exit;
 use anyhow::Context;
 use clap::Args;
@@ -157,7 +157,7 @@ impl VerifyCommand {
     }
 
     fn verify_dataset(&self) -> Result<SimulatedEvaluation, Failure> {
-        let dataset = Dataset::open(&self.dataset)?;
+        let dataset = Dataset::open(&self.dataset, competition())?;
         let archive = dataset.archive()?.map(|digest| digest.blake3);
         check_hash(self.blake3.as_ref(), archive.as_deref())?;
         let claim = self.secret.zip(self.day).map(|(secret, day)| SeasonClaim {
@@ -208,7 +208,7 @@ fn verify_with_progress(
             .map_err(Failure::Local)?,
     );
     let start = Instant::now();
-    let verified = verify(dataset, competition(), workers, &|| bar.inc(1));
+    let verified = verify(dataset, simulator().as_ref(), workers, &|| bar.inc(1));
     bar.finish_and_clear();
     Ok((verified?, start.elapsed()))
 }

@@ -3,12 +3,12 @@
 use super::*;
 use crate::table::{ShardTable, StepRows, TableWriter, join};
 use bytes::Bytes;
-use faceoff_airhockey::{DEFEND, HIT};
-use faceoff_episode::{AirHockeyStep, AnswerTiming, StepRow};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed};
+use faceoff_airhockey::{DEFEND, HIT, simulator};
+use faceoff_episode::{AnswerTiming, StateColumns, StepRow, World};
+use faceoff_types::{EpisodeEnd, Violations};
 use parquet::file::reader::Length;
 use std::{
+    any::Any,
     io::Read,
     path::Path,
     sync::{
@@ -83,46 +83,87 @@ impl ChunkReader for RecordingTable {
     }
 }
 
+/// A world whose numbers rarely repeat, so that they compress as badly as measurements.
+struct NoisyWorld {
+    /// Observation, state and limits.
+    numbers: Vec<f64>,
+}
+
+/// Numbers of an observation.
+const OBSERVED: usize = 20;
+/// Numbers of a state that are in every row.
+const STATE: usize = 25;
+/// Numbers of a state in episodes with an opponent.
+const OPPONENT: usize = 10;
+
+impl NoisyWorld {
+    fn new() -> Self {
+        let numbers = (0..OBSERVED + STATE + 4).map(|index| f64::from(index as u32));
+        let mut world = Self {
+            numbers: numbers.collect(),
+        };
+        world.step(&[]);
+        world
+    }
+}
+
+impl World for NoisyWorld {
+    fn steps(&self) -> u32 {
+        0
+    }
+    fn observation(&self) -> &[f64] {
+        &self.numbers[..OBSERVED]
+    }
+    fn step(&mut self, _: &[f64]) -> Option<EpisodeEnd> {
+        for number in &mut self.numbers {
+            *number = (*number * 1e3 + 0.37).sin();
+        }
+        None
+    }
+    fn divergence(&self) -> Option<String> {
+        None
+    }
+    fn success(&self) -> bool {
+        false
+    }
+    fn violations(&self) -> Violations {
+        Violations::default()
+    }
+    fn record_state(&self, columns: &mut dyn StateColumns) {
+        columns.put(&self.numbers[OBSERVED..][..STATE]);
+        columns.put_absent(OPPONENT);
+    }
+    fn limits(&self) -> &[f64] {
+        &self.numbers[OBSERVED + STATE..]
+    }
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
 /// Writes the step tables of shards with `episodes` episodes of `steps` steps; each becomes a row group.
 fn write_shards(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec<ShardTable> {
-    let settings = PerturbationSettings::default();
-    let (seed, plant) = (Seed::from_number(3), Plant::nominal());
-    let factors = Profile::Ideal.factors();
-    let simulation = Episode::new(
-        task.try_into().unwrap(),
-        Interpolation::Cubic,
-        factors,
-        &settings,
-        &plant,
-        seed,
-    );
-    let mut state = simulation.state();
+    let mut world = NoisyWorld::new();
     (0..shards)
         .map(|shard| {
             let path = dir.join(format!("{task}-{shard}.parquet"));
-            let mut rows = StepRows::new(task);
+            let mut rows = StepRows::new(task, &simulator().competition().recording);
             let mut writer = TableWriter::create(&path, rows.schema()).unwrap();
             for episode in shard * episodes..(shard + 1) * episodes {
                 rows.begin(episode);
                 for step in 0..steps {
-                    // Numbers that rarely repeat compress as badly as measurements.
-                    state.q = state.q.map(|q| (q * 1e3 + 0.37).sin());
-                    rows.observe(simulation.observation());
+                    world.step(&[]);
+                    rows.observe(world.observation());
                     rows.push(&StepRow {
                         step,
-                        action: &state.q.repeat(2),
+                        action: &world.numbers[..14],
                         timing: AnswerTiming {
                             computation_time_s: 1e-3,
                             host_time_s: 0.0,
                             cpu_time_s: None,
                         },
-                        next_observation: simulation.observation(),
-                        world: AirHockeyStep {
-                            state: &state,
-                            constraints: Default::default(),
-                            puck_lost: false,
-                            impacts: &[],
-                        },
+                        next_observation: world.observation(),
+                        world: &world,
                     });
                 }
                 writer.write(rows.take()).unwrap();
@@ -158,7 +199,7 @@ fn read_accesses_one_row_group_of_many() {
     };
     table.ranges.lock().unwrap().clear();
     // Two episodes per shard: episode 33 is in the 17th shard of the second task.
-    let rows = episode(table.clone(), DEFEND, 33, None).unwrap();
+    let rows = episode(table.clone(), DEFEND, 33, None, simulator().competition()).unwrap();
     assert_eq!(rows.num_rows(), 60);
     let accessed: Vec<usize> = (0..80)
         .filter(|group| {
@@ -184,7 +225,7 @@ fn read_accesses_few_pages_of_a_row_group() {
         "30,000 rows are one row group"
     );
     table.bytes_read.store(0, Ordering::Relaxed);
-    let rows = episode(table.clone(), HIT, 31, None).unwrap();
+    let rows = episode(table.clone(), HIT, 31, None, simulator().competition()).unwrap();
     assert_eq!(rows.num_rows(), 500);
     let (read, all) = (table.bytes_read.load(Ordering::Relaxed), table.len());
     assert!(read < all / 8, "{read} of {all} bytes");

@@ -2,12 +2,10 @@
 //! like a real worker: it claims jobs, commits results and scores evaluations.
 
 use crate::site::{LEASE_S, Site, score_outcomes};
-use faceoff_airhockey::LEFT_TABLE;
+use faceoff_airhockey::{EE, JOINT_VEL, LEFT_TABLE};
 use faceoff_store::{ClaimedJob, Job, RunOwner};
 use faceoff_testkit::{shard_commit, shard_outcomes, valid_outcome};
-use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationId, RunId, Task, Violations,
-};
+use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationId, RunId, Task};
 use std::collections::HashMap;
 
 /// Pseudo-random numbers by the algorithm SplitMix64; the same for the same seed.
@@ -46,11 +44,9 @@ fn random_outcome(
             EpisodeEnd::HORIZON
         },
         success,
-        violations: Violations {
-            ee: random.one_in(40),
-            joint_vel: random.one_in(25),
-            ..Violations::default()
-        },
+        violations: [(EE, random.one_in(40)), (JOINT_VEL, random.one_in(25))]
+            .into_iter()
+            .collect(),
         computation_time: ComputationTime {
             mean_s,
             max_s: mean_s * 7.3,

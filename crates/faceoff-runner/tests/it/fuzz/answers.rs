@@ -1,6 +1,7 @@
 //! Fuzz test of agents' answers (lines of JSON): each is valid, or an agent fault with a printable message.
 
 use super::{assert_outcomes, fuzz, mutation::mutate};
+use faceoff_airhockey::simulator;
 use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation, escape_unprintable};
 use faceoff_wire::{
     MAX_LINE_BYTES,
@@ -84,11 +85,11 @@ fn answers_are_valid_or_an_agent_fault() {
         mutate(&mut line, &WORDS, rng);
         assert!(quote_line(&line).chars().count() <= 400);
         let outcome = match kind {
-            0 => parse_ready(&line).map(drop),
+            0 => parse_ready(&line, &simulator().competition().actions).map(drop),
             1 => parse_reset_ready(&line, 7),
             _ => {
                 let mut action = Vec::new();
-                let parsed = parse_act(&line, 7, interpolation, &mut action);
+                let parsed = parse_act(&line, 7, interpolation.into(), &mut action);
                 if parsed.is_ok() {
                     assert_eq!(action.len(), interpolation.len());
                     assert!(action.iter().all(|number| number.abs() <= ACTION_LIMIT));

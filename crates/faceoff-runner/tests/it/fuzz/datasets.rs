@@ -1,13 +1,12 @@
 //! Fuzz test of datasets: each is read, or refused as differing, altered or unreadable.
 
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
-use faceoff_airhockey::competition;
-use faceoff_airhockey::{DEFEND, HIT};
+use faceoff_airhockey::{DEFEND, HIT, simulator};
 use faceoff_dataset::{
-    Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble, shard_arena,
+    Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble, shard_conditions,
     verify::{VerifyError, verify},
 };
-use faceoff_episode::{AnswerTiming, RunningEpisode, StepSink};
+use faceoff_episode::{AnswerTiming, RunningEpisode, Simulator, StepSink};
 use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
@@ -56,14 +55,14 @@ fn record_dataset(dir: &Path) {
     };
     let shard = dir.join("shard");
     let folder = ShardFolder::create(&shard).unwrap();
-    let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let arena = shard_arena(&spec);
+    let mut recorder = Recorder::create(&folder, spec.task, simulator().competition()).unwrap();
+    let environment = simulator().environment(&shard_conditions(&spec));
+    let environment = environment.as_ref();
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
-        let interpolation = Some(Interpolation::Linear);
+        let layout = Some(Interpolation::Linear.into());
         let mut running =
-            RunningEpisode::begin(&arena, spec.task, episode, interpolation, &mut recorder)
-                .unwrap();
+            RunningEpisode::begin(environment, spec.task, episode, layout, &mut recorder).unwrap();
         let outcome = loop {
             let question = running.question().unwrap();
             if question.step == 30 {
@@ -91,7 +90,7 @@ fn record_dataset(dir: &Path) {
         stopped_by_faults: false,
         timing: Default::default(),
     };
-    folder.commit(&spec, &report).unwrap();
+    folder.commit(&spec, &report, simulator().as_ref()).unwrap();
     let meta = EvaluationMeta {
         profile: spec.profile,
         seed: spec.seed,
@@ -101,7 +100,14 @@ fn record_dataset(dir: &Path) {
         variation: Default::default(),
         task_weights: faceoff_airhockey::competition().weights(&Default::default()),
     };
-    assemble(&meta, &[shard], &dir.join("dataset.zip"), None).unwrap();
+    assemble(
+        &meta,
+        &[shard],
+        &dir.join("dataset.zip"),
+        None,
+        simulator().as_ref(),
+    )
+    .unwrap();
 }
 
 /// A dataset or a game's recording: its files by name, and its archive.
@@ -192,16 +198,22 @@ pub(super) fn label(outcome: &Result<(), VerifyError>) -> &'static str {
 /// Reads the whole dataset, and stops at the first error.
 fn read(path: &Path, rng: &mut Rng) -> Result<(), VerifyError> {
     let dataset = if rng.once_in(2) {
-        Dataset::open(path)?
+        Dataset::open(path, simulator().competition())?
     } else {
-        Dataset::open_lazily(path)?
+        Dataset::open_lazily(path, simulator().competition())?
     };
     dataset.results()?;
     dataset.calibration()?;
     dataset.episodes()?;
     let episode = *rng.pick(&[0, 1, 7]);
     dataset.episode(*rng.pick(&[DEFEND, HIT]), episode, None)?;
-    verify(&dataset, &competition(), NonZero::<usize>::MIN, &|| ()).map(drop)
+    verify(
+        &dataset,
+        simulator().as_ref(),
+        NonZero::<usize>::MIN,
+        &|| (),
+    )
+    .map(drop)
 }
 
 #[test]

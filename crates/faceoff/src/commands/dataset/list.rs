@@ -1,5 +1,6 @@
 //! `faceoff dataset list`: one line per episode.
 
+use crate::competition::competition;
 use crate::terminal;
 use clap::Args;
 use faceoff_dataset::Dataset;
@@ -17,7 +18,7 @@ pub struct ListArgs {
 
 impl ListArgs {
     pub fn run(self) -> anyhow::Result<()> {
-        let episodes = Dataset::open_lazily(&self.dataset)?.episodes()?;
+        let episodes = Dataset::open_lazily(&self.dataset, competition())?.episodes()?;
         let mut out = terminal::stdout();
         if !self.json {
             writeln!(

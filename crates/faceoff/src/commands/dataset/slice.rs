@@ -1,6 +1,6 @@
 //! `faceoff dataset slice`: the control steps of one episode as CSV or JSON lines.
 
-use crate::competition::parse_task;
+use crate::competition::{competition, parse_task};
 use crate::terminal;
 use anyhow::Context;
 use arrow_array::{
@@ -73,7 +73,7 @@ impl FromStr for StepRange {
 
 impl SliceArgs {
     pub fn run(self) -> anyhow::Result<()> {
-        let dataset = Dataset::open_lazily(&self.dataset)?;
+        let dataset = Dataset::open_lazily(&self.dataset, competition())?;
         // The step numbers are always read, because `--steps` selects by them.
         let columns = self.columns.as_ref().map(|names| {
             let step = "step".to_owned();

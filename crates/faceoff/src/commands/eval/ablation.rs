@@ -5,6 +5,7 @@ use super::{
     profile_run::{EvalSetup, run_profile},
 };
 use crate::commands::{output::print, table_cells::percent_interval};
+use crate::competition::competition;
 use anyhow::Context;
 use faceoff_scoring::{EpisodeSummary, ProfileEffect};
 use faceoff_types::{Profile, RULESET, Seed, TaskMap};
@@ -29,6 +30,7 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
             .with_context(|| format!("profile {profile}"))?;
         faults += outcome.faults.len();
         let summary = EpisodeSummary::from_outcomes(
+            competition(),
             &outcome.outcomes,
             &setup.tasks,
             &setup.variation.tier_bounds,

@@ -6,7 +6,7 @@ use super::{
     notes::Notes,
     pool::{Job, Verdict, run_shards},
 };
-use crate::competition::competition;
+use crate::competition::{competition, simulator};
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, AssembledDataset, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
@@ -93,7 +93,14 @@ pub(super) fn run_profile(
     };
     let AssembledDataset {
         result, archive, ..
-    } = assemble(&meta, &dirs, &out.join(ARCHIVE_FILE), None).context("joining the recordings")?;
+    } = assemble(
+        &meta,
+        &dirs,
+        &out.join(ARCHIVE_FILE),
+        None,
+        simulator().as_ref(),
+    )
+    .context("joining the recordings")?;
     // The dataset contains them now, and further profiles need the disk space.
     for dir in &dirs {
         fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;

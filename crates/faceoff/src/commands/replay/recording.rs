@@ -1,16 +1,17 @@
 //! The recording of one episode, read from a dataset for the drawings.
 
+use crate::competition::competition;
 use anyhow::Context;
 use arrow_array::{
     Array, RecordBatch,
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_dataset::{Dataset, DatasetError};
+use faceoff_dataset::{Dataset, DatasetError, EpisodeRecord};
 use faceoff_episode::describe_end;
 use faceoff_scoring::{
-    COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
-    JOINT_VEL_POINTS, LINK_POINTS, computation_time_penalty,
+    COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, computation_time_penalty,
+    tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},
 };
 use faceoff_sim::{
     JOINTS,
@@ -57,10 +58,32 @@ pub const CONSTRAINTS: [(&str, f64, &str); 4] = [
     ("elbow and wrist height", LINK_POINTS, "m"),
 ];
 
+/// Columns of the puck's state.
+const PUCK: [&str; 6] = [
+    "puck_x",
+    "puck_y",
+    "puck_yaw",
+    "puck_vx",
+    "puck_vy",
+    "puck_yaw_rate",
+];
+
+/// Columns of the state before the first step.
+fn initial<const N: usize>(record: &EpisodeRecord, names: [&str; N]) -> anyhow::Result<[f64; N]> {
+    let columns = &competition().recording.state;
+    let mut values = [0.0; N];
+    for (value, name) in values.iter_mut().zip(names) {
+        let index = columns.iter().position(|column| column.name == name);
+        let recorded = index.and_then(|index| record.initial_state.get(index).copied()?);
+        *value = recorded.with_context(|| format!("the start has no {name}"))?;
+    }
+    Ok(values)
+}
+
 impl EpisodeRecording {
     /// Reads one episode of a dataset, and little else.
     pub fn read(path: &Path, task: Task, episode: u32) -> anyhow::Result<Self> {
-        let dataset = Dataset::open_lazily(path).with_context(|| {
+        let dataset = Dataset::open_lazily(path, competition()).with_context(|| {
             format!(
                 "opening {} as the dataset of an evaluation (the server has replays of games)",
                 path.display()
@@ -76,9 +99,9 @@ impl EpisodeRecording {
             })?;
         let columns = Columns(&steps);
 
-        let puck: Vec<[f64; 6]> = columns
-            .rows(["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|name| format!("puck_{name}")))?;
-        let last = puck.last().unwrap_or(&record.initial_puck);
+        let puck: Vec<[f64; 6]> = columns.rows(PUCK)?;
+        let initial_puck = initial(&record, PUCK)?;
+        let last = puck.last().unwrap_or(&initial_puck);
         let fault = record.outcome.fault.as_ref().map(|fault| &fault.fault);
         let end_reason = describe_end(task, record.outcome.end, last, record.outcome.steps, fault);
 
@@ -88,7 +111,7 @@ impl EpisodeRecording {
             [x, y, ..] => Some([x, y]),
             _ => None,
         };
-        let [start_x, start_y, _] = record.initial_ee;
+        let start = initial(&record, ["ee_x", "ee_y"])?;
         let mallet = columns.rows(["ee_x", "ee_y"])?.into_iter();
         // The other robot is on the opposite side, rotated by 180°.
         let opponent_to_table_frame = |[x, y]: [f64; 2]| [TABLE.base_x_m - x, -y];
@@ -108,12 +131,12 @@ impl EpisodeRecording {
             points: record.penalty_points,
             seed: record.seed,
             end_reason: escape_unprintable(&end_reason).into_owned(),
-            puck: std::iter::once(record.initial_puck)
+            puck: std::iter::once(initial_puck)
                 .chain(puck)
                 .map(|[x, y, yaw, ..]| [x, y, yaw])
                 .collect(),
             observed_puck: observed.chain(last_observed).map(to_table_frame).collect(),
-            mallet: std::iter::once([start_x, start_y])
+            mallet: std::iter::once(start)
                 .chain(mallet)
                 .map(to_table_frame)
                 .collect(),

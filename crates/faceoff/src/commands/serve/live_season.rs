@@ -94,7 +94,6 @@ async fn serve(
     // Kept as long as agents run.
     let _image = hold_in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
-        competition: Arc::clone(competition()),
         slots: SlotsConfig {
             cpus: slots.cpus,
             threads: slots.threads,

@@ -1,0 +1,28 @@
+//! The conditions of a job: the same to play under, and to verify the recording with.
+
+use faceoff_episode::{Arena, Conditions};
+use faceoff_wire::{game::GameSpec, job::ShardSpec};
+
+/// The conditions of a shard's episodes.
+#[must_use]
+pub fn shard_conditions(spec: &ShardSpec) -> Conditions<'_> {
+    Conditions {
+        ruleset: spec.ruleset,
+        profile: spec.profile,
+        perturbations: &spec.perturbations,
+        seed: spec.seed,
+        mismatch_seed: spec.mismatch_seed,
+    }
+}
+
+/// The world of a game.
+#[must_use]
+pub fn game_arena(spec: &GameSpec) -> Arena {
+    Arena::with_ruleset(
+        spec.ruleset,
+        spec.profile,
+        &spec.perturbations,
+        spec.seed,
+        spec.mismatch_seed,
+    )
+}
