@@ -2,7 +2,7 @@
 
 use faceoff_scoring::{
     COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, EE_POINTS, JOINT_POS_POINTS,
-    JOINT_VEL_POINTS, LINK_POINTS,
+    JOINT_VEL_POINTS, LINK_POINTS, TIER_BOUNDS,
 };
 use faceoff_sim::AirHockeyTask;
 pub use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
@@ -124,6 +124,7 @@ pub fn competition() -> Competition {
                 )
             },
         ],
+        tiers: Some(TIER_BOUNDS),
     }
 }
 
@@ -193,6 +194,7 @@ mod tests {
             changed(|other| other.tasks[0].max_steps += 1),
             changed(|other| other.tasks.swap(0, 1)),
             changed(|other| other.violations[0].points[1] += 1.0),
+            changed(|other| other.tiers = None),
         ] {
             assert_ne!(other, hash);
         }

@@ -67,6 +67,7 @@ pub fn assemble(
         meta.profile,
         &meta.variation,
         &meta.task_weights,
+        meta.tier_bounds(),
         meta.seed,
         Layout::Four,
         tally_tasks(&shards)?,

@@ -15,7 +15,7 @@ use faceoff_episode::AnswerTiming;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed,
-    SlotTiming, TaskMap, TaskWeights, Variation, Violations,
+    SlotTiming, TaskMap, TaskWeights, TierBounds, Variation, Violations,
 };
 use faceoff_wire::dataset::{
     ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
@@ -194,6 +194,7 @@ pub(crate) fn score(
     profile: Profile,
     variation: &Variation,
     weights: &TaskWeights,
+    bounds: Option<TierBounds>,
     seed: Seed,
     layout: Layout,
     tallies: TaskMap<Tally>,
@@ -206,7 +207,7 @@ pub(crate) fn score(
     };
     for (task, tally) in tallies {
         let times = tally.times.finish();
-        let result = faceoff_scoring::score_task(&tally.outcomes, &times, &variation.tier_bounds);
+        let result = faceoff_scoring::score_task(&tally.outcomes, &times, bounds);
         tasks.insert(task, result);
         let [joint_pos, joint_vel, ee, link] = tally.violations;
         let names = Violations::default().by_name().map(|(name, _)| name);
@@ -227,8 +228,9 @@ pub(crate) fn score(
             },
         );
     }
-    let mut result =
-        faceoff_scoring::score_evaluation(ruleset, profile, seed, variation, weights, tasks);
+    let mut result = faceoff_scoring::score_evaluation(
+        ruleset, profile, seed, variation, weights, bounds, tasks,
+    );
     result.timing = timing;
     ScoredEvaluation { result, violations }
 }

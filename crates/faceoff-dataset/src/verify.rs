@@ -28,9 +28,7 @@ use crate::{
 };
 use episode_reader::{EpisodeReader, RecordedEpisode};
 use faceoff_episode::Arena;
-use faceoff_types::{
-    Competition, EvaluationResult, Ruleset, Task, TaskMap, TaskWeights, UnknownRuleset,
-};
+use faceoff_types::{Competition, EvaluationResult, Ruleset, Task, TaskMap, UnknownRuleset};
 use rayon::{
     ThreadPoolBuilder,
     iter::{IntoParallelRefIterator, ParallelIterator},
@@ -73,6 +71,12 @@ pub fn verify(
         checked
             .map_err(|error| DatasetError::Foreign(format!("{MANIFEST_FILE}: weights: {error}")))?;
     }
+    if manifest.variation.tier_bounds.is_some() && competition.tiers.is_none() {
+        return Err(DatasetError::Foreign(format!(
+            "{MANIFEST_FILE}: tier_bounds: the competition has no tiers"
+        ))
+        .into());
+    }
     let mut reader = EpisodeReader::open(dataset, tasks.clone())?;
     let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks());
     let arena = Arena::with_ruleset(
@@ -112,11 +116,7 @@ pub fn verify(
         }
         batch.result
     })?;
-    totals.finish(
-        ruleset,
-        dataset,
-        &competition.weights(&dataset.manifest().variation),
-    )
+    totals.finish(ruleset, dataset, competition)
 }
 
 /// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
@@ -182,7 +182,7 @@ impl Totals {
         self,
         ruleset: Ruleset,
         dataset: &Dataset,
-        weights: &TaskWeights,
+        competition: &Competition,
     ) -> Result<VerifiedDataset, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();
@@ -205,7 +205,8 @@ impl Totals {
             ruleset,
             profile,
             &manifest.variation,
-            weights,
+            &competition.weights(&manifest.variation),
+            competition.tier_bounds(&manifest.variation),
             seed,
             dataset.layout(),
             self.tallies,

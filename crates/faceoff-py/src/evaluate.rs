@@ -141,6 +141,7 @@ impl Evaluation {
             let task = parse_task(outcome.task.as_str())?;
             by_task.entry(task).or_default().push(outcome);
         }
+        let bounds = competition().tier_bounds(&self.variation);
         let result = catch_panic(|| {
             let tasks: TaskMap<TaskResult> = by_task
                 .into_iter()
@@ -151,7 +152,6 @@ impl Evaluation {
                     let steps: u64 = steps.sum();
                     let mut times = StepTimes::for_steps(steps);
                     (0..steps).for_each(|_| times.add(0.0));
-                    let bounds = &self.variation.tier_bounds;
                     (task, score_task(&outcomes, &times, bounds))
                 })
                 .collect();
@@ -162,6 +162,7 @@ impl Evaluation {
                 self.seed,
                 &self.variation,
                 &competition().weights(&self.variation),
+                bounds,
                 tasks,
             ))
         })?;

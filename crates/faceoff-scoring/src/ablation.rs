@@ -87,7 +87,7 @@ mod tests {
     use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
 
     fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-        EpisodeSummary::from_outcomes(outcomes, &TASKS, &Default::default()).unwrap()
+        EpisodeSummary::from_outcomes(outcomes, &TASKS, Some(crate::TIER_BOUNDS)).unwrap()
     }
 
     /// Outcomes with these successes; each failed episode has the 3 penalty points of an end effector violation.

@@ -5,7 +5,7 @@
 use crate::{boxed, problem::Problem, shared_cache::SharedCache};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::Store;
-use faceoff_types::RunId;
+use faceoff_types::{Competition, RunId};
 use std::{collections::HashMap, sync::Arc};
 
 /// Largest number of summaries in memory; enough for the boards of several seasons.
@@ -18,13 +18,15 @@ pub type RunSummaries = HashMap<RunId, Arc<EpisodeSummary>>;
 #[derive(Debug)]
 pub struct Summaries {
     store: Store,
+    competition: Arc<Competition>,
     cached: SharedCache<RunId, EpisodeSummary>,
 }
 
 impl Summaries {
-    pub fn new(store: Store) -> Self {
+    pub fn new(store: Store, competition: Arc<Competition>) -> Self {
         Self {
             store,
+            competition,
             cached: SharedCache::with_entries(MAX_CACHED),
         }
     }
@@ -74,10 +76,9 @@ impl Summaries {
     async fn summarise(&self, run: RunId) -> Result<EpisodeSummary, Problem> {
         let outcomes = self.store.outcomes(run).await?;
         let plan = self.store.run_plan(run).await?;
+        let bounds = self.competition.tier_bounds(&plan.variation);
         // Takes some ten milliseconds, so it runs off the threads that handle requests.
-        let summarise = move || {
-            EpisodeSummary::from_outcomes(&outcomes, &plan.tasks, &plan.variation.tier_bounds)
-        };
+        let summarise = move || EpisodeSummary::from_outcomes(&outcomes, &plan.tasks, bounds);
         tokio::task::spawn_blocking(summarise)
             .await
             .map_err(Problem::internal)?

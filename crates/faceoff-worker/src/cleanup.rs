@@ -3,6 +3,7 @@
 use crate::{ablation_clips, boxed, episode_summaries};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Store, StoreError};
+use faceoff_types::Competition;
 use jiff::{SignedDuration, Timestamp};
 
 /// Upper bound of the time that writing an artifact takes.
@@ -11,11 +12,11 @@ const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 /// Removes obsolete recordings, the data of old runs and half-written files, and keeps the database's write-ahead log short.
 /// Failures are logged, and retried by the next call.
 #[boxed]
-pub async fn clean_up(store: &Store, now: Timestamp) {
+pub async fn clean_up(store: &Store, competition: &Competition, now: Timestamp) {
     if let Err(error) = store.remove_old_recordings(now).await {
         tracing::warn!(%error, "old recordings could not be removed");
     }
-    episode_summaries::store_missing(store, now).await;
+    episode_summaries::store_missing(store, competition, now).await;
     if let Err(error) = clear_runs(store, now).await {
         tracing::warn!(%error, "finished runs could not be cleared");
     }

@@ -4,13 +4,13 @@
 use crate::boxed;
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::Store;
-use faceoff_types::RunId;
+use faceoff_types::{Competition, RunId};
 use jiff::Timestamp;
 
 /// Stores the summaries of all ended runs that have none in the current format. A *run* is the episodes of a submission under
 /// one plan. Failures are logged, and retried by the next call; until then readers compute the summary themselves.
 #[boxed]
-pub(crate) async fn store_missing(store: &Store, now: Timestamp) {
+pub(crate) async fn store_missing(store: &Store, competition: &Competition, now: Timestamp) {
     let missing = match store.unsummarised_runs(EpisodeSummary::VERSION).await {
         Ok(runs) => runs,
         Err(error) => {
@@ -19,18 +19,23 @@ pub(crate) async fn store_missing(store: &Store, now: Timestamp) {
         }
     };
     for run in missing {
-        if let Err(error) = store_summary(store, run, now).await {
+        if let Err(error) = store_summary(store, competition, run, now).await {
             tracing::warn!(%run, error = format!("{error:#}"), "an episode summary could not be stored");
         }
     }
 }
 
-async fn store_summary(store: &Store, run: RunId, now: Timestamp) -> anyhow::Result<()> {
+async fn store_summary(
+    store: &Store,
+    competition: &Competition,
+    run: RunId,
+    now: Timestamp,
+) -> anyhow::Result<()> {
     let outcomes = store.outcomes(run).await?;
     let plan = store.run_plan(run).await?;
+    let bounds = competition.tier_bounds(&plan.variation);
     // Takes some ten milliseconds, so it runs off the async threads.
-    let summarise =
-        move || EpisodeSummary::from_outcomes(&outcomes, &plan.tasks, &plan.variation.tier_bounds);
+    let summarise = move || EpisodeSummary::from_outcomes(&outcomes, &plan.tasks, bounds);
     let summary = tokio::task::spawn_blocking(summarise);
     let json = serde_json::to_string(&summary.await??)?;
     let stored = store.store_episode_summary(run, EpisodeSummary::VERSION, &json, now);

@@ -159,6 +159,7 @@ impl LocalServer {
                     agent: agent_name,
                     ruleset: run.ruleset,
                     task_weights: self.competition.weights(&run.plan.variation),
+                    tiers: self.competition.tiers,
                     variation: run.plan.variation,
                 },
                 recordings,
@@ -193,7 +194,7 @@ impl LocalServer {
         let status = lease_status(self.store.commit_shard(claim, commit, now).await?);
         // Runs with recordings are scored; the others end with their last shard.
         if status == LeaseStatus::Held && recording.is_none() {
-            episode_summaries::store_missing(&self.store, now).await;
+            episode_summaries::store_missing(&self.store, &self.competition, now).await;
         }
         if status == LeaseStatus::Lost
             && let Some(recording) = recording
@@ -249,7 +250,7 @@ impl LocalServer {
             .finish_evaluation(claim, result, dataset, blake3, now);
         let status = lease_status(finished.await?);
         if status == LeaseStatus::Held {
-            episode_summaries::store_missing(&self.store, now).await;
+            episode_summaries::store_missing(&self.store, &self.competition, now).await;
         }
         let artifacts = self.store.artifacts();
         let cleaned = match (status, dataset.rsplit_once('/')) {

@@ -171,6 +171,7 @@ async fn season_belongs_to_one_competition() {
         }],
         ends: Vec::new(),
         violations: Vec::new(),
+        tiers: None,
     };
     let stored = async || -> (Option<String>, Option<String>) {
         sqlx::query_as("SELECT competition_id, competition_hash FROM season")

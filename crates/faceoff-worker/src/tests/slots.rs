@@ -421,7 +421,8 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     // scripted clips these are the episodes 1.
     let artifacts = server.store.artifacts();
     for _ in 0..2 {
-        cleanup::clean_up(&server.store, server.now()).await;
+        let competition = faceoff_airhockey::competition();
+        cleanup::clean_up(&server.store, &competition, server.now()).await;
         assert_eq!(artifacts.ablations_with_parts().await.unwrap(), []);
         for profile in Profile::ABLATION {
             let key = Artifacts::ablation_clips_key(ablation.id, profile);

@@ -149,7 +149,7 @@ fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
             summary: EpisodeSummary::from_outcomes(
                 &outcomes,
                 &tasks,
-                &dataset.manifest().variation.tier_bounds,
+                competition().tier_bounds(&dataset.manifest().variation),
             )?,
             manifest: dataset.manifest().clone(),
         })

@@ -5,6 +5,7 @@ use super::{
     profile_run::{EvalSetup, run_profile},
 };
 use crate::commands::{output::print, table_cells::percent_interval};
+use crate::competition::competition;
 use anyhow::Context;
 use faceoff_scoring::{EpisodeSummary, ProfileEffect};
 use faceoff_types::{Profile, RULESET, Seed, TaskMap};
@@ -31,7 +32,7 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
         let summary = EpisodeSummary::from_outcomes(
             &outcome.outcomes,
             &setup.tasks,
-            &setup.variation.tier_bounds,
+            competition().tier_bounds(&setup.variation),
         );
         runs.insert(profile, summary.context("comparing the profiles")?);
     }
