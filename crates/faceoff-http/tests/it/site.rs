@@ -242,6 +242,16 @@ impl Site {
         self
     }
 
+    /// Restarts the server with a competition that has no tiers.
+    pub async fn without_tiers(mut self) -> Self {
+        self.config.competition = Arc::new(Competition {
+            tiers: None,
+            ..faceoff_airhockey::competition()
+        });
+        self.restart().await;
+        self
+    }
+
     /// A site with these limits, and without a schedule.
     pub async fn start_with(limits: HttpLimits) -> Self {
         Self::start_configured(limits, None).await

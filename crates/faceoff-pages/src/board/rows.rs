@@ -324,11 +324,10 @@ mod tests {
         serde_json::from_value(board).unwrap()
     }
 
-    /// The tier, the teams and the tiers in their cells of each group.
-    fn groups(
-        board: &BoardView,
-        is_by_rank: bool,
-    ) -> Vec<(Option<Tier>, Vec<String>, Vec<Option<Tier>>)> {
+    /// The tier of each group, its teams, and the tiers in the cells of the teams.
+    type TextGroup = (Option<Tier>, Vec<String>, Vec<Option<Tier>>);
+
+    fn groups(board: &BoardView, is_by_rank: bool) -> Vec<TextGroup> {
         let context = Context::new(board, None, is_by_rank);
         let groups = context.groups(|row| context.team_cell(row));
         let summary = |group: Group<TeamCell>| {
