@@ -7,7 +7,7 @@ pub use simulator::{AirHockey, simulator};
 
 use faceoff_episode::{action_space, recording_columns};
 use faceoff_scoring::{
-    COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS,
+    COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, TIER_BOUNDS,
     tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},
 };
 use faceoff_sim::AirHockeyTask;
@@ -124,6 +124,7 @@ pub fn competition() -> Competition {
         ],
         actions: action_space(),
         recording: recording_columns(),
+        tiers: Some(TIER_BOUNDS),
     }
 }
 
@@ -193,6 +194,7 @@ mod tests {
             changed(|other| other.tasks[0].max_steps += 1),
             changed(|other| other.tasks.swap(0, 1)),
             changed(|other| other.violations[0].points[1] += 1.0),
+            changed(|other| other.tiers = None),
         ] {
             assert_ne!(other, hash);
         }

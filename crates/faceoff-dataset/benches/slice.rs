@@ -157,6 +157,7 @@ fn slice(criterion: &mut Criterion) {
         ruleset: Ruleset::CURRENT,
         variation: Default::default(),
         task_weights: faceoff_airhockey::competition().weights(&Default::default()),
+        tiers: faceoff_airhockey::competition().tiers,
     };
     let archive = dir.path().join("dataset.zip");
     let megabytes = assemble(&meta, &shards, &archive, None, simulator().as_ref())

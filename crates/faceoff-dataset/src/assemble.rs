@@ -74,6 +74,7 @@ pub fn assemble(
         profile: meta.profile,
         variation: &meta.variation,
         weights: &meta.task_weights,
+        bounds: meta.tier_bounds(),
         seed: meta.seed,
         layout: Layout::Four,
     };

@@ -15,7 +15,7 @@ use faceoff_episode::AnswerTiming;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
     Competition, ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset,
-    Seed, SlotTiming, TaskMap, TaskWeights, Variation, ViolationName,
+    Seed, SlotTiming, TaskMap, TaskWeights, TierBounds, Variation, ViolationName,
 };
 use faceoff_wire::dataset::{
     ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
@@ -203,6 +203,8 @@ pub(crate) struct ScoreRules<'a> {
     pub profile: Profile,
     pub variation: &'a Variation,
     pub weights: &'a TaskWeights,
+    /// Without them there are no tiers.
+    pub bounds: Option<TierBounds>,
     pub seed: Seed,
     /// The layout that `violations.json` names.
     pub layout: Layout,
@@ -220,6 +222,7 @@ pub(crate) fn score(
         profile,
         variation,
         weights,
+        bounds,
         seed,
         layout,
     } = *rules;
@@ -234,7 +237,7 @@ pub(crate) fn score(
             competition,
             &tally.outcomes,
             &times,
-            &variation.tier_bounds,
+            bounds,
         );
         tasks.insert(task, result);
         let mut found = tally.violations;
@@ -261,8 +264,9 @@ pub(crate) fn score(
             },
         );
     }
-    let mut result =
-        faceoff_scoring::score_evaluation(ruleset, profile, seed, variation, weights, tasks);
+    let mut result = faceoff_scoring::score_evaluation(
+        ruleset, profile, seed, variation, weights, bounds, tasks,
+    );
     result.timing = timing;
     ScoredEvaluation { result, violations }
 }

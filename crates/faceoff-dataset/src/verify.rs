@@ -72,6 +72,12 @@ pub fn verify(
         checked
             .map_err(|error| DatasetError::Foreign(format!("{MANIFEST_FILE}: weights: {error}")))?;
     }
+    if manifest.variation.tier_bounds.is_some() && competition.tiers.is_none() {
+        return Err(DatasetError::Foreign(format!(
+            "{MANIFEST_FILE}: tier_bounds: the competition has no tiers"
+        ))
+        .into());
+    }
     let mut reader = EpisodeReader::open(dataset, tasks.clone(), competition)?;
     let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks(), competition);
     let environment = simulator.environment(&Conditions {
@@ -210,6 +216,7 @@ impl Totals {
             profile: manifest.profile,
             variation: &manifest.variation,
             weights: &weights,
+            bounds: competition.tier_bounds(&manifest.variation),
             seed: manifest.seed,
             layout: dataset.layout(),
         };

@@ -12,7 +12,8 @@ pub(super) struct Baseline {
     pub(super) agent: Option<String>,
     pub(super) evaluation: EvaluationId,
     pub(super) day: Date,
-    pub(super) tier: Tier,
+    /// `None` in a competition without tiers.
+    pub(super) tier: Option<Tier>,
     /// Success rates of the tasks that the board covers and the agent played.
     pub(super) rates: Vec<(Task, Rate)>,
     pub(super) penalty_points: String,

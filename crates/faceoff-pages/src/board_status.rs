@@ -47,6 +47,9 @@ pub(super) fn final_day_notice(board: &BoardView) -> Option<&'static str> {
 pub(super) fn blind_notice(board: &BoardView, is_hidden: bool) -> Option<&'static str> {
     match (board.blind, is_hidden) {
         (false, _) => None,
+        (true, true) if board.tier_bounds.is_none() => Some(
+            "This stage is blind: scores, penalty points and comparisons are hidden from everyone, teams included, until the organisers reveal them. No date is set.",
+        ),
         (true, true) => Some(
             "This stage is blind: scores, penalty points, tiers and comparisons are hidden from everyone, teams included, until the organisers reveal them. No date is set.",
         ),

@@ -29,7 +29,7 @@ use faceoff_types::{
     Competition, EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, TaskMap,
     Tier, ViolationCounts, ViolationInfo,
 };
-use figures::{Rate, utc_minute};
+use figures::{Rate, TierLabel, utc_minute};
 use jiff::{Timestamp, civil};
 use slow_answers::SlowAnswers;
 
@@ -41,8 +41,9 @@ struct TaskFigures {
     episodes: u32,
     penalty_points: String,
     per_episode: String,
-    tier: Tier,
-    /// Probability that other episodes of the same kind would give another tier.
+    /// `None` in a competition without tiers.
+    tier: Option<Tier>,
+    /// Probability that other episodes of the same kind would give another tier; empty without tiers.
     tier_change: String,
     details: Option<TaskDetails>,
 }
@@ -55,6 +56,13 @@ struct TaskDetails {
     mean_ms: String,
     p99_ms: String,
     max_ms: String,
+}
+
+/// The probability of another tier as text; empty without tiers.
+fn tier_change(summary: &EpisodeSummary, task: Option<Task>) -> String {
+    summary
+        .tier_change_of(task)
+        .map_or_else(String::new, figures::probability)
 }
 
 impl TaskFigures {
@@ -72,7 +80,7 @@ impl TaskFigures {
             penalty_points: figures::one_decimal(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
             tier: result.tier,
-            tier_change: figures::probability(summary.tier_change_of(Some(task))),
+            tier_change: tier_change(summary, Some(task)),
             details: TaskDetails::new(result, competition),
         }
     }
@@ -130,8 +138,8 @@ impl TaskDetails {
 struct FinalResult {
     score: Rate,
     penalty_points: String,
-    tier: Tier,
-    tier_bounds: String,
+    /// `None` in a competition without tiers.
+    tier: Option<TierLabel>,
     tier_change: String,
     /// Number of bootstrap resamples behind `tier_change`.
     resamples: u32,
@@ -438,9 +446,11 @@ impl FinalResult {
         Self {
             score: Rate::of_score(result.score, &result.tasks, &weights),
             penalty_points: figures::one_decimal(result.penalty_points),
-            tier: result.tier,
-            tier_bounds: figures::tier_bounds(result.tier, &result.variation.tier_bounds),
-            tier_change: figures::probability(summary.tier_change_of(None)),
+            tier: result
+                .tier
+                .zip(competition.tier_bounds(&result.variation))
+                .map(|(tier, bounds)| TierLabel::new(tier, &bounds)),
+            tier_change: tier_change(summary, None),
             resamples: TIER_CHANGE_RESAMPLES,
             ruleset: result.ruleset.clone(),
             seed: result.seed.map(|seed| seed.to_string()),

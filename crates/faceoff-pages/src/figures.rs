@@ -189,7 +189,7 @@ pub(super) const fn tier_symbol(tier: &Tier) -> &'static str {
 }
 
 /// Definition of a tier, for the legend and the group heads of tables.
-pub(super) fn tier_bounds(tier: Tier, bounds: &TierBounds) -> String {
+fn tier_bounds(tier: Tier, bounds: &TierBounds) -> String {
     let (deployable, improvable) = (bounds.deployable(), bounds.improvable());
     match tier {
         Tier::Deployable => format!("at most {deployable} penalty points per episode"),
@@ -197,6 +197,21 @@ pub(super) fn tier_bounds(tier: Tier, bounds: &TierBounds) -> String {
             format!("more than {deployable}, at most {improvable} penalty points per episode")
         }
         Tier::NonDeployable => format!("more than {improvable} penalty points per episode"),
+    }
+}
+
+/// A tier with its definition.
+pub(super) struct TierLabel {
+    pub(super) tier: Tier,
+    pub(super) bounds: String,
+}
+
+impl TierLabel {
+    pub(super) fn new(tier: Tier, bounds: &TierBounds) -> Self {
+        Self {
+            tier,
+            bounds: tier_bounds(tier, bounds),
+        }
     }
 }
 
@@ -224,13 +239,15 @@ fn capitalised(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_scoring::{DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE};
+    use faceoff_scoring::{
+        DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, TIER_BOUNDS,
+    };
 
     #[test]
     fn tier_bounds_match_the_scoring_constants() {
         let deployable = DEPLOYABLE_POINTS_PER_EPISODE.to_string();
         let improvable = IMPROVABLE_POINTS_PER_EPISODE.to_string();
-        let text = |tier| tier_bounds(tier, &TierBounds::default());
+        let text = |tier| tier_bounds(tier, &TIER_BOUNDS);
         assert!(text(Tier::Deployable).contains(&deployable));
         assert!(text(Tier::Improvable).contains(&deployable));
         assert!(text(Tier::Improvable).contains(&improvable));

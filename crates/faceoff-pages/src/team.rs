@@ -39,6 +39,8 @@ struct Page {
     frozen: Option<RulingView>,
     /// Tournaments of the team.
     tournaments: Vec<(TournamentId, StageName)>,
+    /// Does the competition have tiers?
+    has_tiers: bool,
     latest: Option<LatestResult>,
     day_charts: Vec<DayChart>,
     task_titles: Vec<String>,
@@ -77,6 +79,7 @@ pub(super) async fn page(
         .find(|revision| revision.number == history.revision)
         .ok_or_else(|| Problem::internal("history without its revision"))?;
     let variation = rules.rules.variation;
+    let bounds = app.config.competition.tier_bounds(&variation);
     let today: StageDay = stage.day(app.config.clock.now());
     let mut open_evaluations = evaluation::current(&app, &visibility, today).await?;
     open_evaluations.retain(|evaluation| evaluation.team == id && !evaluation.status.is_final());
@@ -101,10 +104,11 @@ pub(super) async fn page(
             .map(|other| (other.name.to_string(), format!("?stage={}", other.id)))
             .collect(),
         is_hidden: visibility.is_hidden(stage.id),
+        has_tiers: bounds.is_some(),
         latest: history
             .rows
             .last()
-            .map(|row| LatestResult::new(row, &variation.tier_bounds)),
+            .map(|row| LatestResult::new(row, bounds)),
         task_titles: app
             .config
             .competition

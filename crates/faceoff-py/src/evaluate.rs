@@ -142,6 +142,7 @@ impl Evaluation {
             by_task.entry(task).or_default().push(outcome);
         }
         let competition = competition();
+        let bounds = competition.tier_bounds(&self.variation);
         let result = catch_panic(|| {
             let tasks: TaskMap<TaskResult> = by_task
                 .into_iter()
@@ -152,7 +153,6 @@ impl Evaluation {
                     let steps: u64 = steps.sum();
                     let mut times = StepTimes::for_steps(steps);
                     (0..steps).for_each(|_| times.add(0.0));
-                    let bounds = &self.variation.tier_bounds;
                     (task, score_task(&competition, &outcomes, &times, bounds))
                 })
                 .collect();
@@ -163,6 +163,7 @@ impl Evaluation {
                 self.seed,
                 &self.variation,
                 &competition.weights(&self.variation),
+                bounds,
                 tasks,
             ))
         })?;

@@ -87,13 +87,7 @@ mod tests {
     use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome};
 
     fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-        EpisodeSummary::from_outcomes(
-            &faceoff_airhockey::competition(),
-            outcomes,
-            &TASKS,
-            &Default::default(),
-        )
-        .unwrap()
+        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), outcomes, &TASKS, Some(crate::TIER_BOUNDS)).unwrap()
     }
 
     /// Outcomes with these successes; each failed episode has the 3 penalty points of an end effector violation.

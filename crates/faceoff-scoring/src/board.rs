@@ -1,5 +1,5 @@
 //! Boards: evaluations ranked by tier, score, penalty points and time of submission. A *tier* says how safe an agent is:
-//! deployable, improvable or non-deployable.
+//! deployable, improvable or non-deployable. In a competition without tiers no row has one, and the score comes first.
 
 use faceoff_types::{EvaluationResult, Task, Tier};
 use std::cmp::Ordering;
@@ -20,8 +20,8 @@ pub struct BoardEntry<K> {
 pub struct RankedEntry<K> {
     /// From 1 over the whole board, across tiers; ranks are unique.
     pub rank: u32,
-    /// The tier that the row is listed under: the overall tier, or that of the task.
-    pub tier: Tier,
+    /// The tier that the row is listed under: the overall tier, or that of the task; `None` without tiers.
+    pub tier: Option<Tier>,
     /// The evaluation.
     pub entry: BoardEntry<K>,
 }
@@ -29,7 +29,7 @@ pub struct RankedEntry<K> {
 /// The sort key of a board.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoardKey {
-    tier: Tier,
+    tier: Option<Tier>,
     score: f64,
     penalty_points: f64,
     submitted_at_ms: i64,
@@ -37,7 +37,12 @@ pub(crate) struct BoardKey {
 
 impl BoardKey {
     /// Rows with a number that is not finite are last in their tier. The scoring of this crate produces none.
-    pub(crate) fn new(tier: Tier, score: f64, penalty_points: f64, submitted_at_ms: i64) -> Self {
+    pub(crate) fn new(
+        tier: Option<Tier>,
+        score: f64,
+        penalty_points: f64,
+        submitted_at_ms: i64,
+    ) -> Self {
         // Adding 0 turns −0 into 0: `total_cmp` distinguishes them.
         let finite_or = |number: f64, worst: f64| {
             if number.is_finite() {
@@ -86,7 +91,7 @@ pub fn task_board<K>(task: Task, entries: Vec<BoardEntry<K>>) -> Vec<RankedEntry
 /// Ranks the entries. `sort_values` gives an entry's tier, score and penalty points, or `None` to leave the entry out.
 fn ranked<K>(
     entries: Vec<BoardEntry<K>>,
-    sort_values: impl Fn(&EvaluationResult) -> Option<(Tier, f64, f64)>,
+    sort_values: impl Fn(&EvaluationResult) -> Option<(Option<Tier>, f64, f64)>,
 ) -> Vec<RankedEntry<K>> {
     let mut keyed: Vec<_> = entries
         .into_iter()

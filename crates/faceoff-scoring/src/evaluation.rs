@@ -2,7 +2,7 @@
 
 use faceoff_types::{
     EvaluationResult, Profile, Ruleset, Seed, Task, TaskMap, TaskResult, TaskWeights, Tier,
-    Variation,
+    TierBounds, Variation,
 };
 
 /// Weight of a task's success rate in the overall score, in percent.
@@ -26,8 +26,8 @@ pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Tas
 
 /// Scores an evaluation: weighted score, maximum of the tasks' penalty points, worst of their tiers.
 ///
-/// `weights` are those of the tasks under the stage's rules. A missing task counts as 0 in the score. Without any task the
-/// score is 0, the penalty 0 and the tier deployable.
+/// `weights` and `bounds` are those of tasks and tiers under the stage's rules; without bounds there are no tiers. A missing task
+/// counts as 0 in the score. Without any task the score is 0, the penalty 0 and the tier deployable.
 #[must_use]
 pub fn score_evaluation(
     ruleset: Ruleset,
@@ -35,6 +35,7 @@ pub fn score_evaluation(
     seed: Seed,
     variation: &Variation,
     weights: &TaskWeights,
+    bounds: Option<TierBounds>,
     tasks: TaskMap<TaskResult>,
 ) -> EvaluationResult {
     EvaluationResult {
@@ -51,11 +52,13 @@ pub fn score_evaluation(
             .values()
             .map(|result| result.penalty_points)
             .fold(0.0, f64::max),
-        tier: tasks
-            .values()
-            .map(|result| result.tier)
-            .max()
-            .unwrap_or(Tier::Deployable),
+        tier: bounds.map(|_| {
+            tasks
+                .values()
+                .filter_map(|result| result.tier)
+                .max()
+                .unwrap_or(Tier::Deployable)
+        }),
         tasks,
         timing: None,
         variation: variation.clone(),

@@ -2,7 +2,7 @@
 //! and ratings. Both with intervals and tests of differences.
 //!
 //! An *outcome* is the result of one simulated episode. *Penalty points* are for violated safety limits and late answers; an
-//! agent's *tier* follows from them. A *board* ranks evaluations, *standings* rank the teams of a tournament. "The paper" in this
+//! agent's *tier* follows from them, if the competition has tiers. A *board* ranks evaluations, *standings* rank the teams of a tournament. "The paper" in this
 //! crate is the report on the robot air hockey competition of 2023, whose rules these are.
 //!
 //! All functions are pure: a stored recording can be scored again without a simulation, and anyone can check a
@@ -60,6 +60,7 @@ pub use successes::Successes;
 pub use summary::{EpisodeSummary, TaskSummary};
 pub use task::score_task;
 pub use tier::{
-    DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of, tier_with_bounds,
+    DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, TIER_BOUNDS, tier_of,
+    tier_with_bounds,
 };
 pub use tier_change::TIER_CHANGE_RESAMPLES;

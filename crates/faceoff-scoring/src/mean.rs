@@ -21,13 +21,14 @@ const SEED_CONTEXT: &str = "faceoff-scoring seeds of several days 1";
 /// computation time is over all steps, percentile and maximum are the worst of the days. `seed` represents the seeds of
 /// the evaluations in their sequence.
 ///
-/// `weights` are those of the tasks under the rules of the evaluations.
+/// `weights` and `bounds` are those of tasks and tiers under the rules of the evaluations.
 ///
 /// # Errors
 /// If the ruleset of the first evaluation is unknown.
 pub fn mean_result(
     results: &[&EvaluationResult],
     weights: &TaskWeights,
+    bounds: Option<TierBounds>,
 ) -> Result<Option<EvaluationResult>, UnknownRuleset> {
     let [first, ..] = results else {
         return Ok(None);
@@ -38,17 +39,25 @@ pub fn mean_result(
             .iter()
             .filter_map(|result| result.tasks.get(task))
             .collect();
-        (*task, mean_task(&days, &first.variation.tier_bounds))
+        (*task, mean_task(&days, bounds))
     });
     let tasks: TaskMap<TaskResult> = tasks.collect();
     let seed = joint_seed(results.iter().map(|result| result.seed));
     let variation = &first.variation;
-    let mean = score_evaluation(ruleset, first.profile, seed, variation, weights, tasks);
+    let mean = score_evaluation(
+        ruleset,
+        first.profile,
+        seed,
+        variation,
+        weights,
+        bounds,
+        tasks,
+    );
     Ok(Some(mean))
 }
 
 /// The mean of one task's results; `days` has one result for each evaluation.
-fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
+fn mean_task(days: &[&TaskResult], bounds: Option<TierBounds>) -> TaskResult {
     let sum = |value: fn(&TaskResult) -> u32| -> u32 {
         days.iter()
             .fold(0, |sum, day| sum.saturating_add(value(day)))
@@ -77,7 +86,7 @@ fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
                 sum.add(&day.violations);
                 sum
             }),
-        tier: tier_with_bounds(bounds, points, episodes),
+        tier: bounds.map(|bounds| tier_with_bounds(&bounds, points, episodes)),
         steps,
         computation_time_s: ComputationTimeSummary {
             mean: total_time_s / (steps.max(1) as f64),
@@ -100,8 +109,8 @@ fn joint_seed(seeds: impl Iterator<Item = Seed>) -> Seed {
     Seed::from_bytes(*hash.finalize().as_bytes())
 }
 
-/// The episodes of several evaluations as those of one, in the given sequence. Its `tier_change` is 0: a bootstrap
-/// would need all outcomes.
+/// The episodes of several evaluations as those of one, in the given sequence. Its `tier_change` is 0, or absent in a
+/// competition without tiers: a bootstrap would need all outcomes.
 #[must_use]
 pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
     let mut tasks: TaskMap<Vec<&TaskSummary>> = TaskMap::new();
@@ -114,20 +123,23 @@ pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
         let summary = TaskSummary {
             successes: days.iter().flat_map(|day| day.successes.iter()).collect(),
             penalty_points: days.iter().map(|day| day.penalty_points).sum(),
-            tier_change: 0.0,
+            tier_change: days.iter().find_map(|day| day.tier_change).map(|_| 0.0),
         };
         (task, summary)
     });
     EpisodeSummary {
         tasks: tasks.collect(),
-        tier_change: 0.0,
+        tier_change: summaries
+            .iter()
+            .find_map(|summary| summary.tier_change)
+            .map(|_| 0.0),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tier::tier_of;
+    use crate::tier::{TIER_BOUNDS, tier_of};
     use faceoff_airhockey::{EE, HIT, TASKS};
     use faceoff_types::{Profile, Tier, Variation};
 
@@ -144,7 +156,7 @@ mod tests {
             success_ci95: wilson95(successes, 100),
             penalty_points,
             violations: [(EE, 3)].into_iter().collect(),
-            tier: tier_of(penalty_points, 100),
+            tier: Some(tier_of(penalty_points, 100)),
             steps: 1000,
             computation_time_s: ComputationTimeSummary {
                 mean: 0.001 * f64::from(successes),
@@ -158,17 +170,23 @@ mod tests {
             Seed::from_number(seed),
             &Variation::default(),
             &weights(),
+            Some(TIER_BOUNDS),
             [(HIT, task)].into(),
         )
     }
 
+    fn mean_of(results: &[&EvaluationResult]) -> Option<EvaluationResult> {
+        mean_result(results, &weights(), Some(TIER_BOUNDS)).unwrap()
+    }
+
     #[test]
     fn mean_averages_rates_and_points_and_derives_tier() {
-        assert_eq!(mean_result(&[], &weights()).unwrap(), None);
+        assert_eq!(mean_of(&[]), None);
         let (a, b) = (day(1, 40, 20.0), day(2, 60, 100.0));
-        assert_eq!((a.tier, b.tier), (Tier::Deployable, Tier::Improvable));
-        assert_eq!(mean_result(&[&a], &weights()).unwrap().unwrap(), a);
-        let mean = mean_result(&[&a, &b], &weights()).unwrap().unwrap();
+        let tiers = [Tier::Deployable, Tier::Improvable].map(Some);
+        assert_eq!([a.tier, b.tier], tiers);
+        assert_eq!(mean_of(&[&a]).unwrap(), a);
+        let mean = mean_of(&[&a, &b]).unwrap();
         let hit = &mean.tasks[&HIT];
         assert_eq!(
             (hit.episodes, hit.successes, hit.success_rate),
@@ -176,14 +194,30 @@ mod tests {
         );
         assert_eq!(hit.success_ci95, wilson95(100, 200));
         assert_eq!((hit.penalty_points, mean.penalty_points), (60.0, 60.0));
-        assert_eq!(mean.tier, Tier::Improvable, "60 points over 100 episodes");
+        assert_eq!(
+            mean.tier,
+            Some(Tier::Improvable),
+            "60 points over 100 episodes"
+        );
         assert_eq!(mean.score, 20.0);
         assert_eq!((hit.violations.get(EE), hit.steps), (6, 2000));
         assert!((hit.computation_time_s.mean - 0.05).abs() < 1e-12);
-        let repetition = mean_result(&[&a, &b], &weights()).unwrap().unwrap();
+        let repetition = mean_of(&[&a, &b]).unwrap();
         assert_eq!(mean.seed, repetition.seed);
-        let other_order = mean_result(&[&b, &a], &weights()).unwrap().unwrap();
+        let other_order = mean_of(&[&b, &a]).unwrap();
         assert_ne!(mean.seed, other_order.seed);
+    }
+
+    #[test]
+    fn mean_without_tiers_has_no_tier() {
+        let (mut a, mut b) = (day(1, 40, 20.0), day(2, 60, 100.0));
+        for result in [&mut a, &mut b] {
+            result.tier = None;
+            result.tasks[&HIT].tier = None;
+        }
+        let mean = mean_result(&[&a, &b], &weights(), None).unwrap().unwrap();
+        assert_eq!((mean.tier, mean.tasks[&HIT].tier), (None, None));
+        assert_eq!((mean.score, mean.penalty_points), (20.0, 60.0));
     }
 
     #[test]
@@ -194,11 +228,11 @@ mod tests {
                 TaskSummary {
                     successes: solved.iter().copied().collect(),
                     penalty_points: 1.5,
-                    tier_change: 0.5,
+                    tier_change: Some(0.5),
                 },
             )]
             .into(),
-            tier_change: 0.5,
+            tier_change: Some(0.5),
         };
         let joined = joined_summary(&[&summary(&[true, false]), &summary(&[false, true])]);
         let hit = &joined.tasks[&HIT];
@@ -206,6 +240,6 @@ mod tests {
             hit.successes,
             [true, false, false, true].into_iter().collect()
         );
-        assert_eq!((hit.penalty_points, hit.tier_change), (3.0, 0.0));
+        assert_eq!((hit.penalty_points, hit.tier_change), (3.0, Some(0.0)));
     }
 }

@@ -104,8 +104,13 @@ impl TaskScore {
         })
     }
 
-    fn tier(&self, bounds: &TierBounds) -> Tier {
-        tier_with_bounds(bounds, self.penalty_points, self.episodes)
+    fn tier(&self, bounds: Option<TierBounds>) -> Option<Tier> {
+        let bounds = bounds?;
+        Some(tier_with_bounds(
+            &bounds,
+            self.penalty_points,
+            self.episodes,
+        ))
     }
 }
 
@@ -171,8 +176,9 @@ pub struct QualifyingRow {
     pub rank: u32,
     /// Name in the input file.
     pub team: TeamName,
-    /// Overall tier: the worst over the tasks.
-    pub tier: Tier,
+    /// Overall tier: the worst over the tasks; absent in a competition without tiers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tier: Option<Tier>,
     /// Overall score in percent.
     pub score: f64,
     /// Overall deployability score (DS): the maximum over the tasks.
@@ -186,8 +192,9 @@ pub struct QualifyingRow {
 pub struct TaskRow {
     /// Rank on the board of this task, from 1.
     pub rank: u32,
-    /// Tier that follows from the penalty points.
-    pub tier: Tier,
+    /// Tier that follows from the penalty points; absent in a competition without tiers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tier: Option<Tier>,
     /// Fraction of successes.
     pub success_rate: f64,
     /// 95 % Wilson interval of the success rate, as fractions.
@@ -200,14 +207,14 @@ pub struct TaskRow {
 
 impl QualifyingScores {
     /// The board, best first, ranked as [`overall_board`](crate::overall_board). The position in the file replaces the time of
-    /// submission. There is a weight for each task of the competition.
+    /// submission. There is a weight for each task of the competition; `bounds` decide the tiers, if it has tiers.
     ///
     /// # Errors
     /// The first team with a task that the competition does not have, or without one of its tasks.
     pub fn board(
         &self,
         weights: &TaskWeights,
-        bounds: &TierBounds,
+        bounds: Option<TierBounds>,
     ) -> Result<Vec<QualifyingRow>, InvalidTasks> {
         let tasks: Vec<Task> = weights.tasks().collect();
         for (team, scores) in &self.teams {
@@ -247,7 +254,7 @@ impl QualifyingScores {
     }
 
     /// The rank of each team, in the sequence of the file.
-    fn ranks(&self, key: impl Fn(&TaskScores) -> (Tier, f64, f64)) -> Vec<u32> {
+    fn ranks(&self, key: impl Fn(&TaskScores) -> (Option<Tier>, f64, f64)) -> Vec<u32> {
         let mut keyed: Vec<(usize, BoardKey)> = (0..)
             .zip(&self.teams)
             .map(|(index, (_, scores))| {
@@ -284,12 +291,8 @@ impl TaskScores {
         }
     }
 
-    fn tier(&self, bounds: &TierBounds) -> Tier {
-        self.0
-            .values()
-            .map(|score| score.tier(bounds))
-            .max()
-            .unwrap_or(Tier::Deployable)
+    fn tier(&self, bounds: Option<TierBounds>) -> Option<Tier> {
+        self.0.values().filter_map(|score| score.tier(bounds)).max()
     }
 
     fn score(&self, weights: &TaskWeights) -> f64 {
@@ -310,7 +313,7 @@ impl TaskScores {
 }
 
 impl TaskScore {
-    fn row(&self, rank: u32, bounds: &TierBounds) -> TaskRow {
+    fn row(&self, rank: u32, bounds: Option<TierBounds>) -> TaskRow {
         TaskRow {
             rank,
             tier: self.tier(bounds),

@@ -16,7 +16,8 @@ pub struct EpisodeSummary {
     /// One summary for each task of the evaluation.
     pub tasks: TaskMap<TaskSummary>,
     /// As [`TaskSummary::tier_change`], for the overall tier, which is the worst of the tasks' tiers.
-    pub tier_change: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier_change: Option<f64>,
 }
 
 /// Summary of the episodes of one task for boards and comparisons.
@@ -28,8 +29,10 @@ pub struct TaskSummary {
     /// Penalty points over all episodes.
     pub penalty_points: f64,
     /// Probability of another tier on other episodes of the same kind, by a bootstrap with
-    /// [`TIER_CHANGE_RESAMPLES`](crate::TIER_CHANGE_RESAMPLES) resamples of the episodes' penalty points.
-    pub tier_change: f64,
+    /// [`TIER_CHANGE_RESAMPLES`](crate::TIER_CHANGE_RESAMPLES) resamples of the episodes' penalty points; absent in a
+    /// competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier_change: Option<f64>,
 }
 
 impl EpisodeSummary {
@@ -38,8 +41,8 @@ impl EpisodeSummary {
     /// previous one.
     pub const VERSION: u32 = 2;
 
-    /// Summarises an evaluation's episodes, given in any sequence, with the tasks in the order of `tasks`; `bounds` decide the tiers. The same episodes give
-    /// bit-identical summaries.
+    /// Summarises an evaluation's episodes, given in any sequence, with the tasks in the order of `tasks`; `bounds`
+    /// decide the tiers; without them there are none. The same episodes give bit-identical summaries.
     ///
     /// # Errors
     /// If the episodes of a task are not 0, 1, … n − 1, each once.
@@ -47,7 +50,7 @@ impl EpisodeSummary {
         competition: &Competition,
         outcomes: &[EpisodeOutcome],
         tasks: &[Task],
-        bounds: &TierBounds,
+        bounds: Option<TierBounds>,
     ) -> Result<Self, PairingError> {
         let mut by_task: TaskMap<Vec<&EpisodeOutcome>> =
             tasks.iter().map(|task| (*task, Vec::new())).collect();
@@ -75,7 +78,8 @@ impl EpisodeSummary {
                 .map(|outcome| episode_penalty(competition, outcome));
             (*task, points.collect())
         });
-        let change = TierChange::from_points(points.collect(), bounds);
+        let points: TaskMap<Vec<f64>> = points.collect();
+        let change = bounds.map(|bounds| TierChange::from_points(points, &bounds));
         let tasks = by_task.into_iter().map(|(task, episodes)| {
             let summary = TaskSummary {
                 successes: episodes
@@ -87,22 +91,29 @@ impl EpisodeSummary {
                     .iter()
                     .map(|outcome| episode_penalty(competition, outcome))
                     .sum(),
-                tier_change: change.tasks.get(&task).copied().unwrap_or_default(),
+                tier_change: change
+                    .as_ref()
+                    .map(|change| change.tasks.get(&task).copied().unwrap_or_default()),
             };
             (task, summary)
         });
         Ok(Self {
             tasks: tasks.collect(),
-            tier_change: change.overall,
+            tier_change: change.map(|change| change.overall),
         })
     }
 
-    /// The probability of another tier in `task`, or of another overall tier if `task` is `None`; 0 for a missing task.
+    /// The probability of another tier in `task`, or of another overall tier if `task` is `None`; 0 for a missing task, and `None`
+    /// without tiers.
     #[must_use]
-    pub fn tier_change_of(&self, task: Option<Task>) -> f64 {
+    pub fn tier_change_of(&self, task: Option<Task>) -> Option<f64> {
+        let overall = self.tier_change?;
         match task {
-            None => self.tier_change,
-            Some(task) => self.tasks.get(&task).map_or(0.0, |task| task.tier_change),
+            None => Some(overall),
+            Some(task) => match self.tasks.get(&task) {
+                None => Some(0.0),
+                Some(task) => task.tier_change,
+            },
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::{
 };
 use faceoff_types::{Competition, EpisodeOutcome, TaskResult, TierBounds};
 
-/// Scores one task from its episodes; `bounds` decide the tier.
+/// Scores one task from its episodes; `bounds` decide the tier; without them it has none.
 ///
 /// `step_times` are the computation times of all answered steps in the sequence of the episodes. The result then does not
 /// depend on how the episodes were divided into jobs.
@@ -22,7 +22,7 @@ pub fn score_task(
     competition: &Competition,
     outcomes: &[EpisodeOutcome],
     step_times: &StepTimes,
-    bounds: &TierBounds,
+    bounds: Option<TierBounds>,
 ) -> TaskResult {
     let episodes = count(outcomes, |_| true);
     let successes = count(outcomes, |outcome| outcome.success && !has_fault(outcome));
@@ -48,7 +48,7 @@ pub fn score_task(
                 (&outcome.violations, is_late)
             }),
         ),
-        tier: tier_with_bounds(bounds, penalty_points, episodes),
+        tier: bounds.map(|bounds| tier_with_bounds(&bounds, penalty_points, episodes)),
         steps: outcomes
             .iter()
             .map(|outcome| u64::from(outcome.steps))

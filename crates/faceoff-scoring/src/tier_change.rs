@@ -120,12 +120,13 @@ fn tier_of_halves(bounds: &TierBounds, halves: u64, episodes: u32) -> Tier {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tier::TIER_BOUNDS;
     use faceoff_airhockey::{DEFEND, HIT};
     use faceoff_types::Task;
     use statrs::distribution::{Binomial, DiscreteCDF};
 
     fn change(points: &[(Task, Vec<f64>)]) -> TierChange {
-        TierChange::from_points(points.iter().cloned().collect(), &TierBounds::default())
+        TierChange::from_points(points.iter().cloned().collect(), &TIER_BOUNDS)
     }
 
     /// The first `violated` of `episodes` have `points`, the others none.

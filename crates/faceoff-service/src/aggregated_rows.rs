@@ -38,8 +38,10 @@ impl AggregatedRow {
             return Ok(None);
         };
         let weights = competition.weights(&first.result.variation);
+        let bounds = competition.tier_bounds(&first.result.variation);
         let results: Vec<_> = records.iter().map(|record| &record.result).collect();
-        let Some(result) = mean_result(&results, &weights).map_err(Problem::internal)? else {
+        let mean = mean_result(&results, &weights, bounds).map_err(Problem::internal)?;
+        let Some(result) = mean else {
             return Ok(None);
         };
         let evaluations = records.iter().map(|record| record.evaluation).collect();

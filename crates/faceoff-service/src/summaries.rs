@@ -76,10 +76,10 @@ impl Summaries {
     async fn summarise(&self, run: RunId) -> Result<EpisodeSummary, Problem> {
         let outcomes = self.store.outcomes(run).await?;
         let plan = self.store.run_plan(run).await?;
+        let bounds = self.competition.tier_bounds(&plan.variation);
         // Takes some ten milliseconds, so it runs off the threads that handle requests.
         let competition = Arc::clone(&self.competition);
         let summarise = move || {
-            let bounds = &plan.variation.tier_bounds;
             EpisodeSummary::from_outcomes(&competition, &outcomes, &plan.tasks, bounds)
         };
         tokio::task::spawn_blocking(summarise)

@@ -7,7 +7,7 @@
 use crate::AirHockeyTask;
 use crate::{
     channel::Command,
-    episode::Episode,
+    episode::{Episode, constraints::ViolatedGroups},
     game::{Game, GameSetup},
     model::{EE_DESIRED_HEIGHT_M, JOINTS},
     robot::{inverse_kinematics::inverse_kinematics, plant::Plant},
@@ -120,6 +120,33 @@ pub fn episode_hash(mut episode: Episode) -> String {
     }
 }
 
+/// A side's window, under the name that the hashes are made of.
+#[derive(Debug)]
+#[expect(dead_code, reason = "its fields are read by `Debug`")]
+struct Violations {
+    ee: bool,
+    link: bool,
+    joint_pos: bool,
+    joint_vel: bool,
+}
+
+impl From<ViolatedGroups> for Violations {
+    fn from(groups: ViolatedGroups) -> Self {
+        let ViolatedGroups {
+            ee,
+            link,
+            joint_pos,
+            joint_vel,
+        } = groups;
+        Self {
+            ee,
+            link,
+            joint_pos,
+            joint_vel,
+        }
+    }
+}
+
 /// Continues a game for `steps` control steps, both robots with [`strike`]; returns the hash of
 /// observations, pucks, ends of rallies and windows (counts of violations). The last two are hashed as their `Debug` text, so a field of
 /// these types cannot be renamed without a change of the hash.
@@ -132,7 +159,8 @@ pub fn game_hash(game: &mut Game, steps: u32) -> String {
         }
         let outcome = game.step(actions.each_ref().map(|action| Command::Act(action)));
         hash.add(&game.world().puck().state());
-        hash.add_text(&format!("{:?} {:?}", outcome.rally_end, outcome.window));
+        let window = outcome.window.map(|sides| sides.map(Violations::from));
+        hash.add_text(&format!("{:?} {:?}", outcome.rally_end, window));
     }
     hash.digits()
 }

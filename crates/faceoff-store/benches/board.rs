@@ -34,7 +34,7 @@ fn evaluation_result(score: f64) -> EvaluationResult {
         success_ci95: [0.481, 0.543],
         penalty_points: 327.5,
         violations: ViolationCounts::default(),
-        tier: Tier::Deployable,
+        tier: Some(Tier::Deployable),
         steps: 123_456,
         computation_time_s: ComputationTimeSummary {
             mean: 2e-4,
@@ -49,7 +49,7 @@ fn evaluation_result(score: f64) -> EvaluationResult {
         tasks: TASKS.map(|name| (name, task.clone())).into(),
         score,
         penalty_points: 327.5,
-        tier: Tier::Deployable,
+        tier: Some(Tier::Deployable),
         timing: None,
         variation: Default::default(),
     }

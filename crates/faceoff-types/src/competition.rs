@@ -2,7 +2,7 @@
 
 use crate::{
     ActionSpace, EpisodeEnd, InvalidStageRules, Millionths, RecordingColumns, StageRules, Task,
-    TaskMap, TaskWeights, UnknownTask, Variation, ViolationCounts, ViolationName, Violations,
+    TaskMap, TaskWeights, TierBounds, UnknownTask, Variation, ViolationCounts, ViolationName, Violations,
 };
 
 /// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
@@ -20,6 +20,8 @@ pub struct Competition {
     pub violations: Vec<ViolationInfo>,
     pub actions: ActionSpace,
     pub recording: RecordingColumns,
+    /// The bounds of its tiers, unless a stage has others; `None`: a competition without tiers, whose boards rank by score alone.
+    pub tiers: Option<TierBounds>,
 }
 
 /// A task of a competition.
@@ -67,8 +69,8 @@ pub struct ViolationInfo {
 }
 
 impl Competition {
-    /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points. Texts
-    /// are not part of it.
+    /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points,
+    /// bounds of tiers. Texts are not part of it.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
@@ -87,6 +89,11 @@ impl Competition {
             add(violation.name.as_str());
             add(&violation.points_text());
         }
+        // A text that no bounds have.
+        let no_tiers = || "no tiers".to_owned();
+        add(&self
+            .tiers
+            .map_or_else(no_tiers, |bounds| bounds.to_string()));
         hasher.finalize().to_string()
     }
 
@@ -106,6 +113,13 @@ impl Competition {
                 .unwrap_or_else(|_| weights.clone()),
             None => TaskWeights::unchecked(own().collect()),
         }
+    }
+
+    /// The bounds of the tiers under a stage's rules; `None` if the competition has no tiers.
+    #[must_use]
+    pub fn tier_bounds(&self, variation: &Variation) -> Option<TierBounds> {
+        let own = self.tiers?;
+        Some(variation.tier_bounds.unwrap_or(own))
     }
 
     /// These counts, and 0 for all other kinds of violations.
@@ -147,7 +161,7 @@ impl Competition {
     }
 
     /// Checks that evaluations are possible under these rules, and brings tasks and weights into the order of the competition.
-    /// Weights that are those of the competition are left out.
+    /// Weights and bounds of tiers that are those of the competition are left out.
     ///
     /// # Errors
     /// The first invalid field.
@@ -162,6 +176,10 @@ impl Competition {
             let weights = weights.in_order(self.task_names())?;
             let is_own = weights == self.weights(&Variation::default());
             rules.variation.weights = (!is_own).then_some(weights);
+        }
+        if let Some(bounds) = rules.variation.tier_bounds {
+            let own = self.tiers.ok_or(InvalidStageRules::NoTiers(bounds))?;
+            rules.variation.tier_bounds = (bounds != own).then_some(bounds);
         }
         Ok(())
     }
@@ -222,5 +240,84 @@ impl ViolationInfo {
         let points = self.points_text();
         let unit = if points == "1" { "point" } else { "points" };
         format!("{points} {unit}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Profile, Ruleset};
+
+    fn competition(tiers: Option<TierBounds>) -> Competition {
+        Competition {
+            id: "points".to_owned(),
+            title: "Points".to_owned(),
+            tasks: vec![TaskInfo {
+                task: Task::new("reach"),
+                title: "Reach".to_owned(),
+                aim: "Reach the target.".to_owned(),
+                weight: Millionths::new(1_000_000),
+                max_steps: 100,
+            }],
+            ends: Vec::new(),
+            violations: Vec::new(),
+            tiers,
+        }
+    }
+
+    /// The rules with these bounds after the check of a competition.
+    fn checked(tiers: Option<&str>, bounds: Option<&str>) -> Result<StageRules, InvalidStageRules> {
+        let parsed = |text: &str| text.parse().unwrap();
+        let mut rules = StageRules {
+            runtimes: None,
+            ruleset: Ruleset::CURRENT,
+            profile: Profile::Evaluation,
+            tasks: vec![Task::new("reach")],
+            episodes_per_task: 1,
+            max_faults: 0,
+            variation: Variation {
+                tier_bounds: bounds.map(parsed),
+                ..Variation::default()
+            },
+            limits: Default::default(),
+        };
+        let competition = competition(tiers.map(parsed));
+        competition.check_rules(&mut rules).map(|()| rules)
+    }
+
+    #[test]
+    fn competition_without_tiers_refuses_tier_bounds() {
+        assert_eq!(checked(None, None).unwrap().variation.tier_bounds, None);
+        let refused = checked(None, Some("0.1,0.2")).unwrap_err();
+        assert_eq!(refused.field(), "tier_bounds");
+        assert_eq!(
+            refused.to_string(),
+            "tier_bounds: the competition has no tiers, got the bounds 0.1,0.2; leave them out"
+        );
+        let variation = Variation {
+            tier_bounds: Some("0.1,0.2".parse().unwrap()),
+            ..Variation::default()
+        };
+        assert_eq!(competition(None).tier_bounds(&variation), None);
+    }
+
+    #[test]
+    fn tier_bounds_of_the_competition_are_left_out() {
+        let own = Some("0.5,1.5");
+        assert_eq!(checked(own, own).unwrap().variation.tier_bounds, None);
+        let other = checked(own, Some("0.1,0.2")).unwrap().variation;
+        assert_eq!(other.tier_bounds, Some("0.1,0.2".parse().unwrap()));
+        let competition = competition(own.map(|text| text.parse().unwrap()));
+        assert_eq!(competition.tier_bounds(&other), other.tier_bounds);
+        let unchanged = competition.tier_bounds(&Variation::default());
+        assert_eq!(unchanged, competition.tiers);
+    }
+
+    #[test]
+    fn hash_covers_tiers() {
+        let hash =
+            |tiers: Option<&str>| competition(tiers.map(|text| text.parse().unwrap())).hash();
+        assert_ne!(hash(None), hash(Some("0.5,1.5")));
+        assert_ne!(hash(Some("0.1,1.5")), hash(Some("0.5,1.5")));
     }
 }

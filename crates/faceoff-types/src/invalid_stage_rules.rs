@@ -2,7 +2,7 @@
 
 use crate::{
     InvalidLimit, InvalidPerturbation, InvalidRuntimes, InvalidWeights, MAX_DEADLINE_H,
-    MAX_EPISODES_PER_TASK, UnknownTask,
+    MAX_EPISODES_PER_TASK, TierBounds, UnknownTask,
 };
 
 /// The largest number of days in the mean of a board row.
@@ -18,6 +18,9 @@ pub enum InvalidStageRules {
     UnknownTask(#[from] UnknownTask),
     #[error("weights: {0}")]
     Weights(#[from] InvalidWeights),
+    /// Bounds of tiers that do not exist.
+    #[error("tier_bounds: the competition has no tiers, got the bounds {0}; leave them out")]
+    NoTiers(TierBounds),
     #[error("episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]
     Episodes(u32),
     /// No episode per shard, or more than a task can have.
@@ -47,6 +50,7 @@ impl InvalidStageRules {
         match self {
             Self::Tasks | Self::UnknownTask(_) => "tasks",
             Self::Weights(_) => "weights",
+            Self::NoTiers(_) => "tier_bounds",
             Self::Episodes(_) => "episodes_per_task",
             Self::Shards(_) => "episodes_per_shard",
             Self::Ablations(_) => "ablation_episodes",

@@ -32,8 +32,10 @@ pub struct TaskResult {
     pub penalty_points: f64,
     /// Episodes with each violation.
     pub violations: ViolationCounts,
-    /// Tier according to the penalty points.
-    pub tier: Tier,
+    /// Tier according to the penalty points; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(nullable = false))]
+    pub tier: Option<Tier>,
     /// Control steps played.
     pub steps: u64,
     /// Computation times.
@@ -55,8 +57,9 @@ pub struct EvaluationResult {
     pub score: f64,
     /// Overall DS: the maximum over the tasks.
     pub penalty_points: f64,
-    /// Overall tier: the worst over the tasks.
-    pub tier: Tier,
+    /// Overall tier: the worst over the tasks; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier: Option<Tier>,
     /// Timing of the slots, with the worst value over all slots; absent in results of older versions and if
     /// nothing was played.
     #[serde(default, skip_serializing_if = "Option::is_none")]

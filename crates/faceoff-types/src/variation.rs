@@ -12,9 +12,10 @@ pub struct Variation {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub weights: Option<TaskWeights>,
-    /// Largest penalty points per episode of the two better tiers; absent: 0.5 and 1.5.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub tier_bounds: TierBounds,
+    /// Largest penalty points per episode of the two better tiers; absent: those of the competition.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(nullable = false))]
+    pub tier_bounds: Option<TierBounds>,
     /// Magnitudes of the profile's perturbations; absent values are the ruleset's.
     #[serde(default, skip_serializing_if = "is_default")]
     pub perturbations: Box<PerturbationSettings>,
@@ -94,6 +95,22 @@ impl TierBounds {
         }
     }
 
+    /// The bounds of a competition, as a constant.
+    ///
+    /// # Panics
+    /// If the first bound is 0, or the second is not above it.
+    #[must_use]
+    pub const fn constant(deployable: Millionths, improvable: Millionths) -> Self {
+        assert!(
+            0 < deployable.count() && deployable.count() < improvable.count(),
+            "expected 0 < deployable < improvable"
+        );
+        Self {
+            deployable,
+            improvable,
+        }
+    }
+
     /// Bound of the best tier, in penalty points per episode.
     #[must_use]
     pub const fn deployable(&self) -> Millionths {
@@ -104,15 +121,6 @@ impl TierBounds {
     #[must_use]
     pub const fn improvable(&self) -> Millionths {
         self.improvable
-    }
-}
-
-impl Default for TierBounds {
-    fn default() -> Self {
-        Self {
-            deployable: Millionths::new(500_000),
-            improvable: Millionths::new(1_500_000),
-        }
     }
 }
 
@@ -207,7 +215,10 @@ mod tests {
 
     #[test]
     fn bounds_of_tiers_rise() {
-        assert_eq!("0.5,1.5".parse(), Ok(TierBounds::default()));
+        let [deployable, improvable] = [500_000, 1_500_000].map(Millionths::new);
+        let bounds = TierBounds::constant(deployable, improvable);
+        assert_eq!("0.5,1.5".parse(), Ok(bounds));
+        assert_eq!(TierBounds::new(deployable, improvable), Ok(bounds));
         for (wrong, words) in [
             ("0,1", "0 < deployable"),
             ("1.5,0.5", "deployable < improvable"),

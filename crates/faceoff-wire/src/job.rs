@@ -6,9 +6,9 @@
 
 use crate::game::GameSpec;
 use faceoff_types::{
-    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId,
+    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId, Millionths,
     PerturbationSettings, Profile, Ruleset, Seed, StageRuntimes, SubmissionId, Task, TaskWeights,
-    ValidationOutcome, Variation,
+    TierBounds, ValidationOutcome, Variation,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -190,10 +190,32 @@ pub struct EvaluationMeta {
     pub variation: Variation,
     /// Weights of the tasks under these rules, in the order of the competition.
     pub task_weights: TaskWeights,
+    /// The bounds of the competition's tiers, unless the variation has others; null: it has no tiers. Absent in jobs of earlier
+    /// versions.
+    #[serde(default = "first_tiers")]
+    pub tiers: Option<TierBounds>,
+}
+
+impl EvaluationMeta {
+    /// The bounds of the tiers under these rules; `None` if the competition has no tiers.
+    #[must_use]
+    pub fn tier_bounds(&self) -> Option<TierBounds> {
+        let own = self.tiers?;
+        Some(self.variation.tier_bounds.unwrap_or(own))
+    }
 }
 
 fn is_default(perturbations: &PerturbationSettings) -> bool {
     *perturbations == PerturbationSettings::default()
+}
+
+/// The tiers of the only competition that earlier versions had.
+#[expect(clippy::unnecessary_wraps, reason = "the type of the field")]
+const fn first_tiers() -> Option<TierBounds> {
+    Some(TierBounds::constant(
+        Millionths::new(500_000),
+        Millionths::new(1_500_000),
+    ))
 }
 
 const fn first_ruleset() -> Ruleset {

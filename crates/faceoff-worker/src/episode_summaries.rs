@@ -34,10 +34,10 @@ async fn store_summary(
 ) -> anyhow::Result<()> {
     let outcomes = store.outcomes(run).await?;
     let plan = store.run_plan(run).await?;
+    let bounds = competition.tier_bounds(&plan.variation);
     // Takes some ten milliseconds, so it runs off the async threads.
     let competition = Arc::clone(competition);
     let summarise = move || {
-        let bounds = &plan.variation.tier_bounds;
         EpisodeSummary::from_outcomes(&competition, &outcomes, &plan.tasks, bounds)
     };
     let summary = tokio::task::spawn_blocking(summarise);

@@ -165,6 +165,7 @@ impl LocalServer {
                     agent: agent_name,
                     ruleset: run.ruleset,
                     task_weights: self.competition().weights(&run.plan.variation),
+                    tiers: self.competition().tiers,
                     variation: run.plan.variation,
                 },
                 recordings,

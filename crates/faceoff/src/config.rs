@@ -131,7 +131,7 @@ pub struct EvaluationConfig {
     /// Weights of the tasks' success rates in the score.
     pub weights: TaskWeights,
     /// Most penalty points per episode of the tiers (classes of agents) deployable and improvable.
-    pub tier_bounds: TierBounds,
+    pub tier_bounds: Option<TierBounds>,
     /// Magnitudes of the perturbations that the profile enables; left out, those of the ruleset (the simulator's version).
     pub perturbations: Option<Box<PerturbationSettings>>,
     /// When the datasets of released days are published.
@@ -156,7 +156,7 @@ impl Default for EvaluationConfig {
             max_faults: 10,
             ablation_episodes: settings.ablation_episodes,
             weights: competition().weights(&Variation::default()),
-            tier_bounds: TierBounds::default(),
+            tier_bounds: competition().tiers,
             perturbations: None,
             publishes: settings.publishes,
             standings: settings.standings,

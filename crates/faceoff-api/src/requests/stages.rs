@@ -290,7 +290,10 @@ impl StagePatch {
                 &mut variation.weights,
                 self.weights.clone().map(Some).as_ref(),
             ),
-            replace(&mut variation.tier_bounds, self.tier_bounds.as_ref()),
+            replace(
+                &mut variation.tier_bounds,
+                self.tier_bounds.map(Some).as_ref(),
+            ),
             replace(&mut variation.perturbations, self.perturbations.as_ref()),
             replace(&mut rules.limits, self.limits.as_ref()),
             replace(

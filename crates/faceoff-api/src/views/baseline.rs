@@ -16,10 +16,12 @@ pub struct BaselineRow {
     pub would_rank: u32,
     /// Always true.
     pub baseline: bool,
-    /// The overall tier; on a task's board the task's tier.
-    pub tier: Tier,
+    /// The overall tier; on a task's board the task's tier; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tier: Option<Tier>,
     /// Probability that other episodes of the same kind would give another tier, 0 to 1; null for a mean of several
-    /// days.
+    /// days, and without tiers.
     pub tier_change_probability: Option<f64>,
     /// The baseline's name.
     pub team: TeamName,

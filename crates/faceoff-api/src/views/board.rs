@@ -32,8 +32,10 @@ pub struct BoardView {
     pub ruleset: String,
     /// Weight of each task's success rate in the overall score.
     pub weights: TaskWeights,
-    /// For each tier, the most penalty points per episode that it allows.
-    pub tier_bounds: TierBounds,
+    /// For each tier, the most penalty points per episode that it allows; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tier_bounds: Option<TierBounds>,
     /// Magnitudes of the perturbations that the profile switches on; absent if they have the ruleset's values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perturbations: Option<Box<PerturbationSettings>>,
@@ -84,10 +86,12 @@ pub struct BoardRow {
     pub rank: u32,
     /// Number of the group of statistically tied teams, from 1 down the board.
     pub rank_group: u32,
-    /// The overall tier; on a task's board the task's tier.
-    pub tier: Tier,
+    /// The overall tier; on a task's board the task's tier; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tier: Option<Tier>,
     /// Probability that other episodes of the same kind would give another tier, 0 to 1; null for a mean of several
-    /// days.
+    /// days, and without tiers.
     pub tier_change_probability: Option<f64>,
     /// Name of the team.
     pub team: TeamName,

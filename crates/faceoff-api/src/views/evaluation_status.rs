@@ -155,8 +155,10 @@ pub struct ResultView {
     pub score: f64,
     /// Penalty points: the maximum over the tasks.
     pub penalty_points: f64,
-    /// The worst of the tasks' tiers.
-    pub tier: Tier,
+    /// The worst of the tasks' tiers; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tier: Option<Tier>,
     /// How exactly the slots (places that run jobs) measured answer times, and how many episodes they repeated; absent
     /// until the day is released, and in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -228,7 +230,7 @@ mod tests {
                 tasks: Default::default(),
                 score: 0.0,
                 penalty_points: 0.0,
-                tier: Tier::Deployable,
+                tier: Some(Tier::Deployable),
                 timing: None,
             })),
             dataset: Some(String::new()),

@@ -68,8 +68,10 @@ pub struct HistoryRow {
     pub finished_at: Timestamp,
     /// When the day was released; null before.
     pub released_at: Option<Timestamp>,
-    /// Tier of the day's result, overall or in the task.
-    pub tier: Tier,
+    /// Tier of the day's result, overall or in the task; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tier: Option<Tier>,
     /// Overall score of the day in percent.
     pub score: f64,
     /// Overall penalty points of the day: the maximum over the tasks.

@@ -102,8 +102,10 @@ pub struct ChangeView {
 pub struct RankView {
     /// From 1.
     pub rank: u32,
-    /// Overall tier.
-    pub tier: Tier,
+    /// Overall tier; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tier: Option<Tier>,
     /// Overall score in percent.
     pub score: f64,
     /// Overall penalty points.

@@ -19,8 +19,10 @@ pub struct TaskView {
     pub success_ci95: [f64; 2],
     /// Penalty points over all episodes: the task's deployability score (DS).
     pub penalty_points: f64,
-    /// Tier that follows from the penalty points.
-    pub tier: Tier,
+    /// Tier that follows from the penalty points; absent in a competition without tiers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub tier: Option<Tier>,
     /// Number of episodes with each violation; absent until the day is released.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub violations: Option<ViolationCounts>,

@@ -84,6 +84,7 @@ fn dataset_is_complete_and_has_the_direct_score() {
     // Scored directly from the reports and the recorded times.
     let steps = table(&dir.join("steps.parquet"));
     let mut tasks = TaskMap::new();
+    let meta_bounds = evaluation.meta.tier_bounds();
     for task in [HIT, PREPARE] {
         let outcomes: Vec<EpisodeOutcome> = evaluation
             .reports
@@ -99,12 +100,7 @@ fn dataset_is_complete_and_has_the_direct_score() {
         }
         tasks.insert(
             task,
-            faceoff_scoring::score_task(
-                &faceoff_airhockey::competition(),
-                &outcomes,
-                &times,
-                &Default::default(),
-            ),
+            faceoff_scoring::score_task(&faceoff_airhockey::competition(), &outcomes, &times, meta_bounds),
         );
     }
     let meta = &evaluation.meta;
@@ -116,6 +112,7 @@ fn dataset_is_complete_and_has_the_direct_score() {
             meta.seed,
             &Default::default(),
             &meta.task_weights,
+            meta_bounds,
             tasks,
         )
     };

@@ -245,6 +245,7 @@ impl Evaluation {
                 agent: "test".into(),
                 ruleset: Ruleset::CURRENT,
                 task_weights: faceoff_airhockey::competition().weights(&variation),
+                tiers: faceoff_airhockey::competition().tiers,
                 variation,
             },
             dir,

@@ -175,12 +175,7 @@ async fn viewing_an_ablation_stores_nothing_and_reads_the_summary() {
     let version = EpisodeSummary::VERSION;
     let read_stored = async || site.store.episode_summaries(&ids, version).await.unwrap();
     assert!(read_stored().await.is_empty());
-    faceoff_worker::clean_up(
-        &site.store,
-        faceoff_airhockey::simulator().competition(),
-        site.now(),
-    )
-    .await;
+    faceoff_worker::clean_up(&site.store, &faceoff_airhockey::competition(), site.now()).await;
     let stored = read_stored().await;
     assert_eq!(stored.len(), Profile::ABLATION.len());
     let run = runs[&Profile::TrackingLoss];

@@ -65,5 +65,6 @@ mod users;
 mod webhook_receiver;
 mod webhooks;
 mod whole_season;
+mod without_tiers;
 mod worker_files;
 mod workers;

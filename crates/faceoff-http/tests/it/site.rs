@@ -242,6 +242,16 @@ impl Site {
         self
     }
 
+    /// Restarts the server with a competition that has no tiers.
+    pub async fn without_tiers(mut self) -> Self {
+        self.config.competition = Arc::new(Competition {
+            tiers: None,
+            ..faceoff_airhockey::competition()
+        });
+        self.restart().await;
+        self
+    }
+
     /// A site with these limits, and without a schedule.
     pub async fn start_with(limits: HttpLimits) -> Self {
         Self::start_configured(limits, None).await
@@ -677,7 +687,7 @@ pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> Eva
             .filter(|outcome| outcome.task == *task)
             .cloned()
             .collect();
-        let bounds = &plan.variation.tier_bounds;
+        let bounds = faceoff_airhockey::competition().tier_bounds(&plan.variation);
         (
             *task,
             faceoff_scoring::score_task(
@@ -694,6 +704,7 @@ pub fn score_outcomes(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> Eva
         seed,
         &plan.variation,
         &faceoff_airhockey::competition().weights(&plan.variation),
+        faceoff_airhockey::competition().tier_bounds(&plan.variation),
         tasks.collect(),
     )
 }
@@ -785,7 +796,7 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
                 penalty_points: if is_hit { penalty_points } else { 0.0 },
                 violations: faceoff_airhockey::competition()
                     .violation_counts(&[(faceoff_airhockey::EE, 7)]),
-                tier: if is_hit { tier } else { Tier::Deployable },
+                tier: Some(if is_hit { tier } else { Tier::Deployable }),
                 steps: 123_456,
                 computation_time_s: ComputationTimeSummary {
                     mean: 2e-4,
@@ -803,7 +814,7 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
         tasks,
         score: 100.0 * (0.4 * rates[0] + 0.4 * rates[1] + 0.2 * rates[2]),
         penalty_points,
-        tier,
+        tier: Some(tier),
         timing: Some(SlotTiming {
             before_s: RoundTrips {
                 count: 200,

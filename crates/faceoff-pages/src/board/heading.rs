@@ -47,7 +47,8 @@ pub(super) struct Heading {
     pub(super) task_count: String,
     /// Penalty points by kind of violation.
     pub(super) points_by_violation: String,
-    pub(super) tier_bounds: TierBounds,
+    /// `None` in a competition without tiers.
+    pub(super) tier_bounds: Option<TierBounds>,
     /// The stage has its own magnitudes of the perturbations.
     pub(super) has_own_magnitudes: bool,
     /// Set while only the final day counts and it is still to come.

@@ -1,6 +1,6 @@
-//! Rows of a board as text, grouped by tier.
+//! Rows of a board as text, grouped by tier if the competition has tiers.
 
-use crate::figures::{self, Rate};
+use crate::figures::{self, Rate, TierLabel};
 use faceoff_api::views::{
     board::{BoardRow, BoardView},
     task::TaskView,
@@ -49,12 +49,7 @@ pub(super) struct RankChange {
     pub(super) score: Option<String>,
 }
 
-pub(super) struct TierLabel {
-    pub(super) tier: Tier,
-    pub(super) bounds: String,
-}
-
-/// Rows of one tier; all rows if the board is not sorted by rank.
+/// Rows of one tier; all rows if the board is not sorted by rank, and in a competition without tiers.
 pub(super) struct Group<Row> {
     pub(super) tier: Option<TierLabel>,
     pub(super) rows: Vec<Row>,
@@ -188,35 +183,30 @@ impl<'a> Context<'a> {
             extra_evaluation: row.extra_evaluation.clone(),
             day_count: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
             conditions: (!self.has_common_conditions).then(|| conditions(row)),
-            tier: (!self.is_by_rank).then_some(row.tier),
-        }
-    }
-
-    fn tier(&self, tier: Tier) -> TierLabel {
-        TierLabel {
-            tier,
-            bounds: figures::tier_bounds(tier, &self.board.tier_bounds),
+            tier: row.tier.filter(|_| !self.is_by_rank),
         }
     }
 
     /// Groups the rows; tiers without a team are omitted.
     pub(super) fn groups<Row>(&self, row: impl Fn(&BoardRow) -> Row) -> Vec<Group<Row>> {
         let rows = &self.board.rows;
-        let mut groups: Vec<Group<Row>> = if self.is_by_rank {
-            let tier_group = |tier: Tier| Group {
-                tier: Some(self.tier(tier)),
-                rows: rows
-                    .iter()
-                    .filter(|row| row.tier == tier)
-                    .map(&row)
-                    .collect(),
-            };
-            Tier::ALL.into_iter().map(tier_group).collect()
-        } else {
-            vec![Group {
+        let bounds = self.board.tier_bounds.filter(|_| self.is_by_rank);
+        let mut groups: Vec<Group<Row>> = match bounds {
+            Some(bounds) => {
+                let tier_group = |tier: Tier| Group {
+                    tier: Some(TierLabel::new(tier, &bounds)),
+                    rows: rows
+                        .iter()
+                        .filter(|row| row.tier == Some(tier))
+                        .map(&row)
+                        .collect(),
+                };
+                Tier::ALL.into_iter().map(tier_group).collect()
+            }
+            None => vec![Group {
                 tier: None,
                 rows: rows.iter().map(&row).collect(),
-            }]
+            }],
         };
         groups.retain(|group| !group.rows.is_empty());
         groups
@@ -301,5 +291,72 @@ impl TaskRow {
             per_episode: figures::per_episode(result.penalty_points, per_day(row, result.episodes)),
             details: TaskDetails::new(result, competition),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    /// A board with a row for each score; `tier` is that of all rows.
+    fn board(scores: &[f64], tier: Option<Tier>) -> BoardView {
+        let rows: Vec<Value> = (1..)
+            .zip(scores)
+            .map(|(rank, score)| {
+                let id = format!("00000000-0000-0000-0000-00000000000{rank}");
+                json!({
+                    "rank": rank, "rank_group": rank, "tier": tier, "tier_change_probability": null,
+                    "team": format!("Team {rank}"), "team_id": id, "agent": null, "evaluation": id, "evaluations": [id],
+                    "day": "2026-03-01", "finished_at": "2026-03-01T06:30:00Z", "ruleset": "airhockey-2023.3",
+                    "profile": "evaluation", "score": score, "penalty_points": 80.0, "released_at": null, "seed": null,
+                    "tasks": {},
+                })
+            })
+            .collect();
+        let bounds = tier.map(|_| json!({"deployable": 0.5, "improvable": 1.5}));
+        let board = json!({
+            "stage": "00000000-0000-0000-0000-000000000009", "stage_name": "A stage", "revision": 1,
+            "since": "2026-03-01T00:00:00Z", "ruleset": "airhockey-2023.3", "weights": {"hit": 1.0}, "tier_bounds": bounds,
+            "standings": "latest", "rows_by": "latest", "blind": false, "provisional": true, "finalised": null, "task": null,
+            "significance": 0.05, "tier_change_resamples": 2000, "disqualified": [], "rows": rows,
+        });
+        serde_json::from_value(board).unwrap()
+    }
+
+    /// The tier of each group, its teams, and the tiers in the cells of the teams.
+    type TextGroup = (Option<Tier>, Vec<String>, Vec<Option<Tier>>);
+
+    fn groups(board: &BoardView, is_by_rank: bool) -> Vec<TextGroup> {
+        let context = Context::new(board, None, is_by_rank);
+        let groups = context.groups(|row| context.team_cell(row));
+        let summary = |group: Group<TeamCell>| {
+            let teams = group.rows.iter().map(|cell| cell.team.clone()).collect();
+            let tiers = group.rows.iter().map(|cell| cell.tier).collect();
+            (group.tier.map(|label| label.tier), teams, tiers)
+        };
+        groups.into_iter().map(summary).collect()
+    }
+
+    #[test]
+    fn board_without_tiers_is_one_group_without_heading() {
+        let teams = || vec!["Team 1".to_owned(), "Team 2".to_owned()];
+        for is_by_rank in [true, false] {
+            assert_eq!(
+                groups(&board(&[50.0, 40.0], None), is_by_rank),
+                [(None, teams(), vec![None, None])]
+            );
+        }
+        assert_eq!(groups(&board(&[], None), true), []);
+        let tier = Some(Tier::Improvable);
+        let with_tiers = board(&[50.0, 40.0], tier);
+        assert_eq!(
+            groups(&with_tiers, true),
+            [(tier, teams(), vec![None, None])]
+        );
+        assert_eq!(
+            groups(&with_tiers, false),
+            [(None, teams(), vec![tier, tier])]
+        );
     }
 }

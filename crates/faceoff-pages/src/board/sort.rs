@@ -105,7 +105,7 @@ impl Sort {
         })
     }
 
-    /// The default: by rank, grouped by tier.
+    /// The default: by rank, grouped by tier if there are tiers.
     pub(super) fn is_by_rank(&self) -> bool {
         self.key.column == BoardColumn::Place && !self.key.is_reversed
     }

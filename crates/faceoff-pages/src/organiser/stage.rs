@@ -35,6 +35,8 @@ struct Page {
     confirm: Option<String>,
     is_closed: bool,
     has_final_day: bool,
+    /// Does the competition have tiers?
+    has_tiers: bool,
 }
 
 async fn page_with(
@@ -58,6 +60,7 @@ async fn page_with(
         confirm: needs_confirmation.then(|| view.name.to_string()),
         is_closed: view.phase == PhaseView::Closed,
         has_final_day: view.settings.standings == CountingResult::Final,
+        has_tiers: app.config.competition.tiers.is_some(),
         stage: view,
     };
     render_dashboard(&page, notice)

@@ -2,7 +2,7 @@
 
 use crate::{
     chart::{Bound, DayChart, DayValue},
-    figures::{self, Rate},
+    figures::{self, Rate, TierLabel},
 };
 use faceoff_api::views::history::HistoryRow;
 use faceoff_types::{
@@ -15,20 +15,22 @@ pub(super) struct LatestResult {
     /// `None` for a reference agent.
     pub(super) rank: Option<u32>,
     pub(super) day: Date,
-    pub(super) tier: Tier,
-    pub(super) bounds: String,
+    /// `None` in a competition without tiers.
+    pub(super) tier: Option<TierLabel>,
     pub(super) score: String,
     pub(super) penalty_points: String,
     pub(super) evaluation: EvaluationId,
 }
 
 impl LatestResult {
-    pub(super) fn new(row: &HistoryRow, bounds: &TierBounds) -> Self {
+    pub(super) fn new(row: &HistoryRow, bounds: Option<TierBounds>) -> Self {
         Self {
             rank: row.rank,
             day: row.day,
-            tier: row.tier,
-            bounds: figures::tier_bounds(row.tier, bounds),
+            tier: row
+                .tier
+                .zip(bounds)
+                .map(|(tier, bounds)| TierLabel::new(tier, &bounds)),
             score: figures::one_decimal(row.score),
             penalty_points: figures::one_decimal(row.penalty_points),
             evaluation: row.evaluation,
@@ -41,7 +43,8 @@ pub(super) struct DayResult {
     pub(super) day: Date,
     pub(super) evaluation: EvaluationId,
     pub(super) rank: Option<u32>,
-    pub(super) tier: Tier,
+    /// `None` in a competition without tiers.
+    pub(super) tier: Option<Tier>,
     pub(super) score: String,
     pub(super) score_low: String,
     pub(super) score_high: String,
@@ -101,23 +104,25 @@ pub(super) fn charts(
         .iter()
         .map(|row| day_value(row, points_per_episode(row), None));
     let (score, points): (Vec<_>, Vec<_>) = (score.collect(), points.collect());
-    let bounds = [
-        Bound {
-            name: "limit of deployable",
-            value: variation.tier_bounds.deployable().as_f64(),
-        },
-        Bound {
-            name: "limit of improvable",
-            value: variation.tier_bounds.improvable().as_f64(),
-        },
-    ];
+    let bounds = competition.tier_bounds(variation).map(|bounds| {
+        [
+            Bound {
+                name: "limit of deployable",
+                value: bounds.deployable().as_f64(),
+            },
+            Bound {
+                name: "limit of improvable",
+                value: bounds.improvable().as_f64(),
+            },
+        ]
+    });
     let mut charts = vec![
         DayChart::from_percent("Score", &score),
         DayChart::from_zero(
             "Penalty points",
             "per episode, the worst task",
             &points,
-            &bounds,
+            bounds.as_ref().map_or(&[], |bounds| &bounds[..]),
         ),
     ];
     for info in &competition.tasks {

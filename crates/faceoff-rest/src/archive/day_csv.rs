@@ -1,30 +1,28 @@
 //! The evaluations of a day in the season archive, as CSV: one line per team, with its results in all tasks.
 
-use crate::board_csv::{SCORE_COLUMNS, table_with_tasks, task_fields};
+use crate::board_csv::{score_columns, table_with_tasks, task_fields, tier_fields};
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView};
 use faceoff_service::csv::{escape_formula, or_empty};
 use faceoff_types::Competition;
 
 /// A table with one line per evaluation.
 pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView]) -> Vec<u8> {
-    let mut table = table_with_tasks(
-        competition,
-        &[
-            "evaluation",
-            "team",
-            "team_id",
-            "state",
-            "voided",
-            // The reason for an extra evaluation, under the name that readers of older versions know.
-            "extra_turn",
-            "finished_at",
-            "score",
-            "penalty_points",
-            "tier",
-            "dataset_blake3",
-        ],
-        &SCORE_COLUMNS,
-    );
+    let mut columns = vec![
+        "evaluation",
+        "team",
+        "team_id",
+        "state",
+        "voided",
+        // The reason for an extra evaluation, under the name that readers of older versions know.
+        "extra_turn",
+        "finished_at",
+        "score",
+        "penalty_points",
+    ];
+    columns.extend(tier_fields(competition, ["tier"]));
+    columns.push("dataset_blake3");
+    let score_columns = score_columns(competition);
+    let mut table = table_with_tasks(competition, &columns, &score_columns);
     let no_tasks = Default::default();
     for evaluation in evaluations {
         let (state, finished_at) = match &evaluation.status {
@@ -64,14 +62,15 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
             or_empty(finished_at),
             or_empty(result.map(|result| result.score)),
             or_empty(result.map(|result| result.penalty_points)),
-            or_empty(result.map(|result| result.tier)),
-            hash.unwrap_or_default(),
         ];
+        let tier = or_empty(result.and_then(|result| result.tier));
         let tasks = result.map_or(&no_tasks, |result| &result.tasks);
         table.row(
             fields
                 .into_iter()
-                .chain(task_fields(competition, tasks, SCORE_COLUMNS.len())),
+                .chain(tier_fields(competition, [tier]))
+                .chain([hash.unwrap_or_default()])
+                .chain(task_fields(competition, tasks, score_columns.len())),
         );
     }
     table.into_bytes()

@@ -107,6 +107,7 @@ fn meta() -> EvaluationMeta {
         ruleset: Ruleset::CURRENT,
         variation: Default::default(),
         task_weights: faceoff_airhockey::competition().weights(&Default::default()),
+        tiers: faceoff_airhockey::competition().tiers,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Tests of boards, which rank evaluations, and of their groups of statistically tied rows.
 
-use crate::support::{task_result, weights};
+use crate::support::{bounds, task_result, weights};
 use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_scoring::{
     BoardEntry, RankedEntry, overall_board, rank_groups, score_evaluation, task_board,
@@ -18,6 +18,7 @@ fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -
         Seed::from_number(0),
         &Default::default(),
         &weights(),
+        bounds(),
         tasks,
     );
     BoardEntry {
@@ -55,10 +56,37 @@ fn board_sorts_by_tier_score_penalty_and_submission_time() {
         board.iter().map(|row| row.rank).collect::<Vec<_>>(),
         [1, 2, 3, 4, 5, 6]
     );
-    assert_eq!(board[4].tier, Tier::Improvable);
+    assert_eq!(board[4].tier, Some(Tier::Improvable));
     assert_eq!(keys(&task_board(HIT, entries.clone())), expected);
     assert_eq!(task_board(DEFEND, entries), []);
     assert_eq!(overall_board(Vec::<BoardEntry<u8>>::new()), []);
+}
+
+/// The entry of a competition without tiers.
+fn without_tier<K>(mut entry: BoardEntry<K>) -> BoardEntry<K> {
+    entry.result.tier = None;
+    for task in entry.result.tasks.values_mut() {
+        task.tier = None;
+    }
+    entry
+}
+
+#[test]
+fn board_without_tiers_sorts_by_score_and_penalty() {
+    let entries = vec![
+        without_tier(entry("later", 20, 5.0, 2)),
+        without_tier(entry("earlier", 20, 5.0, 1)),
+        without_tier(entry("best", 50, 80.0, 0)),
+        without_tier(entry("cleaner", 20, 4.5, 3)),
+    ];
+    let expected = ["best", "cleaner", "earlier", "later"];
+    let board = overall_board(entries.clone());
+    assert_eq!(keys(&board), expected);
+    assert_eq!(board[0].tier, None);
+    assert_eq!(keys(&task_board(HIT, entries)), expected);
+    // Penalty points divide no rank groups.
+    let groups = rank_groups(&board, |_, _| Ok::<_, Infallible>(false)).unwrap();
+    assert_eq!(groups, [1, 1, 1, 1]);
 }
 
 #[test]
@@ -68,10 +96,14 @@ fn task_board_ignores_other_tasks() {
         .result
         .tasks
         .insert(DEFEND, task_result(50, 40, 60.0));
-    all_rounder.result.tier = Tier::Improvable;
+    all_rounder.result.tier = Some(Tier::Improvable);
     let board = task_board(HIT, vec![entry("hitter", 10, 0.0, 0), all_rounder]);
     assert_eq!(keys(&board), ["all-rounder", "hitter"]);
-    assert_eq!(board[0].tier, Tier::Deployable, "its tier in this task");
+    assert_eq!(
+        board[0].tier,
+        Some(Tier::Deployable),
+        "its tier in this task"
+    );
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! Tests of comparisons of two evaluations, and of the summaries that they need.
 
-use crate::support::{episode, weights};
-use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_VEL, PREPARE, TASKS, competition};
+use crate::support::{bounds, episode, weights};
+use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
 use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
     overall_p_value, overall_score, score_task,
 };
 use faceoff_types::{
-    EpisodeOutcome, Profile, RULESET, Seed, Task, TaskMap, TaskWeights, TierBounds, Variation,
+    EpisodeOutcome, Profile, RULESET, Seed, Task, TaskMap, TaskWeights, Variation, Violations,
 };
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -27,7 +27,7 @@ fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOut
 }
 
 fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-    EpisodeSummary::from_outcomes(&competition(), outcomes, &TASKS, &Default::default()).unwrap()
+    EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), outcomes, &TASKS, bounds()).unwrap()
 }
 
 fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
@@ -92,7 +92,7 @@ fn comparison_uses_variation_and_refuses_different_ones() {
     let mut without_losses = Variation::default();
     without_losses.perturbations.tracking_loss.probability = 0.0;
     let other_bounds = Variation {
-        tier_bounds: "0.1,0.2".parse().unwrap(),
+        tier_bounds: Some("0.1,0.2".parse().unwrap()),
         ..Variation::default()
     };
     for (other, field) in [
@@ -121,21 +121,24 @@ fn tier_change_depends_on_bounds() {
             ..outcome
         })
         .collect();
-    let clear =
-        EpisodeSummary::from_outcomes(&competition(), &costly, &TASKS, &TierBounds::default())
-            .unwrap();
+    let clear = EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &costly, &TASKS, bounds()).unwrap();
     assert_eq!(
-        clear.tier_change, 0.0,
+        clear.tier_change,
+        Some(0.0),
         "10 points in each task, deployable up to 50"
     );
     let tight =
-        EpisodeSummary::from_outcomes(&competition(), &costly, &TASKS, &"0.1,0.5".parse().unwrap())
-            .unwrap();
+        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &costly, &TASKS, Some("0.1,0.5".parse().unwrap())).unwrap();
     assert!(
-        tight.tier_change > 0.5,
-        "10 points in each of three tasks, deployable up to 10: {}",
+        tight.tier_change.unwrap() > 0.5,
+        "10 points in each of three tasks, deployable up to 10: {:?}",
         tight.tier_change
     );
+    let without = EpisodeSummary::from_outcomes(&costly, &TASKS, None).unwrap();
+    assert_eq!(without.tier_change_of(None), None);
+    assert_eq!(without.tier_change_of(Some(HIT)), None);
+    let json = serde_json::to_string(&without).unwrap();
+    assert!(!json.contains("tier"), "{json}");
 }
 
 #[test]
@@ -268,18 +271,18 @@ fn unpaired_evaluations_are_compared_by_rates() {
 fn summary_needs_each_episode_once() {
     let mut outcomes = outcomes(3, |_, _| true);
     outcomes.reverse();
-    EpisodeSummary::from_outcomes(&competition(), &outcomes, &TASKS, &Default::default()).unwrap();
+    EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &outcomes, &TASKS, bounds()).unwrap();
     let first = outcomes.remove(2); // prepare 0
     assert_eq!(
-        EpisodeSummary::from_outcomes(&competition(), &outcomes, &TASKS, &Default::default()),
+        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &outcomes, &TASKS, bounds()),
         Err(PairingError::Missing(PREPARE, 0))
     );
     outcomes.extend([first.clone(), first]);
     assert_eq!(
-        EpisodeSummary::from_outcomes(&competition(), &outcomes, &TASKS, &Default::default()),
+        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &outcomes, &TASKS, bounds()),
         Err(PairingError::Repeated(PREPARE, 0))
     );
-    assert_eq!(summary(&[]).tier_change, 0.0);
+    assert_eq!(summary(&[]).tier_change, Some(0.0));
 }
 
 #[test]
@@ -289,8 +292,8 @@ fn summary_round_trips_as_json() {
         outcome.violations = [(EE, true)].into_iter().collect();
     }
     let summary = summary(&outcomes);
-    assert!(summary.tasks[&HIT].tier_change > 0.2);
-    assert_eq!(summary.tasks[&DEFEND].tier_change, 0.0);
+    assert!(summary.tasks[&HIT].tier_change.unwrap() > 0.2);
+    assert_eq!(summary.tasks[&DEFEND].tier_change, Some(0.0));
     let json = serde_json::to_string(&summary).unwrap();
     assert_eq!(
         serde_json::from_str::<EpisodeSummary>(&json).unwrap(),
@@ -337,7 +340,7 @@ proptest! {
         prop_assert_eq!(comparison.overall.p_value, overall_p_value(&WEIGHTS, &tallies));
         let score = |all: &[EpisodeOutcome]| overall_score(&WEIGHTS, TASKS.map(|task| {
             let task_outcomes: Vec<_> = all.iter().filter(|outcome| outcome.task == task).cloned().collect();
-            (task, score_task(&competition(), &task_outcomes, &StepTimes::default(), &Default::default()).success_rate)
+            (task, score_task(&faceoff_airhockey::competition(), &task_outcomes, &StepTimes::default(), bounds()).success_rate)
         }));
         prop_assert_eq!(comparison.overall.score_a, score(&outcomes_a));
         prop_assert_eq!(comparison.overall.score_b, score(&outcomes_b));

@@ -1,7 +1,7 @@
 //! Tests of the scores of episodes, tasks and evaluations (an evaluation is one agent's run of all tasks).
 
-use crate::support::{episode, task_result, weights};
-use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE, competition};
+use crate::support::{bounds, episode, task_result, weights};
+use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, Ruleset, Seed, TaskMap, Tier,
@@ -11,7 +11,7 @@ use faceoff_types::{
 #[test]
 fn violations_have_own_points_and_count_once() {
     let clean = episode(HIT, 0);
-    assert_eq!(episode_penalty(&competition(), &clean), 0.0);
+    assert_eq!(episode_penalty(&faceoff_airhockey::competition(), &clean), 0.0);
     let penalty = |ee, link, joint_pos, joint_vel| {
         let violations = [
             (EE, ee),
@@ -54,16 +54,11 @@ fn agent_fault_is_failure_with_full_time_penalty() {
         line: None,
     });
     assert_eq!(
-        episode_penalty(&competition(), &faulty),
+        episode_penalty(&faceoff_airhockey::competition(), &faulty),
         5.0,
         "2 points once, not per cause"
     );
-    let result = score_task(
-        &competition(),
-        &[faulty],
-        &StepTimes::default(),
-        &Default::default(),
-    );
+    let result = score_task(&faceoff_airhockey::competition(), &[faulty], &StepTimes::default(), bounds());
     assert_eq!(
         (
             result.successes,
@@ -91,7 +86,7 @@ fn task_result_does_not_depend_on_episode_order() {
     for time_s in [0.1, 0.2, 0.3] {
         times.add(time_s);
     }
-    let result = score_task(&competition(), &outcomes, &times, &Default::default());
+    let result = score_task(&faceoff_airhockey::competition(), &outcomes, &times, bounds());
     assert_eq!(
         (result.episodes, result.successes, result.success_rate),
         (50, 20, 0.4)
@@ -99,7 +94,7 @@ fn task_result_does_not_depend_on_episode_order() {
     assert_eq!(result.penalty_points, 10.0 * 4.0 + 0.5);
     assert_eq!(
         result.tier,
-        Tier::Improvable,
+        Some(Tier::Improvable),
         "over 50 episodes: deployable up to 25 points, improvable up to 75"
     );
     assert_eq!(
@@ -117,10 +112,7 @@ fn task_result_does_not_depend_on_episode_order() {
     assert_eq!(result.steps, 20 * 100 + 30 * 500);
 
     outcomes.reverse();
-    assert_eq!(
-        score_task(&competition(), &outcomes, &times, &Default::default()),
-        result
-    );
+    assert_eq!(score_task(&faceoff_airhockey::competition(), &outcomes, &times, bounds()), result);
 }
 
 #[test]
@@ -137,10 +129,11 @@ fn evaluation_has_worst_tier_and_weighted_score() {
         seed,
         &Default::default(),
         &weights(),
+        bounds(),
         tasks.clone(),
     );
     assert_eq!((result.score, result.penalty_points), (54.0, 60.0));
-    assert_eq!(result.tier, Tier::Improvable);
+    assert_eq!(result.tier, Some(Tier::Improvable));
     assert_eq!(
         (result.ruleset.as_str(), result.profile),
         ("airhockey-2023.3", Profile::Evaluation)
@@ -155,18 +148,41 @@ fn evaluation_has_worst_tier_and_weighted_score() {
         seed,
         &Default::default(),
         &weights(),
+        bounds(),
         hit_alone,
     );
-    assert_eq!((result.score, result.tier), (20.0, Tier::Deployable));
+    assert_eq!((result.score, result.tier), (20.0, Some(Tier::Deployable)));
     let empty = score_evaluation(
         Ruleset::CURRENT,
         Profile::Ideal,
         seed,
         &Default::default(),
         &weights(),
+        bounds(),
         TaskMap::new(),
     );
     assert_eq!((empty.score, empty.penalty_points), (0.0, 0.0));
+    assert_eq!(empty.tier, Some(Tier::Deployable));
+}
+
+#[test]
+fn result_without_tiers_has_no_field_for_them() {
+    let task = score_task(&[episode(HIT, 0)], &StepTimes::for_steps(0), None);
+    assert_eq!(task.tier, None);
+    let result = score_evaluation(
+        Ruleset::CURRENT,
+        Profile::Evaluation,
+        Seed::from_number(1),
+        &Default::default(),
+        &weights(),
+        None,
+        TaskMap::from([(HIT, task)]),
+    );
+    assert_eq!(result.tier, None);
+    let json = serde_json::to_string(&result).unwrap();
+    assert!(!json.contains("tier"), "{json}");
+    let read: faceoff_types::EvaluationResult = serde_json::from_str(&json).unwrap();
+    assert_eq!(read, result);
 }
 
 #[test]
@@ -178,6 +194,7 @@ fn results_round_trip_as_json() {
         Seed::from_number(1),
         &Default::default(),
         &weights(),
+        bounds(),
         tasks,
     );
     let json = serde_json::to_string(&result).unwrap();

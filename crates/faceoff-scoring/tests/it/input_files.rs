@@ -1,6 +1,6 @@
 //! Tests of the input files `tasks.json` and `games.json`: valid input, and errors that name the wrong value.
 
-use crate::support::{read, team, weights};
+use crate::support::{bounds, read, team, weights};
 use faceoff_scoring::{
     QualifyingRow, QualifyingScores,
     tournament::{PlayedGame, score_tournament},
@@ -17,7 +17,7 @@ const TASKS: &str = r#"{
 /// The board of a `tasks.json`, or the error.
 fn board(file: &str) -> Result<Vec<QualifyingRow>, String> {
     let scores = read::<QualifyingScores>(file)?;
-    let board = scores.board(&weights(), &Default::default());
+    let board = scores.board(&weights(), bounds());
     board.map_err(|error| error.to_string())
 }
 

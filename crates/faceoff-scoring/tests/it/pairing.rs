@@ -1,6 +1,6 @@
 //! Tests of paired tests: two teams on the same episodes.
 
-use crate::support::{episode, weights};
+use crate::support::{bounds, episode, weights};
 use faceoff_airhockey::{HIT, TASKS};
 use faceoff_scoring::{EpisodeSummary, PairedTally, PairingError, Successes, overall_p_value};
 use faceoff_types::{EpisodeEnd, EpisodeOutcome, TaskMap};
@@ -18,12 +18,7 @@ fn outcomes(successes: &[bool]) -> Vec<EpisodeOutcome> {
 
 fn tally(a: &[EpisodeOutcome], b: &[EpisodeOutcome]) -> Result<PairedTally, PairingError> {
     let solved = |outcomes: &[EpisodeOutcome]| -> Result<Successes, PairingError> {
-        let mut summary = EpisodeSummary::from_outcomes(
-            &faceoff_airhockey::competition(),
-            outcomes,
-            &TASKS,
-            &Default::default(),
-        )?;
+        let mut summary = EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), outcomes, &TASKS, bounds())?;
         let hit = summary.tasks.swap_remove(&HIT);
         Ok(hit.map_or_else(|| [].into_iter().collect(), |hit| hit.successes))
     };

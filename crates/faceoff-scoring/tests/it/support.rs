@@ -2,7 +2,7 @@
 
 use faceoff_types::{
     ComputationTime, ComputationTimeSummary, EpisodeEnd, EpisodeOutcome, Task, TaskResult,
-    TaskWeights, TeamName, ViolationCounts, Violations,
+    TaskWeights, TeamName, TierBounds, ViolationCounts, Violations,
 };
 use serde_json::Value;
 
@@ -47,7 +47,7 @@ pub fn task_result(episodes: u32, successes: u32, penalty_points: f64) -> TaskRe
         success_ci95: faceoff_scoring::wilson95(successes, episodes),
         penalty_points,
         violations: ViolationCounts::default(),
-        tier: faceoff_scoring::tier_of(penalty_points, episodes),
+        tier: Some(faceoff_scoring::tier_of(penalty_points, episodes)),
         steps: 0,
         computation_time_s: ComputationTimeSummary::default(),
     }
@@ -56,4 +56,9 @@ pub fn task_result(episodes: u32, successes: u32, penalty_points: f64) -> TaskRe
 /// The weights of the tasks in the ruleset.
 pub fn weights() -> TaskWeights {
     faceoff_airhockey::competition().weights(&Default::default())
+}
+
+/// The bounds of the tiers in the ruleset.
+pub fn bounds() -> Option<TierBounds> {
+    faceoff_airhockey::competition().tiers
 }

@@ -54,8 +54,8 @@ pub fn check_count(teams: usize) -> Result<(), Problem> {
 }
 
 /// The teams that qualify for a tournament by their results in a stage. These are the teams in the two better *tiers* (grades of
-/// safety: deployable, improvable) on the stage's live board under its newest rules, without retired teams. The live board
-/// also has results after a freeze of the boards.
+/// safety: deployable, improvable) on the stage's live board under its newest rules, without retired teams. In a
+/// competition without tiers all teams of the board qualify. The live board also has results after a freeze of the boards.
 #[boxed]
 pub async fn qualified_teams(app: &AppState, stage: &Stage) -> Result<Vec<TeamId>, Problem> {
     let query = BoardQuery {
@@ -70,8 +70,9 @@ pub async fn qualified_teams(app: &AppState, stage: &Stage) -> Result<Vec<TeamId
         .filter(|team| team.retired_at.is_some())
         .map(|team| team.id)
         .collect();
-    let qualified = board.rows.into_iter().filter(|row| {
-        matches!(row.tier, Tier::Deployable | Tier::Improvable) && !retired.contains(&row.team_id)
-    });
+    let qualified = board
+        .rows
+        .into_iter()
+        .filter(|row| row.tier != Some(Tier::NonDeployable) && !retired.contains(&row.team_id));
     Ok(qualified.map(|row| row.team_id).collect())
 }

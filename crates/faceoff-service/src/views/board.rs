@@ -1,5 +1,5 @@
 //! Boards: the ranks of the teams in a stage, and their statistical uncertainty. A board belongs to one revision of the stage's
-//! rules. It ranks by *tier* (grade of safety) first, then by score. Teams in the same *rank group* are statistically tied with
+//! rules. It ranks by *tier* (grade of safety) first, if the competition has tiers, then by score. Teams in the same *rank group* are statistically tied with
 //! the first team of the group. A *baseline* is a team of the organisers, which is shown for comparison, without a rank.
 
 use crate::{
@@ -176,7 +176,7 @@ pub async fn build(
         since: revision.since,
         ruleset: revision.rules.ruleset.to_string(),
         weights: app.config.competition.weights(&variation),
-        tier_bounds: variation.tier_bounds,
+        tier_bounds: app.config.competition.tier_bounds(&variation),
         perturbations: (*variation.perturbations != PerturbationSettings::default())
             .then_some(variation.perturbations),
         standings: stage.settings.standings,
@@ -313,7 +313,7 @@ fn row_view(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> Bo
         rank,
         rank_group,
         tier,
-        tier_change_probability: (!is_mean).then(|| row.summary.tier_change_of(task)),
+        tier_change_probability: row.summary.tier_change_of(task).filter(|_| !is_mean),
         team: record.team.name,
         team_id: record.team.id,
         division: record.team.profile.division,

@@ -55,7 +55,9 @@ pub(crate) async fn set(
 /// The part of a result that decides its rank on a board.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct Rank {
-    tier: Tier,
+    /// `None` in a competition without tiers.
+    #[serde(default)]
+    tier: Option<Tier>,
     score: f64,
     penalty_points: f64,
 }

@@ -365,7 +365,7 @@ pub fn result(score: f64) -> EvaluationResult {
         tasks: Default::default(),
         score,
         penalty_points: 0.1 + 0.2,
-        tier: Tier::Improvable,
+        tier: Some(Tier::Improvable),
         timing: None,
         variation: Default::default(),
     }

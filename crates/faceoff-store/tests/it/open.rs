@@ -176,6 +176,7 @@ async fn season_belongs_to_one_competition() {
             layouts: Vec::new(),
         },
         recording: RecordingColumns::default(),
+        tiers: None,
     };
     let stored = async || -> (Option<String>, Option<String>) {
         sqlx::query_as("SELECT competition_id, competition_hash FROM season")

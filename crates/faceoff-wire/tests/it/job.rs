@@ -102,6 +102,7 @@ fn all_jobs_round_trip() {
             ruleset: Ruleset::CURRENT,
             variation: Default::default(),
             task_weights: weights(),
+            tiers: None,
         },
         recordings: vec!["recordings/a".into(), "recordings/b".into()],
         dataset: "datasets/c.zip".into(),
@@ -159,7 +160,7 @@ fn all_reports_round_trip() {
         tasks: Default::default(),
         score: 54.9,
         penalty_points: 327.5,
-        tier: Tier::Deployable,
+        tier: Some(Tier::Deployable),
         timing: Some(SlotTiming::default()),
         variation: Default::default(),
     };
@@ -231,6 +232,7 @@ fn jobs_without_variation_round_trip_unchanged() {
     changed.perturbations.disturbance.sigma_n_per_m_s = 1.0 / 3.0;
     assert_round_trips(&changed);
 
+    let first_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
     let meta = EvaluationMeta {
         profile: Profile::Evaluation,
         seed: Seed::from_number(1),
@@ -239,6 +241,7 @@ fn jobs_without_variation_round_trip_unchanged() {
         ruleset: Ruleset::CURRENT,
         variation: Variation::default(),
         task_weights: weights(),
+        tiers: Some(first_tiers),
     };
     let text = serde_json::to_string(&meta).expect("it is JSON");
     for key in ["\"weights", "tier_bounds", "perturbations", "variation"] {
@@ -248,4 +251,29 @@ fn jobs_without_variation_round_trip_unchanged() {
     changed.variation.weights = Some(weights());
     changed.variation.perturbations.tracking_loss.steps = [1, 2];
     assert_round_trips(&changed);
+}
+
+#[test]
+fn scoring_job_names_the_tiers_of_its_competition() {
+    let meta = EvaluationMeta {
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(1),
+        mismatch_seed: Seed::from_number(2),
+        agent: "a".into(),
+        ruleset: Ruleset::CURRENT,
+        variation: Variation::default(),
+        task_weights: weights(),
+        tiers: None,
+    };
+    assert_eq!(meta.tier_bounds(), None);
+    assert_round_trips(&meta);
+    let first_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
+    let mut json = serde_json::to_value(&meta).expect("it is JSON");
+    json.as_object_mut().expect("an object").remove("tiers");
+    let mut earlier: EvaluationMeta = serde_json::from_value(json).expect("it is read");
+    assert_eq!(earlier.tier_bounds(), Some(first_tiers));
+    let stage_bounds: TierBounds = "0.1,0.2".parse().expect("bounds");
+    earlier.variation.tier_bounds = Some(stage_bounds);
+    assert_eq!(earlier.tier_bounds(), Some(stage_bounds));
+    assert_round_trips(&earlier);
 }

@@ -274,7 +274,7 @@ pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
         tasks: Default::default(),
         score: 50.0,
         penalty_points: 0.0,
-        tier: Tier::Deployable,
+        tier: Some(Tier::Deployable),
         timing: None,
         variation: Default::default(),
     }

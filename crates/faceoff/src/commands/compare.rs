@@ -150,7 +150,7 @@ fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
                 competition(),
                 &outcomes,
                 &tasks,
-                &dataset.manifest().variation.tier_bounds,
+                competition().tier_bounds(&dataset.manifest().variation),
             )?,
             manifest: dataset.manifest().clone(),
         })

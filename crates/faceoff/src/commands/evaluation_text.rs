@@ -6,7 +6,7 @@ use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     task::TaskView,
 };
-use faceoff_types::TaskMap;
+use faceoff_types::{TaskMap, Tier};
 
 /// Status of an evaluation in a few words.
 pub(super) fn status_text(evaluation: &EvaluationView) -> String {
@@ -32,10 +32,10 @@ pub(super) fn status_text(evaluation: &EvaluationView) -> String {
             result: Some(result),
             ..
         } => format!(
-            "finished: score {:.1}, {:.1} penalty points, {}",
+            "finished: score {:.1}, {:.1} penalty points{}",
             result.score,
             result.penalty_points,
-            result.tier.title().to_lowercase()
+            tier_suffix(result.tier)
         ),
         EvaluationStatus::AgentFailed { .. } => "the agent failed".to_owned(),
         EvaluationStatus::PlatformFailed { reason, .. } => format!("platform fault: {reason}"),
@@ -44,10 +44,19 @@ pub(super) fn status_text(evaluation: &EvaluationView) -> String {
     }
 }
 
+/// The tier at the end of a list; empty without tiers.
+pub(super) fn tier_suffix(tier: Option<Tier>) -> String {
+    tier.map_or_else(String::new, |tier| {
+        format!(", {}", tier.title().to_lowercase())
+    })
+}
+
 /// Table of the results by task.
 pub(super) fn task_table(tasks: &TaskMap<TaskView>) -> String {
+    let has_tiers = tasks.values().any(|result| result.tier.is_some());
+    let tier_heading = if has_tiers { "  tier" } else { "" };
     let mut lines = vec![format!(
-        "{:<8} {:>8} {:>9} {:>19} {:>8}  tier",
+        "{:<8} {:>8} {:>9} {:>19} {:>8}{tier_heading}",
         "task", "episodes", "success", "95 % interval", "penalty"
     )];
     // The order in JSON has no meaning.
@@ -56,12 +65,14 @@ pub(super) fn task_table(tasks: &TaskMap<TaskView>) -> String {
         .filter_map(|task| Some((task, tasks.get(&task)?)));
     lines.extend(tasks.map(|(task, result)| {
         format!(
-            "{task:<8} {:>8} {:>7.1} % {:>19} {:>8.1}  {}",
+            "{task:<8} {:>8} {:>7.1} % {:>19} {:>8.1}{}",
             result.episodes,
             100.0 * result.success_rate,
             percent_interval(result.success_ci95),
             result.penalty_points,
-            result.tier.title()
+            result
+                .tier
+                .map_or_else(String::new, |tier| format!("  {}", tier.title()))
         )
     }));
     lines.join("\n")

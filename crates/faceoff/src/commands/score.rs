@@ -104,7 +104,11 @@ impl Kind {
             } => {
                 let scores: QualifyingScores = parse(&input, file)?;
                 let weights = weights.unwrap_or_else(|| competition().weights(&Default::default()));
-                let board = scores.board(&weights, &tier_bounds.unwrap_or_default());
+                ensure!(
+                    tier_bounds.is_none() || competition().tiers.is_some(),
+                    "--tier-bounds: the competition has no tiers; leave it out"
+                );
+                let board = scores.board(&weights, tier_bounds.or(competition().tiers));
                 for row in board.with_context(|| file)? {
                     write_line(out, &row)?;
                 }

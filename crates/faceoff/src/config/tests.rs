@@ -73,7 +73,7 @@ fn all_sections_are_read() {
     assert_eq!(config.evaluation.ablation_episodes, 50);
     let variation = config.rules().variation;
     assert_eq!(variation.weights.unwrap().to_string(), "1,0,0");
-    assert_eq!(variation.tier_bounds.to_string(), "0.25,2");
+    assert_eq!(variation.tier_bounds.unwrap().to_string(), "0.25,2");
     assert_eq!(variation.perturbations.tracking_loss.probability, 0.05);
     assert_eq!(variation.perturbations.tracking_loss.steps, [5, 20]);
     let settings = config.settings().unwrap();

@@ -172,19 +172,15 @@ async fn run_day(store: &Store) -> EvaluationId {
                 ..
             } => {
                 let outcomes = store.outcomes(run.id).await.unwrap();
-                let bounds = run.plan.variation.tier_bounds;
-                let task = faceoff_scoring::score_task(
-                    &faceoff_airhockey::competition(),
-                    &outcomes,
-                    &Default::default(),
-                    &bounds,
-                );
+                let bounds = faceoff_airhockey::competition().tier_bounds(&run.plan.variation);
+                let task = faceoff_scoring::score_task(&faceoff_airhockey::competition(), &outcomes, &Default::default(), bounds);
                 let result: EvaluationResult = faceoff_scoring::score_evaluation(
                     run.ruleset,
                     run.plan.profile,
                     seeds.episodes,
                     &run.plan.variation,
                     &faceoff_airhockey::competition().weights(&run.plan.variation),
+                    bounds,
                     [(HIT, task)].into(),
                 );
                 let dataset = fixture("dataset-layout-3.zip");

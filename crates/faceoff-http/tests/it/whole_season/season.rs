@@ -227,7 +227,7 @@ impl Season {
         self.site.advance(9 * 3600);
         clean_up(
             &self.site.store,
-            faceoff_airhockey::simulator().competition(),
+            &faceoff_airhockey::competition(),
             self.site.now(),
         )
         .await;

@@ -99,6 +99,7 @@ fn record_dataset(dir: &Path) {
         ruleset: spec.ruleset,
         variation: Default::default(),
         task_weights: faceoff_airhockey::competition().weights(&Default::default()),
+        tiers: faceoff_airhockey::competition().tiers,
     };
     assemble(
         &meta,

@@ -4,6 +4,7 @@
 use crate::{
     client::Client,
     commands::{
+        evaluation_text::tier_suffix,
         output::{print, print_list},
         stage_lookup::find_stage,
     },
@@ -180,10 +181,10 @@ fn evaluation_line(evaluation: &ProposedEvaluationView) -> String {
         ),
         ProposedEvaluationStatus::Finalising => "computing the score".to_owned(),
         ProposedEvaluationStatus::Finished { result, .. } => format!(
-            "score {:.1}, {:.1} penalty points, {}",
+            "score {:.1}, {:.1} penalty points{}",
             result.score,
             result.penalty_points,
-            result.tier.title().to_lowercase()
+            tier_suffix(result.tier)
         ),
         ProposedEvaluationStatus::AgentFailed { faults, .. } => {
             format!("the agent failed ({} faults)", faults.len())

@@ -262,12 +262,16 @@ fn stage_text(stage: &StageView) -> String {
         )
         .chain(capacity_warnings(stage))
         .collect();
+    let tiers = competition().tier_bounds(&rules.variation);
+    let tiers = tiers.map_or_else(String::new, |bounds| {
+        format!(", tiers up to {bounds} points per episode")
+    });
     let blind = if settings.blind { ", blind" } else { "" };
     format!(
         "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  cutoff   {next_cutoff}\n  \
          deadline {}\n  rules    revision {} since {}: {}, {} \
-         episodes per task ({}), at most {} faults\n  score    weights {}, tiers up to {} \
-         points per episode, perturbations {}{overrides}\n  board    by {}, {result}\n  datasets public {}\n  kept     {}",
+         episodes per task ({}), at most {} faults\n  score    weights {}{tiers}, perturbations \
+         {}{overrides}\n  board    by {}, {result}\n  datasets public {}\n  kept     {}",
         stage.name,
         stage.id,
         local_time(stage.opens_at),
@@ -280,7 +284,6 @@ fn stage_text(stage: &StageView) -> String {
         tasks.join(", "),
         rules.max_faults,
         competition().weights(&rules.variation),
-        rules.variation.tier_bounds,
         if *rules.variation.perturbations == PerturbationSettings::default() {
             "of the ruleset"
         } else {

@@ -37,10 +37,13 @@ pub(super) fn board_text(board: &BoardView) -> String {
         }
     }
     for row in &board.baselines {
+        let tier = row
+            .tier
+            .map_or_else(String::new, |tier| format!(" {tier},"));
         let _ = writeln!(
             text,
-            "baseline: {}, {}, score {:.1}, {:.2} penalty points, would be rank {}",
-            row.team, row.tier, row.score, row.penalty_points, row.would_rank
+            "baseline: {},{tier} score {:.1}, {:.2} penalty points, would be rank {}",
+            row.team, row.score, row.penalty_points, row.would_rank
         );
     }
     for team in &board.disqualified {
@@ -53,7 +56,7 @@ pub(super) fn board_text(board: &BoardView) -> String {
     text.trim_end().to_owned()
 }
 
-/// The ranked rows; tiers without teams are left out.
+/// The ranked rows; tiers without teams are left out, and so are all headings in a competition without tiers.
 pub fn board_table(board: &BoardView) -> String {
     let tasks: Vec<Task> = competition().task_names().collect();
     let mut text = line(
@@ -61,13 +64,16 @@ pub fn board_table(board: &BoardView) -> String {
         tasks.iter().map(Task::to_string),
         ["penalty pts", "score"],
     );
-    for tier in Tier::ALL {
+    let tiers = [None].into_iter().chain(Tier::ALL.map(Some));
+    for tier in tiers {
         let rows: Vec<_> = board.rows.iter().filter(|row| row.tier == tier).collect();
         if rows.is_empty() {
             continue;
         }
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{:─<WIDTH$}", format!("── {} ", tier.title()));
+        if let Some(tier) = tier {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{:─<WIDTH$}", format!("── {} ", tier.title()));
+        }
         for row in rows {
             text.push_str(&row_line(row, &tasks));
         }

@@ -33,7 +33,7 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
             competition(),
             &outcome.outcomes,
             &setup.tasks,
-            &setup.variation.tier_bounds,
+            competition().tier_bounds(&setup.variation),
         );
         runs.insert(profile, summary.context("comparing the profiles")?);
     }

@@ -90,6 +90,7 @@ pub(super) fn run_profile(
         ruleset: Ruleset::CURRENT,
         variation: setup.variation.clone(),
         task_weights: competition().weights(&setup.variation),
+        tiers: competition().tiers,
     };
     let AssembledDataset {
         result, archive, ..

@@ -88,7 +88,7 @@ impl ServerStage {
         let rules = &self.stage.rules.rules;
         config.evaluation.max_faults = rules.max_faults;
         config.evaluation.weights = competition().weights(&rules.variation);
-        config.evaluation.tier_bounds = rules.variation.tier_bounds;
+        config.evaluation.tier_bounds = competition().tier_bounds(&rules.variation);
         config.evaluation.perturbations = Some(rules.variation.perturbations.clone());
     }
 
