@@ -3,13 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark may panic")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use faceoff_airhockey::{PREPARE, TASKS};
+use faceoff_airhockey::{EVALUATION, PREPARE, TASKS};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{AirHockeyStep, AnswerTiming, EpisodeStart, StepRow, StepSink};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Violations,
-};
+use faceoff_sim::{AirHockeyProfile, Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Ruleset, Seed, Violations};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use std::{hint::black_box, path::Path};
 
@@ -31,7 +29,10 @@ fn record(spec: &ShardSpec, out: &Path) {
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let seed = spec.seed.episode(spec.task, episode);
-        let (cubic, factors) = (Interpolation::Cubic, spec.profile.factors());
+        let (cubic, factors) = (
+            Interpolation::Cubic,
+            AirHockeyProfile::try_from(spec.profile).unwrap().factors(),
+        );
         let simulation = Episode::new(
             spec.task.try_into().unwrap(),
             cubic,
@@ -107,7 +108,7 @@ fn slice(criterion: &mut Criterion) {
                 platform_retries: 0,
                 task,
                 episodes: start..start + EPISODES_PER_SHARD,
-                profile: Profile::Evaluation,
+                profile: EVALUATION,
                 seed,
                 mismatch_seed: seed,
                 max_faults: 0,
@@ -119,7 +120,7 @@ fn slice(criterion: &mut Criterion) {
         }
     }
     let meta = EvaluationMeta {
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed,
         agent: "noise".to_owned(),

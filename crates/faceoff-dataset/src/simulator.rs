@@ -1,8 +1,10 @@
 //! Identity of the simulator: a dataset can only be verified with the simulator that made it.
 
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, EpisodeState, Interpolation, JOINTS, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed};
+use faceoff_sim::{
+    AirHockeyProfile, Episode, EpisodeState, Interpolation, JOINTS, PerturbationSettings, Plant,
+};
+use faceoff_types::Seed;
 use faceoff_wire::dataset::SimulatorId;
 use std::sync::OnceLock;
 
@@ -35,7 +37,7 @@ fn fingerprint() -> String {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,
-            Profile::Evaluation.factors(),
+            AirHockeyProfile::Evaluation.factors(),
             &settings,
             &plant,
             seed.episode(task, 0),

@@ -29,7 +29,8 @@ use crate::{
 use episode_reader::{EpisodeReader, RecordedEpisode};
 use faceoff_episode::Arena;
 use faceoff_types::{
-    Competition, EvaluationResult, Ruleset, Task, TaskMap, TaskWeights, UnknownRuleset,
+    Competition, EvaluationResult, Ruleset, Task, TaskMap, TaskWeights, UnknownProfile,
+    UnknownRuleset,
 };
 use rayon::{
     ThreadPoolBuilder,
@@ -73,11 +74,17 @@ pub fn verify(
         checked
             .map_err(|error| DatasetError::Foreign(format!("{MANIFEST_FILE}: weights: {error}")))?;
     }
+    let profile = manifest
+        .profile
+        .try_into()
+        .map_err(|unknown: UnknownProfile| {
+            DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}"))
+        })?;
     let mut reader = EpisodeReader::open(dataset, tasks.clone())?;
     let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks());
     let arena = Arena::with_ruleset(
         ruleset,
-        manifest.profile,
+        profile,
         &manifest.variation.perturbations,
         manifest.seed,
         manifest.mismatch_seed,

@@ -82,7 +82,7 @@ pub fn play_shard(
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        shard_arena(spec),
+        shard_arena(spec)?,
         monitor,
         OnHostInterference::KeepLastTry,
     );

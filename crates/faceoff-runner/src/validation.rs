@@ -15,8 +15,8 @@ use faceoff_episode::{
 };
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
-use faceoff_sim::EPISODE_STEPS;
-use faceoff_types::{AgentFault, EpisodeOutcome, Profile, Task, ValidationTiming};
+use faceoff_sim::{AirHockeyProfile, EPISODE_STEPS};
+use faceoff_types::{AgentFault, EpisodeOutcome, Task, ValidationTiming};
 use faceoff_wire::job::ValidationSpec;
 use std::fmt;
 
@@ -119,7 +119,7 @@ pub fn validate_monitored(
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ValidationReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
-    let arena = Arena::new(Profile::Evaluation, spec.seed, spec.mismatch_seed);
+    let arena = Arena::new(AirHockeyProfile::Evaluation, spec.seed, spec.mismatch_seed);
     let mut timing = Vec::with_capacity(spec.tasks.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in spec.tasks.iter().copied() {

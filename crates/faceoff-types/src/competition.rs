@@ -1,8 +1,8 @@
 //! A competition: what the platform has to know of it in order to run and to show it.
 
 use crate::{
-    EpisodeEnd, InvalidStageRules, Millionths, StageRules, Task, TaskMap, TaskWeights, UnknownTask,
-    Variation, ViolationCounts, ViolationName,
+    EpisodeEnd, InvalidStageRules, Millionths, Profile, ProfileMap, StageRules, Task, TaskMap,
+    TaskWeights, UnknownProfile, UnknownTask, Variation, ViolationCounts, ViolationName,
 };
 
 /// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
@@ -18,6 +18,12 @@ pub struct Competition {
     pub ends: Vec<EndInfo>,
     /// Kinds of violations of the agent's limits, in the order of tables.
     pub violations: Vec<ViolationInfo>,
+    /// Sets of perturbations, in the order of lists.
+    pub profiles: Vec<ProfileInfo>,
+    /// The profile of the simulator that teams have, with which ablations compare the others. It is one of `profiles`.
+    pub ideal_profile: Profile,
+    /// The profile of evaluations that count, unless a stage has another. It is one of `profiles`.
+    pub counting_profile: Profile,
 }
 
 /// A task of a competition.
@@ -64,9 +70,24 @@ pub struct ViolationInfo {
     pub points: [f64; 2],
 }
 
+/// A profile, that is, a set of perturbations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProfileInfo {
+    /// Its name in files, in the API and on the command line.
+    pub profile: Profile,
+    /// Its name in legends, such as "model mismatch".
+    pub title: String,
+    /// Its perturbations, as a sentence.
+    pub description: String,
+    /// Its letter in charts, where colour alone must not carry the meaning.
+    pub letter: char,
+    /// Do ablations play it?
+    pub is_ablated: bool,
+}
+
 impl Competition {
-    /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points. Texts
-    /// are not part of it.
+    /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points,
+    /// profiles. Texts are not part of it.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
@@ -84,6 +105,9 @@ impl Competition {
         for violation in &self.violations {
             add(violation.name.as_str());
             add(&violation.points_text());
+        }
+        for profile in self.profile_names() {
+            add(profile.as_str());
         }
         hasher.finalize().to_string()
     }
@@ -122,6 +146,46 @@ impl Competition {
         found.ok_or_else(|| UnknownTask::new(name, self.task_names()))
     }
 
+    /// The profiles in the order of lists.
+    pub fn profile_names(&self) -> impl Iterator<Item = Profile> + Clone + '_ {
+        self.profiles.iter().map(|info| info.profile)
+    }
+
+    /// The profiles that an ablation plays, in the order of lists. The ideal one is always among them.
+    pub fn ablation_profiles(&self) -> impl Iterator<Item = Profile> + Clone + '_ {
+        let is_played = |info: &&ProfileInfo| info.is_ablated || info.profile == self.ideal_profile;
+        self.profiles
+            .iter()
+            .filter(is_played)
+            .map(|info| info.profile)
+    }
+
+    /// A profile of this competition from its name.
+    ///
+    /// # Errors
+    /// If the competition has no such profile.
+    pub fn find_profile(&self, name: &str) -> Result<Profile, UnknownProfile> {
+        let found = self
+            .profile_names()
+            .find(|profile| profile.as_str() == name);
+        found.ok_or_else(|| UnknownProfile::new(name, self.profile_names()))
+    }
+
+    /// The description of a profile; `None` if the competition has no such profile.
+    #[must_use]
+    pub fn profile(&self, profile: Profile) -> Option<&ProfileInfo> {
+        self.profiles.iter().find(|info| info.profile == profile)
+    }
+
+    /// Brings a map into the order of the competition's profiles. Profiles that the competition does not have come last.
+    pub fn sort_profiles<V>(&self, map: &mut ProfileMap<V>) {
+        let position = |profile: &Profile| {
+            let found = self.profile_names().position(|other| other == *profile);
+            found.unwrap_or(usize::MAX)
+        };
+        map.sort_by(|a, _, b, _| position(a).cmp(&position(b)));
+    }
+
     /// Checks that evaluations are possible under these rules, and brings tasks and weights into the order of the competition.
     /// Weights that are those of the competition are left out.
     ///
@@ -132,6 +196,7 @@ impl Competition {
         for task in &rules.tasks {
             self.find_task(task.as_str())?;
         }
+        self.find_profile(rules.profile.as_str())?;
         let order = |task: &Task| self.task_names().position(|other| other == *task);
         rules.tasks.sort_by_key(order);
         if let Some(weights) = &rules.variation.weights {

@@ -2,7 +2,7 @@
 
 use crate::{
     InvalidLimit, InvalidPerturbation, InvalidRuntimes, InvalidWeights, MAX_DEADLINE_H,
-    MAX_EPISODES_PER_TASK, UnknownTask,
+    MAX_EPISODES_PER_TASK, UnknownProfile, UnknownTask,
 };
 
 /// The largest number of days in the mean of a board row.
@@ -16,6 +16,8 @@ pub enum InvalidStageRules {
     Tasks,
     #[error("tasks: {0}")]
     UnknownTask(#[from] UnknownTask),
+    #[error("profile: {0}")]
+    UnknownProfile(#[from] UnknownProfile),
     #[error("weights: {0}")]
     Weights(#[from] InvalidWeights),
     #[error("episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]
@@ -46,6 +48,7 @@ impl InvalidStageRules {
     pub const fn field(&self) -> &'static str {
         match self {
             Self::Tasks | Self::UnknownTask(_) => "tasks",
+            Self::UnknownProfile(_) => "profile",
             Self::Weights(_) => "weights",
             Self::Episodes(_) => "episodes_per_task",
             Self::Shards(_) => "episodes_per_shard",

@@ -3,6 +3,7 @@
 use crate::{ablation_clips, boxed, episode_summaries};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Store, StoreError};
+use faceoff_types::Competition;
 use jiff::{SignedDuration, Timestamp};
 
 /// Upper bound of the time that writing an artifact takes.
@@ -11,7 +12,7 @@ const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 /// Removes obsolete recordings, the data of old runs and half-written files, and keeps the database's write-ahead log short.
 /// Failures are logged, and retried by the next call.
 #[boxed]
-pub async fn clean_up(store: &Store, now: Timestamp) {
+pub async fn clean_up(store: &Store, competition: &Competition, now: Timestamp) {
     if let Err(error) = store.remove_old_recordings(now).await {
         tracing::warn!(%error, "old recordings could not be removed");
     }
@@ -25,7 +26,7 @@ pub async fn clean_up(store: &Store, now: Timestamp) {
     if let Err(error) = store.delete_old_deliveries(now).await {
         tracing::warn!(%error, "old webhook deliveries could not be removed");
     }
-    ablation_clips::join_parts(store).await;
+    ablation_clips::join_parts(store, competition.ideal_profile).await;
     apply_retentions(store, now).await;
     if let Err(error) = store.checkpoint().await {
         tracing::warn!(%error, "the database's write-ahead log could not be copied into the database");

@@ -281,9 +281,11 @@ fn public_reason(error: &anyhow::Error) -> &'static str {
         Some(PlatformFault::FullDisk(_) | PlatformFault::Recording(_)) => {
             "the recording could not be made"
         }
-        Some(PlatformFault::Simulation(_) | PlatformFault::UnknownTask(_)) => {
-            "the simulator failed"
-        }
+        Some(
+            PlatformFault::Simulation(_)
+            | PlatformFault::UnknownTask(_)
+            | PlatformFault::UnknownProfile(_),
+        ) => "the simulator failed",
         Some(PlatformFault::HostBusy(_)) => "the host kept an agent from answering",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",
     }

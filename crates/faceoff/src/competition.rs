@@ -1,6 +1,8 @@
 //! The competition that this program runs.
 
-use faceoff_types::{Competition, InvalidWeights, Task, TaskWeights, UnknownTask};
+use faceoff_types::{
+    Competition, InvalidWeights, Profile, Task, TaskWeights, UnknownProfile, UnknownTask,
+};
 use std::sync::{Arc, LazyLock};
 
 static COMPETITION: LazyLock<Arc<Competition>> =
@@ -17,6 +19,14 @@ pub fn competition() -> &'static Arc<Competition> {
 /// If the competition has no such task.
 pub fn parse_task(name: &str) -> Result<Task, UnknownTask> {
     competition().find_task(name)
+}
+
+/// Parses a profile, a set of perturbations, on the command line.
+///
+/// # Errors
+/// If the competition has no such profile.
+pub fn parse_profile(name: &str) -> Result<Profile, UnknownProfile> {
+    competition().find_profile(name)
 }
 
 /// Parses weights on the command line: numbers in the order of the tasks.

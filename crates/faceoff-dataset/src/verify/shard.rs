@@ -40,7 +40,7 @@ pub fn verify_shard(
     if recording.report.outcomes != outcomes {
         return Err(unusable("the recording and the report have different outcomes").into());
     }
-    let arena = shard_arena(spec);
+    let arena = shard_arena(spec).map_err(|unknown| unusable(&unknown.to_string()))?;
     let replayer = Replayer::new(spec.ruleset, arena);
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
     let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps)?;

@@ -1,15 +1,15 @@
 //! Helpers that record evaluations. Their agents are functions: no process, no clock, the same numbers on every machine.
 
 use arrow_array::RecordBatch;
-use faceoff_airhockey::HIT;
+use faceoff_airhockey::{EVALUATION, HIT};
 use faceoff_dataset::{
     AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble,
 };
 use faceoff_episode::{AirHockeyStep, AnswerTiming, EpisodeStart, StepRow, StepSink};
-use faceoff_sim::{Episode, Interpolation, Plant};
+use faceoff_sim::{AirHockeyProfile, Episode, Interpolation, Plant};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
-    Ruleset, Seed, SlotTiming, Task, Variation,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, RoundTrips, Ruleset,
+    Seed, SlotTiming, Task, Variation,
 };
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -53,7 +53,7 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
         platform_retries: 0,
         task,
         episodes,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 2,
@@ -70,7 +70,7 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let seed = spec.seed.episode(spec.task, episode);
-        let factors = spec.profile.factors();
+        let factors = AirHockeyProfile::try_from(spec.profile).unwrap().factors();
         let mut simulation = Episode::new(
             spec.task.try_into().unwrap(),
             Interpolation::Cubic,

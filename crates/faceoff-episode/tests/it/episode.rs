@@ -5,10 +5,10 @@ use faceoff_episode::{
     AirHockeyWorld, AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError,
     RunningEpisode, StepRow, StepSink,
 };
-use faceoff_sim::Bounds;
+use faceoff_sim::{AirHockeyProfile, Bounds};
 use faceoff_types::{
     ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase,
-    Profile, Ruleset, Seed, Task,
+    Ruleset, Seed, Task,
 };
 use std::ops::Range;
 
@@ -47,7 +47,7 @@ const EPISODE: u32 = 4;
 
 fn arena() -> Arena {
     let seed = Seed::from_number(3); // arbitrary
-    Arena::new(Profile::Evaluation, seed, seed.model_mismatch())
+    Arena::new(AirHockeyProfile::Evaluation, seed, seed.model_mismatch())
 }
 
 fn begin<S: StepSink<AirHockeyWorld>>(task: Task, sink: S) -> RunningEpisode<AirHockeyWorld, S> {

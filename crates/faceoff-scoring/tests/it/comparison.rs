@@ -1,14 +1,13 @@
 //! Tests of comparisons of two evaluations, and of the summaries that they need.
 
 use crate::support::{episode, weights};
-use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT, IDEAL, PREPARE, TASKS};
 use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
     overall_p_value, overall_score, score_task,
 };
 use faceoff_types::{
-    EpisodeOutcome, Profile, RULESET, Seed, Task, TaskMap, TaskWeights, TierBounds, Variation,
-    Violations,
+    EpisodeOutcome, RULESET, Seed, Task, TaskMap, TaskWeights, TierBounds, Variation, Violations,
 };
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -34,7 +33,7 @@ fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
 fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
     ComparedEvaluation {
         ruleset: RULESET,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         variation: &NO_VARIATION,
         weights: &WEIGHTS,
         seed: Seed::from_number(1),
@@ -193,7 +192,7 @@ fn comparison_error_names_differing_field() {
         ),
         (
             ComparedEvaluation {
-                profile: Profile::Ideal,
+                profile: IDEAL,
                 ..a
             },
             "profile",

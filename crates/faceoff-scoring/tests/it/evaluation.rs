@@ -1,10 +1,10 @@
 //! Tests of the scores of episodes, tasks and evaluations (an evaluation is one agent's run of all tasks).
 
 use crate::support::{episode, task_result, weights};
-use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
+use faceoff_airhockey::{DEFEND, EE, EVALUATION, HIT, IDEAL, JOINT_POS, JOINT_VEL, LINK, PREPARE};
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, Ruleset, Seed, TaskMap, Tier,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Ruleset, Seed, TaskMap, Tier,
     ViolationName, Violations,
 };
 
@@ -121,7 +121,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     ]);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Evaluation,
+        EVALUATION,
         seed,
         &Default::default(),
         &weights(),
@@ -131,7 +131,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     assert_eq!(result.tier, Tier::Improvable);
     assert_eq!(
         (result.ruleset.as_str(), result.profile),
-        ("airhockey-2023.3", Profile::Evaluation)
+        ("airhockey-2023.3", EVALUATION)
     );
     assert_eq!((result.seed, result.tasks), (seed, tasks.clone()));
 
@@ -139,7 +139,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     hit_alone.retain(|task, _| *task == HIT);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Ideal,
+        IDEAL,
         seed,
         &Default::default(),
         &weights(),
@@ -148,7 +148,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     assert_eq!((result.score, result.tier), (20.0, Tier::Deployable));
     let empty = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Ideal,
+        IDEAL,
         seed,
         &Default::default(),
         &weights(),
@@ -162,7 +162,7 @@ fn results_round_trip_as_json() {
     let tasks = TaskMap::from([(HIT, task_result(30, 7, 12.5))]);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Evaluation,
+        EVALUATION,
         Seed::from_number(1),
         &Default::default(),
         &weights(),

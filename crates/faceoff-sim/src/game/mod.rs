@@ -7,6 +7,7 @@ mod state;
 pub use state::GameState;
 
 use crate::{
+    Factors,
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
     episode::{constraints::ConstraintValues, task::PLAYABLE_Y_M},
     perturbation::table_factors::TableFactors,
@@ -14,9 +15,7 @@ use crate::{
     stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
 };
-use faceoff_types::{
-    Factors, Interpolation, PerturbationSettings, Ruleset, Seed, Violations, WINDOW_STEPS,
-};
+use faceoff_types::{Interpolation, PerturbationSettings, Ruleset, Seed, Violations, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// Settings of a game.

@@ -4,12 +4,12 @@
 
 use crate::reference::{array, cases, max_difference};
 use faceoff_sim::{
-    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, World,
+    Command, Factors, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, World,
     game::referee::Referee,
     golden::game_hash,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
 };
-use faceoff_types::{Factors, Seed, Violations, WINDOW_STEPS};
+use faceoff_types::{Seed, Violations, WINDOW_STEPS};
 use serde_json::Value;
 
 /// Control steps after which a puck that rests on one side is a foul: the first step, and 751 more, which exceed 15 s.

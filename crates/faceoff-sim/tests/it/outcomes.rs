@@ -1,8 +1,8 @@
 //! The success rate of an agent that holds still agrees with that in the *reference*, the challenge's own simulator.
 
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
-use faceoff_types::{Factors, Seed, Violations};
+use faceoff_sim::{Episode, Factors, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
+use faceoff_types::{Seed, Violations};
 
 /// Plays episodes with an arm that holds still. Returns the number of successes and the number of episodes with a violated constraint.
 fn play_holding(task: AirHockeyTask, episodes: u32) -> (u32, u32) {

@@ -5,8 +5,8 @@ use crate::table::{ShardTable, StepRows, TableWriter, join};
 use bytes::Bytes;
 use faceoff_airhockey::{DEFEND, HIT};
 use faceoff_episode::{AirHockeyStep, AnswerTiming, StepRow};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed};
+use faceoff_sim::{AirHockeyProfile, Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::Seed;
 use parquet::file::reader::Length;
 use std::{
     io::Read,
@@ -87,7 +87,7 @@ impl ChunkReader for RecordingTable {
 fn write_shards(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec<ShardTable> {
     let settings = PerturbationSettings::default();
     let (seed, plant) = (Seed::from_number(3), Plant::nominal());
-    let factors = Profile::Ideal.factors();
+    let factors = AirHockeyProfile::Ideal.factors();
     let simulation = Episode::new(
         task.try_into().unwrap(),
         Interpolation::Cubic,

@@ -225,7 +225,12 @@ impl Season {
     /// The server's clean-up.
     pub async fn night(&mut self) {
         self.site.advance(9 * 3600);
-        clean_up(&self.site.store, self.site.now()).await;
+        clean_up(
+            &self.site.store,
+            &faceoff_airhockey::competition(),
+            self.site.now(),
+        )
+        .await;
     }
 
     /// The size of the SQLite files, in bytes.

@@ -2,13 +2,13 @@
 
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use faceoff_airhockey::competition;
-use faceoff_airhockey::{DEFEND, HIT};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT};
 use faceoff_dataset::{
     Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble, shard_arena,
     verify::{VerifyError, verify},
 };
 use faceoff_episode::{AnswerTiming, RunningEpisode, StepSink};
-use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed};
+use faceoff_types::{Interpolation, Phase, Ruleset, Seed};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
 use std::{
@@ -48,7 +48,7 @@ fn record_dataset(dir: &Path) {
         platform_retries: 0,
         task: DEFEND,
         episodes: 0..2,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 9,
@@ -57,7 +57,7 @@ fn record_dataset(dir: &Path) {
     let shard = dir.join("shard");
     let folder = ShardFolder::create(&shard).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let arena = shard_arena(&spec);
+    let arena = shard_arena(&spec).unwrap();
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let interpolation = Some(Interpolation::Linear);
