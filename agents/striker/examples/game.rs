@@ -13,8 +13,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use faceoff_sim::{Game, GameStep};
-use faceoff_types::Profile;
+use faceoff_sim::{AirHockeyProfile, Game, GameStep};
 use striker::Agent;
 
 #[path = "../tests/support/mod.rs"]
@@ -42,7 +41,7 @@ fn main() -> anyhow::Result<()> {
     let steps: u32 = argument(2, "45000")
         .parse()
         .context("number of control steps")?;
-    let profile: Profile = argument(3, "evaluation").parse()?;
+    let profile: AirHockeyProfile = argument(3, "evaluation").parse()?;
     let games: u64 = argument(4, "1").parse().context("number of games")?;
     let first_seed: u64 = argument(5, "1").parse().context("first game's seed")?;
     let traced_steps = std::env::var("TRACE").ok().and_then(|range| {

@@ -12,8 +12,10 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, EpisodeState, Interpolation, PerturbationSettings, Plant, env_info};
-use faceoff_types::{Profile, Seed};
+use faceoff_sim::{
+    AirHockeyProfile, Episode, EpisodeState, Interpolation, PerturbationSettings, Plant, env_info,
+};
+use faceoff_types::Seed;
 use striker::{Agent, Policy};
 
 #[path = "../tests/support/env.rs"]
@@ -67,7 +69,7 @@ fn main() -> anyhow::Result<()> {
     let episodes: u32 = argument(1, "50")
         .parse()
         .context("number of episodes per season")?;
-    let profile: Profile = argument(2, "evaluation").parse()?;
+    let profile: AirHockeyProfile = argument(2, "evaluation").parse()?;
     let seasons: u64 = argument(3, "2").parse().context("number of seasons")?;
     let first_season: u64 = argument(4, "1").parse().context("first season's seed")?;
     let traced_episode = std::env::var("TRACE").ok().and_then(|t| {

@@ -1,4 +1,5 @@
-//! The Robot Air Hockey Challenge as a competition of the platform: its tasks, how their episodes end, and its violations.
+//! The Robot Air Hockey Challenge as a competition of the platform: its tasks, how their episodes end, its violations,
+//! and its profiles (sets of perturbations).
 
 mod env;
 mod simulator;
@@ -10,12 +11,12 @@ use faceoff_scoring::{
     COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, TIER_BOUNDS,
     tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},
 };
-use faceoff_sim::AirHockeyTask;
 pub use faceoff_sim::episode::constraints::{EE, JOINT_POS, JOINT_VEL, LINK};
 pub use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
+use faceoff_sim::{AirHockeyProfile, AirHockeyTask};
 use faceoff_types::{
-    Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths, Task, TaskInfo, ViolationInfo,
-    ViolationName,
+    Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths, Profile, ProfileInfo, Task,
+    TaskInfo, ViolationInfo, ViolationName,
 };
 
 /// Score a goal.
@@ -26,6 +27,30 @@ pub const DEFEND: Task = AirHockeyTask::Defend.name();
 pub const PREPARE: Task = AirHockeyTask::Prepare.name();
 /// The tasks in the order of boards.
 pub const TASKS: [Task; 3] = [HIT, DEFEND, PREPARE];
+
+/// The simulator that teams have, without perturbations.
+pub const IDEAL: Profile = AirHockeyProfile::Ideal.name();
+/// The plant's masses, gains and friction differ from the nominal model.
+pub const MODEL_MISMATCH: Profile = AirHockeyProfile::ModelMismatch.name();
+/// Noise on the observations.
+pub const OBSERVATION_NOISE: Profile = AirHockeyProfile::ObservationNoise.name();
+/// Air flow pushes a moving puck.
+pub const DISTURBANCE: Profile = AirHockeyProfile::Disturbance.name();
+/// The puck's pose freezes for some steps.
+pub const TRACKING_LOSS: Profile = AirHockeyProfile::TrackingLoss.name();
+/// Delays and table of the real laboratory.
+pub const DELAY: Profile = AirHockeyProfile::Delay.name();
+/// Model mismatch, noise, disturbance and tracking loss together; for evaluations that count.
+pub const EVALUATION: Profile = AirHockeyProfile::Evaluation.name();
+/// The profiles of an ablation: no perturbation, each one of [`EVALUATION`] alone, and all of them.
+pub const ABLATION_PROFILES: [Profile; 6] = [
+    IDEAL,
+    MODEL_MISMATCH,
+    OBSERVATION_NOISE,
+    DISTURBANCE,
+    TRACKING_LOSS,
+    EVALUATION,
+];
 
 /// The description that boards, tables, forms and files are made from.
 #[must_use]
@@ -125,6 +150,47 @@ pub fn competition() -> Competition {
         actions: action_space(),
         recording: recording_columns(),
         tiers: Some(TIER_BOUNDS),
+        profiles: vec![
+            profile(
+                IDEAL,
+                'I',
+                "ideal",
+                "The simulator that the teams have, without perturbations.",
+            ),
+            profile(
+                MODEL_MISMATCH,
+                'M',
+                "model mismatch",
+                "Model mismatch alone.",
+            ),
+            profile(
+                OBSERVATION_NOISE,
+                'N',
+                "observation noise",
+                "Observation noise alone.",
+            ),
+            profile(
+                DISTURBANCE,
+                'D',
+                "disturbance",
+                "Air-flow disturbance alone.",
+            ),
+            profile(TRACKING_LOSS, 'T', "tracking loss", "Tracking loss alone."),
+            profile(
+                DELAY,
+                'L',
+                "delay",
+                "Delays and table of the real laboratory alone.",
+            ),
+            profile(
+                EVALUATION,
+                'E',
+                "evaluation (M, N, D and T together)",
+                "Model mismatch, noise, disturbance and tracking loss together; used for evaluations that count.",
+            ),
+        ],
+        ideal_profile: IDEAL,
+        counting_profile: EVALUATION,
     }
 }
 
@@ -136,6 +202,16 @@ fn task(task: Task, title: &str, weight: u32, aim: &str) -> TaskInfo {
         aim: aim.to_owned(),
         weight: Millionths::new(weight),
         max_steps: EPISODE_STEPS,
+    }
+}
+
+fn profile(profile: Profile, letter: char, title: &str, description: &str) -> ProfileInfo {
+    ProfileInfo {
+        profile,
+        title: title.to_owned(),
+        description: description.to_owned(),
+        letter,
+        is_ablated: ABLATION_PROFILES.contains(&profile),
     }
 }
 
@@ -160,6 +236,8 @@ fn violation(
 mod tests {
     use super::*;
     use faceoff_scoring::tournament::MAX_EPISODE_PENALTY;
+    use faceoff_types::{ProfileMap, Ruleset, StageRules, Variation};
+    use std::collections::HashSet;
 
     #[test]
     fn weights_and_points_sum_to_those_of_the_rules() {
@@ -179,6 +257,49 @@ mod tests {
     }
 
     #[test]
+    fn profiles_are_those_of_the_simulator_with_unique_letters() {
+        let competition = competition();
+        let names: Vec<_> = competition.profile_names().collect();
+        assert_eq!(names, AirHockeyProfile::ALL.map(AirHockeyProfile::name));
+        let letters: HashSet<char> = competition
+            .profiles
+            .iter()
+            .map(|info| info.letter)
+            .collect();
+        assert_eq!(letters.len(), names.len());
+        let ablated: Vec<_> = competition.ablation_profiles().collect();
+        assert_eq!(ablated, ABLATION_PROFILES);
+        assert_eq!(competition.find_profile("delay"), Ok(DELAY));
+        assert_eq!(
+            competition.find_profile("easy").unwrap_err().to_string(),
+            "unknown profile \"easy\": expected ideal, model_mismatch, observation_noise, disturbance, tracking_loss, delay or evaluation"
+        );
+    }
+
+    #[test]
+    fn rules_and_maps_follow_the_profiles() {
+        let competition = competition();
+        let mut rules = StageRules {
+            ruleset: Ruleset::CURRENT,
+            profile: DELAY,
+            tasks: TASKS.to_vec(),
+            episodes_per_task: 1,
+            max_faults: 0,
+            variation: Variation::default(),
+            limits: Default::default(),
+            runtimes: None,
+        };
+        assert_eq!(competition.check_rules(&mut rules), Ok(()));
+        rules.profile = Profile::new("easy");
+        let refused = competition.check_rules(&mut rules).unwrap_err();
+        assert_eq!(refused.field(), "profile");
+        let mut map = ProfileMap::from([(rules.profile, 0), (EVALUATION, 1), (IDEAL, 2)]);
+        competition.sort_profiles(&mut map);
+        let sorted: Vec<_> = map.into_keys().collect();
+        assert_eq!(sorted, [IDEAL, EVALUATION, rules.profile]);
+    }
+
+    #[test]
     fn hash_covers_rules_and_no_texts() {
         let hash = competition().hash();
         let changed = |change: fn(&mut Competition)| {
@@ -193,6 +314,7 @@ mod tests {
             changed(|other| other.id.push('x')),
             changed(|other| other.tasks[0].max_steps += 1),
             changed(|other| other.tasks.swap(0, 1)),
+            changed(|other| drop(other.profiles.pop())),
             changed(|other| other.violations[0].points[1] += 1.0),
             changed(|other| other.tiers = None),
         ] {

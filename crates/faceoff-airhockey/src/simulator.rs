@@ -2,7 +2,7 @@
 
 use crate::{competition, env::env};
 use faceoff_episode::{Arena, Conditions, Environment, Simulator};
-use faceoff_types::{AgentTask, Competition, UnknownTask};
+use faceoff_types::{AgentTask, Competition, UnknownProfile, UnknownTask};
 use std::sync::{Arc, LazyLock};
 
 static SIMULATOR: LazyLock<Arc<AirHockey>> = LazyLock::new(|| {
@@ -45,7 +45,10 @@ impl Simulator for AirHockey {
         Ok(serde_json::to_string(&env).expect("writing plain data to memory cannot fail"))
     }
 
-    fn environment(&self, conditions: &Conditions<'_>) -> Box<dyn Environment> {
+    fn environment(
+        &self,
+        conditions: &Conditions<'_>,
+    ) -> Result<Box<dyn Environment>, UnknownProfile> {
         let Conditions {
             ruleset,
             profile,
@@ -53,12 +56,12 @@ impl Simulator for AirHockey {
             seed,
             mismatch_seed,
         } = *conditions;
-        Box::new(Arena::with_ruleset(
+        Ok(Box::new(Arena::with_ruleset(
             ruleset,
-            profile,
+            profile.try_into()?,
             perturbations,
             seed,
             mismatch_seed,
-        ))
+        )))
     }
 }

@@ -3,13 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark may panic")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use faceoff_airhockey::{PREPARE, TASKS, simulator};
+use faceoff_airhockey::{EVALUATION, PREPARE, TASKS, simulator};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{AnswerTiming, EpisodeStart, StateColumns, StepRow, StepSink, World};
 use faceoff_sim::Interpolation;
-use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Violations,
-};
+use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Ruleset, Seed, Violations};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use std::{any::Any, hint::black_box, path::Path};
 
@@ -138,7 +136,7 @@ fn slice(criterion: &mut Criterion) {
                 platform_retries: 0,
                 task,
                 episodes: start..start + EPISODES_PER_SHARD,
-                profile: Profile::Evaluation,
+                profile: EVALUATION,
                 seed,
                 mismatch_seed: seed,
                 max_faults: 0,
@@ -150,7 +148,7 @@ fn slice(criterion: &mut Criterion) {
         }
     }
     let meta = EvaluationMeta {
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed,
         agent: "noise".to_owned(),

@@ -1,6 +1,7 @@
 //! The conditions of a job: the same to play under, and to verify the recording with.
 
 use faceoff_episode::{Arena, Conditions};
+use faceoff_types::UnknownProfile;
 use faceoff_wire::{game::GameSpec, job::ShardSpec};
 
 /// The conditions of a shard's episodes.
@@ -16,13 +17,15 @@ pub fn shard_conditions(spec: &ShardSpec) -> Conditions<'_> {
 }
 
 /// The world of a game.
-#[must_use]
-pub fn game_arena(spec: &GameSpec) -> Arena {
-    Arena::with_ruleset(
+///
+/// # Errors
+/// If the simulator has no such profile.
+pub fn game_arena(spec: &GameSpec) -> Result<Arena, UnknownProfile> {
+    Ok(Arena::with_ruleset(
         spec.ruleset,
-        spec.profile,
+        spec.profile.try_into()?,
         &spec.perturbations,
         spec.seed,
         spec.mismatch_seed,
-    )
+    ))
 }

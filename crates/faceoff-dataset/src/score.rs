@@ -233,12 +233,7 @@ pub(crate) fn score(
     };
     for (task, tally) in tallies {
         let times = tally.times.finish();
-        let result = faceoff_scoring::score_task(
-            competition,
-            &tally.outcomes,
-            &times,
-            bounds,
-        );
+        let result = faceoff_scoring::score_task(competition, &tally.outcomes, &times, bounds);
         tasks.insert(task, result);
         let mut found = tally.violations;
         let mut constraints_of = |name: ViolationName| {

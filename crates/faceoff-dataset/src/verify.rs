@@ -87,6 +87,8 @@ pub fn verify(
         seed: manifest.seed,
         mismatch_seed: manifest.mismatch_seed,
     });
+    let environment = environment
+        .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
     let replayer = Replayer::new(ruleset, environment, competition);
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())

@@ -16,10 +16,11 @@ use std::fmt;
 ///
 /// ```
 /// # use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, NullSink};
-/// # use faceoff_types::{Interpolation, Phase, Profile, Seed, Task};
+/// # use faceoff_sim::AirHockeyProfile;
+/// # use faceoff_types::{Interpolation, Phase, Seed, Task};
 /// # let hit = Task::new("hit");
 /// # let seed = Seed::from_number(1);
-/// let arena = Arena::new(Profile::Ideal, seed, seed.model_mismatch());
+/// let arena = Arena::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
 /// let mut running = RunningEpisode::begin(&arena, hit, 0, Some(Interpolation::Linear.into()), NullSink)?;
 /// let outcome = loop {
 ///     let joint_positions = running.question()?.observation[6..13].to_vec();

@@ -2,7 +2,7 @@
 
 use faceoff_types::{
     ActionLayout, AgentTask, Competition, EpisodeEnd, PerturbationSettings, Profile, Ruleset, Seed,
-    Task, UnknownTask, Violations,
+    Task, UnknownProfile, UnknownTask, Violations,
 };
 use std::{any::Any, fmt, sync::Arc};
 
@@ -82,5 +82,11 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     /// If the simulator has no such task.
     fn env(&self, agent_task: AgentTask) -> Result<String, UnknownTask>;
     /// The environment of an evaluation. It may take milliseconds, so use one for many episodes.
-    fn environment(&self, conditions: &Conditions<'_>) -> Box<dyn Environment>;
+    ///
+    /// # Errors
+    /// If the simulator has no such profile.
+    fn environment(
+        &self,
+        conditions: &Conditions<'_>,
+    ) -> Result<Box<dyn Environment>, UnknownProfile>;
 }

@@ -24,7 +24,7 @@ use faceoff_service::{
         submission, team,
     },
 };
-use faceoff_types::{Profile, SubmissionId, Task};
+use faceoff_types::{Competition, Profile, SubmissionId, Task};
 
 /// One row of the table.
 struct Row {
@@ -37,11 +37,11 @@ struct Row {
     successes: u32,
     episodes: u32,
     penalty_points: String,
-    /// Difference to the profile `ideal`; `None` for `ideal`.
+    /// Difference to the ideal profile; `None` for the ideal one.
     difference: Option<Difference>,
 }
 
-/// Difference of the success rate to the profile `ideal`.
+/// Difference of the success rate to the ideal profile, which has no perturbations.
 struct Difference {
     /// In percentage points.
     points: String,
@@ -69,6 +69,8 @@ struct Page {
     episodes_per_task: u32,
     status: AblationStatus,
     task_results: Vec<TaskResults>,
+    /// The letters of the profiles and what they stand for.
+    legend: String,
     style: &'static str,
     id: SubmissionId,
     outcome_changes: Vec<OutcomeChanges>,
@@ -97,15 +99,22 @@ pub(super) async fn page(
         AblationStatus::Finished { tasks, .. } => {
             let results = tasks.iter();
             results
-                .map(|(task, effects)| TaskResults::new(*task, effects))
+                .map(|(task, effects)| TaskResults::new(*task, effects, &app.config.competition))
                 .collect()
         }
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
+    let competition = &app.config.competition;
+    let ablated = competition.ablation_profiles();
+    let ablated = ablated.filter_map(|profile| competition.profile(profile));
+    let legend: Vec<String> = ablated
+        .map(|info| format!("{}: {}", info.letter, info.title))
+        .collect();
     let clips = AblationClips::load(&app, viewer?, id).await?;
     let outcome_changes = clips.differing_episodes(&app).await?.into_iter();
     render(&Page {
         frame: Frame::load(&app, "").await?,
+        legend: legend.join(", "),
         style: assets::EPISODES_STYLE.url(),
         id,
         outcome_changes: outcome_changes
@@ -120,12 +129,13 @@ pub(super) async fn page(
 }
 
 impl TaskResults {
-    fn new(task: Task, effects: &[ProfileEffect]) -> Self {
-        let rates: Vec<LabelledRate> = effects
+    fn new(task: Task, effects: &[ProfileEffect], competition: &Competition) -> Self {
+        let rates: Vec<LabelledRate<'_>> = effects
             .iter()
             .map(|effect| LabelledRate {
                 name: effect.profile.as_str(),
-                letter: letter(effect.profile),
+                is_ideal: effect.profile == competition.ideal_profile,
+                letter: letter(effect.profile, competition),
                 percent: 100.0 * effect.success_rate,
                 interval: effect.success_ci95.map(|end| 100.0 * end),
             })
@@ -133,24 +143,27 @@ impl TaskResults {
         Self {
             task,
             chart: RateChart::new(task.as_str(), &rates),
-            rows: effects.iter().map(Row::new).collect(),
+            rows: effects
+                .iter()
+                .map(|effect| Row::new(effect, competition))
+                .collect(),
         }
     }
 }
 
 impl Row {
-    fn new(effect: &ProfileEffect) -> Self {
+    fn new(effect: &ProfileEffect, competition: &Competition) -> Self {
         let [low, high] = effect.success_ci95;
         Self {
             profile: effect.profile,
-            letter: letter(effect.profile),
+            letter: letter(effect.profile, competition),
             percent: figures::one_decimal(100.0 * effect.success_rate),
             low: figures::one_decimal(100.0 * low),
             high: figures::one_decimal(100.0 * high),
             successes: effect.successes,
             episodes: effect.episodes,
             penalty_points: figures::one_decimal(effect.penalty_points),
-            difference: (effect.profile != Profile::Ideal).then(|| Difference {
+            difference: (effect.profile != competition.ideal_profile).then(|| Difference {
                 points: figures::signed(100.0 * effect.difference),
                 lost: effect.lost,
                 gained: effect.gained,
@@ -161,30 +174,20 @@ impl Row {
     }
 }
 
-/// Letter of a profile in the chart: colour alone must not carry the meaning.
-const fn letter(profile: Profile) -> char {
-    match profile {
-        Profile::Ideal => 'I',
-        Profile::ModelMismatch => 'M',
-        Profile::ObservationNoise => 'N',
-        Profile::Disturbance => 'D',
-        Profile::TrackingLoss => 'T',
-        Profile::Delay => 'L',
-        Profile::Evaluation => 'E',
-    }
+/// Letter of a profile in the chart. An old ablation may have a profile that the competition no longer has.
+fn letter(profile: Profile, competition: &Competition) -> char {
+    competition.profile(profile).map_or('?', |info| info.letter)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeSet;
+    use faceoff_airhockey::{EVALUATION, IDEAL, competition};
 
     #[test]
-    fn profile_letters_are_unique_and_p_decides_significance() {
-        let letters: BTreeSet<char> = Profile::ABLATION.into_iter().map(letter).collect();
-        assert_eq!(letters.len(), Profile::ABLATION.len());
+    fn profiles_have_letters_and_p_decides_significance() {
         let effect = ProfileEffect {
-            profile: Profile::Evaluation,
+            profile: EVALUATION,
             episodes: 4,
             successes: 1,
             success_rate: 0.25,
@@ -195,10 +198,17 @@ mod tests {
             gained: 0,
             p_value: 0.5,
         };
-        let difference = Row::new(&effect).difference.unwrap();
+        let row = Row::new(&effect, &competition());
+        assert_eq!(row.letter, 'E');
+        let difference = row.difference.unwrap();
         assert_eq!(
             (difference.points.as_str(), difference.is_significant),
             ("−50.0", false)
         );
+        let ideal = ProfileEffect {
+            profile: IDEAL,
+            ..effect
+        };
+        assert!(Row::new(&ideal, &competition()).difference.is_none());
     }
 }

@@ -2,10 +2,10 @@
 
 use crate::errors::{argument_error, catch_panic, simulator_error};
 use faceoff_sim::{
-    Batch as SimBatch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
+    Batch as SimBatch, BatchSetup, Factors, Interpolation, JOINTS, PerturbationSettings, Plant,
     model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 

@@ -8,7 +8,7 @@ use crate::{
 use faceoff_airhockey::{TASKS, competition};
 use faceoff_episode::{AnswerTiming, Arena, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
-use faceoff_sim::AirHockeyTask;
+use faceoff_sim::{AirHockeyProfile, AirHockeyTask};
 use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
 use faceoff_types::{
     EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskMap, TaskResult, Variation,
@@ -47,7 +47,7 @@ impl Evaluation {
         mismatch_seed: Option<&str>,
         perturbations: &str,
     ) -> PyResult<Self> {
-        let profile: Profile = profile
+        let profile: AirHockeyProfile = profile
             .parse()
             .map_err(|error| argument_error("profile", "a profile", error))?;
         let read = |name, text: &str| -> PyResult<Seed> {
@@ -78,7 +78,7 @@ impl Evaluation {
         })?;
         Ok(Self {
             arena,
-            profile,
+            profile: profile.name(),
             seed,
             variation: Variation {
                 perturbations: Box::new(magnitudes),

@@ -9,10 +9,11 @@ use crate::{
     observation,
 };
 use faceoff_sim::{
-    Command, GameSetup, GameState, GameStep, Interpolation, JOINTS, PerturbationSettings, Plant,
-    RallyEnd, channel::observation::OBSERVATION_WITH_OPPONENT_LEN, model::INITIAL_Q,
+    Command, Factor, Factors, GameSetup, GameState, GameStep, Interpolation, JOINTS,
+    PerturbationSettings, Plant, RallyEnd, channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
+    model::INITIAL_Q,
 };
-use faceoff_types::{Factor, Factors, Seed};
+use faceoff_types::Seed;
 use numpy::{PyReadonlyArray1, PyReadwriteArray2, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyDict};
 use serde::Deserialize;

@@ -8,8 +8,8 @@ use crate::{
     errors::{argument_error, check_perturbations},
 };
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, Plant};
-use faceoff_types::{EPISODE_STEPS, Factor, Factors, Interpolation, PerturbationSettings, Seed};
+use faceoff_sim::{Episode, Factor, Factors, Plant};
+use faceoff_types::{EPISODE_STEPS, Interpolation, PerturbationSettings, Seed};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -152,9 +152,11 @@ pub(crate) async fn order_ablation(
         episodes_per_task: checked_episodes(episodes)?,
         ..stage::current(&app).await?.plan()
     };
+    let profiles: Vec<Profile> = app.config.competition.ablation_profiles().collect();
+    let now = app.config.clock.now();
     let ablation = app
         .store
-        .request_ablation(organiser.actor(), id, &plan, app.config.clock.now())
+        .request_ablation(organiser.actor(), id, &plan, &profiles, now)
         .await?;
     tracing::info!(submission = %id, ablation = %ablation.id, "ablation queued");
     let view = ablation::build(&app, ablation).await?;

@@ -286,6 +286,8 @@ async fn changed_rules(
     rules
         .check()
         .map_err(|error| Problem::invalid("rules", error))?;
+    let known = app.config.competition.find_profile(rules.profile.as_str());
+    known.map_err(|error| Problem::invalid("rules", format!("profile: {error}")))?;
     check_offered(app, rules.runtimes.as_ref())?;
     check_robot(app, &rules.perturbations).await?;
     Ok(rules)

@@ -8,12 +8,13 @@
 
 mod instant;
 
+use faceoff_airhockey::EVALUATION;
 use faceoff_runner::{
     AgentEnvironment, GameObserver, GameSpec, LiveFeed, LiveFeedSink, POSITION_INTERVAL, run_game,
 };
 use faceoff_sandbox::{Isolation, affinity};
 use faceoff_types::{
-    GAME_WINDOWS, GameLimits, LiveEvent, LivePosition, Profile, Ruleset, Seed, WINDOW_STEPS,
+    GAME_WINDOWS, GameLimits, LiveEvent, LivePosition, Ruleset, Seed, WINDOW_STEPS,
 };
 use instant::{InstantAgent, environment, instant_agent};
 use std::{fs, time::Instant};
@@ -72,7 +73,7 @@ fn main() {
     let spec = GameSpec {
         ruleset: Ruleset::CURRENT,
         steps,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits::default(),

@@ -20,7 +20,8 @@ use faceoff_runner::{
     AgentEnvironment, KernelCounters, Observer, Session, ShardSpec, play_shard, run_shard,
 };
 use faceoff_sandbox::{Isolation, affinity};
-use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Ruleset, Seed};
+use faceoff_sim::AirHockeyProfile;
+use faceoff_types::{EpisodeOutcome, Interpolation, Ruleset, Seed};
 use faceoff_wire::Message;
 use instant::{ACTION, InstantAgent, environment, instant_agent};
 use std::{
@@ -241,7 +242,7 @@ fn bench_control_steps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("control step");
     group.sample_size(20);
     let seed = Seed::from_number(1);
-    let arena = Arena::new(Profile::Evaluation, seed, seed.model_mismatch());
+    let arena = Arena::new(AirHockeyProfile::Evaluation, seed, seed.model_mismatch());
     let world = || arena.episode(faceoff_sim::AirHockeyTask::Prepare, 0, Interpolation::Cubic);
     group.bench_function("simulator alone", |bencher| {
         bencher.iter_batched(
@@ -273,7 +274,7 @@ fn bench_control_steps(criterion: &mut Criterion) {
         platform_retries: 0,
         task: HIT,
         episodes: 0..20,
-        profile: Profile::Evaluation,
+        profile: AirHockeyProfile::Evaluation.name(),
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 0,

@@ -76,7 +76,7 @@ pub fn play_shard(
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
-    let environment = env.simulator.environment(&shard_conditions(spec));
+    let environment = env.simulator.environment(&shard_conditions(spec))?;
     let mut calibration = Calibration::start(&env.agent_cpus)?;
     let mut player = Player::new(
         bundle,

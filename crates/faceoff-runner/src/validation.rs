@@ -14,7 +14,7 @@ use faceoff_episode::{AnswerTiming, Conditions, EpisodeStart, RecordError, StepR
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
 use faceoff_types::{
-    AgentFault, EpisodeOutcome, PerturbationSettings, Profile, Ruleset, Task, ValidationTiming,
+    AgentFault, EpisodeOutcome, PerturbationSettings, Ruleset, Task, ValidationTiming,
 };
 use faceoff_wire::job::ValidationSpec;
 use std::fmt;
@@ -120,11 +120,11 @@ pub fn validate_monitored(
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
     let environment = env.simulator.environment(&Conditions {
         ruleset: Ruleset::CURRENT,
-        profile: Profile::Evaluation,
+        profile: env.simulator.competition().counting_profile,
         perturbations: &PerturbationSettings::default(),
         seed: spec.seed,
         mismatch_seed: spec.mismatch_seed,
-    });
+    })?;
     let mut timing = Vec::with_capacity(spec.tasks.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in spec.tasks.iter().copied() {

@@ -6,9 +6,9 @@ use crate::{
     paired::{PairedTally, PairingError},
     summary::{EpisodeSummary, TaskSummary},
 };
-use faceoff_types::{Profile, Task, TaskMap};
+use faceoff_types::{Profile, ProfileMap, Task, TaskMap};
 use serde::{Deserialize, Serialize};
-use std::{borrow::Borrow, collections::BTreeMap};
+use std::borrow::Borrow;
 
 /// Results of an agent in one task under one profile, compared with the ideal profile on the same episodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,16 +38,17 @@ pub struct ProfileEffect {
 }
 
 /// Compares each profile with the ideal one, task by task, on paired episodes: the table of the paper's ablation
-/// figure. Profiles are in the order of [`Profile`]; tasks without an ideal run are left out.
+/// figure. Profiles are in the order of `runs`; tasks without an ideal run are left out.
 ///
 /// The caller ensures that all runs have the same seed.
 ///
 /// # Errors
 /// If a profile has more or fewer episodes than the ideal one.
 pub fn ablation(
-    runs: &BTreeMap<Profile, impl Borrow<EpisodeSummary>>,
+    runs: &ProfileMap<impl Borrow<EpisodeSummary>>,
+    ideal: Profile,
 ) -> Result<TaskMap<Vec<ProfileEffect>>, PairingError> {
-    let Some(ideal) = runs.get(&Profile::Ideal) else {
+    let Some(ideal) = runs.get(&ideal) else {
         return Ok(TaskMap::new());
     };
     let effects_of = |(task, ideal): (&Task, &TaskSummary)| {
@@ -83,11 +84,17 @@ fn effect(profile: Profile, tally: &PairedTally, penalty_points: f64) -> Profile
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_airhockey::{DEFEND, EE, HIT, PREPARE, TASKS};
+    use faceoff_airhockey::{DEFEND, EE, EVALUATION, HIT, IDEAL, PREPARE, TASKS, TRACKING_LOSS};
     use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome};
 
     fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), outcomes, &TASKS, Some(crate::TIER_BOUNDS)).unwrap()
+        EpisodeSummary::from_outcomes(
+            &faceoff_airhockey::competition(),
+            outcomes,
+            &TASKS,
+            Some(crate::TIER_BOUNDS),
+        )
+        .unwrap()
     }
 
     /// Outcomes with these successes; each failed episode has the 3 penalty points of an end effector violation.
@@ -113,20 +120,20 @@ mod tests {
         ideal.extend(run(PREPARE, &[true, false]));
         let mut tracking_loss = run(HIT, &[false, false, false, false, false, false, true, true]);
         tracking_loss.extend(run(PREPARE, &[false, true]));
-        let runs = BTreeMap::from([
-            (Profile::TrackingLoss, summary(&tracking_loss)),
-            (Profile::Ideal, summary(&ideal)),
+        let runs = ProfileMap::from([
+            (IDEAL, summary(&ideal)),
+            (TRACKING_LOSS, summary(&tracking_loss)),
         ]);
-        let tasks = ablation(&runs).unwrap();
+        let tasks = ablation(&runs, IDEAL).unwrap();
         assert_eq!(tasks.keys().collect::<Vec<_>>(), [&HIT, &PREPARE]);
         let [ideal, loss] = &tasks[&HIT][..] else {
             panic!("two profiles")
         };
         assert_eq!(
             (ideal.profile, ideal.difference, ideal.p_value),
-            (Profile::Ideal, 0.0, 1.0)
+            (IDEAL, 0.0, 1.0)
         );
-        assert_eq!(loss.profile, Profile::TrackingLoss);
+        assert_eq!(loss.profile, TRACKING_LOSS);
         assert_eq!(
             (loss.episodes, loss.successes, loss.success_rate),
             (8, 2, 0.25)
@@ -141,19 +148,16 @@ mod tests {
 
     #[test]
     fn runs_with_different_episodes_are_refused() {
-        let runs = BTreeMap::from([
-            (Profile::Ideal, summary(&run(HIT, &[true, true]))),
-            (Profile::Evaluation, summary(&run(HIT, &[true]))),
+        let runs = ProfileMap::from([
+            (IDEAL, summary(&run(HIT, &[true, true]))),
+            (EVALUATION, summary(&run(HIT, &[true]))),
         ]);
         let unpaired = |task, episode| Err(PairingError::Unpaired(task, episode));
-        assert_eq!(ablation(&runs), unpaired(HIT, 1));
+        assert_eq!(ablation(&runs, IDEAL), unpaired(HIT, 1));
         let other_task = summary(&run(DEFEND, &[true, true]));
-        let runs = BTreeMap::from([
-            (Profile::Ideal, runs[&Profile::Ideal].clone()),
-            (Profile::Evaluation, other_task),
-        ]);
-        assert_eq!(ablation(&runs), unpaired(HIT, 0));
-        let no_runs = BTreeMap::<_, EpisodeSummary>::new();
-        assert!(ablation(&no_runs).unwrap().is_empty());
+        let runs = ProfileMap::from([(IDEAL, runs[&IDEAL].clone()), (EVALUATION, other_task)]);
+        assert_eq!(ablation(&runs, IDEAL), unpaired(HIT, 0));
+        let no_runs = ProfileMap::<EpisodeSummary>::new();
+        assert!(ablation(&no_runs, IDEAL).unwrap().is_empty());
     }
 }

@@ -141,7 +141,7 @@ mod tests {
     use super::*;
     use crate::tier::{TIER_BOUNDS, tier_of};
     use faceoff_airhockey::{EE, HIT, TASKS};
-    use faceoff_types::{Profile, Tier, Variation};
+    use faceoff_types::{Tier, Variation};
 
     fn weights() -> TaskWeights {
         TaskWeights::parse("0.4,0.4,0.2", TASKS.into_iter()).unwrap()
@@ -166,7 +166,7 @@ mod tests {
         };
         score_evaluation(
             Ruleset::CURRENT,
-            Profile::Evaluation,
+            faceoff_airhockey::EVALUATION,
             Seed::from_number(seed),
             &Variation::default(),
             &weights(),

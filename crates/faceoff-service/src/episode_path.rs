@@ -52,7 +52,7 @@ impl FromRequestParts<App> for AblationPath {
             PathParams::<String, 4>::from_request_parts(parts, app).await?;
         Ok(Self {
             submission: parse(&id, "submission")?,
-            profile: parse(&profile, "profile")?,
+            profile: known_profile(app, &profile)?,
             task: known_task(app, &task)?,
             episode: parse(&episode, "episode")?,
         })
@@ -62,6 +62,11 @@ impl FromRequestParts<App> for AblationPath {
 fn known_task(app: &App, name: &str) -> Result<Task, Problem> {
     let found = app.config.competition.find_task(name);
     found.map_err(|error| Problem::new(ProblemKind::NotFound, error.to_string()))
+}
+
+fn known_profile(app: &App, name: &str) -> Result<Profile, Problem> {
+    let found = app.config.competition.find_profile(name);
+    found.map_err(|error| Problem::new(ProblemKind::NotFound, format!("profile {name:?}: {error}")))
 }
 
 /// Parses a path parameter; `name` is for the message. A parameter that cannot be parsed gives 404, as an unknown id does.

@@ -79,9 +79,8 @@ impl Summaries {
         let bounds = self.competition.tier_bounds(&plan.variation);
         // Takes some ten milliseconds, so it runs off the threads that handle requests.
         let competition = Arc::clone(&self.competition);
-        let summarise = move || {
-            EpisodeSummary::from_outcomes(&competition, &outcomes, &plan.tasks, bounds)
-        };
+        let summarise =
+            move || EpisodeSummary::from_outcomes(&competition, &outcomes, &plan.tasks, bounds);
         tokio::task::spawn_blocking(summarise)
             .await
             .map_err(Problem::internal)?

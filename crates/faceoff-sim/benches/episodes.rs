@@ -3,10 +3,10 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS,
+    Batch, BatchSetup, Command, Episode, Factors, Game, GameSetup, Interpolation, JOINTS,
     PerturbationSettings, Plant, model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 use std::hint::black_box;
 
 /// Control steps of one measured run.

@@ -6,13 +6,14 @@
 
 use crate::AirHockeyTask;
 use crate::{
+    Factors,
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     dynamics::simd_level::SimdLevel,
     episode::{Episode, StepOutcome},
     episode_step::step_episodes_on,
     robot::plant::Plant,
 };
-use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed};
+use faceoff_types::{Interpolation, PerturbationSettings, Seed};
 use rayon::prelude::*;
 
 /// Number of worlds that one thread steps at once.

@@ -1,8 +1,8 @@
 //! The *fingerprint* of the simulator: a hash of the motion in a short episode of each task with all perturbations. A simulator that
 //! computes other numbers has another one.
 
-use crate::{AirHockeyTask, Episode, EpisodeState, Interpolation, JOINTS, Plant};
-use faceoff_types::{PerturbationSettings, Profile, Seed};
+use crate::{AirHockeyProfile, AirHockeyTask, Episode, EpisodeState, Interpolation, JOINTS, Plant};
+use faceoff_types::{PerturbationSettings, Seed};
 use std::sync::OnceLock;
 
 /// Control steps of each episode: enough for contacts of the puck with rim and mallet.
@@ -23,7 +23,7 @@ fn compute() -> String {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,
-            Profile::Evaluation.factors(),
+            AirHockeyProfile::Evaluation.factors(),
             &settings,
             &plant,
             seed.episode(task, 0),

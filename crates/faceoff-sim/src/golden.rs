@@ -6,17 +6,18 @@
 
 use crate::AirHockeyTask;
 use crate::{
+    AirHockeyProfile,
     channel::Command,
     episode::{Episode, constraints::ViolatedGroups},
     game::{Game, GameSetup},
     model::{EE_DESIRED_HEIGHT_M, JOINTS},
     robot::{inverse_kinematics::inverse_kinematics, plant::Plant},
 };
-use faceoff_types::{Interpolation, PerturbationSettings, Profile, Seed};
+use faceoff_types::{Interpolation, PerturbationSettings, Seed};
 use std::fmt;
 
 /// The perturbation profiles: without perturbations, and with those of an evaluation.
-const PROFILES: [Profile; 2] = [Profile::Ideal, Profile::Evaluation];
+const PROFILES: [AirHockeyProfile; 2] = [AirHockeyProfile::Ideal, AirHockeyProfile::Evaluation];
 
 /// Control steps of a golden game: enough for several rallies (the parts of a game from a serve to a goal or foul), and for goals.
 const GAME_STEPS: u32 = 3000;
@@ -54,7 +55,7 @@ pub fn all() -> impl Iterator<Item = Golden> {
 
 /// Runs a golden episode to its end.
 #[must_use]
-pub fn play_episode(task: AirHockeyTask, profile: Profile) -> Golden {
+pub fn play_episode(task: AirHockeyTask, profile: AirHockeyProfile) -> Golden {
     Golden {
         name: format!("{task} {profile}"),
         hash: episode_hash(start_episode(task, profile)),
@@ -63,7 +64,7 @@ pub fn play_episode(task: AirHockeyTask, profile: Profile) -> Golden {
 
 /// Runs a golden game; also returns the game in its final state.
 #[must_use]
-pub fn play_game(profile: Profile) -> (Golden, Game) {
+pub fn play_game(profile: AirHockeyProfile) -> (Golden, Game) {
     let mut game = start_game(profile);
     let golden = Golden {
         name: format!("game {profile}"),
@@ -74,7 +75,7 @@ pub fn play_game(profile: Profile) -> (Golden, Game) {
 
 /// A golden episode at its start.
 #[must_use]
-pub fn start_episode(task: AirHockeyTask, profile: Profile) -> Episode {
+pub fn start_episode(task: AirHockeyTask, profile: AirHockeyProfile) -> Episode {
     let (factors, settings) = (profile.factors(), PerturbationSettings::default());
     let root = Seed::from_number(SEED);
     let plant = Plant::for_factors(factors, &settings, root.model_mismatch());
@@ -88,7 +89,7 @@ pub fn start_episode(task: AirHockeyTask, profile: Profile) -> Episode {
     )
 }
 
-fn start_game(profile: Profile) -> Game {
+fn start_game(profile: AirHockeyProfile) -> Game {
     let (factors, settings) = (profile.factors(), PerturbationSettings::default());
     let seed = Seed::from_number(SEED);
     Game::new(GameSetup {

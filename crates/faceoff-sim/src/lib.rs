@@ -49,6 +49,7 @@ pub use episode_step::{step_episodes, step_episodes_on};
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use fingerprint::fingerprint;
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
+pub use perturbation::{AirHockeyProfile, Factor, Factors};
 pub use robot::plant::Plant;
 // `Runaway`: the part of a world that left its bounds, so that the world stopped (*diverged*).
 pub use world::{Bounds, ContactBody, Divergence, Impact, Impacts, MalletState, Runaway, World};

@@ -3,12 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark fails by panicking")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use faceoff_airhockey::TASKS;
+use faceoff_airhockey::{EVALUATION, TASKS};
 use faceoff_store::Store;
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, Ruleset, RunId, Seed,
-    ShardId, StageId, StageRules, StageSettings, SubmissionId, TaskResult, TeamId, Tier,
-    ViolationCounts, Zone,
+    ComputationTimeSummary, EvaluationId, EvaluationResult, RULESET, Ruleset, RunId, Seed, ShardId,
+    StageId, StageRules, StageSettings, SubmissionId, TaskResult, TeamId, Tier, ViolationCounts,
+    Zone,
 };
 use jiff::{Timestamp, ToSpan, civil::date};
 use sqlx::{Connection, SqliteConnection};
@@ -44,7 +44,7 @@ fn evaluation_result(score: f64) -> EvaluationResult {
     };
     EvaluationResult {
         ruleset: RULESET.into(),
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed: Seed::from_number(1),
         tasks: TASKS.map(|name| (name, task.clone())).into(),
         score,
@@ -172,7 +172,7 @@ fn board(criterion: &mut Criterion) {
         let rules = StageRules {
             runtimes: None,
             ruleset: Ruleset::CURRENT,
-            profile: Profile::Evaluation,
+            profile: EVALUATION,
             tasks: TASKS.to_vec(),
             episodes_per_task: 1000,
             max_faults: 10,

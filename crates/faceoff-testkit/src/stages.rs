@@ -1,14 +1,14 @@
 //! Plans of runs, and stages that have them.
 
-use faceoff_airhockey::{DEFEND, HIT, PREPARE};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT, PREPARE};
 use faceoff_store::{Actor, RunPlan, Stage, StageChange, Store, StoreError};
-use faceoff_types::{Profile, Ruleset, Schedule, StageId, StageRules, StageSettings, Zone};
+use faceoff_types::{Ruleset, Schedule, StageId, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 
 /// 3 tasks of 4 episodes in shards of 2 episodes. 3 agent faults are allowed.
 pub fn six_shard_plan() -> RunPlan {
     RunPlan {
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         tasks: vec![HIT, DEFEND, PREPARE],
         episodes_per_task: 4,
         episodes_per_shard: 2,

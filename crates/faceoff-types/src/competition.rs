@@ -1,8 +1,9 @@
 //! A competition: what the platform has to know of it in order to run and to show it.
 
 use crate::{
-    ActionSpace, EpisodeEnd, InvalidStageRules, Millionths, RecordingColumns, StageRules, Task,
-    TaskMap, TaskWeights, TierBounds, UnknownTask, Variation, ViolationCounts, ViolationName, Violations,
+    ActionSpace, EpisodeEnd, InvalidStageRules, Millionths, Profile, ProfileMap, RecordingColumns,
+    StageRules, Task, TaskMap, TaskWeights, TierBounds, UnknownProfile, UnknownTask, Variation,
+    ViolationCounts, ViolationName, Violations,
 };
 
 /// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
@@ -22,6 +23,12 @@ pub struct Competition {
     pub recording: RecordingColumns,
     /// The bounds of its tiers, unless a stage has others; `None`: a competition without tiers, whose boards rank by score alone.
     pub tiers: Option<TierBounds>,
+    /// Sets of perturbations, in the order of lists.
+    pub profiles: Vec<ProfileInfo>,
+    /// The profile of the simulator that teams have, with which ablations compare the others. It is one of `profiles`.
+    pub ideal_profile: Profile,
+    /// The profile of evaluations that count, unless a stage has another. It is one of `profiles`.
+    pub counting_profile: Profile,
 }
 
 /// A task of a competition.
@@ -68,9 +75,24 @@ pub struct ViolationInfo {
     pub points: [f64; 2],
 }
 
+/// A profile, that is, a set of perturbations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProfileInfo {
+    /// Its name in files, in the API and on the command line.
+    pub profile: Profile,
+    /// Its name in legends, such as "model mismatch".
+    pub title: String,
+    /// Its perturbations, as a sentence.
+    pub description: String,
+    /// Its letter in charts, where colour alone must not carry the meaning.
+    pub letter: char,
+    /// Do ablations play it?
+    pub is_ablated: bool,
+}
+
 impl Competition {
-    /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points,
-    /// bounds of tiers. Texts are not part of it.
+    /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points, bounds of
+    /// tiers, profiles. Texts are not part of it.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
@@ -94,6 +116,9 @@ impl Competition {
         add(&self
             .tiers
             .map_or_else(no_tiers, |bounds| bounds.to_string()));
+        for profile in self.profile_names() {
+            add(profile.as_str());
+        }
         hasher.finalize().to_string()
     }
 
@@ -160,6 +185,46 @@ impl Competition {
         found.ok_or_else(|| UnknownTask::new(name, self.task_names()))
     }
 
+    /// The profiles in the order of lists.
+    pub fn profile_names(&self) -> impl Iterator<Item = Profile> + Clone + '_ {
+        self.profiles.iter().map(|info| info.profile)
+    }
+
+    /// The profiles that an ablation plays, in the order of lists. The ideal one is always among them.
+    pub fn ablation_profiles(&self) -> impl Iterator<Item = Profile> + Clone + '_ {
+        let is_played = |info: &&ProfileInfo| info.is_ablated || info.profile == self.ideal_profile;
+        self.profiles
+            .iter()
+            .filter(is_played)
+            .map(|info| info.profile)
+    }
+
+    /// A profile of this competition from its name.
+    ///
+    /// # Errors
+    /// If the competition has no such profile.
+    pub fn find_profile(&self, name: &str) -> Result<Profile, UnknownProfile> {
+        let found = self
+            .profile_names()
+            .find(|profile| profile.as_str() == name);
+        found.ok_or_else(|| UnknownProfile::new(name, self.profile_names()))
+    }
+
+    /// The description of a profile; `None` if the competition has no such profile.
+    #[must_use]
+    pub fn profile(&self, profile: Profile) -> Option<&ProfileInfo> {
+        self.profiles.iter().find(|info| info.profile == profile)
+    }
+
+    /// Brings a map into the order of the competition's profiles. Profiles that the competition does not have come last.
+    pub fn sort_profiles<V>(&self, map: &mut ProfileMap<V>) {
+        let position = |profile: &Profile| {
+            let found = self.profile_names().position(|other| other == *profile);
+            found.unwrap_or(usize::MAX)
+        };
+        map.sort_by(|a, _, b, _| position(a).cmp(&position(b)));
+    }
+
     /// Checks that evaluations are possible under these rules, and brings tasks and weights into the order of the competition.
     /// Weights and bounds of tiers that are those of the competition are left out.
     ///
@@ -170,6 +235,7 @@ impl Competition {
         for task in &rules.tasks {
             self.find_task(task.as_str())?;
         }
+        self.find_profile(rules.profile.as_str())?;
         let order = |task: &Task| self.task_names().position(|other| other == *task);
         rules.tasks.sort_by_key(order);
         if let Some(weights) = &rules.variation.weights {
@@ -246,7 +312,9 @@ impl ViolationInfo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Profile, Ruleset};
+    use crate::Ruleset;
+
+    const PLAIN: Profile = Profile::new("plain");
 
     fn competition(tiers: Option<TierBounds>) -> Competition {
         Competition {
@@ -262,6 +330,20 @@ mod tests {
             ends: Vec::new(),
             violations: Vec::new(),
             tiers,
+            profiles: vec![ProfileInfo {
+                profile: PLAIN,
+                title: "plain".to_owned(),
+                description: "No perturbations.".to_owned(),
+                letter: 'P',
+                is_ablated: true,
+            }],
+            ideal_profile: PLAIN,
+            counting_profile: PLAIN,
+            actions: ActionSpace {
+                is_stated: false,
+                layouts: Vec::new(),
+            },
+            recording: RecordingColumns::default(),
         }
     }
 
@@ -271,7 +353,7 @@ mod tests {
         let mut rules = StageRules {
             runtimes: None,
             ruleset: Ruleset::CURRENT,
-            profile: Profile::Evaluation,
+            profile: PLAIN,
             tasks: vec![Task::new("reach")],
             episodes_per_task: 1,
             max_faults: 0,

@@ -2,7 +2,7 @@
 
 use crate::{
     InvalidLimit, InvalidPerturbation, InvalidRuntimes, InvalidWeights, MAX_DEADLINE_H,
-    MAX_EPISODES_PER_TASK, TierBounds, UnknownTask,
+    MAX_EPISODES_PER_TASK, TierBounds, UnknownProfile, UnknownTask,
 };
 
 /// The largest number of days in the mean of a board row.
@@ -16,6 +16,8 @@ pub enum InvalidStageRules {
     Tasks,
     #[error("tasks: {0}")]
     UnknownTask(#[from] UnknownTask),
+    #[error("profile: {0}")]
+    UnknownProfile(#[from] UnknownProfile),
     #[error("weights: {0}")]
     Weights(#[from] InvalidWeights),
     /// Bounds of tiers that do not exist.
@@ -49,6 +51,7 @@ impl InvalidStageRules {
     pub const fn field(&self) -> &'static str {
         match self {
             Self::Tasks | Self::UnknownTask(_) => "tasks",
+            Self::UnknownProfile(_) => "profile",
             Self::Weights(_) => "weights",
             Self::NoTiers(_) => "tier_bounds",
             Self::Episodes(_) => "episodes_per_task",

@@ -52,6 +52,7 @@ mod tier;
 mod timing;
 mod tournament_format;
 mod tournament_rules;
+mod unknown_profile;
 mod unknown_task;
 mod validation_outcome;
 mod variation;
@@ -64,7 +65,7 @@ pub use agent_task::{AgentTask, Side};
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
 pub use clock::Clock;
-pub use competition::{Competition, EndInfo, TaskInfo, ViolationInfo};
+pub use competition::{Competition, EndInfo, ProfileInfo, TaskInfo, ViolationInfo};
 pub use computation_time::ComputationTime;
 pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};
 pub use departure_kind::DepartureKind;
@@ -91,7 +92,7 @@ pub use perturbations::{
     PerturbationSettings, TrackingLossSettings,
 };
 pub use printable::{escape_unprintable, is_printable};
-pub use profile::{Factor, Factors, ParseProfileError, Profile};
+pub use profile::{Profile, ProfileMap};
 pub use recording::{RecordingColumn, RecordingColumns};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult};
 pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
@@ -116,6 +117,7 @@ pub use tournament_format::TournamentFormat;
 pub use tournament_rules::{
     InvalidTournament, MAX_FREE_GAMES, MAX_GAME_STEPS, TournamentRules, TournamentSettings,
 };
+pub use unknown_profile::UnknownProfile;
 pub use unknown_task::UnknownTask;
 pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use variation::{InvalidTierBounds, TierBounds, Variation};

@@ -97,7 +97,7 @@ mod tests {
         let rules = |tasks: &[Task], episodes_per_task| StageRules {
             runtimes: None,
             ruleset: Ruleset::CURRENT,
-            profile: Profile::Evaluation,
+            profile: Profile::new("evaluation"),
             tasks: tasks.to_vec(),
             episodes_per_task,
             max_faults: 3,

@@ -87,7 +87,7 @@ impl Default for TournamentRules {
             ruleset: Ruleset::CURRENT,
             format: TournamentFormat::default(),
             steps: GAME_WINDOWS * WINDOW_STEPS,
-            profile: Profile::Evaluation,
+            profile: Profile::new("evaluation"),
             mirrored: false,
             game_limits: GameLimits::default(),
             perturbations: Box::default(),

@@ -5,18 +5,12 @@
 use anyhow::Context as _;
 use faceoff_replay::{merged_index, select_episodes};
 use faceoff_store::{Ablation, AblationState, Artifacts, Store, StoreError};
-use faceoff_types::{AblationId, Profile, Task};
-use std::{
-    collections::{BTreeMap, HashSet},
-    path::PathBuf,
-};
+use faceoff_types::{AblationId, Profile, ProfileMap, Task};
+use std::{collections::HashSet, path::PathBuf};
 
-/// A value per simulator profile: the parts of its shards, or the pack of the selected episodes.
-type ByProfile<T> = BTreeMap<Profile, T>;
-
-/// Joins the parts of each finished ablation into one pack per profile, and removes the parts. Failures are logged, and
-/// retried by the next call.
-pub(crate) async fn join_parts(store: &Store) {
+/// Joins the parts of each finished ablation into one pack per profile, and removes the parts. `ideal` is the profile
+/// of the ideal simulator. Failures are logged, and retried by the next call.
+pub(crate) async fn join_parts(store: &Store, ideal: Profile) {
     let ablations = match store.artifacts().ablations_with_parts().await {
         Ok(ablations) => ablations,
         Err(error) => {
@@ -25,13 +19,13 @@ pub(crate) async fn join_parts(store: &Store) {
         }
     };
     for ablation in ablations {
-        if let Err(error) = join_ablation(store, ablation).await {
+        if let Err(error) = join_ablation(store, ablation, ideal).await {
             tracing::warn!(%ablation, error = format!("{error:#}"), "the clips of an ablation could not be joined");
         }
     }
 }
 
-async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
+async fn join_ablation(store: &Store, id: AblationId, ideal: Profile) -> anyhow::Result<()> {
     let ablation = match store.ablation(id).await {
         Ok(ablation) => Some(ablation),
         // The files are newer than the database if it was restored to an earlier state.
@@ -49,13 +43,13 @@ async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
             state: AblationState::Finished { .. },
             runs,
             ..
-        }) if !is_joined(artifacts, id).await? => {
+        }) if !is_joined(artifacts, id, ideal).await? => {
             let run = runs.values().next().context("it has no runs")?;
             let tasks = store.run_plan(*run).await?.tasks;
             let parts = parts_by_profile(artifacts, id, &tasks).await?;
-            let packs = tokio::task::spawn_blocking(move || select_clips(&parts)).await??;
+            let packs = tokio::task::spawn_blocking(move || select_clips(&parts, ideal)).await??;
             // The pack of the ideal profile comes last: its presence means that all packs are stored.
-            for (profile, pack) in packs.into_iter().rev() {
+            for (profile, pack) in packs {
                 let key = Artifacts::ablation_clips_key(id, profile);
                 artifacts.put_bytes(&key, pack).await?;
             }
@@ -66,8 +60,8 @@ async fn join_ablation(store: &Store, id: AblationId) -> anyhow::Result<()> {
     Ok(artifacts.delete_folder(&parts_folder).await?)
 }
 
-async fn is_joined(artifacts: &Artifacts, id: AblationId) -> anyhow::Result<bool> {
-    let ideal = Artifacts::ablation_clips_key(id, Profile::Ideal);
+async fn is_joined(artifacts: &Artifacts, id: AblationId, ideal: Profile) -> anyhow::Result<bool> {
+    let ideal = Artifacts::ablation_clips_key(id, ideal);
     Ok(artifacts.size_bytes(&ideal).await?.is_some())
 }
 
@@ -76,13 +70,13 @@ async fn parts_by_profile(
     artifacts: &Artifacts,
     id: AblationId,
     tasks: &[Task],
-) -> anyhow::Result<ByProfile<Vec<PathBuf>>> {
+) -> anyhow::Result<ProfileMap<Vec<PathBuf>>> {
     let mut listed = artifacts.list_ablation_parts(id).await?;
     listed.sort_by_key(|part| {
         let position = tasks.iter().position(|task| *task == part.task);
         (position, part.first_episode)
     });
-    let mut parts: ByProfile<Vec<PathBuf>> = BTreeMap::new();
+    let mut parts: ProfileMap<Vec<PathBuf>> = ProfileMap::new();
     for part in listed {
         parts
             .entry(part.profile)
@@ -93,27 +87,29 @@ async fn parts_by_profile(
 }
 
 /// The pack of each profile's episodes that end differently than in the ideal simulator. The ideal profile's pack has all
-/// their counterparts. Profiles without a difference have no pack.
-fn select_clips(parts: &ByProfile<Vec<PathBuf>>) -> anyhow::Result<ByProfile<Vec<u8>>> {
+/// their counterparts, and is the last. Profiles without a difference have no pack.
+fn select_clips(
+    parts: &ProfileMap<Vec<PathBuf>>,
+    ideal_profile: Profile,
+) -> anyhow::Result<Vec<(Profile, Vec<u8>)>> {
     let ideal = parts
-        .get(&Profile::Ideal)
+        .get(&ideal_profile)
         .context("there are no clips of the ideal simulator")?;
     let ideal_index = merged_index(ideal)?;
     let mut ideal_episodes: HashSet<(Task, u32)> = HashSet::new();
-    let mut packs = BTreeMap::new();
+    let mut packs = Vec::new();
     for (profile, parts) in parts
         .iter()
-        .filter(|(profile, _)| **profile != Profile::Ideal)
+        .filter(|(profile, _)| **profile != ideal_profile)
     {
         let differing = merged_index(parts)?.differing_ends(&ideal_index);
         if !differing.is_empty() {
-            packs.insert(*profile, select_episodes(parts, &differing, Vec::new())?);
+            let pack = select_episodes(parts, &differing, Vec::new())?;
+            packs.push((*profile, pack));
             ideal_episodes.extend(differing);
         }
     }
-    packs.insert(
-        Profile::Ideal,
-        select_episodes(ideal, &ideal_episodes, Vec::new())?,
-    );
+    let pack = select_episodes(ideal, &ideal_episodes, Vec::new())?;
+    packs.push((ideal_profile, pack));
     Ok(packs)
 }

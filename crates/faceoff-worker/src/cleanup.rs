@@ -27,7 +27,7 @@ pub async fn clean_up(store: &Store, competition: &Arc<Competition>, now: Timest
     if let Err(error) = store.delete_old_deliveries(now).await {
         tracing::warn!(%error, "old webhook deliveries could not be removed");
     }
-    ablation_clips::join_parts(store).await;
+    ablation_clips::join_parts(store, competition.ideal_profile).await;
     apply_retentions(store, now).await;
     if let Err(error) = store.checkpoint().await {
         tracing::warn!(%error, "the database's write-ahead log could not be copied into the database");

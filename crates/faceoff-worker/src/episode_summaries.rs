@@ -37,9 +37,8 @@ async fn store_summary(
     let bounds = competition.tier_bounds(&plan.variation);
     // Takes some ten milliseconds, so it runs off the async threads.
     let competition = Arc::clone(competition);
-    let summarise = move || {
-        EpisodeSummary::from_outcomes(&competition, &outcomes, &plan.tasks, bounds)
-    };
+    let summarise =
+        move || EpisodeSummary::from_outcomes(&competition, &outcomes, &plan.tasks, bounds);
     let summary = tokio::task::spawn_blocking(summarise);
     let json = serde_json::to_string(&summary.await??)?;
     let stored = store.store_episode_summary(run, EpisodeSummary::VERSION, &json, now);

@@ -5,7 +5,7 @@ use crate::boxed;
 use anyhow::Context as _;
 use faceoff_store::{Actor, Evaluation, RunPlan, Stage, Store};
 use faceoff_types::Clock;
-use faceoff_types::Competition;
+use faceoff_types::{Competition, Profile};
 use jiff::Timestamp;
 use std::sync::Arc;
 use std::{num::NonZeroU32, time::Duration};
@@ -74,11 +74,7 @@ pub async fn start_due(
                 let started = started.with_context(|| format!("the stage {}", stage.name))?;
                 if let Some(started) = started {
                     tracing::info!(stage = %stage.name, evaluations = started.len(), "day started");
-                    let plan = RunPlan {
-                        tasks: competition.task_names().collect(),
-                        ..stage.plan()
-                    };
-                    create_ablations(store, &stage, plan, &started, now).await;
+                    create_ablations(store, competition, &stage, &started, now).await;
                 }
                 // If the cutoff is still due, something lasting prevents the start: do not retry at once.
                 let next = next_cutoff(store, &stage, now).await?;
@@ -124,8 +120,8 @@ async fn next_cutoff(
 /// counting evaluations must not depend on them; organisers can create the ablation by hand.
 async fn create_ablations(
     store: &Store,
+    competition: &Competition,
     stage: &Stage,
-    plan: RunPlan,
     started: &[Evaluation],
     now: Timestamp,
 ) {
@@ -133,16 +129,18 @@ async fn create_ablations(
         return;
     };
     let plan = RunPlan {
+        tasks: competition.task_names().collect(),
         episodes_per_task: episodes.get(),
-        ..plan
+        ..stage.plan()
     };
+    let profiles: Vec<Profile> = competition.ablation_profiles().collect();
     for evaluation in started {
         let submission = evaluation.submission;
         let created = match store.newest_ablation(submission).await {
             Ok(Some(_)) => continue,
             Ok(None) => {
                 store
-                    .request_ablation(Actor::Schedule, submission, &plan, now)
+                    .request_ablation(Actor::Schedule, submission, &plan, &profiles, now)
                     .await
             }
             Err(error) => Err(error),

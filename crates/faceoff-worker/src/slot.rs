@@ -284,7 +284,8 @@ fn public_reason(error: &anyhow::Error) -> &'static str {
         Some(
             PlatformFault::Simulation(_)
             | PlatformFault::Simulator(_)
-            | PlatformFault::UnknownTask(_),
+            | PlatformFault::UnknownTask(_)
+            | PlatformFault::UnknownProfile(_),
         ) => "the simulator failed",
         Some(PlatformFault::HostBusy(_)) => "the host kept an agent from answering",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",

@@ -2,7 +2,9 @@
 
 use faceoff_airhockey::AirHockey;
 use faceoff_episode::Simulator;
-use faceoff_types::{Competition, InvalidWeights, Task, TaskWeights, UnknownTask};
+use faceoff_types::{
+    Competition, InvalidWeights, Profile, Task, TaskWeights, UnknownProfile, UnknownTask,
+};
 use std::sync::{Arc, LazyLock};
 
 static SIMULATOR: LazyLock<Arc<AirHockey>> = LazyLock::new(faceoff_airhockey::simulator);
@@ -23,6 +25,14 @@ pub fn simulator() -> Arc<dyn Simulator> {
 /// If the competition has no such task.
 pub fn parse_task(name: &str) -> Result<Task, UnknownTask> {
     competition().find_task(name)
+}
+
+/// Parses a profile, a set of perturbations, on the command line.
+///
+/// # Errors
+/// If the competition has no such profile.
+pub fn parse_profile(name: &str) -> Result<Profile, UnknownProfile> {
+    competition().find_profile(name)
 }
 
 /// Parses weights on the command line: numbers in the order of the tasks.

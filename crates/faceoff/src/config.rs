@@ -144,7 +144,7 @@ impl Default for EvaluationConfig {
     fn default() -> Self {
         let settings = StageSettings::default();
         Self {
-            profile: Profile::Evaluation,
+            profile: competition().counting_profile,
             tasks: competition().task_names().collect(),
             episodes_per_task: 1000,
             episodes_per_shard: settings.episodes_per_shard,

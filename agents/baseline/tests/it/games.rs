@@ -1,7 +1,7 @@
 //! Short games of the baseline against `striker`, the strong reference agent, and against `hold`, which does not move.
 
 use baseline::Baseline;
-use faceoff_types::Profile;
+use faceoff_sim::AirHockeyProfile;
 use striker::Agent as Striker;
 
 use crate::support::game::{Player, Tally, new_game, play};
@@ -12,7 +12,7 @@ const STEPS: u32 = 6000;
 const DEPLOYABLE_POINTS_MAX: u32 = STEPS / 1000;
 
 fn play_game(seed: u64, mut players: [Player; 2]) -> Tally {
-    let mut game = new_game(Profile::Evaluation, seed);
+    let mut game = new_game(AirHockeyProfile::Evaluation, seed);
     play(&mut game, &mut players, STEPS, |_, _, _| {})
 }
 

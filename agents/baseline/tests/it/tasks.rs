@@ -1,8 +1,10 @@
 //! The baseline's successes in a few episodes of each task, which must roughly agree with the success rates in the README.
 
 use baseline::Baseline;
-use faceoff_sim::{AirHockeyTask, Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed};
+use faceoff_sim::{
+    AirHockeyProfile, AirHockeyTask, Episode, Interpolation, PerturbationSettings, Plant,
+};
+use faceoff_types::Seed;
 use striker::Policy;
 
 use crate::support::env::env;
@@ -16,7 +18,7 @@ const SEASON_SEED: u64 = 101;
 fn count_successes(task: AirHockeyTask, agent_task: striker::Task) -> u32 {
     let season = Seed::from_number(SEASON_SEED);
     let settings = PerturbationSettings::default();
-    let factors = Profile::Evaluation.factors();
+    let factors = AirHockeyProfile::Evaluation.factors();
     let plant = Plant::for_factors(factors, &settings, season.model_mismatch());
     let mut agent = Baseline::new(agent_task, &env(2, 0));
     let mut successes = 0;

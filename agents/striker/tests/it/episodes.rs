@@ -1,7 +1,9 @@
 //! The agent's successes and penalty points in whole simulated episodes under all perturbations, with fixed seeds.
 
-use faceoff_sim::{AirHockeyTask, Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{Profile, Seed};
+use faceoff_sim::{
+    AirHockeyProfile, AirHockeyTask, Episode, Interpolation, PerturbationSettings, Plant,
+};
+use faceoff_types::Seed;
 use striker::{Agent, Policy};
 
 use crate::support::env::env;
@@ -18,7 +20,7 @@ fn play(task: AirHockeyTask) -> (u32, u32) {
     let (mut successes, mut points) = (0, 0);
     for index in 0..EPISODES {
         let seed = season.episode(task, index);
-        let factors = Profile::Evaluation.factors();
+        let factors = AirHockeyProfile::Evaluation.factors();
         let mut episode =
             Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed);
         agent.reset();

@@ -1,6 +1,6 @@
 //! Games in the simulator under all perturbations, with fixed seeds.
 
-use faceoff_types::Profile;
+use faceoff_sim::AirHockeyProfile;
 use striker::Agent;
 
 use crate::support::game::{Player, Tally, new_game, play};
@@ -10,7 +10,7 @@ const STEPS: u32 = 7500;
 /// Penalty points up to which the rules call an agent *deployable*: half a point per window of 500 steps.
 const DEPLOYABLE_POINTS_MAX: u32 = STEPS / 1000;
 
-fn play_game(profile: Profile, seed: u64, mut players: [Player; 2]) -> Tally {
+fn play_game(profile: AirHockeyProfile, seed: u64, mut players: [Player; 2]) -> Tally {
     play(
         &mut new_game(profile, seed),
         &mut players,
@@ -24,7 +24,7 @@ fn striker_beats_hold_from_either_side() {
     for robot_index in [0, 1] {
         let mut players = [Player::Hold(None), Player::Hold(None)];
         players[robot_index] = Player::agent(Agent::new, robot_index);
-        let tally = play_game(Profile::Evaluation, 2, players);
+        let tally = play_game(AirHockeyProfile::Evaluation, 2, players);
         assert!(tally.goals[robot_index] >= 2, "{tally:?}");
         assert_eq!(tally.goals[1 - robot_index], 0, "{tally:?}");
         assert_eq!(tally.fouls[robot_index], 0, "{tally:?}");
@@ -38,7 +38,7 @@ fn striker_beats_hold_from_either_side() {
 #[test]
 fn two_strikers_commit_no_fouls_and_stay_deployable() {
     let players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
-    let tally = play_game(Profile::Evaluation, 2, players);
+    let tally = play_game(AirHockeyProfile::Evaluation, 2, players);
     assert_eq!(tally.fouls, [0, 0], "{tally:?}");
     assert!(
         tally
@@ -52,7 +52,7 @@ fn two_strikers_commit_no_fouls_and_stay_deployable() {
 #[test]
 fn game_is_reproducible() {
     let run = || {
-        let mut game = new_game(Profile::Evaluation, 7);
+        let mut game = new_game(AirHockeyProfile::Evaluation, 7);
         let mut players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
         let tally = play(&mut game, &mut players, 1000, |_, _, _| {});
         (tally, game.world().puck().pose)

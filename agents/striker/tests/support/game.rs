@@ -1,8 +1,8 @@
 //! Plays games of two robots in this process, without pipes, clocks and sandbox.
 
-use faceoff_sim::{Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
+use faceoff_sim::{AirHockeyProfile, Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
 use faceoff_sim::{PerturbationSettings, Plant, ViolatedGroups};
-use faceoff_types::{Profile, Seed};
+use faceoff_types::Seed;
 use striker::{Env, Policy, Task};
 
 use super::env::env;
@@ -79,7 +79,7 @@ impl Tally {
 }
 
 /// A new game with the perturbations of `profile`; the seed determines all random draws.
-pub fn new_game(profile: Profile, seed: u64) -> Game {
+pub fn new_game(profile: AirHockeyProfile, seed: u64) -> Game {
     let seed = Seed::from_number(seed);
     let settings = PerturbationSettings::default();
     Game::new(GameSetup {

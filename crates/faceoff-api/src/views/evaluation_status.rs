@@ -224,7 +224,7 @@ mod tests {
             finished_at,
             result: Some(Box::new(ResultView {
                 ruleset: String::new(),
-                profile: Profile::Evaluation,
+                profile: Profile::new("evaluation"),
                 variation: Variation::default(),
                 seed: None,
                 tasks: Default::default(),

@@ -39,7 +39,8 @@ struct RecordedRally {
 impl GameReplay {
     pub fn open(recording: &GameRecording) -> Result<Self, DatasetError> {
         let spec = &recording.manifest().spec;
-        let arena = game_arena(spec);
+        let arena =
+            game_arena(spec).map_err(|unknown| DatasetError::Foreign(unknown.to_string()))?;
         let rows = GameRows::new();
         let entries =
             |side: Side| recording.table(entries_file(side), rows.entries[side.index()].schema());

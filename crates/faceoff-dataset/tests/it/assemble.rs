@@ -100,7 +100,12 @@ fn dataset_is_complete_and_has_the_direct_score() {
         }
         tasks.insert(
             task,
-            faceoff_scoring::score_task(&faceoff_airhockey::competition(), &outcomes, &times, meta_bounds),
+            faceoff_scoring::score_task(
+                &faceoff_airhockey::competition(),
+                &outcomes,
+                &times,
+                meta_bounds,
+            ),
         );
     }
     let meta = &evaluation.meta;

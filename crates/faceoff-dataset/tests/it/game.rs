@@ -5,15 +5,14 @@ use crate::{
     recordings::table,
 };
 use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
+use faceoff_airhockey::EVALUATION;
 use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
 };
 use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame, SideFault};
 use faceoff_replay::{CHUNK_STEPS, Clip, ClipKey, Pack};
-use faceoff_types::{
-    AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
-};
+use faceoff_types::{AgentFaultKind, GameLimits, Interpolation, Ruleset, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{
     fs::{self, File},
@@ -30,7 +29,7 @@ fn spec() -> GameSpec {
     GameSpec {
         ruleset: Ruleset::CURRENT,
         steps: STEPS,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits::default(),
@@ -43,7 +42,11 @@ fn spec() -> GameSpec {
 /// another interpolation after a restart.
 fn record(out: &Path) {
     let spec = spec();
-    let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
+    let arena = Arena::new(
+        spec.profile.try_into().unwrap(),
+        spec.seed,
+        spec.mismatch_seed,
+    );
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
     let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
     let fault = |detail: &str| SideFault {

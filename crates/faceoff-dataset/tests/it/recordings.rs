@@ -1,7 +1,7 @@
 //! Helpers that record evaluations. Their agents are functions: no process, no clock, the same numbers on every machine.
 
 use arrow_array::RecordBatch;
-use faceoff_airhockey::{HIT, simulator};
+use faceoff_airhockey::{EVALUATION, HIT, simulator};
 use faceoff_dataset::{
     AssembledDataset, Recorder, RecordingError, ShardFolder, ShardReport, assemble,
     shard_conditions,
@@ -9,8 +9,8 @@ use faceoff_dataset::{
 use faceoff_episode::{AnswerTiming, EpisodeStart, Simulator, StepRow, StepSink, World};
 use faceoff_sim::{EPISODE_STEPS, Interpolation};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
-    Ruleset, Seed, SlotTiming, Task, Variation,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, RoundTrips, Ruleset,
+    Seed, SlotTiming, Task, Variation,
 };
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -54,7 +54,7 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
         platform_retries: 0,
         task,
         episodes,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 2,
@@ -66,7 +66,7 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
 pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
     let folder = ShardFolder::create(out).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task, simulator().competition()).unwrap();
-    let environment = simulator().environment(&shard_conditions(spec));
+    let environment = simulator().environment(&shard_conditions(spec)).unwrap();
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let layout = agent.map(|_| Interpolation::Cubic.into());

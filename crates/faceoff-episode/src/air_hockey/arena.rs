@@ -1,9 +1,11 @@
 //! The settings that all episodes of an evaluation, or all rallies of a game, have in common. From them an [`Arena`] creates the
 //! simulations.
 
-use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Bounds, Episode, Game, GameSetup, PerturbationSettings, Plant};
-use faceoff_types::{Factors, Interpolation, Profile, Ruleset, Seed, Task};
+use faceoff_sim::{
+    AirHockeyProfile, AirHockeyTask, Bounds, Episode, Factors, Game, GameSetup,
+    PerturbationSettings, Plant,
+};
+use faceoff_types::{Interpolation, Ruleset, Seed, Task};
 
 /// Rules, perturbations, the season's plant (the true robot, which deviates from the nominal one that agents know) and the seed
 /// from which the seeds of episodes and rallies are derived.
@@ -21,7 +23,7 @@ pub struct Arena {
 impl Arena {
     /// An arena with the current ruleset and its magnitudes of perturbations.
     #[must_use]
-    pub fn new(profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
+    pub fn new(profile: AirHockeyProfile, seed: Seed, mismatch_seed: Seed) -> Self {
         let magnitudes = PerturbationSettings::default();
         Self::with_ruleset(Ruleset::CURRENT, profile, &magnitudes, seed, mismatch_seed)
     }
@@ -31,7 +33,7 @@ impl Arena {
     #[must_use]
     pub fn with_ruleset(
         ruleset: Ruleset,
-        profile: Profile,
+        profile: AirHockeyProfile,
         magnitudes: &PerturbationSettings,
         seed: Seed,
         mismatch_seed: Seed,

@@ -24,10 +24,11 @@ use faceoff_types::{
 ///
 /// ```
 /// # use faceoff_episode::{AnswerTiming, Arena, RallyEntry, RunningGame, NullSink, Response};
-/// # use faceoff_types::{GameEnd, GameLimits, Interpolation, Profile, Seed, Side};
+/// # use faceoff_sim::AirHockeyProfile;
+/// # use faceoff_types::{GameEnd, GameLimits, Interpolation, Seed, Side};
 /// # let seed = Seed::from_number(1);
 /// # let timing = AnswerTiming { computation_time_s: 0.001, host_time_s: 0.0, cpu_time_s: None };
-/// let arena = Arena::new(Profile::Ideal, seed, seed.model_mismatch());
+/// let arena = Arena::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
 /// let mut game = RunningGame::begin(&arena, 900, GameLimits::default(), NullSink);
 /// while game.end().is_none() {
 ///     game.start_rally(Side::BOTH.map(|side| RallyEntry::Ready {

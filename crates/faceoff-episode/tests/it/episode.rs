@@ -5,10 +5,10 @@ use faceoff_episode::{
     AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError, RunningEpisode,
     StateColumns, StepRow, StepSink, World, recording_columns,
 };
-use faceoff_sim::Bounds;
+use faceoff_sim::{AirHockeyProfile, Bounds};
 use faceoff_types::{
     ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase,
-    Profile, Ruleset, Seed, Task,
+    Ruleset, Seed, Task,
 };
 use std::ops::Range;
 
@@ -75,7 +75,7 @@ const EPISODE: u32 = 4;
 
 fn arena() -> Arena {
     let seed = Seed::from_number(3); // arbitrary
-    Arena::new(Profile::Evaluation, seed, seed.model_mismatch())
+    Arena::new(AirHockeyProfile::Evaluation, seed, seed.model_mismatch())
 }
 
 fn begin<S: StepSink>(task: Task, sink: S) -> RunningEpisode<S> {

@@ -4,10 +4,10 @@ use faceoff_episode::{
     AnswerTiming, Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry,
     RallyRow, RallyStart, RecordError, Response, RunningGame, SideFault,
 };
-use faceoff_sim::{Bounds, RallyEnd};
+use faceoff_sim::{AirHockeyProfile, Bounds, RallyEnd};
 use faceoff_types::{
     ACTION_LIMIT, AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Interpolation,
-    Profile, Seed, Side,
+    Seed, Side,
 };
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ const FULL_GAME_STEPS: u32 = 45_000;
 
 fn arena() -> Arena {
     let seed = Seed::from_number(3); // arbitrary
-    Arena::new(Profile::Ideal, seed, seed.model_mismatch())
+    Arena::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch())
 }
 
 /// Bounds on the simulated motion that the largest commands exceed.

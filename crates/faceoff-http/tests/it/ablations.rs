@@ -5,10 +5,11 @@ use crate::{
     clips,
     site::{ADMIN, GZIP, Site, TestTeam, outcome, string},
 };
+use faceoff_airhockey::{ABLATION_PROFILES, IDEAL, TRACKING_LOSS};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::Artifacts;
 use faceoff_testkit::{shard_commit, shard_outcomes};
-use faceoff_types::{EpisodeOutcome, Profile, SubmissionId};
+use faceoff_types::{EpisodeOutcome, SubmissionId};
 use scraper::Selector;
 use serde_json::json;
 
@@ -22,8 +23,8 @@ async fn run_shards(site: &Site, shards: u32) {
         let (claim, run, shard) = site.claim_shard().await;
         let outcomes = shard_outcomes(&shard, |task, episode| {
             let success = match run.plan.profile {
-                Profile::Ideal => true,
-                Profile::TrackingLoss => false,
+                IDEAL => true,
+                TRACKING_LOSS => false,
                 _ => episode % 2 == 0,
             };
             EpisodeOutcome {
@@ -175,10 +176,15 @@ async fn viewing_an_ablation_stores_nothing_and_reads_the_summary() {
     let version = EpisodeSummary::VERSION;
     let read_stored = async || site.store.episode_summaries(&ids, version).await.unwrap();
     assert!(read_stored().await.is_empty());
-    faceoff_worker::clean_up(&site.store, &faceoff_airhockey::competition(), site.now()).await;
+    faceoff_worker::clean_up(
+        &site.store,
+        faceoff_airhockey::simulator().competition(),
+        site.now(),
+    )
+    .await;
     let stored = read_stored().await;
-    assert_eq!(stored.len(), Profile::ABLATION.len());
-    let run = runs[&Profile::TrackingLoss];
+    assert_eq!(stored.len(), ABLATION_PROFILES.len());
+    let run = runs[&TRACKING_LOSS];
     // `words` are the bits of the episodes' successes.
     let marked = stored[&run].replacen(r#""words":[0]"#, r#""words":[1]"#, 1);
     assert_ne!(marked, stored[&run]);
@@ -219,7 +225,7 @@ async fn perturbed_episode_is_shown_beside_the_ideal_one() {
     let ablation = site.store.newest_ablation(submission).await.unwrap();
     let folder = tempfile::tempdir().unwrap();
     let pack = clips::record_clips(folder.path());
-    for profile in [Profile::Ideal, Profile::TrackingLoss] {
+    for profile in [IDEAL, TRACKING_LOSS] {
         let key = Artifacts::ablation_clips_key(ablation.as_ref().unwrap().id, profile);
         site.store.artifacts().put_file(&key, &pack).await.unwrap();
     }

@@ -7,7 +7,7 @@ use crate::{
 use faceoff_airhockey::PREPARE;
 use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, StepSink};
 use faceoff_replay::{Clip, ClipRecorder, join_packs};
-use faceoff_types::{AgentFaultKind, Interpolation, Phase, Profile, Seed};
+use faceoff_types::{AgentFaultKind, Interpolation, Phase, Seed};
 use flate2::read::GzDecoder;
 use reqwest::Method;
 use scraper::{Html, Selector};
@@ -33,7 +33,11 @@ struct RecordedDay {
 /// Records the clips of a short evaluation. Returns the file that joins them.
 pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
     let seed = Seed::from_number(3);
-    let arena = Arena::new(Profile::Evaluation, seed, seed.model_mismatch());
+    let arena = Arena::new(
+        faceoff_airhockey::EVALUATION.try_into().unwrap(),
+        seed,
+        seed.model_mismatch(),
+    );
     let part = folder.join("part");
     let mut clips = ClipRecorder::new(PREPARE, File::create(&part).unwrap()).unwrap();
     for episode in 0..EPISODES {

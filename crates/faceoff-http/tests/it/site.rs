@@ -1,7 +1,7 @@
 //! A running server for tests: axum on a loopback port, SQLite in a temporary folder, a clock that tests set, and helpers that
 //! take the steps of a worker (a process that runs jobs): they claim a job and commit its outcome.
 
-use faceoff_airhockey::{HIT, TASKS};
+use faceoff_airhockey::{EVALUATION, HIT, TASKS};
 use faceoff_api::token::hash_token;
 use faceoff_http::{
     AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, LinkKey,
@@ -809,7 +809,7 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
         .collect();
     EvaluationResult {
         ruleset: RULESET.into(),
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed: Seed::from_number(7),
         tasks,
         score: 100.0 * (0.4 * rates[0] + 0.4 * rates[1] + 0.2 * rates[2]),

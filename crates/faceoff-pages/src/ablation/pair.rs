@@ -51,7 +51,8 @@ pub(crate) async fn page(
     } = path?;
     let clips = AblationClips::load(&app, viewer?, id).await?;
     let mut sides = Vec::new();
-    for (element_id, shown_profile) in [("replay-a", Profile::Ideal), ("replay-b", profile)] {
+    let ideal = app.config.competition.ideal_profile;
+    for (element_id, shown_profile) in [("replay-a", ideal), ("replay-b", profile)] {
         let clip = clips.episode(&app, shown_profile, task, episode).await?;
         let api = format!(
             "{}/ablation/{shown_profile}/{task}/{episode}",

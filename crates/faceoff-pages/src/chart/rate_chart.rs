@@ -8,8 +8,10 @@ const BAR_WIDTH: f64 = 28.0;
 
 /// A rate in percent, with the ends of its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LabelledRate {
-    pub(crate) name: &'static str,
+pub(crate) struct LabelledRate<'a> {
+    pub(crate) name: &'a str,
+    /// Is it the rate with which the others are compared? It has its own colour.
+    pub(crate) is_ideal: bool,
     /// Label below the bar: colour alone must not carry the meaning.
     pub(crate) letter: char,
     pub(crate) percent: f64,
@@ -29,7 +31,7 @@ pub(crate) struct RateChart {
 /// Texts and coordinates of a bar; `low_y` and `high_y` are the ends of the interval.
 #[derive(Debug)]
 pub(crate) struct Bar {
-    pub(crate) class: &'static str,
+    pub(crate) class: String,
     pub(crate) letter: char,
     pub(crate) x: String,
     pub(crate) y: String,
@@ -43,7 +45,7 @@ pub(crate) struct Bar {
 }
 
 impl RateChart {
-    pub(crate) fn new(title: &str, rates: &[LabelledRate]) -> Self {
+    pub(crate) fn new(title: &str, rates: &[LabelledRate<'_>]) -> Self {
         let scale = Scale { max: 100.0 };
         let step = (RIGHT - LEFT) / rates.len().max(1) as f64;
         let middles = (0..).map(|index| LEFT + step * (f64::from(index) + 0.5));
@@ -68,11 +70,11 @@ impl RateChart {
 }
 
 impl Bar {
-    fn new(rate: &LabelledRate, middle: f64, scale: Scale) -> Self {
+    fn new(rate: &LabelledRate<'_>, middle: f64, scale: Scale) -> Self {
         let y = scale.y(rate.percent);
         let [low_y, high_y] = rate.interval.map(|end| scale.y(end));
         Self {
-            class: rate.name,
+            class: if rate.is_ideal { "ideal" } else { rate.name }.to_owned(),
             letter: rate.letter,
             x: figures::one_decimal(middle - BAR_WIDTH / 2.0),
             y: figures::one_decimal(y),
@@ -95,6 +97,7 @@ mod tests {
     fn bar_height_and_position_follow_rate_and_index() {
         let rate = |name, percent| LabelledRate {
             name,
+            is_ideal: name == "one",
             letter: 'X',
             percent,
             interval: [percent / 2.0, 100.0],
@@ -105,6 +108,8 @@ mod tests {
         assert_eq!((&*first.middle, &*first.x), ("115.0", "101.0"));
         assert_eq!((&*first.low_y, &*first.high_y), ("124.0", "12.0"));
         assert_eq!(chart.bars[1].middle, "269.0");
+        let classes = chart.bars.iter().map(|bar| &*bar.class);
+        assert!(classes.eq(["ideal", "two"]));
         assert!(
             chart.description.contains("one 25, two 100"),
             "{}",

@@ -16,6 +16,7 @@ use faceoff_api::views::stage::StageView;
 use faceoff_service::{
     app::App, extract::PageForm, problem::Problem, services::stages, views::stage,
 };
+use faceoff_types::Profile;
 
 #[derive(Template)]
 #[template(path = "organiser_stages.html")]
@@ -26,6 +27,8 @@ struct Page {
     form: StageForm,
     /// Names and titles.
     task_checkboxes: Vec<(String, String)>,
+    /// All of the competition.
+    profiles: Vec<Profile>,
     /// Always `None`: creating a stage needs no confirmation. `stage_fields.html` expects the field.
     confirm: Option<String>,
     is_refused: bool,
@@ -54,6 +57,7 @@ async fn page_with(
         stages: stage::all(app).await?,
         form,
         task_checkboxes: StageForm::task_checkboxes(&app.config.competition),
+        profiles: app.config.competition.profile_names().collect(),
         confirm: None,
         is_refused: matches!(notice, Notice::Refused(_)),
     };

@@ -1,10 +1,12 @@
-//! Schemas that list the tasks of the competition, how their episodes end, and the kinds of violations.
+//! Schemas that list the tasks of the competition, how their episodes end, the kinds of violations, and the profiles.
 
-use faceoff_types::{Competition, EpisodeEnd, Task, TaskWeights, ViolationCounts, ViolationName};
+use faceoff_types::{
+    Competition, EpisodeEnd, Profile, Task, TaskWeights, ViolationCounts, ViolationName,
+};
 use serde_json::{Map, Value, json};
 use utoipa::{PartialSchema, ToSchema};
 
-/// Replaces the schemas of tasks, of their weights, of ends and of violations by those of the competition.
+/// Replaces the schemas of tasks, of their weights, of ends, of violations and of profiles by those of the competition.
 pub(super) fn describe(document: &mut Value, competition: &Competition) {
     let names: Vec<&str> = competition
         .tasks
@@ -30,6 +32,15 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "type": "string",
         "description": format!("Why an episode ended.\n{}", ends.collect::<String>()),
         "enum": competition.ends.iter().map(|info| info.end.as_str()).collect::<Vec<_>>(),
+    });
+    let profiles = competition
+        .profiles
+        .iter()
+        .map(|info| format!("\n- `{}`: {}", info.profile, info.description));
+    schemas[&*Profile::name()] = json!({
+        "type": "string",
+        "description": format!("A named set of perturbations.\n{}", profiles.collect::<String>()),
+        "enum": competition.profile_names().map(|profile| profile.to_string()).collect::<Vec<_>>(),
     });
     let kinds = competition.violations.iter();
     let kinds = kinds.map(|info| {
@@ -118,5 +129,6 @@ mod tests {
         let weights = &schemas["TaskWeights"];
         assert_eq!(weights["required"], schemas["Task"]["enum"]);
         assert_eq!(weights["properties"]["prepare"]["example"], 0.2);
+        assert_eq!(schemas["Profile"]["enum"][6], "evaluation");
     }
 }

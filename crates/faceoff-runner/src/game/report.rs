@@ -140,7 +140,7 @@ pub fn play_game<S: GameSink>(
         Calibration::start(&first.agent_cpus)?,
         Calibration::start(&second.agent_cpus)?,
     ];
-    let arena = game_arena(spec);
+    let arena = game_arena(spec)?;
     let mut sides = Side::BOTH.map(|side| {
         let index = side.index();
         let restart_s = spec.limits.restart_s;

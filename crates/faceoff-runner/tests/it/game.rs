@@ -1,13 +1,14 @@
 //! Games between real agents: the sides do not affect each other.
 
 use crate::agents::{Agent, sandboxed};
+use faceoff_airhockey::EVALUATION;
 use faceoff_dataset::game::{GAME_FILE, GameRecording, side_file, verify_game};
 use faceoff_runner::{
     AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, run_game,
 };
 use faceoff_types::{
-    AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Profile, Ruleset, Seed,
-    Side, SideOutcome, ViolationName,
+    AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Ruleset, Seed, Side,
+    SideOutcome, ViolationName,
 };
 use std::{cell::Cell, fs, path::Path};
 
@@ -17,7 +18,7 @@ pub fn spec(steps: u32) -> GameSpec {
     GameSpec {
         ruleset: Ruleset::CURRENT,
         steps,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits {

@@ -9,7 +9,7 @@ use arrow_array::{
     cast::AsArray,
 };
 use faceoff_airhockey::{HIT, TASKS};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_sim::{AirHockeyProfile, Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::Violations;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::{fs::File, path::Path, time::Duration};
@@ -96,7 +96,7 @@ fn recording_matches_the_simulation() {
             let mut world = Episode::new(
                 task.try_into().unwrap(),
                 Interpolation::Cubic,
-                spec.profile.factors(),
+                AirHockeyProfile::try_from(spec.profile).unwrap().factors(),
                 &settings,
                 &plant,
                 seed,

@@ -1,11 +1,11 @@
 //! Shards: ranges of episodes of one task, played by one agent, with their outcomes, faults and logs.
 
 use crate::agents::{Agent, sandboxed};
-use faceoff_airhockey::{DEFEND, HIT, PREPARE};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT, PREPARE};
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
 };
-use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Task};
+use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Ruleset, Seed, Task};
 use std::{ops::Range, path::Path};
 
 /// Records the events of a shard, and stops it after a number of episodes.
@@ -41,7 +41,7 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
         platform_retries: 0,
         task,
         episodes,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 2,

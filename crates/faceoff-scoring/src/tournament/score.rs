@@ -305,7 +305,7 @@ mod tests {
         let seed = Seed::from_number(1);
         let settings = GameSettings {
             ruleset: Ruleset::CURRENT,
-            profile: Profile::Evaluation,
+            profile: faceoff_airhockey::EVALUATION,
             perturbations: Box::default(),
             limits: GameLimits::default(),
             seed,

@@ -1,11 +1,11 @@
 //! Tests of boards, which rank evaluations, and of their groups of statistically tied rows.
 
 use crate::support::{bounds, task_result, weights};
-use faceoff_airhockey::{DEFEND, HIT};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT};
 use faceoff_scoring::{
     BoardEntry, RankedEntry, overall_board, rank_groups, score_evaluation, task_board,
 };
-use faceoff_types::{Profile, Ruleset, Seed, TaskMap, Tier};
+use faceoff_types::{Ruleset, Seed, TaskMap, Tier};
 use proptest::prelude::*;
 use std::convert::Infallible;
 
@@ -14,7 +14,7 @@ fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -
     let tasks = TaskMap::from([(HIT, task_result(50, successes, penalty_points))]);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Evaluation,
+        EVALUATION,
         Seed::from_number(0),
         &Default::default(),
         &weights(),

@@ -1,14 +1,12 @@
 //! Tests of comparisons of two evaluations, and of the summaries that they need.
 
 use crate::support::{bounds, episode, weights};
-use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
+use faceoff_airhockey::{DEFEND, EE, EVALUATION, HIT, IDEAL, JOINT_VEL, PREPARE, TASKS};
 use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
     overall_p_value, overall_score, score_task,
 };
-use faceoff_types::{
-    EpisodeOutcome, Profile, RULESET, Seed, Task, TaskMap, TaskWeights, Variation, Violations,
-};
+use faceoff_types::{EpisodeOutcome, RULESET, Seed, Task, TaskMap, TaskWeights, Variation};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -27,13 +25,19 @@ fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOut
 }
 
 fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-    EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), outcomes, &TASKS, bounds()).unwrap()
+    EpisodeSummary::from_outcomes(
+        &faceoff_airhockey::competition(),
+        outcomes,
+        &TASKS,
+        bounds(),
+    )
+    .unwrap()
 }
 
 fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
     ComparedEvaluation {
         ruleset: RULESET,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         variation: &NO_VARIATION,
         weights: &WEIGHTS,
         seed: Seed::from_number(1),
@@ -121,20 +125,29 @@ fn tier_change_depends_on_bounds() {
             ..outcome
         })
         .collect();
-    let clear = EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &costly, &TASKS, bounds()).unwrap();
+    let clear =
+        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &costly, &TASKS, bounds())
+            .unwrap();
     assert_eq!(
         clear.tier_change,
         Some(0.0),
         "10 points in each task, deployable up to 50"
     );
-    let tight =
-        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &costly, &TASKS, Some("0.1,0.5".parse().unwrap())).unwrap();
+    let tight = EpisodeSummary::from_outcomes(
+        &faceoff_airhockey::competition(),
+        &costly,
+        &TASKS,
+        Some("0.1,0.5".parse().unwrap()),
+    )
+    .unwrap();
     assert!(
         tight.tier_change.unwrap() > 0.5,
         "10 points in each of three tasks, deployable up to 10: {:?}",
         tight.tier_change
     );
-    let without = EpisodeSummary::from_outcomes(&costly, &TASKS, None).unwrap();
+    let without =
+        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &costly, &TASKS, None)
+            .unwrap();
     assert_eq!(without.tier_change_of(None), None);
     assert_eq!(without.tier_change_of(Some(HIT)), None);
     let json = serde_json::to_string(&without).unwrap();
@@ -195,7 +208,7 @@ fn comparison_error_names_differing_field() {
         ),
         (
             ComparedEvaluation {
-                profile: Profile::Ideal,
+                profile: IDEAL,
                 ..a
             },
             "profile",
@@ -271,15 +284,31 @@ fn unpaired_evaluations_are_compared_by_rates() {
 fn summary_needs_each_episode_once() {
     let mut outcomes = outcomes(3, |_, _| true);
     outcomes.reverse();
-    EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &outcomes, &TASKS, bounds()).unwrap();
+    EpisodeSummary::from_outcomes(
+        &faceoff_airhockey::competition(),
+        &outcomes,
+        &TASKS,
+        bounds(),
+    )
+    .unwrap();
     let first = outcomes.remove(2); // prepare 0
     assert_eq!(
-        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &outcomes, &TASKS, bounds()),
+        EpisodeSummary::from_outcomes(
+            &faceoff_airhockey::competition(),
+            &outcomes,
+            &TASKS,
+            bounds()
+        ),
         Err(PairingError::Missing(PREPARE, 0))
     );
     outcomes.extend([first.clone(), first]);
     assert_eq!(
-        EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), &outcomes, &TASKS, bounds()),
+        EpisodeSummary::from_outcomes(
+            &faceoff_airhockey::competition(),
+            &outcomes,
+            &TASKS,
+            bounds()
+        ),
         Err(PairingError::Repeated(PREPARE, 0))
     );
     assert_eq!(summary(&[]).tier_change, Some(0.0));

@@ -1,17 +1,19 @@
 //! Tests of the scores of episodes, tasks and evaluations (an evaluation is one agent's run of all tasks).
 
 use crate::support::{bounds, episode, task_result, weights};
-use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
+use faceoff_airhockey::{
+    DEFEND, EE, EVALUATION, HIT, IDEAL, JOINT_POS, JOINT_VEL, LINK, PREPARE, competition,
+};
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, Ruleset, Seed, TaskMap, Tier,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Ruleset, Seed, TaskMap, Tier,
     ViolationName,
 };
 
 #[test]
 fn violations_have_own_points_and_count_once() {
     let clean = episode(HIT, 0);
-    assert_eq!(episode_penalty(&faceoff_airhockey::competition(), &clean), 0.0);
+    assert_eq!(episode_penalty(&competition(), &clean), 0.0);
     let penalty = |ee, link, joint_pos, joint_vel| {
         let violations = [
             (EE, ee),
@@ -54,11 +56,11 @@ fn agent_fault_is_failure_with_full_time_penalty() {
         line: None,
     });
     assert_eq!(
-        episode_penalty(&faceoff_airhockey::competition(), &faulty),
+        episode_penalty(&competition(), &faulty),
         5.0,
         "2 points once, not per cause"
     );
-    let result = score_task(&faceoff_airhockey::competition(), &[faulty], &StepTimes::default(), bounds());
+    let result = score_task(&competition(), &[faulty], &StepTimes::default(), bounds());
     assert_eq!(
         (
             result.successes,
@@ -86,7 +88,7 @@ fn task_result_does_not_depend_on_episode_order() {
     for time_s in [0.1, 0.2, 0.3] {
         times.add(time_s);
     }
-    let result = score_task(&faceoff_airhockey::competition(), &outcomes, &times, bounds());
+    let result = score_task(&competition(), &outcomes, &times, bounds());
     assert_eq!(
         (result.episodes, result.successes, result.success_rate),
         (50, 20, 0.4)
@@ -112,7 +114,10 @@ fn task_result_does_not_depend_on_episode_order() {
     assert_eq!(result.steps, 20 * 100 + 30 * 500);
 
     outcomes.reverse();
-    assert_eq!(score_task(&faceoff_airhockey::competition(), &outcomes, &times, bounds()), result);
+    assert_eq!(
+        score_task(&competition(), &outcomes, &times, bounds()),
+        result
+    );
 }
 
 #[test]
@@ -125,7 +130,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     ]);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Evaluation,
+        EVALUATION,
         seed,
         &Default::default(),
         &weights(),
@@ -136,7 +141,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     assert_eq!(result.tier, Some(Tier::Improvable));
     assert_eq!(
         (result.ruleset.as_str(), result.profile),
-        ("airhockey-2023.3", Profile::Evaluation)
+        ("airhockey-2023.3", EVALUATION)
     );
     assert_eq!((result.seed, result.tasks), (seed, tasks.clone()));
 
@@ -144,7 +149,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     hit_alone.retain(|task, _| *task == HIT);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Ideal,
+        IDEAL,
         seed,
         &Default::default(),
         &weights(),
@@ -154,7 +159,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     assert_eq!((result.score, result.tier), (20.0, Some(Tier::Deployable)));
     let empty = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Ideal,
+        IDEAL,
         seed,
         &Default::default(),
         &weights(),
@@ -167,11 +172,16 @@ fn evaluation_has_worst_tier_and_weighted_score() {
 
 #[test]
 fn result_without_tiers_has_no_field_for_them() {
-    let task = score_task(&[episode(HIT, 0)], &StepTimes::for_steps(0), None);
+    let task = score_task(
+        &competition(),
+        &[episode(HIT, 0)],
+        &StepTimes::for_steps(0),
+        None,
+    );
     assert_eq!(task.tier, None);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Evaluation,
+        EVALUATION,
         Seed::from_number(1),
         &Default::default(),
         &weights(),
@@ -190,7 +200,7 @@ fn results_round_trip_as_json() {
     let tasks = TaskMap::from([(HIT, task_result(30, 7, 12.5))]);
     let result = score_evaluation(
         Ruleset::CURRENT,
-        Profile::Evaluation,
+        EVALUATION,
         Seed::from_number(1),
         &Default::default(),
         &weights(),

@@ -18,7 +18,12 @@ fn outcomes(successes: &[bool]) -> Vec<EpisodeOutcome> {
 
 fn tally(a: &[EpisodeOutcome], b: &[EpisodeOutcome]) -> Result<PairedTally, PairingError> {
     let solved = |outcomes: &[EpisodeOutcome]| -> Result<Successes, PairingError> {
-        let mut summary = EpisodeSummary::from_outcomes(&faceoff_airhockey::competition(), outcomes, &TASKS, bounds())?;
+        let mut summary = EpisodeSummary::from_outcomes(
+            &faceoff_airhockey::competition(),
+            outcomes,
+            &TASKS,
+            bounds(),
+        )?;
         let hit = summary.tasks.swap_remove(&HIT);
         Ok(hit.map_or_else(|| [].into_iter().collect(), |hit| hit.successes))
     };

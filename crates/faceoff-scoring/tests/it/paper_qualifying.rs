@@ -1,9 +1,9 @@
 //! Compares boards with the qualifying tables of the paper on the competition of 2023, whose rules these are.
 
 use crate::support::{bounds, read, rows, task_result, weights};
-use faceoff_airhockey::{DEFEND, HIT, TASKS};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT, TASKS};
 use faceoff_scoring::{BoardEntry, QualifyingScores, overall_board, score_evaluation, task_board};
-use faceoff_types::{Profile, Ruleset, Seed, Task};
+use faceoff_types::{Ruleset, Seed, Task};
 use serde_json::{Map, Value, json};
 
 /// The tables of the paper.
@@ -140,7 +140,7 @@ fn boards_of_evaluations_equal_appendix_tables() {
                 key: row["team"].as_str().unwrap(),
                 result: score_evaluation(
                     Ruleset::CURRENT,
-                    Profile::Evaluation,
+                    EVALUATION,
                     Seed::from_number(0),
                     &Default::default(),
                     &weights(),

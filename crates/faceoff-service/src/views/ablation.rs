@@ -8,8 +8,7 @@ use faceoff_api::views::{
 };
 use faceoff_scoring::ProfileEffect;
 use faceoff_store::{Ablation, AblationState};
-use faceoff_types::{Profile, RunId, SubmissionId, TaskMap};
-use std::collections::BTreeMap;
+use faceoff_types::{ProfileMap, RunId, SubmissionId, TaskMap};
 
 /// The newest ablation of a submission, if it has one.
 #[boxed]
@@ -65,13 +64,16 @@ pub async fn exists(app: &AppState, submission: SubmissionId) -> Result<bool, Pr
 /// The effects of the profiles by task, from the summaries of their runs (all episodes under one profile).
 async fn effects(
     app: &AppState,
-    runs: BTreeMap<Profile, RunId>,
+    mut runs: ProfileMap<RunId>,
 ) -> Result<TaskMap<Vec<ProfileEffect>>, Problem> {
+    let competition = &app.config.competition;
+    competition.sort_profiles(&mut runs);
     let run_ids: Vec<_> = runs.values().copied().collect();
     let summaries = app.summaries.load(&run_ids).await?;
-    let summaries_by_profile: BTreeMap<_, _> = runs
+    let summaries_by_profile: ProfileMap<_> = runs
         .into_iter()
         .filter_map(|(profile, run)| Some((profile, summaries.get(&run)?.as_ref())))
         .collect();
-    faceoff_scoring::ablation(&summaries_by_profile).map_err(Problem::internal)
+    faceoff_scoring::ablation(&summaries_by_profile, competition.ideal_profile)
+        .map_err(Problem::internal)
 }

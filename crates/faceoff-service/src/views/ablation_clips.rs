@@ -11,8 +11,7 @@ use crate::{
 };
 use faceoff_replay::{EpisodeLine, Pack};
 use faceoff_store::Artifacts;
-use faceoff_types::{AblationId, Profile, SubmissionId, Task};
-use std::collections::BTreeMap;
+use faceoff_types::{AblationId, Profile, ProfileMap, SubmissionId, Task};
 
 /// The stored clips of a submission's newest ablation.
 #[derive(Debug)]
@@ -92,14 +91,16 @@ impl AblationClips {
     pub async fn differing_episodes(
         &self,
         app: &AppState,
-    ) -> Result<BTreeMap<Profile, Vec<DifferingEpisode>>, Problem> {
-        let Some(ideal) = self.find(app, Profile::Ideal).await? else {
-            return Ok(BTreeMap::new());
+    ) -> Result<ProfileMap<Vec<DifferingEpisode>>, Problem> {
+        let competition = &app.config.competition;
+        let ideal_profile = competition.ideal_profile;
+        let Some(ideal) = self.find(app, ideal_profile).await? else {
+            return Ok(ProfileMap::new());
         };
         let ideal = ideal.read(Pack::clip_index).await?;
-        let mut differing = BTreeMap::new();
-        let profiles = Profile::ABLATION.into_iter();
-        for profile in profiles.filter(|profile| *profile != Profile::Ideal) {
+        let mut differing = ProfileMap::new();
+        let profiles = competition.ablation_profiles();
+        for profile in profiles.filter(|profile| *profile != ideal_profile) {
             let Some(file) = self.find(app, profile).await? else {
                 continue;
             };

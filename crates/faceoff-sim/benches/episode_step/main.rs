@@ -11,10 +11,10 @@ mod recorded;
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Batch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant, SUBSTEPS, SimdLevel,
-    model::INITIAL_Q,
+    Batch, BatchSetup, Factors, Interpolation, JOINTS, PerturbationSettings, Plant, SUBSTEPS,
+    SimdLevel, model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 use recorded::{RecordedEpisode, ReplayingWorlds, hold_still, record_striker};
 use rustix::time::{ClockId, clock_gettime};
 use std::time::{Duration, Instant};

@@ -2,10 +2,10 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Interpolation, PerturbationSettings, Plant, SimdLevel, StepOutcome, env_info,
+    Episode, Factors, Interpolation, PerturbationSettings, Plant, SimdLevel, StepOutcome, env_info,
     model::INITIAL_Q, step_episodes_on,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 use striker::{Agent, Policy};
 
 /// An episode at its start, and the action of each of its control steps.

@@ -10,6 +10,6 @@ pub enum Command<'a> {
     /// No answer arrived in time. The previous position is commanded again, with zero velocity. With
     /// [`Factor::Delay`] (a kind of perturbation) the arm instead continues its last trajectory at constant velocity for 80 ms, then stops.
     ///
-    /// [`Factor::Delay`]: faceoff_types::Factor::Delay
+    /// [`Factor::Delay`]: crate::Factor::Delay
     Late,
 }

@@ -5,9 +5,11 @@ mod command;
 mod latency;
 pub mod observation;
 
-use crate::{perturbation::noise::ObservationNoise, stream::RandomStream, world::World};
+use crate::{
+    Factor, Factors, perturbation::noise::ObservationNoise, stream::RandomStream, world::World,
+};
 pub use command::Command;
-use faceoff_types::{Factor, Factors, Interpolation, PerturbationSettings, Seed};
+use faceoff_types::{Interpolation, PerturbationSettings, Seed};
 use latency::Latency;
 use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
 

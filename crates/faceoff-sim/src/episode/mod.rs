@@ -11,6 +11,7 @@ pub use air_hockey_task::AirHockeyTask;
 pub use task::EPISODE_STEPS;
 
 use crate::{
+    Factors,
     channel::{AgentChannel, Command, observation},
     model::JOINTS,
     perturbation::table_factors::TableFactors,
@@ -20,7 +21,7 @@ use crate::{
     world::{Bounds, Divergence, World},
 };
 use constraints::{ConstraintValues, ViolatedGroups};
-use faceoff_types::{EpisodeEnd, Factors, Interpolation, PerturbationSettings, Seed};
+use faceoff_types::{EpisodeEnd, Interpolation, PerturbationSettings, Seed};
 use opponent::Opponent;
 
 /// A running episode. It is deterministic: it reads no clock and does no I/O. A clone continues with the same bits.
@@ -40,7 +41,7 @@ pub struct Episode {
 
 impl Episode {
     /// An episode at its start. `factors` are the active kinds of perturbations, `settings` their magnitudes. `plant` (the arms' physical
-    /// properties) is nominal unless the factors contain [`ModelMismatch`](faceoff_types::Factor::ModelMismatch); then the caller passes
+    /// properties) is nominal unless the factors contain [`ModelMismatch`](crate::Factor::ModelMismatch); then the caller passes
     /// [`Plant::mismatched`]. The initial state and each factor have their own random stream, derived from `seed` by name.
     #[must_use]
     pub fn new(

@@ -7,6 +7,7 @@ mod state;
 pub use state::GameState;
 
 use crate::{
+    Factors,
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
     episode::{
         constraints::{ConstraintValues, ViolatedGroups},
@@ -17,7 +18,7 @@ use crate::{
     stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
 };
-use faceoff_types::{Factors, Interpolation, PerturbationSettings, Ruleset, Seed, WINDOW_STEPS};
+use faceoff_types::{Interpolation, PerturbationSettings, Ruleset, Seed, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// Settings of a game.

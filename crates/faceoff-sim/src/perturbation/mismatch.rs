@@ -1,6 +1,7 @@
 //! The perturbation `model_mismatch`: the *plant* (the physical properties of the arm) deviates from the nominal model that agents know. It
 //! is drawn once per season.
 
+use crate::{Factor, Factors};
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
     model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
@@ -11,7 +12,7 @@ use crate::{
     },
     stream::RandomStream,
 };
-use faceoff_types::{Factor, Factors, MismatchSettings, PerturbationSettings, Seed};
+use faceoff_types::{MismatchSettings, PerturbationSettings, Seed};
 
 /// The *workspace*: end-effector positions over the table at which the static error is evaluated, m, base frame. The *static error* is the
 /// distance between commanded and reached position at rest.

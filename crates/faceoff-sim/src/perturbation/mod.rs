@@ -4,6 +4,9 @@
 pub mod disturbance;
 mod mismatch;
 pub mod noise;
+mod profile;
 pub mod rehearsal_table;
 pub mod table_factors;
 pub mod tracking_loss;
+
+pub use profile::{AirHockeyProfile, Factor, Factors};

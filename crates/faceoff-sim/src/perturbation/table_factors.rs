@@ -4,11 +4,12 @@ use super::{
     disturbance::Disturbance, rehearsal_table::RehearsalTable, tracking_loss::TrackingLoss,
 };
 use crate::{
+    Factor, Factors,
     stream::RandomStream,
     table::{geometry::PUCK, puck::Puck},
     world::World,
 };
-use faceoff_types::{Factor, Factors, PerturbationSettings, Seed};
+use faceoff_types::{PerturbationSettings, Seed};
 
 /// The factors of one episode or rally, with their draws.
 #[derive(Debug, Clone)]

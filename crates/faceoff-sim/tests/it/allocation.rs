@@ -2,10 +2,10 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, golden::strike,
-    model::INITIAL_Q,
+    Command, Episode, Factors, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
+    golden::strike, model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 
 #[test]
 fn control_steps_allocate_nothing() {

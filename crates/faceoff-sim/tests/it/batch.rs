@@ -2,9 +2,9 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Batch, BatchSetup, Episode, Interpolation, PerturbationSettings, Plant, golden::strike,
+    Batch, BatchSetup, Episode, Factors, Interpolation, PerturbationSettings, Plant, golden::strike,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 
 const WORLDS: u32 = 10;
 

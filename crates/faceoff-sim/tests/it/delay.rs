@@ -4,10 +4,10 @@
 use crate::held_arm::{episode, hold};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Interpolation, PerturbationSettings, Plant, World,
+    Episode, Factor, Factors, Interpolation, PerturbationSettings, Plant, World,
     perturbation::rehearsal_table::RehearsalTable, stream::RandomStream,
 };
-use faceoff_types::{Factor, Factors, Seed};
+use faceoff_types::Seed;
 
 /// Distance of the robot's base from the table's centre along x, m.
 const BASE_X_M: f64 = 1.51;

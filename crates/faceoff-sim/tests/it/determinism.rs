@@ -3,18 +3,17 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Interpolation, Plant, World,
+    AirHockeyProfile, Interpolation, Plant, World,
     golden::{episode_hash, play_episode, start_episode, strike},
     model::INITIAL_Q,
 };
-use faceoff_types::Profile;
 
 #[test]
 fn episode_is_the_same_on_any_thread() {
-    let alone = play_episode(AirHockeyTask::Hit, Profile::Evaluation);
+    let alone = play_episode(AirHockeyTask::Hit, AirHockeyProfile::Evaluation);
     std::thread::scope(|scope| {
         let runs: Vec<_> = (0..4)
-            .map(|_| scope.spawn(|| play_episode(AirHockeyTask::Hit, Profile::Evaluation)))
+            .map(|_| scope.spawn(|| play_episode(AirHockeyTask::Hit, AirHockeyProfile::Evaluation)))
             .collect();
         for run in runs {
             assert_eq!(run.join().unwrap(), alone);
@@ -25,7 +24,7 @@ fn episode_is_the_same_on_any_thread() {
 #[test]
 fn saved_episode_continues_with_the_same_bits() {
     for task in AirHockeyTask::ALL {
-        let mut original = start_episode(task, Profile::Evaluation);
+        let mut original = start_episode(task, AirHockeyProfile::Evaluation);
         for _ in 0..20 {
             let action = strike(original.observation(), original.steps());
             original.step(&action);

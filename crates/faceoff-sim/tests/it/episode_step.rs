@@ -4,10 +4,10 @@
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::episode::ends::CROSSED_MIDDLE;
 use faceoff_sim::{
-    Bounds, Episode, Interpolation, JOINTS, PerturbationSettings, Plant, SimdLevel, StepOutcome,
-    golden::strike, model::INITIAL_Q, step_episodes, step_episodes_on,
+    Bounds, Episode, Factor, Factors, Interpolation, JOINTS, PerturbationSettings, Plant,
+    SimdLevel, StepOutcome, golden::strike, model::INITIAL_Q, step_episodes, step_episodes_on,
 };
-use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factor, Factors, Seed};
+use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Seed};
 
 /// All instruction sets of this machine.
 fn simd_levels() -> Vec<SimdLevel> {

@@ -4,13 +4,13 @@
 
 use crate::reference::{array, cases, max_difference};
 use faceoff_sim::{
-    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, ViolatedGroups,
-    World,
+    Command, Factors, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd,
+    ViolatedGroups, World,
     game::referee::Referee,
     golden::game_hash,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
 };
-use faceoff_types::{Factors, Seed, WINDOW_STEPS};
+use faceoff_types::{Seed, WINDOW_STEPS};
 use serde_json::Value;
 
 /// Control steps after which a puck that rests on one side is a foul: the first step, and 751 more, which exceed 15 s.

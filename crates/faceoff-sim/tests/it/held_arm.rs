@@ -1,8 +1,8 @@
 //! Episodes in which the arm holds its initial position.
 
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
-use faceoff_types::{Factors, Seed};
+use faceoff_sim::{Episode, Factors, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
+use faceoff_types::Seed;
 
 /// An episode of the nominal plant, with the rules' perturbation settings.
 pub fn episode(task: AirHockeyTask, factors: Factors, seed: u64) -> Episode {

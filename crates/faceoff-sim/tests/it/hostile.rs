@@ -3,10 +3,10 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Bounds, Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
-    RallyEnd, model::INITIAL_Q, stream::RandomStream,
+    Bounds, Command, Episode, Factors, Game, GameSetup, Interpolation, JOINTS,
+    PerturbationSettings, Plant, RallyEnd, model::INITIAL_Q, stream::RandomStream,
 };
-use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed};
+use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Seed};
 
 /// Pattern of the numbers in an agent's actions.
 #[derive(Debug, Clone, Copy)]

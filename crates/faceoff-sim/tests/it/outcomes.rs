@@ -2,9 +2,9 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Interpolation, PerturbationSettings, Plant, ViolatedGroups, model::INITIAL_Q,
+    Episode, Factors, Interpolation, PerturbationSettings, Plant, ViolatedGroups, model::INITIAL_Q,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 
 /// Plays episodes with an arm that holds still. Returns the number of successes and the number of episodes with a violated constraint.
 fn play_holding(task: AirHockeyTask, episodes: u32) -> (u32, u32) {

@@ -4,14 +4,14 @@
 use crate::held_arm::{episode, hold};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    PerturbationSettings, Plant,
+    Factor, Factors, PerturbationSettings, Plant,
     perturbation::{
         disturbance::Disturbance, noise::ObservationNoise, tracking_loss::TrackingLoss,
     },
     stream::RandomStream,
     table::puck::Puck,
 };
-use faceoff_types::{Factor, Factors, Seed};
+use faceoff_types::Seed;
 
 /// A stream of random numbers with an arbitrary seed.
 fn stream(label: &str) -> RandomStream {

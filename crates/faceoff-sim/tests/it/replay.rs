@@ -5,9 +5,9 @@
 use crate::reference::{array, cases, flat, max_difference, recording, rows};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Interpolation, MalletState, PerturbationSettings, Plant, SUBSTEPS, World,
+    Episode, Factors, Interpolation, MalletState, PerturbationSettings, Plant, SUBSTEPS, World,
 };
-use faceoff_types::{Factors, Seed};
+use faceoff_types::Seed;
 
 const PUCK_RADIUS_M: f64 = 0.03165;
 const MALLET_RADIUS_M: f64 = 0.04815;

@@ -20,7 +20,7 @@ use faceoff_types::{AblationId, Profile, Ruleset, RunId, SeedLabel, SubmissionId
 use jiff::Timestamp;
 
 impl Store {
-    /// Queues an ablation of a valid submission: the plan's tasks in every ablation profile.
+    /// Queues an ablation of a valid submission: the plan's tasks in each of the profiles, instead of in the plan's.
     /// [`StoreError::Conflict`] if the submission is not valid, or has an open ablation;
     /// [`StoreError::SeasonClosed`] once the season is over.
     #[boxed]
@@ -29,6 +29,7 @@ impl Store {
         actor: Actor,
         submission: SubmissionId,
         plan: &RunPlan,
+        profiles: &[Profile],
         now: Timestamp,
     ) -> Result<Ablation> {
         plan.check()?;
@@ -43,7 +44,7 @@ impl Store {
             }
             let id = AblationId::new();
             ablations::insert(tx, id, submission, now).await?;
-            for profile in Profile::ABLATION {
+            for profile in profiles.iter().copied() {
                 let run = Run {
                     id: RunId::new(),
                     ruleset: Ruleset::CURRENT,

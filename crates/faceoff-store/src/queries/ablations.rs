@@ -10,9 +10,8 @@ use crate::{
         runs,
     },
 };
-use faceoff_types::{AblationId, SubmissionId};
+use faceoff_types::{AblationId, ProfileMap, SubmissionId};
 use sqlx::SqliteConnection;
-use std::collections::BTreeMap;
 
 /// The newest ablation of a submission with its runs and their progress.
 pub(crate) async fn newest(
@@ -27,7 +26,7 @@ pub(crate) async fn newest(
 
 async fn from_row(connection: &mut SqliteConnection, row: AblationRow) -> Result<Ablation> {
     let (id, submission) = (row.id, row.submission_id);
-    let (mut run_by_profile, mut episodes_total, mut episodes_per_task) = (BTreeMap::new(), 0, 0);
+    let (mut run_by_profile, mut episodes_total, mut episodes_per_task) = (ProfileMap::new(), 0, 0);
     for run in ablations::runs(connection, id).await? {
         let plan = runs::find(connection, run).await?.plan;
         episodes_total += plan.episodes_total();

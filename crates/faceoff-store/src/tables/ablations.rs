@@ -4,18 +4,17 @@ use crate::{
     column::Instant,
     error::{Result, StoreError},
 };
-use faceoff_types::{AblationId, Profile, RunId, SubmissionId};
+use faceoff_types::{AblationId, ProfileMap, RunId, SubmissionId};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
-use std::collections::BTreeMap;
 
 /// An ablation: runs of a submission on the same episodes without any perturbation, with each one alone, and with all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ablation {
     pub id: AblationId,
     pub submission: SubmissionId,
-    /// One run for each profile of [`Profile::ABLATION`]; the rest of their plans is the same.
-    pub runs: BTreeMap<Profile, RunId>,
+    /// One run for each profile; the rest of their plans is the same. The order has no meaning.
+    pub runs: ProfileMap<RunId>,
     /// Episodes of each task and profile.
     pub episodes_per_task: u32,
     /// When it was requested.

@@ -346,7 +346,7 @@ fn name_error(name: &StageName) -> impl FnOnce(sqlx::Error) -> StoreError {
 mod tests {
     use super::*;
     use faceoff_airhockey::TASKS;
-    use faceoff_types::{Profile, Ruleset, Schedule};
+    use faceoff_types::{Ruleset, Schedule};
     use jiff::civil::date;
 
     fn time(text: &str) -> Timestamp {
@@ -371,7 +371,7 @@ mod tests {
                 rules: StageRules {
                     runtimes: None,
                     ruleset: Ruleset::CURRENT,
-                    profile: Profile::Evaluation,
+                    profile: faceoff_airhockey::EVALUATION,
                     tasks: TASKS.to_vec(),
                     episodes_per_task: 1,
                     max_faults: 1,

@@ -2,12 +2,12 @@
 //! cost it points. They count for no board, so that workers run them after all other jobs.
 
 use crate::fixture::{TestStore, shard_commit, six_shard_plan};
-use faceoff_airhockey::TASKS;
+use faceoff_airhockey::{ABLATION_PROFILES, TASKS};
 use faceoff_store::*;
 use faceoff_types::*;
 
 /// Number of profiles of an ablation, each of which is a run.
-const PROFILES: u32 = Profile::ABLATION.len() as u32;
+const PROFILES: u32 = ABLATION_PROFILES.len() as u32;
 /// Number of shards of a run: three tasks of four episodes, in shards of two episodes.
 const SHARDS_PER_RUN: u32 = 6;
 const EPISODES_PER_SHARD: u32 = 2;
@@ -44,7 +44,13 @@ impl TestStore {
             ..six_shard_plan()
         };
         self.store
-            .request_ablation(Actor::Organiser, submission, &plan, self.now)
+            .request_ablation(
+                Actor::Organiser,
+                submission,
+                &plan,
+                &ABLATION_PROFILES,
+                self.now,
+            )
             .await
             .unwrap()
     }
@@ -96,7 +102,7 @@ async fn ablation_runs_each_profile_and_task_once() {
         assert_eq!(ablation.runs[&run.plan.profile], run.id);
         played.push((run.plan.profile, shard.task, shard.first_episode));
     }
-    let expected: Vec<_> = Profile::ABLATION
+    let expected: Vec<_> = ABLATION_PROFILES
         .into_iter()
         .flat_map(|profile| TASKS.map(|task| [(profile, task, 0), (profile, task, 2)]))
         .flatten()

@@ -3,7 +3,7 @@
 //! A team submits an agent. A *validation run* checks it, and on each day it is evaluated: workers claim (lease) jobs from
 //! the queue, which are the *shards* of a run (episodes that are run together), and a scoring job at the end.
 
-use faceoff_airhockey::EE;
+use faceoff_airhockey::{EE, EVALUATION};
 use faceoff_store::*;
 pub use faceoff_testkit::{
     assert_conflict, assert_contains, one_shard_plan, rules_and_settings, six_shard_plan,
@@ -360,7 +360,7 @@ pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
 pub fn result(score: f64) -> EvaluationResult {
     EvaluationResult {
         ruleset: RULESET.into(),
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed: Seed::from_number(1),
         tasks: Default::default(),
         score,

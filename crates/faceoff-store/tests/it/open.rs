@@ -1,7 +1,7 @@
 //! The opening of a store, and its behaviour when values in its database are damaged.
 
 use crate::fixture::*;
-use faceoff_airhockey::HIT;
+use faceoff_airhockey::{HIT, IDEAL};
 use faceoff_store::*;
 use faceoff_types::{ActionSpace, Competition, Millionths, RecordingColumns, TaskInfo};
 use sqlx::Connection;
@@ -177,6 +177,9 @@ async fn season_belongs_to_one_competition() {
         },
         recording: RecordingColumns::default(),
         tiers: None,
+        profiles: Vec::new(),
+        ideal_profile: IDEAL,
+        counting_profile: IDEAL,
     };
     let stored = async || -> (Option<String>, Option<String>) {
         sqlx::query_as("SELECT competition_id, competition_hash FROM season")

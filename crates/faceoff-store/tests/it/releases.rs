@@ -2,6 +2,7 @@
 //! faults evaluations are rerun first. Also the end of a season.
 
 use crate::fixture::*;
+use faceoff_airhockey::ABLATION_PROFILES;
 use faceoff_store::*;
 use faceoff_types::{EvaluationId, StageDay};
 use jiff::civil::date;
@@ -255,9 +256,13 @@ async fn closed_season_refuses_all_operations() {
         .rerun_evaluation(Actor::Organiser, evaluation.id, f.now);
     assert_season_closed(rerun.await.unwrap_err());
     let stage = f.store.stages().await.unwrap().remove(0).id;
-    let ablation = f
-        .store
-        .request_ablation(Actor::Organiser, submission.id, &plan, f.now);
+    let ablation = f.store.request_ablation(
+        Actor::Organiser,
+        submission.id,
+        &plan,
+        &ABLATION_PROFILES,
+        f.now,
+    );
     assert_season_closed(ablation.await.unwrap_err());
     assert_eq!(
         f.store.start_scheduled_day(stage, f.now).await.unwrap(),

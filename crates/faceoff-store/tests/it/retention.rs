@@ -2,6 +2,7 @@
 //! kept. Also the deletion of submissions by teams, and the files of disqualified teams, which are kept as evidence.
 
 use crate::fixture::*;
+use faceoff_airhockey::ABLATION_PROFILES;
 use faceoff_store::*;
 use faceoff_testkit::change_settings;
 use faceoff_types::*;
@@ -499,9 +500,9 @@ async fn bundle_is_removed_with_its_last_dataset_unless_active() {
         &["bundle", "was removed", "cannot be evaluated again"],
     );
     let plan = one_shard_plan();
-    let ablation = f
-        .store
-        .request_ablation(Actor::Organiser, old.id, &plan, f.now);
+    let ablation =
+        f.store
+            .request_ablation(Actor::Organiser, old.id, &plan, &ABLATION_PROFILES, f.now);
     assert_conflict(ablation.await, &["was removed"]);
     assert!(f.claim().await.is_none(), "no job is queued");
 }

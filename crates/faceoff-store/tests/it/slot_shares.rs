@@ -3,6 +3,7 @@
 //! which jobs are claimed.
 
 use crate::fixture::*;
+use faceoff_airhockey::ABLATION_PROFILES;
 use faceoff_store::*;
 use faceoff_types::{EvaluationId, TeamId};
 use sqlx::{Row, SqlSafeStr};
@@ -416,6 +417,7 @@ async fn ablations_run_last_and_scoring_first() {
             Actor::Organiser,
             valid_submission,
             &one_episode_plan,
+            &ABLATION_PROFILES,
             s.f.now,
         )
         .await

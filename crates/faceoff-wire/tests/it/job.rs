@@ -1,7 +1,7 @@
 //! Jobs and reports survive a round trip through JSON.
 
 use faceoff_airhockey::TASKS;
-use faceoff_airhockey::{DEFEND, HIT};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT, TRACKING_LOSS};
 use faceoff_types::*;
 use faceoff_wire::game::GameSpec;
 use faceoff_wire::job::*;
@@ -55,7 +55,7 @@ fn shard(recording: Option<&str>) -> JobPayload {
             platform_retries: 1,
             task: DEFEND,
             episodes: 100..u32::MAX,
-            profile: Profile::TrackingLoss,
+            profile: TRACKING_LOSS,
             seed: Seed::from_number(4),
             mismatch_seed: Seed::from_number(5),
             max_faults: 6,
@@ -75,7 +75,7 @@ fn game(recording: Option<&str>) -> JobPayload {
         spec: GameSpec {
             ruleset: Ruleset::CURRENT,
             steps: 45_000,
-            profile: Profile::Evaluation,
+            profile: EVALUATION,
             seed: Seed::from_number(6),
             mismatch_seed: Seed::from_number(5),
             limits: GameLimits::default(),
@@ -95,7 +95,7 @@ fn all_jobs_round_trip() {
     let scoring = JobPayload::Scoring {
         evaluation: EvaluationId::new(),
         meta: EvaluationMeta {
-            profile: Profile::Evaluation,
+            profile: EVALUATION,
             seed: Seed::from_number(7),
             mismatch_seed: Seed::from_number(8),
             agent: "striker".into(),
@@ -155,7 +155,7 @@ fn all_reports_round_trip() {
     };
     let result = EvaluationResult {
         ruleset: RULESET.into(),
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed: Seed::from_number(1),
         tasks: Default::default(),
         score: 54.9,
@@ -234,7 +234,7 @@ fn jobs_without_variation_round_trip_unchanged() {
 
     let first_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
     let meta = EvaluationMeta {
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed: Seed::from_number(1),
         mismatch_seed: Seed::from_number(2),
         agent: "a".into(),
@@ -256,7 +256,7 @@ fn jobs_without_variation_round_trip_unchanged() {
 #[test]
 fn scoring_job_names_the_tiers_of_its_competition() {
     let meta = EvaluationMeta {
-        profile: Profile::Evaluation,
+        profile: faceoff_airhockey::EVALUATION,
         seed: Seed::from_number(1),
         mismatch_seed: Seed::from_number(2),
         agent: "a".into(),

@@ -10,7 +10,7 @@ use crate::{
     slot::Backoff,
     slot_threads::SlotThreads,
 };
-use faceoff_airhockey::TASKS;
+use faceoff_airhockey::{IDEAL, TASKS};
 use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
 use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, PackWriter};
@@ -134,7 +134,7 @@ fn clips(spec: &ShardSpec) -> Vec<u8> {
             task: spec.task,
             episode,
             steps: 10,
-            success: spec.profile == Profile::Ideal || episode != 1,
+            success: spec.profile == IDEAL || episode != 1,
             end: EpisodeEnd::HORIZON,
             why: text,
             start: [0.0; 4],

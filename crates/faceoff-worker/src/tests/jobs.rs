@@ -5,7 +5,7 @@ use super::{
     intercepted_server::{InterceptedServer, Interception},
 };
 use crate::server::{ClaimResult, JobServer as _, LeaseStatus};
-use faceoff_airhockey::TASKS;
+use faceoff_airhockey::{ABLATION_PROFILES, TASKS};
 use faceoff_store::*;
 use faceoff_testkit::{change_rules, six_shard_plan, valid_outcome};
 use faceoff_wire::job::{JobPayload, JobReport, JobSpec, OutputFiles};
@@ -84,7 +84,13 @@ async fn jobs_do_not_contain_the_season_secret() {
     };
     server
         .store
-        .request_ablation(Actor::Organiser, submission, &plan, server.now())
+        .request_ablation(
+            Actor::Organiser,
+            submission,
+            &plan,
+            &ABLATION_PROFILES,
+            server.now(),
+        )
         .await
         .unwrap();
     let secret = server.store.season().await.unwrap().secret;
@@ -131,9 +137,13 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     };
     assert_eq!(*spec.perturbations, Default::default());
     let submission = server.store.evaluation(id).await.unwrap().submission;
-    let created = server
-        .store
-        .request_ablation(Actor::Organiser, submission, &plan, server.now());
+    let created = server.store.request_ablation(
+        Actor::Organiser,
+        submission,
+        &plan,
+        &ABLATION_PROFILES,
+        server.now(),
+    );
     created.await.unwrap();
     complete_and_commit(&server, &job).await;
     let mut changed_jobs = 0;

@@ -1,15 +1,15 @@
 //! Agents whose runtime no stage accepts are refused before they run.
 
 use super::fixture::*;
+use faceoff_airhockey::IDEAL;
 use faceoff_store::*;
 use faceoff_testkit::{accept_runtimes, configure_stage, one_shard_plan, wait_for_validation};
-use faceoff_types::*;
 
 #[tokio::test]
 async fn unaccepted_runtime_is_refused_before_the_agent_runs() {
     let server = Server::new().await;
     let plan = RunPlan {
-        profile: Profile::Ideal,
+        profile: IDEAL,
         max_faults: 0,
         ..one_shard_plan()
     };

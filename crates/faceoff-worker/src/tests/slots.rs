@@ -2,7 +2,7 @@
 
 use super::fixture::*;
 use crate::{cleanup, slot::Backoff};
-use faceoff_airhockey::{HIT, TASKS};
+use faceoff_airhockey::{ABLATION_PROFILES, HIT, IDEAL, TASKS};
 use faceoff_replay::{ClipKey, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_scoring::EpisodeSummary;
@@ -257,7 +257,7 @@ async fn missed_day_is_started_once() {
     let outcome = valid_outcome("native", "a", "");
     finish_validation(&server.store, outcome, server.now()).await;
     let plan = RunPlan {
-        profile: Profile::Ideal,
+        profile: IDEAL,
         max_faults: 0,
         ..one_shard_plan()
     };
@@ -374,7 +374,13 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     };
     server
         .store
-        .request_ablation(Actor::Organiser, submission, &plan, server.now())
+        .request_ablation(
+            Actor::Organiser,
+            submission,
+            &plan,
+            &ABLATION_PROFILES,
+            server.now(),
+        )
         .await
         .unwrap();
     let mut events = server.store.events();
@@ -408,7 +414,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
         .collect();
     // The evaluation has 6 shards; the ablation has one for each of 6 profiles and 3 tasks.
     assert_eq!((specs.len(), ablation_specs.len()), (6 + 18, 18));
-    for (run, profile) in ablation_specs.chunks(3).zip(Profile::ABLATION) {
+    for (run, profile) in ablation_specs.chunks(3).zip(ABLATION_PROFILES) {
         for (spec, task) in run.iter().zip(TASKS) {
             assert_eq!(
                 (spec.profile, spec.task, &spec.episodes),
@@ -423,7 +429,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     for _ in 0..2 {
         cleanup::clean_up(&server.store, server.local().competition(), server.now()).await;
         assert_eq!(artifacts.ablations_with_parts().await.unwrap(), []);
-        for profile in Profile::ABLATION {
+        for profile in ABLATION_PROFILES {
             let key = Artifacts::ablation_clips_key(ablation.id, profile);
             let pack = Pack::open(&artifacts.local_path(&key).unwrap()).unwrap();
             let lines = pack.clip_index().unwrap().episodes;
@@ -437,7 +443,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
             }
         }
         // A part that arrives late has no effect.
-        let late = Artifacts::ablation_part_key(ablation.id, Profile::Ideal, HIT, 0);
+        let late = Artifacts::ablation_part_key(ablation.id, IDEAL, HIT, 0);
         server.put_artifact(&late, b"late").await;
     }
     for run in ablation.runs.into_values() {

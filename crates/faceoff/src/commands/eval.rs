@@ -12,7 +12,7 @@ mod server_stage;
 mod table;
 
 use super::{ca_file::CaFile, local_bundle, output::print};
-use crate::competition::{competition, parse_task};
+use crate::competition::{competition, parse_profile, parse_task};
 use crate::config::Config;
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -43,7 +43,7 @@ pub struct EvalCommand {
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
     /// Perturbations: ideal, one factor's name, or evaluation [default: evaluation, or the stage's with --like-server]
-    #[arg(long)]
+    #[arg(long, value_parser = parse_profile)]
     profile: Option<Profile>,
     /// Run the same episodes in every profile (ideal, each factor alone, all together) and compare
     /// them; writes ablation.json and a folder for each profile
@@ -122,7 +122,7 @@ impl EvalCommand {
                 server_stage.stage().rules.rules.clone()
             }
             None => StageRules {
-                profile: Profile::Evaluation,
+                profile: competition().counting_profile,
                 tasks: competition().task_names().collect(),
                 ..config.rules()
             },
@@ -133,6 +133,7 @@ impl EvalCommand {
         for task in &self.tasks {
             competition().find_task(task.as_str())?;
         }
+        competition().find_profile(rules.profile.as_str())?;
         let is_chosen = |task: &Task| self.tasks.contains(task);
         self.tasks = competition().task_names().filter(is_chosen).collect();
         fs::create_dir_all(&self.out)

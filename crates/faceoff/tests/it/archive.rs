@@ -173,7 +173,12 @@ async fn run_day(store: &Store) -> EvaluationId {
             } => {
                 let outcomes = store.outcomes(run.id).await.unwrap();
                 let bounds = faceoff_airhockey::competition().tier_bounds(&run.plan.variation);
-                let task = faceoff_scoring::score_task(&faceoff_airhockey::competition(), &outcomes, &Default::default(), bounds);
+                let task = faceoff_scoring::score_task(
+                    &faceoff_airhockey::competition(),
+                    &outcomes,
+                    &Default::default(),
+                    bounds,
+                );
                 let result: EvaluationResult = faceoff_scoring::score_evaluation(
                     run.ruleset,
                     run.plan.profile,

@@ -2,7 +2,7 @@
 //! without running agents.
 
 use crate::site::{LEASE_S, Site};
-use faceoff_airhockey::{EE, competition};
+use faceoff_airhockey::{EE, EVALUATION, competition};
 use faceoff_scoring::{
     tier_of,
     tournament::{Forfeit, GameScore, GameTally, SideScore, final_score, judge},
@@ -10,7 +10,7 @@ use faceoff_scoring::{
 use faceoff_store::{
     ClaimedJob, CommitOutcome, Game, GameCommit, GamePurpose, GameRecording, Job, JobClaim,
 };
-use faceoff_types::{ComputationTimeSummary, ForfeitCause, GameLimits, Profile, Ruleset, Seed};
+use faceoff_types::{ComputationTimeSummary, ForfeitCause, GameLimits, Ruleset, Seed};
 use serde_json::Value;
 
 /// The outcome of a game. In pairs the home side is first.
@@ -85,7 +85,7 @@ impl GameOutcome {
         };
         let score = GameScore {
             ruleset: Ruleset::CURRENT,
-            profile: Profile::Evaluation,
+            profile: EVALUATION,
             perturbations: Box::default(),
             limits: GameLimits::default(),
             seed,

@@ -8,7 +8,7 @@ use crate::{
 use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame};
 use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
-use faceoff_types::{GameLimits, Interpolation, Profile, Seed, Side};
+use faceoff_types::{GameLimits, Interpolation, Seed, Side};
 use scraper::{Html, Selector};
 
 /// Control steps of the recorded game.
@@ -17,7 +17,11 @@ const STEPS: u32 = 600;
 /// The clip file of a short game in which both arms do not move.
 fn record_game_clips() -> Vec<u8> {
     let seed = Seed::from_number(5);
-    let arena = Arena::new(Profile::Ideal, seed, seed.model_mismatch());
+    let arena = Arena::new(
+        faceoff_airhockey::IDEAL.try_into().unwrap(),
+        seed,
+        seed.model_mismatch(),
+    );
     let clips = GameClipRecorder::new(Vec::new()).unwrap();
     let mut running = RunningGame::begin(&arena, STEPS, GameLimits::default(), clips);
     while running.end().is_none() {

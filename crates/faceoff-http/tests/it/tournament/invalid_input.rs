@@ -36,6 +36,10 @@ async fn invalid_tournament_is_refused_with_the_reason() {
             &["rules", "step"],
         ),
         (
+            json!({ "name": "Cup", "rules": { "profile": "easy" } }),
+            &["rules", "profile", "easy", "expected ideal"],
+        ),
+        (
             json!({ "name": "Cup", "rules": { "ruleset": "airhockey-2023.1" } }),
             &["ruleset", "leave it out"],
         ),

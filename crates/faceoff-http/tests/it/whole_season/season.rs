@@ -193,7 +193,7 @@ impl Season {
         self.site.set_time(cutoff - SignedDuration::from_millis(1));
         start_due(
             &self.site.store,
-            &faceoff_airhockey::competition(),
+            faceoff_airhockey::simulator().competition(),
             self.site.now(),
         )
         .await
@@ -227,7 +227,7 @@ impl Season {
         self.site.advance(9 * 3600);
         clean_up(
             &self.site.store,
-            &faceoff_airhockey::competition(),
+            faceoff_airhockey::simulator().competition(),
             self.site.now(),
         )
         .await;

@@ -4,7 +4,7 @@ use super::texts::StageForm;
 use faceoff_api::requests::{OrNull, StagePatch};
 use faceoff_service::problem::Problem;
 use faceoff_store::Stage;
-use faceoff_types::{Profile, Schedule};
+use faceoff_types::Schedule;
 use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
 use serde_json::{Value, json};
 use std::{fmt::Display, str::FromStr};
@@ -30,6 +30,8 @@ pub(in crate::organiser) enum InputKind {
     DateTime,
     /// A whole number from this one on.
     Number(u32),
+    /// A profile of the competition.
+    Profile,
     /// Values with their labels.
     Choice(fn() -> Vec<(&'static str, &'static str)>),
     Checkbox,
@@ -149,7 +151,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
                 name: "profile",
                 label: "Perturbations",
                 note: "",
-                kind: InputKind::Choice(profiles),
+                kind: InputKind::Profile,
                 text: |stage| stage.rules.rules.profile.to_string(),
                 read: |form, patch| parse(form, "profile", &mut patch.profile),
             },
@@ -219,11 +221,6 @@ mean_of_last:5: the mean of the last 5 days",
         ],
     },
 ];
-
-fn profiles() -> Vec<(&'static str, &'static str)> {
-    let names = Profile::ALL.iter().map(|profile| profile.as_str());
-    names.map(|name| (name, name)).collect()
-}
 
 fn publications() -> Vec<(&'static str, &'static str)> {
     vec![

@@ -1,13 +1,13 @@
 //! Fuzz test of datasets: each is read, or refused as differing, altered or unreadable.
 
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
-use faceoff_airhockey::{DEFEND, HIT, simulator};
+use faceoff_airhockey::{DEFEND, EVALUATION, HIT, simulator};
 use faceoff_dataset::{
     Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble, shard_conditions,
     verify::{VerifyError, verify},
 };
 use faceoff_episode::{AnswerTiming, RunningEpisode, Simulator, StepSink};
-use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed};
+use faceoff_types::{Interpolation, Phase, Ruleset, Seed};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
 use std::{
@@ -47,7 +47,7 @@ fn record_dataset(dir: &Path) {
         platform_retries: 0,
         task: DEFEND,
         episodes: 0..2,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 9,
@@ -56,7 +56,7 @@ fn record_dataset(dir: &Path) {
     let shard = dir.join("shard");
     let folder = ShardFolder::create(&shard).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task, simulator().competition()).unwrap();
-    let environment = simulator().environment(&shard_conditions(&spec));
+    let environment = simulator().environment(&shard_conditions(&spec)).unwrap();
     let environment = environment.as_ref();
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {

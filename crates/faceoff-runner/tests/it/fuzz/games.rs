@@ -5,14 +5,13 @@ use super::{
     datasets::{ValidRecording, label},
     fuzz,
 };
+use faceoff_airhockey::EVALUATION;
 use faceoff_dataset::{
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
     verify::VerifyError,
 };
 use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame, SideFault};
-use faceoff_types::{
-    AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
-};
+use faceoff_types::{AgentFaultKind, GameLimits, Interpolation, Ruleset, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{fs, path::Path};
 use tempfile::TempDir;
@@ -23,14 +22,18 @@ fn record_game(out: &Path) {
     let spec = GameSpec {
         ruleset: Ruleset::CURRENT,
         steps: 40,
-        profile: Profile::Evaluation,
+        profile: EVALUATION,
         seed,
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits::default(),
         platform_retries: 0,
         perturbations: Box::default(),
     };
-    let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
+    let arena = Arena::new(
+        spec.profile.try_into().unwrap(),
+        spec.seed,
+        spec.mismatch_seed,
+    );
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
     let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
     while game.end().is_none() {

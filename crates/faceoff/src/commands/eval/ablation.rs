@@ -8,9 +8,9 @@ use crate::commands::{output::print, table_cells::percent_interval};
 use crate::competition::competition;
 use anyhow::Context;
 use faceoff_scoring::{EpisodeSummary, ProfileEffect};
-use faceoff_types::{Profile, RULESET, Seed, TaskMap};
+use faceoff_types::{ProfileMap, RULESET, Seed, TaskMap};
 use serde::Serialize;
-use std::{collections::BTreeMap, path::Path};
+use std::path::Path;
 
 /// `ablation.json`.
 #[derive(Debug, Serialize)]
@@ -24,8 +24,8 @@ struct AblationFile {
 /// Runs every profile into a folder of its name and compares them. Returns the number of agent faults.
 pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<usize> {
     let mut faults = 0;
-    let mut runs = BTreeMap::new();
-    for profile in Profile::ABLATION {
+    let mut runs = ProfileMap::new();
+    for profile in competition().ablation_profiles() {
         let outcome = run_profile(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
         faults += outcome.faults.len();
@@ -37,7 +37,8 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
         );
         runs.insert(profile, summary.context("comparing the profiles")?);
     }
-    let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
+    let tasks = faceoff_scoring::ablation(&runs, competition().ideal_profile)
+        .context("comparing the profiles")?;
     let agent = setup.bundle.manifest.name.clone();
     let text = table(&agent, setup.seed, &tasks);
     let path = out.join(ABLATION);

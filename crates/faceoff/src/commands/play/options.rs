@@ -1,5 +1,6 @@
 //! The arguments of `faceoff play`.
 
+use crate::competition::parse_profile;
 use clap::Args;
 use faceoff_types::{GAME_WINDOWS, MAX_GAME_STEPS, Profile, Seed, WINDOW_STEPS};
 use std::path::PathBuf;
@@ -22,7 +23,7 @@ pub(super) struct PlayOptions {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) games: Option<u32>,
     /// Perturbations: ideal, one factor's name, or evaluation
-    #[arg(long, default_value = "evaluation")]
+    #[arg(long, default_value = "evaluation", value_parser = parse_profile)]
     pub(super) profile: Profile,
     /// A number, or 64 hexadecimal digits; the same seed gives the same serves and noise everywhere
     #[arg(long, default_value = "0")]

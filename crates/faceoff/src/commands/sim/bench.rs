@@ -6,10 +6,10 @@ use clap::{Args, ValueEnum};
 use faceoff_episode::Arena;
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
-    model::INITIAL_Q,
+    AirHockeyProfile, Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
+    SUBSTEPS, model::INITIAL_Q,
 };
-use faceoff_types::{Profile, Seed, WINDOW_STEPS};
+use faceoff_types::{Seed, WINDOW_STEPS};
 use serde::Serialize;
 use std::{
     hint::black_box,
@@ -27,8 +27,8 @@ pub struct BenchArgs {
     #[arg(long, default_value_t = 20)]
     episodes: u32,
     /// Perturbations.
-    #[arg(long, default_value_t = Profile::Ideal)]
-    profile: Profile,
+    #[arg(long, default_value_t = AirHockeyProfile::Ideal)]
+    profile: AirHockeyProfile,
     /// Seed of the episodes.
     #[arg(long, default_value = "0")]
     seed: Seed,
@@ -72,7 +72,7 @@ impl BenchTask {
 #[derive(Debug, Serialize)]
 struct Report {
     task: BenchTask,
-    profile: Profile,
+    profile: AirHockeyProfile,
     episodes: u32,
     control_steps: u64,
     seconds: f64,

@@ -3,8 +3,8 @@
 
 use anyhow::{Context as _, Result, bail, ensure};
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Interpolation, JOINTS, MalletState, model::INITIAL_Q};
-use faceoff_types::{Profile, Seed};
+use faceoff_sim::{AirHockeyProfile, Interpolation, JOINTS, MalletState, model::INITIAL_Q};
+use faceoff_types::Seed;
 use serde::Deserialize;
 use serde_json::Value;
 use std::io::Read;
@@ -23,7 +23,7 @@ const NUMBER_LIMIT: f64 = 1e4;
 #[serde(deny_unknown_fields)]
 struct RawScenario {
     task: Option<AirHockeyTask>,
-    profile: Option<Profile>,
+    profile: Option<AirHockeyProfile>,
     seed: Option<Value>,
     robots: Option<u32>,
     puck: Vec<f64>,
@@ -40,7 +40,7 @@ pub struct Scenario {
     /// Adds the task's opponent, terminations and success.
     pub task: Option<AirHockeyTask>,
     /// Perturbations of the world.
-    pub profile: Profile,
+    pub profile: AirHockeyProfile,
     /// Used as evaluation seed and as episode seed.
     pub seed: Seed,
     /// [x, y, yaw, vx, vy, yaw rate].
@@ -124,7 +124,7 @@ impl Scenario {
         ensure!(every_ms >= 1, "every_ms: expected at least 1, got 0");
         Ok(Self {
             task: raw.task,
-            profile: raw.profile.unwrap_or(Profile::Ideal),
+            profile: raw.profile.unwrap_or(AirHockeyProfile::Ideal),
             seed: parse_seed(raw.seed)?,
             puck: to_array(&raw.puck, || "puck".to_owned())?,
             joints,

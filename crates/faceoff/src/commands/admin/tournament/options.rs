@@ -1,5 +1,6 @@
 //! Options of `faceoff admin tournament open` and `change`, and the JSON of the API's rules and settings that they stand for.
 
+use crate::competition::parse_profile;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use faceoff_types::{Profile, Publication};
@@ -25,7 +26,7 @@ pub(in crate::commands::admin) struct TournamentOptions {
     #[arg(long, value_name = "N")]
     steps: Option<u32>,
     /// Perturbation profile
-    #[arg(long)]
+    #[arg(long, value_parser = parse_profile)]
     profile: Option<Profile>,
     /// Play each meeting as a mirrored pair: two games on one seed with swapped sides
     #[arg(long, value_name = "true|false")]

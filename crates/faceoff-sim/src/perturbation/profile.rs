@@ -1,0 +1,191 @@
+//! Profiles: named sets of perturbations, that is, of deliberate differences between the evaluator's simulator and the
+//! one that teams have. Each single perturbation is called a factor.
+
+use faceoff_types::{Profile, UnknownProfile};
+use serde::{Deserialize, Serialize};
+use std::{fmt, str::FromStr};
+
+/// One difference between the evaluator's simulator and the ideal one (RULES, "Perturbation profiles").
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Factor {
+    /// The plant's masses, gains and friction differ from the nominal model, once per season.
+    ModelMismatch,
+    /// Gaussian noise on everything that the agent observes.
+    ObservationNoise,
+    /// Air flow pushes a moving puck.
+    Disturbance,
+    /// The puck's pose freezes for some steps.
+    TrackingLoss,
+    /// Delays and table of the real laboratory. Not in [`Factor::ALL`], since only the profile
+    /// `delay` uses it.
+    Delay,
+}
+
+impl Factor {
+    /// All factors of the `evaluation` profile.
+    pub const ALL: [Self; 4] = [
+        Self::ModelMismatch,
+        Self::ObservationNoise,
+        Self::Disturbance,
+        Self::TrackingLoss,
+    ];
+
+    /// The name used in files and as the single-factor profile.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::ModelMismatch => "model_mismatch",
+            Self::ObservationNoise => "observation_noise",
+            Self::Disturbance => "disturbance",
+            Self::TrackingLoss => "tracking_loss",
+            Self::Delay => "delay",
+        }
+    }
+}
+
+impl fmt::Display for Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+/// The set of active factors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Factors(u8);
+
+impl Factors {
+    /// No factor: the simulator that the teams have.
+    pub const NONE: Self = Self(0);
+    /// All four factors of the `evaluation` profile.
+    pub const ALL: Self = Self(0b1111);
+
+    #[must_use]
+    pub const fn only(factor: Factor) -> Self {
+        Self(1 << factor as u8)
+    }
+
+    /// This set with one more factor.
+    #[must_use]
+    pub const fn with(self, factor: Factor) -> Self {
+        Self(self.0 | 1 << factor as u8)
+    }
+
+    /// Is the factor active?
+    #[must_use]
+    pub const fn contains(self, factor: Factor) -> bool {
+        self.0 & (1 << factor as u8) != 0
+    }
+}
+
+/// A named set of perturbations.
+///
+/// The rules also define a rehearsal profile. Only its delays are implemented, as [`AirHockeyProfile::Delay`], not its safety layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AirHockeyProfile {
+    /// The simulator that the teams have, without perturbations.
+    Ideal,
+    /// Model mismatch alone.
+    ModelMismatch,
+    /// Observation noise alone.
+    ObservationNoise,
+    /// Air-flow disturbance alone.
+    Disturbance,
+    /// Tracking loss alone.
+    TrackingLoss,
+    /// Delays and table of the real laboratory alone.
+    Delay,
+    /// The four factors together; used for evaluations that count.
+    Evaluation,
+}
+
+impl AirHockeyProfile {
+    /// All profiles, in the order of lists.
+    pub const ALL: [Self; 7] = [
+        Self::Ideal,
+        Self::ModelMismatch,
+        Self::ObservationNoise,
+        Self::Disturbance,
+        Self::TrackingLoss,
+        Self::Delay,
+        Self::Evaluation,
+    ];
+
+    /// Its name, by which others know it.
+    #[must_use]
+    pub const fn name(self) -> Profile {
+        Profile::new(match self {
+            Self::Ideal => "ideal",
+            Self::ModelMismatch => Factor::ModelMismatch.as_str(),
+            Self::ObservationNoise => Factor::ObservationNoise.as_str(),
+            Self::Disturbance => Factor::Disturbance.as_str(),
+            Self::TrackingLoss => Factor::TrackingLoss.as_str(),
+            Self::Delay => Factor::Delay.as_str(),
+            Self::Evaluation => "evaluation",
+        })
+    }
+
+    /// The factors that are active in this profile.
+    #[must_use]
+    pub const fn factors(self) -> Factors {
+        match self {
+            Self::Ideal => Factors::NONE,
+            Self::ModelMismatch => Factors::only(Factor::ModelMismatch),
+            Self::ObservationNoise => Factors::only(Factor::ObservationNoise),
+            Self::Disturbance => Factors::only(Factor::Disturbance),
+            Self::TrackingLoss => Factors::only(Factor::TrackingLoss),
+            Self::Delay => Factors::only(Factor::Delay),
+            Self::Evaluation => Factors::ALL,
+        }
+    }
+}
+
+impl fmt::Display for AirHockeyProfile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.name().fmt(f)
+    }
+}
+
+impl From<AirHockeyProfile> for Profile {
+    fn from(profile: AirHockeyProfile) -> Self {
+        profile.name()
+    }
+}
+
+impl FromStr for AirHockeyProfile {
+    type Err = UnknownProfile;
+    fn from_str(name: &str) -> Result<Self, UnknownProfile> {
+        let found = Self::ALL
+            .into_iter()
+            .find(|profile| profile.name().as_str() == name);
+        found.ok_or_else(|| UnknownProfile::new(name, Self::ALL.map(Self::name)))
+    }
+}
+
+impl TryFrom<Profile> for AirHockeyProfile {
+    type Error = UnknownProfile;
+    fn try_from(name: Profile) -> Result<Self, UnknownProfile> {
+        name.as_str().parse()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn profiles_are_found_by_name_with_their_factors() {
+        for profile in AirHockeyProfile::ALL {
+            assert_eq!(profile.name().try_into(), Ok(profile));
+            let json = serde_json::to_string(&profile.name()).unwrap();
+            assert_eq!(serde_json::to_string(&profile).unwrap(), json);
+        }
+        assert!("easy".parse::<AirHockeyProfile>().is_err());
+        for factor in Factor::ALL {
+            assert!(AirHockeyProfile::Evaluation.factors().contains(factor));
+            let single: AirHockeyProfile = factor.as_str().parse().unwrap();
+            assert_eq!(single.factors(), Factors::only(factor));
+        }
+    }
+}
