@@ -48,6 +48,7 @@ mod roles;
 mod runtimes;
 mod scoring_settings;
 mod season;
+mod second_competition;
 mod seeds;
 mod sign_in;
 mod sign_off;

@@ -243,11 +243,17 @@ impl Site {
     }
 
     /// Restarts the server with a competition that has no tiers.
-    pub async fn without_tiers(mut self) -> Self {
-        self.config.competition = Arc::new(Competition {
+    pub async fn without_tiers(self) -> Self {
+        let competition = Competition {
             tiers: None,
             ..faceoff_airhockey::competition()
-        });
+        };
+        self.with_competition(Arc::new(competition)).await
+    }
+
+    /// Restarts the server with another competition.
+    pub async fn with_competition(mut self, competition: Arc<Competition>) -> Self {
+        self.config.competition = competition;
         self.restart().await;
         self
     }
