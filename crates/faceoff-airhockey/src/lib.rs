@@ -1,12 +1,30 @@
-//! The Robot Air Hockey Challenge as a competition of the platform: its tasks, how their episodes end, its violations,
-//! and its profiles (sets of perturbations).
+//! The Robot Air Hockey Challenge as a competition of the platform: its description (tasks, ends of episodes, violations, and profiles,
+//! which are sets of perturbations), its world, and games of two agents. The effects of answers in games and the content of their
+//! recordings are decided here only.
+//!
+//! This crate starts no process, opens no file and reads no clock.
 
+mod arena;
+mod columns;
+mod end_description;
 mod env;
+mod game_record;
+mod running_game;
+mod running_side;
 mod simulator;
+mod world;
 
+pub use arena::Arena;
+pub use columns::{action_space, recording_columns};
+pub use end_description::describe_end;
+pub use game_record::{
+    Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
+    SideFault, SideStep,
+};
+pub use running_game::{FinishedGame, RunningGame};
 pub use simulator::{AirHockey, simulator};
+pub use world::AirHockeyWorld;
 
-use faceoff_episode::{action_space, recording_columns};
 use faceoff_scoring::{
     COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, TIER_BOUNDS,
     tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},

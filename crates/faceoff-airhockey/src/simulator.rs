@@ -1,7 +1,8 @@
 //! The simulator of air hockey, as slots and verification use it.
 
+use crate::Arena;
 use crate::{competition, env::env};
-use faceoff_episode::{Arena, Conditions, Environment, Simulator};
+use faceoff_episode::{Conditions, Environment, Simulator};
 use faceoff_types::{AgentTask, Competition, UnknownProfile, UnknownTask};
 use std::sync::{Arc, LazyLock};
 

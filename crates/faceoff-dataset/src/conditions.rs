@@ -1,6 +1,7 @@
 //! The conditions of a job: the same to play under, and to verify the recording with.
 
-use faceoff_episode::{Arena, Conditions};
+use faceoff_airhockey::Arena;
+use faceoff_episode::Conditions;
 use faceoff_types::UnknownProfile;
 use faceoff_wire::{game::GameSpec, job::ShardSpec};
 

@@ -15,7 +15,8 @@ use std::fmt;
 /// provides the answers, from a process, a recording or a function:
 ///
 /// ```
-/// # use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, NullSink};
+/// # use faceoff_airhockey::{Arena};
+/// # use faceoff_episode::{AnswerTiming, RunningEpisode, NullSink};
 /// # use faceoff_sim::AirHockeyProfile;
 /// # use faceoff_types::{Interpolation, Phase, Seed, Task};
 /// # let hit = Task::new("hit");
@@ -259,6 +260,6 @@ impl<S: StepSink> RunningEpisode<S> {
     }
 }
 
-pub(crate) fn are_finite(observation: &[f64]) -> bool {
+fn are_finite(observation: &[f64]) -> bool {
     observation.iter().all(|value| value.is_finite())
 }

@@ -5,8 +5,9 @@ use crate::{
     actions::{ActionFormat, ActionMode},
     errors::{OrderError, argument_error, catch_panic, check_perturbations, simulator_error},
 };
+use faceoff_airhockey::Arena;
 use faceoff_airhockey::{TASKS, competition};
-use faceoff_episode::{AnswerTiming, Arena, NullSink, RunningEpisode};
+use faceoff_episode::{AnswerTiming, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
 use faceoff_sim::{AirHockeyProfile, AirHockeyTask};
 use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};

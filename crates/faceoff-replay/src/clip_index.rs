@@ -2,7 +2,7 @@
 //! with its start, its end and its violations.
 
 use crate::{error::ReplayError, group::Group};
-use faceoff_episode::describe_end;
+use faceoff_airhockey::describe_end;
 use faceoff_types::{EpisodeEnd, Task, TaskMap};
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};

@@ -12,7 +12,8 @@ use crate::{
     motion::Motion,
     violations::ViolationTracker,
 };
-use faceoff_episode::{AirHockeyWorld, EpisodeStart, StepRow, World, describe_end};
+use faceoff_airhockey::{AirHockeyWorld, describe_end};
+use faceoff_episode::{EpisodeStart, StepRow, World};
 use faceoff_sim::{EpisodeState, JOINTS, model::LINKS, table::frames::table_from_robot};
 use faceoff_types::{EpisodeOutcome, Task, escape_unprintable};
 

@@ -11,9 +11,8 @@ use crate::{
     pack::{ClipKey, PackWriter},
     violations::ViolationTracker,
 };
-use faceoff_episode::{
-    AnswerTiming, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, RecordError,
-};
+use faceoff_airhockey::{GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart};
+use faceoff_episode::{AnswerTiming, RecordError};
 use faceoff_sim::{GameState, RallyEnd};
 use faceoff_types::{Side, WINDOW_STEPS};
 use std::io::Write;

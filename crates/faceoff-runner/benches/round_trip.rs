@@ -14,8 +14,9 @@
 mod instant;
 
 use criterion::{BatchSize, Criterion};
+use faceoff_airhockey::Arena;
 use faceoff_airhockey::HIT;
-use faceoff_episode::{Arena, NullSink};
+use faceoff_episode::NullSink;
 use faceoff_runner::{
     AgentEnvironment, KernelCounters, Observer, Session, ShardSpec, play_shard, run_shard,
 };

@@ -14,7 +14,7 @@ use crate::{
     files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, allow_missing},
     simulator::game_simulator_id,
 };
-use faceoff_episode::FinishedGame;
+use faceoff_airhockey::FinishedGame;
 use faceoff_scoring::tournament::{GameScore, GameSettings, score_game};
 use faceoff_types::{GameOutcome, Side};
 use faceoff_wire::{

@@ -7,7 +7,8 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_episode::{AnswerTiming, Effect, RallyEntry, Response, SideFault, action_space};
+use faceoff_airhockey::{Effect, RallyEntry, Response, SideFault, action_space};
+use faceoff_episode::AnswerTiming;
 use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, AgentTask, Interpolation, Side};
 
 /// Location of a row in a recording.

@@ -6,7 +6,8 @@ use super::{
     rows::{GameRows, record_error},
 };
 use crate::{error::RecordingError, files::allow_missing, table::TableWriter};
-use faceoff_episode::{GameSink, GameStepRow, RallyRow, RallyStart, RecordError};
+use faceoff_airhockey::{GameSink, GameStepRow, RallyRow, RallyStart};
+use faceoff_episode::RecordError;
 use faceoff_replay::GameClipRecorder;
 use faceoff_types::Side;
 use faceoff_wire::game::GAME_SCHEMA;

@@ -16,7 +16,8 @@ use crate::{
 };
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::SchemaRef;
-use faceoff_episode::{FinishedGame, RecordError, RunningGame};
+use faceoff_airhockey::{FinishedGame, RunningGame};
+use faceoff_episode::RecordError;
 use faceoff_types::{AgentFault, Interpolation, Side};
 
 /// Simulates a game again with its recorded inputs.

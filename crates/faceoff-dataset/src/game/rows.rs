@@ -4,7 +4,8 @@ use crate::{
     error::RecordingError,
     table::{EntryRows, MotionRows, RallyRows, SideRows},
 };
-use faceoff_episode::{GameSink, GameStepRow, RallyRow, RallyStart, RecordError};
+use faceoff_airhockey::{GameSink, GameStepRow, RallyRow, RallyStart};
+use faceoff_episode::RecordError;
 use faceoff_types::Side;
 
 /// The rows of all tables of a game.

@@ -13,9 +13,8 @@ use arrow_array::{
     },
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use faceoff_episode::{
-    GameStepRow, RallyEntry, RallyRow, RallyStart, StateColumns, recording_columns,
-};
+use faceoff_airhockey::{GameStepRow, RallyEntry, RallyRow, RallyStart, recording_columns};
+use faceoff_episode::StateColumns;
 use faceoff_types::{AgentFault, Side};
 use std::sync::Arc;
 

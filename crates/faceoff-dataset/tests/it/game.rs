@@ -6,11 +6,12 @@ use crate::{
 };
 use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
 use faceoff_airhockey::EVALUATION;
+use faceoff_airhockey::{Arena, RallyEntry, Response, RunningGame, SideFault};
 use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
 };
-use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame, SideFault};
+use faceoff_episode::AnswerTiming;
 use faceoff_replay::{CHUNK_STEPS, Clip, ClipKey, Pack};
 use faceoff_types::{AgentFaultKind, GameLimits, Interpolation, Ruleset, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};

@@ -1,6 +1,4 @@
-//! Episodes and games run from scripted answers.
+//! Episodes run from scripted answers.
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
-mod episode;
-mod game;
 mod point_mass;

@@ -1,6 +1,5 @@
 //! Episodes in a world other than air hockey: a mass on a line, which the agent pushes to the origin.
 
-use faceoff_airhockey::STOPPED;
 use faceoff_episode::{
     AnswerTiming, Environment, EpisodeStart, NullSink, RecordError, RunningEpisode, StateColumns,
     StepRow, StepSink, World,
@@ -107,6 +106,8 @@ impl Environment for Line {
 
 /// The task of the other world.
 const REACH: Task = Task::new("reach");
+/// The mass has come to the origin.
+const STOPPED: EpisodeEnd = EpisodeEnd::new("stopped");
 
 /// Positions that a recording has.
 #[derive(Default)]

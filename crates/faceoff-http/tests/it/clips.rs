@@ -4,8 +4,9 @@ use crate::{
     html::texts,
     site::{ADMIN, Answer, Site, TestTeam, result},
 };
+use faceoff_airhockey::Arena;
 use faceoff_airhockey::PREPARE;
-use faceoff_episode::{AnswerTiming, Arena, RunningEpisode, StepSink};
+use faceoff_episode::{AnswerTiming, RunningEpisode, StepSink};
 use faceoff_replay::{Clip, ClipRecorder, join_packs};
 use faceoff_types::{AgentFaultKind, Interpolation, Phase, Seed};
 use flate2::read::GzDecoder;

@@ -106,7 +106,8 @@ fn worker_config(site: &Site, simulator: Arc<dyn Simulator>) -> WorkerConfig {
 
 /// The text of the elements that a CSS selector finds, with single spaces.
 fn texts(html: &scraper::Html, selector: &str) -> Vec<String> {
-    let found = html.select(&Selector::parse(selector).unwrap());
+    let selector = Selector::parse(selector).unwrap();
+    let found = html.select(&selector);
     let text = |element: scraper::ElementRef<'_>| {
         let text: String = element.text().collect();
         text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -138,7 +139,9 @@ async fn second_competition_runs_on_the_real_server() {
         let team = site.team(style).await;
         let uploaded = site.upload(&team.token, bundle(style)).await.json(201);
         let id = string(&uploaded["id"]).parse().unwrap();
-        let state = faceoff_testkit::wait_for_validation(&site.store, id).await.state;
+        let state = faceoff_testkit::wait_for_validation(&site.store, id)
+            .await
+            .state;
         let path = format!("/api/v1/submissions/{id}");
         let submission = site.get(&path, Some(&team.token)).await.json(200);
         assert_eq!(submission["state"], "active", "{state:?} {submission}");
@@ -169,11 +172,18 @@ async fn second_competition_runs_on_the_real_server() {
     // Browsed: boards, evaluation, team, episodes, season, stages, the form of a stage.
     let shown = site.get("/", Some(ADMIN)).await.html(200);
     let headings = texts(&shown, "main table th").join(" ");
-    assert!(headings.contains("Reach") && headings.contains("Settle"), "{headings}");
+    assert!(
+        headings.contains("Reach") && headings.contains("Settle"),
+        "{headings}"
+    );
     let of_task = site.get("/tasks/settle", Some(ADMIN)).await;
     assert!(of_task.body.contains("too fast"), "{}", of_task.body);
     let csv = site.get("/api/v1/board?format=csv", Some(ADMIN)).await;
-    assert!(csv.body.contains("speeding") && !csv.body.contains("tier"), "{}", csv.body);
+    assert!(
+        csv.body.contains("speeding") && !csv.body.contains("tier"),
+        "{}",
+        csv.body
+    );
     let evaluation = evaluations[1];
     for path in [
         "/season".to_owned(),

@@ -2,7 +2,7 @@
 //! serve to a goal, a foul or another end.
 
 use super::report::{GameObserver, GameReport};
-use faceoff_episode::{GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart};
+use faceoff_airhockey::{GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart};
 use faceoff_sim::{GameState, RallyEnd, table::frames::table_from_robot};
 use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
 use std::time::{Duration, Instant};

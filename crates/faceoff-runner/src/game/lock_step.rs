@@ -4,7 +4,8 @@
 
 use super::side_player::SidePlayer;
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
-use faceoff_episode::{GameSink, Question, RunningGame};
+use faceoff_airhockey::{GameSink, RunningGame};
+use faceoff_episode::Question;
 use faceoff_sandbox::{Layer, SandboxError};
 use faceoff_types::{Side, TimeLimits};
 use std::time::{Duration, Instant};

@@ -11,13 +11,12 @@ use crate::{
     fault::PlatformFault,
     host_interference::{InterferenceMonitor, KernelCounters},
 };
+use faceoff_airhockey::{FinishedGame, GameSink, GameStepRow, RallyRow, RallyStart, RunningGame};
 use faceoff_dataset::{
     game::{GameArchives, GameRecorder, RecordedGame, remove_game},
     game_arena,
 };
-use faceoff_episode::{
-    FinishedGame, GameSink, GameStepRow, RallyRow, RallyStart, RecordError, RunningGame,
-};
+use faceoff_episode::RecordError;
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::Side;
 use faceoff_wire::game::{GameCalibration, GameSpec};

@@ -9,7 +9,8 @@ use crate::{
     session::Session,
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{AnswerTiming, RallyEntry, Response, SideFault};
+use faceoff_airhockey::{RallyEntry, Response, SideFault};
+use faceoff_episode::AnswerTiming;
 use faceoff_types::{AgentFault, AgentTask, Interpolation, Side, TimeLimits};
 use std::time::{Duration, Instant};
 

@@ -430,10 +430,10 @@ fn cancelled_game_leaves_logs_and_no_recording() {
         steps: u32,
     }
     impl GameObserver for CancellingObserver {
-        fn on_rally_start(&mut self, _: &faceoff_episode::RallyStart<'_>) {
+        fn on_rally_start(&mut self, _: &faceoff_airhockey::RallyStart<'_>) {
             self.rallies += 1;
         }
-        fn on_step(&mut self, _: &faceoff_episode::GameStepRow<'_>) {
+        fn on_step(&mut self, _: &faceoff_airhockey::GameStepRow<'_>) {
             self.steps += 1;
         }
         fn log(&mut self, side: Side, log: &str) {

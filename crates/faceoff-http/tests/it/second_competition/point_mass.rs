@@ -106,12 +106,15 @@ impl Simulator for PointMass {
         &self,
         conditions: &Conditions<'_>,
     ) -> Result<Box<dyn Environment>, UnknownProfile> {
-        self.competition
-            .find_profile(conditions.profile.as_str())?;
+        self.competition.find_profile(conditions.profile.as_str())?;
         let blows = conditions.profile == WINDY;
         Ok(Box::new(Line {
             seed: conditions.seed,
-            wind_m_s2: if blows { 0.2 * fraction(conditions.mismatch_seed) } else { 0.0 },
+            wind_m_s2: if blows {
+                0.2 * fraction(conditions.mismatch_seed)
+            } else {
+                0.0
+            },
             competition: self.competition.clone(),
         }))
     }

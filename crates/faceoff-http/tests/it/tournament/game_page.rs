@@ -5,7 +5,8 @@ use crate::{
     html::{rows, texts},
     site::string,
 };
-use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame};
+use faceoff_airhockey::{Arena, RallyEntry, Response, RunningGame};
+use faceoff_episode::AnswerTiming;
 use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
 use faceoff_types::{GameLimits, Interpolation, Seed, Side};

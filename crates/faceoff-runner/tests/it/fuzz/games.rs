@@ -6,11 +6,12 @@ use super::{
     fuzz,
 };
 use faceoff_airhockey::EVALUATION;
+use faceoff_airhockey::{Arena, RallyEntry, Response, RunningGame, SideFault};
 use faceoff_dataset::{
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
     verify::VerifyError,
 };
-use faceoff_episode::{AnswerTiming, Arena, RallyEntry, Response, RunningGame, SideFault};
+use faceoff_episode::AnswerTiming;
 use faceoff_types::{AgentFaultKind, GameLimits, Interpolation, Ruleset, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{fs, path::Path};

@@ -1,7 +1,7 @@
 //! The progress bar of `faceoff play`.
 
 use anyhow::Context;
-use faceoff_episode::{GameStepRow, RallyRow};
+use faceoff_airhockey::{GameStepRow, RallyRow};
 use faceoff_runner::GameObserver;
 use indicatif::{ProgressBar, ProgressStyle};
 

@@ -7,8 +7,8 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
+use faceoff_airhockey::describe_end;
 use faceoff_dataset::{Dataset, DatasetError, EpisodeRecord};
-use faceoff_episode::describe_end;
 use faceoff_scoring::{
     COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, computation_time_penalty,
     tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},

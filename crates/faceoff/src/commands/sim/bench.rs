@@ -3,7 +3,7 @@
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
-use faceoff_episode::Arena;
+use faceoff_airhockey::Arena;
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     AirHockeyProfile, Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant,

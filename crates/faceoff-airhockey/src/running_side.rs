@@ -1,11 +1,8 @@
 //! One *side* (agent and robot) of a running game. A game is divided into *windows* of equal length, which scoring treats like
 //! episodes.
 
-use crate::{
-    air_hockey::game_record::{RallyEntry, SideFault},
-    record::AnswerTiming,
-    time_sum::TimeSum,
-};
+use crate::game_record::{RallyEntry, SideFault};
+use faceoff_episode::{AnswerTiming, TimeSum};
 use faceoff_sim::{ConstraintValues, ViolatedGroups};
 use faceoff_types::{
     AgentFault, AgentTask, ForfeitCause, GameFault, GameLimits, GameWindow, Phase, Side,

@@ -1,7 +1,7 @@
 //! Inputs of a game between two agents, the *sides*, and the rows of its recording. A game is a sequence of rallies; a *rally* lasts
 //! from a serve to a goal, a foul or another end. In pairs, the first side comes first.
 
-use crate::record::{AnswerTiming, NullSink, RecordError};
+use faceoff_episode::{AnswerTiming, NullSink, RecordError};
 use faceoff_sim::{ConstraintValues, GameState, Impact, RallyEnd};
 use faceoff_types::{AgentFault, AgentFaultKind, Interpolation, Side};
 

@@ -1,9 +1,10 @@
 //! Games from scripted answers: late answers, faults, forfeits and divergence.
 
-use faceoff_episode::{
-    AnswerTiming, Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry,
-    RallyRow, RallyStart, RecordError, Response, RunningGame, SideFault,
+use faceoff_airhockey::{
+    Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow,
+    RallyStart, Response, RunningGame, SideFault,
 };
+use faceoff_episode::{AnswerTiming, RecordError};
 use faceoff_sim::{AirHockeyProfile, Bounds, RallyEnd};
 use faceoff_types::{
     ACTION_LIMIT, AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Interpolation,

@@ -1,9 +1,7 @@
 //! The world of an episode of a qualifying task.
 
-use crate::{
-    air_hockey::arena::Arena,
-    world::{Environment, StateColumns, World},
-};
+use crate::arena::Arena;
+use faceoff_episode::{Environment, StateColumns, World};
 use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact};
 use faceoff_types::{ActionLayout, EpisodeEnd, Interpolation, Seed, Task, UnknownTask, Violations};
 use std::any::Any;

@@ -2,17 +2,14 @@
 //! to a goal, a foul or another end.
 
 use crate::{
-    air_hockey::{
-        arena::Arena,
-        game_record::{
-            Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
-            SideFault, SideStep,
-        },
-        running_side::RunningSide,
+    arena::Arena,
+    game_record::{
+        Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
+        SideFault, SideStep,
     },
-    record::RecordError,
-    running_episode::{NonFiniteObservation, Question, are_finite},
+    running_side::RunningSide,
 };
+use faceoff_episode::{NonFiniteObservation, Question, RecordError};
 use faceoff_sim::{Command, Divergence, Game};
 use faceoff_types::{
     AgentFault, AgentFaultKind, AgentTask, GameEnd, GameLimits, GameOutcome, Interpolation, Phase,
@@ -23,7 +20,8 @@ use faceoff_types::{
 /// provides the responses, from two processes or from a recording:
 ///
 /// ```
-/// # use faceoff_episode::{AnswerTiming, Arena, RallyEntry, RunningGame, NullSink, Response};
+/// # use faceoff_airhockey::{Arena, RallyEntry, RunningGame, Response};
+/// # use faceoff_episode::{AnswerTiming, NullSink};
 /// # use faceoff_sim::AirHockeyProfile;
 /// # use faceoff_types::{GameEnd, GameLimits, Interpolation, Seed, Side};
 /// # let seed = Seed::from_number(1);
@@ -171,7 +169,7 @@ impl<S: GameSink> RunningGame<S> {
         let step = self.rally_steps();
         let observation = &self.game.observation(side.index())[..];
         // Later observations are finite, since a diverging world ends the rally.
-        if step == 0 && !are_finite(observation) {
+        if step == 0 && observation.iter().any(|value| !value.is_finite()) {
             return Err(NonFiniteObservation {
                 agent_task: AgentTask::Game { side },
                 episode: self.rally(),

@@ -1,9 +1,10 @@
 //! Episodes from scripted answers: recordings, limits on steps, faults and divergence.
 
+use faceoff_airhockey::{Arena, recording_columns};
 use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
 use faceoff_episode::{
-    AnswerTiming, Arena, EpisodeStart, NullSink, Question, RecordError, RunningEpisode,
-    StateColumns, StepRow, StepSink, World, recording_columns,
+    AnswerTiming, EpisodeStart, NullSink, Question, RecordError, RunningEpisode, StateColumns,
+    StepRow, StepSink, World,
 };
 use faceoff_sim::{AirHockeyProfile, Bounds};
 use faceoff_types::{
