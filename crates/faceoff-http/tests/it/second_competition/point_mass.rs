@@ -31,7 +31,7 @@ impl PointMass {
             title: title.to_owned(),
             aim: aim.to_owned(),
             weight: Millionths::new(500_000),
-            max_steps: 60,
+            max_steps: 80,
         };
         let profile = |profile, letter, description: &str| ProfileInfo {
             profile,
