@@ -33,8 +33,8 @@ pub use faceoff_sim::episode::constraints::{EE, JOINT_POS, JOINT_VEL, LINK};
 pub use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
 use faceoff_sim::{AirHockeyProfile, AirHockeyTask};
 use faceoff_types::{
-    Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths, Profile, ProfileInfo, Task,
-    TaskInfo, ViolationInfo, ViolationName,
+    CONTROL_STEP_S, Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths, Profile,
+    ProfileInfo, Task, TaskInfo, ViolationInfo, ViolationName,
 };
 
 /// Score a goal.
@@ -220,6 +220,7 @@ fn task(task: Task, title: &str, weight: u32, aim: &str) -> TaskInfo {
         aim: aim.to_owned(),
         weight: Millionths::new(weight),
         max_steps: EPISODE_STEPS,
+        control_step_s: CONTROL_STEP_S,
     }
 }
 

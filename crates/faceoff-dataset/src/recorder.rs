@@ -42,7 +42,7 @@ impl Recorder {
         Ok(Self {
             steps_file: TableWriter::create(&folder.partial(STEPS_FILE), steps.schema())?,
             episodes_file: TableWriter::create(&folder.partial(EPISODES_FILE), episodes.schema())?,
-            clips: ClipRecorder::new(task, BufWriter::new(clips))?,
+            clips: ClipRecorder::new(task, competition, BufWriter::new(clips))?,
             steps,
             episodes,
         })

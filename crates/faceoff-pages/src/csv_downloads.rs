@@ -3,7 +3,7 @@
 use super::frame::PageProblem;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::ablation::AblationStatus;
-use faceoff_replay::Group;
+use faceoff_replay::EpisodeLine;
 use faceoff_service::{
     app::App,
     csv::{Table, escape_formula, or_empty},
@@ -12,7 +12,7 @@ use faceoff_service::{
     viewer::Viewer,
     views::{ablation, clips::Clips, visibility::Visibility},
 };
-use faceoff_types::{EvaluationId, SubmissionId};
+use faceoff_types::{EvaluationId, SubmissionId, ViolationName};
 
 type CsvResponse = Result<Response, PageProblem>;
 
@@ -25,31 +25,24 @@ pub(super) async fn episodes(
     let PathParam(id) = id?;
     let visibility = Visibility::load(&app, viewer?).await?;
     let view = Clips::find(&app, &visibility, id).await?.episodes().await?;
-    let mut columns: Vec<String> = [
-        "task",
-        "episode",
-        "steps",
-        "success",
-        "end",
-        "why",
-        "start_x_m",
-        "start_y_m",
-        "start_vx_m_s",
-        "start_vy_m_s",
-        "last_x_m",
-        "last_y_m",
-        "last_vx_m_s",
-        "last_vy_m_s",
-        "longest_s",
-        "late",
-    ]
-    .map(str::to_owned)
-    .into();
-    for group in Group::ALL {
-        let name = group.as_str();
-        for suffix in ["first_step", "steps", "worst", "x_m", "y_m", "joint"] {
-            columns.push(format!("{name}_{suffix}"));
+    let mut columns: Vec<String> = ["task", "episode", "steps", "success", "end", "why"]
+        .map(str::to_owned)
+        .into();
+    // Of other worlds than air hockey no positions are known.
+    let has_positions =
+        view.episodes.is_empty() || view.episodes.iter().any(EpisodeLine::has_clips);
+    let mut suffixes = vec!["first_step", "steps", "worst"];
+    if has_positions {
+        for state in ["start", "last"] {
+            let values = ["x_m", "y_m", "vx_m_s", "vy_m_s"];
+            columns.extend(values.map(|value| format!("{state}_{value}")));
         }
+        suffixes.extend(["x_m", "y_m", "joint"]);
+    }
+    columns.extend(["longest_s", "late"].map(str::to_owned));
+    let kinds: Vec<ViolationName> = app.config.competition.world_violations().collect();
+    for name in &kinds {
+        columns.extend(suffixes.iter().map(|suffix| format!("{name}_{suffix}")));
     }
     let mut table = Table::new(&columns);
     for line in &view.episodes {
@@ -61,22 +54,31 @@ pub(super) async fn episodes(
             line.end.as_str().to_owned(),
             escape_formula(&line.why),
         ];
-        row.extend(line.start.iter().chain(&line.last).map(ToString::to_string));
+        if has_positions {
+            let states = [line.start, line.last].into_iter();
+            let numbers = states.flat_map(|state| state.map_or([None; 4], |state| state.map(Some)));
+            row.extend(numbers.map(or_empty));
+        }
         row.push(or_empty(line.longest_s));
         row.push(or_empty(line.longest_s.map(|_| line.late)));
-        for group in Group::ALL {
+        for name in &kinds {
             let violation = line
                 .broken
                 .iter()
-                .find(|violation| violation.group == group);
+                .find(|violation| violation.group == *name);
             row.extend([
                 or_empty(violation.map(|violation| violation.from)),
                 or_empty(violation.map(|violation| violation.samples)),
                 or_empty(violation.map(|violation| violation.worst)),
-                or_empty(violation.map(|violation| violation.at[0])),
-                or_empty(violation.map(|violation| violation.at[1])),
-                or_empty(violation.and_then(|violation| violation.joint)),
             ]);
+            if has_positions {
+                let at = violation.and_then(|violation| violation.at);
+                row.extend([
+                    or_empty(at.map(|[x, _]| x)),
+                    or_empty(at.map(|[_, y]| y)),
+                    or_empty(violation.and_then(|violation| violation.joint)),
+                ]);
+            }
         }
         table.row(row);
     }

@@ -1,6 +1,7 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
 use faceoff_replay::{Group, ViolationSummary};
+use faceoff_types::Competition;
 
 pub(super) const fn group_label(group: Group) -> &'static str {
     match group {
@@ -12,11 +13,18 @@ pub(super) const fn group_label(group: Group) -> &'static str {
 }
 
 /// A violation with its size and duration.
-pub(super) fn describe_violation(violation: &ViolationSummary) -> String {
-    let excess = match violation.group {
-        Group::Ee | Group::Link => excess_text(1e3 * violation.worst, 1, "mm"),
-        Group::JointPos => excess_text(violation.worst, 4, "rad"),
-        Group::JointVel => excess_text(violation.worst, 3, "rad/s"),
+pub(super) fn describe_violation(
+    competition: &Competition,
+    violation: &ViolationSummary,
+) -> String {
+    let group = Group::ALL
+        .into_iter()
+        .find(|group| group.name() == violation.group);
+    let excess = match group {
+        Some(Group::Ee | Group::Link) => excess_text(1e3 * violation.worst, 1, "mm"),
+        Some(Group::JointPos) => excess_text(violation.worst, 4, "rad"),
+        Some(Group::JointVel) => excess_text(violation.worst, 3, "rad/s"),
+        None => format!("up to {:.3}", violation.worst),
     };
     let joint = match violation.joint {
         Some(joint) => format!(" of joint {joint}"),
@@ -24,7 +32,7 @@ pub(super) fn describe_violation(violation: &ViolationSummary) -> String {
     };
     format!(
         "{}{joint}: by {excess}, from step {}, for {} {}",
-        group_label(violation.group),
+        competition.violation_title(violation.group),
         violation.from,
         violation.samples,
         if violation.samples == 1 {

@@ -12,7 +12,8 @@ use super::{
 use crate::query::with_query;
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_api::requests::EpisodesQuery;
+use faceoff_api::requests::{EpisodesQuery, ViolatedLimit};
+use faceoff_replay::EpisodeLine;
 use faceoff_service::{
     app::App,
     extract::{PathParam, QueryParams},
@@ -56,6 +57,8 @@ struct Page {
     outcomes: Vec<SelectOption>,
     violated: Vec<SelectOption>,
     ends: Vec<SelectOption>,
+    /// Are positions on the table known?
+    has_table: bool,
     table: TableOutline,
     start_maps: Vec<StartMap>,
     violations: ViolationMap,
@@ -81,11 +84,17 @@ pub(super) async fn page(
         Problem::new(ProblemKind::InvalidRequest, detail)
     };
     let chosen = query.filter().map_err(invalid)?;
+    let competition = &app.config.competition;
     if let Some(task) = chosen.task {
-        let found = app.config.competition.find_task(task.as_str());
+        let found = competition.find_task(task.as_str());
         found.map_err(|_| invalid("task"))?;
     }
-    let ends = &app.config.competition.ends;
+    if let Some(ViolatedLimit::One(name)) = chosen.violated
+        && !competition.world_violations().any(|known| known == name)
+    {
+        return Err(invalid("violated").into());
+    }
+    let ends = &competition.ends;
     if let Some(end) = chosen.end
         && !ends.iter().any(|info| info.end == end)
     {
@@ -114,7 +123,7 @@ pub(super) async fn page(
         .iter()
         .skip(first)
         .take(ROWS_PER_PAGE)
-        .map(|line| Row::new(id, line))
+        .map(|line| Row::new(competition, id, line))
         .collect();
     let other_page = |number: usize| {
         let query = EpisodesQuery {
@@ -130,17 +139,14 @@ pub(super) async fn page(
         is_selected: selected == value,
     };
     let is_played = |task: &Task| view.episodes.iter().any(|line| line.task == *task);
-    let tasks = app.config.competition.task_names().filter(is_played);
-    let groups = [
-        ("any", "any limit"),
-        ("ee", "end effector"),
-        ("link", "elbow, wrist"),
-        ("joint_pos", "joint position"),
-        ("joint_vel", "joint velocity"),
-    ];
+    let tasks = competition.task_names().filter(is_played);
+    let any = ("any".to_owned(), "any limit".to_owned());
+    let kinds = competition
+        .world_violations()
+        .map(|name| (name.to_string(), competition.violation_title(name)));
     let late = clips
         .can_see_observations
-        .then_some(("late", "a late answer"));
+        .then(|| ("late".to_owned(), "a late answer".to_owned()));
     render(&Page {
         frame: Frame::load(&app, "").await?,
         style: assets::EPISODES_STYLE.url(),
@@ -163,15 +169,16 @@ pub(super) async fn page(
         outcomes: [("success", "success"), ("failure", "no success")]
             .map(|(value, label)| option(&query.outcome, value, label))
             .into(),
-        violated: groups
-            .into_iter()
+        violated: std::iter::once(any)
+            .chain(kinds)
             .chain(late)
-            .map(|(value, label)| option(&query.violated, value, label))
+            .map(|(value, label)| option(&query.violated, &value, &label))
             .collect(),
         ends: ends
             .iter()
             .map(|info| option(&query.end, info.end.as_str(), &info.title))
             .collect(),
+        has_table: view.episodes.is_empty() || view.episodes.iter().any(EpisodeLine::has_clips),
         table: TableOutline::new(),
         start_maps: tasks
             .filter_map(|task| StartMap::new(task, &matching))

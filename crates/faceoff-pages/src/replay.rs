@@ -10,7 +10,6 @@ use crate::embeddable::Embeddable;
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::paths;
-use faceoff_replay::model::CONTROL_STEP_S;
 use faceoff_service::{
     app::App,
     episode_path::EpisodePath,
@@ -94,6 +93,7 @@ impl EpisodeReplay {
         let clips = Clips::find(app, &visibility, id).await?;
         let clip = clips.episode(task, episode).await?;
         let line = &clip.line;
+        let competition = &app.config.competition;
         let team = app.store.team(clips.evaluation.team).await?;
         let day = clips.evaluation.stage_day.date;
         let api = format!("{}/episodes/{task}/{episode}", paths::evaluation(id));
@@ -105,9 +105,13 @@ impl EpisodeReplay {
             day,
             success: line.success,
             end_reason: line.why.clone(),
-            violations: line.broken.iter().map(describe_violation).collect(),
+            violations: line
+                .broken
+                .iter()
+                .map(|violation| describe_violation(competition, violation))
+                .collect(),
             late_answers: line.late,
-            duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
+            duration_s: format!("{:.2}", competition.duration_s(task, line.steps)),
             replay: ReplaySection::new(
                 &clip,
                 &api,

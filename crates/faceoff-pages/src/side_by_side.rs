@@ -2,8 +2,8 @@
 //! which the browser draws an episode.
 
 use super::{episode_text::describe_violation, replay_section::ReplaySection};
-use faceoff_replay::model::CONTROL_STEP_S;
 use faceoff_service::views::clip_file::Episode;
+use faceoff_types::Competition;
 
 /// One of the two replays in `side_by_side.html`.
 pub(super) struct Side {
@@ -31,6 +31,7 @@ pub(super) fn neighbours(
 impl Side {
     /// `api`: address of the clips. `element_id`: id of the HTML element.
     pub(super) fn new(
+        competition: &Competition,
         element_id: &'static str,
         episode: &Episode,
         api: &str,
@@ -43,8 +44,12 @@ impl Side {
             name,
             path: None,
             success: outcome.success,
-            duration_s: format!("{:.2}", f64::from(outcome.steps) * CONTROL_STEP_S),
-            violations: outcome.broken.iter().map(describe_violation).collect(),
+            duration_s: format!("{:.2}", competition.duration_s(outcome.task, outcome.steps)),
+            violations: outcome
+                .broken
+                .iter()
+                .map(|violation| describe_violation(competition, violation))
+                .collect(),
             replay: ReplaySection {
                 id: element_id,
                 sync_group: Some("both"),

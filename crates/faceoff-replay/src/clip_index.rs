@@ -1,9 +1,8 @@
 //! The index of the episodes in a pack of clips (a clip is the recording of an episode for replays): a line for each episode
 //! with its start, its end and its violations.
 
-use crate::{error::ReplayError, group::Group};
-use faceoff_airhockey::describe_end;
-use faceoff_types::{EpisodeEnd, Task, TaskMap};
+use crate::error::ReplayError;
+use faceoff_types::{EpisodeEnd, Task, TaskMap, ViolationName};
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -13,6 +12,8 @@ use std::{
 
 /// Name and version of the index's layout.
 const INDEX_FORMAT: &str = "faceoff-sheet/1";
+/// What everybody may read of an episode that a fault of the agent ended.
+const AGENT_FAULT_TEXT: &str = "a fault of the agent ended the episode";
 /// Maximum uncompressed size of an index.
 const MAX_BYTES: u64 = 256 << 20;
 
@@ -51,11 +52,14 @@ pub struct EpisodeLine {
     pub end: EpisodeEnd,
     /// Description of the end.
     pub why: String,
-    /// True position and velocity of the puck at the start: x, y (m), vx, vy (m/s), table frame.
-    pub start: [f64; 4],
+    /// True position and velocity of the puck at the start: x, y (m), vx, vy (m/s), table frame. Absent in other worlds than air
+    /// hockey, whose episodes have no clips.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<[f64; 4]>,
     /// True position and velocity of the puck at the end, as in `start`.
-    pub last: [f64; 4],
-    /// Violations, one entry per group of constraints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub last: Option<[f64; 4]>,
+    /// Violations, one entry per kind.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub broken: Vec<ViolationSummary>,
     /// Longest computation time, s; only visible to those with access to the dataset.
@@ -67,10 +71,16 @@ pub struct EpisodeLine {
 }
 
 impl EpisodeLine {
+    /// Has the episode clips, so that it can be replayed?
+    #[must_use]
+    pub const fn has_clips(&self) -> bool {
+        self.start.is_some()
+    }
+
     /// Removes what only those with access to the dataset may see: details of faults, and computation times.
     pub fn make_public(&mut self) {
         if self.end == EpisodeEnd::AGENT_FAULT {
-            self.why = describe_end(self.task, self.end, &[0.0; 6], self.steps, None);
+            self.why = AGENT_FAULT_TEXT.to_owned();
         }
         self.longest_s = None;
         self.late = 0;
@@ -85,20 +95,21 @@ const fn is_zero(count: &u32) -> bool {
     *count == 0
 }
 
-/// The violations of a group of constraints in an episode.
+/// The violations of one kind in an episode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ViolationSummary {
-    /// The group of constraints.
-    pub group: Group,
+    /// The kind of violation.
+    pub group: ViolationName,
     /// The first sample with a violation. Sample k is the state after k control steps.
     pub from: u32,
     /// Number of samples with a violation.
     pub samples: u32,
-    /// Largest excess over the limit: rad, rad/s or m.
+    /// Largest excess over the limit, such as rad, rad/s or m.
     pub worst: f64,
-    /// Position of the end effector at the first sample: x, y (m), table frame.
-    pub at: [f64; 2],
+    /// Position of the end effector at the first sample: x, y (m), table frame; in air hockey.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at: Option<[f64; 2]>,
     /// For joint positions and velocities: the joint that exceeded its limit most at the first sample, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<u32>,

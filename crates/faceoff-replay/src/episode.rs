@@ -92,7 +92,7 @@ impl Recording {
         if let Some(violation) = self
             .violations
             .iter_mut()
-            .find(|violation| violation.group == group)
+            .find(|violation| violation.group == group.name())
         {
             violation.samples += 1;
             violation.worst = violation.worst.max(value);
@@ -115,11 +115,11 @@ impl Recording {
             Group::Ee | Group::Link => None,
         };
         self.violations.push(ViolationSummary {
-            group,
+            group: group.name(),
             from: sample,
             samples: 1,
             worst: value,
-            at: [x, y],
+            at: Some([x, y]),
             joint,
         });
     }
@@ -149,8 +149,8 @@ impl Recording {
             success: outcome.success,
             end: outcome.end,
             why: reason.clone(),
-            start: position_and_velocity(&self.start),
-            last: position_and_velocity(&self.last),
+            start: Some(position_and_velocity(&self.start)),
+            last: Some(position_and_velocity(&self.last)),
             broken: self.violations,
             longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
             late: u32::try_from(late.len()).unwrap_or(u32::MAX),

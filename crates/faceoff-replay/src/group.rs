@@ -1,6 +1,8 @@
 //! The groups of constraints on a robot's motion, each of which has one kind of violation.
 
+use faceoff_airhockey::{EE, JOINT_POS, JOINT_VEL, LINK};
 use faceoff_sim::ConstraintValues;
+use faceoff_types::ViolationName;
 use serde::{Deserialize, Serialize};
 
 /// A group of constraints.
@@ -21,14 +23,14 @@ pub enum Group {
 impl Group {
     pub const ALL: [Self; 4] = [Self::Ee, Self::Link, Self::JointPos, Self::JointVel];
 
-    /// Name in files.
+    /// The name of its kind of violation.
     #[must_use]
-    pub const fn as_str(self) -> &'static str {
+    pub const fn name(self) -> ViolationName {
         match self {
-            Self::Ee => "ee",
-            Self::Link => "link",
-            Self::JointPos => "joint_pos",
-            Self::JointVel => "joint_vel",
+            Self::Ee => EE,
+            Self::Link => LINK,
+            Self::JointPos => JOINT_POS,
+            Self::JointVel => JOINT_VEL,
         }
     }
 

@@ -18,6 +18,7 @@ mod gzip;
 mod header;
 mod motion;
 mod pack;
+mod plain_episode;
 mod positions;
 mod recorder;
 #[cfg(test)]

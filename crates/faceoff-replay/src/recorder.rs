@@ -6,19 +6,29 @@ use crate::{
     error::ReplayError,
     gzip::Gzip,
     pack::{ClipKey, PackWriter},
+    plain_episode::PlainRecording,
 };
 use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
-use faceoff_types::{EpisodeOutcome, Task};
-use std::io::Write;
+use faceoff_types::{Competition, EpisodeOutcome, Task};
+use std::{io::Write, sync::Arc};
 
 /// Writes a pack of the episodes of one task. It holds the samples of one episode and a line for each episode in memory.
 pub struct ClipRecorder<W> {
     task: Task,
+    competition: Arc<Competition>,
     pack: PackWriter<W>,
     index: ClipIndex,
     /// The episode that is being recorded.
-    current: Option<Recording>,
+    current: Option<Current>,
     gzip: Gzip,
+}
+
+/// An episode that is being recorded.
+enum Current {
+    /// With clips.
+    AirHockey(Box<Recording>),
+    /// In another world: a line without clips.
+    Plain(PlainRecording),
 }
 
 impl<W> std::fmt::Debug for ClipRecorder<W> {
@@ -35,9 +45,10 @@ impl<W: Write> ClipRecorder<W> {
     ///
     /// # Errors
     /// [`ReplayError::Io`].
-    pub fn new(task: Task, out: W) -> Result<Self, ReplayError> {
+    pub fn new(task: Task, competition: &Arc<Competition>, out: W) -> Result<Self, ReplayError> {
         Ok(Self {
             task,
+            competition: competition.clone(),
             pack: PackWriter::new(out)?,
             index: ClipIndex::default(),
             current: None,
@@ -59,6 +70,14 @@ impl<W: Write> ClipRecorder<W> {
             return Ok(());
         };
         let times = self.index.times.entry(self.task).or_default();
+        let recording = match recording {
+            Current::AirHockey(recording) => *recording,
+            Current::Plain(recording) => {
+                let line = recording.end(outcome, &self.competition, times);
+                self.index.episodes.push(line);
+                return Ok(());
+            }
+        };
         let clips = recording.end(outcome, times);
         let [motion, observed] = clips.compressed(&mut self.gzip)?;
         let episode = outcome.episode;
@@ -73,18 +92,24 @@ impl<W: Write> ClipRecorder<W> {
 
 impl<W: Write> StepSink for ClipRecorder<W> {
     fn begin(&mut self, start: EpisodeStart<'_>) {
-        self.current = Recording::begin(&start);
+        let recording = Recording::begin(&start).map(Box::new);
+        self.current = Some(recording.map_or_else(
+            || Current::Plain(PlainRecording::default()),
+            Current::AirHockey,
+        ));
     }
 
     fn observe(&mut self, observation: &[f64]) {
-        if let Some(recording) = &mut self.current {
+        if let Some(Current::AirHockey(recording)) = &mut self.current {
             recording.observe(observation);
         }
     }
 
     fn step(&mut self, row: &StepRow<'_>) {
-        if let Some(recording) = &mut self.current {
-            recording.step(row);
+        match &mut self.current {
+            Some(Current::AirHockey(recording)) => recording.step(row),
+            Some(Current::Plain(recording)) => recording.step(row, &self.competition),
+            None => {}
         }
     }
 

@@ -45,6 +45,8 @@ pub struct TaskInfo {
     pub weight: Millionths,
     /// Control steps of the longest episode.
     pub max_steps: u32,
+    /// Duration of a control step, in seconds.
+    pub control_step_s: f64,
 }
 
 /// A way in which episodes end.
@@ -163,6 +165,13 @@ impl Competition {
             .filter(is_of_world)
     }
 
+    /// The title of a kind of violation; its name if the competition has no such kind.
+    #[must_use]
+    pub fn violation_title(&self, name: ViolationName) -> String {
+        let info = self.violation(name);
+        info.map_or_else(|| name.to_string(), |info| info.title.clone())
+    }
+
     /// The description of a kind of violation; `None` if the competition has no such kind.
     #[must_use]
     pub fn violation(&self, name: ViolationName) -> Option<&ViolationInfo> {
@@ -268,6 +277,13 @@ impl Competition {
         self.task(task).map_or(0, |info| info.max_steps)
     }
 
+    /// Duration of these control steps of a task, in seconds.
+    #[must_use]
+    pub fn duration_s(&self, task: Task, steps: u32) -> f64 {
+        let step_s = self.task(task).map_or(0.0, |info| info.control_step_s);
+        f64::from(steps) * step_s
+    }
+
     /// Control steps of the longest episode.
     #[must_use]
     pub fn longest_episode(&self) -> u32 {
@@ -326,6 +342,7 @@ mod tests {
                 aim: "Reach the target.".to_owned(),
                 weight: Millionths::new(1_000_000),
                 max_steps: 100,
+                control_step_s: 0.1,
             }],
             ends: Vec::new(),
             violations: Vec::new(),

@@ -1,21 +1,20 @@
 //! Filter of an evaluation's episodes, for the page that lists them: by task, outcome, violated limit and end.
 
-use faceoff_replay::{EpisodeLine, Group};
-use faceoff_types::{EpisodeEnd, Task};
+use faceoff_replay::EpisodeLine;
+use faceoff_types::{EpisodeEnd, Task, ViolationName};
 use serde::{Deserialize, Serialize};
 
 /// Query of the page with an evaluation's episodes. An empty form field selects all episodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpisodesQuery {
-    /// `hit`, `defend` or `prepare`.
+    /// A task of the competition.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub task: String,
     /// `success` or `failure`.
     #[serde(default, alias = "went", skip_serializing_if = "String::is_empty")]
     pub outcome: String,
-    /// The limit that the episode violated: a constraint on the end effector (`ee`), a robot link (`link`), a joint position
-    /// (`joint_pos`) or a joint velocity (`joint_vel`), `any` of these, or the time of an answer (`late`).
+    /// The limit that the episode violated: a kind of violation of the competition, `any` of these, or the time of an answer (`late`).
     #[serde(default, alias = "broke", skip_serializing_if = "String::is_empty")]
     pub violated: String,
     /// How the episode ended.
@@ -44,8 +43,8 @@ pub struct EpisodeFilter {
 pub enum ViolatedLimit {
     /// At least one constraint.
     Any,
-    /// A constraint of this group.
-    One(Group),
+    /// This limit of the competition.
+    One(ViolationName),
     /// The time limit of an answer, which is one control step.
     Late,
 }

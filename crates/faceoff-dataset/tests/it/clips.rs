@@ -4,7 +4,7 @@ use crate::recordings::{Evaluation, swing_arm};
 use arrow_array::{Array, Int64Array, cast::AsArray, types::Float64Type};
 use faceoff_airhockey::{DEFEND, EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE, simulator};
 use faceoff_dataset::{Dataset, assemble};
-use faceoff_replay::{Clip, ClipKey, ContactWith, Group, Pack};
+use faceoff_replay::{Clip, ClipKey, ContactWith, Pack};
 use faceoff_types::Task;
 use std::path::PathBuf;
 
@@ -172,19 +172,11 @@ fn clip_index_matches_the_dataset_for_each_episode() {
         );
         assert_eq!(motion.header.end.unwrap().why, line.why);
         let task_violations = &violations.tasks[&outcome.task];
-        for (group, name) in [
-            (Group::Ee, EE),
-            (Group::Link, LINK),
-            (Group::JointPos, JOINT_POS),
-            (Group::JointVel, JOINT_VEL),
-        ] {
+        for name in [EE, LINK, JOINT_POS, JOINT_VEL] {
             let recorded = task_violations.constraints[&name]
                 .iter()
                 .find(|violation| violation.episode == outcome.episode);
-            let found = line
-                .broken
-                .iter()
-                .find(|violation| violation.group == group);
+            let found = line.broken.iter().find(|violation| violation.group == name);
             match (recorded, found) {
                 (None, None) => {}
                 (Some(recorded), Some(found)) => {
@@ -193,7 +185,7 @@ fn clip_index_matches_the_dataset_for_each_episode() {
                     assert_eq!(found.worst, recorded.max);
                     compared += 1;
                 }
-                (recorded, found) => panic!("{group:?}: {recorded:?} but {found:?}"),
+                (recorded, found) => panic!("{name}: {recorded:?} but {found:?}"),
             }
         }
     }

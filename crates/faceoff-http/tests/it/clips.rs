@@ -40,7 +40,12 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
         seed.model_mismatch(),
     );
     let part = folder.join("part");
-    let mut clips = ClipRecorder::new(PREPARE, File::create(&part).unwrap()).unwrap();
+    let mut clips = ClipRecorder::new(
+        PREPARE,
+        faceoff_airhockey::simulator().competition(),
+        File::create(&part).unwrap(),
+    )
+    .unwrap();
     for episode in 0..EPISODES {
         let layout = Some(Interpolation::Cubic.into());
         let mut running =

@@ -164,7 +164,10 @@ async fn second_competition_runs_on_the_real_server() {
     let row = |index: usize, field: &str| rows[index][field].clone();
     let ranked: Vec<Value> = (0..3).map(|index| row(index, "team")).collect();
     assert_eq!(ranked, ["steady", "hasty", "idle"], "{board}");
-    assert_eq!((row(0, "score"), row(0, "penalty_points")), (json!(100.0), json!(0.0)));
+    assert_eq!(
+        (row(0, "score"), row(0, "penalty_points")),
+        (json!(100.0), json!(0.0))
+    );
     assert_eq!(row(2, "score"), 0.0);
     assert_eq!(rows[0].get("tier"), None);
     let violations = &rows[1]["tasks"]["settle"]["violations"];
@@ -200,6 +203,25 @@ async fn second_competition_runs_on_the_real_server() {
             assert!(!text.contains(foreign), "{foreign} is on {path}: {text}");
         }
     }
+    let path = format!("/evaluations/{evaluation}/episodes?violated=speeding&task=reach");
+    let episodes = site.get(&path, Some(&teams[1].token)).await.html(200);
+    let rows = texts(&episodes, "table.episodes tbody tr");
+    assert_eq!(rows.len(), 6, "{rows:?}");
+    assert!(
+        rows[0].contains("success arrived speed: by up to"),
+        "{rows:?}"
+    );
+    let path = format!("/api/v1/evaluations/{evaluation}/episodes");
+    let listed = site.get(&path, Some(&teams[1].token)).await.json(200);
+    let first = &listed["episodes"][0];
+    assert_eq!(
+        (&first["task"], &first["end"]),
+        (&json!("reach"), &json!("arrived"))
+    );
+    assert_eq!(
+        (first.get("start"), &first["broken"][0]["group"]),
+        (None, &json!("speeding"))
+    );
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
     let names = &document["components"]["schemas"]["Task"]["enum"];
     assert_eq!(names, &json!(["reach", "settle"]));

@@ -59,6 +59,7 @@ pub(crate) async fn page(
             paths::submission(id)
         );
         sides.push(Side::new(
+            &app.config.competition,
             element_id,
             &clip,
             &api,

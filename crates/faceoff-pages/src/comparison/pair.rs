@@ -93,7 +93,13 @@ async fn side(
     );
     Ok(Side {
         path: Some(page_path(evaluation.evaluation, task, episode)),
-        ..Side::new(element_id, &clip, &api, evaluation.team.to_string())
+        ..Side::new(
+            &app.config.competition,
+            element_id,
+            &clip,
+            &api,
+            evaluation.team.to_string(),
+        )
     })
 }
 

@@ -43,7 +43,7 @@ impl StartMap {
         let lines: Vec<&EpisodeLine> = lines
             .iter()
             .copied()
-            .filter(|line| line.task == task)
+            .filter(|line| line.task == task && line.has_clips())
             .collect();
         if lines.is_empty() {
             return None;
@@ -51,7 +51,8 @@ impl StartMap {
         let starts = |success: bool| -> Vec<Position> {
             let episodes = lines.iter().filter(|line| line.success == success);
             episodes
-                .map(|line| [line.start[0], line.start[1]])
+                .filter_map(|line| line.start)
+                .map(|[x, y, ..]| [x, y])
                 .collect()
         };
         let (solved, failed) = (starts(true), starts(false));
@@ -66,7 +67,7 @@ impl StartMap {
                     id: format!("across-{task}"),
                     caption: "Success by start position across the table",
                     value: "y",
-                    rows: success_by(&lines, |line| line.start[1], "m", 0.2),
+                    rows: success_by(&lines, |[_, y, ..]| y, "m", 0.2),
                 },
                 SuccessTable {
                     id: format!("speed-{task}"),
@@ -83,19 +84,18 @@ impl StartMap {
 }
 
 /// Speed of the puck at the start, m/s. `hypot` is avoided: it differs between C libraries.
-fn speed(line: &EpisodeLine) -> f64 {
-    let [_, _, vx, vy] = line.start;
+fn speed([_, _, vx, vy]: [f64; 4]) -> f64 {
     (vx * vx + vy * vy).sqrt()
 }
 
 /// Success by classes of a value, each `width` wide. Empty classes are omitted; a single class gives no rows.
 fn success_by(
     lines: &[&EpisodeLine],
-    value: impl Fn(&EpisodeLine) -> f64,
+    value: impl Fn([f64; 4]) -> f64,
     unit: &str,
     width: f64,
 ) -> Vec<SuccessRow> {
-    let class = |line: &EpisodeLine| (value(line) / width).floor();
+    let class = |line: &EpisodeLine| (value(line.start.unwrap_or_default()) / width).floor();
     let mut classes: Vec<f64> = lines.iter().map(|line| class(line)).collect();
     classes.sort_by(f64::total_cmp);
     classes.dedup();
@@ -144,12 +144,13 @@ impl ViolationMap {
     pub(super) fn new(lines: &[&EpisodeLine]) -> Self {
         let violations = || lines.iter().flat_map(|line| &line.broken);
         let marks = ViolationMarks::by_group(|group| {
-            let matching = violations().filter(|violation| violation.group == group);
-            matching.map(|violation| violation.at).collect()
+            let matching = violations().filter(|violation| violation.group == group.name());
+            matching.filter_map(|violation| violation.at).collect()
         });
-        let count = |group, joint| {
-            let matching = violations()
-                .filter(|violation| violation.group == group && violation.joint == Some(joint));
+        let count = |group: Group, joint| {
+            let matching = violations().filter(|violation| {
+                violation.group == group.name() && violation.joint == Some(joint)
+            });
             matching.count()
         };
         let joints = (1..=7)

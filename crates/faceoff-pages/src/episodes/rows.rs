@@ -1,14 +1,15 @@
 //! Rows of the table of episodes.
 
 use crate::{episode_text::describe_violation, figures, replay::page_path};
-use faceoff_replay::{EpisodeLine, model::CONTROL_STEP_S};
-use faceoff_types::{EvaluationId, Task};
+use faceoff_replay::EpisodeLine;
+use faceoff_types::{Competition, EvaluationId, Task};
 
 /// An episode in the table.
 pub(super) struct Row {
     pub(super) task: Task,
     pub(super) episode: u32,
-    pub(super) path: String,
+    /// The page of its replay, if it has one.
+    pub(super) path: Option<String>,
     pub(super) success: bool,
     pub(super) end_reason: String,
     pub(super) violations: Vec<String>,
@@ -18,16 +19,20 @@ pub(super) struct Row {
 }
 
 impl Row {
-    pub(super) fn new(id: EvaluationId, line: &EpisodeLine) -> Self {
+    pub(super) fn new(competition: &Competition, id: EvaluationId, line: &EpisodeLine) -> Self {
         let EpisodeLine { task, episode, .. } = line;
         Self {
             task: *task,
             episode: *episode,
-            path: page_path(id, *task, *episode),
+            path: line.has_clips().then(|| page_path(id, *task, *episode)),
             success: line.success,
             end_reason: line.why.clone(),
-            violations: line.broken.iter().map(describe_violation).collect(),
-            duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
+            violations: line
+                .broken
+                .iter()
+                .map(|violation| describe_violation(competition, violation))
+                .collect(),
+            duration_s: format!("{:.2}", competition.duration_s(*task, line.steps)),
             slowest_ms: line.longest_s.map(figures::milliseconds),
         }
     }

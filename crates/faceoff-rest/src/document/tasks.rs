@@ -33,6 +33,17 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "description": format!("Why an episode ended.\n{}", ends.collect::<String>()),
         "enum": competition.ends.iter().map(|info| info.end.as_str()).collect::<Vec<_>>(),
     });
+    let limits = competition.world_violations();
+    let breaches = competition
+        .violations
+        .iter()
+        .filter(|info| info.name != ViolationName::COMPUTATION_TIME)
+        .map(|info| format!("\n- `{}`: {}", info.name, info.breach));
+    schemas[&*ViolationName::name()] = json!({
+        "type": "string",
+        "description": format!("A kind of violation.\n{}", breaches.collect::<String>()),
+        "enum": limits.map(|name| name.to_string()).collect::<Vec<_>>(),
+    });
     let profiles = competition
         .profiles
         .iter()

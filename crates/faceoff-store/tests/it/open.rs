@@ -83,7 +83,7 @@ async fn damaged_values_are_reported_without_panic() {
     let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let damages = [
         "UPDATE evaluations SET day = 'someday'",
-        "UPDATE runs SET profile = 'dream'",
+        "UPDATE runs SET profile = '?'",
         "UPDATE runs SET tasks = '[\"hit\"'",
         "UPDATE evaluations SET created_at = 9223372036854775807",
         "UPDATE runs SET max_faults = 5000000000",
@@ -108,18 +108,14 @@ async fn damaged_job_does_not_block_others() {
     let undamaged = f.evaluate(beta.id, &six_shard_plan()).await;
     damage(
         &f,
-        "UPDATE runs SET profile = 'dream' WHERE id = (SELECT run_id FROM contestants c
+        "UPDATE runs SET profile = '?' WHERE id = (SELECT run_id FROM contestants c
              JOIN submissions s ON s.id = c.submission_id JOIN teams t ON t.id = s.team_id
              WHERE t.name = 'Alpha')",
     )
     .await;
     let (_, run, _) = f.claim_shard().await;
     assert_eq!(run.id, undamaged.run);
-    damage(
-        &f,
-        "UPDATE runs SET profile = 'ideal' WHERE profile = 'dream'",
-    )
-    .await;
+    damage(&f, "UPDATE runs SET profile = 'ideal' WHERE profile = '?'").await;
     let evaluations = f.store.evaluations_of(alpha.team).await.unwrap();
     let state = &evaluations[0].state;
     assert!(
@@ -168,6 +164,7 @@ async fn season_belongs_to_one_competition() {
             aim: "An aim.".to_owned(),
             weight: Millionths::new(1_000_000),
             max_steps,
+            control_step_s: 0.1,
         }],
         ends: Vec::new(),
         violations: Vec::new(),

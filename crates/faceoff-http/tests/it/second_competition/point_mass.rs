@@ -32,6 +32,7 @@ impl PointMass {
             aim: aim.to_owned(),
             weight: Millionths::new(500_000),
             max_steps: 80,
+            control_step_s: STEP_S,
         };
         let profile = |profile, letter, description: &str| ProfileInfo {
             profile,

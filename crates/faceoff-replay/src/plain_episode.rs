@@ -1,0 +1,72 @@
+//! The line of an episode in a world other than air hockey, of which there are no clips.
+
+use crate::clip_index::{EpisodeLine, TimeBins, ViolationSummary};
+use faceoff_episode::StepRow;
+use faceoff_types::{Competition, EpisodeOutcome, escape_unprintable};
+
+/// An episode of which only the line is recorded.
+#[derive(Debug, Default)]
+pub(crate) struct PlainRecording {
+    violations: Vec<ViolationSummary>,
+    /// Computation times, s.
+    times_s: Vec<f64>,
+}
+
+impl PlainRecording {
+    pub fn step(&mut self, row: &StepRow<'_>, competition: &Competition) {
+        let sample = row.step + 1;
+        let limits = competition.recording.limits.iter().zip(row.world.limits());
+        for (name, value) in limits.filter(|(_, value)| **value > 0.0) {
+            let known = self
+                .violations
+                .iter_mut()
+                .find(|known| known.group == *name);
+            if let Some(violation) = known {
+                violation.samples += 1;
+                violation.worst = violation.worst.max(*value);
+            } else {
+                self.violations.push(ViolationSummary {
+                    group: *name,
+                    from: sample,
+                    samples: 1,
+                    worst: *value,
+                    at: None,
+                    joint: None,
+                });
+            }
+        }
+        self.times_s.push(row.timing.computation_time_s);
+    }
+
+    /// The line of the index. Adds the computation times to `times`.
+    pub fn end(
+        self,
+        outcome: &EpisodeOutcome,
+        competition: &Competition,
+        times: &mut TimeBins,
+    ) -> EpisodeLine {
+        let step_s = competition.duration_s(outcome.task, 1);
+        let late = self.times_s.iter().filter(|time_s| **time_s > step_s);
+        let late = u32::try_from(late.count()).unwrap_or(u32::MAX);
+        self.times_s.iter().for_each(|time_s| times.add(*time_s));
+        let end = competition.ends.iter().find(|info| info.end == outcome.end);
+        let why = match (&outcome.fault, end) {
+            (Some(fault), _) => format!("the agent's fault ended the episode: {}", fault.fault),
+            (None, Some(info)) => info.title.clone(),
+            (None, None) => outcome.end.to_string(),
+        };
+        EpisodeLine {
+            task: outcome.task,
+            episode: outcome.episode,
+            steps: outcome.steps,
+            success: outcome.success,
+            end: outcome.end,
+            why: escape_unprintable(&why).into_owned(),
+            start: None,
+            last: None,
+            broken: self.violations,
+            longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
+            late,
+        }
+    }
+}
