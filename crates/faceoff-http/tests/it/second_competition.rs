@@ -208,7 +208,7 @@ async fn second_competition_runs_on_the_real_server() {
     let rows = texts(&episodes, "table.episodes tbody tr");
     assert_eq!(rows.len(), 6, "{rows:?}");
     assert!(
-        rows[0].contains("success arrived speed: by up to"),
+        rows[0].contains("arrived") && rows[0].contains("speed: by up to"),
         "{rows:?}"
     );
     let path = format!("/api/v1/evaluations/{evaluation}/episodes");
