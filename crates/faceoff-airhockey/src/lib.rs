@@ -76,6 +76,10 @@ pub fn competition() -> Competition {
     Competition {
         id: "airhockey-2023".to_owned(),
         title: "Robot Air Hockey Challenge".to_owned(),
+        short_title: "Robot Air Hockey".to_owned(),
+        subject: "robot air hockey".to_owned(),
+        has_replays: true,
+        has_games: true,
         tasks: vec![
             task(
                 HIT,
@@ -338,6 +342,25 @@ mod tests {
             changed(|other| other.tiers = None),
         ] {
             assert_ne!(other, hash);
+        }
+    }
+
+    #[test]
+    fn competition_that_does_not_fit_together_is_refused() {
+        assert_eq!(competition().check(), Ok(()));
+        let refused = |change: fn(&mut Competition)| {
+            let mut other = competition();
+            change(&mut other);
+            other.check().unwrap_err()
+        };
+        for (problem, words) in [
+            (refused(|other| other.actions.is_stated = false), "layouts"),
+            (refused(|other| other.actions.layouts.clear()), "layout"),
+            (refused(|other| other.profiles.clear()), "profile"),
+            (refused(|other| other.recording.limits.truncate(3)), "limit"),
+            (refused(|other| drop(other.violations.remove(0))), "limit"),
+        ] {
+            assert!(problem.contains(words), "{problem}");
         }
     }
 

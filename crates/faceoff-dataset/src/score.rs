@@ -23,11 +23,11 @@ use faceoff_wire::dataset::{
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
-/// Data of one answered step for scoring.
-#[derive(Debug, Clone)]
-pub(crate) struct StepMeasurement {
-    pub timing: AnswerTiming,
-    /// How far each limit is exceeded, in the order of the recording's columns. Violated if above 0.
+/// Data of an episode's steps for scoring.
+#[derive(Debug, Default)]
+pub(crate) struct Measurements {
+    pub timings: Vec<AnswerTiming>,
+    /// How far each limit is exceeded, step by step, in the order of the recording's columns. Violated if above 0.
     pub limits: Vec<f64>,
 }
 
@@ -70,7 +70,17 @@ impl Tally {
         self.outcomes.push(outcome);
     }
 
-    pub fn add_step(&mut self, episode: u32, step: u32, timing: AnswerTiming, limits: &[f64]) {
+    /// Adds the steps of an episode.
+    pub fn add_steps(&mut self, episode: u32, measured: &Measurements) {
+        let count = self.violations.len();
+        for (step, timing) in measured.timings.iter().enumerate() {
+            let limits = &measured.limits[step * count..][..count];
+            let step = u32::try_from(step).unwrap_or(u32::MAX);
+            self.add_step(episode, step, *timing, limits);
+        }
+    }
+
+    fn add_step(&mut self, episode: u32, step: u32, timing: AnswerTiming, limits: &[f64]) {
         let AnswerTiming {
             computation_time_s,
             host_time_s,

@@ -182,9 +182,7 @@ impl Totals {
         self.steps += u64::from(replayed.outcome.steps);
         self.host_noise_reruns += replayed.host_noise_reruns;
         if let Some(tally) = self.tallies.get_mut(&recorded.task) {
-            for (step, measured) in (0..).zip(&replayed.steps) {
-                tally.add_step(recorded.episode, step, measured.timing, &measured.limits);
-            }
+            tally.add_steps(recorded.episode, &replayed.steps);
             tally.add_episode(replayed.outcome);
         }
     }

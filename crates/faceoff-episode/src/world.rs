@@ -76,7 +76,7 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     fn competition(&self) -> &Arc<Competition>;
     /// A hash of what the simulator computes, as 64 hexadecimal digits: recordings of a simulator with another one cannot be verified.
     fn fingerprint(&self) -> &str;
-    /// The field `env` of the message `hello`, as JSON: the constants of the task for its agents.
+    /// The field `env` of the message `hello`, as JSON on one line: the constants of the task for its agents.
     ///
     /// # Errors
     /// If the simulator has no such task.

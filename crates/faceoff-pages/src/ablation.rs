@@ -74,6 +74,7 @@ struct Page {
     style: &'static str,
     id: SubmissionId,
     outcome_changes: Vec<OutcomeChanges>,
+    has_replays: bool,
 }
 
 /// Episodes that end differently with a profile than in the ideal simulator.
@@ -117,6 +118,7 @@ pub(super) async fn page(
         legend: legend.join(", "),
         style: assets::EPISODES_STYLE.url(),
         id,
+        has_replays: app.config.competition.has_replays,
         outcome_changes: outcome_changes
             .map(|(profile, pairs)| OutcomeChanges { profile, pairs })
             .collect(),

@@ -37,6 +37,8 @@ const POLL_SECONDS: u32 = 10;
 #[derive(Template)]
 #[template(path = "board.html")]
 struct OverallPage {
+    /// Its name in the heading.
+    competition: String,
     frame: Frame,
     heading: Heading,
     days: Days,
@@ -90,6 +92,7 @@ pub(super) async fn overall(
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
     let context = Context::new(&board, timeline.previous_board.as_ref(), sort.is_by_rank());
     let page = OverallPage {
+        competition: competition.short_title.clone(),
         frame: Frame::for_app(&app, season.name, "/"),
         heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
         days: Days::new(&board, &timeline, &address),

@@ -221,6 +221,7 @@ struct Page {
     ablation: Option<String>,
     /// Are episodes and replays visible?
     has_episodes: bool,
+    has_replays: bool,
     /// Text in place of a result.
     state: String,
     is_dataset_public: bool,
@@ -296,6 +297,7 @@ pub(super) async fn page(
         day: view.day,
         profile: view.profile,
         has_episodes: clips.is_some(),
+        has_replays: clips.is_some() && app.config.competition.has_replays,
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
         state: match frozen {
             Some(frozen) => format!(

@@ -28,6 +28,8 @@ pub(super) struct Frame {
     pub(super) script: &'static str,
     pub(super) icon: &'static str,
     has_tournaments: bool,
+    /// What agents do in this competition; `None` on pages that are the same for all competitions.
+    pub(super) subject: Option<String>,
     /// Address of the picture in link previews; `None` if the public address of the server is not configured.
     pub(super) preview: Option<String>,
 }
@@ -54,6 +56,7 @@ impl Frame {
                 )
             }),
             has_tournaments: app.has_tournaments.load(Ordering::Relaxed),
+            subject: Some(app.config.competition.subject.clone()),
             preview: app
                 .config
                 .public_url
@@ -75,8 +78,16 @@ impl Frame {
             script: assets::SCRIPT.url(),
             icon: assets::ICON.url(),
             has_tournaments: false,
+            subject: None,
             preview: None,
         }
+    }
+
+    /// The title of link previews of pages that have no own one: the subject with a capital letter.
+    pub(super) fn preview_title(&self) -> String {
+        let mut letters = self.subject.as_deref().unwrap_or("competition").chars();
+        let first = letters.next().map(|first| first.to_uppercase());
+        first.into_iter().flatten().chain(letters).collect()
     }
 
     /// Path and name of each navigation entry.

@@ -55,9 +55,11 @@ pub struct EpisodeLine {
     /// True position and velocity of the puck at the start: x, y (m), vx, vy (m/s), table frame. Absent in other worlds than air
     /// hockey, whose episodes have no clips.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub start: Option<[f64; 4]>,
     /// True position and velocity of the puck at the end, as in `start`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub last: Option<[f64; 4]>,
     /// Violations, one entry per kind.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -109,6 +111,7 @@ pub struct ViolationSummary {
     pub worst: f64,
     /// Position of the end effector at the first sample: x, y (m), table frame; in air hockey.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub at: Option<[f64; 2]>,
     /// For joint positions and velocities: the joint that exceeded its limit most at the first sample, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]

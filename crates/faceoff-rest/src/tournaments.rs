@@ -286,6 +286,12 @@ async fn changed_rules(
     rules
         .check()
         .map_err(|error| Problem::invalid("rules", error))?;
+    if !app.config.competition.has_games {
+        return Err(Problem::invalid(
+            "rules",
+            "the competition has no games of two agents",
+        ));
+    }
     let known = app.config.competition.find_profile(rules.profile.as_str());
     known.map_err(|error| Problem::invalid("rules", format!("profile: {error}")))?;
     check_offered(app, rules.runtimes.as_ref())?;

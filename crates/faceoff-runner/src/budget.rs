@@ -1,21 +1,23 @@
 //! Time budgets over many answers (`docs/rules.md`, "Real time is the rule"). With only a limit per answer, an agent could occupy a
 //! worker's slot for days.
 
-use faceoff_sim::model::CONTROL_STEP_S;
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 
 /// Budget for the sum of the answer times of one episode.
 #[derive(Debug)]
 pub(crate) struct EpisodeBudget<'a> {
     time: &'a TimeLimits,
+    /// Duration of a control step, in seconds.
+    control_step_s: f64,
     used_s: f64,
     steps: u32,
 }
 
 impl<'a> EpisodeBudget<'a> {
-    pub fn new(time: &'a TimeLimits) -> Self {
+    pub fn new(time: &'a TimeLimits, control_step_s: f64) -> Self {
         Self {
             time,
+            control_step_s,
             used_s: 0.0,
             steps: 0,
         }
@@ -28,7 +30,7 @@ impl<'a> EpisodeBudget<'a> {
     pub fn spend(&mut self, answer_s: f64) -> Result<(), AgentFaultKind> {
         self.used_s += answer_s;
         self.steps += 1;
-        let control_s = f64::from(self.steps) * CONTROL_STEP_S;
+        let control_s = f64::from(self.steps) * self.control_step_s;
         let limit_s = self.time.episode_control_times * control_s + self.time.episode_extra_s;
         check_limit(Phase::Step, self.used_s, limit_s)
     }
@@ -81,7 +83,7 @@ mod tests {
     /// Number of answers of `answer_s` that the budget allows.
     fn allowed_answers(answer_s: f64) -> u32 {
         let time = TimeLimits::default();
-        let mut budget = EpisodeBudget::new(&time);
+        let mut budget = EpisodeBudget::new(&time, 0.02);
         (0..500)
             .find(|_| budget.spend(answer_s).is_err())
             .unwrap_or(500)

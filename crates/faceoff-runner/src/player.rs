@@ -321,7 +321,10 @@ impl<'a> Player<'a> {
         running: &mut DynEpisode<'_>,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, SessionError> {
-        let mut budget = EpisodeBudget::new(&self.env.time);
+        let mut budget = EpisodeBudget::new(
+            &self.env.time,
+            self.env.simulator.competition().duration_s(self.task, 1),
+        );
         loop {
             if cancelled() {
                 return Err(PlatformFault::Cancelled.into());

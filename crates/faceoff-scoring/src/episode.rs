@@ -16,17 +16,23 @@ const STEP_S: f64 = 0.02;
 /// Limits of the slowest answer of an episode in seconds; beyond them the penalty is 0.5, 1 and 2 points.
 pub const COMPUTATION_TIME_LIMITS_S: [f64; 3] = [STEP_S, 5.0 * STEP_S, 10.0 * STEP_S];
 
-/// Penalty points for the computation times of one episode: 0, 0.5, 1 or 2 (reference implementation, within the
+/// Penalty points for the computation times of one episode of air hockey: 0, 0.5, 1 or 2 (reference implementation, within the
 /// paper's "0.5–2 pts").
 #[must_use]
 pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
-    let [half_point_s, one_point_s, two_points_s] = COMPUTATION_TIME_LIMITS_S;
-    if time.max_s > two_points_s || time.mean_s > STEP_S {
-        COMPUTATION_TIME_MAX_POINTS
-    } else if time.max_s > one_point_s {
-        1.0
-    } else if time.max_s > half_point_s {
-        COMPUTATION_TIME_MIN_POINTS
+    let points = [COMPUTATION_TIME_MIN_POINTS, COMPUTATION_TIME_MAX_POINTS];
+    time_penalty(time, STEP_S, points)
+}
+
+/// Penalty points for the computation times of one episode: the least for an answer that took longer than a control step, twice as many
+/// beyond five control steps, and the most beyond ten, or if the answers took longer than a control step on average.
+fn time_penalty(time: &ComputationTime, step_s: f64, [least, most]: [f64; 2]) -> f64 {
+    if time.max_s > 10.0 * step_s || time.mean_s > step_s {
+        most
+    } else if time.max_s > 5.0 * step_s {
+        most.min(2.0 * least)
+    } else if time.max_s > step_s {
+        least
     } else {
         0.0
     }
@@ -34,13 +40,14 @@ pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
 
 /// Penalty points for the computation times of an episode, or for its agent fault; none if the competition has no limit on them.
 pub(crate) fn time_or_fault_penalty(competition: &Competition, outcome: &EpisodeOutcome) -> f64 {
-    let limit = competition.violation(ViolationName::COMPUTATION_TIME);
-    if limit.is_none() {
-        0.0
-    } else if has_fault(outcome) {
-        COMPUTATION_TIME_MAX_POINTS
+    let Some(limit) = competition.violation(ViolationName::COMPUTATION_TIME) else {
+        return 0.0;
+    };
+    if has_fault(outcome) {
+        limit.points[1]
     } else {
-        computation_time_penalty(&outcome.computation_time)
+        let step_s = competition.duration_s(outcome.task, 1);
+        time_penalty(&outcome.computation_time, step_s, limit.points)
     }
 }
 

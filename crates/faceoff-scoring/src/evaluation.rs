@@ -27,7 +27,8 @@ pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Tas
 /// Scores an evaluation: weighted score, maximum of the tasks' penalty points, worst of their tiers.
 ///
 /// `weights` and `bounds` are those of tasks and tiers under the stage's rules; without bounds there are no tiers. A missing task
-/// counts as 0 in the score. Without any task the score is 0, the penalty 0 and the tier deployable.
+/// counts as 0 in the score. Without any task the score is 0, the penalty 0 and the tier, if
+/// there are tiers, deployable.
 #[must_use]
 pub fn score_evaluation(
     ruleset: Ruleset,

@@ -11,8 +11,8 @@ pub const TIER_CHANGE_RESAMPLES: u32 = 2000;
 /// Identifies the stream of random draws; a change of the method needs a new name.
 const STREAM: &str = "faceoff-scoring tier change bootstrap 1";
 
-/// Highest penalty of an episode in half points. Penalties are multiples of half a point, so in this unit they are small
-/// integers.
+/// Highest penalty of an episode in half points that the method counts. Penalties are multiples of half a point, so in this unit they are
+/// small integers.
 const MAX_HALVES: f64 = u8::MAX as f64;
 
 /// Probabilities of another tier on other episodes of the same kind.

@@ -56,6 +56,8 @@ pub struct Capacity {
     pub slots: u32,
     /// Limits of an agent's computation time.
     pub time: TimeLimits,
+    /// Simulated duration of the competition's longest episode, in seconds.
+    pub longest_episode_s: f64,
     /// Names of the runtimes (environments such as Python) that an agent may ask for.
     pub runtimes: Vec<String>,
 }

@@ -6,20 +6,31 @@ use crate::{
     ViolationCounts, ViolationName, Violations,
 };
 
-/// The description of a competition. Boards, tables, forms and files take their tasks and violations from it.
+/// The description of a competition. Boards, tables, forms and files take their tasks, violations, profiles and tiers from it, recordings
+/// their columns, and parsers of answers the layouts of actions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Competition {
     /// Letters, digits and dashes. It tells competitions apart.
     pub id: String,
     /// Its name for people.
     pub title: String,
+    /// Its name in the heading of the board.
+    pub short_title: String,
+    /// What agents do, in running text, such as "robot air hockey".
+    pub subject: String,
+    /// Are there clips of its episodes, so that they can be replayed?
+    pub has_replays: bool,
+    /// Are there games of two agents, so that tournaments are possible?
+    pub has_games: bool,
     /// In the order of boards.
     pub tasks: Vec<TaskInfo>,
     /// How episodes end, in the order of lists.
     pub ends: Vec<EndInfo>,
     /// Kinds of violations of the agent's limits, in the order of tables.
     pub violations: Vec<ViolationInfo>,
+    /// The layouts of agents' actions.
     pub actions: ActionSpace,
+    /// The columns of recordings.
     pub recording: RecordingColumns,
     /// The bounds of its tiers, unless a stage has others; `None`: a competition without tiers, whose boards rank by score alone.
     pub tiers: Option<TierBounds>,
@@ -93,6 +104,41 @@ pub struct ProfileInfo {
 }
 
 impl Competition {
+    /// Checks that its parts fit together.
+    ///
+    /// # Errors
+    /// What does not fit.
+    pub fn check(&self) -> Result<(), String> {
+        let require = |holds: bool, problem: &str| match holds {
+            true => Ok(()),
+            false => Err(problem.to_owned()),
+        };
+        require(!self.tasks.is_empty(), "it has no tasks")?;
+        let layouts = self.actions.layouts.len();
+        require(layouts > 0, "it has no layout of actions")?;
+        require(
+            self.actions.is_stated || layouts == 1,
+            "agents have to state one of several layouts",
+        )?;
+        let profiles = [self.ideal_profile, self.counting_profile];
+        require(
+            profiles.iter().all(|name| self.profile(*name).is_some()),
+            "the ideal or the counting profile is none of its profiles",
+        )?;
+        let limits = &self.recording.limits;
+        let all_recorded = self.world_violations().all(|name| limits.contains(&name));
+        require(
+            all_recorded && limits.len() == self.world_violations().count(),
+            "its recordings do not have each limit once",
+        )?;
+        // The filter of episodes has these names.
+        let is_reserved = |name: ViolationName| matches!(name.as_str(), "any" | "late");
+        require(
+            !self.world_violations().any(is_reserved),
+            "a kind of violation cannot be called `any` or `late`",
+        )
+    }
+
     /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points, bounds of
     /// tiers, profiles. Texts are not part of it.
     #[must_use]
@@ -284,6 +330,14 @@ impl Competition {
         f64::from(steps) * step_s
     }
 
+    /// Duration of the longest episode of any task, in seconds.
+    #[must_use]
+    pub fn longest_episode_s(&self) -> f64 {
+        let tasks = self.tasks.iter();
+        let durations = tasks.map(|info| f64::from(info.max_steps) * info.control_step_s);
+        durations.fold(0.0, f64::max)
+    }
+
     /// Control steps of the longest episode.
     #[must_use]
     pub fn longest_episode(&self) -> u32 {
@@ -336,6 +390,10 @@ mod tests {
         Competition {
             id: "points".to_owned(),
             title: "Points".to_owned(),
+            short_title: "Points".to_owned(),
+            subject: "points".to_owned(),
+            has_replays: false,
+            has_games: false,
             tasks: vec![TaskInfo {
                 task: Task::new("reach"),
                 title: "Reach".to_owned(),

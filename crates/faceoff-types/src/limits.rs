@@ -1,7 +1,6 @@
 //! Limits of an agent's resources and times. They are part of each job; the *slot*, the place in a worker that runs the
 //! job, enforces them.
 
-use crate::{CONTROL_STEP_S, EPISODE_STEPS};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -135,12 +134,17 @@ impl TimeLimits {
     pub const MAX_WAIT: Duration = Duration::from_secs(3600);
 
     /// The longest time for which an agent can occupy a slot, in seconds: the sum of its budgets for `episodes`
-    /// episodes in `shards` shards, with a restart after each of `max_faults` faults. Host interference comes on top.
+    /// episodes of at most `longest_episode_s` (simulated time) in `shards` shards, with a restart after each of `max_faults` faults. Host interference comes on top.
     #[must_use]
-    pub fn max_slot_time_s(&self, episodes: u32, shards: u32, max_faults: u32) -> f64 {
+    pub fn max_slot_time_s(
+        &self,
+        longest_episode_s: f64,
+        episodes: u32,
+        shards: u32,
+        max_faults: u32,
+    ) -> f64 {
         let process_s = self.startup_s + self.bye_s;
-        let control_s = f64::from(EPISODE_STEPS) * CONTROL_STEP_S;
-        let episode_s = control_s * self.episode_control_times
+        let episode_s = longest_episode_s * self.episode_control_times
             + self.episode_extra_s
             + self.step_s
             + self.reset_mean_s;
@@ -175,7 +179,7 @@ mod tests {
         // From docs/monitoring.md: 11 processes × 125 s + 50 s for resets + 50 episodes × 23 s.
         const DOCUMENTED_S: f64 = 2575.0;
         let (episodes, shards, max_faults) = (50, 1, 10);
-        let longest_s = TimeLimits::default().max_slot_time_s(episodes, shards, max_faults);
+        let longest_s = TimeLimits::default().max_slot_time_s(10.0, episodes, shards, max_faults);
         assert!((longest_s - DOCUMENTED_S).abs() < 1e-9, "{longest_s}");
     }
 }

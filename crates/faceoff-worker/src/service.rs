@@ -139,6 +139,8 @@ pub(crate) async fn run_with(
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     anyhow::ensure!(config.lease_s > 0, "a lease lasts at least one second");
+    let fits = server.competition().check();
+    fits.map_err(|problem| anyhow::anyhow!("the competition is refused: {problem}"))?;
     let folder = config.slots.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
 

@@ -86,8 +86,9 @@ impl RecordedEntry {
         let interpolation = columns
             .text("interpolation", 0)
             .map(|text| {
-                parse_interpolation(text)
-                    .ok_or_else(|| location.difference("interpolation", text, "1 to 5, -1 or null"))
+                parse_interpolation(text).ok_or_else(|| {
+                    location.difference("interpolation", text, action_space().codes_text())
+                })
             })
             .transpose()?;
         match (startup_s.is_some(), must_start) {

@@ -4,7 +4,7 @@ use super::{compare, difference::Difference, episode_reader::RecordedEpisode};
 use crate::{
     dataset::Columns,
     files::{EPISODES_FILE, STEPS_FILE},
-    score::StepMeasurement,
+    score::Measurements,
     table::{EpisodeRows, HOST_TIME, StepRows},
     times::seconds,
 };
@@ -32,7 +32,7 @@ pub(super) struct Replayer {
 pub(super) struct ReplayedEpisode {
     pub outcome: EpisodeOutcome,
     /// Data of the episode's steps for scoring.
-    pub steps: Vec<StepMeasurement>,
+    pub steps: Measurements,
     /// How often the episode was played again because other programs disturbed the host.
     pub host_noise_reruns: u32,
 }
@@ -41,8 +41,8 @@ pub(super) struct ReplayedEpisode {
 struct EpisodeReplay<'a> {
     recorded: &'a RecordedEpisode,
     ruleset: Ruleset,
-    /// Numbers in an action; 0 if the agent failed before it could give any.
-    action_len: usize,
+    /// The layout of the agent's actions; `None` if it failed before it stated one, so that it has no steps.
+    layout: Option<ActionLayout>,
     running: RunningEpisode<ReplayRows>,
 }
 
@@ -50,7 +50,7 @@ struct EpisodeReplay<'a> {
 struct ReplayRows {
     steps: StepRows,
     episodes: EpisodeRows,
-    measured: Vec<StepMeasurement>,
+    measured: Measurements,
 }
 
 impl StepSink for ReplayRows {
@@ -66,10 +66,8 @@ impl StepSink for ReplayRows {
     fn step(&mut self, row: &StepRow<'_>) {
         self.steps.push(row);
         self.episodes.step(row);
-        self.measured.push(StepMeasurement {
-            timing: row.timing,
-            limits: row.world.limits().to_vec(),
-        });
+        self.measured.timings.push(row.timing);
+        self.measured.limits.extend_from_slice(row.world.limits());
     }
 
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
@@ -107,7 +105,7 @@ impl Replayer {
         let rows = ReplayRows {
             steps: StepRows::new(recorded.task, &self.competition.recording),
             episodes: EpisodeRows::new(&self.competition),
-            measured: Vec::new(),
+            measured: Measurements::default(),
         };
         let (task, episode) = (recorded.task, recorded.episode);
         let environment = self.environment.as_ref();
@@ -123,7 +121,7 @@ impl Replayer {
         let mut replay = EpisodeReplay {
             recorded,
             ruleset: self.ruleset,
-            action_len: inputs.layout.map_or(0, |layout| layout.len()),
+            layout: inputs.layout,
             running,
         };
         let mut outcome = None;
@@ -167,7 +165,11 @@ impl EpisodeReplay<'_> {
             let expected = format!("no more steps: the episode has ended ({})", end.as_str());
             return Err(self.step_difference(step, "step", "another step".to_owned(), expected));
         }
-        let action = self.read_action(batch, row, step)?;
+        let Some(layout) = self.layout else {
+            let expected = "no steps: the agent had not started".to_owned();
+            return Err(self.step_difference(step, "step", "a step".to_owned(), expected));
+        };
+        let action = self.read_action(batch, row, step, layout.len())?;
         let timing = self.read_timing(batch, row, step)?;
         // The running episode stores a divergence; the recorded fault must match it.
         Ok(self
@@ -182,15 +184,15 @@ impl EpisodeReplay<'_> {
         batch: &RecordBatch,
         row: usize,
         step: u32,
+        len: usize,
     ) -> Result<Float64Array, Difference> {
         let actions: &ListArray = batch["action"].as_list();
         let wrong = |recorded: String| {
             let expected = match self.ruleset {
-                Ruleset::First => format!("{} finite numbers", self.action_len),
-                Ruleset::Second | Ruleset::Third => format!(
-                    "{} numbers of at most {ACTION_LIMIT} in magnitude",
-                    self.action_len
-                ),
+                Ruleset::First => format!("{} finite numbers", len),
+                Ruleset::Second | Ruleset::Third => {
+                    format!("{} numbers of at most {ACTION_LIMIT} in magnitude", len)
+                }
             };
             self.step_difference(step, "action", recorded, expected)
         };
@@ -199,7 +201,7 @@ impl EpisodeReplay<'_> {
         }
         let values = actions.value(row);
         let action: &Float64Array = values.as_primitive::<Float64Type>();
-        if action.len() != self.action_len || action.null_count() > 0 {
+        if action.len() != len || action.null_count() > 0 {
             return Err(wrong(format!(
                 "{} numbers",
                 action.len() - action.null_count()

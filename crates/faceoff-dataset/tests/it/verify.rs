@@ -677,3 +677,30 @@ fn invented_divergence_is_found() {
     );
     assert!(found.recorded.contains("diverge"), "{found}");
 }
+
+#[test]
+fn steps_of_an_agent_that_had_not_started_are_found() {
+    let faults_in_step_3: Agent =
+        |question| (question.step != Some(3)).then_some([question.initial_joints, [0.0; 7]]);
+    let evaluation = Evaluation::play(Some(faults_in_step_3), &[(PREPARE, 0..2)]).assembled();
+    let forgery = Forgery::copy_of(&evaluation.folder());
+    forgery.change_table("episodes.parquet", |batch| {
+        let mut columns = batch.columns().to_vec();
+        let index = |name: &str| batch.schema().index_of(name).unwrap();
+        let faults: &StringArray = batch["fault"].as_string();
+        let at_start = |fault: Option<&str>| {
+            let mut fault: serde_json::Value = serde_json::from_str(fault.unwrap()).unwrap();
+            fault["episode"].take();
+            fault["step"].take();
+            Some(fault.to_string())
+        };
+        let forged: StringArray = faults.iter().map(at_start).collect();
+        columns[index("fault")] = Arc::new(forged);
+        let rows = batch.num_rows();
+        columns[index("interpolation")] = Arc::new(StringArray::new_null(rows));
+        RecordBatch::try_new(batch.schema(), columns).unwrap()
+    });
+    let found = difference(forgery.update_manifest().dir.path(), 2);
+    assert_eq!((&*found.field, found.step), ("step", Some(0)), "{found}");
+    assert!(found.expected.contains("had not started"), "{found}");
+}

@@ -205,6 +205,7 @@ fn config_without_slots(upload_dir: PathBuf, clock: Clock) -> HttpConfig {
         clock,
         limits: generous_limits(),
         capacity: Capacity {
+            longest_episode_s: faceoff_airhockey::competition().longest_episode_s(),
             slots: 0,
             runtimes: Vec::new(),
             time: TimeLimits::default(),
@@ -287,6 +288,7 @@ impl Site {
         let config = HttpConfig {
             limits,
             capacity: Capacity {
+                longest_episode_s: faceoff_airhockey::competition().longest_episode_s(),
                 slots: 2,
                 time: TimeLimits::default(),
                 runtimes: ["native", "python3"].map(str::to_owned).to_vec(),

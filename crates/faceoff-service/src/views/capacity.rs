@@ -120,9 +120,12 @@ fn next_load(
     let expected = teams
         .iter()
         .map(|team| Some(durations.episode_ms_of(*team)? * f64::from(episodes)));
-    let longest_per_team_s = capacity
-        .time
-        .max_slot_time_s(episodes, shards, plan.max_faults);
+    let longest_per_team_s = capacity.time.max_slot_time_s(
+        capacity.longest_episode_s,
+        episodes,
+        shards,
+        plan.max_faults,
+    );
     Load {
         day,
         is_under_way: false,
@@ -149,9 +152,12 @@ fn open_load(
             .filter(|entry| entry.stage_day == day.stage_day && entry.episodes > 0)
     };
     let longest_s = |entry: &EvaluationBacklog| {
-        capacity
-            .time
-            .max_slot_time_s(entry.episodes, entry.shards, entry.max_faults)
+        capacity.time.max_slot_time_s(
+            capacity.longest_episode_s,
+            entry.episodes,
+            entry.shards,
+            entry.max_faults,
+        )
     };
     Load {
         day: day.stage_day.date,

@@ -158,6 +158,10 @@ async fn season_belongs_to_one_competition() {
     let competition = |id: &str, max_steps| Competition {
         id: id.to_owned(),
         title: "A competition".to_owned(),
+        short_title: "A competition".to_owned(),
+        subject: "a subject".to_owned(),
+        has_replays: false,
+        has_games: false,
         tasks: vec![TaskInfo {
             task: HIT,
             title: "A task".to_owned(),

@@ -68,6 +68,7 @@ async fn start_site(max_bundle_bytes: u64) -> Site {
         clock: Clock::new(now),
         limits: HttpLimits::default(),
         capacity: Capacity {
+            longest_episode_s: competition().longest_episode_s(),
             slots: 1,
             time: TimeLimits::default(),
             runtimes: ["native", "python3"].map(str::to_owned).to_vec(),

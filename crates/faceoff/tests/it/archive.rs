@@ -98,6 +98,7 @@ async fn start_site() -> Site {
         clock: Clock::new(now),
         limits: HttpLimits::default(),
         capacity: Capacity {
+            longest_episode_s: faceoff_airhockey::competition().longest_episode_s(),
             runtimes: Vec::new(),
             slots: 1,
             time: TimeLimits::default(),

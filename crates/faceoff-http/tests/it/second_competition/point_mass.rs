@@ -49,7 +49,11 @@ impl PointMass {
         Arc::new(Self {
             competition: Arc::new(Competition {
                 id: "point-mass".to_owned(),
-                title: "Point Mass".to_owned(),
+                title: "Point Mass Challenge".to_owned(),
+                short_title: "Point Mass".to_owned(),
+                subject: "pushing a point mass".to_owned(),
+                has_replays: false,
+                has_games: false,
                 tasks: vec![
                     task(REACH, "Reach", "Come to the origin."),
                     task(SETTLE, "Settle", "Come to rest at the origin."),

@@ -4,6 +4,7 @@ use super::{
     http::{serve_http, shutdown_signal},
     site::{Site, announce},
 };
+use crate::competition::competition;
 use crate::config::Config;
 use anyhow::Context;
 use faceoff_http::{AgentResources, Capacity, ConnectionLimits};
@@ -26,6 +27,7 @@ pub async fn serve(
     let (store, address) = (site.store.clone(), site.address);
     let made_at = archived.made_at;
     let capacity = Capacity {
+        longest_episode_s: competition().longest_episode_s(),
         slots: 0,
         runtimes: Vec::new(),
         time: config.time.clone(),

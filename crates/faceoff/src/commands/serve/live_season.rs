@@ -191,6 +191,7 @@ async fn configure_season(config: &Config, store: &Store, now: Timestamp) -> any
 
 fn capacity(config: &Config, cpus: &CpuLayout, agent: &AgentEnvironment) -> Capacity {
     Capacity {
+        longest_episode_s: competition().longest_episode_s(),
         slots: match config.workers.play {
             true => u32::try_from(cpus.slots.len()).unwrap_or(u32::MAX),
             false => 0,
