@@ -31,6 +31,16 @@ impl Violations {
             .filter_map(|(name, violated)| violated.then_some(name))
     }
 
+    /// Is each of these limits listed, and no other? Their order decides nothing: JSON of other programs may have another.
+    #[must_use]
+    pub fn has_kinds(&self, kinds: impl IntoIterator<Item = ViolationName>) -> bool {
+        let mut unlisted = self.0.clone();
+        kinds
+            .into_iter()
+            .all(|kind| unlisted.swap_remove(&kind).is_some())
+            && unlisted.is_empty()
+    }
+
     /// Was the limit violated?
     #[must_use]
     pub fn contains(&self, name: ViolationName) -> bool {
@@ -131,5 +141,20 @@ mod tests {
         assert_eq!(text, r#"{"fall":2,"speed":4,"heat":4}"#);
         assert_eq!(counts.get(ViolationName::new("speed")), 4);
         assert_eq!(counts.get(ViolationName::COMPUTATION_TIME), 0);
+    }
+
+    #[test]
+    fn kinds_of_a_report_are_compared_without_order() {
+        let [ee, link] = ["ee", "link"].map(ViolationName::new);
+        let reported: Violations = serde_json::from_str(r#"{"link": true, "ee": false}"#)
+            .expect("violations are an object of booleans");
+        assert!(reported.has_kinds([ee, link]));
+        assert!(!reported.has_kinds([ee]), "an unknown kind is refused");
+        let other = ViolationName::new("other");
+        assert!(
+            !reported.has_kinds([ee, link, other]),
+            "a missing kind is refused"
+        );
+        assert!(!reported.has_kinds([ee, other]));
     }
 }

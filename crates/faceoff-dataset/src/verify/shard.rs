@@ -52,8 +52,7 @@ pub fn verify_shard(
             let problem = format!("the report has the unknown end {:?}", outcome.end);
             return Err(unusable(&problem).into());
         }
-        let kinds = outcome.violations.iter().map(|(name, _)| name);
-        if !kinds.eq(competition.world_violations()) {
+        if !outcome.violations.has_kinds(competition.world_violations()) {
             return Err(unusable("the report has other kinds of violations").into());
         }
         // One at a time: the steps of a whole shard need not be in memory.
