@@ -1,11 +1,12 @@
 //! The settings that all episodes of an evaluation, or all rallies of a game, have in common. From them an [`Arena`] creates the
 //! simulations.
 
+use faceoff_sim::Interpolation;
 use faceoff_sim::{
     AirHockeyProfile, AirHockeyTask, Bounds, Episode, Factors, Game, GameSetup,
     PerturbationSettings, Plant,
 };
-use faceoff_types::{Interpolation, Ruleset, Seed, Task};
+use faceoff_types::{Ruleset, Seed, Task};
 
 /// Rules, perturbations, the season's plant (the true robot, which deviates from the nominal one that agents know) and the seed
 /// from which the seeds of episodes and rallies are derived.

@@ -1,7 +1,10 @@
 //! The columns of air hockey's recordings, and the layouts of its actions.
 
-use faceoff_sim::episode::constraints::{EE, JOINT_POS, JOINT_VEL, LINK};
-use faceoff_types::{ActionSpace, Interpolation, RecordingColumn, RecordingColumns};
+use faceoff_sim::{
+    Interpolation,
+    episode::constraints::{EE, JOINT_POS, JOINT_VEL, LINK},
+};
+use faceoff_types::{ActionSpace, RecordingColumn, RecordingColumns};
 
 const PUCK: [&str; 6] = ["x", "y", "yaw", "vx", "vy", "yaw_rate"];
 const POSITION: [&str; 3] = ["x", "y", "z"];

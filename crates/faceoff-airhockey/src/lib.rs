@@ -9,6 +9,7 @@ mod columns;
 mod end_description;
 mod env;
 mod game_record;
+mod magnitudes;
 mod running_game;
 mod running_side;
 mod simulator;
@@ -21,6 +22,7 @@ pub use game_record::{
     Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
     SideFault, SideStep,
 };
+pub use magnitudes::{checked_magnitudes, settings};
 pub use running_game::{FinishedGame, RunningGame};
 pub use simulator::{AirHockey, simulator};
 pub use world::AirHockeyWorld;
@@ -29,6 +31,7 @@ use faceoff_scoring::{
     COMPUTATION_TIME_MAX_POINTS, COMPUTATION_TIME_MIN_POINTS, TIER_BOUNDS,
     tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS},
 };
+pub use faceoff_sim::Interpolation;
 pub use faceoff_sim::episode::constraints::{EE, JOINT_POS, JOINT_VEL, LINK};
 pub use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
 use faceoff_sim::{AirHockeyProfile, AirHockeyTask};
@@ -213,6 +216,7 @@ pub fn competition() -> Competition {
         ],
         ideal_profile: IDEAL,
         counting_profile: EVALUATION,
+        magnitudes: magnitudes::magnitudes(),
     }
 }
 

@@ -10,10 +10,11 @@ use crate::{
     running_side::RunningSide,
 };
 use faceoff_episode::{NonFiniteObservation, Question, RecordError};
+use faceoff_sim::Interpolation;
 use faceoff_sim::{Command, Divergence, Game};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, AgentTask, GameEnd, GameLimits, GameOutcome, Interpolation, Phase,
-    Side, WINDOW_STEPS,
+    AgentFault, AgentFaultKind, AgentTask, GameEnd, GameLimits, GameOutcome, Phase, Side,
+    WINDOW_STEPS,
 };
 
 /// A running game. It provides the observations for each side, takes their responses and computes the effects. The caller
@@ -23,7 +24,8 @@ use faceoff_types::{
 /// # use faceoff_airhockey::{Arena, RallyEntry, RunningGame, Response};
 /// # use faceoff_episode::{AnswerTiming, NullSink};
 /// # use faceoff_sim::AirHockeyProfile;
-/// # use faceoff_types::{GameEnd, GameLimits, Interpolation, Seed, Side};
+/// # use faceoff_sim::Interpolation;
+/// # use faceoff_types::{GameEnd, GameLimits, Seed, Side};
 /// # let seed = Seed::from_number(1);
 /// # let timing = AnswerTiming { computation_time_s: 0.001, host_time_s: 0.0, cpu_time_s: None };
 /// let arena = Arena::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());

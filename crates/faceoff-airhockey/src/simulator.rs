@@ -1,9 +1,13 @@
 //! The simulator of air hockey, as slots and verification use it.
 
 use crate::Arena;
-use crate::{competition, env::env};
-use faceoff_episode::{Conditions, Environment, Simulator};
-use faceoff_types::{AgentTask, Competition, UnknownProfile, UnknownTask};
+use crate::{
+    competition,
+    env::env,
+    magnitudes::{check_robot, settings},
+};
+use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator};
+use faceoff_types::{AgentTask, Competition, Magnitudes, Seed, UnknownTask};
 use std::sync::{Arc, LazyLock};
 
 static SIMULATOR: LazyLock<Arc<AirHockey>> = LazyLock::new(|| {
@@ -25,6 +29,14 @@ pub struct AirHockey {
 }
 
 impl AirHockey {
+    /// With a changed description, such as other tiers.
+    #[must_use]
+    pub fn with_competition(competition: Competition) -> Self {
+        Self {
+            competition: Arc::new(competition),
+        }
+    }
+
     /// Its description.
     #[must_use]
     pub const fn competition(&self) -> &Arc<Competition> {
@@ -49,7 +61,7 @@ impl Simulator for AirHockey {
     fn environment(
         &self,
         conditions: &Conditions<'_>,
-    ) -> Result<Box<dyn Environment>, UnknownProfile> {
+    ) -> Result<Box<dyn Environment>, InvalidConditions> {
         let Conditions {
             ruleset,
             profile,
@@ -59,10 +71,14 @@ impl Simulator for AirHockey {
         } = *conditions;
         Ok(Box::new(Arena::with_ruleset(
             ruleset,
-            profile.try_into()?,
-            perturbations,
+            profile.try_into().map_err(InvalidConditions::Profile)?,
+            &settings(perturbations).map_err(InvalidConditions::Magnitudes)?,
             seed,
             mismatch_seed,
         )))
+    }
+
+    fn check_magnitudes(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
+        check_robot(magnitudes, mismatch_seed)
     }
 }

@@ -2,8 +2,9 @@
 
 use crate::arena::Arena;
 use faceoff_episode::{Environment, StateColumns, World};
+use faceoff_sim::Interpolation;
 use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact};
-use faceoff_types::{ActionLayout, EpisodeEnd, Interpolation, Seed, Task, UnknownTask, Violations};
+use faceoff_types::{ActionLayout, EpisodeEnd, Seed, Task, UnknownTask, Violations};
 use std::any::Any;
 
 /// An episode of the simulator, with its state after the last step.

@@ -1,8 +1,7 @@
 //! The conditions of a job: the same to play under, and to verify the recording with.
 
-use faceoff_airhockey::Arena;
-use faceoff_episode::Conditions;
-use faceoff_types::UnknownProfile;
+use faceoff_airhockey::{Arena, settings};
+use faceoff_episode::{Conditions, InvalidConditions};
 use faceoff_wire::{game::GameSpec, job::ShardSpec};
 
 /// The conditions of a shard's episodes.
@@ -20,12 +19,14 @@ pub fn shard_conditions(spec: &ShardSpec) -> Conditions<'_> {
 /// The world of a game.
 ///
 /// # Errors
-/// If the simulator has no such profile.
-pub fn game_arena(spec: &GameSpec) -> Result<Arena, UnknownProfile> {
+/// If the simulator has no such profile or magnitudes.
+pub fn game_arena(spec: &GameSpec) -> Result<Arena, InvalidConditions> {
     Ok(Arena::with_ruleset(
         spec.ruleset,
-        spec.profile.try_into()?,
-        &spec.perturbations,
+        spec.profile
+            .try_into()
+            .map_err(InvalidConditions::Profile)?,
+        &settings(&spec.perturbations).map_err(InvalidConditions::Magnitudes)?,
         spec.seed,
         spec.mismatch_seed,
     ))

@@ -39,4 +39,3 @@ pub use granted_files::writable_files;
 pub use recorder::Recorder;
 pub use shard::ShardReport;
 pub use shard_folder::{SHARD_FILES, ShardFolder};
-pub use simulator::can_draw_plant;

@@ -1,8 +1,6 @@
 //! Identity of the simulator: a dataset can only be verified with the simulator that made it.
 
 use faceoff_episode::Simulator;
-use faceoff_sim::{PerturbationSettings, Plant};
-use faceoff_types::Seed;
 use faceoff_wire::dataset::SimulatorId;
 
 /// Version and fingerprint of a simulator in this program.
@@ -20,11 +18,4 @@ fn id(fingerprint: &str) -> SimulatorId {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         fingerprint: fingerprint.to_owned(),
     }
-}
-
-/// Can a plant (the simulated robot and table) be drawn within these magnitudes of the perturbations? See
-/// [`Plant::can_be_drawn`]; takes up to a second.
-#[must_use]
-pub fn can_draw_plant(settings: &PerturbationSettings, mismatch_seed: Seed) -> bool {
-    Plant::can_be_drawn(settings, mismatch_seed)
 }

@@ -66,7 +66,7 @@ pub fn verify(
     let competition = simulator.competition();
     let tasks = competition
         .played_tasks(&manifest.episodes)
-        .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
+        .map_err(|invalid| DatasetError::Foreign(format!("{MANIFEST_FILE}: {invalid}")))?;
     if let Some(weights) = &manifest.variation.weights {
         let checked = weights.in_order(competition.task_names());
         checked
@@ -88,7 +88,7 @@ pub fn verify(
         mismatch_seed: manifest.mismatch_seed,
     });
     let environment = environment
-        .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
+        .map_err(|invalid| DatasetError::Foreign(format!("{MANIFEST_FILE}: {invalid}")))?;
     let replayer = Replayer::new(ruleset, environment, competition);
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
@@ -132,10 +132,10 @@ fn check_reproducible(
         .ruleset
         .parse()
         .map_err(|unknown: UnknownRuleset| DatasetError::Foreign(unknown.to_string()))?;
-    manifest
-        .variation
-        .perturbations
-        .check()
+    let mut magnitudes = manifest.variation.perturbations.clone();
+    simulator
+        .competition()
+        .check_magnitudes(&mut magnitudes)
         .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
     if manifest.simulator != current {
         return Err(DatasetError::Foreign(format!(

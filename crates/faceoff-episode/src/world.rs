@@ -1,8 +1,8 @@
 //! The traits of simulated worlds. An episode is played against them, so that it is the same for every competition.
 
 use faceoff_types::{
-    ActionLayout, AgentTask, Competition, EpisodeEnd, PerturbationSettings, Profile, Ruleset, Seed,
-    Task, UnknownProfile, UnknownTask, Violations,
+    ActionLayout, AgentTask, Competition, EpisodeEnd, Magnitudes, Profile, Ruleset, Seed, Task,
+    UnknownProfile, UnknownTask, Violations,
 };
 use std::{any::Any, fmt, sync::Arc};
 
@@ -64,11 +64,21 @@ pub struct Conditions<'a> {
     pub ruleset: Ruleset,
     pub profile: Profile,
     /// Magnitudes of the profile's perturbations.
-    pub perturbations: &'a PerturbationSettings,
+    pub perturbations: &'a Magnitudes,
     /// The seed from which the seeds of the episodes are derived.
     pub seed: Seed,
     /// The seed from which the season's deviations of the model are drawn.
     pub mismatch_seed: Seed,
+}
+
+/// Conditions that a simulator does not have.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidConditions {
+    #[error(transparent)]
+    Profile(#[from] UnknownProfile),
+    /// Why the magnitudes are invalid.
+    #[error("perturbations: {0}")]
+    Magnitudes(String),
 }
 
 /// A competition with its simulator: slots play episodes in it, and verification plays recorded ones again.
@@ -84,9 +94,18 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     /// The environment of an evaluation. It may take milliseconds, so use one for many episodes.
     ///
     /// # Errors
-    /// If the simulator has no such profile.
+    /// If the simulator has no such profile or magnitudes.
     fn environment(
         &self,
         conditions: &Conditions<'_>,
-    ) -> Result<Box<dyn Environment>, UnknownProfile>;
+    ) -> Result<Box<dyn Environment>, InvalidConditions>;
+    /// Checks that a season with this seed of deviations can be played with magnitudes that are in range, one by one
+    /// ([`Competition::check_magnitudes`]). It may take a second.
+    ///
+    /// # Errors
+    /// Why not, beginning with the name of a group.
+    fn check_magnitudes(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
+        let _ = (magnitudes, mismatch_seed);
+        Ok(())
+    }
 }

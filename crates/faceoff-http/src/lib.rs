@@ -39,7 +39,7 @@ use std::sync::Arc;
 pub fn router(store: Store, live: LiveState, config: HttpConfig) -> Router {
     let timeout = config.limits.request_timeout;
     let app = Arc::new(AppState::new(store, live, config));
-    let (api, document) = faceoff_rest::router(timeout, &app.config.competition);
+    let (api, document) = faceoff_rest::router(timeout, app.config.competition());
     let site = Router::new()
         .merge(api)
         .merge(

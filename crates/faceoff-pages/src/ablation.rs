@@ -100,12 +100,12 @@ pub(super) async fn page(
         AblationStatus::Finished { tasks, .. } => {
             let results = tasks.iter();
             results
-                .map(|(task, effects)| TaskResults::new(*task, effects, &app.config.competition))
+                .map(|(task, effects)| TaskResults::new(*task, effects, app.config.competition()))
                 .collect()
         }
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
-    let competition = &app.config.competition;
+    let competition = app.config.competition();
     let ablated = competition.ablation_profiles();
     let ablated = ablated.filter_map(|profile| competition.profile(profile));
     let legend: Vec<String> = ablated
@@ -118,7 +118,7 @@ pub(super) async fn page(
         legend: legend.join(", "),
         style: assets::EPISODES_STYLE.url(),
         id,
-        has_replays: app.config.competition.has_replays,
+        has_replays: app.config.competition().has_replays,
         outcome_changes: outcome_changes
             .map(|(profile, pairs)| OutcomeChanges { profile, pairs })
             .collect(),

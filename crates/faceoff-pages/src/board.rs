@@ -81,7 +81,7 @@ pub(super) async fn overall(
 ) -> Result<Response, PageProblem> {
     let QueryParams(query) = query?;
     let address = Address::new("/", &query);
-    let competition = Arc::clone(&app.config.competition);
+    let competition = Arc::clone(app.config.competition());
     let sort = Sort::new(&query, None, &address, &competition)?;
     let visibility = Visibility::load(&app, viewer?).await?;
     let season = SeasonHead::load(&app).await?;
@@ -147,7 +147,7 @@ pub(super) async fn by_task(
     let (PathParam(task), QueryParams(query)) = (task?, query?);
     let path = format!("/tasks/{task}");
     let address = Address::new(&path, &query);
-    let competition = Arc::clone(&app.config.competition);
+    let competition = Arc::clone(app.config.competition());
     let sort = Sort::new(&query, Some(task), &address, &competition)?;
     let info = competition
         .task(task)

@@ -105,7 +105,7 @@ pub(super) async fn page(
     let visibility = Visibility::load(&app, viewer?).await?;
     let view =
         comparison::compare(&app, &visibility, ids, ComparisonQuery { episodes: true }).await?;
-    let mut has_replays = app.config.competition.has_replays;
+    let mut has_replays = app.config.competition().has_replays;
     for id in ids {
         has_replays &= Clips::find(&app, &visibility, id).await.is_ok();
     }

@@ -40,7 +40,7 @@ pub(super) async fn episodes(
         suffixes.extend(["x_m", "y_m", "joint"]);
     }
     columns.extend(["longest_s", "late"].map(str::to_owned));
-    let kinds: Vec<ViolationName> = app.config.competition.world_violations().collect();
+    let kinds: Vec<ViolationName> = app.config.competition().world_violations().collect();
     for name in &kinds {
         columns.extend(suffixes.iter().map(|suffix| format!("{name}_{suffix}")));
     }

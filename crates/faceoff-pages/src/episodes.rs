@@ -84,7 +84,7 @@ pub(super) async fn page(
         Problem::new(ProblemKind::InvalidRequest, detail)
     };
     let chosen = query.filter().map_err(invalid)?;
-    let competition = &app.config.competition;
+    let competition = app.config.competition();
     if let Some(task) = chosen.task {
         let found = competition.find_task(task.as_str());
         found.map_err(|_| invalid("task"))?;

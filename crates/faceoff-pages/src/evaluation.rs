@@ -281,13 +281,13 @@ pub(super) async fn page(
                 comparable,
                 slow_answers: SlowAnswers::load(&app, &view, result).await?,
                 answer_times: answer_times(result, &distributions),
-                ..FinalResult::new(result, *finished_at, &summary, &app.config.competition)
+                ..FinalResult::new(result, *finished_at, &summary, app.config.competition())
             })
         }
         _ => None,
     };
     render(&Page {
-        violation_heads: figures::violation_heads(&app.config.competition),
+        violation_heads: figures::violation_heads(app.config.competition()),
         frame: Frame::load(&app, "").await?,
         id,
         team: view.team_name.to_string(),
@@ -297,7 +297,7 @@ pub(super) async fn page(
         day: view.day,
         profile: view.profile,
         has_episodes: clips.is_some(),
-        has_replays: clips.is_some() && app.config.competition.has_replays,
+        has_replays: clips.is_some() && app.config.competition().has_replays,
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
         state: match frozen {
             Some(frozen) => format!(

@@ -56,7 +56,7 @@ impl Frame {
                 )
             }),
             has_tournaments: app.has_tournaments.load(Ordering::Relaxed),
-            subject: Some(app.config.competition.subject.clone()),
+            subject: Some(app.config.competition().subject.clone()),
             preview: app
                 .config
                 .public_url

@@ -93,7 +93,7 @@ impl EpisodeReplay {
         let clips = Clips::find(app, &visibility, id).await?;
         let clip = clips.episode(task, episode).await?;
         let line = &clip.line;
-        let competition = &app.config.competition;
+        let competition = app.config.competition();
         let team = app.store.team(clips.evaluation.team).await?;
         let day = clips.evaluation.stage_day.date;
         let api = format!("{}/episodes/{task}/{episode}", paths::evaluation(id));

@@ -91,7 +91,7 @@ pub(super) async fn page(
             .map(|tournament| (tournament.id, tournament.name))
             .collect(),
         frame: Frame::for_app(&app, season.name.clone(), "/season"),
-        competition: Arc::clone(&app.config.competition),
+        competition: Arc::clone(app.config.competition()),
         opened: utc_second(season.created_at),
         closed: season.closed_at.map(utc_second),
         season,

@@ -79,7 +79,7 @@ pub(super) async fn page(
         .find(|revision| revision.number == history.revision)
         .ok_or_else(|| Problem::internal("history without its revision"))?;
     let variation = rules.rules.variation;
-    let bounds = app.config.competition.tier_bounds(&variation);
+    let bounds = app.config.competition().tier_bounds(&variation);
     let today: StageDay = stage.day(app.config.clock.now());
     let mut open_evaluations = evaluation::current(&app, &visibility, today).await?;
     open_evaluations.retain(|evaluation| evaluation.team == id && !evaluation.status.is_final());
@@ -111,19 +111,19 @@ pub(super) async fn page(
             .map(|row| LatestResult::new(row, bounds)),
         task_titles: app
             .config
-            .competition
+            .competition()
             .tasks
             .iter()
             .map(|info| info.title.clone())
             .collect(),
-        day_charts: days::charts(&history.rows, &variation, &app.config.competition),
-        violation_heads: crate::figures::violation_heads(&app.config.competition),
-        violations: days::violations(&history.rows, &app.config.competition),
+        day_charts: days::charts(&history.rows, &variation, app.config.competition()),
+        violation_heads: crate::figures::violation_heads(app.config.competition()),
+        violations: days::violations(&history.rows, app.config.competition()),
         days: history
             .rows
             .iter()
             .rev()
-            .map(|row| DayResult::new(row, &variation, &app.config.competition))
+            .map(|row| DayResult::new(row, &variation, app.config.competition()))
             .collect(),
         history_query: format!("?stage={}&revision={}", stage.id, history.revision),
         frozen: history.frozen,

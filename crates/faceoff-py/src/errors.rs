@@ -1,6 +1,8 @@
 //! Errors as Python exceptions: the classes of the package's `errors.py`.
 
-use faceoff_types::PerturbationSettings;
+use faceoff_airhockey::checked_magnitudes;
+use faceoff_sim::PerturbationSettings;
+use faceoff_types::Magnitudes;
 use pyo3::{import_exception, prelude::*};
 use std::{
     any::Any,
@@ -41,9 +43,8 @@ pub fn panic_message(panic: &(dyn Any + Send)) -> String {
 }
 
 /// Refuses magnitudes of perturbations that are outside of their ranges.
-pub fn check_perturbations(magnitudes: &PerturbationSettings) -> PyResult<()> {
-    magnitudes
-        .check()
+pub fn check_perturbations(settings: &PerturbationSettings) -> PyResult<Magnitudes> {
+    checked_magnitudes(settings)
         .map_err(|error| argument_error("perturbations", "valid magnitudes", error))
 }
 

@@ -62,16 +62,16 @@ impl Evaluation {
             Some(text) => read("mismatch_seed", text)?,
             None => seed.model_mismatch(),
         };
-        let magnitudes: PerturbationSettings = serde_json::from_str(perturbations)
+        let settings: PerturbationSettings = serde_json::from_str(perturbations)
             .map_err(|error| argument_error("perturbations", "magnitudes of factors", error))?;
-        check_perturbations(&magnitudes)?;
+        let magnitudes = check_perturbations(&settings)?;
         let arena = py.detach(|| {
             catch_panic(|| {
                 let ruleset = Ruleset::CURRENT;
                 Ok(Arena::with_ruleset(
                     ruleset,
                     profile,
-                    &magnitudes,
+                    &settings,
                     seed,
                     mismatch_seed,
                 ))
@@ -82,7 +82,7 @@ impl Evaluation {
             profile: profile.name(),
             seed,
             variation: Variation {
-                perturbations: Box::new(magnitudes),
+                perturbations: magnitudes,
                 ..Variation::default()
             },
         })

@@ -76,7 +76,7 @@ mod _native {
     /// action becomes a trajectory of 20 ms.
     #[pyfunction]
     fn action_shape(interpolation: Option<i64>) -> PyResult<Vec<usize>> {
-        let interpolation = faceoff_types::Interpolation::from_code(interpolation);
+        let interpolation = faceoff_sim::Interpolation::from_code(interpolation);
         let interpolation = interpolation.map_err(|error| {
             argument_error("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0)
         })?;

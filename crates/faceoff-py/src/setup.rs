@@ -8,8 +8,8 @@ use crate::{
     errors::{argument_error, check_perturbations},
 };
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, Factor, Factors, Plant};
-use faceoff_types::{EPISODE_STEPS, Interpolation, PerturbationSettings, Seed};
+use faceoff_sim::{Episode, Factor, Factors, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::{EPISODE_STEPS, Seed};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +50,7 @@ impl Setup {
                 setup.max_episode_steps,
             ));
         }
-        check_perturbations(&setup.perturbations)?;
+        let _checked = check_perturbations(&setup.perturbations)?;
         let magnitudes = &setup.perturbations;
         let is_drawn = setup.factors.contains(&Factor::ModelMismatch);
         // Thousands of unsuccessful draws would look like a hang.

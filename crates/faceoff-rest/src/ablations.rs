@@ -148,11 +148,11 @@ pub(crate) async fn order_ablation(
 ) -> Result<impl IntoResponse, Problem> {
     let episodes = request.episodes_per_task.unwrap_or(DEFAULT_EPISODES);
     let plan = RunPlan {
-        tasks: app.config.competition.task_names().collect(),
+        tasks: app.config.competition().task_names().collect(),
         episodes_per_task: checked_episodes(episodes)?,
         ..stage::current(&app).await?.plan()
     };
-    let profiles: Vec<Profile> = app.config.competition.ablation_profiles().collect();
+    let profiles: Vec<Profile> = app.config.competition().ablation_profiles().collect();
     let now = app.config.clock.now();
     let ablation = app
         .store

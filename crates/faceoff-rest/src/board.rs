@@ -91,7 +91,7 @@ pub(crate) async fn board_history(
     let format = choose_format(query.format, &headers);
     let tag = tag(&app, change, viewer, format, &("history", &query))?;
     let history = history::query(&app, &visibility, query);
-    let csv = |history: &_| board_csv::history_table(&app.config.competition, history);
+    let csv = |history: &_| board_csv::history_table(app.config.competition(), history);
     send(&tag, &conditions, format, history, csv).await
 }
 
@@ -111,7 +111,7 @@ async fn respond(
     let format = choose_format(query.format, headers);
     let tag = tag(app, change, viewer, format, &(task, &query))?;
     let board = board::query(app, &visibility, query, task);
-    let csv = |board: &_| board_csv::board_table(&app.config.competition, board);
+    let csv = |board: &_| board_csv::board_table(app.config.competition(), board);
     send(&tag, conditions, format, board, csv).await
 }
 

@@ -19,7 +19,7 @@ use faceoff_service::{
     services::{
         decisions::checked_reason,
         entrants,
-        stages::{check_offered, check_robot, parse_name},
+        stages::{check_magnitudes, check_offered, parse_name},
     },
     views::{stage, tournament},
 };
@@ -283,19 +283,10 @@ async fn changed_rules(
         }
         rules.ruleset = Ruleset::CURRENT;
     }
-    rules
-        .check()
-        .map_err(|error| Problem::invalid("rules", error))?;
-    if !app.config.competition.has_games {
-        return Err(Problem::invalid(
-            "rules",
-            "the competition has no games of two agents",
-        ));
-    }
-    let known = app.config.competition.find_profile(rules.profile.as_str());
-    known.map_err(|error| Problem::invalid("rules", format!("profile: {error}")))?;
+    let checked = app.config.competition().check_tournament(&mut rules);
+    checked.map_err(|error| Problem::invalid("rules", error))?;
     check_offered(app, rules.runtimes.as_ref())?;
-    check_robot(app, &rules.perturbations).await?;
+    check_magnitudes(app, &rules.perturbations).await?;
     Ok(rules)
 }
 

@@ -78,7 +78,7 @@ fn main() {
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits::default(),
         platform_retries: 0,
-        perturbations: Box::default(),
+        perturbations: Default::default(),
     };
     let out = tempfile::tempdir().unwrap();
     let load_average = || fs::read_to_string("/proc/loadavg").unwrap_or_default();

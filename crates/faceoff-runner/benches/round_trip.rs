@@ -22,7 +22,8 @@ use faceoff_runner::{
 };
 use faceoff_sandbox::{Isolation, affinity};
 use faceoff_sim::AirHockeyProfile;
-use faceoff_types::{EpisodeOutcome, Interpolation, Ruleset, Seed};
+use faceoff_sim::Interpolation;
+use faceoff_types::{EpisodeOutcome, Ruleset, Seed};
 use faceoff_wire::Message;
 use instant::{ACTION, InstantAgent, environment, instant_agent};
 use std::{

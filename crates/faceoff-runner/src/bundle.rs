@@ -18,7 +18,7 @@ pub use faceoff_types::BundleLimits;
 pub use image::Image;
 
 use budget::{Budget, CancellableReader, MultiStreamReader};
-use faceoff_types::{ArchiveFormat, IMAGE_RUNTIME};
+use faceoff_types::{ArchiveFormat, Competition, IMAGE_RUNTIME};
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
 use fs_err::File;
 use std::{
@@ -180,6 +180,15 @@ fn read_archive<'a>(
         ArchiveFormat::Tar => tar_archive::unpack(cancellable(file), tree, budget)?,
     }
     Ok(format)
+}
+
+/// Checks that agents of a competition may have the bundle's interpolation.
+///
+/// # Errors
+/// [`BundleError::Invalid`] with the interpolations that there are.
+pub fn check_interpolation(bundle: &Bundle, competition: &Competition) -> Result<(), BundleError> {
+    let checked = bundle.manifest.check_interpolation(&competition.actions);
+    checked.map_err(|error| BundleError::Invalid(error.to_string()))
 }
 
 /// Opens a developer's own folder in place, or unpacks an archive into a new folder `bundle` of

@@ -3,9 +3,9 @@
 
 use crate::wait_breakdown::WaitBreakdown;
 use faceoff_dataset::RecordingError;
-use faceoff_episode::{NonFiniteObservation, RecordError};
+use faceoff_episode::{InvalidConditions, NonFiniteObservation, RecordError};
 use faceoff_sandbox::SandboxError;
-use faceoff_types::{AgentFaultKind, UnknownProfile, UnknownTask, is_full_disk};
+use faceoff_types::{AgentFaultKind, UnknownTask, is_full_disk};
 use std::io;
 
 /// Failure of a session with an agent.
@@ -89,9 +89,9 @@ pub enum PlatformFault {
     /// The simulator has no such task.
     #[error(transparent)]
     UnknownTask(#[from] UnknownTask),
-    /// The simulator has no such profile.
+    /// The simulator has no such profile or magnitudes.
     #[error(transparent)]
-    UnknownProfile(#[from] UnknownProfile),
+    InvalidConditions(#[from] InvalidConditions),
     /// Host interference repeatedly prevented an agent's answer, in a run that needs a verdict on the agent.
     #[error("host interference prevented the agent's answer ({0})")]
     HostBusy(WaitBreakdown),

@@ -13,9 +13,7 @@ use crate::{
 use faceoff_episode::{AnswerTiming, Conditions, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
-use faceoff_types::{
-    AgentFault, EpisodeOutcome, PerturbationSettings, Ruleset, Task, ValidationTiming,
-};
+use faceoff_types::{AgentFault, EpisodeOutcome, Magnitudes, Ruleset, Task, ValidationTiming};
 use faceoff_wire::job::ValidationSpec;
 use std::fmt;
 
@@ -121,7 +119,7 @@ pub fn validate_monitored(
     let environment = env.simulator.environment(&Conditions {
         ruleset: Ruleset::CURRENT,
         profile: env.simulator.competition().counting_profile,
-        perturbations: &PerturbationSettings::default(),
+        perturbations: &Magnitudes::default(),
         seed: spec.seed,
         mismatch_seed: spec.mismatch_seed,
     })?;

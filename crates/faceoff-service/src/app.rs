@@ -95,7 +95,7 @@ impl AppState {
             upload_slots: Arc::new(UploadSlots::new(config.limits.team_uploads)),
             artifact_writes: Semaphore::new(MAX_ARTIFACT_WRITES),
             archive_permit: Arc::new(Semaphore::new(1)),
-            summaries: Summaries::new(store.clone(), Arc::clone(&config.competition)),
+            summaries: Summaries::new(store.clone(), Arc::clone(config.competition())),
             board_rows: SharedCache::with_entries(MAX_BOARDS),
             answer_cache: answer_cache::new(),
             ratings: SharedCache::with_entries(MAX_TOURNAMENTS),

@@ -4,6 +4,7 @@ use crate::{
     agent_resources::AgentResources, link_key::LinkKey, rate_limits::RateLimits,
     transfer_rate::MinTransferRate,
 };
+use faceoff_episode::Simulator;
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
 use faceoff_store::UploadQuota;
@@ -65,8 +66,8 @@ pub struct Capacity {
 /// Everything that the handlers need besides the store.
 #[derive(Debug, Clone)]
 pub struct HttpConfig {
-    /// Its tasks and violations are the columns of boards and files.
-    pub competition: Arc<Competition>,
+    /// The tasks and violations of its competition are the columns of boards and files.
+    pub simulator: Arc<dyn Simulator>,
     /// Largest packed bundle, in bytes.
     pub max_bundle_bytes: u64,
     /// The server's public URL without a trailing slash. Links begin with it; if it begins with https, cookies are sent
@@ -90,4 +91,12 @@ pub struct HttpConfig {
     pub metrics: Metrics,
     /// Reads the resource usage of this process from the operating system.
     pub process: fn() -> Process,
+}
+
+impl HttpConfig {
+    /// The competition of the season.
+    #[must_use]
+    pub fn competition(&self) -> &Arc<Competition> {
+        self.simulator.competition()
+    }
 }

@@ -60,12 +60,12 @@ impl FromRequestParts<App> for AblationPath {
 }
 
 fn known_task(app: &App, name: &str) -> Result<Task, Problem> {
-    let found = app.config.competition.find_task(name);
+    let found = app.config.competition().find_task(name);
     found.map_err(|error| Problem::new(ProblemKind::NotFound, error.to_string()))
 }
 
 fn known_profile(app: &App, name: &str) -> Result<Profile, Problem> {
-    let found = app.config.competition.find_profile(name);
+    let found = app.config.competition().find_profile(name);
     found.map_err(|error| Problem::new(ProblemKind::NotFound, format!("profile {name:?}: {error}")))
 }
 

@@ -13,7 +13,8 @@ use crate::{
     episode_step::step_episodes_on,
     robot::plant::Plant,
 };
-use faceoff_types::{Interpolation, PerturbationSettings, Seed};
+use crate::{Interpolation, PerturbationSettings};
+use faceoff_types::Seed;
 use rayon::prelude::*;
 
 /// Number of worlds that one thread steps at once.

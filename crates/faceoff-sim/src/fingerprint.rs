@@ -1,8 +1,9 @@
 //! The *fingerprint* of the simulator: a hash of the motion in a short episode of each task with all perturbations. A simulator that
 //! computes other numbers has another one.
 
+use crate::PerturbationSettings;
 use crate::{AirHockeyProfile, AirHockeyTask, Episode, EpisodeState, Interpolation, JOINTS, Plant};
-use faceoff_types::{PerturbationSettings, Seed};
+use faceoff_types::Seed;
 use std::sync::OnceLock;
 
 /// Control steps of each episode: enough for contacts of the puck with rim and mallet.

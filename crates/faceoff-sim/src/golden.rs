@@ -13,7 +13,8 @@ use crate::{
     model::{EE_DESIRED_HEIGHT_M, JOINTS},
     robot::{inverse_kinematics::inverse_kinematics, plant::Plant},
 };
-use faceoff_types::{Interpolation, PerturbationSettings, Seed};
+use crate::{Interpolation, PerturbationSettings};
+use faceoff_types::Seed;
 use std::fmt;
 
 /// The perturbation profiles: without perturbations, and with those of an evaluation.

@@ -1,6 +1,6 @@
 //! Interpolations: how the numbers of an agent's action become a trajectory of the robot's joints.
 
-use crate::ActionLayout;
+use faceoff_types::ActionLayout;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

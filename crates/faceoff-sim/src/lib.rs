@@ -29,6 +29,7 @@ mod fingerprint;
 pub mod export;
 pub mod game;
 pub mod golden;
+mod interpolation;
 pub mod model;
 pub mod perturbation;
 pub mod robot;
@@ -46,10 +47,13 @@ pub use episode::{
     env_info::{EnvInfo, env_info, env_info_for},
 };
 pub use episode_step::{step_episodes, step_episodes_on};
-pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use fingerprint::fingerprint;
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
-pub use perturbation::{AirHockeyProfile, Factor, Factors};
+pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
+pub use perturbation::{
+    AirHockeyProfile, DelaySettings, DisturbanceSettings, Factor, Factors, MismatchSettings,
+    NoiseSettings, PerturbationSettings, TrackingLossSettings,
+};
 pub use robot::plant::Plant;
 // `Runaway`: the part of a world that left its bounds, so that the world stopped (*diverged*).
 pub use world::{Bounds, ContactBody, Divergence, Impact, Impacts, MalletState, Runaway, World};

@@ -1,7 +1,8 @@
 //! The numbers of the robot: a KUKA LBR iiwa 14 arm with a rod, at whose end a mallet hangs on a *universal joint* (two hinges). They
 //! are read from the *reference*, the challenge's own simulator; `docs/robot.md` lists them.
 
-pub use faceoff_types::{CONTROL_STEP_S, JOINTS, SUBSTEPS};
+pub use crate::{JOINTS, SUBSTEPS};
+pub use faceoff_types::CONTROL_STEP_S;
 
 /// Degrees of freedom of the *plant* (the simulated arm): the seven driven joints and the two hinges of the universal joint.
 pub const DOFS: usize = 9;

@@ -91,6 +91,11 @@ impl ActionSpace {
         if self.is_stated { None } else { first() }
     }
 
+    /// The codes of all layouts.
+    pub fn codes(&self) -> impl Iterator<Item = Option<i64>> + '_ {
+        self.layouts.iter().map(|layout| layout.code)
+    }
+
     /// The layout with a code.
     #[must_use]
     pub fn find(&self, code: Option<i64>) -> Option<ActionLayout> {

@@ -1,8 +1,9 @@
 //! A competition: what the platform has to know of it in order to run and to show it.
 
 use crate::{
-    ActionSpace, EpisodeEnd, InvalidStageRules, Millionths, Profile, ProfileMap, RecordingColumns,
-    StageRules, Task, TaskMap, TaskWeights, TierBounds, UnknownProfile, UnknownTask, Variation,
+    ActionSpace, EpisodeEnd, InvalidMagnitude, InvalidStageRules, InvalidTournament, MagnitudeInfo,
+    Magnitudes, Millionths, Profile, ProfileMap, RecordingColumns, StageRules, Task, TaskMap,
+    TaskWeights, TierBounds, TournamentRules, UnknownProfile, UnknownTask, Variation,
     ViolationCounts, ViolationName, Violations,
 };
 
@@ -40,6 +41,8 @@ pub struct Competition {
     pub ideal_profile: Profile,
     /// The profile of evaluations that count, unless a stage has another. It is one of `profiles`.
     pub counting_profile: Profile,
+    /// Magnitudes of the perturbations, group by group, in the order of files.
+    pub magnitudes: Vec<MagnitudeInfo>,
 }
 
 /// A task of a competition.
@@ -280,6 +283,14 @@ impl Competition {
         map.sort_by(|a, _, b, _| position(a).cmp(&position(b)));
     }
 
+    /// Checks magnitudes, and completes them in the order of files; none is left if all are those of the competition.
+    ///
+    /// # Errors
+    /// The first magnitude that is unknown or out of range.
+    pub fn check_magnitudes(&self, magnitudes: &mut Magnitudes) -> Result<(), InvalidMagnitude> {
+        magnitudes.complete(&self.magnitudes)
+    }
+
     /// Checks that evaluations are possible under these rules, and brings tasks and weights into the order of the competition.
     /// Weights and bounds of tiers that are those of the competition are left out.
     ///
@@ -291,6 +302,7 @@ impl Competition {
             self.find_task(task.as_str())?;
         }
         self.find_profile(rules.profile.as_str())?;
+        self.check_magnitudes(&mut rules.variation.perturbations)?;
         let order = |task: &Task| self.task_names().position(|other| other == *task);
         rules.tasks.sort_by_key(order);
         if let Some(weights) = &rules.variation.weights {
@@ -303,6 +315,19 @@ impl Competition {
             rules.variation.tier_bounds = (bounds != own).then_some(bounds);
         }
         Ok(())
+    }
+
+    /// Checks that games are possible under these rules, and completes their magnitudes.
+    ///
+    /// # Errors
+    /// The first invalid field.
+    pub fn check_tournament(&self, rules: &mut TournamentRules) -> Result<(), InvalidTournament> {
+        rules.check()?;
+        if !self.has_games {
+            return Err(InvalidTournament::NoGames);
+        }
+        self.find_profile(rules.profile.as_str())?;
+        Ok(self.check_magnitudes(&mut rules.perturbations)?)
     }
 
     /// The tasks of a map in the order of the competition, whatever the order of the map.
@@ -414,6 +439,7 @@ mod tests {
             }],
             ideal_profile: PLAIN,
             counting_profile: PLAIN,
+            magnitudes: Vec::new(),
             actions: ActionSpace {
                 is_stated: false,
                 layouts: Vec::new(),

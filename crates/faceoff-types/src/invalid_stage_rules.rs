@@ -1,7 +1,7 @@
 //! Errors in the rules and settings of a stage.
 
 use crate::{
-    InvalidLimit, InvalidPerturbation, InvalidRuntimes, InvalidWeights, MAX_DEADLINE_H,
+    InvalidLimit, InvalidMagnitude, InvalidRuntimes, InvalidWeights, MAX_DEADLINE_H,
     MAX_EPISODES_PER_TASK, TierBounds, UnknownProfile, UnknownTask,
 };
 
@@ -35,7 +35,7 @@ pub enum InvalidStageRules {
     #[error("standings: a mean is of 1 to {MAX_MEAN_DAYS} days, got {0}")]
     MeanDays(u32),
     #[error("perturbations.{0}")]
-    Perturbations(#[from] InvalidPerturbation),
+    Perturbations(#[from] InvalidMagnitude),
     #[error("limits.{0}")]
     Limits(InvalidLimit),
     #[error("runtimes: {0}")]

@@ -20,14 +20,13 @@ mod game;
 mod game_limits;
 mod game_seed_label;
 mod ids;
-mod interpolation;
 mod invalid_stage_rules;
 mod limits;
 mod live_game;
+mod magnitudes;
 mod millionths;
 mod names;
 mod outcome;
-mod perturbations;
 mod printable;
 mod profile;
 mod recording;
@@ -80,17 +79,13 @@ pub use ids::{
     ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
     TournamentId, UserId, WebhookId,
 };
-pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use invalid_stage_rules::{InvalidStageRules, MAX_MEAN_DAYS};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use live_game::{GameEvent, LiveEvent, LiveGame, LivePosition};
+pub use magnitudes::{InvalidMagnitude, Magnitude, MagnitudeInfo, Magnitudes};
 pub use millionths::{Millionths, NotMillionths};
 pub use names::{DivisionName, InvalidName, StageName, TeamName, UserName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
-pub use perturbations::{
-    DelaySettings, DisturbanceSettings, InvalidPerturbation, MismatchSettings, NoiseSettings,
-    PerturbationSettings, TrackingLossSettings,
-};
 pub use printable::{escape_unprintable, is_printable};
 pub use profile::{Profile, ProfileMap};
 pub use recording::{RecordingColumn, RecordingColumns};

@@ -2,8 +2,8 @@
 //! settings do not.
 
 use crate::{
-    GAME_WINDOWS, GameLimits, InvalidLimit, InvalidPerturbation, PerturbationSettings, Profile,
-    Publication, Ruleset, Runtimes, StageLimits, TournamentFormat, WINDOW_STEPS,
+    GAME_WINDOWS, GameLimits, InvalidLimit, InvalidMagnitude, Magnitudes, Profile, Publication,
+    Ruleset, Runtimes, StageLimits, TournamentFormat, UnknownProfile, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
@@ -32,8 +32,8 @@ pub struct TournamentRules {
     /// Limits of each side, in addition to those of single answers.
     pub game_limits: GameLimits,
     /// Magnitudes of the profile's perturbations; absent: the ruleset's.
-    #[serde(skip_serializing_if = "is_default")]
-    pub perturbations: Box<PerturbationSettings>,
+    #[serde(skip_serializing_if = "Magnitudes::is_empty")]
+    pub perturbations: Magnitudes,
     /// Limits of agents that differ from the server's configuration; absent if none do.
     #[serde(skip_serializing_if = "StageLimits::is_none")]
     pub limits: Box<StageLimits>,
@@ -71,8 +71,12 @@ pub enum InvalidTournament {
         expected: &'static str,
         got: f64,
     },
+    #[error("the competition has no games of two agents")]
+    NoGames,
+    #[error("profile: {0}")]
+    UnknownProfile(#[from] UnknownProfile),
     #[error("perturbations.{0}")]
-    Perturbations(#[from] InvalidPerturbation),
+    Perturbations(#[from] InvalidMagnitude),
     #[error("limits.{0}")]
     Limits(InvalidLimit),
     #[error("runtimes: {0}")]
@@ -90,7 +94,7 @@ impl Default for TournamentRules {
             profile: Profile::new("evaluation"),
             mirrored: false,
             game_limits: GameLimits::default(),
-            perturbations: Box::default(),
+            perturbations: Magnitudes::default(),
             limits: Box::default(),
             runtimes: None,
         }
@@ -135,7 +139,6 @@ impl TournamentRules {
                 });
             }
         }
-        self.perturbations.check()?;
         if let Some(runtimes) = &self.runtimes {
             runtimes.check()?;
         }
@@ -163,10 +166,6 @@ impl TournamentSettings {
         }
         Ok(())
     }
-}
-
-fn is_default(perturbations: &PerturbationSettings) -> bool {
-    *perturbations == PerturbationSettings::default()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Variations: a stage's deviations from the ruleset that affect scores.
 
-use crate::{Millionths, PerturbationSettings, TaskWeights, millionths::NotMillionths};
+use crate::{Magnitudes, Millionths, TaskWeights, millionths::NotMillionths};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
@@ -16,9 +16,9 @@ pub struct Variation {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the profile's perturbations; absent values are the ruleset's.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub perturbations: Box<PerturbationSettings>,
+    /// Magnitudes of the profile's perturbations; absent values are the competition's.
+    #[serde(default, skip_serializing_if = "Magnitudes::is_empty")]
+    pub perturbations: Magnitudes,
 }
 
 impl Variation {
@@ -206,11 +206,8 @@ mod tests {
         assert_eq!(serde_json::to_string(&read).unwrap(), text);
         let no_losses = r#"{"perturbations":{"tracking_loss":{"probability":0.0}}}"#;
         let read: Variation = serde_json::from_str(no_losses).unwrap();
-        let mut expected = PerturbationSettings::default();
-        expected.tracking_loss.probability = 0.0;
-        assert_eq!(*read.perturbations, expected);
-        let written = serde_json::to_string(&read).unwrap();
-        assert_eq!(serde_json::from_str::<Variation>(&written).unwrap(), read);
+        assert!(!read.is_none());
+        assert_eq!(serde_json::to_string(&read).unwrap(), no_losses);
     }
 
     #[test]

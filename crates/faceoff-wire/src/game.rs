@@ -6,7 +6,7 @@
 //! without seeds.
 
 use crate::dataset::{FileDigest, SimulatorId};
-use faceoff_types::{GameLimits, PerturbationSettings, Profile, Ruleset, Seed, SlotTiming};
+use faceoff_types::{GameLimits, Magnitudes, Profile, Ruleset, Seed, SlotTiming};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -35,8 +35,8 @@ pub struct GameSpec {
     #[serde(default)]
     pub platform_retries: u32,
     /// Magnitudes of the profile's perturbations; absent: the ruleset's.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub perturbations: Box<PerturbationSettings>,
+    #[serde(default, skip_serializing_if = "Magnitudes::is_empty")]
+    pub perturbations: Magnitudes,
 }
 
 /// `manifest.json` of a game: a description of the game, with the hashes of its files.
@@ -78,8 +78,4 @@ pub struct GameSideManifest {
 pub struct GameCalibration {
     /// One entry per side, the first side's first.
     pub sides: [SlotTiming; 2],
-}
-
-fn is_default(perturbations: &PerturbationSettings) -> bool {
-    *perturbations == PerturbationSettings::default()
 }

@@ -6,9 +6,9 @@
 
 use crate::game::GameSpec;
 use faceoff_types::{
-    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId, Millionths,
-    PerturbationSettings, Profile, Ruleset, Seed, StageRuntimes, SubmissionId, Task, TaskWeights,
-    TierBounds, ValidationOutcome, Variation,
+    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId, Magnitudes,
+    Millionths, Profile, Ruleset, Seed, StageRuntimes, SubmissionId, Task, TaskWeights, TierBounds,
+    ValidationOutcome, Variation,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -168,8 +168,8 @@ pub struct ShardSpec {
     #[serde(default)]
     pub platform_retries: u32,
     /// Magnitudes of the profile's perturbations; absent: the ruleset's.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub perturbations: Box<PerturbationSettings>,
+    #[serde(default, skip_serializing_if = "Magnitudes::is_empty")]
+    pub perturbations: Magnitudes,
 }
 
 /// Metadata of an evaluation's dataset.
@@ -203,10 +203,6 @@ impl EvaluationMeta {
         let own = self.tiers?;
         Some(self.variation.tier_bounds.unwrap_or(own))
     }
-}
-
-fn is_default(perturbations: &PerturbationSettings) -> bool {
-    *perturbations == PerturbationSettings::default()
 }
 
 /// The tiers of the only competition that earlier versions had.

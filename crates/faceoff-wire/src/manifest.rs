@@ -1,7 +1,7 @@
 //! Parser of `agent.toml`, which names an agent and says how to start it. A *bundle* is the archive that a team submits; it contains
 //! this file and the agent's program.
 
-use faceoff_types::{Interpolation, escape_unprintable, is_printable};
+use faceoff_types::{ActionSpace, escape_unprintable, is_printable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -77,6 +77,36 @@ impl Manifest {
         value.len() <= 4096 && !value.contains('\0')
     }
 
+    /// Checks that the competition has the interpolation.
+    ///
+    /// # Errors
+    /// Names the interpolations that there are.
+    pub fn check_interpolation(&self, actions: &ActionSpace) -> Result<(), ManifestError> {
+        let Some(code) = self.interpolation else {
+            return Ok(());
+        };
+        if !actions.is_stated {
+            let problem = format!("is {code}: leave it out, the competition has none");
+            return require(false, "interpolation", &problem);
+        }
+        let numbers: Vec<String> = actions
+            .codes()
+            .flatten()
+            .map(|code| code.to_string())
+            .collect();
+        let null = if actions.find(None).is_some() {
+            "; for null leave it out and answer hello with null"
+        } else {
+            ""
+        };
+        let problem = format!("is {code}: expected one of {}{null}", numbers.join(", "));
+        require(
+            actions.find(Some(code)).is_some(),
+            "interpolation",
+            &problem,
+        )
+    }
+
     fn check(&self) -> Result<(), ManifestError> {
         let chars = self.name.chars().count();
         require(
@@ -115,16 +145,6 @@ impl Manifest {
             "runtime",
             "must be a runtime's name: letters, digits, dots, dashes and underscores",
         )?;
-        if let Some(code) = self.interpolation {
-            require(
-                Interpolation::from_code(Some(code)).is_ok(),
-                "interpolation",
-                &format!(
-                    "is {code}: expected 1, 2, 3, 4, 5 or -1; for whole trajectories leave it out \
-                     and answer hello with null"
-                ),
-            )?;
-        }
         require(
             self.env.len() <= 64,
             "env",
@@ -164,6 +184,7 @@ fn require(condition: bool, key: &str, problem: &str) -> Result<(), ManifestErro
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_types::ActionLayout;
 
     const VALID_MANIFEST: &str = r#"
         name = "striker"
@@ -213,11 +234,6 @@ mod tests {
             ),
             (
                 "interpolation = 3",
-                "interpolation = 0",
-                "interpolation is 0: expected",
-            ),
-            (
-                "interpolation = 3",
                 "interpretation = 3",
                 "unknown field `interpretation`",
             ),
@@ -233,5 +249,35 @@ mod tests {
             );
         }
         assert!(Manifest::parse(&" ".repeat(MANIFEST_MAX_BYTES as usize + 1)).is_err());
+    }
+
+    #[test]
+    fn unknown_interpolation_is_refused_with_the_known_ones() {
+        let mut manifest = Manifest::parse(VALID_MANIFEST).unwrap();
+        let layout = |code| ActionLayout::new(code, &[2]);
+        let stated = ActionSpace {
+            is_stated: true,
+            layouts: [Some(3), Some(-1), None].map(layout).into(),
+        };
+        assert_eq!(manifest.check_interpolation(&stated), Ok(()));
+        let single = ActionSpace {
+            is_stated: false,
+            layouts: vec![layout(None)],
+        };
+        let refused = |manifest: &Manifest, actions| {
+            let checked = manifest.check_interpolation(actions);
+            checked.unwrap_err().to_string()
+        };
+        assert_eq!(
+            refused(&manifest, &single),
+            "agent.toml: interpolation is 3: leave it out, the competition has none"
+        );
+        manifest.interpolation = Some(0);
+        assert_eq!(
+            refused(&manifest, &stated),
+            "agent.toml: interpolation is 0: expected one of 3, -1; for null leave it out and answer hello with null"
+        );
+        manifest.interpolation = None;
+        assert_eq!(manifest.check_interpolation(&single), Ok(()));
     }
 }

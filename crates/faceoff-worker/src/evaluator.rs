@@ -79,7 +79,9 @@ impl Evaluator for Runner {
         limits: &BundleLimits,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<Bundle, BundleError> {
-        bundle::unpack(archive, into, limits, cancelled)
+        let bundle = bundle::unpack(archive, into, limits, cancelled)?;
+        bundle::check_interpolation(&bundle, self.simulator.competition())?;
+        Ok(bundle)
     }
 
     fn validate(

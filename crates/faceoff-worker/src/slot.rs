@@ -285,7 +285,7 @@ fn public_reason(error: &anyhow::Error) -> &'static str {
             PlatformFault::Simulation(_)
             | PlatformFault::Simulator(_)
             | PlatformFault::UnknownTask(_)
-            | PlatformFault::UnknownProfile(_),
+            | PlatformFault::InvalidConditions(_),
         ) => "the simulator failed",
         Some(PlatformFault::HostBusy(_)) => "the host kept an agent from answering",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",

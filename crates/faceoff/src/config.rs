@@ -11,8 +11,8 @@ use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLi
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
-    CountingResult, DayDeadline, InvalidSchedule, PerturbationSettings, Profile, Publication,
-    Ruleset, Schedule, StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation, Zone,
+    CountingResult, DayDeadline, InvalidSchedule, Magnitudes, Profile, Publication, Ruleset,
+    Schedule, StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation, Zone,
 };
 use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
@@ -132,8 +132,8 @@ pub struct EvaluationConfig {
     pub weights: TaskWeights,
     /// Most penalty points per episode of the tiers (classes of agents) deployable and improvable.
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile enables; left out, those of the ruleset (the simulator's version).
-    pub perturbations: Option<Box<PerturbationSettings>>,
+    /// Magnitudes of the perturbations that the profile enables; left out, those of the competition.
+    pub perturbations: Magnitudes,
     /// When the datasets of released days are published.
     pub publishes: Publication,
     /// The result that counts for a team's row on the board.
@@ -157,7 +157,7 @@ impl Default for EvaluationConfig {
             ablation_episodes: settings.ablation_episodes,
             weights: competition().weights(&Variation::default()),
             tier_bounds: competition().tiers,
-            perturbations: None,
+            perturbations: Magnitudes::default(),
             publishes: settings.publishes,
             standings: settings.standings,
         }
@@ -375,7 +375,7 @@ impl Config {
             variation: Variation {
                 weights: Some(evaluation.weights.clone()),
                 tier_bounds: evaluation.tier_bounds,
-                perturbations: evaluation.perturbations.clone().unwrap_or_default(),
+                perturbations: evaluation.perturbations.clone(),
             },
             limits: Default::default(),
         };

@@ -6,10 +6,11 @@ use faceoff_episode::{
     AnswerTiming, EpisodeStart, NullSink, Question, RecordError, RunningEpisode, StateColumns,
     StepRow, StepSink, World,
 };
+use faceoff_sim::Interpolation;
 use faceoff_sim::{AirHockeyProfile, Bounds};
 use faceoff_types::{
-    ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase,
-    Ruleset, Seed, Task,
+    ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Ruleset, Seed,
+    Task,
 };
 use std::ops::Range;
 

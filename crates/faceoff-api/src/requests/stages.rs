@@ -7,9 +7,9 @@ mod schema;
 use super::double_option::{OrNull, deserialize_some};
 use crate::objects_only;
 use faceoff_types::{
-    CountingResult, DayDeadline, InvalidStageRules, PerturbationSettings, Profile, Publication,
-    Retention, Ruleset, Runtimes, Schedule, StageLimits, StageRules, StageSettings,
-    StageUploadLimits, Task, TaskWeights, TierBounds, Zone,
+    CountingResult, DayDeadline, InvalidStageRules, Magnitudes, Profile, Publication, Retention,
+    Ruleset, Runtimes, Schedule, StageLimits, StageRules, StageSettings, StageUploadLimits, Task,
+    TaskWeights, TierBounds, Zone,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
@@ -93,19 +93,19 @@ pub struct StagePatch {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile switches on. Replaces all of them: fields that are left out get
-    /// the ruleset's values.
+    /// Magnitudes of the perturbations that the profile switches on. Replaces all of them: those that are left out get
+    /// the values of the competition.
     #[cfg_attr(
         feature = "clap",
         arg(
             long,
             value_name = "FILE",
             value_parser = options::read_perturbations,
-            help = "A JSON file with magnitudes of the perturbations; those left out are the ruleset's, so {} resets all of them"
+            help = "A JSON file with magnitudes of the perturbations; those left out are the competition's, so {} resets all of them"
         )
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub perturbations: Option<Box<PerturbationSettings>>,
+    pub perturbations: Option<Magnitudes>,
     /// Resource limits of agents. Replaces all of them: fields that are left out get the values of the server's
     /// configuration.
     #[cfg_attr(

@@ -7,8 +7,8 @@ use crate::views::{
     team::TeamView,
 };
 use faceoff_types::{
-    CountingResult, DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId,
-    StageName, Task, TaskWeights, TeamId, TeamName, Tier, TierBounds, deprecated_names,
+    CountingResult, DivisionName, EvaluationId, Magnitudes, Profile, Seed, StageId, StageName,
+    Task, TaskWeights, TeamId, TeamName, Tier, TierBounds, deprecated_names,
 };
 use indexmap::IndexMap;
 use jiff::{Timestamp, civil::Date};
@@ -38,7 +38,7 @@ pub struct BoardView {
     pub tier_bounds: Option<TierBounds>,
     /// Magnitudes of the perturbations that the profile switches on; absent if they have the ruleset's values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub perturbations: Option<Box<PerturbationSettings>>,
+    pub perturbations: Option<Magnitudes>,
     /// Which of a team's evaluations count in the end.
     pub standings: CountingResult,
     /// Which of a team's evaluations the rows show: those that count, those that the query asks for, or, before a final

@@ -9,7 +9,8 @@ use arrow_array::{
 };
 use faceoff_airhockey::{Effect, RallyEntry, Response, SideFault, action_space};
 use faceoff_episode::AnswerTiming;
-use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, AgentTask, Interpolation, Side};
+use faceoff_sim::Interpolation;
+use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, AgentTask, Side};
 
 /// Location of a row in a recording.
 #[derive(Debug, Clone, Copy)]

@@ -18,7 +18,8 @@ use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::SchemaRef;
 use faceoff_airhockey::{FinishedGame, RunningGame};
 use faceoff_episode::RecordError;
-use faceoff_types::{AgentFault, Interpolation, Side};
+use faceoff_sim::Interpolation;
+use faceoff_types::{AgentFault, Side};
 
 /// Simulates a game again with its recorded inputs.
 pub(super) struct GameReplay {

@@ -72,10 +72,10 @@ fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
             names.join(" and ")
         )));
     }
-    manifest
-        .spec
-        .perturbations
-        .check()
+    let mut magnitudes = manifest.spec.perturbations.clone();
+    faceoff_airhockey::simulator()
+        .competition()
+        .check_magnitudes(&mut magnitudes)
         .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
     if manifest.simulator != current {
         return Err(DatasetError::Foreign(format!(

@@ -13,7 +13,8 @@ use faceoff_dataset::{
 };
 use faceoff_episode::AnswerTiming;
 use faceoff_replay::{CHUNK_STEPS, Clip, ClipKey, Pack};
-use faceoff_types::{AgentFaultKind, GameLimits, Interpolation, Ruleset, Seed, Side, SlotTiming};
+use faceoff_sim::Interpolation;
+use faceoff_types::{AgentFaultKind, GameLimits, Ruleset, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{
     fs::{self, File},
@@ -35,7 +36,7 @@ fn spec() -> GameSpec {
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits::default(),
         platform_retries: 0,
-        perturbations: Box::default(),
+        perturbations: Default::default(),
     }
 }
 

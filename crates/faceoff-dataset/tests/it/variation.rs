@@ -7,8 +7,9 @@ use crate::{
     verify::check,
 };
 use faceoff_airhockey::{DEFEND, HIT, simulator};
-use faceoff_dataset::{Dataset, can_draw_plant, verify::VerifyError};
-use faceoff_types::{PerturbationSettings, Task, Variation};
+use faceoff_dataset::{Dataset, verify::VerifyError};
+use faceoff_episode::Simulator as _;
+use faceoff_types::{Magnitude, Magnitudes, Task, Variation};
 use faceoff_wire::dataset::DatasetManifest;
 use serde_json::{Value, json};
 
@@ -74,8 +75,11 @@ fn forged_variation_is_found() {
         std::fs::write(&path, serde_json::to_vec(&manifest).unwrap()).unwrap();
         check(forgery.update_manifest().dir.path(), 2)
     };
-    let fewer_losses =
-        forged(&|variation| variation.perturbations.tracking_loss.probability = 0.03);
+    let forged_magnitude = |group: &str, name: &str, value: f64| {
+        let value = Magnitude::Number(value);
+        forged(&|variation| variation.perturbations.set(group, name, value))
+    };
+    let fewer_losses = forged_magnitude("tracking_loss", "probability", 0.03);
     assert!(
         matches!(fewer_losses, Err(VerifyError::Differs(_))),
         "{fewer_losses:?}"
@@ -85,8 +89,7 @@ fn forged_variation_is_found() {
         matches!(weights, Err(VerifyError::Differs(_))),
         "{weights:?}"
     );
-    let impossible_tilt =
-        forged(&|variation| variation.perturbations.delay.tilt_m_s2 = 1e9).unwrap_err();
+    let impossible_tilt = forged_magnitude("delay", "tilt_m_s2", 1e9).unwrap_err();
     assert!(
         impossible_tilt.to_string().contains("delay.tilt_m_s2"),
         "{impossible_tilt}"
@@ -96,20 +99,21 @@ fn forged_variation_is_found() {
 #[test]
 fn shards_of_other_magnitudes_are_not_joined() {
     let mut played = Evaluation::play_with_variation(large_variation(), Some(swing_arm), &SHARDS);
-    *played.meta.variation.perturbations = PerturbationSettings::default();
+    played.meta.variation.perturbations = Magnitudes::default();
     let refused = played.assemble("dataset.zip").unwrap_err().to_string();
     assert!(refused.contains("other magnitudes"), "{refused}");
 }
 
 #[test]
-fn unreachable_plant_ranges_are_detected_in_advance() {
+fn unreachable_robot_is_detected_in_advance() {
     let seed = faceoff_types::Seed::from_number(7).model_mismatch();
-    let mut settings = PerturbationSettings::default();
-    assert!(can_draw_plant(&settings, seed));
-    assert!(can_draw_plant(&large_variation().perturbations, seed));
-    settings.model_mismatch.static_error_m = [0.9, 1.0];
-    assert!(
-        !can_draw_plant(&settings, seed),
-        "an arm that sags by its own length"
-    );
+    let check = |magnitudes: &Magnitudes| simulator().check_magnitudes(magnitudes, seed);
+    let mut magnitudes = Magnitudes::default();
+    assert_eq!(check(&magnitudes), Ok(()));
+    assert_eq!(check(&large_variation().perturbations), Ok(()));
+    // An arm that sags by its own length.
+    let error_m = Magnitude::Range([0.9, 1.0]);
+    magnitudes.set("model_mismatch", "static_error_m", error_m);
+    let refused = check(&magnitudes).unwrap_err();
+    assert!(refused.contains("none of 300 robots"), "{refused}");
 }

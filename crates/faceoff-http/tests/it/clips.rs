@@ -5,10 +5,11 @@ use crate::{
     site::{ADMIN, Answer, Site, TestTeam, result},
 };
 use faceoff_airhockey::Arena;
+use faceoff_airhockey::Interpolation;
 use faceoff_airhockey::PREPARE;
 use faceoff_episode::{AnswerTiming, RunningEpisode, StepSink};
 use faceoff_replay::{Clip, ClipRecorder, join_packs};
-use faceoff_types::{AgentFaultKind, Interpolation, Phase, Seed};
+use faceoff_types::{AgentFaultKind, Phase, Seed};
 use flate2::read::GzDecoder;
 use reqwest::Method;
 use scraper::{Html, Selector};

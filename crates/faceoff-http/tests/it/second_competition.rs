@@ -119,7 +119,7 @@ fn texts(html: &scraper::Html, selector: &str) -> Vec<String> {
 async fn second_competition_runs_on_the_real_server() {
     let simulator = PointMass::new();
     let site = Site::start().await;
-    let site = site.with_competition(simulator.competition().clone()).await;
+    let site = site.with_simulator(simulator.clone()).await;
     let rules = json!({
         "tasks": ["settle", "reach"], "profile": "windy", "episodes_per_task": 6, "episodes_per_shard": 3,
         "confirm": "Qualifying",

@@ -1,8 +1,9 @@
 //! A running server for tests: axum on a loopback port, SQLite in a temporary folder, a clock that tests set, and helpers that
 //! take the steps of a worker (a process that runs jobs): they claim a job and commit its outcome.
 
-use faceoff_airhockey::{EVALUATION, HIT, TASKS};
+use faceoff_airhockey::{AirHockey, EVALUATION, HIT, TASKS};
 use faceoff_api::token::hash_token;
+use faceoff_episode::Simulator;
 use faceoff_http::{
     AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, LinkKey,
     MinTransferRate, RateLimits, router,
@@ -198,7 +199,7 @@ fn agent_resources() -> AgentResources {
 /// The configuration of a server that runs no agents.
 fn config_without_slots(upload_dir: PathBuf, clock: Clock) -> HttpConfig {
     HttpConfig {
-        competition: Arc::new(faceoff_airhockey::competition()),
+        simulator: faceoff_airhockey::simulator(),
         max_bundle_bytes: MAX_BUNDLE_BYTES,
         public_url: None,
         upload_dir,
@@ -249,12 +250,13 @@ impl Site {
             tiers: None,
             ..faceoff_airhockey::competition()
         };
-        self.with_competition(Arc::new(competition)).await
+        let simulator = AirHockey::with_competition(competition);
+        self.with_simulator(Arc::new(simulator)).await
     }
 
     /// Restarts the server with another competition.
-    pub async fn with_competition(mut self, competition: Arc<Competition>) -> Self {
-        self.config.competition = competition;
+    pub async fn with_simulator(mut self, simulator: Arc<dyn Simulator>) -> Self {
+        self.config.simulator = simulator;
         self.restart().await;
         self
     }

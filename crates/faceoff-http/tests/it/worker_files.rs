@@ -3,7 +3,7 @@
 
 use crate::site::{Answer, GZIP, Site};
 use faceoff_store::{Actor, ClaimedJob, Job, JobClaim};
-use faceoff_types::{BundleRef, PerturbationSettings};
+use faceoff_types::BundleRef;
 use faceoff_wire::{
     game::GameSpec,
     grant::{ExpectedRecording, Grant, GrantKey, WriteScope},
@@ -231,7 +231,7 @@ async fn banned_worker_loses_access() {
 fn game() -> GameSpec {
     let spec = json!({
         "ruleset": "airhockey-2023.3", "steps": 500, "profile": "ideal", "seed": "0".repeat(64),
-        "mismatch_seed": "0".repeat(64), "perturbations": PerturbationSettings::default(),
+        "mismatch_seed": "0".repeat(64), "perturbations": {},
     });
     serde_json::from_value(spec).unwrap()
 }

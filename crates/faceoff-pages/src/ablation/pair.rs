@@ -51,7 +51,7 @@ pub(crate) async fn page(
     } = path?;
     let clips = AblationClips::load(&app, viewer?, id).await?;
     let mut sides = Vec::new();
-    let ideal = app.config.competition.ideal_profile;
+    let ideal = app.config.competition().ideal_profile;
     for (element_id, shown_profile) in [("replay-a", ideal), ("replay-b", profile)] {
         let clip = clips.episode(&app, shown_profile, task, episode).await?;
         let api = format!(
@@ -59,7 +59,7 @@ pub(crate) async fn page(
             paths::submission(id)
         );
         sides.push(Side::new(
-            &app.config.competition,
+            app.config.competition(),
             element_id,
             &clip,
             &api,

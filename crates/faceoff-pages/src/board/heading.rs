@@ -126,9 +126,9 @@ impl Heading {
                     paused: None,
                     frozen: board.frozen.clone(),
                     rows_caption: board_status::rows_caption(board),
-                    weighted_sum: weighted_sum(&app.config.competition, &board.weights),
-                    task_count: in_words(app.config.competition.tasks.len()),
-                    points_by_violation: points_by_violation(&app.config.competition),
+                    weighted_sum: weighted_sum(app.config.competition(), &board.weights),
+                    task_count: in_words(app.config.competition().tasks.len()),
+                    points_by_violation: points_by_violation(app.config.competition()),
                     tier_bounds: board.tier_bounds,
                     has_own_magnitudes: board.perturbations.is_some(),
                     final_day_notice: board_status::final_day_notice(board),
@@ -136,7 +136,7 @@ impl Heading {
                     is_hidden,
                     result_status: board_status::result_status(board),
                     is_provisional: board.provisional,
-                    tabs: tabs(&app.config.competition, board.task, address),
+                    tabs: tabs(app.config.competition(), board.task, address),
                 });
             }
         }

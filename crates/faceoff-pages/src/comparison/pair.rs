@@ -94,7 +94,7 @@ async fn side(
     Ok(Side {
         path: Some(page_path(evaluation.evaluation, task, episode)),
         ..Side::new(
-            &app.config.competition,
+            app.config.competition(),
             element_id,
             &clip,
             &api,

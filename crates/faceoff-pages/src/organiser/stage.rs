@@ -58,12 +58,12 @@ async fn page_with(
         frame: Frame::load(app, "").await?,
         head: DashboardHeader::new(&user.caller, "/organiser/stages", notice),
         form,
-        task_checkboxes: StageForm::task_checkboxes(&app.config.competition),
-        profiles: app.config.competition.profile_names().collect(),
+        task_checkboxes: StageForm::task_checkboxes(app.config.competition()),
+        profiles: app.config.competition().profile_names().collect(),
         confirm: needs_confirmation.then(|| view.name.to_string()),
         is_closed: view.phase == PhaseView::Closed,
         has_final_day: view.settings.standings == CountingResult::Final,
-        has_tiers: app.config.competition.tiers.is_some(),
+        has_tiers: app.config.competition().tiers.is_some(),
         stage: view,
     };
     render_dashboard(&page, notice)
@@ -88,7 +88,7 @@ pub(super) async fn change(
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let stage = app.store.stage(id).await?;
     let actor = user.organiser.actor();
-    let changed = match form.change(&stage, &app.config.competition) {
+    let changed = match form.change(&stage, app.config.competition()) {
         Ok(change) => stages::change_stage(&app, actor, id, change).await,
         Err(problem) => Err(problem),
     };

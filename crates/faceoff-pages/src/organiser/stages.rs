@@ -56,8 +56,8 @@ async fn page_with(
         head: DashboardHeader::new(&user.caller, path, notice),
         stages: stage::all(app).await?,
         form,
-        task_checkboxes: StageForm::task_checkboxes(&app.config.competition),
-        profiles: app.config.competition.profile_names().collect(),
+        task_checkboxes: StageForm::task_checkboxes(app.config.competition()),
+        profiles: app.config.competition().profile_names().collect(),
         confirm: None,
         is_refused: matches!(notice, Notice::Refused(_)),
     };
@@ -79,7 +79,7 @@ pub(super) async fn create(
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
     let actor = user.organiser.actor();
-    let created = match form.new_stage(&app.config.competition) {
+    let created = match form.new_stage(app.config.competition()) {
         Ok(new) => stages::create_stage(&app, actor, new).await,
         Err(problem) => Err(problem),
     };

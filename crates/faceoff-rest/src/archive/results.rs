@@ -158,7 +158,7 @@ async fn put_boards(
     files
         .put(
             &format!("{folder}/board.csv"),
-            board_csv::board_table(&app.config.competition, &newest),
+            board_csv::board_table(app.config.competition(), &newest),
         )
         .await?;
     for task in &stage.rules.rules.tasks {
@@ -179,7 +179,7 @@ async fn put_boards(
         files
             .put(
                 &format!("{name}.csv"),
-                board_csv::board_table(&app.config.competition, &board),
+                board_csv::board_table(app.config.competition(), &board),
             )
             .await?;
     }
@@ -202,7 +202,7 @@ async fn put_day(
     files
         .put(
             &format!("{name}.csv"),
-            day_csv::day_table(&app.config.competition, &evaluations),
+            day_csv::day_table(app.config.competition(), &evaluations),
         )
         .await
 }

@@ -1,7 +1,8 @@
 //! Schemas that list the tasks of the competition, how their episodes end, the kinds of violations, and the profiles.
 
 use faceoff_types::{
-    Competition, EpisodeEnd, Profile, Task, TaskWeights, ViolationCounts, ViolationName,
+    Competition, EpisodeEnd, Magnitude, MagnitudeInfo, Magnitudes, Profile, Task, TaskWeights,
+    ViolationCounts, ViolationName,
 };
 use serde_json::{Map, Value, json};
 use utoipa::{PartialSchema, ToSchema};
@@ -84,6 +85,7 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "required": violations.keys().collect::<Vec<_>>(),
         "properties": lists.collect::<Map<String, Value>>(),
     });
+    schemas[&*Magnitudes::name()] = magnitudes(competition);
     let weight = |info: &faceoff_types::TaskInfo| {
         let schema = json!({
             "type": "number",
@@ -100,6 +102,45 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "required": names,
         "additionalProperties": false,
     });
+}
+
+/// The schema of magnitudes of perturbations: an object for each group.
+fn magnitudes(competition: &Competition) -> Value {
+    let mut groups = Map::new();
+    for info in &competition.magnitudes {
+        let group = groups.entry(info.group.clone()).or_insert_with(
+            || json!({"type": "object", "properties": {}, "additionalProperties": false}),
+        );
+        group["properties"][&info.name] = magnitude(info);
+    }
+    json!({
+        "type": "object",
+        "description": "Magnitudes of all perturbations; the defaults are the competition's. The profile decides which \
+                        perturbations are active.",
+        "properties": groups,
+        "additionalProperties": false,
+    })
+}
+
+fn magnitude(info: &MagnitudeInfo) -> Value {
+    let [least, most] = info.bounds;
+    let number = match info.default {
+        Magnitude::Count(_) | Magnitude::Counts(_) => json!({
+            "type": "integer", "format": "int32", "minimum": least as i64, "maximum": most as i64,
+        }),
+        Magnitude::Number(_) | Magnitude::Range(_) => json!({
+            "type": "number", "format": "double", "minimum": least, "maximum": most,
+        }),
+    };
+    let mut schema = match info.default {
+        Magnitude::Count(_) | Magnitude::Number(_) => number,
+        Magnitude::Counts(_) | Magnitude::Range(_) => {
+            json!({"type": "array", "items": number, "minItems": 2, "maxItems": 2})
+        }
+    };
+    schema["description"] = info.description.clone().into();
+    schema["default"] = json!(info.default);
+    schema
 }
 
 /// Keys of maps by task have the schema of tasks.
@@ -141,5 +182,9 @@ mod tests {
         assert_eq!(weights["required"], schemas["Task"]["enum"]);
         assert_eq!(weights["properties"]["prepare"]["example"], 0.2);
         assert_eq!(schemas["Profile"]["enum"][6], "evaluation");
+        let loss = &schemas["PerturbationSettings"]["properties"]["tracking_loss"]["properties"];
+        assert_eq!(loss["probability"]["maximum"], 1.0);
+        assert_eq!(loss["steps"]["default"], json!([5, 20]));
+        assert_eq!(loss["steps"]["items"]["type"], "integer");
     }
 }

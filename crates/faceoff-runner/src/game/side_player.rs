@@ -11,7 +11,8 @@ use crate::{
 };
 use faceoff_airhockey::{RallyEntry, Response, SideFault};
 use faceoff_episode::AnswerTiming;
-use faceoff_types::{AgentFault, AgentTask, Interpolation, Side, TimeLimits};
+use faceoff_sim::Interpolation;
+use faceoff_types::{AgentFault, AgentTask, Side, TimeLimits};
 use std::time::{Duration, Instant};
 
 /// One side of a game: its agent's process, which is restarted after a fault, and its current question.

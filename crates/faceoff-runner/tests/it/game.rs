@@ -27,7 +27,7 @@ pub fn spec(steps: u32) -> GameSpec {
             ..GameLimits::default()
         },
         platform_retries: 0,
-        perturbations: Box::default(),
+        perturbations: Default::default(),
     }
 }
 

@@ -14,9 +14,8 @@ use crate::{
     tier::tier_of,
 };
 use faceoff_types::{
-    ComputationTimeSummary, ForfeitCause, GameLimits, GameOutcome, GameWindow,
-    PerturbationSettings, Profile, RoundNumber, Ruleset, Seed, SideOutcome, TeamName, Tier,
-    ViolationCounts, WINDOW_STEPS,
+    ComputationTimeSummary, ForfeitCause, GameLimits, GameOutcome, GameWindow, Magnitudes, Profile,
+    RoundNumber, Ruleset, Seed, SideOutcome, TeamName, Tier, ViolationCounts, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +27,7 @@ pub struct GameSettings {
     /// The perturbation profile.
     pub profile: Profile,
     /// Magnitudes of the perturbations that the profile enables.
-    pub perturbations: Box<PerturbationSettings>,
+    pub perturbations: Magnitudes,
     /// Limits of faults and time for each side.
     pub limits: GameLimits,
     /// Seed of this game.
@@ -45,8 +44,8 @@ pub struct GameScore {
     /// The perturbation profile.
     pub profile: Profile,
     /// Magnitudes of the perturbations that the profile enables; absent if those of the ruleset.
-    #[serde(default, skip_serializing_if = "is_default_perturbations")]
-    pub perturbations: Box<PerturbationSettings>,
+    #[serde(default, skip_serializing_if = "Magnitudes::is_empty")]
+    pub perturbations: Magnitudes,
     /// Limits of faults and time for each side; absent if those of the rules.
     #[serde(default, skip_serializing_if = "is_default_limits")]
     pub limits: GameLimits,
@@ -238,10 +237,6 @@ fn count(number: usize) -> u32 {
     u32::try_from(number).unwrap_or(u32::MAX)
 }
 
-fn is_default_perturbations(perturbations: &PerturbationSettings) -> bool {
-    *perturbations == PerturbationSettings::default()
-}
-
 fn is_default_limits(limits: &GameLimits) -> bool {
     *limits == GameLimits::default()
 }
@@ -306,7 +301,7 @@ mod tests {
         let settings = GameSettings {
             ruleset: Ruleset::CURRENT,
             profile: faceoff_airhockey::EVALUATION,
-            perturbations: Box::default(),
+            perturbations: Magnitudes::default(),
             limits: GameLimits::default(),
             seed,
             agents: ["a".to_owned(), "b".to_owned()],

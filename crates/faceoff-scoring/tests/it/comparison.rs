@@ -6,7 +6,9 @@ use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
     overall_p_value, overall_score, score_task,
 };
-use faceoff_types::{EpisodeOutcome, RULESET, Seed, Task, TaskMap, TaskWeights, Variation};
+use faceoff_types::{
+    EpisodeOutcome, Magnitude, RULESET, Seed, Task, TaskMap, TaskWeights, Variation,
+};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -94,7 +96,10 @@ fn comparison_uses_variation_and_refuses_different_ones() {
     assert!(!evaluation_of(&a).differs_significantly(&evaluation_of(&b), None));
 
     let mut without_losses = Variation::default();
-    without_losses.perturbations.tracking_loss.probability = 0.0;
+    let never = Magnitude::Number(0.0);
+    without_losses
+        .perturbations
+        .set("tracking_loss", "probability", never);
     let other_bounds = Variation {
         tier_bounds: Some("0.1,0.2".parse().unwrap()),
         ..Variation::default()

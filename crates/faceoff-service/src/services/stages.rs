@@ -5,9 +5,10 @@ use crate::{app::AppState, boxed, problem::Problem, views::stage};
 use faceoff_api::requests::{NewStage, OrNull, StagePatch};
 use faceoff_store::{Actor, Stage, StagePhase};
 use faceoff_types::{
-    CountingResult, InvalidStageRules, MismatchSettings, PerturbationSettings, Retention, Ruleset,
-    Runtimes, StageId, StageName, StageSettings,
+    CountingResult, InvalidStageRules, Magnitudes, Retention, Ruleset, Runtimes, StageId,
+    StageName, StageSettings,
 };
+use std::sync::Arc;
 
 /// Parses the name of a stage, or of a tournament, whose names have the same rules.
 pub fn parse_name(text: &str) -> Result<StageName, Problem> {
@@ -48,28 +49,17 @@ pub fn check_offered(app: &AppState, requested: Option<&Runtimes>) -> Result<(),
     }
 }
 
-/// Refuses magnitudes of perturbations from which no simulated robot can be drawn. The robot of a season is drawn at random: its
-/// mass and gains differ from the model that the teams have, so far that its static error is in a configured range.
+/// Refuses magnitudes of perturbations with which this season cannot be played.
 #[boxed]
-pub async fn check_robot(app: &AppState, settings: &PerturbationSettings) -> Result<(), Problem> {
-    if settings.model_mismatch == MismatchSettings::default() {
-        return Ok(());
-    }
+pub async fn check_magnitudes(app: &AppState, magnitudes: &Magnitudes) -> Result<(), Problem> {
     let seed = app.store.season().await?.secret.model_mismatch();
-    let [min_error_m, max_error_m] = settings.model_mismatch.static_error_m;
-    let settings = settings.clone();
-    let has_robot = move || faceoff_dataset::can_draw_plant(&settings, seed);
-    if tokio::task::spawn_blocking(has_robot)
+    let simulator = Arc::clone(&app.config.simulator);
+    let magnitudes = magnitudes.clone();
+    let check = move || simulator.check_magnitudes(&magnitudes, seed);
+    let checked = tokio::task::spawn_blocking(check)
         .await
-        .map_err(Problem::internal)?
-    {
-        return Ok(());
-    }
-    let detail = format!(
-        "model_mismatch: none of 300 robots drawn from these ranges of mass and gains has a largest static error of \
-         {min_error_m} to {max_error_m} m (static_error_m); widen one of the ranges"
-    );
-    Err(Problem::invalid("perturbations", detail))
+        .map_err(Problem::internal)?;
+    checked.map_err(|problem| Problem::invalid("perturbations", problem))
 }
 
 /// Creates a stage. Fields that are left out are copied from the open stage, or from the nearest one.
@@ -91,10 +81,10 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
     };
     patch
         .apply(&mut rules, &mut settings)
-        .and_then(|()| app.config.competition.check_rules(&mut rules))
+        .and_then(|()| app.config.competition().check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(patch.retention)?.unwrap_or_default();
-    check_robot(app, &rules.variation.perturbations).await?;
+    check_magnitudes(app, &rules.variation.perturbations).await?;
     let new_stage = faceoff_store::NewStage {
         name: parse_name(&name)?,
         opens_at: patch.opens_at.unwrap_or(now),
@@ -128,11 +118,11 @@ pub async fn change_stage(
     let mut settings = stage.settings.clone();
     change
         .apply(&mut rules, &mut settings)
-        .and_then(|()| app.config.competition.check_rules(&mut rules))
+        .and_then(|()| app.config.competition().check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != current_rules.variation.perturbations {
-        check_robot(app, &rules.variation.perturbations).await?;
+        check_magnitudes(app, &rules.variation.perturbations).await?;
     }
     let mut effects = Vec::new();
     if stage.phase(now) == StagePhase::Open {

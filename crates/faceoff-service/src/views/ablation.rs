@@ -66,7 +66,7 @@ async fn effects(
     app: &AppState,
     mut runs: ProfileMap<RunId>,
 ) -> Result<TaskMap<Vec<ProfileEffect>>, Problem> {
-    let competition = &app.config.competition;
+    let competition = app.config.competition();
     competition.sort_profiles(&mut runs);
     let run_ids: Vec<_> = runs.values().copied().collect();
     let summaries = app.summaries.load(&run_ids).await?;

@@ -92,7 +92,7 @@ impl AblationClips {
         &self,
         app: &AppState,
     ) -> Result<ProfileMap<Vec<DifferingEpisode>>, Problem> {
-        let competition = &app.config.competition;
+        let competition = app.config.competition();
         let ideal_profile = competition.ideal_profile;
         let Some(ideal) = self.find(app, ideal_profile).await? else {
             return Ok(ProfileMap::new());

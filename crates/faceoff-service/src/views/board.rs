@@ -25,8 +25,7 @@ use faceoff_scoring::{
 };
 use faceoff_store::{BoardRecord, BoardScope, Stage};
 use faceoff_types::{
-    Competition, CountingResult, DivisionName, PerturbationSettings, Seed, StageId, Task,
-    TaskWeights, UnknownTask,
+    Competition, CountingResult, DivisionName, Seed, StageId, Task, TaskWeights, UnknownTask,
 };
 use jiff::civil::Date;
 use std::sync::Arc;
@@ -83,7 +82,7 @@ pub async fn query(
     query: BoardQuery,
     task: Option<Task>,
 ) -> Result<BoardView, Problem> {
-    let competition = &app.config.competition;
+    let competition = app.config.competition();
     if let Some(task) = task.filter(|task| competition.task(*task).is_none()) {
         return Err(unknown_task(competition, task));
     }
@@ -175,10 +174,9 @@ pub async fn build(
         revision: revision_number,
         since: revision.since,
         ruleset: revision.rules.ruleset.to_string(),
-        weights: app.config.competition.weights(&variation),
-        tier_bounds: app.config.competition.tier_bounds(&variation),
-        perturbations: (*variation.perturbations != PerturbationSettings::default())
-            .then_some(variation.perturbations),
+        weights: app.config.competition().weights(&variation),
+        tier_bounds: app.config.competition().tier_bounds(&variation),
+        perturbations: (!variation.perturbations.is_empty()).then_some(variation.perturbations),
         standings: stage.settings.standings,
         rows_by,
         day: scope.last_day,
@@ -231,7 +229,7 @@ async fn ranked_rows(
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
     let rows: Vec<Row> = rows
         .into_iter()
-        .map(|aggregated| Row::new(aggregated, &summaries, &app.config.competition))
+        .map(|aggregated| Row::new(aggregated, &summaries, app.config.competition()))
         .collect::<Result<_, _>>()?;
     let all_ranked = board_rows::rank(rows, task, |row| &row.aggregated.record);
     let (ranked, baselines) = board_rows::split_baselines(all_ranked, |row: &Row| {

@@ -108,7 +108,7 @@ async fn load(
         final_day: None,
         task,
     };
-    aggregate(records, rule, &app.config.competition)
+    aggregate(records, rule, app.config.competition())
 }
 
 /// Which of a team's results count.

@@ -50,7 +50,7 @@ impl Side {
         };
         let result = result.clone();
         Ok(Self {
-            weights: app.config.competition.weights(&result.variation),
+            weights: app.config.competition().weights(&result.variation),
             summary: app.summaries.load_run(evaluation.run).await?,
             evaluation,
             result,

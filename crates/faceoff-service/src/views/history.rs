@@ -33,7 +33,7 @@ pub async fn query(
     query: HistoryQuery,
 ) -> Result<HistoryView, Problem> {
     if let Some(task) = query.task {
-        let found = app.config.competition.find_task(task.as_str());
+        let found = app.config.competition().find_task(task.as_str());
         found
             .map_err(|error| Problem::new(ProblemKind::InvalidRequest, format!("task: {error}")))?;
     }
@@ -81,7 +81,7 @@ pub async fn query(
         rows_by,
         final_day,
         query.task,
-        &app.config.competition,
+        app.config.competition(),
     )?;
     let mut days: Vec<Date> = rows.iter().map(|row| row.day).collect();
     days.dedup();

@@ -18,7 +18,7 @@ pub async fn read(app: &AppState, dataset: &str) -> Result<ViolationsView, Probl
         .artifacts()
         .local_path(dataset)
         .map_err(Problem::internal)?;
-    let competition = Arc::clone(&app.config.competition);
+    let competition = Arc::clone(app.config.competition());
     let read = move || Dataset::open_lazily(&path, &competition)?.violations();
     let violations = tokio::task::spawn_blocking(read)
         .await

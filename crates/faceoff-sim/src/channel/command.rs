@@ -5,7 +5,7 @@
 pub enum Command<'a> {
     /// An action: one number per joint in each row, row-major, of length [`Interpolation::len`], finite.
     ///
-    /// [`Interpolation::len`]: faceoff_types::Interpolation::len
+    /// [`Interpolation::len`]: crate::Interpolation::len
     Act(&'a [f64]),
     /// No answer arrived in time. The previous position is commanded again, with zero velocity. With
     /// [`Factor::Delay`] (a kind of perturbation) the arm instead continues its last trajectory at constant velocity for 80 ms, then stops.

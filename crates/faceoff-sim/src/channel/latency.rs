@@ -1,8 +1,8 @@
 //! Delays of the perturbation `delay`: the agent sees the puck late, and its actions are applied late (`docs/rules.md`, "Perturbations").
 
 use super::command::Command;
+use crate::{DelaySettings, Interpolation};
 use crate::{stream::RandomStream, world::World};
-use faceoff_types::{DelaySettings, Interpolation};
 
 /// Length of the first part of an observation, which describes the puck and arrives late: its pose and velocity.
 const PUCK_LEN: usize = 6;

@@ -8,8 +8,9 @@ pub mod observation;
 use crate::{
     Factor, Factors, perturbation::noise::ObservationNoise, stream::RandomStream, world::World,
 };
+use crate::{Interpolation, PerturbationSettings};
 pub use command::Command;
-use faceoff_types::{Interpolation, PerturbationSettings, Seed};
+use faceoff_types::Seed;
 use latency::Latency;
 use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
 

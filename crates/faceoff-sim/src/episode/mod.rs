@@ -20,8 +20,9 @@ use crate::{
     table::puck::Puck,
     world::{Bounds, Divergence, World},
 };
+use crate::{Interpolation, PerturbationSettings};
 use constraints::{ConstraintValues, ViolatedGroups};
-use faceoff_types::{EpisodeEnd, Interpolation, PerturbationSettings, Seed};
+use faceoff_types::{EpisodeEnd, Seed};
 use opponent::Opponent;
 
 /// A running episode. It is deterministic: it reads no clock and does no I/O. A clone continues with the same bits.

@@ -18,7 +18,8 @@ use crate::{
     stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
 };
-use faceoff_types::{Interpolation, PerturbationSettings, Ruleset, Seed, WINDOW_STEPS};
+use crate::{Interpolation, PerturbationSettings};
+use faceoff_types::{Ruleset, Seed, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// Settings of a game.

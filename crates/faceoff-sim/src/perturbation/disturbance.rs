@@ -1,7 +1,7 @@
 //! The perturbation `disturbance`: an air flow that pushes a moving puck.
 
+use crate::DisturbanceSettings;
 use crate::{model::SUBSTEP_S, stream::RandomStream, table::puck::Puck};
-use faceoff_types::DisturbanceSettings;
 
 /// The air flow. Its force on the puck along each axis is the puck's speed times an Ornstein–Uhlenbeck process, which is noise with a
 /// correlation time.

@@ -2,6 +2,7 @@
 //! is drawn once per season.
 
 use crate::{Factor, Factors};
+use crate::{MismatchSettings, PerturbationSettings};
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
     model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
@@ -12,7 +13,7 @@ use crate::{
     },
     stream::RandomStream,
 };
-use faceoff_types::{MismatchSettings, PerturbationSettings, Seed};
+use faceoff_types::Seed;
 
 /// The *workspace*: end-effector positions over the table at which the static error is evaluated, m, base frame. The *static error* is the
 /// distance between commanded and reached position at rest.

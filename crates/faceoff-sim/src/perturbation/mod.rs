@@ -6,7 +6,12 @@ mod mismatch;
 pub mod noise;
 mod profile;
 pub mod rehearsal_table;
+mod settings;
 pub mod table_factors;
 pub mod tracking_loss;
 
 pub use profile::{AirHockeyProfile, Factor, Factors};
+pub use settings::{
+    DelaySettings, DisturbanceSettings, MismatchSettings, NoiseSettings, PerturbationSettings,
+    TrackingLossSettings,
+};

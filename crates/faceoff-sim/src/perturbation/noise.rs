@@ -1,7 +1,7 @@
 //! The perturbation `observation_noise`: Gaussian noise on the agent's observations.
 
+use crate::NoiseSettings;
 use crate::{model::JOINTS, stream::RandomStream};
-use faceoff_types::NoiseSettings;
 
 /// Draws the noise of successive observations.
 #[derive(Debug, Clone, PartialEq)]

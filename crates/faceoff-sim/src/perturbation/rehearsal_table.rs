@@ -1,8 +1,8 @@
 //! The table of the perturbation `delay`, which is for rehearsals on a real robot: as in a laboratory, the table is not quite level, and
 //! its air cushion damps the puck more or less than designed.
 
+use crate::DelaySettings;
 use crate::stream::RandomStream;
-use faceoff_types::DelaySettings;
 
 /// The properties of the table, drawn once per episode or rally.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,13 +3,14 @@
 use super::{
     disturbance::Disturbance, rehearsal_table::RehearsalTable, tracking_loss::TrackingLoss,
 };
+use crate::PerturbationSettings;
 use crate::{
     Factor, Factors,
     stream::RandomStream,
     table::{geometry::PUCK, puck::Puck},
     world::World,
 };
-use faceoff_types::{PerturbationSettings, Seed};
+use faceoff_types::Seed;
 
 /// The factors of one episode or rally, with their draws.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! The perturbation `tracking_loss`: the simulated camera loses the puck for some control steps.
 
+use crate::TrackingLossSettings;
 use crate::stream::RandomStream;
-use faceoff_types::TrackingLossSettings;
 
 /// Draws the control steps in which the puck is lost.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,11 +4,11 @@
 //! Symbols: `T` is the duration of a control step (s), `j` a joint; p, v and a are the position (rad), velocity (rad/s) and acceleration
 //! (rad/s²) at the start of the step, which is the end of the previous trajectory.
 
+use crate::Interpolation;
 use crate::{
     dynamics::lanes::{Lanes, gather},
     model::{CONTROL_STEP_S as T, JOINTS, SUBSTEP_S, SUBSTEPS},
 };
-use faceoff_types::Interpolation;
 
 /// Desired motion of the joints at one instant; `L` is `f64` for one arm, or SIMD lanes for several.
 #[derive(Debug, Clone, Copy, PartialEq)]

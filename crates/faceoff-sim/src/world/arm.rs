@@ -1,6 +1,7 @@
 //! The state of one arm: seven driven joints, the two hinges of the *universal joint* on which the mallet hangs, and the controllers.
 
 use super::joints::JointConstraints;
+use crate::Interpolation;
 use crate::{
     dynamics::arm::Kinematics,
     model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
@@ -12,7 +13,6 @@ use crate::{
         universal_joint::{UniversalJoint, mallet_vertical_angles},
     },
 };
-use faceoff_types::Interpolation;
 
 /// One arm with its controllers: all state that its future depends on.
 #[derive(Debug, Clone, PartialEq)]

@@ -20,6 +20,7 @@ mod solver;
 mod substep;
 mod time_step;
 
+use crate::Interpolation;
 use crate::{
     dynamics::arm::Kinematics,
     model::{DOFS, INITIAL_Q, JOINTS},
@@ -32,7 +33,7 @@ use crate::{
 };
 use arm::Arm;
 pub use bounds::{Bounds, Divergence, Runaway};
-use faceoff_types::{Interpolation, Ruleset};
+use faceoff_types::Ruleset;
 pub use impacts::{ContactBody, Impact, Impacts};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.

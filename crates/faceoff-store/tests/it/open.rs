@@ -181,6 +181,7 @@ async fn season_belongs_to_one_competition() {
         profiles: Vec::new(),
         ideal_profile: IDEAL,
         counting_profile: IDEAL,
+        magnitudes: Vec::new(),
     };
     let stored = async || -> (Option<String>, Option<String>) {
         sqlx::query_as("SELECT competition_id, competition_hash FROM season")

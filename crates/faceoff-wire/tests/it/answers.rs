@@ -1,7 +1,8 @@
 //! Valid and invalid lines of an agent. Unless a test says otherwise, the line answers step 4 and the interpolation is cubic, so that
 //! an action has 2 rows of 7 numbers.
 
-use faceoff_types::{ActionLayout, ActionSpace, AgentFaultKind, Interpolation};
+use faceoff_airhockey::Interpolation;
+use faceoff_types::{ActionLayout, ActionSpace, AgentFaultKind};
 use faceoff_wire::{
     MAX_LINE_BYTES,
     answer::{parse_act, parse_ready, parse_reset_ready},

@@ -227,9 +227,12 @@ fn jobs_without_variation_round_trip_unchanged() {
     let text = serde_json::to_string(&spec).expect("it is JSON");
     assert!(!text.contains("perturbations"), "{text}");
     let read: ShardSpec = serde_json::from_str(&text).expect("it is read back");
-    assert_eq!(*read.perturbations, PerturbationSettings::default());
+    assert_eq!(read.perturbations, Magnitudes::default());
     let mut changed = spec;
-    changed.perturbations.disturbance.sigma_n_per_m_s = 1.0 / 3.0;
+    let magnitude = Magnitude::Number(1.0 / 3.0);
+    changed
+        .perturbations
+        .set("disturbance", "sigma_n_per_m_s", magnitude);
     assert_round_trips(&changed);
 
     let first_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
@@ -249,7 +252,8 @@ fn jobs_without_variation_round_trip_unchanged() {
     }
     let mut changed = meta;
     changed.variation.weights = Some(weights());
-    changed.variation.perturbations.tracking_loss.steps = [1, 2];
+    let perturbations = &mut changed.variation.perturbations;
+    perturbations.set("tracking_loss", "steps", Magnitude::Counts([1, 2]));
     assert_round_trips(&changed);
 }
 

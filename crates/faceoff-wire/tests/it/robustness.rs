@@ -1,6 +1,7 @@
 //! Property tests: actions and observations keep their bits, and no line of an agent makes the parser panic.
 
-use faceoff_types::{ACTION_LIMIT, Interpolation};
+use faceoff_airhockey::Interpolation;
+use faceoff_types::ACTION_LIMIT;
 use faceoff_wire::{
     Message,
     answer::{parse_act, parse_ready, parse_reset_ready},

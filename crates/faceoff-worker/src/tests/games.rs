@@ -98,7 +98,10 @@ async fn game_job_is_complete_and_contains_no_secret() {
     };
     rules.game_limits.max_faults = 3;
     rules.limits.pids = Some(7);
-    rules.perturbations.tracking_loss.probability = 0.25;
+    let magnitude = Magnitude::Number(0.25);
+    rules
+        .perturbations
+        .set("tracking_loss", "probability", magnitude);
     let game = start_one_game(&server, rules.clone()).await;
     let local = server.local();
     let claimed = blocking(move || local.claim("test").unwrap()).await;

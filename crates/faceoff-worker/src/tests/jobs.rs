@@ -8,6 +8,7 @@ use crate::server::{ClaimResult, JobServer as _, LeaseStatus};
 use faceoff_airhockey::{ABLATION_PROFILES, TASKS};
 use faceoff_store::*;
 use faceoff_testkit::{change_rules, six_shard_plan, valid_outcome};
+use faceoff_types::Magnitude;
 use faceoff_wire::job::{JobPayload, JobReport, JobSpec, OutputFiles};
 
 /// Claims the next job.
@@ -125,7 +126,9 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     let stage = server.store.stages().await.unwrap()[0].clone();
     let mut changed_variation = stage.rules.rules.variation.clone();
     changed_variation.weights = Some(faceoff_types::TaskWeights::of(faceoff_airhockey::HIT));
-    changed_variation.perturbations.tracking_loss.probability = 0.25;
+    changed_variation
+        .perturbations
+        .set("tracking_loss", "probability", Magnitude::Number(0.25));
     let changed = change_rules(&server.store, stage.id, server.now(), |rules| {
         rules.variation = changed_variation.clone();
     });
@@ -135,7 +138,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     let JobPayload::Shard { spec, .. } = &job.payload else {
         panic!("expected a shard");
     };
-    assert_eq!(*spec.perturbations, Default::default());
+    assert_eq!(spec.perturbations, Default::default());
     let submission = server.store.evaluation(id).await.unwrap().submission;
     let created = server.store.request_ablation(
         Actor::Organiser,

@@ -1,7 +1,7 @@
 //! The client against a real server on a loopback port.
 
 use super::*;
-use crate::competition::{competition, parse_weights};
+use crate::competition::{competition, parse_weights, simulator};
 use faceoff_api::{
     requests::{ComparisonQuery, DeleteSubmission, NewStage, OrNull, StagePatch},
     token::hash_token,
@@ -19,7 +19,6 @@ use faceoff_testkit::{
 use faceoff_types::{Clock, CountingResult, DayDeadline, EvaluationId, TimeLimits};
 use indicatif::ProgressBar;
 use jiff::Timestamp;
-use std::sync::Arc;
 use tempfile::TempDir;
 
 /// The organiser's token.
@@ -61,7 +60,7 @@ async fn start_site(max_bundle_bytes: u64) -> Site {
     };
     configure_stage(&store, &plan, None, now()).await;
     let config = HttpConfig {
-        competition: Arc::clone(competition()),
+        simulator: simulator(),
         max_bundle_bytes,
         public_url: None,
         upload_dir: folder.path().to_owned(),

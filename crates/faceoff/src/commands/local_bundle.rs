@@ -1,6 +1,6 @@
 //! Bundles that `eval` and `play` run on a developer's machine.
 
-use crate::{config::Config, packing::Selection};
+use crate::{competition::competition, config::Config, packing::Selection};
 use anyhow::Context;
 use faceoff_runner::{
     AgentEnvironment,
@@ -31,13 +31,18 @@ pub(super) fn open(
     no_sandbox: bool,
     limits: &BundleLimits,
 ) -> anyhow::Result<Bundle> {
+    let open = |path: &Path| -> anyhow::Result<Bundle> {
+        let bundle = bundle::open(path, scratch, limits)?;
+        bundle::check_interpolation(&bundle, competition())?;
+        Ok(bundle)
+    };
     if !path.is_dir() || no_sandbox {
-        return Ok(bundle::open(path, scratch, limits)?);
+        return open(path);
     }
     let archive = scratch.join("bundle.tar.gz");
     let file = File::create(&archive).with_context(|| format!("creating {}", archive.display()))?;
     Selection::read(path)?.pack(file)?;
-    let bundle = bundle::open(&archive, scratch, limits)?;
+    let bundle = open(&archive)?;
     fs::remove_file(&archive).with_context(|| format!("removing {}", archive.display()))?;
     Ok(bundle)
 }

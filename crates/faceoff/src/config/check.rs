@@ -1,11 +1,10 @@
 //! Checks of values that are invalid on any server or on this host.
 
 use super::Config;
-use crate::competition::competition;
+use crate::competition::{competition, simulator};
 use anyhow::{Context as _, anyhow, bail, ensure};
-use faceoff_dataset::can_draw_plant;
 use faceoff_sandbox::affinity;
-use faceoff_types::{IMAGE_RUNTIME, MismatchSettings, Seed};
+use faceoff_types::{IMAGE_RUNTIME, Seed};
 use std::collections::HashSet;
 
 /// More slots per CPU than this would make no progress.
@@ -63,15 +62,10 @@ impl Config {
 
     /// Refuses perturbations for which no robot with this mismatch seed exists.
     pub fn check_robot(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
-        let settings = self.rules().variation.perturbations;
-        let [min_error_m, max_error_m] = settings.model_mismatch.static_error_m;
-        ensure!(
-            settings.model_mismatch == MismatchSettings::default()
-                || can_draw_plant(&settings, mismatch_seed),
-            "evaluation.perturbations: none of 300 robots drawn from these ranges of mass and gains has its largest static \
-            error within {min_error_m} to {max_error_m} m (model_mismatch.static_error_m); widen one of the ranges"
-        );
-        Ok(())
+        let magnitudes = self.rules().variation.perturbations;
+        simulator()
+            .check_magnitudes(&magnitudes, mismatch_seed)
+            .map_err(|problem| anyhow!("evaluation.perturbations.{problem}"))
     }
 
     /// Checks the conditions that the types do not express.
@@ -124,11 +118,6 @@ impl Config {
             "evaluation.tasks: expected at least one task"
         );
         let mut rules = self.rules();
-        rules
-            .variation
-            .perturbations
-            .check()
-            .context("evaluation.perturbations")?;
         let mut unique = HashSet::new();
         if let Some(duplicate) = evaluation.tasks.iter().find(|task| !unique.insert(**task)) {
             bail!("evaluation.tasks: {duplicate} is listed twice");

@@ -1,6 +1,7 @@
 //! The configuration: defaults, errors, and agreement with the documentation.
 
 use super::*;
+use faceoff_types::Magnitude;
 use std::time::Duration;
 
 /// The error of an invalid configuration.
@@ -74,8 +75,9 @@ fn all_sections_are_read() {
     let variation = config.rules().variation;
     assert_eq!(variation.weights.unwrap().to_string(), "1,0,0");
     assert_eq!(variation.tier_bounds.unwrap().to_string(), "0.25,2");
-    assert_eq!(variation.perturbations.tracking_loss.probability, 0.05);
-    assert_eq!(variation.perturbations.tracking_loss.steps, [5, 20]);
+    let loss = |name| variation.perturbations.get("tracking_loss", name);
+    assert_eq!(loss("probability"), Some(Magnitude::Number(0.05)));
+    assert_eq!(loss("steps"), Some(Magnitude::Counts([5, 20])));
     let settings = config.settings().unwrap();
     assert_eq!(settings.publishes, Publication::Never);
     assert_eq!(settings.standings, CountingResult::MeanOfLast(5));

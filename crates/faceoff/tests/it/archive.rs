@@ -22,7 +22,6 @@ use std::{
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
     process::{Child, Command, Output, Stdio},
-    sync::Arc,
 };
 use tempfile::TempDir;
 
@@ -91,7 +90,7 @@ async fn start_site() -> Site {
         .unwrap();
     let evaluation = run_day(&store).await;
     let config = HttpConfig {
-        competition: Arc::new(faceoff_airhockey::competition()),
+        simulator: faceoff_airhockey::simulator(),
         max_bundle_bytes: 64,
         public_url: None,
         upload_dir: folder.path().to_owned(),

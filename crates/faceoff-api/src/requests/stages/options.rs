@@ -2,7 +2,7 @@
 
 use crate::requests::double_option::OrNull;
 use clap::{ArgMatches, Args, Command, FromArgMatches, Id, error::ErrorKind};
-use faceoff_types::{PerturbationSettings, Runtimes, Schedule};
+use faceoff_types::{Magnitudes, Runtimes, Schedule};
 use jiff::civil::{Date, Time};
 use serde::de::DeserializeOwned;
 use std::convert::Infallible;
@@ -15,12 +15,10 @@ pub(super) fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     Ok(parsed)
 }
 
-/// Reads a JSON file with magnitudes of the perturbations.
-pub(super) fn read_perturbations(path: &str) -> Result<Box<PerturbationSettings>, String> {
+/// Reads a JSON file with magnitudes of the perturbations. The server checks them.
+pub(super) fn read_perturbations(path: &str) -> Result<Magnitudes, String> {
     let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
-    let settings: Box<PerturbationSettings> = parse_json(&text)?;
-    settings.check().map_err(|error| error.to_string())?;
-    Ok(settings)
+    parse_json(&text)
 }
 
 /// Names of runtimes separated by commas; `all` is every runtime that the server offers.

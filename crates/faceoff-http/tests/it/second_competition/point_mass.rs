@@ -1,7 +1,7 @@
 //! A competition of a mass on a line, which the agent accelerates. It has nothing of air hockey: two tasks, one kind of violation, no
 //! tiers, one layout of actions, and profiles with a constant wind.
 
-use faceoff_episode::{Conditions, Environment, Simulator, StateColumns, World};
+use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator, StateColumns, World};
 use faceoff_types::*;
 use std::{any::Any, sync::Arc};
 
@@ -79,6 +79,13 @@ impl PointMass {
                 ],
                 ideal_profile: CALM,
                 counting_profile: WINDY,
+                magnitudes: vec![MagnitudeInfo {
+                    group: "wind".to_owned(),
+                    name: "strength_m_s2".to_owned(),
+                    description: "The strongest wind of a season.".to_owned(),
+                    default: Magnitude::Number(0.2),
+                    bounds: [0.0, 1.0],
+                }],
                 actions: ActionSpace {
                     is_stated: false,
                     layouts: vec![ActionLayout::new(None, &[1])],
@@ -110,13 +117,19 @@ impl Simulator for PointMass {
     fn environment(
         &self,
         conditions: &Conditions<'_>,
-    ) -> Result<Box<dyn Environment>, UnknownProfile> {
+    ) -> Result<Box<dyn Environment>, InvalidConditions> {
         self.competition.find_profile(conditions.profile.as_str())?;
+        let strength = conditions.perturbations.get("wind", "strength_m_s2");
+        let strength_m_s2 = match strength {
+            None => 0.2,
+            Some(Magnitude::Number(strength)) => strength,
+            Some(other) => return Err(InvalidConditions::Magnitudes(format!("wind is {other}"))),
+        };
         let blows = conditions.profile == WINDY;
         Ok(Box::new(Line {
             seed: conditions.seed,
             wind_m_s2: if blows {
-                0.2 * fraction(conditions.mismatch_seed)
+                strength_m_s2 * fraction(conditions.mismatch_seed)
             } else {
                 0.0
             },

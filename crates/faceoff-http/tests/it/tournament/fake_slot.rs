@@ -86,7 +86,7 @@ impl GameOutcome {
         let score = GameScore {
             ruleset: Ruleset::CURRENT,
             profile: EVALUATION,
-            perturbations: Box::default(),
+            perturbations: Default::default(),
             limits: GameLimits::default(),
             seed,
             steps: windows * 500,

@@ -5,11 +5,12 @@ use crate::{
     html::{rows, texts},
     site::string,
 };
+use faceoff_airhockey::Interpolation;
 use faceoff_airhockey::{Arena, RallyEntry, Response, RunningGame};
 use faceoff_episode::AnswerTiming;
 use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
-use faceoff_types::{GameLimits, Interpolation, Seed, Side};
+use faceoff_types::{GameLimits, Seed, Side};
 use scraper::{Html, Selector};
 
 /// Control steps of the recorded game.

@@ -2,7 +2,8 @@
 
 use super::{assert_outcomes, fuzz, mutation::mutate};
 use faceoff_airhockey::simulator;
-use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation, escape_unprintable};
+use faceoff_sim::Interpolation;
+use faceoff_types::{ACTION_LIMIT, AgentFaultKind, escape_unprintable};
 use faceoff_wire::{
     MAX_LINE_BYTES,
     answer::{parse_act, parse_ready, parse_reset_ready},

@@ -7,7 +7,8 @@ use faceoff_dataset::{
     verify::{VerifyError, verify},
 };
 use faceoff_episode::{AnswerTiming, RunningEpisode, Simulator, StepSink};
-use faceoff_types::{Interpolation, Phase, Ruleset, Seed};
+use faceoff_sim::Interpolation;
+use faceoff_types::{Phase, Ruleset, Seed};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
 use std::{

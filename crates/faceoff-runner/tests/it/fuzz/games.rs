@@ -12,7 +12,8 @@ use faceoff_dataset::{
     verify::VerifyError,
 };
 use faceoff_episode::AnswerTiming;
-use faceoff_types::{AgentFaultKind, GameLimits, Interpolation, Ruleset, Seed, Side, SlotTiming};
+use faceoff_sim::Interpolation;
+use faceoff_types::{AgentFaultKind, GameLimits, Ruleset, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{fs, path::Path};
 use tempfile::TempDir;
@@ -28,7 +29,7 @@ fn record_game(out: &Path) {
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits::default(),
         platform_retries: 0,
-        perturbations: Box::default(),
+        perturbations: Default::default(),
     };
     let arena = Arena::new(
         spec.profile.try_into().unwrap(),

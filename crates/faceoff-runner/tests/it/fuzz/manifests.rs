@@ -40,11 +40,16 @@ const WORDS: [&str; 24] = [
 
 #[test]
 fn manifest_is_parsed_or_its_key_is_named() {
+    let actions = faceoff_airhockey::action_space();
     let outcomes = fuzz("manifests", 30_000, |rng| {
         let mut text = rng.pick(&VALID).as_bytes().to_vec();
         mutate(&mut text, &WORDS, rng);
         let text = String::from_utf8_lossy(&text);
-        match Manifest::parse(&text) {
+        let parsed = Manifest::parse(&text).and_then(|manifest| {
+            manifest.check_interpolation(&actions)?;
+            Ok(manifest)
+        });
+        match parsed {
             Ok(manifest) => {
                 assert!(manifest.name.chars().all(is_printable));
                 let reparsed = Manifest::parse(&toml_of(&manifest)).unwrap();

@@ -18,7 +18,7 @@ use faceoff_api::{
         stage::{PhaseView, StageView},
     },
 };
-use faceoff_types::{PerturbationSettings, Publication, Task, TaskWeights, Zone};
+use faceoff_types::{Publication, Task, TaskWeights, Zone};
 use jiff::{Timestamp, Zoned, civil::DateTime};
 
 #[derive(Debug, Subcommand)]
@@ -286,7 +286,7 @@ fn stage_text(stage: &StageView) -> String {
         tasks.join(", "),
         rules.max_faults,
         competition().weights(&rules.variation),
-        if *rules.variation.perturbations == PerturbationSettings::default() {
+        if rules.variation.perturbations.is_empty() {
             "of the ruleset"
         } else {
             "custom"

@@ -89,7 +89,7 @@ impl ServerStage {
         config.evaluation.max_faults = rules.max_faults;
         config.evaluation.weights = competition().weights(&rules.variation);
         config.evaluation.tier_bounds = competition().tier_bounds(&rules.variation);
-        config.evaluation.perturbations = Some(rules.variation.perturbations.clone());
+        config.evaluation.perturbations = rules.variation.perturbations.clone();
     }
 
     /// Refuses a bundle whose runtime the stage does not allow or this machine does not offer.

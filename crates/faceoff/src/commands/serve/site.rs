@@ -1,25 +1,23 @@
 //! What serving a season needs, whether it runs or is archived: the opened data folder, the address and the HTTP settings.
 
 use super::data_folder::{empty_folder, load_or_create_link_key, lock, set_admin_token};
-use crate::competition::competition;
+use crate::competition::{competition, simulator};
 use crate::{config::Config, machine};
 use anyhow::Context;
 use faceoff_http::{AgentResources, Capacity, HttpConfig, LinkKey};
 use faceoff_metrics::Metrics;
 use faceoff_store::{FreeSpace, Store};
-use faceoff_types::{Clock, Competition};
+use faceoff_types::Clock;
 use jiff::Timestamp;
 use std::{
     fs::File,
     io::Write as _,
     net::SocketAddr,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 use tokio::net::TcpListener;
 
 pub(super) struct Site {
-    competition: Arc<Competition>,
     pub(super) store: Store,
     pub(super) listener: TcpListener,
     pub(super) address: SocketAddr,
@@ -45,8 +43,9 @@ impl Site {
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
-        let competition = Arc::clone(competition());
-        let bound = store.bind_competition(&competition, Timestamp::now()).await;
+        let bound = store
+            .bind_competition(competition(), Timestamp::now())
+            .await;
         bound.with_context(|| format!("opening the data folder {}", data_dir.display()))?;
         set_admin_token(&store, data_dir, Timestamp::now()).await?;
         let listen = config.server.listen;
@@ -54,7 +53,6 @@ impl Site {
             format!("listening on {listen}; choose another address with --listen")
         })?;
         Ok(Self {
-            competition,
             store,
             address: listener.local_addr().context("reading the bound address")?,
             listener,
@@ -73,7 +71,7 @@ impl Site {
         agent_resources: AgentResources,
     ) -> HttpConfig {
         HttpConfig {
-            competition: Arc::clone(&self.competition),
+            simulator: simulator(),
             max_bundle_bytes: config.bundle.packed_bytes,
             public_url: config.server.public_url.clone(),
             upload_dir: self.upload_dir.clone(),

@@ -1,0 +1,244 @@
+//! The magnitudes of air hockey's perturbations: their ranges and meaning. The *plant* is the robot in the evaluator's simulator, and the
+//! *nominal model* is the one that teams have.
+
+use crate::competition;
+use Magnitude::{Counts, Number, Range};
+use faceoff_sim::{MismatchSettings, PerturbationSettings, Plant};
+use faceoff_types::{InvalidMagnitude, Magnitude, MagnitudeInfo, Magnitudes, Seed};
+
+/// The descriptions, group by group.
+pub(crate) fn magnitudes() -> Vec<MagnitudeInfo> {
+    let PerturbationSettings {
+        model_mismatch: mismatch,
+        observation_noise: noise,
+        disturbance,
+        tracking_loss: loss,
+        delay,
+    } = PerturbationSettings::default();
+    // The deviation of the plant, which is drawn once per season.
+    let model_mismatch = describe("model_mismatch");
+    let observation_noise = describe("observation_noise");
+    let air_flow = describe("disturbance");
+    let tracking_loss = describe("tracking_loss");
+    let laboratory = describe("delay");
+    vec![
+        model_mismatch(
+            "mass",
+            "Range of the factor on each link's mass and inertia.",
+            Range(mismatch.mass),
+            [0.1, 10.0],
+        ),
+        model_mismatch(
+            "gains",
+            "Range of the factor on each joint's gains.",
+            Range(mismatch.gains),
+            [0.1, 10.0],
+        ),
+        model_mismatch(
+            "friction",
+            "Range of the factor on each joint's damping and dry friction.",
+            Range(mismatch.friction),
+            [0.1, 10.0],
+        ),
+        model_mismatch(
+            "static_error_m",
+            "Accepted range of the largest static end-effector error over the workspace, in metres.",
+            Range(mismatch.static_error_m),
+            [0.0, 1.0],
+        ),
+        observation_noise(
+            "puck_position_m",
+            "Standard deviation of the puck's x and y, m.",
+            Number(noise.puck_position_m),
+            [0.0, 1.0],
+        ),
+        observation_noise(
+            "puck_yaw_rad",
+            "Standard deviation of the puck's yaw, rad.",
+            Number(noise.puck_yaw_rad),
+            [0.0, 10.0],
+        ),
+        observation_noise(
+            "puck_velocity_m_s",
+            "Standard deviation of the puck's velocity, m/s.",
+            Number(noise.puck_velocity_m_s),
+            [0.0, 10.0],
+        ),
+        observation_noise(
+            "puck_yaw_rate_rad_s",
+            "Standard deviation of the puck's yaw rate, rad/s.",
+            Number(noise.puck_yaw_rate_rad_s),
+            [0.0, 100.0],
+        ),
+        observation_noise(
+            "joint_position_rad",
+            "Standard deviation of the joint positions, rad.",
+            Number(noise.joint_position_rad),
+            [0.0, 1.0],
+        ),
+        observation_noise(
+            "joint_velocity_rad_s",
+            "Standard deviation of the joint velocities, rad/s.",
+            Number(noise.joint_velocity_rad_s),
+            [0.0, 10.0],
+        ),
+        air_flow(
+            "sigma_n_per_m_s",
+            "Standard deviation of the air flow's force on the puck per axis, in N per m/s of the puck's speed.",
+            Number(disturbance.sigma_n_per_m_s),
+            [0.0, 1.0],
+        ),
+        // The noise process is advanced every millisecond.
+        air_flow(
+            "correlation_time_s",
+            "Time constant with which the force changes, s.",
+            Number(disturbance.correlation_time_s),
+            [0.001, 1000.0],
+        ),
+        tracking_loss(
+            "probability",
+            "Probability per control step, while the puck is tracked.",
+            Number(loss.probability),
+            [0.0, 1.0],
+        ),
+        tracking_loss(
+            "steps",
+            "Shortest and longest loss, in control steps.",
+            Counts(loss.steps),
+            [1.0, 500.0],
+        ),
+        laboratory(
+            "second_step_probability",
+            "Probability that the puck is observed two control steps late instead of one.",
+            Number(delay.second_step_probability),
+            [0.0, 1.0],
+        ),
+        laboratory(
+            "tilt_m_s2",
+            "Standard deviation per axis of the puck's acceleration due to the table's tilt, m/s².",
+            Number(delay.tilt_m_s2),
+            [0.0, 10.0],
+        ),
+        laboratory(
+            "puck_damping_per_s",
+            "Range of the decay rate of the puck's velocity, 1/s.",
+            Range(delay.puck_damping_per_s),
+            [0.0, 100.0],
+        ),
+    ]
+}
+
+/// Describes the magnitudes of a group.
+fn describe(group: &'static str) -> impl Fn(&str, &str, Magnitude, [f64; 2]) -> MagnitudeInfo {
+    move |name, description, default, bounds| MagnitudeInfo {
+        group: group.to_owned(),
+        name: name.to_owned(),
+        description: description.to_owned(),
+        default,
+        bounds,
+    }
+}
+
+/// Checks the simulator's settings, and returns them as the platform has them.
+///
+/// # Errors
+/// The first magnitude that is out of range.
+///
+/// # Panics
+/// Never: settings consist of numbers, in pairs at most.
+pub fn checked_magnitudes(settings: &PerturbationSettings) -> Result<Magnitudes, InvalidMagnitude> {
+    let mut magnitudes: Magnitudes = serde_json::to_value(settings)
+        .and_then(serde_json::from_value)
+        .expect("settings consist of numbers");
+    competition().check_magnitudes(&mut magnitudes)?;
+    Ok(magnitudes)
+}
+
+/// The simulator's settings; those of the ruleset where magnitudes are left out.
+///
+/// # Errors
+/// Which magnitude the simulator does not have, as text.
+pub fn settings(magnitudes: &Magnitudes) -> Result<PerturbationSettings, String> {
+    magnitudes.to_settings().map_err(|error| error.to_string())
+}
+
+/// Checks that a robot can be drawn for the season. It takes up to a second, but not with the ruleset's magnitudes.
+pub(crate) fn check_robot(magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
+    let settings = settings(magnitudes)?;
+    if settings.model_mismatch == MismatchSettings::default()
+        || Plant::can_be_drawn(&settings, mismatch_seed)
+    {
+        return Ok(());
+    }
+    let [min_error_m, max_error_m] = settings.model_mismatch.static_error_m;
+    Err(format!(
+        "model_mismatch: none of 300 robots drawn from these ranges of mass and gains has a largest static error of \
+         {min_error_m} to {max_error_m} m (static_error_m); widen one of the ranges"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn magnitudes_are_all_of_the_simulator() {
+        let mut all = Magnitudes::default();
+        for info in magnitudes() {
+            all.set(&info.group, &info.name, info.default);
+        }
+        let defaults = PerturbationSettings::default();
+        assert_eq!(
+            serde_json::to_string(&all).unwrap(),
+            serde_json::to_string(&defaults).unwrap(),
+            "the same fields, in the same order, with the same defaults"
+        );
+        assert_eq!(settings(&all).unwrap(), defaults);
+        assert!(checked_magnitudes(&defaults).unwrap().is_empty());
+    }
+
+    #[test]
+    fn changed_settings_have_the_bits_of_the_magnitudes() {
+        let mut changed = PerturbationSettings::default();
+        changed.disturbance.sigma_n_per_m_s = 1.0 / 3.0;
+        changed.tracking_loss.steps = [1, 2];
+        let magnitudes = checked_magnitudes(&changed).unwrap();
+        assert_eq!(
+            serde_json::to_string(&magnitudes).unwrap(),
+            serde_json::to_string(&changed).unwrap(),
+            "files of earlier versions have the same bytes"
+        );
+        assert_eq!(settings(&magnitudes).unwrap(), changed);
+    }
+
+    #[test]
+    fn magnitude_out_of_range_is_refused_by_name() {
+        for (json, words) in [
+            (
+                r#"{"model_mismatch":{"mass":[1.2,0.8]}}"#,
+                "model_mismatch.mass: expected two numbers from 0.1 to 10",
+            ),
+            (
+                r#"{"observation_noise":{"puck_position_m":-0.1}}"#,
+                "puck_position_m: expected a number from 0 to 1, got -0.1",
+            ),
+            (
+                r#"{"disturbance":{"correlation_time_s":0.0}}"#,
+                "correlation_time_s",
+            ),
+            (
+                r#"{"tracking_loss":{"steps":[9,3]}}"#,
+                "tracking_loss.steps",
+            ),
+            (
+                r#"{"tracking_loss":{"chance":0.5}}"#,
+                "tracking_loss.chance: unknown",
+            ),
+        ] {
+            let mut magnitudes: Magnitudes = serde_json::from_str(json).unwrap();
+            let error = competition().check_magnitudes(&mut magnitudes);
+            let error = error.unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+}
