@@ -3,10 +3,10 @@
 
 use faceoff_sim::Interpolation;
 use faceoff_sim::{
-    AirHockeyProfile, AirHockeyTask, Bounds, Episode, Factors, Game, GameSetup,
+    AirHockeyProfile, AirHockeyRuleset, AirHockeyTask, Bounds, Episode, Factors, Game, GameSetup,
     PerturbationSettings, Plant,
 };
-use faceoff_types::{Ruleset, Seed, Task};
+use faceoff_types::{Seed, Task};
 
 /// Rules, perturbations, the season's plant (the true robot, which deviates from the nominal one that agents know) and the seed
 /// from which the seeds of episodes and rallies are derived.
@@ -26,14 +26,20 @@ impl Arena {
     #[must_use]
     pub fn new(profile: AirHockeyProfile, seed: Seed, mismatch_seed: Seed) -> Self {
         let magnitudes = PerturbationSettings::default();
-        Self::with_ruleset(Ruleset::CURRENT, profile, &magnitudes, seed, mismatch_seed)
+        Self::with_ruleset(
+            AirHockeyRuleset::CURRENT,
+            profile,
+            &magnitudes,
+            seed,
+            mismatch_seed,
+        )
     }
 
     /// An arena with a ruleset, and with magnitudes for the perturbations of the profile. It draws the plant from `mismatch_seed`,
     /// which takes milliseconds, so use one arena for many episodes.
     #[must_use]
     pub fn with_ruleset(
-        ruleset: Ruleset,
+        ruleset: AirHockeyRuleset,
         profile: AirHockeyProfile,
         magnitudes: &PerturbationSettings,
         seed: Seed,

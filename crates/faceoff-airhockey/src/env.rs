@@ -1,7 +1,8 @@
 //! The field `env` of the message `hello`: the simulator's constants, as an agent gets them.
 
+use crate::RULESET;
 use faceoff_sim::{AirHockeyTask, EPISODE_STEPS, EnvInfo, JOINTS, env_info, env_info_for};
-use faceoff_types::{AgentTask, GAME_WINDOWS, RULESET, UnknownTask, WINDOW_STEPS};
+use faceoff_types::{AgentTask, GAME_WINDOWS, UnknownTask, WINDOW_STEPS};
 use serde::Serialize;
 
 /// `env` of `hello`: constants of the simulation, under the names of the challenge's `env_info`.
@@ -168,7 +169,7 @@ pub(crate) fn env(agent_task: AgentTask) -> Result<Env, UnknownTask> {
                 .collect(),
         },
         episode_steps,
-        ruleset: RULESET.to_owned(),
+        ruleset: RULESET.to_string(),
     })
 }
 

@@ -24,7 +24,7 @@ pub use game_record::{
 };
 pub use magnitudes::{checked_magnitudes, settings};
 pub use running_game::{FinishedGame, RunningGame};
-pub use simulator::{AirHockey, simulator};
+pub use simulator::{AirHockey, find_ruleset, simulator};
 pub use world::AirHockeyWorld;
 
 use faceoff_scoring::{
@@ -34,10 +34,10 @@ use faceoff_scoring::{
 pub use faceoff_sim::Interpolation;
 pub use faceoff_sim::episode::constraints::{EE, JOINT_POS, JOINT_VEL, LINK};
 pub use faceoff_sim::episode::ends::{CROSSED_MIDDLE, LEFT_TABLE, REACHED_AXIS, STOPPED};
-use faceoff_sim::{AirHockeyProfile, AirHockeyTask};
+use faceoff_sim::{AirHockeyProfile, AirHockeyRuleset, AirHockeyTask};
 use faceoff_types::{
-    CONTROL_STEP_S, Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths, Profile,
-    ProfileInfo, Task, TaskInfo, ViolationInfo, ViolationName,
+    ACTION_LIMIT, CONTROL_STEP_S, Competition, EPISODE_STEPS, EndInfo, EpisodeEnd, Millionths,
+    Profile, ProfileInfo, Ruleset, RulesetInfo, Task, TaskInfo, ViolationInfo, ViolationName,
 };
 
 /// Score a goal.
@@ -48,6 +48,15 @@ pub const DEFEND: Task = AirHockeyTask::Defend.name();
 pub const PREPARE: Task = AirHockeyTask::Prepare.name();
 /// The tasks in the order of boards.
 pub const TASKS: [Task; 3] = [HIT, DEFEND, PREPARE];
+
+/// The versions of simulator and scoring, oldest first; see [`AirHockeyRuleset`].
+pub const RULESETS: [Ruleset; 3] = [
+    AirHockeyRuleset::First.name(),
+    AirHockeyRuleset::Second.name(),
+    AirHockeyRuleset::Third.name(),
+];
+/// The ruleset of new evaluations.
+pub const RULESET: Ruleset = AirHockeyRuleset::CURRENT.name();
 
 /// The simulator that teams have, without perturbations.
 pub const IDEAL: Profile = AirHockeyProfile::Ideal.name();
@@ -81,6 +90,7 @@ pub fn competition() -> Competition {
         title: "Robot Air Hockey Challenge".to_owned(),
         short_title: "Robot Air Hockey".to_owned(),
         subject: "robot air hockey".to_owned(),
+        rulesets: AirHockeyRuleset::ALL.map(ruleset).into(),
         has_replays: true,
         has_games: true,
         tasks: vec![
@@ -221,6 +231,16 @@ pub fn competition() -> Competition {
 }
 
 /// `weight` in millionths.
+const fn ruleset(ruleset: AirHockeyRuleset) -> RulesetInfo {
+    RulesetInfo {
+        ruleset: ruleset.name(),
+        action_limit: match ruleset {
+            AirHockeyRuleset::First => f64::MAX,
+            AirHockeyRuleset::Second | AirHockeyRuleset::Third => ACTION_LIMIT,
+        },
+    }
+}
+
 fn task(task: Task, title: &str, weight: u32, aim: &str) -> TaskInfo {
     TaskInfo {
         task,
@@ -263,7 +283,7 @@ fn violation(
 mod tests {
     use super::*;
     use faceoff_scoring::tournament::MAX_EPISODE_PENALTY;
-    use faceoff_types::{ProfileMap, Ruleset, StageRules, Variation};
+    use faceoff_types::{ProfileMap, StageRules, Variation};
     use std::collections::HashSet;
 
     #[test]
@@ -307,7 +327,7 @@ mod tests {
     fn rules_and_maps_follow_the_profiles() {
         let competition = competition();
         let mut rules = StageRules {
-            ruleset: Ruleset::CURRENT,
+            ruleset: RULESET,
             profile: DELAY,
             tasks: TASKS.to_vec(),
             episodes_per_task: 1,

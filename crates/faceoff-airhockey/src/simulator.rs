@@ -7,7 +7,8 @@ use crate::{
     magnitudes::{check_robot, settings},
 };
 use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator};
-use faceoff_types::{AgentTask, Competition, Magnitudes, Seed, UnknownTask};
+use faceoff_sim::AirHockeyRuleset;
+use faceoff_types::{AgentTask, Competition, Magnitudes, Ruleset, Seed, UnknownTask};
 use std::sync::{Arc, LazyLock};
 
 static SIMULATOR: LazyLock<Arc<AirHockey>> = LazyLock::new(|| {
@@ -70,7 +71,7 @@ impl Simulator for AirHockey {
             mismatch_seed,
         } = *conditions;
         Ok(Box::new(Arena::with_ruleset(
-            ruleset,
+            find_ruleset(ruleset)?,
             profile.try_into().map_err(InvalidConditions::Profile)?,
             &settings(perturbations).map_err(InvalidConditions::Magnitudes)?,
             seed,
@@ -81,4 +82,12 @@ impl Simulator for AirHockey {
     fn check_magnitudes(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
         check_robot(magnitudes, mismatch_seed)
     }
+}
+
+/// The simulator's ruleset of this name.
+///
+/// # Errors
+/// If the simulator has no such ruleset.
+pub fn find_ruleset(ruleset: Ruleset) -> Result<AirHockeyRuleset, InvalidConditions> {
+    AirHockeyRuleset::find(ruleset).ok_or(InvalidConditions::Ruleset(ruleset))
 }

@@ -7,7 +7,7 @@ use faceoff_airhockey::{EVALUATION, PREPARE, TASKS, simulator};
 use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{AnswerTiming, EpisodeStart, StateColumns, StepRow, StepSink, World};
 use faceoff_sim::Interpolation;
-use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Ruleset, Seed, Violations};
+use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Seed, Violations};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use std::{any::Any, hint::black_box, path::Path};
 
@@ -132,7 +132,7 @@ fn slice(criterion: &mut Criterion) {
     for task in TASKS {
         for start in (0..EPISODES).step_by(EPISODES_PER_SHARD as usize) {
             let spec = ShardSpec {
-                ruleset: Ruleset::CURRENT,
+                ruleset: faceoff_airhockey::RULESET,
                 platform_retries: 0,
                 task,
                 episodes: start..start + EPISODES_PER_SHARD,
@@ -152,7 +152,7 @@ fn slice(criterion: &mut Criterion) {
         seed,
         mismatch_seed: seed,
         agent: "noise".to_owned(),
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         variation: Default::default(),
         task_weights: faceoff_airhockey::competition().weights(&Default::default()),
         tiers: faceoff_airhockey::competition().tiers,

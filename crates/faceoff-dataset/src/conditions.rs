@@ -1,6 +1,6 @@
 //! The conditions of a job: the same to play under, and to verify the recording with.
 
-use faceoff_airhockey::{Arena, settings};
+use faceoff_airhockey::{Arena, find_ruleset, settings};
 use faceoff_episode::{Conditions, InvalidConditions};
 use faceoff_wire::{game::GameSpec, job::ShardSpec};
 
@@ -19,10 +19,10 @@ pub fn shard_conditions(spec: &ShardSpec) -> Conditions<'_> {
 /// The world of a game.
 ///
 /// # Errors
-/// If the simulator has no such profile or magnitudes.
+/// If the simulator has no such ruleset, profile or magnitudes.
 pub fn game_arena(spec: &GameSpec) -> Result<Arena, InvalidConditions> {
     Ok(Arena::with_ruleset(
-        spec.ruleset,
+        find_ruleset(spec.ruleset)?,
         spec.profile
             .try_into()
             .map_err(InvalidConditions::Profile)?,

@@ -28,7 +28,7 @@ use crate::{
 };
 use episode_reader::{EpisodeReader, RecordedEpisode};
 use faceoff_episode::{Conditions, Simulator};
-use faceoff_types::{Competition, EvaluationResult, Ruleset, Task, TaskMap, UnknownRuleset};
+use faceoff_types::{Competition, EvaluationResult, Ruleset, RulesetInfo, Task, TaskMap};
 use rayon::{
     ThreadPoolBuilder,
     iter::{IntoParallelRefIterator, ParallelIterator},
@@ -81,7 +81,7 @@ pub fn verify(
     let mut reader = EpisodeReader::open(dataset, tasks.clone(), competition)?;
     let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks(), competition);
     let environment = simulator.environment(&Conditions {
-        ruleset,
+        ruleset: ruleset.ruleset,
         profile: manifest.profile,
         perturbations: &manifest.variation.perturbations,
         seed: manifest.seed,
@@ -119,22 +119,20 @@ pub fn verify(
         }
         batch.result
     })?;
-    totals.finish(ruleset, dataset, competition)
+    totals.finish(ruleset.ruleset, dataset, competition)
 }
 
 /// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
 fn check_reproducible(
     dataset: &Dataset,
     simulator: &dyn Simulator,
-) -> Result<Ruleset, DatasetError> {
+) -> Result<RulesetInfo, DatasetError> {
     let (manifest, current) = (dataset.manifest(), simulator_id(simulator));
-    let ruleset = manifest
-        .ruleset
-        .parse()
-        .map_err(|unknown: UnknownRuleset| DatasetError::Foreign(unknown.to_string()))?;
+    let competition = simulator.competition();
+    let found = competition.find_ruleset(&manifest.ruleset);
+    let ruleset = *found.map_err(|unknown| DatasetError::Foreign(unknown.to_string()))?;
     let mut magnitudes = manifest.variation.perturbations.clone();
-    simulator
-        .competition()
+    competition
         .check_magnitudes(&mut magnitudes)
         .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
     if manifest.simulator != current {

@@ -74,6 +74,8 @@ pub struct Conditions<'a> {
 /// Conditions that a simulator does not have.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidConditions {
+    #[error("the simulator does not have the ruleset {0}")]
+    Ruleset(Ruleset),
     #[error(transparent)]
     Profile(#[from] UnknownProfile),
     /// Why the magnitudes are invalid.
@@ -94,7 +96,7 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     /// The environment of an evaluation. It may take milliseconds, so use one for many episodes.
     ///
     /// # Errors
-    /// If the simulator has no such profile or magnitudes.
+    /// If the simulator has no such ruleset, profile or magnitudes.
     fn environment(
         &self,
         conditions: &Conditions<'_>,

@@ -9,7 +9,7 @@ use axum::{
 use faceoff_service::{
     app::AppState, conditions::ETag, problem::Problem, views::season::SeasonHead,
 };
-use faceoff_types::RULESET;
+use faceoff_types::Ruleset;
 use std::sync::atomic::Ordering;
 
 /// Header, navigation and footer of every page.
@@ -17,7 +17,8 @@ use std::sync::atomic::Ordering;
 pub(super) struct Frame {
     /// Name of the season; empty on pages that do not load it.
     pub(super) season: String,
-    pub(super) ruleset: &'static str,
+    /// The ruleset of new evaluations; `None` on pages that are the same for all competitions.
+    pub(super) ruleset: Option<Ruleset>,
     /// Notice about a problem of the server.
     pub(super) notice: Option<&'static str>,
     /// Notice that the season is archived; `None` for a running season.
@@ -56,6 +57,7 @@ impl Frame {
                 )
             }),
             has_tournaments: app.has_tournaments.load(Ordering::Relaxed),
+            ruleset: Some(app.config.competition().ruleset()),
             subject: Some(app.config.competition().subject.clone()),
             preview: app
                 .config
@@ -72,7 +74,7 @@ impl Frame {
             season,
             notice: None,
             archived: None,
-            ruleset: RULESET,
+            ruleset: None,
             current: current.into(),
             style: assets::STYLE.url(),
             script: assets::SCRIPT.url(),

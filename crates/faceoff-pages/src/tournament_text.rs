@@ -80,7 +80,7 @@ mod tests {
     fn final_and_swiss_rounds_depend_on_results() {
         let rules = |format| TournamentRules {
             format,
-            ..TournamentRules::default()
+            ..faceoff_airhockey::competition().tournament_rules()
         };
         let groups = rules(TournamentFormat::Groups {
             groups: 2,
@@ -89,7 +89,7 @@ mod tests {
         assert!(!is_drawn_from_results(&groups, RoundNumber::FIRST));
         assert!(is_drawn_from_results(&groups, RoundNumber::SECOND));
         assert!(!is_drawn_from_results(
-            &TournamentRules::default(),
+            &faceoff_airhockey::competition().tournament_rules(),
             RoundNumber::SECOND
         ));
     }

@@ -10,10 +10,10 @@ use faceoff_airhockey::{TASKS, competition};
 use faceoff_episode::{AnswerTiming, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
 use faceoff_sim::{AirHockeyProfile, AirHockeyTask};
-use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
-use faceoff_types::{
-    EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskMap, TaskResult, Variation,
+use faceoff_sim::{
+    AirHockeyRuleset, Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q,
 };
+use faceoff_types::{EpisodeOutcome, Phase, Profile, Seed, Task, TaskMap, TaskResult, Variation};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
@@ -67,7 +67,7 @@ impl Evaluation {
         let magnitudes = check_perturbations(&settings)?;
         let arena = py.detach(|| {
             catch_panic(|| {
-                let ruleset = Ruleset::CURRENT;
+                let ruleset = AirHockeyRuleset::CURRENT;
                 Ok(Arena::with_ruleset(
                     ruleset,
                     profile,
@@ -157,7 +157,7 @@ impl Evaluation {
                     (task, score_task(&competition, &outcomes, &times, bounds))
                 })
                 .collect();
-            let ruleset = Ruleset::CURRENT;
+            let ruleset = faceoff_airhockey::RULESET;
             Ok(score_evaluation(
                 ruleset,
                 self.profile,

@@ -153,10 +153,11 @@ pub(crate) async fn order_ablation(
         ..stage::current(&app).await?.plan()
     };
     let profiles: Vec<Profile> = app.config.competition().ablation_profiles().collect();
+    let ruleset = app.config.competition().ruleset();
     let now = app.config.clock.now();
     let ablation = app
         .store
-        .request_ablation(organiser.actor(), id, &plan, &profiles, now)
+        .request_ablation(organiser.actor(), id, ruleset, &plan, &profiles, now)
         .await?;
     tracing::info!(submission = %id, ablation = %ablation.id, "ablation queued");
     let view = ablation::build(&app, ablation).await?;

@@ -24,7 +24,7 @@ use faceoff_service::{
     views::{stage, tournament},
 };
 use faceoff_store::Stage;
-use faceoff_types::{Ruleset, TournamentId, TournamentRules, TournamentSettings};
+use faceoff_types::{TournamentId, TournamentRules, TournamentSettings};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 
@@ -67,7 +67,12 @@ pub(crate) async fn open_tournament(
     Body(request): Body<NewTournament>,
 ) -> Result<impl IntoResponse, Problem> {
     let name = parse_name(&request.name)?;
-    let rules = changed_rules(&app, &TournamentRules::default(), request.rules).await?;
+    let rules = changed_rules(
+        &app,
+        &app.config.competition().tournament_rules(),
+        request.rules,
+    )
+    .await?;
     let settings = changed_settings(&TournamentSettings::default(), request.settings)?;
     let stage = match (&request.stage, &request.teams) {
         (Some(stage), _) => Some(find_stage(&app, stage).await?),
@@ -271,17 +276,17 @@ async fn changed_rules(
         .as_ref()
         .is_some_and(|fields| fields.contains_key("ruleset"));
     let mut rules: TournamentRules = apply_patch("rules", current, fields)?;
+    let newest = app.config.competition().ruleset();
     // An upgrade of the server alone does not change a tournament.
     if rules != *current {
-        if sets_ruleset && rules.ruleset != Ruleset::CURRENT {
+        if sets_ruleset && rules.ruleset != newest {
             let detail = format!(
-                "ruleset: expected the current one, {}, got {}; leave it out",
-                Ruleset::CURRENT,
+                "ruleset: expected the current one, {newest}, got {}; leave it out",
                 rules.ruleset
             );
             return Err(Problem::invalid("rules", detail));
         }
-        rules.ruleset = Ruleset::CURRENT;
+        rules.ruleset = newest;
     }
     let checked = app.config.competition().check_tournament(&mut rules);
     checked.map_err(|error| Problem::invalid("rules", error))?;

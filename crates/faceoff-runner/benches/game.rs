@@ -13,9 +13,7 @@ use faceoff_runner::{
     AgentEnvironment, GameObserver, GameSpec, LiveFeed, LiveFeedSink, POSITION_INTERVAL, run_game,
 };
 use faceoff_sandbox::{Isolation, affinity};
-use faceoff_types::{
-    GAME_WINDOWS, GameLimits, LiveEvent, LivePosition, Ruleset, Seed, WINDOW_STEPS,
-};
+use faceoff_types::{GAME_WINDOWS, GameLimits, LiveEvent, LivePosition, Seed, WINDOW_STEPS};
 use instant::{InstantAgent, environment, instant_agent};
 use std::{fs, time::Instant};
 
@@ -71,7 +69,7 @@ fn main() {
     let envs = [env_on_cpu(1), env_on_cpu(2)];
     let seed = Seed::from_number(1);
     let spec = GameSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         steps,
         profile: EVALUATION,
         seed,

@@ -23,7 +23,7 @@ use faceoff_runner::{
 use faceoff_sandbox::{Isolation, affinity};
 use faceoff_sim::AirHockeyProfile;
 use faceoff_sim::Interpolation;
-use faceoff_types::{EpisodeOutcome, Ruleset, Seed};
+use faceoff_types::{EpisodeOutcome, Seed};
 use faceoff_wire::Message;
 use instant::{ACTION, InstantAgent, environment, instant_agent};
 use std::{
@@ -272,7 +272,7 @@ fn bench_control_steps(criterion: &mut Criterion) {
     });
     let out = tempfile::tempdir().unwrap();
     let spec = ShardSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         platform_retries: 0,
         task: HIT,
         episodes: 0..20,

@@ -89,7 +89,7 @@ pub enum PlatformFault {
     /// The simulator has no such task.
     #[error(transparent)]
     UnknownTask(#[from] UnknownTask),
-    /// The simulator has no such profile or magnitudes.
+    /// The simulator has no such ruleset, profile or magnitudes.
     #[error(transparent)]
     InvalidConditions(#[from] InvalidConditions),
     /// Host interference repeatedly prevented an agent's answer, in a run that needs a verdict on the agent.

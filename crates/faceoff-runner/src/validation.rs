@@ -13,7 +13,7 @@ use crate::{
 use faceoff_episode::{AnswerTiming, Conditions, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
-use faceoff_types::{AgentFault, EpisodeOutcome, Magnitudes, Ruleset, Task, ValidationTiming};
+use faceoff_types::{AgentFault, EpisodeOutcome, Magnitudes, Task, ValidationTiming};
 use faceoff_wire::job::ValidationSpec;
 use std::fmt;
 
@@ -117,7 +117,7 @@ pub fn validate_monitored(
 ) -> Result<ValidationReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
     let environment = env.simulator.environment(&Conditions {
-        ruleset: Ruleset::CURRENT,
+        ruleset: env.simulator.competition().ruleset(),
         profile: env.simulator.competition().counting_profile,
         perturbations: &Magnitudes::default(),
         seed: spec.seed,

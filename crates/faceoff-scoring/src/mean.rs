@@ -7,8 +7,8 @@ use crate::{
     tier::tier_with_bounds,
 };
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationResult, Ruleset, Seed, TaskMap, TaskResult, TaskWeights,
-    TierBounds, UnknownRuleset, ViolationCounts,
+    ComputationTimeSummary, EvaluationResult, InvalidShortName, Ruleset, Seed, TaskMap, TaskResult,
+    TaskWeights, TierBounds, ViolationCounts,
 };
 
 /// Key derivation context (BLAKE3) of the hash that represents the seeds of several days.
@@ -24,12 +24,12 @@ const SEED_CONTEXT: &str = "faceoff-scoring seeds of several days 1";
 /// `weights` and `bounds` are those of tasks and tiers under the rules of the evaluations.
 ///
 /// # Errors
-/// If the ruleset of the first evaluation is unknown.
+/// If the name of the first evaluation's ruleset is malformed.
 pub fn mean_result(
     results: &[&EvaluationResult],
     weights: &TaskWeights,
     bounds: Option<TierBounds>,
-) -> Result<Option<EvaluationResult>, UnknownRuleset> {
+) -> Result<Option<EvaluationResult>, InvalidShortName> {
     let [first, ..] = results else {
         return Ok(None);
     };
@@ -165,7 +165,7 @@ mod tests {
             },
         };
         score_evaluation(
-            Ruleset::CURRENT,
+            faceoff_airhockey::RULESET,
             faceoff_airhockey::EVALUATION,
             Seed::from_number(seed),
             &Variation::default(),

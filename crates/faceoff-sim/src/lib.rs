@@ -33,6 +33,7 @@ mod interpolation;
 pub mod model;
 pub mod perturbation;
 pub mod robot;
+mod ruleset;
 // Random numbers.
 pub mod stream;
 pub mod table;
@@ -55,5 +56,6 @@ pub use perturbation::{
     NoiseSettings, PerturbationSettings, TrackingLossSettings,
 };
 pub use robot::plant::Plant;
+pub use ruleset::AirHockeyRuleset;
 // `Runaway`: the part of a world that left its bounds, so that the world stopped (*diverged*).
 pub use world::{Bounds, ContactBody, Divergence, Impact, Impacts, MalletState, Runaway, World};

@@ -6,9 +6,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_airhockey::{EVALUATION, TASKS};
 use faceoff_store::Store;
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationId, EvaluationResult, RULESET, Ruleset, RunId, Seed, ShardId,
-    StageId, StageRules, StageSettings, SubmissionId, TaskResult, TeamId, Tier, ViolationCounts,
-    Zone,
+    ComputationTimeSummary, EvaluationId, EvaluationResult, RunId, Seed, ShardId, StageId,
+    StageRules, StageSettings, SubmissionId, TaskResult, TeamId, Tier, ViolationCounts, Zone,
 };
 use jiff::{Timestamp, ToSpan, civil::date};
 use sqlx::{Connection, SqliteConnection};
@@ -43,7 +42,7 @@ fn evaluation_result(score: f64) -> EvaluationResult {
         },
     };
     EvaluationResult {
-        ruleset: RULESET.into(),
+        ruleset: faceoff_airhockey::RULESET.to_string(),
         profile: EVALUATION,
         seed: Seed::from_number(1),
         tasks: TASKS.map(|name| (name, task.clone())).into(),
@@ -171,7 +170,7 @@ fn board(criterion: &mut Criterion) {
         let now = Timestamp::now();
         let rules = StageRules {
             runtimes: None,
-            ruleset: Ruleset::CURRENT,
+            ruleset: faceoff_airhockey::RULESET,
             profile: EVALUATION,
             tasks: TASKS.to_vec(),
             episodes_per_task: 1000,

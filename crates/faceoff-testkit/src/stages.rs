@@ -2,7 +2,7 @@
 
 use faceoff_airhockey::{DEFEND, EVALUATION, HIT, PREPARE};
 use faceoff_store::{Actor, RunPlan, Stage, StageChange, Store, StoreError};
-use faceoff_types::{Ruleset, Schedule, StageId, StageRules, StageSettings, Zone};
+use faceoff_types::{Schedule, StageId, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 
 /// 3 tasks of 4 episodes in shards of 2 episodes. 3 agent faults are allowed.
@@ -38,7 +38,7 @@ pub fn one_shard_plan() -> RunPlan {
 pub fn rules_and_settings(plan: &RunPlan) -> (StageRules, StageSettings) {
     let rules = StageRules {
         runtimes: None,
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         profile: plan.profile,
         tasks: plan.tasks.clone(),
         episodes_per_task: plan.episodes_per_task,

@@ -2,9 +2,9 @@
 
 use crate::{
     ActionSpace, EpisodeEnd, InvalidMagnitude, InvalidStageRules, InvalidTournament, MagnitudeInfo,
-    Magnitudes, Millionths, Profile, ProfileMap, RecordingColumns, StageRules, Task, TaskMap,
-    TaskWeights, TierBounds, TournamentRules, UnknownProfile, UnknownTask, Variation,
-    ViolationCounts, ViolationName, Violations,
+    Magnitudes, Millionths, Profile, ProfileMap, RecordingColumns, Ruleset, StageRules, Task,
+    TaskMap, TaskWeights, TierBounds, TournamentRules, UnknownProfile, UnknownRuleset, UnknownTask,
+    Variation, ViolationCounts, ViolationName, Violations,
 };
 
 /// The description of a competition. Boards, tables, forms and files take their tasks, violations, profiles and tiers from it, recordings
@@ -19,6 +19,8 @@ pub struct Competition {
     pub short_title: String,
     /// What agents do, in running text, such as "robot air hockey".
     pub subject: String,
+    /// Versions of its simulator and of its scoring, oldest first: at least one. New evaluations have the last one.
+    pub rulesets: Vec<RulesetInfo>,
     /// Are there clips of its episodes, so that they can be replayed?
     pub has_replays: bool,
     /// Are there games of two agents, so that tournaments are possible?
@@ -43,6 +45,14 @@ pub struct Competition {
     pub counting_profile: Profile,
     /// Magnitudes of the perturbations, group by group, in the order of files.
     pub magnitudes: Vec<MagnitudeInfo>,
+}
+
+/// A version of a competition's simulator and of its scoring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RulesetInfo {
+    pub ruleset: Ruleset,
+    /// The largest magnitude of a number in a recorded action.
+    pub action_limit: f64,
 }
 
 /// A task of a competition.
@@ -116,6 +126,7 @@ impl Competition {
             true => Ok(()),
             false => Err(problem.to_owned()),
         };
+        require(!self.rulesets.is_empty(), "it has no ruleset")?;
         require(!self.tasks.is_empty(), "it has no tasks")?;
         let layouts = self.actions.layouts.len();
         require(layouts > 0, "it has no layout of actions")?;
@@ -171,6 +182,26 @@ impl Competition {
             add(profile.as_str());
         }
         hasher.finalize().to_string()
+    }
+
+    /// The ruleset of new evaluations.
+    ///
+    /// # Panics
+    /// If the competition has no ruleset, which [`check`](Self::check) refuses.
+    #[must_use]
+    pub fn ruleset(&self) -> Ruleset {
+        let newest = self.rulesets.last();
+        newest.expect("a competition has a ruleset").ruleset
+    }
+
+    /// A ruleset of this competition from its name.
+    ///
+    /// # Errors
+    /// If the competition has no such ruleset.
+    pub fn find_ruleset(&self, name: &str) -> Result<&RulesetInfo, UnknownRuleset> {
+        let known = || self.rulesets.iter();
+        let found = known().find(|info| info.ruleset.as_str() == name);
+        found.ok_or_else(|| UnknownRuleset::new(name, known().map(|info| info.ruleset)))
     }
 
     /// The tasks in the order of boards.
@@ -317,6 +348,12 @@ impl Competition {
         Ok(())
     }
 
+    /// The rules of a tournament unless organisers choose others.
+    #[must_use]
+    pub fn tournament_rules(&self) -> TournamentRules {
+        TournamentRules::new(self.ruleset(), self.counting_profile)
+    }
+
     /// Checks that games are possible under these rules, and completes their magnitudes.
     ///
     /// # Errors
@@ -407,7 +444,6 @@ impl ViolationInfo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ruleset;
 
     const PLAIN: Profile = Profile::new("plain");
 
@@ -417,6 +453,10 @@ mod tests {
             title: "Points".to_owned(),
             short_title: "Points".to_owned(),
             subject: "points".to_owned(),
+            rulesets: vec![RulesetInfo {
+                ruleset: Ruleset::new("points-1"),
+                action_limit: 1.0,
+            }],
             has_replays: false,
             has_games: false,
             tasks: vec![TaskInfo {
@@ -453,7 +493,7 @@ mod tests {
         let parsed = |text: &str| text.parse().unwrap();
         let mut rules = StageRules {
             runtimes: None,
-            ruleset: Ruleset::CURRENT,
+            ruleset: Ruleset::new("points-1"),
             profile: PLAIN,
             tasks: vec![Task::new("reach")],
             episodes_per_task: 1,
@@ -494,6 +534,25 @@ mod tests {
         assert_eq!(competition.tier_bounds(&other), other.tier_bounds);
         let unchanged = competition.tier_bounds(&Variation::default());
         assert_eq!(unchanged, competition.tiers);
+    }
+
+    #[test]
+    fn unknown_ruleset_error_lists_all_known_names() {
+        let mut competition = competition(None);
+        competition.rulesets.push(RulesetInfo {
+            ruleset: Ruleset::new("points-1.1"),
+            action_limit: 2.0,
+        });
+        assert_eq!(competition.ruleset().as_str(), "points-1.1");
+        let first = competition.find_ruleset("points-1").unwrap();
+        assert_eq!(first.action_limit, 1.0);
+        assert_eq!(
+            competition
+                .find_ruleset("points-2")
+                .unwrap_err()
+                .to_string(),
+            "unknown ruleset \"points-2\": this version knows points-1, points-1.1"
+        );
     }
 
     #[test]

@@ -5,6 +5,16 @@ use crate::{AgentFault, ComputationTime, Side, Violations};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
+/// Control steps of a window, the equivalent of an episode in games: each violation counts at most once per window
+/// (paper §2.2).
+pub const WINDOW_STEPS: u32 = 500;
+
+/// Windows of a game: 45,000 control steps, 15 minutes (paper §2.2).
+pub const GAME_WINDOWS: u32 = 90;
+
+/// Number of fouls of a robot that give its opponent one point (reference implementation).
+pub const FOULS_PER_POINT: u32 = 3;
+
 /// The outcome of a game. In pairs, the first side comes first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameOutcome {

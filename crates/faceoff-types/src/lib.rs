@@ -64,14 +64,17 @@ pub use agent_task::{AgentTask, Side};
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
 pub use clock::Clock;
-pub use competition::{Competition, EndInfo, ProfileInfo, TaskInfo, ViolationInfo};
+pub use competition::{Competition, EndInfo, ProfileInfo, RulesetInfo, TaskInfo, ViolationInfo};
 pub use computation_time::ComputationTime;
 pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};
 pub use departure_kind::DepartureKind;
 pub use deprecated_names::DeprecatedNames;
 pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::is_full_disk;
-pub use game::{ForfeitCause, GameEnd, GameFault, GameOutcome, GameWindow, SideOutcome};
+pub use game::{
+    FOULS_PER_POINT, ForfeitCause, GAME_WINDOWS, GameEnd, GameFault, GameOutcome, GameWindow,
+    SideOutcome, WINDOW_STEPS,
+};
 pub use game_limits::GameLimits;
 pub use game_seed_label::{GameSeedLabel, ParseGameSeedLabelError};
 pub use ids::{
@@ -92,9 +95,7 @@ pub use recording::{RecordingColumn, RecordingColumns};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult};
 pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
 pub use round_number::{InvalidRoundNumber, RoundNumber};
-pub use ruleset::{
-    ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
-};
+pub use ruleset::{ACTION_LIMIT, Ruleset, UnknownRuleset};
 pub use runtime_inventory::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
 pub use runtimes::{IMAGE_RUNTIME, InvalidRuntimes, RuntimeRefused, Runtimes, StageRuntimes};
 pub use schedule::{InvalidSchedule, Schedule};

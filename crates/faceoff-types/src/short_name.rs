@@ -5,7 +5,7 @@ use std::fmt;
 /// Maximum length of a short name.
 pub(crate) const MAX_LEN: usize = 24;
 
-/// 1 to 24 of a-z, 0-9, `_` and `-`, with a letter first.
+/// 1 to 24 of a-z, 0-9, `_`, `-` and in some types `.`, with a letter first.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ShortName {
     /// ASCII, filled up with zeros.
@@ -14,7 +14,7 @@ pub(crate) struct ShortName {
 
 impl ShortName {
     /// `None` if the text is no short name.
-    pub(crate) const fn from_text(text: &str) -> Option<Self> {
+    pub(crate) const fn from_text(text: &str, with_dots: bool) -> Option<Self> {
         let text = text.as_bytes();
         if text.is_empty() || text.len() > MAX_LEN || !text[0].is_ascii_lowercase() {
             return None;
@@ -23,7 +23,8 @@ impl ShortName {
         let mut index = 0;
         while index < text.len() {
             let byte = text[index];
-            if !matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-') {
+            let is_plain = matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-');
+            if !is_plain && !(with_dots && byte == b'.') {
                 return None;
             }
             bytes[index] = byte;
@@ -48,16 +49,24 @@ impl fmt::Debug for ShortName {
 /// Text that is not the name of such a thing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{text:?} is not the name of {kind}: expected 1 to {MAX_LEN} of a-z, 0-9, _ and -, with a letter first"
+    "{text:?} is not the name of {kind}: expected 1 to {MAX_LEN} of {}, with a letter first",
+    if *with_dots { "a-z, 0-9, _, - and ." } else { "a-z, 0-9, _ and -" }
 )]
 pub struct InvalidShortName {
     pub(crate) text: String,
     pub(crate) kind: &'static str,
+    pub(crate) with_dots: bool,
 }
 
-/// A type of short names; `kind` is its description with an article.
+/// A type of short names; `kind` is its description with an article. `with_dots`: its names may have dots.
 macro_rules! short_name {
     ($(#[$doc:meta])* $name:ident, $kind:literal) => {
+        $crate::short_name::short_name!(@ false, $(#[$doc])* $name, $kind);
+    };
+    ($(#[$doc:meta])* $name:ident, $kind:literal, with_dots) => {
+        $crate::short_name::short_name!(@ true, $(#[$doc])* $name, $kind);
+    };
+    (@ $with_dots:literal, $(#[$doc:meta])* $name:ident, $kind:literal) => {
         $(#[$doc])*
         #[derive(Clone, Copy, PartialEq, Eq, Hash)]
         pub struct $name($crate::short_name::ShortName);
@@ -66,10 +75,10 @@ macro_rules! short_name {
             /// From a text in the code; others are parsed.
             ///
             /// # Panics
-            /// If the text is not 1 to 24 of a-z, 0-9, `_` and `-`, with a letter first.
+            /// If the text is not such a name.
             #[must_use]
             pub const fn new(name: &str) -> Self {
-                match $crate::short_name::ShortName::from_text(name) {
+                match $crate::short_name::ShortName::from_text(name, $with_dots) {
                     Some(name) => Self(name),
                     None => panic!("not a short name"),
                 }
@@ -97,10 +106,11 @@ macro_rules! short_name {
         impl std::str::FromStr for $name {
             type Err = $crate::InvalidShortName;
             fn from_str(text: &str) -> Result<Self, Self::Err> {
-                let name = $crate::short_name::ShortName::from_text(text);
+                let name = $crate::short_name::ShortName::from_text(text, $with_dots);
                 name.map(Self).ok_or_else(|| $crate::InvalidShortName {
                     text: text.to_owned(),
                     kind: $kind,
+                    with_dots: $with_dots,
                 })
             }
         }
@@ -147,7 +157,7 @@ pub(crate) use short_name;
 #[cfg(test)]
 mod tests {
     use super::MAX_LEN;
-    use crate::Task;
+    use crate::{Ruleset, Task};
 
     #[test]
     fn names_are_short_and_plain() {
@@ -159,8 +169,11 @@ mod tests {
             assert_eq!(json, format!("{name:?}"));
             assert_eq!(serde_json::from_str::<Task>(&json).unwrap(), task);
         }
+        assert_eq!("a-1.2".parse::<Ruleset>().unwrap().as_str(), "a-1.2");
+        let error = "A".parse::<Ruleset>().unwrap_err().to_string();
+        assert!(error.contains("a-z, 0-9, _, - and ."), "{error}");
         let too_long = "a".repeat(MAX_LEN + 1);
-        for name in ["", "2d", "Hit", "a b", "a/b", "ü", "a\0", &too_long] {
+        for name in ["", "2d", "Hit", "a b", "a/b", "a.b", "ü", "a\0", &too_long] {
             let error = name.parse::<Task>().unwrap_err().to_string();
             assert!(
                 error.contains("is not the name of a task: expected 1 to 24"),

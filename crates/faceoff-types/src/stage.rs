@@ -95,7 +95,7 @@ mod tests {
         let [hit, defend] = ["hit", "defend"].map(Task::new);
         let rules = |tasks: &[Task], episodes_per_task| StageRules {
             runtimes: None,
-            ruleset: Ruleset::CURRENT,
+            ruleset: Ruleset::new("airhockey-2023.3"),
             profile: Profile::new("evaluation"),
             tasks: tasks.to_vec(),
             episodes_per_task,

@@ -16,29 +16,33 @@ pub const MAX_FREE_GAMES: u32 = 1000;
 /// The rules on which the results of a tournament depend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct TournamentRules {
     /// Version of the simulator and of the scoring.
     #[cfg_attr(feature = "openapi", schema(value_type = String, example = "airhockey-2023.3"))]
     pub ruleset: Ruleset,
     /// Format, which decides the pairings.
+    #[serde(default)]
     pub format: TournamentFormat,
     /// Control steps per game; its last window (penalty points are counted per window of 500 steps) may be shorter.
+    #[serde(default = "default_steps")]
     pub steps: u32,
     /// Perturbation profile.
     pub profile: Profile,
     /// Does each pairing consist of two games with the same seed and swapped sides?
+    #[serde(default)]
     pub mirrored: bool,
     /// Limits of each side, in addition to those of single answers.
+    #[serde(default)]
     pub game_limits: GameLimits,
     /// Magnitudes of the profile's perturbations; absent: the ruleset's.
-    #[serde(skip_serializing_if = "Magnitudes::is_empty")]
+    #[serde(default, skip_serializing_if = "Magnitudes::is_empty")]
     pub perturbations: Magnitudes,
     /// Limits of agents that differ from the server's configuration; absent if none do.
-    #[serde(skip_serializing_if = "StageLimits::is_none")]
+    #[serde(default, skip_serializing_if = "StageLimits::is_none")]
     pub limits: Box<StageLimits>,
     /// Runtimes that agents may use; absent: all that the server offers.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runtimes: Option<Runtimes>,
 }
 
@@ -85,13 +89,19 @@ pub enum InvalidTournament {
     FreeGames(u32),
 }
 
-impl Default for TournamentRules {
-    fn default() -> Self {
+const fn default_steps() -> u32 {
+    GAME_WINDOWS * WINDOW_STEPS
+}
+
+impl TournamentRules {
+    /// The rules of the original challenge, with a ruleset and a profile of the competition.
+    #[must_use]
+    pub fn new(ruleset: Ruleset, profile: Profile) -> Self {
         Self {
-            ruleset: Ruleset::CURRENT,
+            ruleset,
             format: TournamentFormat::default(),
-            steps: GAME_WINDOWS * WINDOW_STEPS,
-            profile: Profile::new("evaluation"),
+            steps: default_steps(),
+            profile,
             mirrored: false,
             game_limits: GameLimits::default(),
             perturbations: Magnitudes::default(),
@@ -99,9 +109,7 @@ impl Default for TournamentRules {
             runtimes: None,
         }
     }
-}
 
-impl TournamentRules {
     /// Checks that games are possible under these rules.
     ///
     /// # Errors
@@ -172,14 +180,20 @@ impl TournamentSettings {
 mod tests {
     use super::*;
 
-    fn rules(json: &str) -> TournamentRules {
-        serde_json::from_str(json).unwrap()
+    /// The rules of the challenge with these changes.
+    fn rules(json: &str) -> Result<TournamentRules, serde_json::Error> {
+        let mut fields: serde_json::Map<String, serde_json::Value> = serde_json::from_str(json)?;
+        fields.insert("ruleset".to_owned(), "airhockey-2023.3".into());
+        fields.insert("profile".to_owned(), "evaluation".into());
+        serde_json::from_value(fields.into())
     }
 
     #[test]
     fn rules_default_to_the_challenge() {
-        let rules = rules("{}");
-        assert_eq!(rules, TournamentRules::default());
+        let rules = rules("{}").unwrap();
+        let new = TournamentRules::new(rules.ruleset, rules.profile);
+        assert_eq!(rules, new);
+
         assert_eq!(rules.format.last_round().get(), 2);
         assert_eq!(rules.steps, 45_000);
         assert_eq!(rules.check(), Ok(()));
@@ -210,7 +224,7 @@ mod tests {
             ),
             (r#"{"limits":{"pids":1}}"#, "limits.pids"),
         ] {
-            let error = rules(json).check().unwrap_err().to_string();
+            let error = rules(json).unwrap().check().unwrap_err().to_string();
             assert!(error.contains(words), "{json}: {error}");
         }
         for json in [
@@ -219,10 +233,7 @@ mod tests {
             r#"{"format":{"kind":"swiss","rounds":0}}"#,
             r#"{"format":{"kind":"swiss","rounds":3,"groups":1}}"#,
         ] {
-            assert!(
-                serde_json::from_str::<TournamentRules>(json).is_err(),
-                "{json}"
-            );
+            assert!(rules(json).is_err(), "{json}");
         }
         let many = TournamentSettings {
             free_games_per_day: MAX_FREE_GAMES + 1,

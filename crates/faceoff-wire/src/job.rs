@@ -215,7 +215,7 @@ const fn first_tiers() -> Option<TierBounds> {
 }
 
 const fn first_ruleset() -> Ruleset {
-    Ruleset::First
+    Ruleset::new("airhockey-2023.1")
 }
 
 /// The result of a completed job. After a platform fault there is no report: the job goes back to the queue.

@@ -134,13 +134,14 @@ async fn create_ablations(
         ..stage.plan()
     };
     let profiles: Vec<Profile> = competition.ablation_profiles().collect();
+    let ruleset = competition.ruleset();
     for evaluation in started {
         let submission = evaluation.submission;
         let created = match store.newest_ablation(submission).await {
             Ok(Some(_)) => continue,
             Ok(None) => {
                 store
-                    .request_ablation(Actor::Schedule, submission, &plan, &profiles, now)
+                    .request_ablation(Actor::Schedule, submission, ruleset, &plan, &profiles, now)
                     .await
             }
             Err(error) => Err(error),

@@ -11,8 +11,8 @@ use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLi
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
-    CountingResult, DayDeadline, InvalidSchedule, Magnitudes, Profile, Publication, Ruleset,
-    Schedule, StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation, Zone,
+    CountingResult, DayDeadline, InvalidSchedule, Magnitudes, Profile, Publication, Schedule,
+    StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation, Zone,
 };
 use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
@@ -367,7 +367,7 @@ impl Config {
         let evaluation = &self.evaluation;
         let mut rules = StageRules {
             runtimes: None,
-            ruleset: Ruleset::CURRENT,
+            ruleset: competition().ruleset(),
             profile: evaluation.profile,
             tasks: evaluation.tasks.clone(),
             episodes_per_task: evaluation.episodes_per_task,

@@ -9,8 +9,7 @@ use faceoff_episode::{
 use faceoff_sim::Interpolation;
 use faceoff_sim::{AirHockeyProfile, Bounds};
 use faceoff_types::{
-    ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Ruleset, Seed,
-    Task,
+    ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task,
 };
 use std::ops::Range;
 
@@ -277,7 +276,7 @@ fn divergence_is_an_agent_fault() {
     assert_eq!(running.outcome_after_recorded_fault(fault), Some(outcome));
 
     // The first ruleset had no such bounds.
-    let mut running = begin_within(Bounds::of(Ruleset::First), NullSink);
+    let mut running = begin_within(Bounds::of(faceoff_sim::AirHockeyRuleset::First), NullSink);
     for action in &played.actions {
         assert!(running.answer(action, timing).is_ok());
     }

@@ -267,8 +267,8 @@ fn replace<T: Clone>(value: &mut T, new: Option<&T>) -> bool {
 }
 
 impl StagePatch {
-    /// Changes the rules and settings of a stage and checks the result. If the patch has rules, they are rules of the
-    /// current ruleset; otherwise a stage keeps its ruleset when a newer server version brings another one.
+    /// Changes the rules and settings of a stage and checks the result. If the patch has rules, they are rules of `newest`,
+    /// the ruleset of new evaluations; otherwise a stage keeps its ruleset when a newer server version brings another one.
     ///
     /// # Errors
     /// The first value that is invalid after the change.
@@ -276,6 +276,7 @@ impl StagePatch {
         &self,
         rules: &mut StageRules,
         settings: &mut StageSettings,
+        newest: Ruleset,
     ) -> Result<(), InvalidStageRules> {
         let variation = &mut rules.variation;
         let new_rules = [
@@ -302,7 +303,7 @@ impl StagePatch {
             ),
         ];
         if new_rules.contains(&true) {
-            rules.ruleset = Ruleset::CURRENT;
+            rules.ruleset = newest;
         }
         replace(
             &mut settings.schedule,
@@ -367,10 +368,12 @@ mod tests {
         Value::Object(fields.collect())
     }
 
+    const NEWEST: Ruleset = Ruleset::new("airhockey-2023.3");
+
     #[test]
     fn patch_changes_every_rule_and_setting() {
         let rules: StageRules = serde_json::from_value(json!({
-            "ruleset": Ruleset::CURRENT,
+            "ruleset": NEWEST,
             "profile": "delay",
             "tasks": ["defend"],
             "episodes_per_task": 7,
@@ -402,7 +405,7 @@ mod tests {
         json.as_object_mut().unwrap().remove("ruleset");
         let patch: StagePatch = serde_json::from_value(json).unwrap();
         let mut changed_rules: StageRules = serde_json::from_value(json!({
-            "ruleset": Ruleset::Second,
+            "ruleset": "airhockey-2023.2",
             "profile": "evaluation",
             "tasks": ["hit"],
             "episodes_per_task": 1,
@@ -411,13 +414,14 @@ mod tests {
         .unwrap();
         let mut changed_settings = StageSettings::default();
         let unchanged = (changed_rules.clone(), changed_settings.clone());
-        let applied = StagePatch::default().apply(&mut changed_rules, &mut changed_settings);
+        let applied =
+            StagePatch::default().apply(&mut changed_rules, &mut changed_settings, NEWEST);
         assert_eq!(applied, Ok(()));
         assert_eq!(
             (&changed_rules, &changed_settings),
             (&unchanged.0, &unchanged.1)
         );
-        let applied = patch.apply(&mut changed_rules, &mut changed_settings);
+        let applied = patch.apply(&mut changed_rules, &mut changed_settings, NEWEST);
         assert_eq!(applied, Ok(()));
         assert_eq!((changed_rules, changed_settings), (rules, settings));
     }

@@ -11,7 +11,7 @@ use crate::{
     verify::{VerifyError, compare},
 };
 use faceoff_scoring::tournament::{GameScore, score_game};
-use faceoff_types::Ruleset;
+use faceoff_sim::AirHockeyRuleset;
 
 /// A game that was verified: the simulation gives the same numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,11 +62,13 @@ pub fn verify_game(
 fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
     let (manifest, current) = (recording.manifest(), game_simulator_id());
     let ruleset = manifest.spec.ruleset;
-    if !ruleset.has_games() {
-        let with_games = Ruleset::ALL
+    if !AirHockeyRuleset::find(ruleset).is_some_and(AirHockeyRuleset::has_games) {
+        let with_games = AirHockeyRuleset::ALL
             .into_iter()
             .filter(|ruleset| ruleset.has_games());
-        let names: Vec<_> = with_games.map(Ruleset::as_str).collect();
+        let names: Vec<_> = with_games
+            .map(|ruleset| ruleset.name().to_string())
+            .collect();
         return Err(DatasetError::Foreign(format!(
             "the game states {ruleset}; only {} have games",
             names.join(" and ")

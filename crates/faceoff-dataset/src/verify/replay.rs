@@ -17,13 +17,13 @@ use faceoff_episode::{
     AnswerTiming, Environment, EpisodeStart, RecordError, RunningEpisode, StepRow, StepSink,
 };
 use faceoff_types::{
-    ACTION_LIMIT, ActionLayout, ActionSpace, AgentFault, Competition, EpisodeOutcome, Ruleset,
+    ActionLayout, ActionSpace, AgentFault, Competition, EpisodeOutcome, RulesetInfo,
 };
 use std::sync::Arc;
 
 /// Simulates the episodes of an evaluation again.
 pub(super) struct Replayer {
-    ruleset: Ruleset,
+    ruleset: RulesetInfo,
     environment: Box<dyn Environment>,
     competition: Arc<Competition>,
 }
@@ -40,7 +40,7 @@ pub(super) struct ReplayedEpisode {
 /// Replay of one episode with its recorded answers.
 struct EpisodeReplay<'a> {
     recorded: &'a RecordedEpisode,
-    ruleset: Ruleset,
+    ruleset: RulesetInfo,
     /// The layout of the agent's actions; `None` if it failed before it stated one, so that it has no steps.
     layout: Option<ActionLayout>,
     running: RunningEpisode<ReplayRows>,
@@ -88,7 +88,7 @@ struct RecordedInputs {
 
 impl Replayer {
     pub fn new(
-        ruleset: Ruleset,
+        ruleset: RulesetInfo,
         environment: Box<dyn Environment>,
         competition: &Arc<Competition>,
     ) -> Self {
@@ -188,11 +188,11 @@ impl EpisodeReplay<'_> {
     ) -> Result<Float64Array, Difference> {
         let actions: &ListArray = batch["action"].as_list();
         let wrong = |recorded: String| {
-            let expected = match self.ruleset {
-                Ruleset::First => format!("{} finite numbers", len),
-                Ruleset::Second | Ruleset::Third => {
-                    format!("{} numbers of at most {ACTION_LIMIT} in magnitude", len)
-                }
+            let limit = self.ruleset.action_limit;
+            let expected = if limit == f64::MAX {
+                format!("{len} finite numbers")
+            } else {
+                format!("{len} numbers of at most {limit} in magnitude")
             };
             self.step_difference(step, "action", recorded, expected)
         };
@@ -207,7 +207,7 @@ impl EpisodeReplay<'_> {
                 action.len() - action.null_count()
             )));
         }
-        let limit = self.ruleset.action_limit();
+        let limit = self.ruleset.action_limit;
         let allowed = |number: &&f64| number.abs() <= limit;
         match action.values().iter().find(|number| !allowed(number)) {
             Some(number) => Err(wrong(format!("{number:?}"))),

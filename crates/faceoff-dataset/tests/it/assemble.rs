@@ -5,7 +5,7 @@ use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
 use faceoff_airhockey::{EE, HIT, JOINT_POS, JOINT_VEL, LINK, PREPARE};
 use faceoff_dataset::RecordingError;
 use faceoff_scoring::StepTimes;
-use faceoff_types::{EpisodeOutcome, EvaluationResult, Ruleset, SlotTiming, TaskMap};
+use faceoff_types::{EpisodeOutcome, EvaluationResult, SlotTiming, TaskMap};
 use faceoff_wire::dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, ViolationsFile};
 use std::{
     fs::{self, File},
@@ -233,7 +233,7 @@ fn missing_repeated_and_foreign_shards_are_refused() {
     evaluation.shards = Vec::new();
     assert_refused(&evaluation, "an evaluation without shards");
     evaluation.shards = all_shards;
-    evaluation.meta.ruleset = Ruleset::First;
+    evaluation.meta.ruleset = faceoff_airhockey::RULESETS[0];
     assert_refused(
         &evaluation,
         "was played by airhockey-2023.3, the evaluation by airhockey-2023.1",

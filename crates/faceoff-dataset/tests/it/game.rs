@@ -14,7 +14,7 @@ use faceoff_dataset::{
 use faceoff_episode::AnswerTiming;
 use faceoff_replay::{CHUNK_STEPS, Clip, ClipKey, Pack};
 use faceoff_sim::Interpolation;
-use faceoff_types::{AgentFaultKind, GameLimits, Ruleset, Seed, Side, SlotTiming};
+use faceoff_types::{AgentFaultKind, GameLimits, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{
     fs::{self, File},
@@ -29,7 +29,7 @@ const STEPS: u32 = 1600;
 fn spec() -> GameSpec {
     let seed = Seed::from_number(11);
     GameSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         steps: STEPS,
         profile: EVALUATION,
         seed,

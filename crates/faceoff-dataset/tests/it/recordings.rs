@@ -9,8 +9,8 @@ use faceoff_dataset::{
 use faceoff_episode::{AnswerTiming, EpisodeStart, Simulator, StepRow, StepSink, World};
 use faceoff_sim::{EPISODE_STEPS, Interpolation};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, RoundTrips, Ruleset,
-    Seed, SlotTiming, Task, Variation,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, RoundTrips, Seed,
+    SlotTiming, Task, Variation,
 };
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -50,7 +50,7 @@ pub fn swing_arm(question: &Question) -> Option<[[f64; 7]; 2]> {
 pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
     let seed = Seed::from_number(7);
     ShardSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         platform_retries: 0,
         task,
         episodes,
@@ -243,7 +243,7 @@ impl Evaluation {
                 seed: spec.seed,
                 mismatch_seed: spec.mismatch_seed,
                 agent: "test".into(),
-                ruleset: Ruleset::CURRENT,
+                ruleset: faceoff_airhockey::RULESET,
                 task_weights: faceoff_airhockey::competition().weights(&variation),
                 tiers: faceoff_airhockey::competition().tiers,
                 variation,

@@ -818,7 +818,7 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
         })
         .collect();
     EvaluationResult {
-        ruleset: RULESET.into(),
+        ruleset: faceoff_airhockey::RULESET.to_string(),
         profile: EVALUATION,
         seed: Seed::from_number(7),
         tasks,

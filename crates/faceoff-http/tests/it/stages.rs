@@ -2,7 +2,6 @@
 
 use crate::site::{ADMIN, Answer, Site, result};
 use faceoff_testkit::change_rules;
-use faceoff_types::Ruleset;
 use serde_json::{Value, json};
 
 async fn create_stage(site: &Site, body: Value) -> Answer {
@@ -167,7 +166,7 @@ async fn stage_keeps_its_ruleset_until_its_rules_change() {
     let site = Site::start().await;
     // The change stores the stage as a server with the previous ruleset would have stored it.
     change_rules(&site.store, site.stage().await, site.now(), |rules| {
-        rules.ruleset = Ruleset::Second;
+        rules.ruleset = faceoff_airhockey::RULESETS[1];
     })
     .await
     .unwrap();

@@ -10,7 +10,7 @@ use faceoff_dataset::{
     Dataset, assemble,
     verify::{VerifiedDataset, verify},
 };
-use faceoff_types::{AgentFaultKind, Ruleset, Task, ViolationName};
+use faceoff_types::{AgentFaultKind, Task, ViolationName};
 use faceoff_wire::job::EvaluationMeta;
 use std::{
     fs::File,
@@ -104,7 +104,7 @@ fn meta() -> EvaluationMeta {
         seed: spec.seed,
         mismatch_seed: spec.mismatch_seed,
         agent: "test".into(),
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         variation: Default::default(),
         task_weights: faceoff_airhockey::competition().weights(&Default::default()),
         tiers: faceoff_airhockey::competition().tiers,

@@ -7,8 +7,8 @@ use faceoff_runner::{
     AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, run_game,
 };
 use faceoff_types::{
-    AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Ruleset, Seed, Side,
-    SideOutcome, ViolationName,
+    AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Seed, Side, SideOutcome,
+    ViolationName,
 };
 use std::{cell::Cell, fs, path::Path};
 
@@ -16,7 +16,7 @@ use std::{cell::Cell, fs, path::Path};
 pub fn spec(steps: u32) -> GameSpec {
     let seed = Seed::from_number(7);
     GameSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         steps,
         profile: EVALUATION,
         seed,

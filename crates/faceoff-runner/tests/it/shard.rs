@@ -5,7 +5,7 @@ use faceoff_airhockey::{DEFEND, EVALUATION, HIT, PREPARE};
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
 };
-use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Ruleset, Seed, Task};
+use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Seed, Task};
 use std::{ops::Range, path::Path};
 
 /// Records the events of a shard, and stops it after a number of episodes.
@@ -37,7 +37,7 @@ impl Observer for RecordingObserver {
 pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
     let seed = Seed::from_number(7);
     ShardSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         platform_retries: 0,
         task,
         episodes,

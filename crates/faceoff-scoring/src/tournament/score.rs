@@ -299,7 +299,7 @@ mod tests {
     fn scored(end: GameEnd, sides: [SideOutcome; 2]) -> GameScore {
         let seed = Seed::from_number(1);
         let settings = GameSettings {
-            ruleset: Ruleset::CURRENT,
+            ruleset: faceoff_airhockey::RULESET,
             profile: faceoff_airhockey::EVALUATION,
             perturbations: Magnitudes::default(),
             limits: GameLimits::default(),

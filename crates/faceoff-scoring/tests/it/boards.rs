@@ -5,7 +5,7 @@ use faceoff_airhockey::{DEFEND, EVALUATION, HIT};
 use faceoff_scoring::{
     BoardEntry, RankedEntry, overall_board, rank_groups, score_evaluation, task_board,
 };
-use faceoff_types::{Ruleset, Seed, TaskMap, Tier};
+use faceoff_types::{Seed, TaskMap, Tier};
 use proptest::prelude::*;
 use std::convert::Infallible;
 
@@ -13,7 +13,7 @@ use std::convert::Infallible;
 fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -> BoardEntry<K> {
     let tasks = TaskMap::from([(HIT, task_result(50, successes, penalty_points))]);
     let result = score_evaluation(
-        Ruleset::CURRENT,
+        faceoff_airhockey::RULESET,
         EVALUATION,
         Seed::from_number(0),
         &Default::default(),

@@ -6,9 +6,7 @@ use faceoff_scoring::{
     ComparedEvaluation, EpisodeSummary, NotComparable, PairedTally, PairingError, StepTimes,
     overall_p_value, overall_score, score_task,
 };
-use faceoff_types::{
-    EpisodeOutcome, Magnitude, RULESET, Seed, Task, TaskMap, TaskWeights, Variation,
-};
+use faceoff_types::{EpisodeOutcome, Magnitude, Seed, Task, TaskMap, TaskWeights, Variation};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -38,7 +36,7 @@ fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
 
 fn evaluation(summary: &EpisodeSummary) -> ComparedEvaluation<'_> {
     ComparedEvaluation {
-        ruleset: RULESET,
+        ruleset: "airhockey-2023.3",
         profile: EVALUATION,
         variation: &NO_VARIATION,
         weights: &WEIGHTS,

@@ -6,8 +6,7 @@ use faceoff_airhockey::{
 };
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Ruleset, Seed, TaskMap, Tier,
-    ViolationName,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Seed, TaskMap, Tier, ViolationName,
 };
 
 #[test]
@@ -129,7 +128,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
         (PREPARE, task_result(50, 5, 0.0)),
     ]);
     let result = score_evaluation(
-        Ruleset::CURRENT,
+        faceoff_airhockey::RULESET,
         EVALUATION,
         seed,
         &Default::default(),
@@ -148,7 +147,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     let mut hit_alone = tasks;
     hit_alone.retain(|task, _| *task == HIT);
     let result = score_evaluation(
-        Ruleset::CURRENT,
+        faceoff_airhockey::RULESET,
         IDEAL,
         seed,
         &Default::default(),
@@ -158,7 +157,7 @@ fn evaluation_has_worst_tier_and_weighted_score() {
     );
     assert_eq!((result.score, result.tier), (20.0, Some(Tier::Deployable)));
     let empty = score_evaluation(
-        Ruleset::CURRENT,
+        faceoff_airhockey::RULESET,
         IDEAL,
         seed,
         &Default::default(),
@@ -180,7 +179,7 @@ fn result_without_tiers_has_no_field_for_them() {
     );
     assert_eq!(task.tier, None);
     let result = score_evaluation(
-        Ruleset::CURRENT,
+        faceoff_airhockey::RULESET,
         EVALUATION,
         Seed::from_number(1),
         &Default::default(),
@@ -199,7 +198,7 @@ fn result_without_tiers_has_no_field_for_them() {
 fn results_round_trip_as_json() {
     let tasks = TaskMap::from([(HIT, task_result(30, 7, 12.5))]);
     let result = score_evaluation(
-        Ruleset::CURRENT,
+        faceoff_airhockey::RULESET,
         EVALUATION,
         Seed::from_number(1),
         &Default::default(),

@@ -3,7 +3,7 @@
 use crate::support::{bounds, read, rows, task_result, weights};
 use faceoff_airhockey::{DEFEND, EVALUATION, HIT, TASKS};
 use faceoff_scoring::{BoardEntry, QualifyingScores, overall_board, score_evaluation, task_board};
-use faceoff_types::{Ruleset, Seed, Task};
+use faceoff_types::{Seed, Task};
 use serde_json::{Map, Value, json};
 
 /// The tables of the paper.
@@ -139,7 +139,7 @@ fn boards_of_evaluations_equal_appendix_tables() {
             BoardEntry {
                 key: row["team"].as_str().unwrap(),
                 result: score_evaluation(
-                    Ruleset::CURRENT,
+                    faceoff_airhockey::RULESET,
                     EVALUATION,
                     Seed::from_number(0),
                     &Default::default(),

@@ -5,8 +5,8 @@ use crate::{app::AppState, boxed, problem::Problem, views::stage};
 use faceoff_api::requests::{NewStage, OrNull, StagePatch};
 use faceoff_store::{Actor, Stage, StagePhase};
 use faceoff_types::{
-    CountingResult, InvalidStageRules, Magnitudes, Retention, Ruleset, Runtimes, StageId,
-    StageName, StageSettings,
+    CountingResult, InvalidStageRules, Magnitudes, Retention, Runtimes, StageId, StageName,
+    StageSettings,
 };
 use std::sync::Arc;
 
@@ -73,14 +73,18 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
     } = new;
     check_offered(app, requested_runtimes(&patch))?;
     let mut rules = template.rules.rules;
-    rules.ruleset = Ruleset::CURRENT;
+    rules.ruleset = app.config.competition().ruleset();
     let mut settings = StageSettings {
         episodes_per_shard: template.settings.episodes_per_shard,
         uploads: template.settings.uploads,
         ..StageSettings::default()
     };
     patch
-        .apply(&mut rules, &mut settings)
+        .apply(
+            &mut rules,
+            &mut settings,
+            app.config.competition().ruleset(),
+        )
         .and_then(|()| app.config.competition().check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(patch.retention)?.unwrap_or_default();
@@ -117,7 +121,11 @@ pub async fn change_stage(
     let mut rules = current_rules.clone();
     let mut settings = stage.settings.clone();
     change
-        .apply(&mut rules, &mut settings)
+        .apply(
+            &mut rules,
+            &mut settings,
+            app.config.competition().ruleset(),
+        )
         .and_then(|()| app.config.competition().check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(change.retention)?;

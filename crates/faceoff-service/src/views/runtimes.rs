@@ -6,7 +6,7 @@ use faceoff_api::views::{
     runtimes::{Absent, RuntimesView, StageResources, TournamentResources},
     stage::PhaseView,
 };
-use faceoff_types::{RULESET, RuntimeContent, RuntimeInventory, Runtimes};
+use faceoff_types::{RuntimeContent, RuntimeInventory, Runtimes};
 
 /// The current runtimes and limits.
 #[boxed]
@@ -42,7 +42,7 @@ pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
     let tournaments = app.store.tournaments().await?.into_iter();
     let tournaments = tournaments.filter(|tournament| tournament.closed_at.is_none());
     Ok(RuntimesView {
-        ruleset: RULESET.to_owned(),
+        ruleset: app.config.competition().ruleset().to_string(),
         machine: resources.machine.clone(),
         gpu: Absent::None,
         network: Absent::None,

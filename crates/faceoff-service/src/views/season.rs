@@ -12,7 +12,7 @@ use faceoff_api::views::{
     ruling::RulingView,
     season::{SeasonDay, SeasonView},
 };
-use faceoff_types::{RULESET, Seed, StageDay};
+use faceoff_types::{Seed, StageDay};
 use std::{collections::HashMap, sync::atomic::Ordering};
 
 /// The season, as the viewer may see it.
@@ -31,7 +31,7 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
         .await?;
     let reveal_if_closed = |seed: Seed| season.closed_at.map(|_| seed);
     Ok(SeasonView {
-        ruleset: RULESET.to_owned(),
+        ruleset: app.config.competition().ruleset().to_string(),
         created_at: season.created_at,
         closed_at: season.closed_at,
         paused: season.paused.map(ruling::view),

@@ -6,6 +6,7 @@ mod state;
 
 pub use state::GameState;
 
+use crate::{AirHockeyRuleset, Interpolation, PerturbationSettings};
 use crate::{
     Factors,
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
@@ -18,8 +19,7 @@ use crate::{
     stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
 };
-use crate::{Interpolation, PerturbationSettings};
-use faceoff_types::{Ruleset, Seed, WINDOW_STEPS};
+use faceoff_types::{Seed, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// Settings of a game.
@@ -85,7 +85,7 @@ impl Game {
     #[must_use]
     pub fn new(setup: GameSetup) -> Self {
         let serving_robot = usize::from(RandomStream::new(&setup.seed, "first_side").unit() < 0.5);
-        let bounds = Bounds::of(Ruleset::CURRENT);
+        let bounds = Bounds::of(AirHockeyRuleset::CURRENT);
         let rally = Rally::new(&setup, bounds, 0, serving_robot);
         Self {
             setup,

@@ -3,11 +3,11 @@
 
 use super::{arm::Arm, arm_lanes::MotionLanes};
 use crate::{
+    AirHockeyRuleset,
     dynamics::lanes::Lanes,
     model::{DOFS, JOINTS, LINKS},
     table::puck::Puck,
 };
-use faceoff_types::Ruleset;
 use std::{f64::consts::FRAC_PI_2, fmt};
 
 /// The bounds of the simulation, far beyond ordinary motion of robot and puck. A world that would leave them stops
@@ -47,10 +47,10 @@ impl Bounds {
 
     /// The bounds of a ruleset.
     #[must_use]
-    pub const fn of(ruleset: Ruleset) -> Self {
+    pub const fn of(ruleset: AirHockeyRuleset) -> Self {
         match ruleset {
-            Ruleset::First => Self::FINITE,
-            Ruleset::Second | Ruleset::Third => Self::WIDE,
+            AirHockeyRuleset::First => Self::FINITE,
+            AirHockeyRuleset::Second | AirHockeyRuleset::Third => Self::WIDE,
         }
     }
 

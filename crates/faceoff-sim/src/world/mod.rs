@@ -20,7 +20,7 @@ mod solver;
 mod substep;
 mod time_step;
 
-use crate::Interpolation;
+use crate::{AirHockeyRuleset, Interpolation};
 use crate::{
     dynamics::arm::Kinematics,
     model::{DOFS, INITIAL_Q, JOINTS},
@@ -33,7 +33,6 @@ use crate::{
 };
 use arm::Arm;
 pub use bounds::{Bounds, Divergence, Runaway};
-use faceoff_types::Ruleset;
 pub use impacts::{ContactBody, Impact, Impacts};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
@@ -82,7 +81,7 @@ impl World {
             imposed_mallet: None,
             air_n: [0.0; 2],
             substep: 0,
-            bounds: Bounds::of(Ruleset::CURRENT),
+            bounds: Bounds::of(AirHockeyRuleset::CURRENT),
             runaway_robots: None,
             last_contact_robots: [false; 2],
             divergence: None,

@@ -28,6 +28,7 @@ impl Store {
         &self,
         actor: Actor,
         submission: SubmissionId,
+        ruleset: Ruleset,
         plan: &RunPlan,
         profiles: &[Profile],
         now: Timestamp,
@@ -47,7 +48,7 @@ impl Store {
             for profile in profiles.iter().copied() {
                 let run = Run {
                     id: RunId::new(),
-                    ruleset: Ruleset::CURRENT,
+                    ruleset,
                     plan: RunPlan {
                         profile,
                         ..plan.clone()

@@ -346,7 +346,7 @@ fn name_error(name: &StageName) -> impl FnOnce(sqlx::Error) -> StoreError {
 mod tests {
     use super::*;
     use faceoff_airhockey::TASKS;
-    use faceoff_types::{Ruleset, Schedule};
+    use faceoff_types::Schedule;
     use jiff::civil::date;
 
     fn time(text: &str) -> Timestamp {
@@ -370,7 +370,7 @@ mod tests {
                 since: time("2026-03-02T10:00:00Z"),
                 rules: StageRules {
                     runtimes: None,
-                    ruleset: Ruleset::CURRENT,
+                    ruleset: faceoff_airhockey::RULESET,
                     profile: faceoff_airhockey::EVALUATION,
                     tasks: TASKS.to_vec(),
                     episodes_per_task: 1,

@@ -47,6 +47,7 @@ impl TestStore {
             .request_ablation(
                 Actor::Organiser,
                 submission,
+                faceoff_airhockey::RULESET,
                 &plan,
                 &ABLATION_PROFILES,
                 self.now,

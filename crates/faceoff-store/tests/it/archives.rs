@@ -527,7 +527,7 @@ async fn public_archive_has_only_games_that_count() {
     let tournament = NewTournament {
         name: "Cup".parse().unwrap(),
         stage: None,
-        rules: TournamentRules::default(),
+        rules: faceoff_airhockey::competition().tournament_rules(),
         settings: TournamentSettings::default(),
         entrants: teams.to_vec(),
     };

@@ -160,7 +160,7 @@ async fn filled_store() -> TestStore {
     let cup = NewTournament {
         name: "Cup".parse().unwrap(),
         stage: None,
-        rules: TournamentRules::default(),
+        rules: faceoff_airhockey::competition().tournament_rules(),
         settings: TournamentSettings::default(),
         entrants: submissions
             .iter()

@@ -359,7 +359,7 @@ pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
 /// Result of an evaluation. Its penalty points are no short decimal.
 pub fn result(score: f64) -> EvaluationResult {
     EvaluationResult {
-        ruleset: RULESET.into(),
+        ruleset: faceoff_airhockey::RULESET.to_string(),
         profile: EVALUATION,
         seed: Seed::from_number(1),
         tasks: Default::default(),

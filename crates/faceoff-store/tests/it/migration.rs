@@ -623,7 +623,10 @@ async fn migration_creates_first_stage_with_revisions() {
         .collect();
     assert_eq!(
         revisions,
-        [(1, IDEAL, Ruleset::First), (2, EVALUATION, Ruleset::First)]
+        [
+            (1, IDEAL, faceoff_airhockey::RULESETS[0]),
+            (2, EVALUATION, faceoff_airhockey::RULESETS[0])
+        ]
     );
     let revision = async |number| store.evaluation(id(number)).await.unwrap().revision;
     assert_eq!((revision(1400).await, revision(1100).await), (1, 2));

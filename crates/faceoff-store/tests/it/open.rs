@@ -162,6 +162,7 @@ async fn season_belongs_to_one_competition() {
         subject: "a subject".to_owned(),
         has_replays: false,
         has_games: false,
+        rulesets: Vec::new(),
         tasks: vec![TaskInfo {
             task: HIT,
             title: "A task".to_owned(),

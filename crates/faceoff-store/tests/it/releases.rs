@@ -259,6 +259,7 @@ async fn closed_season_refuses_all_operations() {
     let ablation = f.store.request_ablation(
         Actor::Organiser,
         submission.id,
+        faceoff_airhockey::RULESET,
         &plan,
         &ABLATION_PROFILES,
         f.now,

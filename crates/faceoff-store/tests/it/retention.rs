@@ -500,9 +500,14 @@ async fn bundle_is_removed_with_its_last_dataset_unless_active() {
         &["bundle", "was removed", "cannot be evaluated again"],
     );
     let plan = one_shard_plan();
-    let ablation =
-        f.store
-            .request_ablation(Actor::Organiser, old.id, &plan, &ABLATION_PROFILES, f.now);
+    let ablation = f.store.request_ablation(
+        Actor::Organiser,
+        old.id,
+        faceoff_airhockey::RULESET,
+        &plan,
+        &ABLATION_PROFILES,
+        f.now,
+    );
     assert_conflict(ablation.await, &["was removed"]);
     assert!(f.claim().await.is_none(), "no job is queued");
 }

@@ -61,8 +61,8 @@ async fn newest_board(f: &TestStore) -> (u32, Ruleset) {
 
 #[tokio::test]
 async fn runs_started_before_upgrade_keep_their_ruleset() {
-    for earlier in Ruleset::ALL {
-        if earlier != Ruleset::CURRENT {
+    for earlier in faceoff_airhockey::RULESETS {
+        if earlier != faceoff_airhockey::RULESET {
             upgrade_from(earlier).await;
         }
     }
@@ -73,7 +73,7 @@ async fn upgrade_from(earlier: Ruleset) {
     let mut f = TestStore::new().await;
     let [alpha, beta] = f.two_valid_submissions().await;
     f.evaluate(alpha.id, &six_shard_plan()).await;
-    assert_eq!(newest_board(&f).await, (1, Ruleset::CURRENT));
+    assert_eq!(newest_board(&f).await, (1, faceoff_airhockey::RULESET));
     set_ruleset(&f, earlier).await;
     assert_eq!(run_evaluation(&f, 10.0).await, earlier);
     assert_eq!(newest_board(&f).await, (1, earlier));
@@ -91,8 +91,8 @@ async fn upgrade_from(earlier: Ruleset) {
         earlier,
         "Beta's evaluation was queued before the upgrade"
     );
-    assert_eq!(run_evaluation(&f, 30.0).await, Ruleset::CURRENT);
-    assert_eq!(newest_board(&f).await, (2, Ruleset::CURRENT));
+    assert_eq!(run_evaluation(&f, 30.0).await, faceoff_airhockey::RULESET);
+    assert_eq!(newest_board(&f).await, (2, faceoff_airhockey::RULESET));
     assert_eq!(board_teams(&f, 1).await, ["Alpha", "Beta"]);
     assert_eq!(board_teams(&f, 2).await, ["Alpha"]);
     assert_eq!(f.board().await[0].result.score, 30.0);

@@ -416,6 +416,7 @@ async fn ablations_run_last_and_scoring_first() {
         .request_ablation(
             Actor::Organiser,
             valid_submission,
+            faceoff_airhockey::RULESET,
             &one_episode_plan,
             &ABLATION_PROFILES,
             s.f.now,

@@ -71,7 +71,12 @@ async fn one_game(f: &TestStore, rules: TournamentRules) -> (Tournament, Vec<Tea
 
 /// A tournament of three teams whose first round has started. Each of its three matchdays has one game.
 async fn three_games(f: &TestStore) -> (Tournament, [TeamId; 3]) {
-    let (cup, teams) = opened(f, &["A", "B", "C"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        f,
+        &["A", "B", "C"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let [a, b, c] = teams[..] else { panic!() };
     let round = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     start(f, cup.id, &round).await.unwrap();
@@ -117,7 +122,12 @@ async fn run_next_game(f: &TestStore) -> GameId {
 #[tokio::test]
 async fn ban_requeues_running_games_and_lists_results() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        &f,
+        &["A", "B", "C"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let pairings = [
         [teams[0], teams[1]],
         [teams[1], teams[2]],
@@ -186,7 +196,12 @@ fn departure(
 #[tokio::test]
 async fn round_starts_once_and_ends_with_its_last_game() {
     let mut f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        &f,
+        &["A", "B", "C"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let [a, b, c] = teams[..] else { panic!() };
     assert_eq!(cup.number, 1);
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
@@ -252,7 +267,7 @@ async fn mirrored_halves_share_a_seed_and_swap_sides() {
     let f = TestStore::new().await;
     let rules = TournamentRules {
         mirrored: true,
-        ..TournamentRules::default()
+        ..faceoff_airhockey::competition().tournament_rules()
     };
     let (cup, _) = one_game(&f, rules).await;
     let games = record(&f, cup.id).await.games;
@@ -270,7 +285,12 @@ async fn mirrored_halves_share_a_seed_and_swap_sides() {
 #[tokio::test]
 async fn round_needs_a_valid_submission_of_each_team() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        &f,
+        &["A", "B"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let late = f.create_team("Late").await;
     f.store
         .add_entrants(Actor::Organiser, cup.id, &[late.id], f.now)
@@ -308,7 +328,7 @@ async fn round_refuses_runtimes_that_rules_exclude() {
     let f = TestStore::new().await;
     let rules = TournamentRules {
         runtimes: Some(["python3".to_owned()].into_iter().collect()),
-        ..TournamentRules::default()
+        ..faceoff_airhockey::competition().tournament_rules()
     };
     let (cup, teams) = opened(&f, &["A", "B"], rules).await;
     assert_conflict(
@@ -320,7 +340,7 @@ async fn round_refuses_runtimes_that_rules_exclude() {
 #[tokio::test]
 async fn game_with_platform_faults_has_attempts_but_no_result() {
     let mut f = TestStore::new().await;
-    let (cup, teams) = one_game(&f, TournamentRules::default()).await;
+    let (cup, teams) = one_game(&f, faceoff_airhockey::competition().tournament_rules()).await;
     let game = record(&f, cup.id).await.games[0].id;
     // A slot that dies, one that shuts down, and platform faults until the game is given up.
     let (lost, _, _) = claim_game(&f).await;
@@ -421,7 +441,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
 #[tokio::test]
 async fn paused_tournament_starts_no_game() {
     let f = TestStore::new().await;
-    let (cup, teams) = one_game(&f, TournamentRules::default()).await;
+    let (cup, teams) = one_game(&f, faceoff_airhockey::competition().tournament_rules()).await;
     let paused = f
         .store
         .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
@@ -573,7 +593,12 @@ async fn departure_cancels_open_games() {
 #[tokio::test]
 async fn rerun_game_does_not_reopen_its_round() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        &f,
+        &["A", "B", "C"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     start(&f, cup.id, &first).await.unwrap();
@@ -616,7 +641,12 @@ async fn rerun_game_does_not_reopen_its_round() {
 #[tokio::test]
 async fn disqualification_also_applies_after_withdrawal() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        &f,
+        &["A", "B", "C"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     start(&f, cup.id, &first).await.unwrap();
@@ -683,7 +713,12 @@ async fn disqualification_also_applies_after_withdrawal() {
 #[tokio::test]
 async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     let mut f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B", "Base"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        &f,
+        &["A", "B", "Base"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let [a, b, base] = teams[..] else { panic!() };
     let out = departure(base, DepartureKind::Withdrawn, None);
     f.store
@@ -773,7 +808,7 @@ async fn schedule_replays_have_new_seeds_and_do_not_count() {
     let f = TestStore::new().await;
     let once = TournamentRules {
         format: TournamentFormat::RoundRobin { rounds: round(1) },
-        ..TournamentRules::default()
+        ..faceoff_airhockey::competition().tournament_rules()
     };
     let (cup, teams) = opened(&f, &["A", "B"], once).await;
     let replay = async |times| {
@@ -838,8 +873,8 @@ async fn schedule_replays_have_new_seeds_and_do_not_count() {
 async fn tournament_keeps_its_earlier_ruleset() {
     let f = TestStore::new().await;
     let rules = TournamentRules {
-        ruleset: Ruleset::Second,
-        ..TournamentRules::default()
+        ruleset: faceoff_airhockey::RULESETS[1],
+        ..faceoff_airhockey::competition().tournament_rules()
     };
     one_game(&f, rules).await;
     // A newer version starts.
@@ -851,17 +886,22 @@ async fn tournament_keeps_its_earlier_ruleset() {
     else {
         panic!("expected a game");
     };
-    assert_eq!(rules.ruleset, Ruleset::Second);
+    assert_eq!(rules.ruleset, faceoff_airhockey::RULESETS[1]);
 }
 
 #[tokio::test]
 async fn closed_tournament_is_final_and_frees_bundles() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
+    let (cup, teams) = opened(
+        &f,
+        &["A", "B"],
+        faceoff_airhockey::competition().tournament_rules(),
+    )
+    .await;
     let rules = TournamentChange {
         rules: Some(TournamentRules {
             steps: 500,
-            ..TournamentRules::default()
+            ..faceoff_airhockey::competition().tournament_rules()
         }),
         ..TournamentChange::default()
     };
@@ -875,7 +915,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         .await
         .unwrap();
     let other = TournamentChange {
-        rules: Some(TournamentRules::default()),
+        rules: Some(faceoff_airhockey::competition().tournament_rules()),
         ..TournamentChange::default()
     };
     assert_conflict(
@@ -919,7 +959,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
     let twice = NewTournament {
         name: "cup".parse().unwrap(),
         stage: None,
-        rules: TournamentRules::default(),
+        rules: faceoff_airhockey::competition().tournament_rules(),
         settings: TournamentSettings::default(),
         entrants: Vec::new(),
     };

@@ -51,7 +51,7 @@ fn shard(recording: Option<&str>) -> JobPayload {
         part_of: Uuid::from_u128(3),
         agent: agent(),
         spec: ShardSpec {
-            ruleset: Ruleset::CURRENT,
+            ruleset: faceoff_airhockey::RULESET,
             platform_retries: 1,
             task: DEFEND,
             episodes: 100..u32::MAX,
@@ -73,7 +73,7 @@ fn game(recording: Option<&str>) -> JobPayload {
         attempt: 2,
         agents: Box::new([agent(), agent()]),
         spec: GameSpec {
-            ruleset: Ruleset::CURRENT,
+            ruleset: faceoff_airhockey::RULESET,
             steps: 45_000,
             profile: EVALUATION,
             seed: Seed::from_number(6),
@@ -99,7 +99,7 @@ fn all_jobs_round_trip() {
             seed: Seed::from_number(7),
             mismatch_seed: Seed::from_number(8),
             agent: "striker".into(),
-            ruleset: Ruleset::CURRENT,
+            ruleset: faceoff_airhockey::RULESET,
             variation: Default::default(),
             task_weights: weights(),
             tiers: None,
@@ -154,7 +154,7 @@ fn all_reports_round_trip() {
         }),
     };
     let result = EvaluationResult {
-        ruleset: RULESET.into(),
+        ruleset: faceoff_airhockey::RULESET.to_string(),
         profile: EVALUATION,
         seed: Seed::from_number(1),
         tasks: Default::default(),
@@ -241,7 +241,7 @@ fn jobs_without_variation_round_trip_unchanged() {
         seed: Seed::from_number(1),
         mismatch_seed: Seed::from_number(2),
         agent: "a".into(),
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         variation: Variation::default(),
         task_weights: weights(),
         tiers: Some(first_tiers),
@@ -264,7 +264,7 @@ fn scoring_job_names_the_tiers_of_its_competition() {
         seed: Seed::from_number(1),
         mismatch_seed: Seed::from_number(2),
         agent: "a".into(),
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         variation: Variation::default(),
         task_weights: weights(),
         tiers: None,

@@ -94,7 +94,7 @@ async fn game_job_is_complete_and_contains_no_secret() {
     let server = Server::new().await;
     let mut rules = TournamentRules {
         steps: 500,
-        ..TournamentRules::default()
+        ..faceoff_airhockey::competition().tournament_rules()
     };
     rules.game_limits.max_faults = 3;
     rules.limits.pids = Some(7);
@@ -139,7 +139,9 @@ async fn game_job_is_complete_and_contains_no_secret() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn platform_fault_ends_game_without_result_until_rerun() {
     let server = Server::new().await;
-    let game = start_one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, faceoff_airhockey::competition().tournament_rules())
+        .await
+        .id;
     let seeds = Arc::new(Mutex::new(BTreeSet::new()));
     let failing_evaluator = {
         let seeds = Arc::clone(&seeds);
@@ -208,7 +210,9 @@ async fn ended_attempts(server: &Server, game: GameId) -> u32 {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn only_the_counting_recording_of_a_game_is_kept() {
     let server = Server::new().await;
-    let game = start_one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, faceoff_airhockey::competition().tournament_rules())
+        .await
+        .id;
     // The recording of an attempt that was killed between upload and commit.
     let killed = format!("games/{game}/killed/game.zip");
     server.put_artifact(&killed, b"PK").await;
@@ -250,7 +254,9 @@ async fn only_the_counting_recording_of_a_game_is_kept() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn lost_lease_discards_result_and_recording() {
     let server = Server::new().await;
-    let game = start_one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, faceoff_airhockey::competition().tournament_rules())
+        .await
+        .id;
     let local = server.local();
     let claimed = blocking(move || local.claim("lost").unwrap()).await;
     let ClaimResult::Job(job) = claimed else {
@@ -294,7 +300,9 @@ async fn lost_lease_discards_result_and_recording() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn lost_commit_response_keeps_result_and_recording() {
     let server = Server::new().await;
-    let game = start_one_game(&server, TournamentRules::default()).await.id;
+    let game = start_one_game(&server, faceoff_airhockey::competition().tournament_rules())
+        .await
+        .id;
     let commits = Arc::new(AtomicU32::new(0));
     let running = server.start_intercepted_slots(1, &Scripted::with_game(|_, _| Ok(())), |local| {
         let commits = Arc::clone(&commits);
@@ -324,7 +332,7 @@ async fn live_updates_cover_each_attempt() {
     let server = Server::new().await;
     let rules = TournamentRules {
         steps: 500,
-        ..TournamentRules::default()
+        ..faceoff_airhockey::competition().tournament_rules()
     };
     let game = start_one_game(&server, rules).await.id;
     let event = LiveEvent {

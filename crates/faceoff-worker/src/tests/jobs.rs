@@ -88,6 +88,7 @@ async fn jobs_do_not_contain_the_season_secret() {
         .request_ablation(
             Actor::Organiser,
             submission,
+            faceoff_airhockey::RULESET,
             &plan,
             &ABLATION_PROFILES,
             server.now(),
@@ -143,6 +144,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     let created = server.store.request_ablation(
         Actor::Organiser,
         submission,
+        faceoff_airhockey::RULESET,
         &plan,
         &ABLATION_PROFILES,
         server.now(),

@@ -377,6 +377,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
         .request_ablation(
             Actor::Organiser,
             submission,
+            faceoff_airhockey::RULESET,
             &plan,
             &ABLATION_PROFILES,
             server.now(),

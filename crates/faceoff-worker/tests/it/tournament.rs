@@ -16,7 +16,7 @@ pub fn rules(steps: u32) -> TournamentRules {
             restart_s: 600.0,
             ..GameLimits::default()
         },
-        ..TournamentRules::default()
+        ..faceoff_airhockey::competition().tournament_rules()
     }
 }
 

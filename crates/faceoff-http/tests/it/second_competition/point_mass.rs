@@ -58,6 +58,10 @@ impl PointMass {
                     task(REACH, "Reach", "Come to the origin."),
                     task(SETTLE, "Settle", "Come to rest at the origin."),
                 ],
+                rulesets: vec![RulesetInfo {
+                    ruleset: Ruleset::new("points-1"),
+                    action_limit: ACTION_LIMIT,
+                }],
                 ends: vec![
                     end(EpisodeEnd::HORIZON, "time limit reached"),
                     end(ARRIVED, "arrived"),

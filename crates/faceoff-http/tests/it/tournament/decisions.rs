@@ -9,7 +9,7 @@ use crate::{
     users::member,
 };
 use faceoff_store::{Actor, TournamentChange};
-use faceoff_types::{Ruleset, TournamentRules};
+use faceoff_types::TournamentRules;
 use serde_json::{Value, json};
 
 /// The team's row in the standings of a tournament.
@@ -357,7 +357,7 @@ async fn tournament_keeps_its_ruleset_until_its_rules_change() {
     // The change stores the tournament as a server with the previous ruleset would have stored it.
     let earlier_ruleset = TournamentChange {
         rules: Some(TournamentRules {
-            ruleset: Ruleset::Second,
+            ruleset: faceoff_airhockey::RULESETS[1],
             ..opened.rules
         }),
         ..TournamentChange::default()

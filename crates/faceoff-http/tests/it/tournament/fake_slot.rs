@@ -10,7 +10,7 @@ use faceoff_scoring::{
 use faceoff_store::{
     ClaimedJob, CommitOutcome, Game, GameCommit, GamePurpose, GameRecording, Job, JobClaim,
 };
-use faceoff_types::{ComputationTimeSummary, ForfeitCause, GameLimits, Ruleset, Seed};
+use faceoff_types::{ComputationTimeSummary, ForfeitCause, GameLimits, Seed};
 use serde_json::Value;
 
 /// The outcome of a game. In pairs the home side is first.
@@ -84,7 +84,7 @@ impl GameOutcome {
             }),
         };
         let score = GameScore {
-            ruleset: Ruleset::CURRENT,
+            ruleset: faceoff_airhockey::RULESET,
             profile: EVALUATION,
             perturbations: Default::default(),
             limits: GameLimits::default(),

@@ -8,7 +8,7 @@ use faceoff_dataset::{
 };
 use faceoff_episode::{AnswerTiming, RunningEpisode, Simulator, StepSink};
 use faceoff_sim::Interpolation;
-use faceoff_types::{Phase, Ruleset, Seed};
+use faceoff_types::{Phase, Seed};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use serde_json::{Value, json};
 use std::{
@@ -44,7 +44,7 @@ const WORDS: [&str; 16] = [
 fn record_dataset(dir: &Path) {
     let seed = Seed::from_number(5);
     let spec = ShardSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         platform_retries: 0,
         task: DEFEND,
         episodes: 0..2,

@@ -13,7 +13,7 @@ use faceoff_dataset::{
 };
 use faceoff_episode::AnswerTiming;
 use faceoff_sim::Interpolation;
-use faceoff_types::{AgentFaultKind, GameLimits, Ruleset, Seed, Side, SlotTiming};
+use faceoff_types::{AgentFaultKind, GameLimits, Seed, Side, SlotTiming};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{fs, path::Path};
 use tempfile::TempDir;
@@ -22,7 +22,7 @@ use tempfile::TempDir;
 fn record_game(out: &Path) {
     let seed = Seed::from_number(5);
     let spec = GameSpec {
-        ruleset: Ruleset::CURRENT,
+        ruleset: faceoff_airhockey::RULESET,
         steps: 40,
         profile: EVALUATION,
         seed,

@@ -8,14 +8,14 @@ use crate::commands::{output::print, table_cells::percent_interval};
 use crate::competition::competition;
 use anyhow::Context;
 use faceoff_scoring::{EpisodeSummary, ProfileEffect};
-use faceoff_types::{ProfileMap, RULESET, Seed, TaskMap};
+use faceoff_types::{ProfileMap, Ruleset, Seed, TaskMap};
 use serde::Serialize;
 use std::path::Path;
 
 /// `ablation.json`.
 #[derive(Debug, Serialize)]
 struct AblationFile {
-    ruleset: &'static str,
+    ruleset: Ruleset,
     seed: Seed,
     agent: String,
     tasks: TaskMap<Vec<ProfileEffect>>,
@@ -43,7 +43,7 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
     let text = table(&agent, setup.seed, &tasks);
     let path = out.join(ABLATION);
     let file = AblationFile {
-        ruleset: RULESET,
+        ruleset: competition().ruleset(),
         seed: setup.seed,
         agent,
         tasks,
@@ -55,7 +55,10 @@ pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<u
 
 /// The comparison as text.
 fn table(agent: &str, seed: Seed, tasks: &TaskMap<Vec<ProfileEffect>>) -> String {
-    let mut lines = vec![format!("{agent}: ablation ({RULESET}), seed {seed}\n")];
+    let mut lines = vec![format!(
+        "{agent}: ablation ({}), seed {seed}\n",
+        competition().ruleset()
+    )];
     lines.push(format!(
         "{:<8} {:<17} {:>8} {:>8} {:>17} {:>9} {:>5} {:>6} {:>7} {:>8}",
         "task",

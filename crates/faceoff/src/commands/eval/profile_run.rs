@@ -10,9 +10,7 @@ use crate::competition::{competition, simulator};
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, AssembledDataset, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
-use faceoff_types::{
-    AgentFault, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed, Task, Variation,
-};
+use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, Seed, Task, Variation};
 use faceoff_wire::job::{EvaluationMeta, ShardSpec};
 use std::{
     fs,
@@ -87,7 +85,7 @@ pub(super) fn run_profile(
         seed: setup.seed,
         mismatch_seed: setup.mismatch_seed,
         agent: setup.bundle.manifest.name.clone(),
-        ruleset: Ruleset::CURRENT,
+        ruleset: competition().ruleset(),
         variation: setup.variation.clone(),
         task_weights: competition().weights(&setup.variation),
         tiers: competition().tiers,
@@ -126,7 +124,7 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
             jobs.push(Job {
                 out: setup.scratch.join(format!("{profile}-{task}-{start}")),
                 spec: ShardSpec {
-                    ruleset: Ruleset::CURRENT,
+                    ruleset: competition().ruleset(),
                     platform_retries: 0,
                     task: *task,
                     episodes: start..end,

@@ -9,7 +9,7 @@ use faceoff_api::views::{
     stage::{PhaseView, StageView},
 };
 use faceoff_runner::{AgentEnvironment, take_inventory};
-use faceoff_types::{IMAGE_RUNTIME, RULESET, Ruleset};
+use faceoff_types::IMAGE_RUNTIME;
 use std::path::Path;
 
 /// A stage of a server with its rules and limits.
@@ -30,13 +30,14 @@ impl ServerStage {
     /// If the server does not answer, uses another ruleset than this program, or has no such stage.
     pub fn fetch(url: &str, ca_file: Option<&Path>, stage: Option<&str>) -> anyhow::Result<Self> {
         let client = Client::new(url, None, ca_file)?;
+        let own = competition().ruleset();
         let context = || format!("cannot evaluate like the server at {url}");
         block_on(async {
             let server = client.runtimes().await?;
             // Checked before the stages are read, whose rules another version cannot parse.
             ensure!(
-                server.ruleset == RULESET,
-                "it uses the ruleset {}, this program {RULESET}; use the server's version of faceoff",
+                server.ruleset == own.as_str(),
+                "it uses the ruleset {}, this program {own}; use the server's version of faceoff",
                 server.ruleset
             );
             let stages = client.stages().await?;
@@ -52,10 +53,10 @@ impl ServerStage {
         name_or_id: Option<&str>,
     ) -> anyhow::Result<Self> {
         let stage = select_stage(stages, &server.stages, name_or_id)?;
-        let ruleset = stage.rules.rules.ruleset;
+        let (ruleset, own) = (stage.rules.rules.ruleset, competition().ruleset());
         ensure!(
-            ruleset == Ruleset::CURRENT,
-            "its stage “{}” still uses the ruleset {ruleset}, this program {RULESET}; name another stage (--stage), or use \
+            ruleset == own,
+            "its stage “{}” still uses the ruleset {ruleset}, this program {own}; name another stage (--stage), or use \
             a version of faceoff with {ruleset}",
             stage.name
         );

@@ -7,7 +7,7 @@ use faceoff_runner::{
     AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, bundle::Bundle, run_game,
 };
 use faceoff_sandbox::affinity;
-use faceoff_types::{GameLimits, Ruleset, Seed};
+use faceoff_types::{GameLimits, Seed};
 use faceoff_worker::CpuLayout;
 use std::{fs, path::Path};
 use tempfile::TempDir;
@@ -53,7 +53,7 @@ impl Matchup {
         ];
         let envs = environments(options, &config, &bundles)?;
         let spec = GameSpec {
-            ruleset: Ruleset::CURRENT,
+            ruleset: crate::competition::competition().ruleset(),
             steps: options.steps,
             profile: options.profile,
             seed: options.seed,
