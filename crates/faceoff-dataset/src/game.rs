@@ -2,6 +2,7 @@
 //! game, the archive of the game and of each side, reading, and verification by simulating the game again.
 
 mod archive;
+mod conditions;
 mod files;
 mod recorded_inputs;
 mod recorder;
@@ -12,6 +13,7 @@ mod table;
 mod verify;
 
 pub use archive::{GameArchives, RecordedGame, remove_game};
+pub use conditions::game_arena;
 pub use files::{GAME_FILE, GAME_FILES, side_file};
 pub use recorder::GameRecorder;
 pub use recording::GameRecording;

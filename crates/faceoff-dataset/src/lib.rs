@@ -31,7 +31,7 @@ mod times;
 pub mod verify;
 
 pub use assemble::{AssembledDataset, assemble};
-pub use conditions::{game_arena, shard_conditions};
+pub use conditions::shard_conditions;
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
 pub use files::{ARCHIVE_FILE, CLIPS_FILE, allow_missing};

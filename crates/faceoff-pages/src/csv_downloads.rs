@@ -1,5 +1,7 @@
 //! Downloads in CSV: episodes and answer times of an evaluation, and ablations.
 
+mod positions;
+
 use super::frame::PageProblem;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::ablation::AblationStatus;
@@ -28,16 +30,12 @@ pub(super) async fn episodes(
     let mut columns: Vec<String> = ["task", "episode", "steps", "success", "end", "why"]
         .map(str::to_owned)
         .into();
-    // Of other worlds than air hockey no positions are known.
     let has_positions =
         view.episodes.is_empty() || view.episodes.iter().any(EpisodeLine::has_clips);
     let mut suffixes = vec!["first_step", "steps", "worst"];
     if has_positions {
-        for state in ["start", "last"] {
-            let values = ["x_m", "y_m", "vx_m_s", "vy_m_s"];
-            columns.extend(values.map(|value| format!("{state}_{value}")));
-        }
-        suffixes.extend(["x_m", "y_m", "joint"]);
+        columns.extend(positions::state_columns());
+        suffixes.extend(positions::VIOLATION_SUFFIXES);
     }
     columns.extend(["longest_s", "late"].map(str::to_owned));
     let kinds: Vec<ViolationName> = app.config.competition().world_violations().collect();
@@ -55,9 +53,7 @@ pub(super) async fn episodes(
             escape_formula(&line.why),
         ];
         if has_positions {
-            let states = [line.start, line.last].into_iter();
-            let numbers = states.flat_map(|state| state.map_or([None; 4], |state| state.map(Some)));
-            row.extend(numbers.map(or_empty));
+            row.extend(positions::states(line));
         }
         row.push(or_empty(line.longest_s));
         row.push(or_empty(line.longest_s.map(|_| line.late)));
@@ -72,12 +68,7 @@ pub(super) async fn episodes(
                 or_empty(violation.map(|violation| violation.worst)),
             ]);
             if has_positions {
-                let at = violation.and_then(|violation| violation.at);
-                row.extend([
-                    or_empty(at.map(|[x, _]| x)),
-                    or_empty(at.map(|[_, y]| y)),
-                    or_empty(violation.and_then(|violation| violation.joint)),
-                ]);
+                row.extend(positions::violation(violation));
             }
         }
         table.row(row);

@@ -30,6 +30,20 @@ pub struct GameAnalysis {
     pub violations: Vec<LocatedViolation>,
 }
 
+impl GameAnalysis {
+    /// Bytes of memory that it needs.
+    #[must_use]
+    pub fn memory_bytes(&self) -> usize {
+        let positions: usize = self.goals.iter().map(|goal| goal.positions.len()).sum();
+        size_of::<Self>()
+            + size_of_val(self.rally_ends.as_slice())
+            + size_of_val(self.goals.as_slice())
+            + positions * size_of::<[f64; 2]>()
+            + size_of_val(self.shots.as_slice())
+            + size_of_val(self.violations.as_slice())
+    }
+}
+
 /// The path of the puck into a goal: over at most the last [`GOAL_PATH_STEPS`] control steps of its rally.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoalPath {

@@ -118,6 +118,21 @@ pub struct ViolationSummary {
     pub joint: Option<u32>,
 }
 
+impl ViolationSummary {
+    /// The first sample with a violation; where it happened is not known.
+    #[must_use]
+    pub const fn begin(group: ViolationName, from: u32, worst: f64) -> Self {
+        Self {
+            group,
+            from,
+            samples: 1,
+            worst,
+            at: None,
+            joint: None,
+        }
+    }
+}
+
 /// A histogram of computation times, with ten bins per power of ten.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]

@@ -115,12 +115,9 @@ impl Recording {
             Group::Ee | Group::Link => None,
         };
         self.violations.push(ViolationSummary {
-            group: group.name(),
-            from: sample,
-            samples: 1,
-            worst: value,
             at: Some([x, y]),
             joint,
+            ..ViolationSummary::begin(group.name(), sample, value)
         });
     }
 

@@ -16,6 +16,7 @@ mod game;
 mod group;
 mod gzip;
 mod header;
+pub mod model;
 mod motion;
 mod pack;
 mod plain_episode;
@@ -25,7 +26,7 @@ mod recorder;
 mod viewer_model;
 mod violations;
 
-pub use analysis::{GOAL_PATH_STEPS, GameAnalysis, GoalPath, LocatedViolation, Shot};
+pub use analysis::*;
 pub use clip::Clip;
 pub use clip_index::{ClipIndex, EpisodeLine, TimeBins, ViolationSummary};
 pub use column::Column;
@@ -38,12 +39,3 @@ pub use header::{
 };
 pub use pack::{ClipKey, Pack, PackWriter, join_packs, merged_index, select_episodes};
 pub use recorder::ClipRecorder;
-
-/// Constants of the model that are needed to draw a clip.
-pub mod model {
-    pub use faceoff_sim::{
-        episode::task::{PLAYABLE_Y_M, TASK_RULES},
-        model::{CONTROL_STEP_S, TOOL},
-        table::geometry::{PUCK, TABLE},
-    };
-}

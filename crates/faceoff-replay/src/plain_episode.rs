@@ -25,14 +25,8 @@ impl PlainRecording {
                 violation.samples += 1;
                 violation.worst = violation.worst.max(*value);
             } else {
-                self.violations.push(ViolationSummary {
-                    group: *name,
-                    from: sample,
-                    samples: 1,
-                    worst: *value,
-                    at: None,
-                    joint: None,
-                });
+                let begun = ViolationSummary::begin(*name, sample, *value);
+                self.violations.push(begun);
             }
         }
         self.times_s.push(row.timing.computation_time_s);

@@ -37,7 +37,7 @@ pub(crate) async fn season_archive(
     let Ok(permit) = Arc::clone(&app.archive_permit).try_acquire_owned() else {
         return Err(archive_busy());
     };
-    let prepared = archive::prepare(&app, edition).await?;
+    let prepared = archive::collect(&app, edition).await?;
     tracing::info!(
         actor = %organiser.actor(),
         %edition,

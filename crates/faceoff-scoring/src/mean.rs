@@ -42,7 +42,7 @@ pub fn mean_result(
         (*task, mean_task(&days, bounds))
     });
     let tasks: TaskMap<TaskResult> = tasks.collect();
-    let seed = joint_seed(results.iter().map(|result| result.seed));
+    let seed = combined_seed(results.iter().map(|result| result.seed));
     let variation = &first.variation;
     let mean = score_evaluation(
         ruleset,
@@ -97,7 +97,7 @@ fn mean_task(days: &[&TaskResult], bounds: Option<TierBounds>) -> TaskResult {
 }
 
 /// A hash of the seeds of several days; the seed itself for one day.
-fn joint_seed(seeds: impl Iterator<Item = Seed>) -> Seed {
+fn combined_seed(seeds: impl Iterator<Item = Seed>) -> Seed {
     let seeds: Vec<Seed> = seeds.collect();
     if let [seed] = seeds[..] {
         return seed;

@@ -99,7 +99,7 @@ impl AppState {
             board_rows: SharedCache::with_entries(MAX_BOARDS),
             answer_cache: answer_cache::new(),
             ratings: SharedCache::with_entries(MAX_TOURNAMENTS),
-            game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, analysis_bytes),
+            game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, GameAnalysis::memory_bytes),
             champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
             tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),
@@ -146,14 +146,4 @@ impl AppState {
         }
         checked
     }
-}
-
-fn analysis_bytes(analysis: &GameAnalysis) -> usize {
-    let positions: usize = analysis.goals.iter().map(|goal| goal.positions.len()).sum();
-    size_of::<GameAnalysis>()
-        + size_of_val(analysis.rally_ends.as_slice())
-        + size_of_val(analysis.goals.as_slice())
-        + positions * size_of::<[f64; 2]>()
-        + size_of_val(analysis.shots.as_slice())
-        + size_of_val(analysis.violations.as_slice())
 }

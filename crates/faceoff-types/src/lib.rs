@@ -71,10 +71,7 @@ pub use departure_kind::DepartureKind;
 pub use deprecated_names::DeprecatedNames;
 pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::is_full_disk;
-pub use game::{
-    FOULS_PER_POINT, ForfeitCause, GAME_WINDOWS, GameEnd, GameFault, GameOutcome, GameWindow,
-    SideOutcome, WINDOW_STEPS,
-};
+pub use game::*;
 pub use game_limits::GameLimits;
 pub use game_seed_label::{GameSeedLabel, ParseGameSeedLabelError};
 pub use ids::{

@@ -1,11 +1,11 @@
-//! The line between the platform and air hockey: the table of `ARCHITECTURE.md` that puts crates on a side, and words of air
-//! hockey in crates of the platform.
+//! The line between the platform and air hockey: the tables of `ARCHITECTURE.md` that put crates, and modules inside of them, on a
+//! side, and words of air hockey in crates of the platform.
 
 use super::imports::is_test_item;
 use faceoff_tests::repository;
 use std::{
-    collections::BTreeSet,
-    fs,
+    collections::{BTreeMap, BTreeSet},
+    fmt, fs,
     path::{Path, PathBuf},
 };
 use syn::{
@@ -39,8 +39,56 @@ pub fn side(row: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// Words of air hockey in the crate whose root is in `folder`, outside of comments and tests, each with its file.
-pub fn words_in(folder: &Path) -> Vec<String> {
+/// The modules of air hockey inside of crates of the platform, by crate: paths below `src/` without an extension.
+pub fn modules() -> BTreeMap<String, Vec<String>> {
+    let text = fs::read_to_string(repository().join("ARCHITECTURE.md"))
+        .expect("ARCHITECTURE.md can be read");
+    let rows = text
+        .lines()
+        .skip_while(|line| !line.starts_with("| crate | modules of air hockey |"))
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
+    let cells = |row: &str| -> Vec<String> {
+        let cells = row.trim_matches('|').split('|');
+        cells.map(|cell| cell.trim().to_owned()).collect()
+    };
+    rows.map(|row| {
+        let [name, modules] = &cells(row)[..] else {
+            panic!("a row of two cells: {row}");
+        };
+        let modules = modules
+            .split(',')
+            .map(|module| module.trim().trim_matches('`').to_owned());
+        (name.trim_matches('`').to_owned(), modules.collect())
+    })
+    .collect()
+}
+
+/// A word of air hockey, or the name of one of its crates.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Finding {
+    pub word: String,
+    /// Path below the root of the crate.
+    pub file: String,
+}
+
+impl Finding {
+    /// Is it in the module with this path, or in a module of it?
+    pub fn is_in(&self, module: &str) -> bool {
+        let path = self.file.trim_end_matches(".rs");
+        path.strip_prefix(module)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?} in {}", self.word, self.file)
+    }
+}
+
+/// Words of air hockey and names of its crates in the crate whose root is in `folder`, outside of comments and tests.
+pub fn findings(folder: &Path, air_hockey: &BTreeSet<String>) -> Vec<Finding> {
     let mut files = Vec::new();
     collect_files(folder, &mut files);
     let mut found = Vec::new();
@@ -48,15 +96,20 @@ pub fn words_in(folder: &Path) -> Vec<String> {
         let text = fs::read_to_string(&file).expect("a source file can be read");
         let syntax =
             syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
-        let mut finder = WordFinder::default();
-        finder.visit_file(&syntax);
-        let name = file.strip_prefix(folder).unwrap_or(&file).display();
-        found.extend(
-            finder
-                .words
+        let mut finder = WordFinder {
+            crates: air_hockey
                 .iter()
-                .map(|word| format!("{word:?} in {name}")),
-        );
+                .map(|name| name.replace('-', "_"))
+                .collect(),
+            words: BTreeSet::new(),
+        };
+        finder.visit_file(&syntax);
+        let name = file.strip_prefix(folder).unwrap_or(&file);
+        let name = name.to_string_lossy().into_owned();
+        found.extend(finder.words.into_iter().map(|word| Finding {
+            word,
+            file: name.clone(),
+        }));
     }
     found
 }
@@ -81,8 +134,9 @@ fn collect_files(folder: &Path, files: &mut Vec<PathBuf>) {
 }
 
 /// Collects words from identifiers, strings and the contents of macros.
-#[derive(Default)]
 struct WordFinder {
+    /// Names of the crates of air hockey, as in paths.
+    crates: BTreeSet<String>,
     words: BTreeSet<String>,
 }
 
@@ -116,7 +170,12 @@ impl Visit<'_> for WordFinder {
     }
 
     fn visit_ident(&mut self, ident: &syn::Ident) {
-        self.read(&ident.to_string());
+        let name = ident.to_string();
+        if self.crates.contains(&name) {
+            self.words.insert(name);
+        } else {
+            self.read(&name);
+        }
     }
 
     fn visit_lit_str(&mut self, literal: &LitStr) {

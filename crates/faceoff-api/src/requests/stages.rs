@@ -4,6 +4,9 @@
 mod options;
 mod schema;
 
+#[cfg(feature = "clap")]
+pub use options::read_perturbations;
+
 use super::double_option::{OrNull, deserialize_some};
 use crate::objects_only;
 use faceoff_types::{

@@ -100,7 +100,7 @@ pub struct BusySlotView {
     pub job: Uuid,
     /// Description of the job; absent if it started before this server process.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(example = "hit episodes 0 to 49")]
+    #[schema(example = "episodes 0 to 49 of a task")]
     pub job_description: Option<String>,
     /// When the job started.
     pub since: Timestamp,

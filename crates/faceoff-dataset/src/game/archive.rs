@@ -1,6 +1,7 @@
 //! Writes the archives of a game: the whole recording, and for each side (one of the two agents) the part that it may see.
 
 use super::{
+    conditions::simulator_id,
     files::{
         CLIPS_FILE, GAME_FILE, MOTION_FILE, OUTCOME_FILE, RALLIES_FILE, SIDE_OUTCOME_FILE,
         entries_file, log_file, side_file, steps_file,
@@ -12,7 +13,6 @@ use crate::{
     digest,
     error::RecordingError,
     files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE, allow_missing},
-    simulator::game_simulator_id,
 };
 use faceoff_airhockey::FinishedGame;
 use faceoff_scoring::tournament::{GameScore, GameSettings, score_game};
@@ -162,7 +162,7 @@ impl ArchiveContents<'_> {
         archive.add_json(CALIBRATION_FILE, self.calibration)?;
         let manifest = GameManifest {
             schema: GAME_SCHEMA.to_owned(),
-            simulator: game_simulator_id(),
+            simulator: simulator_id(),
             spec: self.spec.clone(),
             agents: self.agents.clone(),
             files: archive.files().clone(),

@@ -2,6 +2,7 @@
 //! compared with the recorded one.
 
 use super::{
+    conditions::game_arena,
     files::{MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
     recorded_inputs::{RecordedEntry, RecordedResponse, RowLocation},
     recording::GameRecording,
@@ -9,7 +10,6 @@ use super::{
     table::GameTable,
 };
 use crate::{
-    conditions::game_arena,
     dataset::Columns,
     error::DatasetError,
     verify::{Difference, VerifyError, compare},

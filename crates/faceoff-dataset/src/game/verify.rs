@@ -1,13 +1,13 @@
 //! Verification of a game: simulates it again from its recording and compares every number.
 
 use super::{
-    archive::game_settings, files::OUTCOME_FILE, recording::GameRecording, replay::GameReplay,
+    archive::game_settings, conditions::simulator_id, files::OUTCOME_FILE,
+    recording::GameRecording, replay::GameReplay,
 };
 use crate::{
     error::DatasetError,
     files::RESULTS_FILE,
     score::json_file,
-    simulator::game_simulator_id,
     verify::{VerifyError, compare},
 };
 use faceoff_scoring::tournament::{GameScore, score_game};
@@ -60,7 +60,7 @@ pub fn verify_game(
 
 /// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
 fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
-    let (manifest, current) = (recording.manifest(), game_simulator_id());
+    let (manifest, current) = (recording.manifest(), simulator_id());
     let ruleset = manifest.spec.ruleset;
     if !AirHockeyRuleset::find(ruleset).is_some_and(AirHockeyRuleset::has_games) {
         let with_games = AirHockeyRuleset::ALL

@@ -107,8 +107,3 @@ impl StateColumns for StateValues {
         self.0.extend(std::iter::repeat_n(None, count));
     }
 }
-
-/// `name_1` … `name_7`.
-pub(super) fn joints(name: &str) -> [String; 7] {
-    [1, 2, 3, 4, 5, 6, 7].map(|joint| format!("{name}_{joint}"))
-}

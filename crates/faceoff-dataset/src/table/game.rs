@@ -1,10 +1,7 @@
 //! The tables of a game of two agents (its *sides*): the true motion, the observations and actions of each side, the
 //! rallies, and the *entries*: how each side entered each rally, with the start and reset of its agent.
 
-use super::{
-    columns::{FloatColumns, joints},
-    steps::constraint_columns,
-};
+use super::{columns::FloatColumns, steps::constraint_columns};
 use crate::{error::RecordingError, times::nanoseconds};
 use arrow_array::{
     ArrayRef,
@@ -17,6 +14,11 @@ use faceoff_airhockey::{GameStepRow, RallyEntry, RallyRow, RallyStart, recording
 use faceoff_episode::StateColumns;
 use faceoff_types::{AgentFault, Side};
 use std::sync::Arc;
+
+/// `name_1` … `name_7`.
+fn joints(name: &str) -> [String; 7] {
+    [1, 2, 3, 4, 5, 6, 7].map(|joint| format!("{name}_{joint}"))
+}
 
 /// Columns with the numbers of a row's step.
 #[derive(Default)]

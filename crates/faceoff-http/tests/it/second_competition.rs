@@ -120,13 +120,18 @@ async fn second_competition_runs_on_the_real_server() {
     let simulator = PointMass::new();
     let site = Site::start().await;
     let site = site.with_simulator(simulator.clone()).await;
+    let too_strong = json!({ "perturbations": { "wind": { "strength_m_s2": 2 } } });
+    let refused = site.change_first_stage(too_strong).await.json(422);
+    let detail = string(&refused["detail"]);
+    assert!(detail.contains("a number from 0 to 1"), "{detail}");
     let rules = json!({
         "tasks": ["settle", "reach"], "profile": "windy", "episodes_per_task": 6, "episodes_per_shard": 3,
-        "confirm": "Qualifying",
+        "perturbations": { "wind": { "strength_m_s2": 0.5 } }, "confirm": "Qualifying",
     });
     let changed = site.change_first_stage(rules).await.json(200);
     let tasks = &changed["tasks"];
     assert_eq!(tasks, &json!(["reach", "settle"]), "{changed}");
+    assert_eq!(changed["ruleset"], "points-1");
 
     let shutdown = CancellationToken::new();
     let worker = tokio::spawn(faceoff_worker::run(
@@ -174,6 +179,25 @@ async fn second_competition_runs_on_the_real_server() {
     assert_eq!(violations, &json!({ "speeding": 6 }), "{board}");
     assert_eq!(row(1, "penalty_points"), 2.0 * 6.0);
 
+    // Ablated: each profile is compared with the ideal one.
+    let submission = site.store.evaluations_of(teams[2].id.parse().unwrap());
+    let submission = submission.await.unwrap()[0].submission;
+    let ablation = format!("/api/v1/submissions/{submission}/ablation");
+    let request = json!({ "episodes_per_task": 4 });
+    site.post(&ablation, Some(ADMIN), &request).await.json(201);
+    let finished = faceoff_testkit::wait_for(&site.store, async || {
+        let view = site.get(&ablation, Some(ADMIN)).await.json(200);
+        (view["state"] == "finished").then_some(view)
+    });
+    let effects = finished.await["tasks"]["settle"].clone();
+    let profiles: Vec<&str> = effects
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|effect| string(&effect["profile"]))
+        .collect();
+    assert_eq!(profiles, ["calm", "windy"], "{effects}");
+
     // Browsed: boards, evaluation, team, episodes, season, stages, the form of a stage.
     let shown = site.get("/", Some(ADMIN)).await.html(200);
     let headings = texts(&shown, "main table th").join(" ");
@@ -195,6 +219,8 @@ async fn second_competition_runs_on_the_real_server() {
         "/tasks/reach".to_owned(),
         format!("/evaluations/{evaluation}"),
         format!("/evaluations/{evaluation}/episodes"),
+        format!("/evaluations/{evaluation}/compare/{}", evaluations[2]),
+        format!("/submissions/{submission}/ablation"),
         format!("/teams/{}", teams[1].id),
     ] {
         let page = site.get(&path, Some(&teams[1].token)).await;
@@ -207,6 +233,7 @@ async fn second_competition_runs_on_the_real_server() {
             "mallet",
             "deployable",
             "air hockey",
+            "airhockey",
         ] {
             assert!(!text.contains(foreign), "{foreign} is on {path}: {text}");
         }

@@ -66,7 +66,7 @@ pub(crate) const fn store_edition(edition: Edition) -> faceoff_store::Edition {
 ///
 /// # Errors
 /// `StorageFull`; `Conflict` if an organiser's archive is requested from a public one.
-pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<PreparedArchive, Problem> {
+pub(crate) async fn collect(app: &App, edition: Edition) -> Result<PreparedArchive, Problem> {
     free_space::check(app)?;
     let folder = tempfile::Builder::new()
         .prefix("archive-")

@@ -12,10 +12,7 @@ use crate::{
     host_interference::{InterferenceMonitor, KernelCounters},
 };
 use faceoff_airhockey::{FinishedGame, GameSink, GameStepRow, RallyRow, RallyStart, RunningGame};
-use faceoff_dataset::{
-    game::{GameArchives, GameRecorder, RecordedGame, remove_game},
-    game_arena,
-};
+use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, game_arena, remove_game};
 use faceoff_episode::RecordError;
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::Side;

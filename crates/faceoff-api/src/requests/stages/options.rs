@@ -15,8 +15,11 @@ pub(super) fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     Ok(parsed)
 }
 
-/// Reads a JSON file with magnitudes of the perturbations. The server checks them.
-pub(super) fn read_perturbations(path: &str) -> Result<Magnitudes, String> {
+/// Reads a JSON file with magnitudes of the perturbations. Which are valid is known to the competition.
+///
+/// # Errors
+/// If the file cannot be read, or has another structure.
+pub fn read_perturbations(path: &str) -> Result<Magnitudes, String> {
     let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
     parse_json(&text)
 }

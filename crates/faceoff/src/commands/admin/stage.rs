@@ -1,7 +1,7 @@
 //! `faceoff admin stage`: creates, changes and lists the season's *stages*, periods with their own rules, cutoffs and board.
 //! The *ruleset* is the simulator's version, from which a stage's rules may deviate.
 
-use crate::competition::{competition, parse_profile, parse_task, parse_weights};
+use crate::competition::{competition, parse_profile, parse_task, parse_weights, read_magnitudes};
 use crate::{
     client::Client,
     commands::{
@@ -74,7 +74,10 @@ pub(super) enum StageAction {
 
 // The API's crate, which has this option, does not know the competition.
 #[derive(Debug, Args)]
-#[command(mut_arg("profile", |option| option.value_parser(parse_profile)))]
+#[command(
+    mut_arg("profile", |option| option.value_parser(parse_profile)),
+    mut_arg("perturbations", |option| option.value_parser(read_magnitudes)),
+)]
 pub(super) struct StageOptions {
     /// Opening time, e.g. "2026-12-01 06:00" in the stage's time zone, or with an offset [default of a new stage: now]
     #[arg(long, value_name = "TIME")]
