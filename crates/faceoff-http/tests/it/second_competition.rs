@@ -190,7 +190,7 @@ async fn second_competition_runs_on_the_real_server() {
         (view["state"] == "finished").then_some(view)
     });
     let effects = finished.await["tasks"]["settle"].clone();
-    let profiles: Vec<&str> = effects
+    let profiles: Vec<String> = effects
         .as_array()
         .unwrap()
         .iter()
