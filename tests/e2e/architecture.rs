@@ -111,13 +111,16 @@ fn only_listed_modules_of_the_platform_know_air_hockey() {
         let is_clean = |module: &&String| !findings.iter().any(|finding| finding.is_in(module));
         let clean = listed.iter().filter(is_clean);
         problems.extend(clean.map(|module| format!("{name}: {module} has no word of air hockey")));
-        if listed.is_empty() {
-            let crossing = member
-                .dependencies
-                .iter()
-                .filter(|name| air_hockey.contains(*name));
-            problems.extend(crossing.map(|dependency| format!("{name} uses {dependency}")));
-        }
+        // Only listed modules use a crate of air hockey.
+        let is_used = |dependency: &str| {
+            let name = dependency.replace('-', "_");
+            findings.iter().any(|finding| finding.word == name)
+        };
+        let crossing = member
+            .dependencies
+            .iter()
+            .filter(|dependency| air_hockey.contains(*dependency) && !is_used(dependency));
+        problems.extend(crossing.map(|dependency| format!("{name} depends on {dependency}")));
     }
     let unknown = modules.keys().filter(|name| !platform.contains(*name));
     problems.extend(unknown.map(|name| format!("{name} is no crate of the platform")));
@@ -153,10 +156,24 @@ fn word_and_crate_of_air_hockey_are_found() {
         words("use faceoff_sim::World; pub fn f(_: faceoff_types::Task) {}"),
         ["\"faceoff_sim\" in lib.rs"]
     );
+    assert_eq!(
+        words("pub fn f() { println!(\"{}\", faceoff_sim::fingerprint()); }"),
+        ["\"faceoff_sim\" in lib.rs"]
+    );
     let allowed = "/// A comment on the puck.
         pub fn whitelist() {}
         #[cfg(test)] mod tests { fn hit() {} }";
     assert_eq!(words(allowed), [""; 0]);
+    let with_test_module = write_crate(&[
+        ("lib.rs", "mod a; #[cfg(test)] mod b;"),
+        ("a.rs", "#[cfg(test)] mod c; mod d;"),
+        ("a/c.rs", "fn hit() {}"),
+        ("a/d.rs", "fn puck() {}"),
+        ("b.rs", "fn goal() {}"),
+    ]);
+    let found = line::findings(with_test_module.path(), &crates);
+    let found: Vec<String> = found.iter().map(ToString::to_string).collect();
+    assert_eq!(found, ["\"puck\" in a/d.rs"]);
     let [finding] = &findings("game/live.rs", "pub fn foul() {}")[..] else {
         panic!("one word");
     };

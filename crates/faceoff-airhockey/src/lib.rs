@@ -22,9 +22,9 @@ pub use game_record::{
     Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
     SideFault, SideStep,
 };
-pub use magnitudes::{checked_magnitudes, settings};
+pub use magnitudes::settings;
 pub use running_game::{FinishedGame, RunningGame};
-pub use simulator::{AirHockey, find_ruleset, simulator};
+pub use simulator::{AirHockey, checked_magnitudes, find_ruleset, simulator};
 pub use world::AirHockeyWorld;
 
 use faceoff_scoring::{
@@ -230,7 +230,6 @@ pub fn competition() -> Competition {
     }
 }
 
-/// `weight` in millionths.
 const fn ruleset(ruleset: AirHockeyRuleset) -> RulesetInfo {
     RulesetInfo {
         ruleset: ruleset.name(),
@@ -241,6 +240,7 @@ const fn ruleset(ruleset: AirHockeyRuleset) -> RulesetInfo {
     }
 }
 
+/// `weight` in millionths.
 fn task(task: Task, title: &str, weight: u32, aim: &str) -> TaskInfo {
     TaskInfo {
         task,

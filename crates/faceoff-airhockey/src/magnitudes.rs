@@ -1,10 +1,9 @@
 //! The magnitudes of air hockey's perturbations: their ranges and meaning. The *plant* is the robot in the evaluator's simulator, and the
 //! *nominal model* is the one that teams have.
 
-use crate::competition;
 use Magnitude::{Counts, Number, Range};
 use faceoff_sim::{MismatchSettings, PerturbationSettings, Plant};
-use faceoff_types::{InvalidMagnitude, Magnitude, MagnitudeInfo, Magnitudes, Seed};
+use faceoff_types::{Magnitude, MagnitudeInfo, Magnitudes, Seed};
 
 /// The descriptions, group by group.
 pub(crate) fn magnitudes() -> Vec<MagnitudeInfo> {
@@ -139,21 +138,6 @@ fn describe(group: &'static str) -> impl Fn(&str, &str, Magnitude, [f64; 2]) -> 
     }
 }
 
-/// Checks the simulator's settings, and returns them as the platform has them.
-///
-/// # Errors
-/// The first magnitude that is out of range.
-///
-/// # Panics
-/// Never: settings consist of numbers, in pairs at most.
-pub fn checked_magnitudes(settings: &PerturbationSettings) -> Result<Magnitudes, InvalidMagnitude> {
-    let mut magnitudes: Magnitudes = serde_json::to_value(settings)
-        .and_then(serde_json::from_value)
-        .expect("settings consist of numbers");
-    competition().check_magnitudes(&mut magnitudes)?;
-    Ok(magnitudes)
-}
-
 /// The simulator's settings; those of the ruleset where magnitudes are left out.
 ///
 /// # Errors
@@ -180,6 +164,7 @@ pub(crate) fn check_robot(magnitudes: &Magnitudes, mismatch_seed: Seed) -> Resul
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{checked_magnitudes, competition};
 
     #[test]
     fn magnitudes_are_all_of_the_simulator() {
@@ -211,34 +196,63 @@ mod tests {
         assert_eq!(settings(&magnitudes).unwrap(), changed);
     }
 
+    /// All ranges, and a value beyond each end of them.
     #[test]
-    fn magnitude_out_of_range_is_refused_by_name() {
-        for (json, words) in [
-            (
-                r#"{"model_mismatch":{"mass":[1.2,0.8]}}"#,
-                "model_mismatch.mass: expected two numbers from 0.1 to 10",
-            ),
-            (
-                r#"{"observation_noise":{"puck_position_m":-0.1}}"#,
-                "puck_position_m: expected a number from 0 to 1, got -0.1",
-            ),
-            (
-                r#"{"disturbance":{"correlation_time_s":0.0}}"#,
-                "correlation_time_s",
-            ),
-            (
-                r#"{"tracking_loss":{"steps":[9,3]}}"#,
-                "tracking_loss.steps",
-            ),
-            (
-                r#"{"tracking_loss":{"chance":0.5}}"#,
-                "tracking_loss.chance: unknown",
-            ),
+    fn magnitudes_out_of_range_are_refused_by_name() {
+        let refused = |group: &str, name: &str, value| {
+            let mut magnitudes = Magnitudes::default();
+            magnitudes.set(group, name, value);
+            let checked = competition().check_magnitudes(&mut magnitudes);
+            checked.err().map(|error| error.to_string())
+        };
+        for (group, name, [least, most]) in [
+            ("model_mismatch", "mass", [0.1, 10.0]),
+            ("model_mismatch", "gains", [0.1, 10.0]),
+            ("model_mismatch", "friction", [0.1, 10.0]),
+            ("model_mismatch", "static_error_m", [0.0, 1.0]),
+            ("observation_noise", "puck_position_m", [0.0, 1.0]),
+            ("observation_noise", "puck_yaw_rad", [0.0, 10.0]),
+            ("observation_noise", "puck_velocity_m_s", [0.0, 10.0]),
+            ("observation_noise", "puck_yaw_rate_rad_s", [0.0, 100.0]),
+            ("observation_noise", "joint_position_rad", [0.0, 1.0]),
+            ("observation_noise", "joint_velocity_rad_s", [0.0, 10.0]),
+            ("disturbance", "sigma_n_per_m_s", [0.0, 1.0]),
+            ("disturbance", "correlation_time_s", [0.001, 1000.0]),
+            ("tracking_loss", "probability", [0.0, 1.0]),
+            ("tracking_loss", "steps", [1.0, 500.0]),
+            ("delay", "second_step_probability", [0.0, 1.0]),
+            ("delay", "tilt_m_s2", [0.0, 10.0]),
+            ("delay", "puck_damping_per_s", [0.0, 100.0]),
         ] {
-            let mut magnitudes: Magnitudes = serde_json::from_str(json).unwrap();
-            let error = competition().check_magnitudes(&mut magnitudes);
-            let error = error.unwrap_err().to_string();
-            assert!(error.contains(words), "{error}");
+            let value = |number: f64| match (name, group) {
+                ("steps", _) => Counts([number as u32; 2]),
+                ("mass" | "gains" | "friction" | "static_error_m" | "puck_damping_per_s", _) => {
+                    Range([number; 2])
+                }
+                _ => Number(number),
+            };
+            for valid in [least, most] {
+                assert_eq!(refused(group, name, value(valid)), None, "{group}.{name}");
+            }
+            for invalid in [least - 1.0, most + 1.0, f64::NAN] {
+                let error = refused(group, name, value(invalid)).unwrap();
+                let expected = format!("{group}.{name}: expected ");
+                assert!(error.starts_with(&expected), "{error}");
+                assert!(
+                    error.contains(&format!("from {least} to {most}")),
+                    "{error}"
+                );
+            }
         }
+        let descending = refused("model_mismatch", "mass", Range([1.2, 0.8])).unwrap();
+        assert!(descending.contains("the smaller one first"), "{descending}");
+        let unknown = refused("tracking_loss", "chance", Number(0.5)).unwrap();
+        assert!(
+            unknown.contains("tracking_loss.chance: unknown"),
+            "{unknown}"
+        );
+        let mut not_a_number = PerturbationSettings::default();
+        not_a_number.delay.tilt_m_s2 = f64::NAN;
+        assert!(checked_magnitudes(&not_a_number).is_err());
     }
 }

@@ -7,8 +7,10 @@ use crate::{
     magnitudes::{check_robot, settings},
 };
 use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator};
-use faceoff_sim::AirHockeyRuleset;
-use faceoff_types::{AgentTask, Competition, Magnitudes, Ruleset, Seed, UnknownTask};
+use faceoff_sim::{AirHockeyRuleset, PerturbationSettings};
+use faceoff_types::{
+    AgentTask, Competition, InvalidMagnitude, Magnitudes, Ruleset, Seed, UnknownTask,
+};
 use std::sync::{Arc, LazyLock};
 
 static SIMULATOR: LazyLock<Arc<AirHockey>> = LazyLock::new(|| {
@@ -79,7 +81,7 @@ impl Simulator for AirHockey {
         )))
     }
 
-    fn check_magnitudes(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
+    fn check_playable(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
         check_robot(magnitudes, mismatch_seed)
     }
 }
@@ -90,4 +92,19 @@ impl Simulator for AirHockey {
 /// If the simulator has no such ruleset.
 pub fn find_ruleset(ruleset: Ruleset) -> Result<AirHockeyRuleset, InvalidConditions> {
     AirHockeyRuleset::find(ruleset).ok_or(InvalidConditions::Ruleset(ruleset))
+}
+
+/// Checks settings of the simulator, and returns them as the platform has them.
+///
+/// # Errors
+/// The first magnitude that is out of range, or not a number.
+pub fn checked_magnitudes(settings: &PerturbationSettings) -> Result<Magnitudes, InvalidMagnitude> {
+    let parsed = serde_json::to_value(settings).and_then(serde_json::from_value);
+    let mut magnitudes: Magnitudes = parsed.map_err(|error| InvalidMagnitude::Value {
+        field: "perturbations".to_owned(),
+        expected: "numbers".to_owned(),
+        got: error.to_string(),
+    })?;
+    SIMULATOR.competition.check_magnitudes(&mut magnitudes)?;
+    Ok(magnitudes)
 }

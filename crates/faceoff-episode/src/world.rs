@@ -106,7 +106,7 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// Why not, beginning with the name of a group.
-    fn check_magnitudes(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
+    fn check_playable(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
         let _ = (magnitudes, mismatch_seed);
         Ok(())
     }

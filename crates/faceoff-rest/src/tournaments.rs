@@ -19,7 +19,7 @@ use faceoff_service::{
     services::{
         decisions::checked_reason,
         entrants,
-        stages::{check_magnitudes, check_offered, parse_name},
+        stages::{check_offered, check_playable, parse_name},
     },
     views::{stage, tournament},
 };
@@ -244,22 +244,30 @@ async fn find_stage(app: &App, text: &str) -> Result<Stage, Problem> {
     })
 }
 
-/// `current`, changed by the fields of a JSON merge patch (RFC 7396). `name` is the field of the request, for errors.
+/// `current`, changed by the fields of a JSON merge patch (RFC 7396); `null` restores the value in `defaults`. `name` is the field of the
+/// request, for errors.
 fn apply_patch<T: Serialize + DeserializeOwned>(
     name: &str,
     current: &T,
+    defaults: &T,
     fields: Option<Map<String, Value>>,
 ) -> Result<T, Problem> {
-    let value = serde_json::to_value(current).map_err(Problem::internal)?;
-    let Value::Object(mut object) = value else {
-        return Err(Problem::internal(format_args!(
+    let object = |value: &T| match serde_json::to_value(value).map_err(Problem::internal)? {
+        Value::Object(object) => Ok(object),
+        _ => Err(Problem::internal(format_args!(
             "{name} are not a JSON object"
-        )));
+        ))),
     };
+    let (mut object, mut defaults) = (object(current)?, object(defaults)?);
     for (field, value) in fields.unwrap_or_default() {
+        let value = match value {
+            Value::Null => defaults.remove(&field),
+            value => Some(value),
+        };
         match value {
-            Value::Null => drop(object.remove(&field)),
-            value => drop(object.insert(field, value)),
+            Some(value) => drop(object.insert(field, value)),
+            // Left out by default.
+            None => drop(object.remove(&field)),
         }
     }
     let value = Value::Object(object);
@@ -275,8 +283,12 @@ async fn changed_rules(
     let sets_ruleset = fields
         .as_ref()
         .is_some_and(|fields| fields.contains_key("ruleset"));
-    let mut rules: TournamentRules = apply_patch("rules", current, fields)?;
-    let newest = app.config.competition().ruleset();
+    let competition = app.config.competition();
+    let mut rules = apply_patch("rules", current, &competition.tournament_rules(), fields)?;
+    // Completes magnitudes, so that those that state a default are no change.
+    let checked = competition.check_tournament(&mut rules);
+    checked.map_err(|error| Problem::invalid("rules", error))?;
+    let newest = competition.ruleset();
     // An upgrade of the server alone does not change a tournament.
     if rules != *current {
         if sets_ruleset && rules.ruleset != newest {
@@ -288,10 +300,8 @@ async fn changed_rules(
         }
         rules.ruleset = newest;
     }
-    let checked = app.config.competition().check_tournament(&mut rules);
-    checked.map_err(|error| Problem::invalid("rules", error))?;
     check_offered(app, rules.runtimes.as_ref())?;
-    check_magnitudes(app, &rules.perturbations).await?;
+    check_playable(app, &rules.perturbations).await?;
     Ok(rules)
 }
 
@@ -299,7 +309,7 @@ fn changed_settings(
     current: &TournamentSettings,
     fields: Option<Map<String, Value>>,
 ) -> Result<TournamentSettings, Problem> {
-    let settings: TournamentSettings = apply_patch("settings", current, fields)?;
+    let settings = apply_patch("settings", current, &TournamentSettings::default(), fields)?;
     settings
         .check()
         .map_err(|error| Problem::invalid("settings", error))?;

@@ -77,6 +77,7 @@ fn main() {
         limits: GameLimits::default(),
         platform_retries: 0,
         perturbations: Default::default(),
+        forfeit_score: Default::default(),
     };
     let out = tempfile::tempdir().unwrap();
     let load_average = || fs::read_to_string("/proc/loadavg").unwrap_or_default();

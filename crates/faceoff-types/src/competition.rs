@@ -1,11 +1,12 @@
 //! A competition: what the platform has to know of it in order to run and to show it.
 
 use crate::{
-    ActionSpace, EpisodeEnd, InvalidMagnitude, InvalidStageRules, InvalidTournament, MagnitudeInfo,
-    Magnitudes, Millionths, Profile, ProfileMap, RecordingColumns, Ruleset, StageRules, Task,
-    TaskMap, TaskWeights, TierBounds, TournamentRules, UnknownProfile, UnknownRuleset, UnknownTask,
-    Variation, ViolationCounts, ViolationName, Violations,
+    ACTION_LIMIT, ActionSpace, EpisodeEnd, InvalidMagnitude, InvalidStageRules, InvalidTournament,
+    MagnitudeInfo, Magnitudes, Millionths, Profile, ProfileMap, RecordingColumns, Ruleset,
+    StageRules, Task, TaskMap, TaskWeights, TierBounds, TournamentRules, UnknownProfile,
+    UnknownRuleset, UnknownTask, Variation, ViolationCounts, ViolationName, Violations,
 };
+use std::collections::HashSet;
 
 /// The description of a competition. Boards, tables, forms and files take their tasks, violations, profiles and tiers from it, recordings
 /// their columns, and parsers of answers the layouts of actions.
@@ -51,7 +52,8 @@ pub struct Competition {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RulesetInfo {
     pub ruleset: Ruleset,
-    /// The largest magnitude of a number in a recorded action.
+    /// The largest magnitude of a number in a recorded action: at least [`ACTION_LIMIT`], at most `f64::MAX`, which only refuses
+    /// infinite numbers.
     pub action_limit: f64,
 }
 
@@ -127,6 +129,33 @@ impl Competition {
             false => Err(problem.to_owned()),
         };
         require(!self.rulesets.is_empty(), "it has no ruleset")?;
+        let mut seen = HashSet::new();
+        let is_new = |info: &RulesetInfo| seen.insert(info.ruleset);
+        require(self.rulesets.iter().all(is_new), "a ruleset occurs twice")?;
+        // Larger numbers are refused when an agent sends them, infinite ones always.
+        let has_valid_limit =
+            |info: &RulesetInfo| (ACTION_LIMIT..=f64::MAX).contains(&info.action_limit);
+        require(
+            self.rulesets.iter().all(has_valid_limit),
+            "recorded numbers of a ruleset must be as large as an agent may send",
+        )?;
+        let mut defaults = Magnitudes::default();
+        for info in &self.magnitudes {
+            require(
+                defaults.get(&info.group, &info.name).is_none(),
+                "a magnitude occurs twice",
+            )?;
+            defaults.set(&info.group, &info.name, info.default);
+        }
+        let mut groups: Vec<&str> = self.magnitudes.iter().map(|info| &*info.group).collect();
+        groups.dedup();
+        let mut seen = HashSet::new();
+        require(
+            groups.into_iter().all(|group| seen.insert(group)),
+            "the magnitudes of a group do not follow each other",
+        )?;
+        self.check_magnitudes(&mut defaults)
+            .map_err(|error| format!("the default of a magnitude is invalid: {error}"))?;
         require(!self.tasks.is_empty(), "it has no tasks")?;
         let layouts = self.actions.layouts.len();
         require(layouts > 0, "it has no layout of actions")?;
@@ -154,7 +183,7 @@ impl Competition {
     }
 
     /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points, bounds of
-    /// tiers, profiles. Texts are not part of it.
+    /// tiers, profiles. Texts are not part of it, nor what a ruleset names: its constants and the defaults of magnitudes.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
@@ -329,6 +358,7 @@ impl Competition {
     /// The first invalid field.
     pub fn check_rules(&self, rules: &mut StageRules) -> Result<(), InvalidStageRules> {
         rules.check()?;
+        self.find_ruleset(rules.ruleset.as_str())?;
         for task in &rules.tasks {
             self.find_task(task.as_str())?;
         }
@@ -363,6 +393,7 @@ impl Competition {
         if !self.has_games {
             return Err(InvalidTournament::NoGames);
         }
+        self.find_ruleset(rules.ruleset.as_str())?;
         self.find_profile(rules.profile.as_str())?;
         Ok(self.check_magnitudes(&mut rules.perturbations)?)
     }
@@ -455,7 +486,7 @@ mod tests {
             subject: "points".to_owned(),
             rulesets: vec![RulesetInfo {
                 ruleset: Ruleset::new("points-1"),
-                action_limit: 1.0,
+                action_limit: ACTION_LIMIT,
             }],
             has_replays: false,
             has_games: false,
@@ -541,11 +572,11 @@ mod tests {
         let mut competition = competition(None);
         competition.rulesets.push(RulesetInfo {
             ruleset: Ruleset::new("points-1.1"),
-            action_limit: 2.0,
+            action_limit: f64::MAX,
         });
         assert_eq!(competition.ruleset().as_str(), "points-1.1");
         let first = competition.find_ruleset("points-1").unwrap();
-        assert_eq!(first.action_limit, 1.0);
+        assert_eq!(first.action_limit, ACTION_LIMIT);
         assert_eq!(
             competition
                 .find_ruleset("points-2")

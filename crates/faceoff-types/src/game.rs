@@ -15,6 +15,30 @@ pub const GAME_WINDOWS: u32 = 90;
 /// Number of fouls of a robot that give its opponent one point (reference implementation).
 pub const FOULS_PER_POINT: u32 = 3;
 
+/// What a forfeited game counts for the side that did not forfeit, as score and as goals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum ForfeitScore {
+    /// 10 : 0. The rule of tournaments that earlier versions opened.
+    #[default]
+    Ten,
+    /// 10 : 0, or as it stood if that side led by more than ten. A side that is far behind gains nothing by a forfeit.
+    TenOrLead,
+}
+
+impl ForfeitScore {
+    /// Is it the rule of earlier versions, which files do not state?
+    #[expect(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks for a reference"
+    )]
+    #[must_use]
+    pub const fn is_first(&self) -> bool {
+        matches!(self, Self::Ten)
+    }
+}
+
 /// The outcome of a game. In pairs, the first side comes first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameOutcome {

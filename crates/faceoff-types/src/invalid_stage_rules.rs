@@ -2,7 +2,7 @@
 
 use crate::{
     InvalidLimit, InvalidMagnitude, InvalidRuntimes, InvalidWeights, MAX_DEADLINE_H,
-    MAX_EPISODES_PER_TASK, TierBounds, UnknownProfile, UnknownTask,
+    MAX_EPISODES_PER_TASK, TierBounds, UnknownProfile, UnknownRuleset, UnknownTask,
 };
 
 /// The largest number of days in the mean of a board row.
@@ -16,6 +16,8 @@ pub enum InvalidStageRules {
     Tasks,
     #[error("tasks: {0}")]
     UnknownTask(#[from] UnknownTask),
+    #[error("ruleset: {0}")]
+    UnknownRuleset(#[from] UnknownRuleset),
     #[error("profile: {0}")]
     UnknownProfile(#[from] UnknownProfile),
     #[error("weights: {0}")]
@@ -51,6 +53,7 @@ impl InvalidStageRules {
     pub const fn field(&self) -> &'static str {
         match self {
             Self::Tasks | Self::UnknownTask(_) => "tasks",
+            Self::UnknownRuleset(_) => "ruleset",
             Self::UnknownProfile(_) => "profile",
             Self::Weights(_) => "weights",
             Self::NoTiers(_) => "tier_bounds",

@@ -109,6 +109,7 @@ pub use timing::{RoundTrips, SlotTiming};
 pub use tournament_format::TournamentFormat;
 pub use tournament_rules::{
     InvalidTournament, MAX_FREE_GAMES, MAX_GAME_STEPS, TournamentRules, TournamentSettings,
+    Withdrawals,
 };
 pub use unknown_profile::UnknownProfile;
 pub use unknown_task::UnknownTask;

@@ -68,7 +68,7 @@ pub enum GameEvent {
     },
     /// The game is over and has a result, which counts once it is stored.
     Ended {
-        /// Final score; 10 : 0 after a forfeit.
+        /// Final score; after a forfeit 10 : 0, or a larger lead.
         score: [u32; 2],
         /// The winning side, 1 or 2; null for a draw.
         #[cfg_attr(feature = "openapi", schema(value_type = Option<u32>, minimum = 1, maximum = 2))]

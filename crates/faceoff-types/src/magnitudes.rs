@@ -2,14 +2,56 @@
 //! [`Competition`](crate::Competition).
 
 use indexmap::IndexMap;
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use std::fmt;
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{self, DeserializeOwned, MapAccess, Visitor},
+};
+use std::{fmt, marker::PhantomData};
 
 /// Magnitudes of the perturbations by group and name. Those left out have the default of the competition. The profile decides which
 /// perturbations are active.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Magnitudes(IndexMap<String, IndexMap<String, Magnitude>>);
+pub struct Magnitudes(Fields<Fields<Magnitude>>);
+
+/// Values by name, each name once.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(transparent)]
+struct Fields<T>(IndexMap<String, T>);
+
+impl<T> Default for Fields<T> {
+    fn default() -> Self {
+        Self(IndexMap::new())
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Fields<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entries<T>(PhantomData<T>);
+
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
+            type Value = Fields<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("magnitudes by name")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Fields<T>, A::Error> {
+                let mut fields = Fields::default();
+                while let Some((name, value)) = map.next_entry::<String, T>()? {
+                    if fields.0.contains_key(&name) {
+                        let problem = format_args!("duplicate field `{name}`");
+                        return Err(de::Error::custom(problem));
+                    }
+                    fields.0.insert(name, value);
+                }
+                Ok(fields)
+            }
+        }
+
+        deserializer.deserialize_map(Entries(PhantomData))
+    }
+}
 
 /// A magnitude: a number, or two.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -74,19 +116,19 @@ impl Magnitudes {
     /// Are all magnitudes the competition's? A checked value without magnitudes says so.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.0.0.is_empty()
     }
 
     /// Gives a magnitude this value.
     pub fn set(&mut self, group: &str, name: &str, value: Magnitude) {
-        let group = self.0.entry(group.to_owned()).or_default();
-        group.insert(name.to_owned(), value);
+        let group = self.0.0.entry(group.to_owned()).or_default();
+        group.0.insert(name.to_owned(), value);
     }
 
     /// The value of a magnitude; `None` if it is that of the competition.
     #[must_use]
     pub fn get(&self, group: &str, name: &str) -> Option<Magnitude> {
-        self.0.get(group)?.get(name).copied()
+        self.0.0.get(group)?.0.get(name).copied()
     }
 
     /// The magnitudes as the settings of a simulator, whose defaults are those of the competition.
@@ -99,14 +141,14 @@ impl Magnitudes {
 
     /// Checks the magnitudes, and completes them in the order of their descriptions. If all are the defaults, none is left.
     pub(crate) fn complete(&mut self, known: &[MagnitudeInfo]) -> Result<(), InvalidMagnitude> {
-        for (group, values) in &self.0 {
+        for (group, values) in &self.0.0 {
             let of_group = || known.iter().filter(|info| info.group == *group);
             if of_group().next().is_none() {
                 let mut groups: Vec<String> = known.iter().map(|info| info.group.clone()).collect();
                 groups.dedup();
                 return Err(InvalidMagnitude::unknown(group.clone(), groups));
             }
-            for name in values.keys() {
+            for name in values.0.keys() {
                 if of_group().all(|info| info.name != *name) {
                     let names = of_group().map(|info| info.name.clone()).collect();
                     return Err(InvalidMagnitude::unknown(format!("{group}.{name}"), names));
@@ -269,6 +311,14 @@ mod tests {
             (
                 r#"{"loss":{"chance":0.5}}"#,
                 "loss.chance: unknown, expected one of steps",
+            ),
+            (
+                r#"{"loss":{"steps":[1,2]},"loss":{}}"#,
+                "duplicate field `loss`",
+            ),
+            (
+                r#"{"loss":{"steps":[1,2],"steps":[1,2]}}"#,
+                "duplicate field `steps`",
             ),
         ] {
             let error = completed(json).unwrap_err();

@@ -2,8 +2,9 @@
 //! settings do not.
 
 use crate::{
-    GAME_WINDOWS, GameLimits, InvalidLimit, InvalidMagnitude, Magnitudes, Profile, Publication,
-    Ruleset, Runtimes, StageLimits, TournamentFormat, UnknownProfile, WINDOW_STEPS,
+    ForfeitScore, GAME_WINDOWS, GameLimits, InvalidLimit, InvalidMagnitude, Magnitudes, Profile,
+    Publication, Ruleset, Runtimes, StageLimits, TournamentFormat, UnknownProfile, UnknownRuleset,
+    WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +33,12 @@ pub struct TournamentRules {
     /// Does each pairing consist of two games with the same seed and swapped sides?
     #[serde(default)]
     pub mirrored: bool,
+    /// What a forfeited game counts; absent: 10 : 0.
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    pub forfeit_score: ForfeitScore,
+    /// When a withdrawal takes effect; absent: at once.
+    #[serde(default, skip_serializing_if = "Withdrawals::is_first")]
+    pub withdrawals: Withdrawals,
     /// Limits of each side, in addition to those of single answers.
     #[serde(default)]
     pub game_limits: GameLimits,
@@ -44,6 +51,32 @@ pub struct TournamentRules {
     /// Runtimes that agents may use; absent: all that the server offers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runtimes: Option<Runtimes>,
+}
+
+/// When the withdrawal of a team takes effect. A disqualification takes effect at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Withdrawals {
+    /// None of its games of the round under way counts, not even those already played. The rule of tournaments that earlier versions
+    /// opened.
+    #[default]
+    AtOnce,
+    /// Its games of the round under way are played and count, so that a withdrawal cannot choose which of its opponents keep their
+    /// points.
+    AfterRound,
+}
+
+impl Withdrawals {
+    /// Is it the rule of earlier versions, which stored rules do not state?
+    #[expect(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks for a reference"
+    )]
+    #[must_use]
+    pub const fn is_first(&self) -> bool {
+        matches!(self, Self::AtOnce)
+    }
 }
 
 /// Settings of a tournament that do not affect results.
@@ -77,6 +110,8 @@ pub enum InvalidTournament {
     },
     #[error("the competition has no games of two agents")]
     NoGames,
+    #[error("ruleset: {0}")]
+    UnknownRuleset(#[from] UnknownRuleset),
     #[error("profile: {0}")]
     UnknownProfile(#[from] UnknownProfile),
     #[error("perturbations.{0}")]
@@ -103,6 +138,8 @@ impl TournamentRules {
             steps: default_steps(),
             profile,
             mirrored: false,
+            forfeit_score: ForfeitScore::TenOrLead,
+            withdrawals: Withdrawals::AfterRound,
             game_limits: GameLimits::default(),
             perturbations: Magnitudes::default(),
             limits: Box::default(),
@@ -192,7 +229,19 @@ mod tests {
     fn rules_default_to_the_challenge() {
         let rules = rules("{}").unwrap();
         let new = TournamentRules::new(rules.ruleset, rules.profile);
-        assert_eq!(rules, new);
+        // Stored rules of earlier versions do not state these.
+        let earlier = TournamentRules {
+            forfeit_score: ForfeitScore::Ten,
+            withdrawals: Withdrawals::AtOnce,
+            ..new.clone()
+        };
+        assert_eq!(rules, earlier);
+        let text = serde_json::to_string(&new).unwrap();
+        assert!(
+            text.contains(r#""forfeit_score":"ten_or_lead","withdrawals":"after_round""#),
+            "{text}"
+        );
+        assert_eq!(serde_json::from_str::<TournamentRules>(&text).unwrap(), new);
 
         assert_eq!(rules.format.last_round().get(), 2);
         assert_eq!(rules.steps, 45_000);

@@ -16,7 +16,7 @@ pub struct Variation {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the profile's perturbations; absent values are the competition's.
+    /// Magnitudes of the profile's perturbations; absent values are the ruleset's.
     #[serde(default, skip_serializing_if = "Magnitudes::is_empty")]
     pub perturbations: Magnitudes,
 }

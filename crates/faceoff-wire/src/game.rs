@@ -6,7 +6,7 @@
 //! without seeds.
 
 use crate::dataset::{FileDigest, SimulatorId};
-use faceoff_types::{GameLimits, Magnitudes, Profile, Ruleset, Seed, SlotTiming};
+use faceoff_types::{ForfeitScore, GameLimits, Magnitudes, Profile, Ruleset, Seed, SlotTiming};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -31,6 +31,9 @@ pub struct GameSpec {
     /// Limits of each side on time and faults.
     #[serde(default)]
     pub limits: GameLimits,
+    /// What the game counts after a forfeit; absent: 10 : 0.
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    pub forfeit_score: ForfeitScore,
     /// Number of earlier attempts that a platform fault (a failure that is not the agents') ended.
     #[serde(default)]
     pub platform_retries: u32,

@@ -147,6 +147,7 @@ impl LocalServer {
                     limits: rules.game_limits,
                     platform_retries,
                     perturbations: rules.perturbations,
+                    forfeit_score: rules.forfeit_score,
                 },
                 recording: keeps_recording.then(|| game_recording_key(game, &claim)),
             },

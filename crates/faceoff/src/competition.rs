@@ -78,7 +78,7 @@ mod tests {
                 "tracking_loss.chance: unknown, expected one of probability, steps",
             ),
             (r#"{"rain":{}}"#, "rain: unknown"),
-            ("[", "EOF"),
+            ("{", "EOF"),
         ] {
             let refused = read(text).unwrap_err();
             assert!(refused.contains(words), "{refused}");

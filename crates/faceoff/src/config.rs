@@ -132,7 +132,8 @@ pub struct EvaluationConfig {
     pub weights: TaskWeights,
     /// Most penalty points per episode of the tiers (classes of agents) deployable and improvable.
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile enables; left out, those of the competition.
+    /// Magnitudes of the perturbations that the profile enables; left out, those of the ruleset.
+    #[serde(skip_serializing_if = "Magnitudes::is_empty")]
     pub perturbations: Magnitudes,
     /// When the datasets of released days are published.
     pub publishes: Publication,

@@ -89,22 +89,29 @@ impl fmt::Display for Finding {
 
 /// Words of air hockey and names of its crates in the crate whose root is in `folder`, outside of comments and tests.
 pub fn findings(folder: &Path, air_hockey: &BTreeSet<String>) -> Vec<Finding> {
-    let mut files = Vec::new();
-    collect_files(folder, &mut files);
-    let mut found = Vec::new();
-    for file in files {
-        let text = fs::read_to_string(&file).expect("a source file can be read");
+    let mut paths = Vec::new();
+    collect_files(folder, &mut paths);
+    let read = |path: PathBuf| {
+        let text = fs::read_to_string(&path).expect("a source file can be read");
         let syntax =
-            syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+            syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        (path, syntax)
+    };
+    let files: Vec<(PathBuf, syn::File)> = paths.into_iter().map(read).collect();
+    let of_tests: BTreeSet<PathBuf> = files.iter().flat_map(test_modules).collect();
+    let mut found = Vec::new();
+    for (file, syntax) in files.iter().filter(|(file, _)| !of_tests.contains(file)) {
         let mut finder = WordFinder {
+            // The agents are programs, no crates that others import.
             crates: air_hockey
                 .iter()
+                .filter(|name| name.starts_with("faceoff-"))
                 .map(|name| name.replace('-', "_"))
                 .collect(),
             words: BTreeSet::new(),
         };
-        finder.visit_file(&syntax);
-        let name = file.strip_prefix(folder).unwrap_or(&file);
+        finder.visit_file(syntax);
+        let name = file.strip_prefix(folder).unwrap_or(file);
         let name = name.to_string_lossy().into_owned();
         found.extend(finder.words.into_iter().map(|word| Finding {
             word,
@@ -112,6 +119,24 @@ pub fn findings(folder: &Path, air_hockey: &BTreeSet<String>) -> Vec<Finding> {
         }));
     }
     found
+}
+
+/// The files of modules of this file that only tests have.
+fn test_modules((path, syntax): &(PathBuf, syn::File)) -> Vec<PathBuf> {
+    let stem = path.file_stem().unwrap_or_default();
+    let is_root = ["lib", "main", "mod"].iter().any(|root| stem == *root);
+    let folder = if is_root {
+        path.with_file_name("")
+    } else {
+        path.with_extension("")
+    };
+    let files = syntax.items.iter().filter_map(|item| match item {
+        Item::Mod(module) if module.content.is_none() && is_test_item(item) => {
+            Some(folder.join(format!("{}.rs", module.ident)))
+        }
+        _ => None,
+    });
+    files.collect()
 }
 
 fn collect_files(folder: &Path, files: &mut Vec<PathBuf>) {
@@ -142,6 +167,9 @@ struct WordFinder {
 
 impl WordFinder {
     fn read(&mut self, text: &str) {
+        let names = text.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+        let crates = names.filter(|name| self.crates.contains(*name));
+        self.words.extend(crates.map(str::to_owned));
         for word in words(text) {
             let singular = word.strip_suffix('s').unwrap_or(&word);
             if WORDS.contains(&singular) {
@@ -170,12 +198,7 @@ impl Visit<'_> for WordFinder {
     }
 
     fn visit_ident(&mut self, ident: &syn::Ident) {
-        let name = ident.to_string();
-        if self.crates.contains(&name) {
-            self.words.insert(name);
-        } else {
-            self.read(&name);
-        }
+        self.read(&ident.to_string());
     }
 
     fn visit_lit_str(&mut self, literal: &LitStr) {

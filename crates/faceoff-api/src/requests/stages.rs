@@ -97,14 +97,14 @@ pub struct StagePatch {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tier_bounds: Option<TierBounds>,
     /// Magnitudes of the perturbations that the profile switches on. Replaces all of them: those that are left out get
-    /// the values of the competition.
+    /// the ruleset's values.
     #[cfg_attr(
         feature = "clap",
         arg(
             long,
             value_name = "FILE",
             value_parser = options::read_perturbations,
-            help = "A JSON file with magnitudes of the perturbations; those left out are the competition's, so {} resets all of them"
+            help = "A JSON file with magnitudes of the perturbations; those left out are the ruleset's, so {} resets all of them"
         )
     )]
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -143,7 +143,7 @@ pub enum GameStatus {
 /// Result of a game. In arrays with one item per side the home side comes first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct GameResultView {
-    /// Final score, which counts: includes points for the opponent's fouls; 10 : 0 after a forfeit.
+    /// Final score, which counts: includes points for the opponent's fouls; after a forfeit 10 : 0, or a larger lead.
     pub score: [u32; 2],
     /// Goals, without points for fouls.
     pub goals: [u32; 2],

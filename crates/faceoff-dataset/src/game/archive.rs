@@ -62,6 +62,7 @@ pub(super) fn game_settings(spec: &GameSpec, agents: &[String; 2]) -> GameSettin
         profile: spec.profile,
         perturbations: spec.perturbations.clone(),
         limits: spec.limits.clone(),
+        forfeit_score: spec.forfeit_score,
         seed: spec.seed,
         agents: agents.clone(),
     }

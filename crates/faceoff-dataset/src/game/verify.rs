@@ -61,7 +61,12 @@ pub fn verify_game(
 /// Checks that this version can reproduce the states: same ruleset, same simulator, valid magnitudes.
 fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
     let (manifest, current) = (recording.manifest(), simulator_id());
+    let simulator = faceoff_airhockey::simulator();
+    let competition = simulator.competition();
     let ruleset = manifest.spec.ruleset;
+    competition
+        .find_ruleset(ruleset.as_str())
+        .map_err(|unknown| DatasetError::Foreign(unknown.to_string()))?;
     if !AirHockeyRuleset::find(ruleset).is_some_and(AirHockeyRuleset::has_games) {
         let with_games = AirHockeyRuleset::ALL
             .into_iter()
@@ -75,8 +80,7 @@ fn check_reproducible(recording: &GameRecording) -> Result<(), DatasetError> {
         )));
     }
     let mut magnitudes = manifest.spec.perturbations.clone();
-    faceoff_airhockey::simulator()
-        .competition()
+    competition
         .check_magnitudes(&mut magnitudes)
         .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
     if manifest.simulator != current {

@@ -15,6 +15,9 @@ pub enum VerifyError {
     /// The first difference from the simulation.
     #[error("{0}")]
     Differs(Box<Difference>),
+    /// This simulator does not have the conditions of the job.
+    #[error("the job cannot be simulated: {0}")]
+    Job(String),
     /// The threads could not be started.
     #[error("starting the workers: {0}")]
     Workers(#[from] rayon::ThreadPoolBuildError),

@@ -43,9 +43,9 @@ pub fn verify_shard(
     }
     let competition = simulator.competition();
     let environment = simulator.environment(&shard_conditions(spec));
-    let environment = environment.map_err(|unknown| unusable(&unknown.to_string()))?;
+    let environment = environment.map_err(|invalid| VerifyError::Job(invalid.to_string()))?;
     let ruleset = competition.find_ruleset(spec.ruleset.as_str());
-    let ruleset = *ruleset.map_err(|unknown| unusable(&unknown.to_string()))?;
+    let ruleset = *ruleset.map_err(|unknown| VerifyError::Job(unknown.to_string()))?;
     let replayer = Replayer::new(ruleset, environment, competition);
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
     let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps, competition)?;

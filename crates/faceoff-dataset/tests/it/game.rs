@@ -37,6 +37,7 @@ fn spec() -> GameSpec {
         limits: GameLimits::default(),
         platform_retries: 0,
         perturbations: Default::default(),
+        forfeit_score: Default::default(),
     }
 }
 
@@ -285,7 +286,7 @@ fn damaged_and_foreign_recordings_have_different_errors() {
         (
             "airhockey-2023.3",
             "airhockey-1999",
-            "`airhockey-2023.1`, `airhockey-2023.2`, `airhockey-2023.3`",
+            "this version knows airhockey-2023.1, airhockey-2023.2, airhockey-2023.3",
         ),
     ] {
         let forged = Forgery::copy_of(unpacked.path());

@@ -86,6 +86,7 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "properties": lists.collect::<Map<String, Value>>(),
     });
     schemas[&*Magnitudes::name()] = magnitudes(competition);
+    add_defaults(schemas, competition);
     let weight = |info: &faceoff_types::TaskInfo| {
         let schema = json!({
             "type": "number",
@@ -102,6 +103,19 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "required": names,
         "additionalProperties": false,
     });
+}
+
+/// Tournaments' rules have the defaults of the competition, in descriptions of rules and of their changes.
+fn add_defaults(schemas: &mut Value, competition: &Competition) {
+    let rules = json!(competition.tournament_rules());
+    for name in ["TournamentRules", "TournamentRulesChange"] {
+        let properties = schemas[name]["properties"].as_object_mut();
+        for (field, schema) in properties.into_iter().flatten() {
+            if let (Some(default), Some(schema)) = (rules.get(field), schema.as_object_mut()) {
+                schema.insert("default".to_owned(), default.clone());
+            }
+        }
+    }
 }
 
 /// The schema of magnitudes of perturbations: an object for each group.

@@ -28,6 +28,7 @@ pub fn spec(steps: u32) -> GameSpec {
         },
         platform_retries: 0,
         perturbations: Default::default(),
+        forfeit_score: Default::default(),
     }
 }
 

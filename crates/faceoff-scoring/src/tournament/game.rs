@@ -7,7 +7,9 @@ use super::{
     side::Side,
     submission_label::SubmissionLabel,
 };
-use faceoff_types::{FOULS_PER_POINT, GAME_WINDOWS, RoundNumber, TeamName, WINDOW_STEPS};
+use faceoff_types::{
+    FOULS_PER_POINT, ForfeitScore, GAME_WINDOWS, RoundNumber, TeamName, WINDOW_STEPS,
+};
 use serde::{Deserialize, Serialize};
 
 /// A played game, one entry of `games.json`. Pairs are `[home, away]`.
@@ -18,7 +20,7 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "GameEntry")]
 pub struct PlayedGame {
     raw: GameEntry,
-    /// Final score `[home, away]` that counts: 10 : 0 after a forfeit.
+    /// Final score `[home, away]` that counts, also after a forfeit.
     score: [u32; 2],
     result: GameResult,
 }
@@ -49,6 +51,9 @@ pub struct GameEntry {
     /// The limit that each side exceeded, if it forfeited.
     #[serde(default, skip_serializing_if = "has_no_forfeit")]
     pub forfeit: [Option<Forfeit>; 2],
+    /// What the game counts after a forfeit; absent: 10 : 0.
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    pub forfeit_score: ForfeitScore,
     /// Submissions of the two teams, if each is to have its own rating.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub submissions: Option<[SubmissionLabel; 2]>,
@@ -80,7 +85,7 @@ pub struct InvalidGame {
 pub struct ScoredGame {
     #[serde(flatten)]
     raw: GameEntry,
-    /// Final score that counts, including points for the opponent's fouls; 10 : 0 after a forfeit.
+    /// Final score that counts, including points for the opponent's fouls; after a forfeit 10 : 0, or a larger lead.
     pub score: [u32; 2],
     /// The winner; `None` is a draw.
     pub winner: Option<TeamName>,
@@ -148,10 +153,10 @@ impl PlayedGame {
         self.raw.goals
     }
 
-    /// Goals for the standings: 10 : 0 after a forfeit, otherwise those scored.
+    /// Goals for the standings: those scored, but after a forfeit 10 : 0 or a larger lead.
     #[must_use]
     pub fn counted_goals(&self) -> [u32; 2] {
-        forfeit_score(self.raw.forfeit).unwrap_or(self.raw.goals)
+        self.raw.counted(self.raw.goals)
     }
 
     /// The limit that each side exceeded; `None` if it did not forfeit.
@@ -175,7 +180,7 @@ impl PlayedGame {
         self.raw.pair
     }
 
-    /// Final score that counts; 10 : 0 after a forfeit.
+    /// Final score that counts, also after a forfeit.
     #[must_use]
     pub const fn score(&self) -> [u32; 2] {
         self.score
@@ -229,7 +234,7 @@ impl TryFrom<GameEntry> for PlayedGame {
                     windows: raw.windows.unwrap_or(GAME_WINDOWS),
                     forfeits: raw.forfeit,
                 });
-                let score = forfeit_score(raw.forfeit).unwrap_or(played_score);
+                let score = raw.counted(played_score);
                 Ok(Self { raw, score, result })
             }
             Err(reason) => Err(InvalidGame {
@@ -243,6 +248,11 @@ impl TryFrom<GameEntry> for PlayedGame {
 }
 
 impl GameEntry {
+    /// The score, or the goals, that count if the game stood at `played`.
+    fn counted(&self, played: [u32; 2]) -> [u32; 2] {
+        forfeit_score(self.forfeit_score, self.forfeit, played).unwrap_or(played)
+    }
+
     /// The final score before forfeits, or the reason why the entry is invalid.
     fn check(&self) -> Result<[u32; 2], String> {
         if let Err(error) = RoundNumber::try_from(self.round) {
@@ -288,15 +298,17 @@ impl GameEntry {
 
     /// The final score before forfeits, from goals and fouls or from `score`.
     fn final_score(&self) -> Result<[u32; 2], String> {
-        if let Some(forfeit_score) = forfeit_score(self.forfeit) {
+        if !has_no_forfeit(&self.forfeit) {
             let fouls = self.fouls.ok_or(
                 "a forfeited game needs its fouls: the score before the forfeit does not count",
             )?;
+            let played = final_score(self.goals, fouls);
+            let counted = self.counted(played);
             return match self.score {
-                Some(score) if score != forfeit_score => Err(format!(
-                    "score: a game with this forfeit counts {forfeit_score:?}, got {score:?}"
+                Some(score) if score != counted => Err(format!(
+                    "score: a game with this forfeit counts {counted:?}, got {score:?}"
                 )),
-                _ => Ok(final_score(self.goals, fouls)),
+                _ => Ok(played),
             };
         }
         match (self.fouls, self.score) {

@@ -52,7 +52,7 @@ pub struct VarianceComparison {
 /// Goal differences of a pair for the first submission of the pairing: `[home game, away game]`.
 type Halves = [i64; 2];
 
-/// Finds the complete mirrored pairs. Goals are those of the standings, so 10 : 0 for a forfeit.
+/// Finds the complete mirrored pairs. Goals are those of the standings, so 10 : 0 or more for a forfeit.
 ///
 /// # Errors
 /// If games with the same pair number are not a mirrored pair.

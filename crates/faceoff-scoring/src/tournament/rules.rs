@@ -5,7 +5,7 @@ use super::{
     side::Side,
 };
 use crate::tier::tier_of;
-use faceoff_types::{FOULS_PER_POINT, Tier};
+use faceoff_types::{FOULS_PER_POINT, ForfeitScore, Tier};
 use std::cmp::Ordering;
 
 /// Points of a won game.
@@ -14,7 +14,7 @@ pub const POINTS_WIN: u32 = 3;
 pub const POINTS_DRAW: u32 = 1;
 /// Points of a lost game.
 pub const POINTS_LOSS: u32 = 0;
-/// Goals of the other side in a forfeited game.
+/// Goals of the other side in a forfeited game, unless it led by more.
 pub const FORFEIT_GOALS: u32 = 10;
 
 /// The numbers that decide a game. Pairs are `[home, away]`.
@@ -39,13 +39,27 @@ pub fn final_score(goals: [u32; 2], fouls: [u32; 2]) -> [u32; 2] {
     ]
 }
 
-/// Score of a forfeited game: 10 : 0 for the other side, 0 : 0 if both sides forfeited. `None` without a forfeit.
+/// Score (or goals) of a forfeited game that stood at `played`; 0 : 0 if both sides forfeited. `None` without a forfeit.
 #[must_use]
-pub fn forfeit_score(forfeits: [Option<Forfeit>; 2]) -> Option<[u32; 2]> {
+pub fn forfeit_score(
+    rule: ForfeitScore,
+    forfeits: [Option<Forfeit>; 2],
+    played: [u32; 2],
+) -> Option<[u32; 2]> {
+    let won_by = |winner: Side| {
+        let lead = played[winner as usize].saturating_sub(played[winner.other() as usize]);
+        if rule == ForfeitScore::TenOrLead && lead > FORFEIT_GOALS {
+            return played;
+        }
+        match winner {
+            Side::Home => [FORFEIT_GOALS, 0],
+            Side::Away => [0, FORFEIT_GOALS],
+        }
+    };
     match forfeits {
         [None, None] => None,
-        [Some(_), None] => Some([0, FORFEIT_GOALS]),
-        [None, Some(_)] => Some([FORFEIT_GOALS, 0]),
+        [Some(_), None] => Some(won_by(Side::Away)),
+        [None, Some(_)] => Some(won_by(Side::Home)),
         [Some(_), Some(_)] => Some([0, 0]),
     }
 }
@@ -188,9 +202,33 @@ mod tests {
             ),
         ] {
             assert_eq!(judged([1, 2], unsafe_home, forfeits), expected);
-            assert_eq!(forfeit_score(forfeits), Some(expected_score));
+            for rule in [ForfeitScore::Ten, ForfeitScore::TenOrLead] {
+                let score = forfeit_score(rule, forfeits, [1, 2]);
+                assert_eq!(score, Some(expected_score));
+            }
         }
-        assert_eq!(forfeit_score([None, None]), None);
+        assert_eq!(forfeit_score(ForfeitScore::Ten, [None, None], [1, 2]), None);
+    }
+
+    #[test]
+    fn forfeit_saves_no_goals_of_a_side_far_behind() {
+        let by_home = [Some(Forfeit::Faults), None];
+        let by_away = [None, Some(Forfeit::Time)];
+        for (forfeits, played, expected) in [
+            (by_home, [0, 25], [0, 25]),
+            (by_home, [3, 14], [3, 14]),
+            (by_home, [4, 14], [0, 10]),
+            (by_home, [25, 0], [0, 10]),
+            (by_away, [11, 0], [11, 0]),
+            (by_away, [10, 0], [10, 0]),
+            (by_away, [0, 25], [10, 0]),
+            ([Some(Forfeit::Time); 2], [25, 0], [0, 0]),
+        ] {
+            let score = |rule| forfeit_score(rule, forfeits, played).unwrap();
+            assert_eq!(score(ForfeitScore::TenOrLead), expected, "{played:?}");
+            let [home, away] = score(ForfeitScore::Ten);
+            assert!(home.max(away) <= FORFEIT_GOALS);
+        }
     }
 
     #[test]

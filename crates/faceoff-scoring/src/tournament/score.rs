@@ -14,8 +14,9 @@ use crate::{
     tier::tier_of,
 };
 use faceoff_types::{
-    ComputationTimeSummary, ForfeitCause, GameLimits, GameOutcome, GameWindow, Magnitudes, Profile,
-    RoundNumber, Ruleset, Seed, SideOutcome, TeamName, Tier, ViolationCounts, WINDOW_STEPS,
+    ComputationTimeSummary, ForfeitCause, ForfeitScore, GameLimits, GameOutcome, GameWindow,
+    Magnitudes, Profile, RoundNumber, Ruleset, Seed, SideOutcome, TeamName, Tier, ViolationCounts,
+    WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +31,8 @@ pub struct GameSettings {
     pub perturbations: Magnitudes,
     /// Limits of faults and time for each side.
     pub limits: GameLimits,
+    /// What the game counts after a forfeit.
+    pub forfeit_score: ForfeitScore,
     /// Seed of this game.
     pub seed: Seed,
     /// Names of the agents, first side first.
@@ -67,6 +70,9 @@ pub struct GameScore {
     pub reason: ResultReason,
     /// `played`, `forfeit` or `both_forfeit`.
     pub end: String,
+    /// What the game counts after a forfeit; absent: 10 : 0, or a game without a forfeit.
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    pub forfeit_score: ForfeitScore,
 }
 
 impl GameScore {
@@ -91,6 +97,7 @@ impl GameScore {
             penalty_points: [first.penalty_points, second.penalty_points],
             windows: Some(self.windows.max(1)),
             forfeit: self.forfeits(),
+            forfeit_score: self.forfeit_score,
             submissions: None,
             pair: None,
         }
@@ -126,7 +133,7 @@ pub struct SideScore {
     pub goals: u32,
     /// Number of fouls.
     pub fouls: u32,
-    /// The score that counts, including points for the opponent's fouls; 10 : 0 after a forfeit.
+    /// The score that counts, including points for the opponent's fouls; after a forfeit 10 : 0, or a larger lead.
     pub score: u32,
     /// Penalty points over all windows: the deployability score (DS).
     pub penalty_points: f64,
@@ -183,7 +190,8 @@ pub fn score_game(
         windows,
         forfeits,
     });
-    let score = forfeit_score(forfeits).unwrap_or(played_score);
+    let counted = forfeit_score(settings.forfeit_score, forfeits, played_score);
+    let score = counted.unwrap_or(played_score);
     let side = |i: usize, side: &SideOutcome| SideScore {
         agent: settings.agents[i].clone(),
         goals: side.goals,
@@ -211,6 +219,8 @@ pub fn score_game(
         winner: result.winner(),
         reason: result.into(),
         end: outcome.end.as_str().to_owned(),
+        // Games without a forfeit do not state the rule.
+        forfeit_score: counted.map_or_else(ForfeitScore::default, |_| settings.forfeit_score),
     }
 }
 
@@ -303,6 +313,7 @@ mod tests {
             profile: faceoff_airhockey::EVALUATION,
             perturbations: Magnitudes::default(),
             limits: GameLimits::default(),
+            forfeit_score: ForfeitScore::TenOrLead,
             seed,
             agents: ["a".to_owned(), "b".to_owned()],
         };

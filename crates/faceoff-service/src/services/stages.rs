@@ -49,13 +49,22 @@ pub fn check_offered(app: &AppState, requested: Option<&Runtimes>) -> Result<(),
     }
 }
 
+/// Checks magnitudes, and completes them, so that those that state a default are no change.
+fn complete_magnitudes(app: &AppState, patch: &mut StagePatch) -> Result<(), Problem> {
+    let Some(magnitudes) = &mut patch.perturbations else {
+        return Ok(());
+    };
+    let checked = app.config.competition().check_magnitudes(magnitudes);
+    checked.map_err(|error| invalid_rules(&error.into()))
+}
+
 /// Refuses magnitudes of perturbations with which this season cannot be played.
 #[boxed]
-pub async fn check_magnitudes(app: &AppState, magnitudes: &Magnitudes) -> Result<(), Problem> {
+pub async fn check_playable(app: &AppState, magnitudes: &Magnitudes) -> Result<(), Problem> {
     let seed = app.store.season().await?.secret.model_mismatch();
     let simulator = Arc::clone(&app.config.simulator);
     let magnitudes = magnitudes.clone();
-    let check = move || simulator.check_magnitudes(&magnitudes, seed);
+    let check = move || simulator.check_playable(&magnitudes, seed);
     let checked = tokio::task::spawn_blocking(check)
         .await
         .map_err(Problem::internal)?;
@@ -69,8 +78,9 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
     let now = app.config.clock.now();
     let NewStage {
         name,
-        settings: patch,
+        settings: mut patch,
     } = new;
+    complete_magnitudes(app, &mut patch)?;
     check_offered(app, requested_runtimes(&patch))?;
     let mut rules = template.rules.rules;
     rules.ruleset = app.config.competition().ruleset();
@@ -88,7 +98,7 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
         .and_then(|()| app.config.competition().check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(patch.retention)?.unwrap_or_default();
-    check_magnitudes(app, &rules.variation.perturbations).await?;
+    check_playable(app, &rules.variation.perturbations).await?;
     let new_stage = faceoff_store::NewStage {
         name: parse_name(&name)?,
         opens_at: patch.opens_at.unwrap_or(now),
@@ -112,8 +122,9 @@ pub async fn change_stage(
     app: &AppState,
     actor: Actor,
     id: StageId,
-    change: StagePatch,
+    mut change: StagePatch,
 ) -> Result<Stage, Problem> {
+    complete_magnitudes(app, &mut change)?;
     let stage = app.store.stage(id).await?;
     let now = app.config.clock.now();
     let current_rules = &stage.rules.rules;
@@ -130,7 +141,7 @@ pub async fn change_stage(
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != current_rules.variation.perturbations {
-        check_magnitudes(app, &rules.variation.perturbations).await?;
+        check_playable(app, &rules.variation.perturbations).await?;
     }
     let mut effects = Vec::new();
     if stage.phase(now) == StagePhase::Open {

@@ -160,9 +160,16 @@ impl TournamentState {
 
     /// Whether the game has no result and can still get one that counts.
     pub(crate) fn needs_result(&self, game: &Game) -> bool {
+        let round = match game.purpose {
+            GamePurpose::Round(entry) => Some(entry.round),
+            _ => None,
+        };
+        // A team that withdraws may play the round under way to its end.
         let has_left = |team: &TeamId| {
             let entrant = self.entrants.iter().find(|entrant| entrant.team == *team);
-            entrant.is_some_and(|entrant| entrant.departure.is_some())
+            let departure = entrant.and_then(|entrant| entrant.departure.as_ref());
+            departure
+                .is_some_and(|departure| round.is_none_or(|round| departure.from_round <= round))
         };
         !matches!(
             game.state,

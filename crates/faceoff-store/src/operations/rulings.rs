@@ -14,6 +14,7 @@ use crate::{
     tables::{
         counting_evaluations, days, entrants, entries,
         evaluations::{Evaluation, Failure},
+        rounds,
         rulings::Ruling,
         sign_offs,
         teams::{self, Team},
@@ -21,7 +22,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{DepartureKind, EvaluationId, StageDay, TeamId};
+use faceoff_types::{DepartureKind, EvaluationId, StageDay, TeamId, Withdrawals};
 use jiff::Timestamp;
 
 pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
@@ -45,11 +46,18 @@ async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()
     };
     for tournament in tournaments::all(tx).await? {
         let entrants = entrants::all(tx, tournament.id).await?;
-        let takes_part = entrants
-            .iter()
-            .any(|entrant| entrant.team == team && entrant.departure.is_none());
+        let rounds = rounds::count(tx, tournament.id).await?;
+        // A team that withdraws may play the round under way to its end.
+        let takes_part = entrants.iter().any(|entrant| {
+            let plays = entrant.departure.as_ref().is_none_or(|departure| {
+                tournament.rules.withdrawals == Withdrawals::AfterRound
+                    && departure.kind == DepartureKind::Withdrawn
+                    && departure.from_round.get() > rounds
+            });
+            entrant.team == team && plays
+        });
         if tournament.closed_at.is_none() && takes_part {
-            remove_entrant(tx, tournament.id, &departure).await?;
+            remove_entrant(tx, &tournament, &departure).await?;
         }
     }
     Ok(())

@@ -593,12 +593,11 @@ async fn departure_cancels_open_games() {
 #[tokio::test]
 async fn rerun_game_does_not_reopen_its_round() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(
-        &f,
-        &["A", "B", "C"],
-        faceoff_airhockey::competition().tournament_rules(),
-    )
-    .await;
+    let rules = TournamentRules {
+        withdrawals: Withdrawals::AtOnce,
+        ..faceoff_airhockey::competition().tournament_rules()
+    };
+    let (cup, teams) = opened(&f, &["A", "B", "C"], rules).await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     start(&f, cup.id, &first).await.unwrap();
@@ -636,6 +635,68 @@ async fn rerun_game_does_not_reopen_its_round() {
         .close_tournament(Actor::Organiser, cup.id, f.now)
         .await
         .unwrap();
+}
+
+#[tokio::test]
+async fn withdrawn_team_plays_the_round_to_its_end() {
+    let f = TestStore::new().await;
+    let (cup, [a, b, c]) = three_games(&f).await;
+    run_next_game(&f).await;
+    let out = departure(c, DepartureKind::Withdrawn, None);
+    let leave = async |request: &DepartureRequest| {
+        f.store
+            .leave_tournament(Actor::Organiser, cup.id, request, f.now)
+            .await
+    };
+    let early = departure(c, DepartureKind::Withdrawn, Some(round(1)));
+    assert_conflict(leave(&early).await, &["from_round: expected 2"]);
+    let left = leave(&out).await.unwrap().unwrap();
+    assert_eq!(left.from_round, round(2));
+    assert_conflict(leave(&out).await, &["has left the tournament already"]);
+    let next = drawn(2, &[&[[b, a]]], &[]);
+    assert_conflict(
+        start(&f, cup.id, &next).await,
+        &["2 games of earlier rounds have no result"],
+    );
+    for _ in 0..2 {
+        run_next_game(&f).await;
+    }
+    let after = record(&f, cup.id).await;
+    assert!(after.rounds[0].over_at.is_some());
+    let is_played = |game: &Game| matches!(game.state, GameState::Played(_));
+    assert!(after.games.iter().all(is_played), "{:?}", after.games);
+    start(&f, cup.id, &next).await.unwrap();
+}
+
+#[tokio::test]
+async fn withdrawal_does_not_delay_a_disqualification() {
+    for of_the_season in [false, true] {
+        let f = TestStore::new().await;
+        let (cup, [_, _, c]) = three_games(&f).await;
+        let request = departure(c, DepartureKind::Withdrawn, None);
+        let leave = async |request: &DepartureRequest| {
+            let left = f
+                .store
+                .leave_tournament(Actor::Organiser, cup.id, request, f.now);
+            left.await.unwrap().unwrap()
+        };
+        assert_eq!(leave(&request).await.from_round, round(2));
+        if of_the_season {
+            let ruling = f.store.disqualify_team(Actor::Organiser, c, REASON, f.now);
+            ruling.await.unwrap();
+        } else {
+            leave(&departure(c, DepartureKind::Disqualified, None)).await;
+        }
+        let after = record(&f, cup.id).await;
+        let entrant = after.entrants.iter().find(|one| one.team == c).unwrap();
+        let departure = entrant.departure.as_ref().unwrap();
+        assert_eq!(
+            (departure.kind, departure.from_round),
+            (DepartureKind::Disqualified, round(1))
+        );
+        let open = after.games.iter().filter(|game| game.state.is_open());
+        assert_eq!(open.count(), 1, "its games are cancelled");
+    }
 }
 
 #[tokio::test]

@@ -81,6 +81,7 @@ fn game(recording: Option<&str>) -> JobPayload {
             limits: GameLimits::default(),
             platform_retries: 1,
             perturbations: Default::default(),
+            forfeit_score: Default::default(),
         },
         recording: recording.map(str::to_owned),
     }

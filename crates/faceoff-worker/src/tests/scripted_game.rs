@@ -38,6 +38,7 @@ pub(super) fn game_report(spec: &GameSpec, out: &Path) -> GameReport {
         profile: spec.profile,
         perturbations: spec.perturbations.clone(),
         limits: spec.limits.clone(),
+        forfeit_score: spec.forfeit_score,
         seed: spec.seed,
         agents: ["first".into(), "second".into()],
     };

@@ -163,7 +163,7 @@ impl EvalCommand {
             .mismatch_seed
             .unwrap_or_else(|| self.seed.model_mismatch());
         config
-            .check_robot(mismatch_seed)
+            .check_playable(mismatch_seed)
             .context("the configuration")?;
         let setup = EvalSetup {
             tasks: std::mem::take(&mut self.tasks),

@@ -60,11 +60,11 @@ impl Config {
         }
     }
 
-    /// Refuses perturbations for which no robot with this mismatch seed exists.
-    pub fn check_robot(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
+    /// Refuses perturbations with which a season with this seed cannot be played.
+    pub fn check_playable(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
         let magnitudes = self.rules().variation.perturbations;
         simulator()
-            .check_magnitudes(&magnitudes, mismatch_seed)
+            .check_playable(&magnitudes, mismatch_seed)
             .map_err(|problem| anyhow!("evaluation.perturbations.{problem}"))
     }
 

@@ -117,7 +117,7 @@ fn error_names_the_field() {
     assert!(wrong.contains("0 < deployable < improvable"), "{wrong}");
     let wrong = error("[evaluation]\nperturbations = { delay = { tilt_m_s2 = -1 } }");
     assert!(
-        wrong.contains("evaluation.perturbations: delay.tilt_m_s2"),
+        wrong.contains("evaluation.perturbations.delay.tilt_m_s2"),
         "{wrong}"
     );
     assert!(error("[evaluation]\nperturbations = { noise = {} }").contains("noise"));

@@ -28,7 +28,9 @@ fn ranked_names(view: &Value) -> Vec<String> {
 
 #[tokio::test]
 async fn withdrawn_team_keeps_its_finished_rounds() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    // As in tournaments that earlier versions opened.
+    let body = json!({ "rules": { "withdrawals": "at_once" } });
+    let cup = Cup::open(&["A", "B", "C"], body).await;
     cup.start_round().await;
     cup.play(first_by_name_wins).await;
     cup.start_round().await;
@@ -92,6 +94,34 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
 }
 
 #[tokio::test]
+async fn withdrawn_team_plays_the_round_under_way() {
+    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    assert_eq!(cup.view().await["rules"]["withdrawals"], "after_round");
+    cup.start_round().await;
+    cup.play_next(first_by_name_wins).await.unwrap();
+    let departure =
+        json!({ "team": "A", "as": "withdrawn", "reason": "the arm is sold", "confirm": "A" });
+    let view = cup.post("departures", departure).await.json(200);
+    assert_eq!(view["entrants"][0]["departure"]["from_round"], 2);
+    assert_eq!(view["phase"], "round", "its games are still open: {view}");
+    assert_eq!(cup.play(first_by_name_wins).await, 2);
+    let view = cup.view().await;
+    assert_eq!(row(&view, "A")["points_per_round"], json!([6]));
+    assert_eq!(row(&view, "B")["points_per_round"], json!([3]));
+    assert_eq!(view["phase"], "between");
+    for game in cup.games().await {
+        assert_eq!(
+            (game.get("excluded_by"), &game["state"]),
+            (None, &json!("played"))
+        );
+    }
+    cup.start_round().await;
+    let of_second = cup.games().await;
+    let of_second = of_second.iter().filter(|game| game["round"] == 2);
+    assert_eq!(of_second.count(), 1, "only B and C are paired");
+}
+
+#[tokio::test]
 async fn disqualified_team_is_last_and_loses_chosen_rounds() {
     let cup = Cup::open(&["A", "B", "C"], json!({})).await;
     for _ in 0..2 {
@@ -145,7 +175,10 @@ async fn team_is_withdrawn_by_a_member_not_by_its_token() {
         .problem(
             409,
             "not-confirmed",
-            &["A would be withdrawn", "2 of its games"],
+            &[
+                "A would be withdrawn",
+                "games of a running round would still be played",
+            ],
         );
     let view = cup.site.post(&path, Some(&ada), &body).await.json(200);
     assert_eq!(view["entrants"][0]["departure"]["as"], "withdrawn");
@@ -155,7 +188,7 @@ async fn team_is_withdrawn_by_a_member_not_by_its_token() {
         .await
         .json(200);
     assert_eq!(log["events"][0]["actor_name"], "Ada");
-    assert_eq!(cup.play(first_by_name_wins).await, 1);
+    assert_eq!(cup.play(first_by_name_wins).await, 3);
 }
 
 #[tokio::test]

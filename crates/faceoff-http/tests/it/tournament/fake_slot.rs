@@ -96,6 +96,7 @@ impl GameOutcome {
             winner: result.winner(),
             reason: result.into(),
             end: "played".to_owned(),
+            forfeit_score: Default::default(),
         };
         serde_json::to_value(score).unwrap()
     }

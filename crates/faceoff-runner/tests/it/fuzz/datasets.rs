@@ -194,6 +194,7 @@ pub(super) fn label(outcome: &Result<(), VerifyError>) -> &'static str {
         Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
         Err(VerifyError::Workers(error)) => panic!("{error}"),
         Err(VerifyError::Recording(error)) => panic!("{error}"),
+        Err(VerifyError::Job(error)) => panic!("{error}"),
     }
 }
 

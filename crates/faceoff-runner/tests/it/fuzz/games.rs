@@ -30,6 +30,7 @@ fn record_game(out: &Path) {
         limits: GameLimits::default(),
         platform_retries: 0,
         perturbations: Default::default(),
+        forfeit_score: Default::default(),
     };
     let arena = Arena::new(
         spec.profile.try_into().unwrap(),

@@ -15,7 +15,9 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{DepartureKind, RoundNumber, TeamId, TournamentFormat, TournamentId};
+use faceoff_types::{
+    DepartureKind, RoundNumber, TeamId, TournamentFormat, TournamentId, Withdrawals,
+};
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
@@ -24,7 +26,7 @@ use std::collections::BTreeSet;
 pub struct DepartureRequest {
     pub team: TeamId,
     pub kind: DepartureKind,
-    /// First round whose games with the team do not count; `None`: the current round, or between rounds the next one.
+    /// First round whose games with the team do not count; `None`: the latest that is possible.
     pub from_round: Option<RoundNumber>,
     /// Public.
     pub reason: String,
@@ -46,11 +48,12 @@ async fn check_accepts_entrants(tx: &mut Tx, tournament: &Tournament) -> Result<
     Ok(())
 }
 
-/// Cancels a team's games that have no result.
+/// Cancels a team's games that have no result, without those of rounds before `played_until`.
 async fn cancel_open_games(
     tx: &mut Tx,
     id: TournamentId,
     team: TeamId,
+    played_until: Option<RoundNumber>,
     reason: &str,
 ) -> Result<()> {
     let mut games = games::of_rounds(tx, id).await?;
@@ -66,7 +69,11 @@ async fn cancel_open_games(
             game.state,
             GameState::Played(_) | GameState::Cancelled { .. }
         );
-        if is_over || !game.teams.contains(&team) {
+        let is_kept = matches!(
+            game.purpose,
+            GamePurpose::Round(entry) if played_until.is_some_and(|until| entry.round < until)
+        );
+        if is_over || is_kept || !game.teams.contains(&team) {
             continue;
         }
         game_lifecycle::cancel(tx, &game, reason).await?;
@@ -86,8 +93,28 @@ async fn current_round(tx: &mut Tx, id: TournamentId) -> Result<RoundNumber> {
     let newest = rounds::count(tx, id).await?;
     let pending = games::pending(tx, id).await?;
     let is_under_way = pending.iter().any(|pending| pending.round.get() == newest);
-    RoundNumber::try_from(if is_under_way { newest } else { newest + 1 })
+    round_number(if is_under_way { newest } else { newest + 1 })
+}
+
+fn round_number(number: u32) -> Result<RoundNumber> {
+    RoundNumber::try_from(number)
         .map_err(|_| StoreError::Conflict("all possible rounds have been played".into()))
+}
+
+/// The latest round from which a departure may take effect.
+async fn latest_round(
+    tx: &mut Tx,
+    tournament: &Tournament,
+    kind: DepartureKind,
+) -> Result<RoundNumber> {
+    match (kind, tournament.rules.withdrawals) {
+        (DepartureKind::Withdrawn, Withdrawals::AfterRound) => {
+            round_number(rounds::count(tx, tournament.id).await? + 1)
+        }
+        (DepartureKind::Disqualified, _) | (_, Withdrawals::AtOnce) => {
+            current_round(tx, tournament.id).await
+        }
+    }
 }
 
 impl Store {
@@ -124,8 +151,9 @@ impl Store {
         .await
     }
 
-    /// Removes a team from a tournament for good. Its games without a result are cancelled, and its games do not count
-    /// from the current round on (between rounds: from the next one). The games of a disqualified team can stop counting
+    /// Removes a team from a tournament for good. From the current round on (between rounds: from the next one) its games do not
+    /// count, and those without a result are cancelled. A team that withdraws plays the round under way to its end, if the rules of the
+    /// tournament say so. The games of a disqualified team can stop counting
     /// from an earlier round on (`from_round`). Before the first round the team is only removed (`None`) and can be added again. A team that
     /// withdrew can be disqualified later. [`StoreError::Conflict`] if it has left in another way, is not an entrant, or the
     /// tournament is closed.
@@ -138,8 +166,8 @@ impl Store {
         now: Timestamp,
     ) -> Result<Option<Departure>> {
         self.write(actor, now, async |tx| {
-            tournaments::find_open(tx, id).await?;
-            remove_entrant(tx, id, request).await
+            let tournament = tournaments::find_open(tx, id).await?;
+            remove_entrant(tx, &tournament, request).await
         })
         .await
     }
@@ -148,9 +176,10 @@ impl Store {
 /// Removes a team from a tournament that is not closed.
 pub(crate) async fn remove_entrant(
     tx: &mut Tx,
-    id: TournamentId,
+    tournament: &Tournament,
     request: &DepartureRequest,
 ) -> Result<Option<Departure>> {
+    let id = tournament.id;
     let DepartureRequest {
         team,
         kind,
@@ -165,17 +194,17 @@ pub(crate) async fn remove_entrant(
     let latest_round = match (&entrant.departure, kind) {
         (None, _) if rounds::count(tx, id).await? == 0 => {
             entrants::remove(tx, id, team).await?;
-            cancel_open_games(tx, id, team, &cancel_reason).await?;
+            cancel_open_games(tx, id, team, None, &cancel_reason).await?;
             let reason = reason.clone();
             tx.record(Subject::Tournament(id), Event::TeamOut { team, reason });
             return Ok(None);
         }
-        (None, _) => current_round(tx, id).await?,
-        // A team cannot avoid disqualification by withdrawing first.
+        (None, _) => latest_round(tx, tournament, kind).await?,
+        // A team cannot avoid disqualification by withdrawing first, nor delay it.
         (Some(earlier), DepartureKind::Disqualified)
             if earlier.kind == DepartureKind::Withdrawn =>
         {
-            earlier.from_round
+            earlier.from_round.min(current_round(tx, id).await?)
         }
         (Some(_), _) => {
             return StoreError::conflict(format!(
@@ -201,7 +230,10 @@ pub(crate) async fn remove_entrant(
         reason: reason.clone(),
     };
     entrants::set_departure(tx, id, team, &departure).await?;
-    cancel_open_games(tx, id, team, &cancel_reason).await?;
+    let plays_on =
+        kind == DepartureKind::Withdrawn && tournament.rules.withdrawals == Withdrawals::AfterRound;
+    let played_until = plays_on.then_some(from_round);
+    cancel_open_games(tx, id, team, played_until, &cancel_reason).await?;
     let event = Event::TeamLeftTournament {
         team,
         left_as: kind,

@@ -3,7 +3,7 @@
 use super::differences;
 use crate::competition::competition;
 use crate::{client::Client, commands::block_on, config::Config, machine};
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use faceoff_api::views::{
     runtimes::{RuntimesView, StageResources},
     stage::{PhaseView, StageView},
@@ -52,7 +52,7 @@ impl ServerStage {
         stages: Vec<StageView>,
         name_or_id: Option<&str>,
     ) -> anyhow::Result<Self> {
-        let stage = select_stage(stages, &server.stages, name_or_id)?;
+        let mut stage = select_stage(stages, &server.stages, name_or_id)?;
         let (ruleset, own) = (stage.rules.rules.ruleset, competition().ruleset());
         ensure!(
             ruleset == own,
@@ -60,6 +60,10 @@ impl ServerStage {
             a version of faceoff with {ruleset}",
             stage.name
         );
+        let rules = &mut stage.rules.rules;
+        competition()
+            .check_rules(rules)
+            .map_err(|error| anyhow!("its stage “{}” has invalid rules: {error}", stage.name))?;
         let offer = server.stages.iter().find(|offer| offer.id == stage.id);
         let offer = offer.cloned().with_context(|| {
             format!(

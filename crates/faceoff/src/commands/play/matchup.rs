@@ -7,7 +7,7 @@ use faceoff_runner::{
     AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, bundle::Bundle, run_game,
 };
 use faceoff_sandbox::affinity;
-use faceoff_types::{GameLimits, Seed};
+use faceoff_types::{ForfeitScore, GameLimits, Seed};
 use faceoff_worker::CpuLayout;
 use std::{fs, path::Path};
 use tempfile::TempDir;
@@ -26,7 +26,7 @@ pub(super) struct Matchup {
 pub(super) fn load_config(options: &PlayOptions) -> anyhow::Result<Config> {
     let config = Config::load(options.config.as_deref())?;
     config
-        .check_robot(mismatch_seed(options))
+        .check_playable(mismatch_seed(options))
         .context("the configuration")?;
     Ok(config)
 }
@@ -59,6 +59,7 @@ impl Matchup {
             seed: options.seed,
             mismatch_seed: mismatch_seed(options),
             limits: GameLimits::default(),
+            forfeit_score: ForfeitScore::TenOrLead,
             platform_retries: 0,
             perturbations: config.rules().variation.perturbations,
         };

@@ -65,7 +65,7 @@ pub(super) struct SeriesGame {
     home: u32,
     pub(super) goals: [u32; 2],
     fouls: [u32; 2],
-    /// The counted score, including points for fouls; 10 : 0 after a forfeit.
+    /// The counted score, including points for fouls; after a forfeit 10 : 0, or a larger lead.
     pub(super) score: [u32; 2],
     penalty_points: [f64; 2],
     /// 0 or 1; `None`: a draw.

@@ -176,7 +176,7 @@ async fn configure_season(config: &Config, store: &Store, now: Timestamp) -> any
     }
     let season = store.season().await.context("reading the season")?;
     config
-        .check_robot(season.secret.model_mismatch())
+        .check_playable(season.secret.model_mismatch())
         .context("the configuration")?;
     store
         .configure_stage(

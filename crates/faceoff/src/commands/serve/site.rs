@@ -3,7 +3,7 @@
 use super::data_folder::{empty_folder, load_or_create_link_key, lock, set_admin_token};
 use crate::competition::{competition, simulator};
 use crate::{config::Config, machine};
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use faceoff_http::{AgentResources, Capacity, HttpConfig, LinkKey};
 use faceoff_metrics::Metrics;
 use faceoff_store::{FreeSpace, Store};
@@ -43,6 +43,8 @@ impl Site {
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
+        let checked = competition().check();
+        checked.map_err(|problem| anyhow!("the competition of this program: {problem}"))?;
         let bound = store
             .bind_competition(competition(), Timestamp::now())
             .await;

@@ -158,8 +158,10 @@ mod tests {
             rules(&["--format", "round-robin"]),
             rules(&["--format", "swiss", "--rounds", "3", "--profile", "ideal"]),
         ] {
-            let rules: faceoff_types::TournamentRules =
-                serde_json::from_value(Value::Object(rules)).unwrap();
+            let defaults = crate::competition::competition().tournament_rules();
+            let mut merged = json!(defaults);
+            merged.as_object_mut().unwrap().extend(rules);
+            let rules: faceoff_types::TournamentRules = serde_json::from_value(merged).unwrap();
             assert_eq!(rules.check(), Ok(()));
         }
         assert_eq!(options(&[]).rules().unwrap(), None);
