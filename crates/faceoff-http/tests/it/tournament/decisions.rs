@@ -383,6 +383,25 @@ async fn rules_are_fixed_after_the_first_round_starts() {
 }
 
 #[tokio::test]
+async fn null_restores_the_default_of_each_rule() {
+    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let default_rules = cup.view().await["rules"].clone();
+    let own = json!({
+        "format": { "kind": "swiss", "rounds": 3 }, "steps": 1500, "profile": "ideal", "mirrored": true,
+        "forfeit_score": "ten", "withdrawals": "at_once", "game_limits": { "max_faults": 5 },
+        "perturbations": { "tracking_loss": { "probability": 0.5 } }, "limits": { "pids": 50 }, "runtimes": ["native"],
+    });
+    let changed = cup.change(json!({ "rules": own })).await.json(200);
+    assert_ne!(changed["rules"], default_rules);
+    let fields = own.as_object().unwrap().keys();
+    let mut nulls: serde_json::Map<String, Value> =
+        fields.map(|field| (field.clone(), Value::Null)).collect();
+    nulls.insert("ruleset".to_owned(), Value::Null);
+    let restored = cup.change(json!({ "rules": nulls })).await.json(200);
+    assert_eq!(restored["rules"], default_rules);
+}
+
+#[tokio::test]
 async fn tournament_keeps_its_ruleset_until_its_rules_change() {
     let cup = Cup::open(&["A", "B"], json!({})).await;
     let store = &cup.site.store;
@@ -404,6 +423,9 @@ async fn tournament_keeps_its_ruleset_until_its_rules_change() {
         json!({}),
         json!({ "mirrored": false }),
         json!({ "ruleset": "airhockey-2023.2" }),
+        // Magnitudes that state the default.
+        json!({ "perturbations": { "tracking_loss": { "probability": 0.03 } } }),
+        json!({ "perturbations": { "tracking_loss": {} } }),
     ] {
         let unchanged = cup.change(json!({ "rules": rules })).await.json(200);
         assert_eq!(unchanged["rules"]["ruleset"], "airhockey-2023.2");
