@@ -286,7 +286,7 @@ async fn second_competition_runs_on_the_real_server() {
     let opened = Dataset::open(&archive, other.competition()).unwrap();
     let refused = verify(&opened, other.as_ref(), NonZero::new(1).unwrap(), &|| ());
     let error = refused.unwrap_err().to_string();
-    assert!(error.contains("fingerprint"), "{error}");
+    assert!(error.contains("unknown ruleset \"points-1\""), "{error}");
 
     shutdown.cancel();
     worker.await.unwrap().unwrap();

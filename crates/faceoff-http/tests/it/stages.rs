@@ -173,12 +173,6 @@ async fn stage_keeps_its_ruleset_until_its_rules_change() {
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     for (body, revision, ruleset) in [
         (json!({ "name": "Heats" }), 2, "airhockey-2023.2"),
-        // Magnitudes that state the default.
-        (
-            json!({ "perturbations": { "tracking_loss": { "probability": 0.03 } } }),
-            2,
-            "airhockey-2023.2",
-        ),
         (
             json!({ "episodes_per_task": 9, "confirm": "Heats" }),
             3,

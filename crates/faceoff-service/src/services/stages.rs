@@ -49,15 +49,6 @@ pub fn check_offered(app: &AppState, requested: Option<&Runtimes>) -> Result<(),
     }
 }
 
-/// Checks magnitudes, and completes them, so that those that state a default are no change.
-fn complete_magnitudes(app: &AppState, patch: &mut StagePatch) -> Result<(), Problem> {
-    let Some(magnitudes) = &mut patch.perturbations else {
-        return Ok(());
-    };
-    let checked = app.config.competition().check_magnitudes(magnitudes);
-    checked.map_err(|error| invalid_rules(&error.into()))
-}
-
 /// Refuses magnitudes of perturbations with which this season cannot be played.
 #[boxed]
 pub async fn check_playable(app: &AppState, magnitudes: &Magnitudes) -> Result<(), Problem> {
@@ -78,9 +69,8 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
     let now = app.config.clock.now();
     let NewStage {
         name,
-        settings: mut patch,
+        settings: patch,
     } = new;
-    complete_magnitudes(app, &mut patch)?;
     check_offered(app, requested_runtimes(&patch))?;
     let mut rules = template.rules.rules;
     rules.ruleset = app.config.competition().ruleset();
@@ -122,9 +112,8 @@ pub async fn change_stage(
     app: &AppState,
     actor: Actor,
     id: StageId,
-    mut change: StagePatch,
+    change: StagePatch,
 ) -> Result<Stage, Problem> {
-    complete_magnitudes(app, &mut change)?;
     let stage = app.store.stage(id).await?;
     let now = app.config.clock.now();
     let current_rules = &stage.rules.rules;

@@ -238,7 +238,7 @@ async fn number_of_live_readers_is_limited() {
     busy.problem(503, "busy", &["1 readers"]);
     assert_eq!(busy.header("retry-after"), "2");
     // The stream of a cancelled game ends.
-    let departure = json!({ "team": "A", "as": "withdrawn", "reason": "x", "confirm": "A" });
+    let departure = json!({ "team": "A", "as": "disqualified", "reason": "x", "confirm": "A" });
     cup.post("departures", departure).await.json(200);
     assert_eq!(stream.next().await.unwrap().data["state"], "cancelled");
     assert_eq!(stream.next().await, None);

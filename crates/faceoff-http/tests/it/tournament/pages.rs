@@ -225,7 +225,7 @@ async fn excluded_game_names_the_team_that_left() {
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     let [home, _] = cup.names(&game).await;
     let departure =
-        json!({ "team": home, "as": "withdrawn", "reason": "the arm is sold", "confirm": home });
+        json!({ "team": home, "as": "disqualified", "reason": "the arm is sold", "confirm": home });
     cup.post("departures", departure).await.json(200);
     let words = format!("because {home} left");
     let game_page = page(&cup.site, &format!("/games/{}", game.id)).await;
@@ -242,7 +242,7 @@ async fn excluded_game_names_the_team_that_left() {
         "{results:?}"
     );
     let teams = texts(&html, "[data-live-region=entrants] th");
-    let expected = format!("{home} withdrawn from round 1: the arm is sold");
+    let expected = format!("{home} disqualified from round 1: the arm is sold");
     assert!(teams.contains(&expected), "{teams:?}");
 }
 
