@@ -120,7 +120,9 @@ async fn second_competition_runs_on_the_real_server() {
     let simulator = PointMass::new();
     let site = Site::start().await;
     let site = site.with_simulator(simulator.clone()).await;
-    let too_strong = json!({ "perturbations": { "wind": { "strength_m_s2": 2 } } });
+    let too_strong = json!({
+        "tasks": ["reach"], "profile": "windy", "perturbations": { "wind": { "strength_m_s2": 2 } },
+    });
     site.change_first_stage(too_strong).await.problem(
         422,
         "invalid-content",
