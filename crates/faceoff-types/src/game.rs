@@ -29,10 +29,6 @@ pub enum ForfeitScore {
 
 impl ForfeitScore {
     /// Is it the rule of earlier versions, which files do not state?
-    #[expect(
-        clippy::trivially_copy_pass_by_ref,
-        reason = "serde asks for a reference"
-    )]
     #[must_use]
     pub const fn is_first(&self) -> bool {
         matches!(self, Self::Ten)

@@ -24,7 +24,8 @@ impl ShortName {
         while index < text.len() {
             let byte = text[index];
             let is_plain = matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-');
-            if !is_plain && !(with_dots && byte == b'.') {
+            let is_allowed = is_plain || with_dots && byte == b'.';
+            if !is_allowed {
                 return None;
             }
             bytes[index] = byte;

@@ -69,10 +69,6 @@ pub enum Withdrawals {
 
 impl Withdrawals {
     /// Is it the rule of earlier versions, which stored rules do not state?
-    #[expect(
-        clippy::trivially_copy_pass_by_ref,
-        reason = "serde asks for a reference"
-    )]
     #[must_use]
     pub const fn is_first(&self) -> bool {
         matches!(self, Self::AtOnce)
