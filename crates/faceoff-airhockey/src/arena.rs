@@ -1,10 +1,9 @@
 //! The settings that all episodes of an evaluation, or all rallies of a game, have in common. From them an [`Arena`] creates the
 //! simulations.
 
-use faceoff_sim::Interpolation;
 use faceoff_sim::{
     AirHockeyProfile, AirHockeyRuleset, AirHockeyTask, Bounds, Episode, Factors, Game, GameSetup,
-    PerturbationSettings, Plant,
+    Interpolation, PerturbationSettings, Plant,
 };
 use faceoff_types::{Seed, Task};
 

@@ -2,8 +2,7 @@
 //! from a serve to a goal, a foul or another end. In pairs, the first side comes first.
 
 use faceoff_episode::{AnswerTiming, NullSink, RecordError};
-use faceoff_sim::Interpolation;
-use faceoff_sim::{ConstraintValues, GameState, Impact, RallyEnd};
+use faceoff_sim::{ConstraintValues, GameState, Impact, Interpolation, RallyEnd};
 use faceoff_types::{AgentFault, AgentFaultKind, Side};
 
 /// A fault of a side's agent, without its position in the game.

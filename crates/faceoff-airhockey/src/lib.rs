@@ -22,9 +22,8 @@ pub use game_record::{
     Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
     SideFault, SideStep,
 };
-pub use magnitudes::settings;
 pub use running_game::{FinishedGame, RunningGame};
-pub use simulator::{AirHockey, checked_magnitudes, find_ruleset, simulator};
+pub use simulator::{AirHockey, arena, checked_magnitudes, simulator};
 pub use world::AirHockeyWorld;
 
 use faceoff_scoring::{

@@ -142,7 +142,7 @@ fn describe(group: &'static str) -> impl Fn(&str, &str, Magnitude, [f64; 2]) -> 
 ///
 /// # Errors
 /// Which magnitude the simulator does not have, as text.
-pub fn settings(magnitudes: &Magnitudes) -> Result<PerturbationSettings, String> {
+pub(crate) fn settings(magnitudes: &Magnitudes) -> Result<PerturbationSettings, String> {
     magnitudes.to_settings().map_err(|error| error.to_string())
 }
 

@@ -10,8 +10,7 @@ use crate::{
     running_side::RunningSide,
 };
 use faceoff_episode::{NonFiniteObservation, Question, RecordError};
-use faceoff_sim::Interpolation;
-use faceoff_sim::{Command, Divergence, Game};
+use faceoff_sim::{Command, Divergence, Game, Interpolation};
 use faceoff_types::{
     AgentFault, AgentFaultKind, AgentTask, GameEnd, GameLimits, GameOutcome, Phase, Side,
     WINDOW_STEPS,

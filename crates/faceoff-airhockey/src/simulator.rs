@@ -8,9 +8,7 @@ use crate::{
 };
 use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator};
 use faceoff_sim::{AirHockeyRuleset, PerturbationSettings};
-use faceoff_types::{
-    AgentTask, Competition, InvalidMagnitude, Magnitudes, Ruleset, Seed, UnknownTask,
-};
+use faceoff_types::{AgentTask, Competition, InvalidMagnitude, Magnitudes, Seed, UnknownTask};
 use std::sync::{Arc, LazyLock};
 
 static SIMULATOR: LazyLock<Arc<AirHockey>> = LazyLock::new(|| {
@@ -65,20 +63,7 @@ impl Simulator for AirHockey {
         &self,
         conditions: &Conditions<'_>,
     ) -> Result<Box<dyn Environment>, InvalidConditions> {
-        let Conditions {
-            ruleset,
-            profile,
-            perturbations,
-            seed,
-            mismatch_seed,
-        } = *conditions;
-        Ok(Box::new(Arena::with_ruleset(
-            find_ruleset(ruleset)?,
-            profile.try_into().map_err(InvalidConditions::Profile)?,
-            &settings(perturbations).map_err(InvalidConditions::Magnitudes)?,
-            seed,
-            mismatch_seed,
-        )))
+        Ok(Box::new(arena(conditions)?))
     }
 
     fn check_playable(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
@@ -86,12 +71,25 @@ impl Simulator for AirHockey {
     }
 }
 
-/// The simulator's ruleset of this name.
+/// The arena of an evaluation or of a game.
 ///
 /// # Errors
-/// If the simulator has no such ruleset.
-pub fn find_ruleset(ruleset: Ruleset) -> Result<AirHockeyRuleset, InvalidConditions> {
-    AirHockeyRuleset::find(ruleset).ok_or(InvalidConditions::Ruleset(ruleset))
+/// If the simulator has no such ruleset, profile or magnitudes.
+pub fn arena(conditions: &Conditions<'_>) -> Result<Arena, InvalidConditions> {
+    let Conditions {
+        ruleset,
+        profile,
+        perturbations,
+        seed,
+        mismatch_seed,
+    } = *conditions;
+    Ok(Arena::with_ruleset(
+        AirHockeyRuleset::find(ruleset).ok_or(InvalidConditions::Ruleset(ruleset))?,
+        profile.try_into().map_err(InvalidConditions::Profile)?,
+        &settings(perturbations).map_err(InvalidConditions::Magnitudes)?,
+        seed,
+        mismatch_seed,
+    ))
 }
 
 /// Checks settings of the simulator, and returns them as the platform has them.

@@ -2,8 +2,7 @@
 
 use crate::arena::Arena;
 use faceoff_episode::{Environment, StateColumns, World};
-use faceoff_sim::Interpolation;
-use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact};
+use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact, Interpolation};
 use faceoff_types::{ActionLayout, EpisodeEnd, Seed, Task, UnknownTask, Violations};
 use std::any::Any;
 

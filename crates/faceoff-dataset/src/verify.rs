@@ -66,7 +66,7 @@ pub fn verify(
     let competition = simulator.competition();
     let tasks = competition
         .played_tasks(&manifest.episodes)
-        .map_err(|invalid| DatasetError::Foreign(format!("{MANIFEST_FILE}: {invalid}")))?;
+        .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
     if let Some(weights) = &manifest.variation.weights {
         let checked = weights.in_order(competition.task_names());
         checked

@@ -53,7 +53,7 @@ impl Game {
     fn new(setup: &str) -> PyResult<Self> {
         let setup: Setup = serde_json::from_str(setup)
             .map_err(|error| argument_error("setup", "a setup in JSON", error))?;
-        let _checked = check_perturbations(&setup.perturbations)?;
+        check_perturbations(&setup.perturbations)?;
         let action_formats = [0, 1].map(|robot| ActionFormat {
             mode: setup.action_mode[robot],
             interpolation: setup.interpolation[robot],

@@ -50,7 +50,7 @@ impl Setup {
                 setup.max_episode_steps,
             ));
         }
-        let _checked = check_perturbations(&setup.perturbations)?;
+        check_perturbations(&setup.perturbations)?;
         let magnitudes = &setup.perturbations;
         let is_drawn = setup.factors.contains(&Factor::ModelMismatch);
         // Thousands of unsuccessful draws would look like a hang.

@@ -3,8 +3,7 @@
 
 use crate::{column::Column, header::TrackingGap, motion::joints};
 use faceoff_episode::AnswerTiming;
-use faceoff_sim::Interpolation;
-use faceoff_sim::{JOINTS, model::CONTROL_STEP_S, table::geometry::TABLE};
+use faceoff_sim::{Interpolation, JOINTS, model::CONTROL_STEP_S, table::geometry::TABLE};
 use std::f64::consts::PI;
 
 // Resolutions: values are stored as multiples of these.

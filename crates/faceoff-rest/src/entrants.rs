@@ -14,7 +14,7 @@ use faceoff_service::{
     views::{tournament, tournament_state::TournamentState},
 };
 use faceoff_store::{Actor, DepartureRequest, GameState};
-use faceoff_types::{DepartureKind, TournamentId, Withdrawals};
+use faceoff_types::{DepartureKind, TournamentId};
 use std::slice;
 
 /// Enters teams into a tournament.
@@ -156,9 +156,7 @@ fn check_confirmed(
         );
         return Problem::check_confirmed(confirm, entrant.name.as_str(), &effect);
     }
-    let plays_on = departure.kind == DepartureKind::Withdrawn
-        && state.tournament.rules.withdrawals == Withdrawals::AfterRound;
-    if plays_on {
+    if state.tournament.rules.plays_on(departure.kind) {
         let effect = format!(
             "{} would be withdrawn for good; its games of a running round would still be played and count, and it would not play in \
              later rounds; its unfinished test and friendly games would be cancelled; the reason {:?} would be public",

@@ -2,9 +2,9 @@
 //! settings do not.
 
 use crate::{
-    ForfeitScore, GAME_WINDOWS, GameLimits, InvalidLimit, InvalidMagnitude, Magnitudes, Profile,
-    Publication, Ruleset, Runtimes, StageLimits, TournamentFormat, UnknownProfile, UnknownRuleset,
-    WINDOW_STEPS,
+    DepartureKind, ForfeitScore, GAME_WINDOWS, GameLimits, InvalidLimit, InvalidMagnitude,
+    Magnitudes, Profile, Publication, Ruleset, Runtimes, StageLimits, TournamentFormat,
+    UnknownProfile, UnknownRuleset, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
@@ -141,6 +141,12 @@ impl TournamentRules {
             limits: Box::default(),
             runtimes: None,
         }
+    }
+
+    /// Does a team that leaves in this way play the round under way to its end?
+    #[must_use]
+    pub fn plays_on(&self, departure: DepartureKind) -> bool {
+        departure == DepartureKind::Withdrawn && self.withdrawals == Withdrawals::AfterRound
     }
 
     /// Checks that games are possible under these rules.

@@ -6,8 +6,7 @@ use faceoff_episode::{
     AnswerTiming, EpisodeStart, NullSink, Question, RecordError, RunningEpisode, StateColumns,
     StepRow, StepSink, World,
 };
-use faceoff_sim::Interpolation;
-use faceoff_sim::{AirHockeyProfile, Bounds};
+use faceoff_sim::{AirHockeyProfile, Bounds, Interpolation};
 use faceoff_types::{
     ACTION_LIMIT, AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task,
 };

@@ -5,8 +5,7 @@ use faceoff_airhockey::{
     RallyStart, Response, RunningGame, SideFault,
 };
 use faceoff_episode::{AnswerTiming, RecordError};
-use faceoff_sim::Interpolation;
-use faceoff_sim::{AirHockeyProfile, Bounds, RallyEnd};
+use faceoff_sim::{AirHockeyProfile, Bounds, Interpolation, RallyEnd};
 use faceoff_types::{
     ACTION_LIMIT, AgentFaultKind, AgentTask, ForfeitCause, GameEnd, GameLimits, Seed, Side,
 };

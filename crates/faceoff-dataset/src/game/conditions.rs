@@ -1,8 +1,8 @@
 //! The conditions of a game: the same to play under, and to verify the recording with.
 
 use crate::simulator;
-use faceoff_airhockey::{Arena, find_ruleset, settings};
-use faceoff_episode::InvalidConditions;
+use faceoff_airhockey::{Arena, arena};
+use faceoff_episode::{Conditions, InvalidConditions};
 use faceoff_wire::{dataset::SimulatorId, game::GameSpec};
 
 /// The world of a game.
@@ -10,15 +10,13 @@ use faceoff_wire::{dataset::SimulatorId, game::GameSpec};
 /// # Errors
 /// If the simulator has no such ruleset, profile or magnitudes.
 pub fn game_arena(spec: &GameSpec) -> Result<Arena, InvalidConditions> {
-    Ok(Arena::with_ruleset(
-        find_ruleset(spec.ruleset)?,
-        spec.profile
-            .try_into()
-            .map_err(InvalidConditions::Profile)?,
-        &settings(&spec.perturbations).map_err(InvalidConditions::Magnitudes)?,
-        spec.seed,
-        spec.mismatch_seed,
-    ))
+    arena(&Conditions {
+        ruleset: spec.ruleset,
+        profile: spec.profile,
+        perturbations: &spec.perturbations,
+        seed: spec.seed,
+        mismatch_seed: spec.mismatch_seed,
+    })
 }
 
 /// Version and fingerprint of the simulator of games.

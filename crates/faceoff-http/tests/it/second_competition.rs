@@ -261,6 +261,12 @@ async fn second_competition_runs_on_the_real_server() {
         (first.get("start"), &first["broken"][0]["group"]),
         (None, &json!("speeding"))
     );
+    let missing = site.get("/nothing-here", None).await;
+    assert!(!missing.body.contains("airhockey"), "{}", missing.body);
+    let cup = json!({ "name": "Cup", "teams": ["idle", "hasty"] });
+    site.post("/api/v1/tournaments", Some(ADMIN), &cup)
+        .await
+        .problem(422, "invalid-content", &["no games of two agents"]);
     let document = site.get("/api/v1/openapi.json", None).await.json(200);
     let names = &document["components"]["schemas"]["Task"]["enum"];
     assert_eq!(names, &json!(["reach", "settle"]));

@@ -182,7 +182,8 @@ mod tests {
     fn tasks_of_the_competition_are_the_values() {
         let by_task = json!({"type": "object", "propertyNames": Task::schema()});
         let by_name = json!({"type": "object", "propertyNames": {"type": "string"}});
-        let mut document = json!({"components": {"schemas": {"Task": {"type": "string"}, "ByTask": by_task, "ByName": by_name}}});
+        let mut document = json!({"components": {"schemas": {"Task": {"type": "string"}, "ByTask": by_task, "ByName": by_name,
+            "TournamentRules": {"properties": {"steps": {"type": "integer"}}}}}});
         describe(&mut document, &faceoff_airhockey::competition());
         let schemas = &document["components"]["schemas"];
         assert_eq!(schemas["Task"]["enum"], json!(["hit", "defend", "prepare"]));
@@ -196,6 +197,8 @@ mod tests {
         assert_eq!(weights["required"], schemas["Task"]["enum"]);
         assert_eq!(weights["properties"]["prepare"]["example"], 0.2);
         assert_eq!(schemas["Profile"]["enum"][6], "evaluation");
+        let steps = &schemas["TournamentRules"]["properties"]["steps"];
+        assert_eq!(steps["default"], 45_000);
         let loss = &schemas["PerturbationSettings"]["properties"]["tracking_loss"]["properties"];
         assert_eq!(loss["probability"]["maximum"], 1.0);
         assert_eq!(loss["steps"]["default"], json!([5, 20]));

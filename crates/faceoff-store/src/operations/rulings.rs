@@ -22,7 +22,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{DepartureKind, EvaluationId, StageDay, TeamId, Withdrawals};
+use faceoff_types::{DepartureKind, EvaluationId, StageDay, TeamId};
 use jiff::Timestamp;
 
 pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
@@ -44,19 +44,18 @@ async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()
         from_round: None,
         reason: reason.to_owned(),
     };
-    for tournament in tournaments::all(tx).await? {
+    let tournaments = tournaments::all(tx).await?.into_iter();
+    for tournament in tournaments.filter(|tournament| tournament.closed_at.is_none()) {
         let entrants = entrants::all(tx, tournament.id).await?;
         let rounds = rounds::count(tx, tournament.id).await?;
         // A team that withdraws may play the round under way to its end.
         let takes_part = entrants.iter().any(|entrant| {
             let plays = entrant.departure.as_ref().is_none_or(|departure| {
-                tournament.rules.withdrawals == Withdrawals::AfterRound
-                    && departure.kind == DepartureKind::Withdrawn
-                    && departure.from_round.get() > rounds
+                tournament.rules.plays_on(departure.kind) && departure.from_round.get() > rounds
             });
             entrant.team == team && plays
         });
-        if tournament.closed_at.is_none() && takes_part {
+        if takes_part {
             remove_entrant(tx, &tournament, &departure).await?;
         }
     }

@@ -186,7 +186,7 @@ pub(crate) async fn pending(
            FROM games g
            JOIN entrants home ON home.tournament_id = g.tournament_id AND home.team_id = g.home_team_id
            JOIN entrants away ON away.tournament_id = g.tournament_id AND away.team_id = g.away_team_id
-           WHERE g.tournament_id = ? AND g.purpose = 'round' AND g.state <> 'played'
+           WHERE g.tournament_id = ? AND g.purpose = 'round' AND g.state NOT IN ('played', 'cancelled')
              AND (home.left_as IS NULL OR home.from_round > g.round)
              AND (away.left_as IS NULL OR away.from_round > g.round)
            ORDER BY g.round, g.pairing, g.second_half"#,

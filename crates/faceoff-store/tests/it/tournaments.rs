@@ -669,6 +669,38 @@ async fn withdrawn_team_plays_the_round_to_its_end() {
 }
 
 #[tokio::test]
+async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
+    let f = TestStore::new().await;
+    let (cup, [a, b, c]) = three_games(&f).await;
+    for _ in 0..3 {
+        run_next_game(&f).await;
+    }
+    let games = record(&f, cup.id).await.games;
+    let of_c = games.iter().find(|game| game.teams.contains(&c)).unwrap();
+    let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
+    start(&f, cup.id, &second).await.unwrap();
+    f.store
+        .void_game(Actor::Organiser, of_c.id, REASON, f.now)
+        .await
+        .unwrap();
+    let out = departure(c, DepartureKind::Disqualified, None);
+    let left = f
+        .store
+        .leave_tournament(Actor::Organiser, cup.id, &out, f.now);
+    assert_eq!(left.await.unwrap().unwrap().from_round, round(2));
+    assert!(matches!(
+        state(&f, of_c.id).await,
+        GameState::Cancelled { .. }
+    ));
+    run_next_game(&f).await;
+    assert!(record(&f, cup.id).await.rounds[1].over_at.is_some());
+    f.store
+        .close_tournament(Actor::Organiser, cup.id, f.now)
+        .await
+        .unwrap();
+}
+
+#[tokio::test]
 async fn withdrawal_does_not_delay_a_disqualification() {
     for of_the_season in [false, true] {
         let f = TestStore::new().await;

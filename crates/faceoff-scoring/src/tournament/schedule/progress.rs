@@ -54,7 +54,8 @@ impl<'a> Progress<'a> {
             .collect()
     }
 
-    /// The games of a round without a result, except those of teams that had left by then.
+    /// The games of a round without a result, except those of teams that left. Whether such a team still plays the round is known to
+    /// the caller.
     fn open_pairings<'b>(
         &'b self,
         round: &'a Round,
@@ -64,9 +65,7 @@ impl<'a> Progress<'a> {
         round.pairings().filter(move |pairing| {
             let teams = pairing.teams();
             !finished.contains(&(number, sorted_by_name(teams)))
-                && !teams
-                    .iter()
-                    .any(|team| self.departures.excludes(team, number))
+                && !teams.iter().any(|team| self.departures.contains(team))
         })
     }
 

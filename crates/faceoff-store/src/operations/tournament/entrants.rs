@@ -15,9 +15,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{
-    DepartureKind, RoundNumber, TeamId, TournamentFormat, TournamentId, Withdrawals,
-};
+use faceoff_types::{DepartureKind, RoundNumber, TeamId, TournamentFormat, TournamentId};
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
@@ -107,13 +105,10 @@ async fn latest_round(
     tournament: &Tournament,
     kind: DepartureKind,
 ) -> Result<RoundNumber> {
-    match (kind, tournament.rules.withdrawals) {
-        (DepartureKind::Withdrawn, Withdrawals::AfterRound) => {
-            round_number(rounds::count(tx, tournament.id).await? + 1)
-        }
-        (DepartureKind::Disqualified, _) | (_, Withdrawals::AtOnce) => {
-            current_round(tx, tournament.id).await
-        }
+    if tournament.rules.plays_on(kind) {
+        round_number(rounds::count(tx, tournament.id).await? + 1)
+    } else {
+        current_round(tx, tournament.id).await
     }
 }
 
@@ -230,9 +225,7 @@ pub(crate) async fn remove_entrant(
         reason: reason.clone(),
     };
     entrants::set_departure(tx, id, team, &departure).await?;
-    let plays_on =
-        kind == DepartureKind::Withdrawn && tournament.rules.withdrawals == Withdrawals::AfterRound;
-    let played_until = plays_on.then_some(from_round);
+    let played_until = tournament.rules.plays_on(kind).then_some(from_round);
     cancel_open_games(tx, id, team, played_until, &cancel_reason).await?;
     let event = Event::TeamLeftTournament {
         team,
