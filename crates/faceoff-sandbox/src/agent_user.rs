@@ -3,19 +3,21 @@
 //! Agents of an unprivileged service run as the service's user, confined to a user namespace. A root service
 //! must not run agents as root. Two agents must not share what the kernel accounts per user (processes, keys,
 //! pipes). So each agent of a root service gets its own user id from a range that distributions leave unused
-//! (0x7000_0000 to 0x7fff_ffff, unused according to systemd's list of user ids).
+//! (0x7000_0000 to 0x7fff_ffff, unused according to systemd's list of user ids). It is drawn at random, since the
+//! agent can read it in `/proc/self/mountinfo`: a count would show how many agents were started.
 
 use crate::{Layer, SandboxError, error::IoContext};
-use rustix::{fs, process, thread};
-use std::sync::atomic::{AtomicU32, Ordering};
+use rustix::{
+    fs, process,
+    rand::{GetRandomFlags, getrandom},
+    thread,
+};
 
 const RANGE_START: u32 = 0x7000_0000;
-/// Number of user ids per service process. The pid (22 bits) and the index among these ids (6 bits) fill the range.
-const IDS_PER_SERVICE: u32 = 64;
-const PID_MASK: u32 = (1 << 22) - 1;
+/// With so many ids, two agents that run at once have the same one with a negligible probability.
+const RANGE_MASK: u32 = (1 << 28) - 1;
 /// The kernel's id for unmapped users; the fallback in a container that maps few ids.
 const OVERFLOW_ID: u32 = 65_534;
-static NEXT_INDEX: AtomicU32 = AtomicU32::new(0);
 
 /// The host user of one agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,9 +32,9 @@ impl AgentUser {
         if !process::geteuid().is_root() {
             return Ok(None);
         }
-        let index = NEXT_INDEX.fetch_add(1, Ordering::Relaxed) % IDS_PER_SERVICE;
-        let pid = std::process::id() & PID_MASK;
-        let own_id = RANGE_START + pid * IDS_PER_SERVICE + index;
+        let mut bytes = [0; 4];
+        getrandom(&mut bytes, GetRandomFlags::empty()).context("cannot draw a user id")?;
+        let own_id = RANGE_START + (u32::from_ne_bytes(bytes) & RANGE_MASK);
         let maps = [
             read_map("/proc/self/uid_map")?,
             read_map("/proc/self/gid_map")?,
@@ -48,6 +50,12 @@ impl AgentUser {
                      so its agents would be root too; run it as an ordinary user, or map more ids"
                 ),
             })
+    }
+
+    /// Is this process root of the host's first user namespace, and not only of a container's?
+    pub(crate) fn is_host_root() -> bool {
+        let map = read_map("/proc/self/uid_map").unwrap_or_default();
+        process::geteuid().is_root() && map.split_whitespace().eq(["0", "0", "4294967295"])
     }
 
     /// Switches to this user irrevocably. Called between fork and exec, where only system calls are allowed.

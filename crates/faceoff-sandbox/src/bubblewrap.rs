@@ -4,7 +4,9 @@ use crate::{
     Layer, SandboxError, SpawnSpec,
     cpu_view::CpuView,
     error::IoContext,
+    file_tree,
     private_mounts::PrivateMounts,
+    private_network::PrivateNetwork,
     seccomp::{self, Filters},
 };
 use rustix::fs::{MemfdFlags, memfd_create};
@@ -26,29 +28,28 @@ const ID_IN_SANDBOX: &str = "1000";
 const PASSWD: &str = "agent:x:1000:1000:agent:/tmp:/bin/sh\n";
 const GROUP: &str = "agent:x:1000:\n";
 
-/// Hidden because they show settings and counters of the whole host (asynchronous I/O, terminals, open files …),
-/// and terminals, whose number all agents share.
-const HIDDEN_FOLDERS: [&str; 4] = ["/proc/sys", "/proc/pressure", "/proc/fs", "/dev/pts"];
-/// Hidden because they show counters of the whole host, including file locks.
-const HIDDEN_FILES: [&str; 17] = [
-    "/proc/locks",
-    "/proc/vmstat",
-    "/proc/interrupts",
-    "/proc/softirqs",
-    "/proc/buddyinfo",
-    "/proc/pagetypeinfo",
-    "/proc/zoneinfo",
-    "/proc/slabinfo",
-    "/proc/vmallocinfo",
-    "/proc/diskstats",
-    "/proc/schedstat",
-    "/proc/cgroups",
-    "/proc/keys",
-    "/proc/key-users",
-    "/proc/timer_list",
-    "/proc/allocinfo",
-    "/proc/swaps",
+/// The only files of `/proc` that agents see beside those of their processes: snapshots ([`SNAPSHOT_FILES`]), links, constants, and
+/// System V objects, which an agent has of its own. All others show settings and counters of the whole host (locks, asynchronous
+/// I/O, interrupts, open files …).
+const VISIBLE_IN_PROC: [&str; 13] = [
+    "cpuinfo",
+    "devices",
+    "filesystems",
+    "loadavg",
+    "meminfo",
+    "mounts",
+    "net",
+    "self",
+    "stat",
+    "sysvipc",
+    "thread-self",
+    "uptime",
+    "version",
 ];
+/// Terminals, whose number all agents share.
+const TERMINALS: &str = "/dev/pts";
+/// A larger bundle is not copied into memory for each start of its agent, since copying would take long.
+const COPIED_BUNDLE_BYTES: u64 = 32 << 20;
 
 /// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because
 /// the live counters would show what other agents do (e.g. the number of started processes). The snapshots list only the agent's CPUs.
@@ -136,15 +137,20 @@ impl Bubblewrap {
         let mut line = CommandLine {
             args: Vec::new(),
             inherited_fds: Vec::new(),
-            mounts: private_mounts.then(PrivateMounts::default),
+            mounts: private_mounts.then(PrivateMounts::new),
         };
         line.args([
             "--unshare-user",
             "--unshare-ipc",
             "--unshare-pid",
-            "--unshare-net",
             "--unshare-uts",
         ]);
+        let network = if private_mounts {
+            Some(PrivateNetwork::new()?)
+        } else {
+            line.args(["--unshare-net"]);
+            None
+        };
         line.args([
             "--unshare-cgroup",
             "--uid",
@@ -201,7 +207,7 @@ impl Bubblewrap {
                 line.file(path, content.as_bytes())?;
             }
         }
-        line.read_only(&spec.bundle_dir, Path::new("/agent"))?;
+        line.bundle(&spec.bundle_dir)?;
         line.args([
             "--chdir",
             "/agent",
@@ -228,6 +234,7 @@ impl Bubblewrap {
             command,
             inherited_fds: line.inherited_fds,
             mounts: line.mounts,
+            network,
         })
     }
 }
@@ -238,6 +245,8 @@ pub(crate) struct Invocation {
     pub command: Command,
     pub inherited_fds: Vec<OwnedFd>,
     pub mounts: Option<PrivateMounts>,
+    /// The network, if bubblewrap does not make it.
+    pub network: Option<PrivateNetwork>,
 }
 
 /// The agent's environment variables; the bundle's own may replace all others.
@@ -277,14 +286,14 @@ impl CommandLine {
 
     /// Covers files that show the whole host or other agents, and that no agent needs.
     fn hide_counters(&mut self) {
-        for folder in HIDDEN_FOLDERS
-            .into_iter()
-            .filter(|path| is_in_sandbox(path))
-        {
+        static HIDDEN: OnceLock<Hidden> = OnceLock::new();
+        let Hidden { folders, files } = HIDDEN.get_or_init(Hidden::in_proc);
+        let folders = folders.iter().map(String::as_str).chain([TERMINALS]);
+        for folder in folders {
             let cover = ["--perms", "0555", "--size", "4096", "--tmpfs", folder];
             self.args(cover.into_iter().chain(["--remount-ro", folder]));
         }
-        for file in HIDDEN_FILES.into_iter().filter(|path| is_in_sandbox(path)) {
+        for file in files {
             self.args(["--ro-bind", "/dev/null", file]);
         }
     }
@@ -317,6 +326,24 @@ impl CommandLine {
         self.args(["--perms", "0444"]);
         self.fd("--file", fd);
         self.args([inside]);
+        Ok(())
+    }
+
+    /// Shows the bundle, as a copy if possible.
+    fn bundle(&mut self, host: &Path) -> Result<(), SandboxError> {
+        let inside = Path::new("/agent");
+        let Some(mounts) = &mut self.mounts else {
+            return self.read_only(host, inside);
+        };
+        let mut bytes = 0;
+        file_tree::add_size(host, COPIED_BUNDLE_BYTES, &mut bytes)
+            .context(format_args!("cannot look into {}", host.display()))?;
+        if bytes > COPIED_BUNDLE_BYTES {
+            return self.read_only(host, inside);
+        }
+        let source = mounts.add_copy(host)?;
+        self.args
+            .extend(["--ro-bind".into(), source, inside.into()]);
         Ok(())
     }
 
@@ -362,9 +389,32 @@ fn check_mount_points(root: &Path) -> Result<(), SandboxError> {
     Ok(())
 }
 
-/// Does the sandbox have this path? It has the host's `/proc`; `/dev` is bubblewrap's own.
-fn is_in_sandbox(path: &str) -> bool {
-    path.starts_with("/dev/") || Path::new(path).exists()
+/// The entries of `/proc` that agents must not see.
+struct Hidden {
+    folders: Vec<String>,
+    files: Vec<String>,
+}
+
+impl Hidden {
+    /// All but the visible ones and those of processes, which have numbers as names.
+    fn in_proc() -> Self {
+        let (mut folders, mut files) = (Vec::new(), Vec::new());
+        for entry in fs::read_dir("/proc").into_iter().flatten().flatten() {
+            let Ok(name) = entry.file_name().into_string() else {
+                continue;
+            };
+            let is_process = name.bytes().all(|byte| byte.is_ascii_digit());
+            if is_process || VISIBLE_IN_PROC.contains(&name.as_str()) {
+                continue;
+            }
+            let path = format!("/proc/{name}");
+            match entry.file_type() {
+                Ok(kind) if kind.is_dir() => folders.push(path),
+                _ => files.push(path),
+            }
+        }
+        Self { folders, files }
+    }
 }
 
 /// Sorted paths without duplicates and without paths inside others, which a mount of the outer path shows already.

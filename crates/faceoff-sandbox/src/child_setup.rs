@@ -1,6 +1,9 @@
 //! Set-up of the child process between fork and exec: cgroup, CPUs, mounts, limits, user and filters.
 
-use crate::{Limits, agent_user::AgentUser, private_mounts::PrivateMounts, seccomp::Filters};
+use crate::{
+    Limits, agent_user::AgentUser, answered_calls::AnsweredCalls, private_mounts::PrivateMounts,
+    private_network::PrivateNetwork, seccomp::Filters,
+};
 use rustix::{
     fs::{Mode, OFlags, open},
     io::{Errno, FdFlags, fcntl_setfd, write},
@@ -24,10 +27,14 @@ pub(crate) struct ChildSetup {
     pub rlimits: Vec<(Resource, Rlimit)>,
     /// Files made reachable for `user`, mounted while the child is still root.
     pub mounts: Option<PrivateMounts>,
+    /// The agent's network, made while the child is still root.
+    pub network: Option<PrivateNetwork>,
     /// The user that the child becomes.
     pub user: Option<AgentUser>,
     /// File descriptors that stay open after the exec.
     pub inherited_fds: Vec<OwnedFd>,
+    /// The filter of the calls that the service answers.
+    pub answered_calls: Option<AnsweredCalls>,
     /// Filters that the child installs itself; used without bubblewrap.
     pub filters: Option<Filters>,
     /// Makes the agent the first victim of the OOM killer when the host runs out of memory.
@@ -41,23 +48,27 @@ enum Step {
     EnterCgroup,
     SetCpus,
     MakeMounts,
+    MakeNetwork,
     SetRlimits,
     BecomeUser,
     PassDescriptors,
     DieWithParent,
+    AnswerCalls,
     InstallFilters,
 }
 
 impl Step {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 11] = [
         Self::CloseDescriptors,
         Self::EnterCgroup,
         Self::SetCpus,
         Self::MakeMounts,
+        Self::MakeNetwork,
         Self::SetRlimits,
         Self::BecomeUser,
         Self::PassDescriptors,
         Self::DieWithParent,
+        Self::AnswerCalls,
         Self::InstallFilters,
     ];
 
@@ -70,12 +81,20 @@ impl Step {
             Self::SetCpus => "cannot bind the agent to its CPUs",
             Self::MakeMounts => {
                 "cannot mount files for the agent's user in a mount namespace (a root service needs \
-                 CAP_SYS_ADMIN; without it, run the service as an ordinary user)"
+                 CAP_SYS_ADMIN and CAP_MKNOD; without them, run the service as an ordinary user)"
+            }
+            Self::MakeNetwork => {
+                "cannot make a network namespace for the agent (a root service needs CAP_SYS_ADMIN; without it, run the \
+                 service as an ordinary user)"
             }
             Self::SetRlimits => "cannot set the agent's resource limits",
             Self::BecomeUser => "cannot become the agent's user",
             Self::PassDescriptors => "cannot pass a descriptor to bubblewrap",
             Self::DieWithParent => "cannot tie the agent to the service",
+            Self::AnswerCalls => {
+                "cannot install the seccomp filter whose calls the service answers (no other program may have installed one \
+                 above this service)"
+            }
             Self::InstallFilters => "cannot install the seccomp filter",
         }
     }
@@ -143,6 +162,11 @@ impl ChildSetup {
                 .mount_all()
                 .map_err(|error| (Step::MakeMounts, error))?;
         }
+        if let Some(network) = &self.network {
+            network
+                .enter()
+                .map_err(|error| (Step::MakeNetwork, error))?;
+        }
         for &(resource, limit) in &self.rlimits {
             process::setrlimit(resource, limit).map_err(|error| (Step::SetRlimits, error))?;
         }
@@ -159,6 +183,11 @@ impl ChildSetup {
             .map_err(|error| (Step::DieWithParent, error))?;
         if process::getppid() != Some(parent) {
             return Err((Step::DieWithParent, Errno::SRCH));
+        }
+        if let Some(calls) = &self.answered_calls {
+            calls
+                .install()
+                .map_err(|error| (Step::AnswerCalls, error))?;
         }
         if let Some(filters) = &self.filters {
             for program in filters.in_order() {

@@ -4,6 +4,7 @@ use crate::{
     Isolation, Layer, SandboxError, SpawnError, SpawnSpec,
     affinity::cpu_set,
     agent_user::AgentUser,
+    answered_calls::{AnsweredCalls, CallAnswerer},
     bubblewrap::{Bubblewrap, environment},
     cgroup::AgentCgroup,
     channel::Channel,
@@ -43,6 +44,8 @@ pub(crate) struct LaunchedAgent {
 pub(crate) struct Launch {
     command: Command,
     setup: ChildSetup,
+    /// Answers some of the agent's system calls.
+    answerer: Option<CallAnswerer>,
     channel: Channel,
     status: Option<StatusPipe>,
     cgroup: Option<AgentCgroup>,
@@ -68,10 +71,12 @@ impl Launch {
         let channel = Channel::new()?;
         let cgroup = AgentCgroup::create(&spec.limits, &spec.isolation, &spec.cpus)?;
         let is_confined = cgroup.as_ref().is_some_and(|cgroup| cgroup.confines_cpus);
-        let filters = if enforces(Layer::Seccomp) {
-            Some(Filters::build(!spec.cpus.is_empty() && !is_confined)?)
+        let (filters, answered_calls, answerer) = if enforces(Layer::Seccomp) {
+            let (calls, answerer) = AnsweredCalls::new(spec.limits.scratch_bytes)?;
+            let filters = Filters::build(!spec.cpus.is_empty() && !is_confined)?;
+            (Some(filters), Some(calls), Some(answerer))
         } else {
-            None
+            (None, None, None)
         };
         let mut setup = ChildSetup {
             cgroup_procs: cgroup
@@ -86,6 +91,7 @@ impl Launch {
                 Vec::new()
             },
             user,
+            answered_calls,
             raise_oom_score: true,
             ..ChildSetup::default()
         };
@@ -95,10 +101,12 @@ impl Launch {
                 Bubblewrap::find()?.command(spec, writer, filters.as_ref(), user.is_some())?;
             setup.inherited_fds = invocation.inherited_fds;
             setup.mounts = invocation.mounts;
+            setup.network = invocation.network;
             let command = invocation.command;
             return Ok(Self {
                 command,
                 setup,
+                answerer,
                 channel,
                 status: Some(status),
                 cgroup,
@@ -117,6 +125,7 @@ impl Launch {
         Ok(Self {
             command,
             setup,
+            answerer,
             channel,
             status: None,
             cgroup,
@@ -135,6 +144,7 @@ impl Launch {
         Ok(Self {
             command,
             setup,
+            answerer: None,
             channel: Channel::new()?,
             status: None,
             cgroup: None,
@@ -147,6 +157,7 @@ impl Launch {
         let Self {
             mut command,
             setup,
+            answerer,
             channel,
             status,
             cgroup,
@@ -171,6 +182,9 @@ impl Launch {
         };
         const WATCH_ACTION: &str = "cannot watch the agent";
         let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH_ACTION)?;
+        if let Some(answerer) = answerer {
+            answerer.start()?;
+        }
         let mut stderr =
             StderrTail::drain(log, spec.limits.stderr_tail_bytes).context(WATCH_ACTION)?;
         if let Some(status) = &mut tree.status {

@@ -5,14 +5,13 @@
 //! all pages and names are cached at all times.
 
 use crate::{
-    Runtime, RuntimeFiles, SandboxError, bubblewrap::mount_order, error::IoContext, owner::Owner,
-    runtime::path_in_image,
+    Runtime, RuntimeFiles, SandboxError, bubblewrap::mount_order, error::IoContext, file_tree,
+    owner::Owner, runtime::path_in_image,
 };
 use rustix::fs::{StatVfs, statvfs};
 use std::{
     collections::BTreeMap,
-    fs, io,
-    os::unix::fs::{PermissionsExt, symlink},
+    fs,
     path::{Path, PathBuf},
 };
 
@@ -20,8 +19,6 @@ use std::{
 pub const MEMORY_FOLDER: &str = "/dev/shm";
 /// Prefix of the image folders.
 pub(crate) const IMAGE_PREFIX: &str = "faceoff-runtime-";
-/// Memory is allocated in pages of this size.
-const PAGE_BYTES: u64 = 4096;
 
 /// A copy of the runtimes' files in memory; removed on drop.
 #[derive(Debug)]
@@ -64,7 +61,7 @@ impl MemoryImage {
         for path in paths(runtimes) {
             let target = path_in_image(folder.path(), &path);
             let copied = fs::create_dir_all(target.parent().unwrap_or(folder.path()))
-                .and_then(|()| copy(&path, &target));
+                .and_then(|()| file_tree::copy(&path, &target, file_tree::Times::Original));
             copied.context(format_args!("cannot copy {} into memory", path.display()))?;
         }
         for runtime in runtimes.values_mut() {
@@ -85,7 +82,7 @@ impl MemoryImage {
     ) -> Result<u64, MemoryImageError> {
         let mut bytes = 0;
         for path in paths(runtimes) {
-            add_size(&path, limit_bytes, &mut bytes)
+            file_tree::add_size(&path, limit_bytes, &mut bytes)
                 .context(format_args!("cannot look into {}", path.display()))?;
         }
         let StatVfs {
@@ -113,65 +110,10 @@ fn paths(runtimes: &BTreeMap<String, Runtime>) -> Vec<PathBuf> {
     mount_order(&all.cloned().collect::<Vec<_>>())
 }
 
-/// Adds the size of the files below `path`; stops once the sum exceeds `limit_bytes`.
-fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Result<()> {
-    let Some(meta) = readable(fs::symlink_metadata(path))? else {
-        return Ok(());
-    };
-    *bytes += meta.len().next_multiple_of(PAGE_BYTES);
-    if meta.is_dir() {
-        for entry in readable(fs::read_dir(path))?.into_iter().flatten() {
-            if *bytes > limit_bytes {
-                break;
-            }
-            add_size(&entry?.path(), limit_bytes, bytes)?;
-        }
-    }
-    Ok(())
-}
-
-fn copy(source: &Path, target: &Path) -> io::Result<()> {
-    let Some(meta) = readable(fs::symlink_metadata(source))? else {
-        return Ok(());
-    };
-    if meta.is_symlink() {
-        return symlink(fs::read_link(source)?, target);
-    }
-    if meta.is_file() {
-        return readable(fs::copy(source, target)).map(drop);
-    }
-    if !meta.is_dir() {
-        return Ok(());
-    }
-    fs::create_dir_all(target)?;
-    for entry in readable(fs::read_dir(source))?.into_iter().flatten() {
-        let entry = entry?;
-        copy(&entry.path(), &target.join(entry.file_name()))?;
-    }
-    fs::set_permissions(
-        target,
-        fs::Permissions::from_mode(meta.permissions().mode() | 0o700),
-    )
-}
-
-/// `None` for missing and unreadable files: agents cannot read them either.
-fn readable<T>(result: io::Result<T>) -> io::Result<Option<T>> {
-    match result {
-        Err(error)
-            if matches!(
-                error.kind(),
-                io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied
-            ) =>
-        {
-            Ok(None)
-        }
-        result => result.map(Some),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 
     #[test]
     fn memory_image_copies_files_and_is_removed_on_drop() {
@@ -213,6 +155,17 @@ mod tests {
             .permissions()
             .mode();
         assert_eq!(mode & 0o777, 0o755);
+        let modified_at = |path: &Path| {
+            let meta = fs::metadata(path).unwrap();
+            (meta.mtime(), meta.mtime_nsec())
+        };
+        for name in ["lib", "lib/inner/file", "program"] {
+            assert_eq!(
+                modified_at(&copy_of(name)),
+                modified_at(&path_of(name)),
+                "{name}: compiled Python files contain the times of their sources"
+            );
+        }
         assert_eq!(fs::metadata(copy_of("program")).unwrap().len(), 5000);
         drop(image);
         assert!(!folder.exists());

@@ -1,60 +1,109 @@
-//! Makes files reachable for an agent's user that cannot reach them by path.
+//! Makes files reachable for an agent's user that cannot reach them by path, and gives the agent files of its own where several agents
+//! would share the host's.
 //!
 //! A root service keeps bundles in a folder closed to other users. bubblewrap runs as the agent's user and
-//! looks its sources up by path. So the child, while it is still root, bind-mounts them below `/tmp` of a
+//! looks its sources up by path. So the child, while it is still root, mounts them below `/tmp` of a
 //! private mount namespace. No other process sees these mounts, and they end with the namespace.
 
-use crate::{SandboxError, error::IoContext};
+use crate::{SandboxError, agent_user::AgentUser, error::IoContext, file_tree};
 use rustix::{
-    fs::{CWD, Mode, OFlags, mkdir, open},
+    fs::{CWD, FileType, Mode, OFlags, chmodat, makedev, mkdir, mknodat, open},
     io::Errno,
     mount::{
-        MountFlags, MountPropagationFlags, MoveMountFlags, OpenTreeFlags, mount, mount_change,
-        move_mount, open_tree,
+        FsMountFlags, FsOpenFlags, MountAttrFlags, MountFlags, MountPropagationFlags,
+        MoveMountFlags, OpenTreeFlags, fsconfig_create, fsconfig_set_string, fsmount, fsopen,
+        mount, mount_bind, mount_change, move_mount, open_tree,
     },
     thread::{UnshareFlags, unshare_unsafe},
 };
 use std::{
     ffi::{CStr, CString, OsString},
     fs, io,
-    os::{fd::OwnedFd, unix::ffi::OsStrExt},
-    path::Path,
+    os::{
+        fd::{AsRawFd, OwnedFd},
+        unix::ffi::OsStrExt,
+    },
+    path::{Path, PathBuf},
 };
 
 /// The folder over which the mounts' file system is mounted. Every host has it, and only the private namespace sees the change.
 const MOUNT_FOLDER: &CStr = c"/tmp";
 
-/// The bind mounts for one agent's bubblewrap.
-#[derive(Debug, Default)]
+/// The devices that bubblewrap shows, a name for them in [`MOUNT_FOLDER`], and their major and minor numbers. A lock of a device is a
+/// lock of its file, which every agent could see. So each agent gets files of its own.
+const DEVICES: [(&CStr, &CStr, u32, u32); 6] = [
+    (c"/dev/null", c"/tmp/null", 1, 3),
+    (c"/dev/zero", c"/tmp/zero", 1, 5),
+    (c"/dev/full", c"/tmp/full", 1, 7),
+    (c"/dev/random", c"/tmp/random", 1, 8),
+    (c"/dev/urandom", c"/tmp/urandom", 1, 9),
+    (c"/dev/tty", c"/tmp/tty", 5, 0),
+];
+
+/// The mounts for one agent's bubblewrap.
+#[derive(Debug)]
 pub(crate) struct PrivateMounts {
     sources: Vec<Source>,
+    /// May this service make files of devices?
+    makes_devices: bool,
 }
 
 #[derive(Debug)]
 struct Source {
-    path: CString,
+    origin: Origin,
     mount_point: CString,
     is_folder: bool,
-    /// In the child: the detached mount of `path`, until it is moved to `mount_point`.
-    tree: Option<OwnedFd>,
+}
+
+/// What is mounted.
+#[derive(Debug)]
+enum Origin {
+    /// The host's file or folder. In the child it becomes a detached mount.
+    Path(CString),
+    /// A detached mount.
+    Detached(OwnedFd),
+    /// A mount that has been moved to its place.
+    Moved,
 }
 
 impl PrivateMounts {
+    pub(crate) fn new() -> Self {
+        Self {
+            sources: Vec::new(),
+            // The root of a container's user namespace may not.
+            makes_devices: AgentUser::is_host_root(),
+        }
+    }
+
     /// Adds `path` and returns the path at which bubblewrap will find it.
     pub(crate) fn add(&mut self, path: &Path) -> Result<OsString, SandboxError> {
         let failure = format!("cannot show {} to the agent", path.display());
         let path = fs::canonicalize(path).context(&failure)?;
+        let is_folder = fs::metadata(&path).context(&failure)?.is_dir();
+        let origin = CString::new(path.as_os_str().as_bytes())
+            .map_err(io::Error::other)
+            .context(&failure)?;
+        self.push(Origin::Path(origin), is_folder)
+    }
+
+    /// Adds a copy of the folder `path` in a file system of its own, in memory: its numbers of files, times and free space depend on
+    /// nothing else on the host. Returns the path at which bubblewrap will find it.
+    pub(crate) fn add_copy(&mut self, path: &Path) -> Result<OsString, SandboxError> {
+        let mount = file_system_in_memory().context("cannot make a file system for the bundle")?;
+        let inside = PathBuf::from(format!("/proc/self/fd/{}", mount.as_raw_fd()));
+        file_tree::copy(path, &inside, file_tree::Times::Fixed)
+            .context(format_args!("cannot copy {} into memory", path.display()))?;
+        self.push(Origin::Detached(mount), true)
+    }
+
+    fn push(&mut self, origin: Origin, is_folder: bool) -> Result<OsString, SandboxError> {
         let mount_point = format!("/tmp/{}", self.sources.len());
-        let text = |bytes: &[u8]| {
-            CString::new(bytes)
-                .map_err(io::Error::other)
-                .context(&failure)
-        };
         self.sources.push(Source {
-            path: text(path.as_os_str().as_bytes())?,
-            mount_point: text(mount_point.as_bytes())?,
-            is_folder: fs::metadata(&path).context(&failure)?.is_dir(),
-            tree: None,
+            origin,
+            mount_point: CString::new(mount_point.clone())
+                .map_err(io::Error::other)
+                .context("cannot name a mount point")?,
+            is_folder,
         });
         Ok(mount_point.into())
     }
@@ -79,16 +128,20 @@ impl PrivateMounts {
             | OpenTreeFlags::OPEN_TREE_CLOEXEC
             | OpenTreeFlags::AT_RECURSIVE;
         for source in &mut self.sources {
-            source.tree = Some(open_tree(CWD, &source.path, clone_flags)?);
+            if let Origin::Path(path) = &source.origin {
+                source.origin = Origin::Detached(open_tree(CWD, path, clone_flags)?);
+            }
         }
-        let flags = MountFlags::NOSUID | MountFlags::NODEV;
         mount(
             c"tmpfs",
             MOUNT_FOLDER,
             c"tmpfs",
-            flags,
+            MountFlags::NOSUID,
             c"mode=0755,size=64k",
         )?;
+        if self.makes_devices {
+            make_devices()?;
+        }
         for source in &mut self.sources {
             if source.is_folder {
                 mkdir(&source.mount_point, Mode::from_raw_mode(0o755))?;
@@ -100,7 +153,7 @@ impl PrivateMounts {
                     Mode::from_raw_mode(0o644),
                 )?);
             }
-            if let Some(tree) = source.tree.take() {
+            if let Origin::Detached(tree) = std::mem::replace(&mut source.origin, Origin::Moved) {
                 move_mount(
                     tree,
                     c"",
@@ -112,4 +165,34 @@ impl PrivateMounts {
         }
         Ok(())
     }
+}
+
+/// Makes files of devices and mounts them over the host's, from which bubblewrap takes them.
+fn make_devices() -> Result<(), Errno> {
+    let everyone = Mode::from_raw_mode(0o666);
+    for (device, file, major, minor) in DEVICES {
+        mknodat(
+            CWD,
+            file,
+            FileType::CharacterDevice,
+            everyone,
+            makedev(major, minor),
+        )?;
+        // The umask may have removed bits.
+        chmodat(CWD, file, everyone, rustix::fs::AtFlags::empty())?;
+        mount_bind(file, device)?;
+    }
+    Ok(())
+}
+
+/// A new file system in memory, mounted nowhere.
+fn file_system_in_memory() -> Result<OwnedFd, Errno> {
+    let settings = fsopen("tmpfs", FsOpenFlags::FSOPEN_CLOEXEC)?;
+    fsconfig_set_string(&settings, "mode", "0755")?;
+    fsconfig_create(&settings)?;
+    fsmount(
+        &settings,
+        FsMountFlags::FSMOUNT_CLOEXEC,
+        MountAttrFlags::MOUNT_ATTR_NOSUID | MountAttrFlags::MOUNT_ATTR_NODEV,
+    )
 }

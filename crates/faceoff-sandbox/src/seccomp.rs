@@ -6,7 +6,8 @@
 //! x32 calls, which would bypass a list of numbers. Programs then fall back to older calls.
 //!
 //! The files that agents share (of the bundle and the runtime) must not be a covert channel between agents. So
-//! the refused calls include all that leave a trace on a file or in the page cache, and all that reveal one.
+//! the refused calls include all that leave a trace on a file or in the page cache, and all that reveal one. The same
+//! holds for numbers that the kernel counts for the whole host, as far as a call shows them.
 
 use crate::{Layer, SandboxError};
 use seccompiler::{
@@ -109,7 +110,35 @@ const ABSENT: &[i64] = &[
     CACHESTAT,
     // slots for asynchronous I/O are counted for the whole host, and every agent can read the count
     libc::SYS_io_setup,
+    // the inode numbers of these files are counted for the whole host
+    libc::SYS_memfd_create,
+    libc::SYS_memfd_secret,
+    // the inode number of a process's descriptor is the host's count of processes
+    libc::SYS_pidfd_open,
+    // show numbers of mounts, which are counted for the whole host
+    libc::SYS_statx,
+    STATMOUNT,
+    LISTMOUNT,
 ];
+
+/// The numbers of the system calls `statmount` and `listmount`, the same on all architectures.
+const STATMOUNT: i64 = 457;
+const LISTMOUNT: i64 = 458;
+
+/// Socket options that are answered as if the kernel did not know them: numbers that are counted for the whole host, and descriptors of
+/// processes.
+const UNKNOWN_SOCKET_OPTIONS: [libc::c_int; 4] =
+    [libc::SO_COOKIE, SO_NETNS_COOKIE, SO_PASSPIDFD, SO_PEERPIDFD];
+const SO_NETNS_COOKIE: libc::c_int = 71;
+const SO_PASSPIDFD: libc::c_int = 76;
+const SO_PEERPIDFD: libc::c_int = 77;
+
+/// Requests of `ioctl` that are answered as for a file without them: where a file lies on the disk (`FS_IOC_FIEMAP`), and the entropy
+/// of the host (`RNDGETENTCNT`).
+const UNKNOWN_CONTROLS: [u32; 2] = [0xc020_660b, 0x8004_5200];
+/// Type of the requests about namespaces, whose numbers are counted for the whole host, and a mask for the type of a request.
+const NAMESPACE_CONTROLS: u32 = 0xb700;
+const CONTROL_TYPE: u32 = 0xff00;
 
 #[cfg(target_arch = "x86_64")]
 const ABSENT_ON_THIS_ARCH: &[i64] = &[libc::SYS_inotify_init];
@@ -157,6 +186,11 @@ const NAMESPACE_FLAGS: [libc::c_int; 7] = [
     libc::CLONE_NEWNET,
 ];
 
+/// Makes `clone` return a descriptor of the new process.
+const CLONE_PIDFD: u64 = 0x1000;
+/// Lets the kernel merge a process's equal pages with those of others.
+const PR_SET_MEMORY_MERGE: libc::c_int = 67;
+
 /// The newest reviewed call: `mseal` (Linux 6.10). Since 424, numbers are the same on all architectures. Newer
 /// calls do not exist for agents until a developer has reviewed them.
 const NEWEST_KNOWN: u32 = 462;
@@ -201,8 +235,38 @@ impl Filters {
         ignored.insert(libc::SYS_setsockopt, buffer_size);
         let mut unknown_requests = Rules::new();
         unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
-        // Collapsing pages of a file changes its state in memory for other agents.
-        unknown_requests.insert(libc::SYS_madvise, one_of(2, &[libc::MADV_COLLAPSE])?);
+        // Collapsing pages of a file changes its state in memory for other agents. Merged pages show by the time of a write whether
+        // another agent has an equal one.
+        let advice = [libc::MADV_COLLAPSE, libc::MADV_MERGEABLE];
+        unknown_requests.insert(libc::SYS_madvise, one_of(2, &advice)?);
+        unknown_requests.insert(libc::SYS_prctl, one_of(0, &[PR_SET_MEMORY_MERGE])?);
+        let descriptor_of_process = SeccompCmpOp::MaskedEq(CLONE_PIDFD);
+        let with_descriptor = rule([SeccompCondition::new(
+            0,
+            SeccompCmpArgLen::Dword,
+            descriptor_of_process,
+            CLONE_PIDFD,
+        )])?;
+        unknown_requests.insert(libc::SYS_clone, vec![with_descriptor]);
+        let options = UNKNOWN_SOCKET_OPTIONS.map(|option| {
+            rule([
+                argument(1, SeccompCmpOp::Eq, libc::SOL_SOCKET),
+                argument(2, SeccompCmpOp::Eq, option),
+            ])
+        });
+        let options = options.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let unknown_options = Rules::from([
+            (libc::SYS_getsockopt, options.clone()),
+            (libc::SYS_setsockopt, options),
+        ]);
+        let mut controls = one_of(1, &UNKNOWN_CONTROLS.map(u32::cast_signed))?;
+        let of_namespaces = SeccompCmpOp::MaskedEq(u64::from(CONTROL_TYPE));
+        controls.push(rule([argument(
+            1,
+            of_namespaces,
+            NAMESPACE_CONTROLS.cast_signed(),
+        )])?);
+        let unknown_controls = Rules::from([(libc::SYS_ioctl, controls)]);
         // `preadv2` with flags can read only what is in memory, or keep what it reads out of memory.
         let with_flags = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];
         let read_flags = Rules::from([(libc::SYS_preadv2, with_flags)]);
@@ -211,6 +275,8 @@ impl Filters {
             compile(any_arguments(&[ABSENT, ABSENT_ON_THIS_ARCH]), libc::ENOSYS)?,
             compile(ignored, 0)?,
             compile(unknown_requests, libc::EINVAL)?,
+            compile(unknown_options, libc::ENOPROTOOPT)?,
+            compile(unknown_controls, libc::ENOTTY)?,
             compile(read_flags, libc::EOPNOTSUPP)?,
             // Last, because it refuses `seccomp` itself.
             compile(rules, libc::EPERM)?,
@@ -228,6 +294,27 @@ fn any_arguments(lists: &[&[i64]]) -> Rules {
     let calls = lists.iter().copied().flatten();
     calls.map(|&call| (call, Vec::new())).collect()
 }
+
+/// The filter that passes calls to the service, which answers them ([`crate::answered_calls`]).
+pub(crate) fn answered_calls() -> Result<BpfProgram, SandboxError> {
+    // The compiler has no such answer, so its answer of another kind is replaced.
+    const PLACEHOLDER: u32 = 4095;
+    let mut program = compile(any_arguments(&[ANSWERED]), PLACEHOLDER.cast_signed())?;
+    for instruction in &mut program {
+        if instruction.k == libc::SECCOMP_RET_ERRNO | PLACEHOLDER {
+            instruction.k = libc::SECCOMP_RET_USER_NOTIF;
+        }
+    }
+    Ok(program)
+}
+
+/// Calls that the service answers.
+const ANSWERED: &[i64] = &[
+    libc::SYS_statfs,
+    libc::SYS_fstatfs,
+    libc::SYS_sysinfo,
+    libc::SYS_setsid,
+];
 
 /// Compiles a filter that answers the calls of `rules` with `errno`; 0 is success.
 fn compile(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError> {

@@ -154,7 +154,7 @@ fn drop_from_memory(path: &Path) {
 
 #[test]
 fn advice_neither_loads_nor_drops_a_shared_file() {
-    let subject = Subject::new("covert_channel", &["big"]);
+    let subject = Subject::new("covert_channel", &["big"]).with_large_bundle();
     let file = subject.bundle.path().join("big");
     // Larger than the read-ahead of a single page.
     fs::write(&file, vec![7; 8 << 20]).unwrap();
@@ -186,7 +186,7 @@ fn advice_neither_loads_nor_drops_a_shared_file() {
 
 #[test]
 fn reading_leaves_no_access_time() {
-    let subject = Subject::new("covert_channel", &["covert_channel.py"]);
+    let subject = Subject::new("covert_channel", &["covert_channel.py"]).with_large_bundle();
     let file = subject.bundle.path().join("covert_channel.py");
     let long_ago = SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000);
     File::open(&file)

@@ -104,6 +104,13 @@ impl Subject {
         }
     }
 
+    /// Makes the bundle so large that the agent sees the host's files, not a copy in memory.
+    pub fn with_large_bundle(self) -> Self {
+        let filling = fs::File::create(self.bundle.path().join("filling")).unwrap();
+        filling.set_len(1 << 30).unwrap();
+        self
+    }
+
     pub fn with_limits(mut self, change: impl FnOnce(&mut Limits)) -> Self {
         change(&mut self.spec.limits);
         self

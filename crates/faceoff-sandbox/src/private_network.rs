@@ -1,0 +1,102 @@
+//! The agent's network namespace, in which nothing of the host's network shows.
+//!
+//! bubblewrap could make the namespace as well. But files of `/proc/PID/net` show counters of the whole host, such as the number of its
+//! connections and packets, which visitors move. Files of one namespace have one mode for all processes. So the child, while it is still
+//! root, makes the namespace and closes its files to others.
+
+use crate::{SandboxError, error::IoContext};
+use rustix::{
+    fs::{AtFlags, CWD, Mode, chmodat},
+    io::Errno,
+    net::{AddressFamily, SocketFlags, SocketType, socket_with},
+    thread::{UnshareFlags, unshare_unsafe},
+};
+use std::{
+    ffi::CString,
+    fs, io,
+    mem::MaybeUninit,
+    os::{fd::AsRawFd, unix::ffi::OsStrExt},
+    sync::OnceLock,
+};
+
+const FOLDER: &str = "/proc/self/net";
+/// Files that show the namespace's own state only, and that programs read to list interfaces.
+const OPEN_FILES: [&str; 4] = ["dev", "if_inet6", "ipv6_route", "route"];
+
+/// The network of one agent.
+#[derive(Debug)]
+pub(crate) struct PrivateNetwork {
+    closed_files: &'static [CString],
+}
+
+impl PrivateNetwork {
+    pub(crate) fn new() -> Result<Self, SandboxError> {
+        static CLOSED: OnceLock<Vec<CString>> = OnceLock::new();
+        if CLOSED.get().is_none() {
+            let files = closed_files().context(format_args!("cannot read {FOLDER}"))?;
+            let _ = CLOSED.set(files);
+        }
+        Ok(Self {
+            closed_files: CLOSED.get().map(Vec::as_slice).unwrap_or_default(),
+        })
+    }
+
+    /// Makes the namespace. It is called between fork and exec, as root, and makes system calls only.
+    pub(crate) fn enter(&self) -> Result<(), Errno> {
+        #[expect(
+            unsafe_code,
+            reason = "rustix marks all unsharing unsafe, since some flags affect shared file descriptors"
+        )]
+        // SAFETY: NEWNET does not affect the table of file descriptors.
+        unsafe {
+            unshare_unsafe(UnshareFlags::NEWNET)?;
+        }
+        start_loopback()?;
+        for file in self.closed_files {
+            match chmodat(CWD, file, Mode::empty(), AtFlags::empty()) {
+                // A module of the kernel may have been loaded or unloaded since the names were read.
+                Ok(()) | Err(Errno::NOENT) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Starts the loopback interface, which programs expect.
+fn start_loopback() -> Result<(), Errno> {
+    let any = socket_with(
+        AddressFamily::INET,
+        SocketType::DGRAM,
+        SocketFlags::CLOEXEC,
+        None,
+    )?;
+    #[expect(unsafe_code, reason = "rustix cannot change an interface")]
+    // SAFETY: the structure consists of integers, for which zero is a value. The kernel reads it during the call.
+    let result = unsafe {
+        let mut request: libc::ifreq = MaybeUninit::zeroed().assume_init();
+        request.ifr_name[0] = b'l' as libc::c_char;
+        request.ifr_name[1] = b'o' as libc::c_char;
+        request.ifr_ifru.ifru_flags = (libc::IFF_UP | libc::IFF_RUNNING) as libc::c_short;
+        libc::ioctl(any.as_raw_fd(), libc::SIOCSIFFLAGS as _, &raw const request)
+    };
+    if result == 0 {
+        return Ok(());
+    }
+    let error = io::Error::last_os_error();
+    Err(Errno::from_io_error(&error).unwrap_or(Errno::INVAL))
+}
+
+/// Paths of the files and folders to close.
+fn closed_files() -> io::Result<Vec<CString>> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(FOLDER)? {
+        let entry = entry?;
+        if OPEN_FILES.iter().any(|open| entry.file_name() == *open) {
+            continue;
+        }
+        let path = entry.path();
+        files.push(CString::new(path.as_os_str().as_bytes()).map_err(io::Error::other)?);
+    }
+    Ok(files)
+}

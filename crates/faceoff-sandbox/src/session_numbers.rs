@@ -1,0 +1,105 @@
+//! Numbers of sessions, which the kernel counts for the whole host.
+//!
+//! A new session gets a scheduling group with the next number, which `/proc/self/autogroup` shows. An agent could count to a value that a
+//! later agent reads. So an agent may start few sessions, and after its end a random number of them is skipped, which is larger.
+
+use rustix::rand::{GetRandomFlags, getrandom};
+use std::time::{Duration, Instant};
+
+/// Number of sessions that an agent may start at once; the first is bubblewrap's.
+const SESSIONS: f64 = 9.0;
+/// Time after which it may start another one.
+const TIME_PER_SESSION: Duration = Duration::from_secs(10);
+/// Number of sessions that are skipped at most.
+const MAX_SKIPPED: u8 = 127;
+
+/// Sessions that an agent may still start.
+pub(crate) struct SessionBudget {
+    left: f64,
+    at: Instant,
+}
+
+impl SessionBudget {
+    pub(crate) fn new(now: Instant) -> Self {
+        Self {
+            left: SESSIONS,
+            at: now,
+        }
+    }
+
+    /// May the agent start another session now? Then it is counted.
+    pub(crate) fn take(&mut self, now: Instant) -> bool {
+        let waited = now.saturating_duration_since(self.at);
+        self.at = now;
+        let gained = waited.as_secs_f64() / TIME_PER_SESSION.as_secs_f64();
+        self.left = (self.left + gained).min(SESSIONS);
+        let may_start = self.left >= 1.0;
+        if may_start {
+            self.left -= 1.0;
+        }
+        may_start
+    }
+}
+
+/// Starts a random number of sessions that end at once.
+pub(crate) fn skip_some() {
+    let mut byte = [0];
+    if getrandom(&mut byte, GetRandomFlags::empty()).is_err() {
+        return;
+    }
+    // The highest bit is dropped.
+    for _ in 0..byte[0] & MAX_SKIPPED {
+        if !skip_one() {
+            return;
+        }
+    }
+}
+
+/// Starts a session in a process that ends at once; `false` if there can be no further process now.
+fn skip_one() -> bool {
+    const STACK_BYTES: usize = 16 << 10;
+    extern "C" fn start_session(_: *mut libc::c_void) -> libc::c_int {
+        #[expect(unsafe_code, reason = "rustix's function is not callable from here")]
+        // SAFETY: the call takes no arguments. It sets `errno` of the thread that waits, which nothing reads.
+        unsafe {
+            libc::setsid();
+        }
+        0
+    }
+    // A stack is aligned to 16 bytes.
+    let mut stack = vec![0_u128; STACK_BYTES / size_of::<u128>()];
+    // Without a signal at its end, so that no other code of this process waits for it.
+    let flags = libc::CLONE_VM | libc::CLONE_VFORK;
+    #[expect(unsafe_code, reason = "a fork would copy all tables of this process")]
+    // SAFETY: the process runs `start_session` on a stack of its own, and this thread waits until it has ended. The function
+    // makes one system call, and neither allocates nor locks nor unwinds.
+    unsafe {
+        let top = stack.as_mut_ptr_range().end;
+        let pid = libc::clone(start_session, top.cast(), flags, std::ptr::null_mut());
+        pid > 0 && libc::waitpid(pid, std::ptr::null_mut(), libc::__WCLONE) == pid
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sessions_are_counted_and_come_back_slowly() {
+        let start = Instant::now();
+        let mut budget = SessionBudget::new(start);
+        let mut started_at = |now| (0..100).filter(|_| budget.take(now)).count();
+        assert_eq!(started_at(start), SESSIONS as usize);
+        assert_eq!(started_at(start + TIME_PER_SESSION / 2), 0);
+        assert_eq!(started_at(start + TIME_PER_SESSION), 1);
+        assert_eq!(
+            started_at(start + 1000 * TIME_PER_SESSION),
+            SESSIONS as usize
+        );
+    }
+
+    #[test]
+    fn skipped_session_has_ended() {
+        assert!((0..20).all(|_| skip_one()));
+    }
+}
