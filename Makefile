@@ -35,7 +35,7 @@ export CARGO_INCREMENTAL := 0
 endif
 DEMO       := $(TARGET_DIR)/demo
 
-.PHONY: demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   run a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -189,6 +189,10 @@ fuzz: setup-test
 busy: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	$(CARGO) test --locked --workspace --test e2e busy_host -- --include-ignored --test-threads 1
+
+# Prints the rates of the channels between agents that remain (docs/security.md). Run it alone.
+channels: setup-test
+	$(CARGO) test --locked --workspace --test it rates_of_remaining_channels -- --ignored --nocapture
 
 # Hundreds of visitors beside evaluations, on the same CPUs; run it on an idle machine.
 load:

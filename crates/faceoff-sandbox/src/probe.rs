@@ -2,6 +2,7 @@
 
 use crate::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SandboxError, SpawnError, SpawnSpec,
+    answered_calls,
     bubblewrap::{self, Bubblewrap},
 };
 use serde::Serialize;
@@ -39,10 +40,7 @@ pub fn probe_host() -> Vec<HostFeature> {
 fn probe(layer: Layer) -> HostFeature {
     let result = match layer {
         Layer::Namespaces => probe_namespaces(),
-        Layer::Seccomp => probe_by_file(layer, "/proc/self/status", |text| {
-            let mode = field(text, "Seccomp:")?;
-            (mode == "2").then(|| "a filter was installed and is active".to_owned())
-        }),
+        Layer::Seccomp => probe_seccomp(),
         Layer::CgroupMemory => probe_cgroup(layer, "memory"),
         Layer::CgroupPids => probe_cgroup(layer, "pids"),
         Layer::CgroupCpu => probe_cgroup(layer, "cpu"),
@@ -106,6 +104,22 @@ fn probe_namespaces() -> Result<String, String> {
     ))
 }
 
+fn probe_seccomp() -> Result<String, String> {
+    let status = run_cat(Layer::Seccomp, "/proc/self/status")?;
+    if field(&status, "Seccomp:") != Some("2") {
+        return Err("a filter was installed, but it is not active".to_owned());
+    }
+    // Free blocks, as the service answers for the kernel.
+    let answer = run(Layer::Seccomp, "stat", &["-f", "-c", "%a", "/"])?;
+    let expected = answered_calls::free_blocks(Limits::default().scratch_bytes);
+    if answer.trim() != expected.to_string() {
+        return Err(
+            "a filter is active, but the service cannot answer a process's calls".to_owned(),
+        );
+    }
+    Ok("a filter was installed and is active, and the service answers calls".to_owned())
+}
+
 fn probe_cgroup(layer: Layer, controller: &str) -> Result<String, String> {
     let find_cgroup = |text: &str| {
         text.lines().find_map(|line| {
@@ -162,21 +176,27 @@ fn probe_by_file(
 
 /// Starts `cat file` with only `layer` enabled, and returns its output.
 fn run_cat(layer: Layer, file: &str) -> Result<String, String> {
-    let cat = ["/usr/bin/cat", "/bin/cat"]
-        .into_iter()
-        .find(|path| Path::new(path).is_file());
-    let cat = cat.ok_or("the probe needs /usr/bin/cat")?;
+    run(layer, "cat", &[file])
+}
+
+/// Starts a program of the system with only `layer` enabled, and returns its output.
+fn run(layer: Layer, program: &str, arguments: &[&str]) -> Result<String, String> {
+    let candidates = ["/usr/bin", "/bin"].map(|folder| Path::new(folder).join(program));
+    let found = candidates.iter().find(|path| path.is_file());
+    let program = found.ok_or_else(|| format!("the probe needs /usr/bin/{program}"))?;
     let (_private, bundle) = make_bundle(layer)
         .map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
     let mut runtime = Runtime::native();
-    runtime.read_only_paths.push(cat.into());
+    runtime.read_only_paths.push(program.clone());
     let disabled_layers = Layer::ALL
         .into_iter()
         .filter(|other| *other != layer)
         .collect();
     let spec = SpawnSpec {
         bundle_dir: bundle,
-        command: vec![cat.into(), file.into()],
+        command: std::iter::once(program.display().to_string())
+            .chain(arguments.iter().map(|&argument| argument.to_owned()))
+            .collect(),
         env: BTreeMap::new(),
         runtime,
         limits: Limits {
@@ -239,7 +259,9 @@ fn fix_for(layer: Layer, error: &str) -> String {
     match layer {
         Layer::Namespaces => fix_namespaces(error),
         Layer::Seccomp => {
-            "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014)".into()
+            "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014), and give a root service in a container \
+             CAP_SYS_PTRACE; in Docker: docker run --cap-add SYS_PTRACE"
+                .into()
         }
         Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu => fix_cgroups(),
         Layer::Rlimits => {

@@ -16,6 +16,7 @@ mod cpu_limits;
 mod exit_causes;
 mod file_writes;
 mod harness;
+mod host_counters;
 mod host_visibility;
 mod images;
 mod killed_service;
