@@ -28,23 +28,38 @@ const ID_IN_SANDBOX: &str = "1000";
 const PASSWD: &str = "agent:x:1000:1000:agent:/tmp:/bin/sh\n";
 const GROUP: &str = "agent:x:1000:\n";
 
-/// The only files of `/proc` that agents see beside those of their processes: snapshots ([`SNAPSHOT_FILES`]), links, constants, and
-/// System V objects, which an agent has of its own. All others show settings and counters of the whole host (locks, asynchronous
-/// I/O, interrupts, open files …).
-const VISIBLE_IN_PROC: [&str; 13] = [
-    "cpuinfo",
-    "devices",
-    "filesystems",
-    "loadavg",
-    "meminfo",
-    "mounts",
-    "net",
-    "self",
-    "stat",
-    "sysvipc",
-    "thread-self",
-    "uptime",
-    "version",
+/// The only files of `/proc` that are not hidden beside those of processes. All others show settings and counters of the whole host (locks,
+/// asynchronous I/O, interrupts, open files …).
+const VISIBLE_IN_PROC: [&[&str]; 4] = [
+    // Links, and System V objects, which an agent has of its own.
+    &["mounts", "net", "self", "sysvipc", "thread-self"],
+    &SNAPSHOT_NAMES,
+    // Constants.
+    &[
+        "config.gz",
+        "consoles",
+        "devices",
+        "dma",
+        "execdomains",
+        "filesystems",
+        "iomem",
+        "ioports",
+        "kallsyms",
+        "misc",
+        "mtrr",
+        "version",
+    ],
+    // Files that only root may read. Each mount over a file would take time at the start.
+    &[
+        "kmsg",
+        "kpagecgroup",
+        "kpagecount",
+        "kpageflags",
+        "pagetypeinfo",
+        "slabinfo",
+        "timer_list",
+        "vmallocinfo",
+    ],
 ];
 /// Terminals, whose number all agents share.
 const TERMINALS: &str = "/dev/pts";
@@ -53,13 +68,7 @@ const COPIED_BUNDLE_BYTES: u64 = 32 << 20;
 
 /// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because
 /// the live counters would show what other agents do (e.g. the number of started processes). The snapshots list only the agent's CPUs.
-const SNAPSHOT_FILES: [&str; 5] = [
-    "/proc/stat",
-    "/proc/cpuinfo",
-    "/proc/meminfo",
-    "/proc/loadavg",
-    "/proc/uptime",
-];
+const SNAPSHOT_NAMES: [&str; 5] = ["stat", "cpuinfo", "meminfo", "loadavg", "uptime"];
 
 /// An installed bubblewrap and its features.
 #[derive(Debug, Clone)]
@@ -300,10 +309,14 @@ impl CommandLine {
 
     /// Mounts the snapshots over the host's counters.
     fn show_counter_snapshots(&mut self, cpus: &CpuView) -> Result<(), SandboxError> {
-        static SNAPSHOTS: OnceLock<Vec<(&str, Vec<u8>)>> = OnceLock::new();
+        static SNAPSHOTS: OnceLock<Vec<(String, Vec<u8>)>> = OnceLock::new();
         let snapshots = SNAPSHOTS.get_or_init(|| {
-            let read = |path| Some((path, fs::read(path).ok()?));
-            SNAPSHOT_FILES.into_iter().filter_map(read).collect()
+            let paths = SNAPSHOT_NAMES.map(|name| format!("/proc/{name}"));
+            let read = |path: String| {
+                let content = fs::read(&path).ok()?;
+                Some((path, content))
+            };
+            paths.into_iter().filter_map(read).collect()
         });
         for (path, content) in snapshots {
             self.cover(path, &cpus.filter_file(path, content))?;
@@ -404,7 +417,7 @@ impl Hidden {
                 continue;
             };
             let is_process = name.bytes().all(|byte| byte.is_ascii_digit());
-            if is_process || VISIBLE_IN_PROC.contains(&name.as_str()) {
+            if is_process || VISIBLE_IN_PROC.concat().contains(&name.as_str()) {
                 continue;
             }
             let path = format!("/proc/{name}");
