@@ -215,6 +215,7 @@ struct Page {
     agent: Option<String>,
     voided: Option<RulingView>,
     extra_evaluation: Option<String>,
+    is_rerun_after_release: bool,
     day: civil::Date,
     profile: Profile,
     /// Path of the ablation of the submission, if there is one.
@@ -294,6 +295,7 @@ pub(super) async fn page(
         agent: submission.agent_name,
         voided: view.voided.clone(),
         extra_evaluation: view.extra_evaluation.clone(),
+        is_rerun_after_release: view.rerun_after_release,
         day: view.day,
         profile: view.profile,
         has_episodes: clips.is_some(),

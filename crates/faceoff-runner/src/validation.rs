@@ -13,9 +13,9 @@ use crate::{
 use faceoff_episode::{AnswerTiming, Conditions, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
-use faceoff_types::{AgentFault, EpisodeOutcome, Magnitudes, Task, ValidationTiming};
+use faceoff_types::{AgentFault, EpisodeOutcome, Task, ValidationTiming};
 use faceoff_wire::job::ValidationSpec;
-use std::fmt;
+use std::{fmt, ops::Range};
 
 /// Minimum number of control steps per task in a validation run.
 pub const VALIDATION_STEPS: u32 = 250;
@@ -88,8 +88,9 @@ impl fmt::Display for ValidationFailure {
 /// Runs a validation: checks that the agent starts, answers and keeps real time.
 ///
 /// Runs episodes of each task as in an evaluation, in the same sandbox and with the same limits, until at least
-/// [`VALIDATION_STEPS`] control steps of the task are played. Ends with the first failure. The spec's seed determines
-/// the episodes and their number, so that an agent cannot distinguish this run from an evaluation.
+/// [`VALIDATION_STEPS`] control steps of the task are played. Ends with the first failure. The episodes, their numbers and
+/// their conditions are those of a shard of an evaluation, and the spec's seed determines how many are played, so that an agent
+/// cannot distinguish this run from an evaluation.
 ///
 /// # Errors
 /// Platform faults only; an agent fault is in the report. [`PlatformFault::Cancelled`] if `cancelled`, which is called
@@ -117,43 +118,49 @@ pub fn validate_monitored(
 ) -> Result<ValidationReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
     let environment = env.simulator.environment(&Conditions {
-        ruleset: env.simulator.competition().ruleset(),
-        profile: env.simulator.competition().counting_profile,
-        perturbations: &Magnitudes::default(),
+        ruleset: spec.ruleset,
+        profile: spec.profile,
+        perturbations: &spec.perturbations,
         seed: spec.seed,
         mismatch_seed: spec.mismatch_seed,
     })?;
     let mut timing = Vec::with_capacity(spec.tasks.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in spec.tasks.iter().copied() {
-        let plan = TaskPlan::new(spec, task);
-        let mut player = Player::new(
-            bundle,
-            env,
-            task,
-            plan.episodes,
-            environment.as_ref(),
-            monitor,
-            OnHostInterference::PlatformFault,
-        );
+        let TaskPlan { mut shards, steps } = TaskPlan::new(spec, task);
         let mut answers = Answers::default();
-        let mut outcomes = Vec::new();
-        while answers.timings.len() < plan.steps as usize {
-            let episode = plan.first_episode + outcomes.len() as u32;
-            let outcome = player.play(
-                episode,
-                environment.max_steps(task),
-                &mut answers,
-                cancelled,
-            )?;
-            let has_fault = outcome.fault.is_some();
-            outcomes.push(outcome);
-            if has_fault {
-                break;
+        let mut outcomes: Vec<EpisodeOutcome> = Vec::new();
+        let mut wait = None;
+        let is_complete = |answers: &Answers, outcomes: &[EpisodeOutcome]| {
+            let has_fault = outcomes.last().is_some_and(|last| last.fault.is_some());
+            has_fault || answers.timings.len() >= steps as usize
+        };
+        // An agent plays one shard in an evaluation. If a shard is too short, another agent plays the next.
+        while !is_complete(&answers, &outcomes) {
+            let episodes = shards.next_episodes();
+            let mut player = Player::new(
+                bundle,
+                env,
+                task,
+                episodes.end - episodes.start,
+                environment.as_ref(),
+                monitor,
+                OnHostInterference::PlatformFault,
+            );
+            for episode in episodes {
+                outcomes.push(player.play(
+                    episode,
+                    environment.max_steps(task),
+                    &mut answers,
+                    cancelled,
+                )?);
+                if is_complete(&answers, &outcomes) {
+                    break;
+                }
             }
+            wait = player.last_wait();
+            log.add(&player.close()?, None);
         }
-        let wait = player.last_wait();
-        log.add(&player.close()?, None);
         let (host_mean_s, cpu_mean_s) = answers.mean_host_and_cpu_s();
         let summary = answers.summary(task, &outcomes);
         let fault = outcomes.into_iter().find_map(|outcome| outcome.fault);
@@ -185,31 +192,46 @@ pub fn validate_monitored(
 
 /// The episodes of one task in a validation run.
 struct TaskPlan {
-    /// An episode number at which a shard of an evaluation would begin.
-    first_episode: u32,
-    /// Approximate number of episodes that the steps need.
-    episodes: u32,
+    shards: Shards,
     /// Episodes are started until this many control steps are played.
     steps: u32,
 }
 
 impl TaskPlan {
-    /// Episodes begin at a multiple of this, as in a shard, because the protocol sends the episode number to the agent.
-    const SHARD_EPISODES: u32 = 50;
-    /// Number of shards from which the first episode is chosen.
-    const SHARDS: u32 = 20;
-
     fn new(spec: &ValidationSpec, task: Task) -> Self {
         // The label “smoke” is part of the seed: another one would change the episodes.
         let derived = spec.seed.derive("smoke", task.as_str().as_bytes());
         let [a, b, c, d, e, f, g, h, ..] = *derived.as_bytes();
-        let shard = u32::from_le_bytes([a, b, c, d]) % Self::SHARDS;
+        let count = spec.episodes_per_task.div_ceil(spec.episodes_per_shard);
         let extra_steps = u32::from_le_bytes([e, f, g, h]) % VALIDATION_STEPS;
         Self {
-            first_episode: shard * Self::SHARD_EPISODES,
-            episodes: Self::SHARD_EPISODES,
+            shards: Shards {
+                episodes_per_task: spec.episodes_per_task,
+                episodes_per_shard: spec.episodes_per_shard,
+                count,
+                next: u32::from_le_bytes([a, b, c, d]) % count,
+            },
             steps: VALIDATION_STEPS + extra_steps,
         }
+    }
+}
+
+/// The shards of an evaluation, from a drawn one on; after the last comes the first. The protocol sends the number of an episode to the
+/// agent, so these are the numbers of a shard.
+struct Shards {
+    episodes_per_task: u32,
+    episodes_per_shard: u32,
+    count: u32,
+    next: u32,
+}
+
+impl Shards {
+    /// The episodes of the next shard.
+    fn next_episodes(&mut self) -> Range<u32> {
+        let start = self.next * self.episodes_per_shard;
+        let end = start.saturating_add(self.episodes_per_shard);
+        self.next = (self.next + 1) % self.count;
+        start..end.min(self.episodes_per_task)
     }
 }
 
@@ -273,5 +295,23 @@ impl StepSink for Answers {
     fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
         self.completed = self.timings.len();
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn episodes_are_those_of_shards() {
+        let mut shards = Shards {
+            episodes_per_task: 12,
+            episodes_per_shard: 5,
+            count: 3,
+            next: 1,
+        };
+        for expected in [5..10, 10..12, 0..5, 5..10] {
+            assert_eq!(shards.next_episodes(), expected);
+        }
     }
 }

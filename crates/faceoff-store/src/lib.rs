@@ -89,6 +89,7 @@ pub use queries::{
     board_days::BoardDays,
     evaluations::EvaluationFilter,
     gauges::Gauges,
+    progress::{RunProgress, ShardProgress},
     queue_forecast::{EvaluationBacklog, QueueForecast, QueuePosition},
     runs::RunFaults,
     storage::{StorageScope, TeamStorage},

@@ -135,10 +135,18 @@ pub struct GameFiles {
 }
 
 /// The episodes of a validation run.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ValidationSpec {
+    /// The ruleset, profile, magnitudes, tasks and episodes are those of an evaluation: an agent cannot tell the runs apart.
+    pub ruleset: Ruleset,
+    pub profile: Profile,
+    pub perturbations: Magnitudes,
     /// The tasks in the order of play.
     pub tasks: Vec<Task>,
+    /// Episodes of each task in an evaluation; at least one.
+    pub episodes_per_task: u32,
+    /// Episodes of a shard; at least one.
+    pub episodes_per_shard: u32,
     /// The submission's own seed.
     pub seed: Seed,
     /// Seed of the season's model mismatch (the simulated robot's deviations from the nominal one), so that the robot is the same as

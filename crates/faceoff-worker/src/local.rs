@@ -11,10 +11,11 @@ use faceoff_episode::Simulator;
 use faceoff_live::LiveState;
 use faceoff_store::{
     Artifacts, ClaimedJob, CommitOutcome, GameCommit, GameRecording, Job, JobClaim, JobFilter,
-    RunOwner, ShardCommit, Store, StoreError,
+    RunOwner, RunPlan, RunSeeds, ShardCommit, Store, StoreError,
 };
 use faceoff_types::{
-    AgentLimits, BundleRef, Clock, Competition, EvaluationResult, GameId, StageLimits,
+    AgentLimits, BundleRef, Clock, Competition, EvaluationResult, GameId, Magnitudes, Ruleset,
+    StageLimits, StageSettings,
 };
 use faceoff_wire::{
     game::GameSpec,
@@ -71,24 +72,58 @@ impl LocalServer {
         }
     }
 
+    /// A validation run like an evaluation of the stage; without one, like an evaluation by the server's settings.
+    fn validation_spec(
+        &self,
+        stage: Option<(Ruleset, RunPlan)>,
+        seeds: RunSeeds,
+    ) -> ValidationSpec {
+        let competition = self.competition();
+        let RunSeeds { episodes, mismatch } = seeds;
+        match stage {
+            Some((ruleset, plan)) => ValidationSpec {
+                ruleset,
+                profile: plan.profile,
+                perturbations: plan.variation.perturbations,
+                tasks: plan.tasks,
+                episodes_per_task: plan.episodes_per_task,
+                episodes_per_shard: plan.episodes_per_shard,
+                seed: episodes,
+                mismatch_seed: mismatch,
+            },
+            None => {
+                let episodes_per_shard = StageSettings::default().episodes_per_shard;
+                ValidationSpec {
+                    ruleset: competition.ruleset(),
+                    profile: competition.counting_profile,
+                    perturbations: Magnitudes::default(),
+                    tasks: competition.task_names().collect(),
+                    episodes_per_task: episodes_per_shard,
+                    episodes_per_shard,
+                    seed: episodes,
+                    mismatch_seed: mismatch,
+                }
+            }
+        }
+    }
+
     fn job_spec(&self, claimed: ClaimedJob) -> JobSpec {
         let ClaimedJob { claim, job } = claimed;
         let payload = match job {
             Job::Validation {
                 submission,
                 seeds,
-                limits,
+                stage,
                 runtimes,
-            } => JobPayload::Validation {
-                submission: submission.id,
-                agent: self.agent(submission.bundle, &limits),
-                spec: ValidationSpec {
-                    tasks: self.competition().task_names().collect(),
-                    seed: seeds.episodes,
-                    mismatch_seed: seeds.mismatch,
-                },
-                runtimes,
-            },
+            } => {
+                let limits = stage.as_ref().map(|stage| stage.1.limits.clone());
+                JobPayload::Validation {
+                    submission: submission.id,
+                    agent: self.agent(submission.bundle, &limits.unwrap_or_default()),
+                    spec: self.validation_spec(stage.map(|stage| *stage), seeds),
+                    runtimes,
+                }
+            }
             Job::Shard {
                 owner,
                 run,

@@ -38,6 +38,10 @@ pub struct BaselineRow {
     /// If it is an extra evaluation: the reason for it; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extra_evaluation: Option<String>,
+    /// Does it repeat an evaluation of the day on an organiser's order, given after the release, when the day's seed was public?
+    /// Absent if not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub rerun_after_release: bool,
     /// When the score was stored.
     pub finished_at: Timestamp,
     /// The ruleset of the score.

@@ -1,6 +1,8 @@
 //! Tests of evaluations in the API: progress, results, faults, cancelling and rerunning.
 
 use crate::site::{ADMIN, DATASET, LEASE_S, Site, result, string};
+use faceoff_testkit::{outcome, shard_commit, shard_outcomes};
+use jiff::SignedDuration;
 use serde_json::json;
 
 #[tokio::test]
@@ -31,7 +33,14 @@ async fn evaluation_shows_progress_result_and_dataset() {
     assert_eq!(running["state"], "running");
     assert_eq!(
         running["progress"],
-        json!({ "episodes_done": 3, "episodes_total": 12 })
+        json!({ "episodes_done": 0, "episodes_total": 12 }),
+        "no shard is complete"
+    );
+    let running = site.get(&path, Some(ADMIN)).await.json(200);
+    assert_eq!(
+        running["progress"],
+        json!({ "episodes_done": 3, "episodes_total": 12 }),
+        "organisers see all episodes"
     );
     site.store.release(&claim, site.now()).await.unwrap();
 
@@ -139,6 +148,37 @@ async fn failed_evaluation_shows_its_faults_and_log() {
     assert!(!page.body.contains("not finite") && !page.body.contains("log of hit"));
 }
 
+/// An agent could speak to its team by the pace of its episodes.
+#[tokio::test]
+async fn progress_shows_whole_shards_once_a_minute() {
+    let site = Site::start().await;
+    let (team, _, path) = site.team_with_evaluation("Alpha", "striker").await;
+    let progress = async || {
+        let view = site.get(&path, Some(&team.token)).await.json(200);
+        view["progress"]["episodes_done"].as_u64().unwrap()
+    };
+    let begin = site.now();
+    let (claim, run, shard) = site.claim_shard().await;
+    site.set_time(begin + SignedDuration::from_secs(7));
+    assert!(
+        site.store
+            .heartbeat(&claim, 3, LEASE_S, site.now())
+            .await
+            .unwrap()
+    );
+    let outcomes = shard_outcomes(&shard, |task, episode| outcome(task, episode, false));
+    let commit = shard_commit(outcomes, Some(claim.recording_key(run.id)));
+    site.store
+        .commit_shard(&claim, commit, site.now())
+        .await
+        .unwrap();
+    // The clock of the tests starts at a full minute.
+    for (seconds, expected) in [(8, 0), (59, 0), (60, 4), (61, 4)] {
+        site.set_time(begin + SignedDuration::from_secs(seconds));
+        assert_eq!(progress().await, expected, "after {seconds} s");
+    }
+}
+
 #[tokio::test]
 async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
     let site = Site::start().await;
@@ -169,6 +209,7 @@ async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
     let again_path = again.header("location").to_owned();
     let again = again.json(201);
     assert_eq!(again["rerun_of"], cancelled["id"]);
+    assert_eq!(again["rerun_after_release"], true);
     for field in ["submission", "day", "episodes_per_task", "profile"] {
         assert_eq!(again[field], cancelled[field], "{field}");
     }
@@ -183,6 +224,10 @@ async fn cancelled_evaluation_shows_reason_and_can_be_rerun() {
         .problem(404, "not-found", &[]);
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(board["rows"][0]["rerun_after_release"], true, "{board}");
+    let page = site.get("/", None).await.body;
+    assert!(page.contains("evaluated again after the release"), "{page}");
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(me["today"]["evaluation"], again["id"]);
 }

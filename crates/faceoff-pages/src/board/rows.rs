@@ -30,6 +30,7 @@ pub(super) struct TeamCell {
     pub(super) day: civil::Date,
     /// Reason of an extra evaluation.
     pub(super) extra_evaluation: Option<String>,
+    pub(super) is_rerun_after_release: bool,
     /// Number of days in the mean, if there are several.
     pub(super) day_count: Option<usize>,
     /// Conditions of the evaluation, where they differ between rows.
@@ -181,6 +182,7 @@ impl<'a> Context<'a> {
             evaluation: row.evaluation,
             day: row.day,
             extra_evaluation: row.extra_evaluation.clone(),
+            is_rerun_after_release: row.rerun_after_release,
             day_count: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
             conditions: (!self.has_common_conditions).then(|| conditions(row)),
             tier: row.tier.filter(|_| !self.is_by_rank),

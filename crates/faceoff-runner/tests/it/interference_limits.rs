@@ -34,6 +34,11 @@ fn run_validation(
 ) -> Result<ValidationReport, PlatformFault> {
     let seed = Seed::from_number(0);
     let spec = ValidationSpec {
+        ruleset: faceoff_airhockey::RULESET,
+        profile: faceoff_airhockey::EVALUATION,
+        perturbations: Default::default(),
+        episodes_per_task: 1000,
+        episodes_per_shard: 50,
         tasks: faceoff_airhockey::TASKS.to_vec(),
         seed,
         mismatch_seed: seed.model_mismatch(),

@@ -1,7 +1,7 @@
 //! Misbehaving agents in a validation: each misbehaviour is an agent fault with its own verdict.
 
 use crate::agents::{Agent, sandboxed, with_short_step_limit};
-use faceoff_airhockey::{HIT, TASKS};
+use faceoff_airhockey::{DEFEND, HIT, TASKS};
 use faceoff_runner::{
     AgentEnvironment, PlatformFault, VALIDATION_STEPS, ValidationFailure, ValidationReport,
     ValidationSpec, validate,
@@ -12,6 +12,11 @@ use faceoff_types::{AgentFault, AgentFaultKind, Phase, Seed};
 fn spec(number: u64) -> ValidationSpec {
     let seed = Seed::from_number(number);
     ValidationSpec {
+        ruleset: faceoff_airhockey::RULESET,
+        profile: faceoff_airhockey::EVALUATION,
+        perturbations: Default::default(),
+        episodes_per_task: 1000,
+        episodes_per_shard: 50,
         tasks: faceoff_airhockey::TASKS.to_vec(),
         seed,
         mismatch_seed: seed.model_mismatch(),
@@ -75,6 +80,38 @@ fn validation_length_and_episodes_depend_on_the_seed() {
     let (other_steps, other_log) = run(2);
     assert_ne!(other_steps, steps);
     assert_ne!(other_log, log);
+}
+
+#[test]
+fn validation_plays_shards_of_the_stage() {
+    let agent = Agent::with(
+        "print('start', file=sys.stderr)\n\
+         def on_reset(episode): print(episode, file=sys.stderr)",
+    );
+    for number in 0..3 {
+        let spec = ValidationSpec {
+            tasks: vec![DEFEND],
+            episodes_per_task: 5,
+            episodes_per_shard: 2,
+            ..spec(number)
+        };
+        let report = validate(&spec, &agent.bundle, &sandboxed(), &|| false).unwrap();
+        assert_eq!(report.failure, None, "{}", report.log);
+        assert_eq!(report.timing.len(), 1);
+        let lines: Vec<_> = report.log.split_whitespace().collect();
+        let processes: Vec<_> = lines.split(|line| *line == "start").skip(1).collect();
+        let shards = [&["0", "1"][..], &["2", "3"], &["4"]];
+        let (last, complete) = processes.split_last().unwrap();
+        let first = shards
+            .iter()
+            .position(|shard| shard.starts_with(&[processes[0][0]]));
+        let in_order = shards.iter().cycle().skip(first.unwrap());
+        for (process, shard) in complete.iter().zip(in_order.clone()) {
+            assert_eq!(process, shard, "{lines:?}");
+        }
+        let last_shard = in_order.clone().nth(complete.len()).unwrap();
+        assert!(last_shard.starts_with(last), "{lines:?}");
+    }
 }
 
 #[test]

@@ -27,11 +27,11 @@ pub async fn newest(
 pub async fn build(app: &AppState, ablation: Ablation) -> Result<AblationView, Problem> {
     let status = match ablation.state {
         AblationState::Open {
-            episodes_done,
+            progress,
             episodes_total,
         } => AblationStatus::Open {
             progress: Progress {
-                episodes_done,
+                episodes_done: progress.in_whole_shards(app.config.clock.now()),
                 episodes_total,
             },
         },

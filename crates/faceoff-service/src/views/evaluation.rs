@@ -151,7 +151,9 @@ fn evaluation_view(
     );
     let episodes_total = evaluation.plan.episodes_total();
     let episodes_done = match &evaluation.state {
-        EvaluationState::Running { episodes_done, .. } => *episodes_done,
+        EvaluationState::Running { progress, .. } => {
+            visibility.episodes_done(progress).min(episodes_total)
+        }
         EvaluationState::Finalising | EvaluationState::Finished { .. } => episodes_total,
         EvaluationState::Queued
         | EvaluationState::AgentFailed { .. }
@@ -215,6 +217,10 @@ fn evaluation_view(
         deadline_at: evaluation.deadline_at,
         rerun_of: evaluation.rerun_of,
         extra_evaluation: evaluation.extra_for,
+        rerun_after_release: evaluation.rerun_of.is_some()
+            && evaluation
+                .released_at
+                .is_some_and(|released_at| evaluation.created_at >= released_at),
         voided: evaluation.voided.map(ruling::view),
         blind: is_hidden,
         public: is_public,

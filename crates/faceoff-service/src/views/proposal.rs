@@ -41,12 +41,12 @@ async fn evaluation_view(
         episodes_total: 0,
     };
     if let EvaluationState::Running {
-        episodes_done,
+        progress: run,
         episodes_total,
     } = &evaluation.state
     {
         progress = Progress {
-            episodes_done: *episodes_done,
+            episodes_done: run.episodes_done.min(*episodes_total),
             episodes_total: *episodes_total,
         };
     }
@@ -133,6 +133,8 @@ async fn board_record(
         day: day.unwrap_or_else(|| stage.day(proposal.created_at).date),
         released_at,
         extra_for,
+        rerun_after_release: released_at
+            .is_some_and(|released_at| evaluation.created_at >= released_at),
         finished_at: *finished_at,
         result: (**result).clone(),
     }))

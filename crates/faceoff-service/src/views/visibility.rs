@@ -13,8 +13,8 @@ use crate::{
     viewer::Viewer,
 };
 use faceoff_store::{
-    Evaluation, EvaluationState, Game, GamePurpose, Ruling, Stage, StagePhase, StoreError,
-    Tournament, TournamentRound,
+    Evaluation, EvaluationState, Game, GamePurpose, Ruling, RunProgress, Stage, StagePhase,
+    StoreError, Tournament, TournamentRound,
 };
 use faceoff_types::{Publication, Side, StageId};
 use jiff::Timestamp;
@@ -24,6 +24,8 @@ use std::collections::BTreeMap;
 #[derive(Debug)]
 pub struct Visibility {
     viewer: Viewer,
+    /// When this was determined.
+    now: Timestamp,
     stages: BTreeMap<StageId, StageRestrictions>,
 }
 
@@ -75,6 +77,7 @@ impl Visibility {
         let stages = app.store.stages().await?;
         Ok(Self {
             viewer,
+            now,
             stages: stages.into_iter().map(restrictions).collect(),
         })
     }
@@ -82,6 +85,14 @@ impl Visibility {
     #[boxed]
     pub async fn for_organiser(app: &AppState) -> Result<Self, Problem> {
         Self::load(app, Viewer::Organiser).await
+    }
+
+    /// The progress of a run, as the viewer may see it: others than organisers see whole shards, once a minute.
+    pub(crate) fn episodes_done(&self, progress: &RunProgress) -> u32 {
+        match self.viewer {
+            Viewer::Organiser => progress.episodes_done,
+            Viewer::Team(_) | Viewer::Visitor => progress.in_whole_shards(self.now),
+        }
     }
 
     /// Refuses all viewers but organisers; `resource` is its name in the message.

@@ -118,14 +118,13 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 mismatch: secret.model_mismatch(),
             };
             let all = stages::all(tx).await?;
-            let limits = stages::current(&all, tx.now)
-                .map(|stage| stage.rules.rules.limits.clone())
-                .unwrap_or_default();
+            let stage = stages::current(&all, tx.now)
+                .map(|stage| Box::new((stage.rules.rules.ruleset, stage.plan())));
             let runtimes = stage_runtimes::required_runtimes(&all, tx.now);
             Ok(Job::Validation {
                 submission,
                 seeds,
-                limits,
+                stage,
                 runtimes,
             })
         }

@@ -4,10 +4,10 @@
 use crate::{
     operations::runs::RunOwner,
     queue::JobClaim,
-    tables::{runs::Run, shards::Shard, submissions::Submission},
+    tables::{plan::RunPlan, runs::Run, shards::Shard, submissions::Submission},
 };
 use faceoff_types::{
-    BundleRef, EvaluationId, GameId, Seed, StageLimits, StageRuntimes, TournamentRules,
+    BundleRef, EvaluationId, GameId, Ruleset, Seed, StageRuntimes, TournamentRules,
 };
 
 /// A leased job.
@@ -26,8 +26,9 @@ pub enum Job {
         submission: Submission,
         /// Seeds of the validation run's own episodes.
         seeds: RunSeeds,
-        /// Limits for the agent: those of the current stage.
-        limits: Box<StageLimits>,
+        /// The ruleset and the plan of an evaluation in the current stage, which the validation run resembles; `None` if no stage is
+        /// open.
+        stage: Option<Box<(Ruleset, RunPlan)>>,
         /// Accepted runtimes of each stage that the submission could be evaluated in; it is invalid if none of them
         /// accepts its runtime. Empty if a stage accepts any runtime.
         runtimes: Vec<StageRuntimes>,

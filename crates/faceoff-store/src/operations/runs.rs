@@ -74,8 +74,8 @@ pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Resu
         .ok_or_else(|| StoreError::Damaged(format!("run {run}: it has no owner")))
 }
 
-/// Adds a run, divides it into shards in the order of tasks and episodes, and queues a job like `job` for each. Their slot
-/// time is charged to `team`. [`StoreError::Conflict`] if the bundle of a contestant was removed.
+/// Adds a run, divides it into shards, and queues a job like `job` for each, in an order that is drawn for this run: no agent knows which
+/// episodes another team's agent has just played. Their slot time is charged to `team`. [`StoreError::Conflict`] if the bundle of a contestant was removed.
 pub(crate) async fn queue_run(
     tx: &mut Tx,
     run: &Run,
@@ -88,7 +88,7 @@ pub(crate) async fn queue_run(
     }
     runs::insert(tx, run, contestants).await?;
     let account = queue::account(tx, job.lane, &team.to_string()).await?;
-    let mut position = 0;
+    let mut parts = Vec::new();
     for task in run.plan.tasks.iter().copied() {
         let mut first_episode = 0;
         while first_episode < run.plan.episodes_per_task {
@@ -103,13 +103,23 @@ pub(crate) async fn queue_run(
                 end_episode,
                 recording: None,
             };
-            let job_id = queue::insert(tx, job, account).await?;
-            shards::insert(tx, run.id, &shard, position, job_id).await?;
-            position += 1;
+            parts.push((random_number()?, parts.len(), shard));
             first_episode = end_episode;
         }
     }
+    parts.sort_unstable_by_key(|(order, ..)| *order);
+    for (_, position, shard) in parts {
+        let job_id = queue::insert(tx, job, account).await?;
+        let position = u32::try_from(position).unwrap_or(u32::MAX);
+        shards::insert(tx, run.id, &shard, position, job_id).await?;
+    }
     Ok(())
+}
+
+/// A place in the order of play.
+fn random_number() -> Result<u64> {
+    getrandom::u64()
+        .map_err(|error| StoreError::Damaged(format!("the host has no random numbers: {error}")))
 }
 
 /// Drops the open jobs of a run from the queue.

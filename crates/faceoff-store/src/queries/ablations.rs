@@ -3,7 +3,7 @@
 use crate::{
     boxed,
     error::Result,
-    queries::progress,
+    queries::progress::{self, RunProgress},
     store::Store,
     tables::{
         ablations::{self, Ablation, AblationRow, AblationState},
@@ -36,9 +36,12 @@ async fn from_row(connection: &mut SqliteConnection, row: AblationRow) -> Result
     let state = match (row.finished_at, row.reason) {
         (None, _) => {
             let runs: Vec<_> = run_by_profile.values().copied().collect();
-            let episodes_done = progress::of_runs(connection, &runs).await?;
+            let mut progress = RunProgress::default();
+            for run in progress::of_runs(connection, &runs).await?.into_values() {
+                progress.add(run);
+            }
             AblationState::Open {
-                episodes_done: episodes_done.into_values().sum(),
+                progress,
                 episodes_total,
             }
         }

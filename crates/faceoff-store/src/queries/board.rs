@@ -34,6 +34,8 @@ pub struct BoardRecord {
     pub released_at: Option<Timestamp>,
     /// The reason of an extra evaluation; `None` for the team's regular one of the day.
     pub extra_for: Option<String>,
+    /// Does it repeat an evaluation of the day, and was requested after the release, when the day's seed was public?
+    pub rerun_after_release: bool,
     /// When the evaluation was scored.
     pub finished_at: Timestamp,
     pub result: EvaluationResult,
@@ -57,6 +59,7 @@ pub(super) struct BoardRow {
     pub(super) day: Text<Date>,
     pub(super) released_at: Option<Instant>,
     pub(super) extra_for: Option<String>,
+    pub(super) rerun_after_release: bool,
     pub(super) finished_at: Instant,
     pub(super) result: Json<EvaluationResult>,
 }
@@ -85,6 +88,7 @@ impl From<BoardRow> for BoardRecord {
             day: row.day.0,
             released_at: row.released_at.map(|at| at.0),
             extra_for: row.extra_for,
+            rerun_after_release: row.rerun_after_release,
             finished_at: row.finished_at.0,
             result: row.result.0,
         }
@@ -99,6 +103,8 @@ macro_rules! select_board {
             $name + r#"SELECT t.id AS team, t.name, t.created_at AS invited_at, t.affiliation, t.link, t.division,
                       t.retired_at, t.is_baseline, s.id AS submission, s.created_at AS submitted_at, s.agent_name,
                       e.id AS evaluation, e.run_id AS run, d.day, d.released_at, e.extra_for,
+                      e.rerun_of IS NOT NULL AND d.released_at IS NOT NULL AND e.created_at >= d.released_at
+                          AS "rerun_after_release!: bool",
                       e.finished_at AS "finished_at!", e.result AS "result!" "# + $tail,
             $($argument),*
         )

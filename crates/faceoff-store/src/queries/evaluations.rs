@@ -3,7 +3,7 @@
 use crate::{
     boxed,
     error::{Result, StoreError},
-    queries::progress,
+    queries::progress::{self, RunProgress},
     store::Store,
     tables::evaluations::{self, Evaluation, EvaluationRow},
 };
@@ -11,19 +11,19 @@ use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::{Timestamp, civil::Date};
 use sqlx::SqliteConnection;
 
-/// Turns rows into evaluations by `convert`, which is given the number of episodes done in a running one.
+/// Turns rows into evaluations by `convert`, which is given the progress of a running one.
 pub(super) async fn with_progress_by<T>(
     connection: &mut SqliteConnection,
     rows: Vec<EvaluationRow>,
-    convert: fn(EvaluationRow, u32) -> Result<T>,
+    convert: fn(EvaluationRow, RunProgress) -> Result<T>,
 ) -> Result<Vec<T>> {
     let running: Vec<_> = rows.iter().filter_map(EvaluationRow::open_run).collect();
-    let episodes_done = progress::of_runs(connection, &running).await?;
+    let mut by_run = progress::of_runs(connection, &running).await?;
     rows.into_iter()
         .map(|row| {
             let run = row.open_run();
-            let done = run.and_then(|run| episodes_done.get(&run).copied());
-            convert(row, done.unwrap_or(0))
+            let progress = run.and_then(|run| by_run.remove(&run));
+            convert(row, progress.unwrap_or_default())
         })
         .collect()
 }

@@ -3,6 +3,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
+    queries::progress::RunProgress,
 };
 use faceoff_types::{AblationId, ProfileMap, RunId, SubmissionId};
 use jiff::Timestamp;
@@ -26,8 +27,8 @@ pub struct Ablation {
 pub enum AblationState {
     /// Queued or running.
     Open {
-        /// As reported by the workers.
-        episodes_done: u32,
+        /// Of all profiles.
+        progress: RunProgress,
         /// Episodes over all profiles and tasks.
         episodes_total: u32,
     },

@@ -4,6 +4,7 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
+    queries::progress::RunProgress,
     tables::{plan::RunPlan, rulings::Ruling, runs::RunState},
 };
 use faceoff_types::{
@@ -78,8 +79,7 @@ pub enum EvaluationState {
     /// No shard has started.
     Queued,
     Running {
-        /// As reported by the workers.
-        episodes_done: u32,
+        progress: RunProgress,
         episodes_total: u32,
     },
     /// All shards are committed, the score is being computed.
@@ -202,7 +202,11 @@ impl EvaluationRow {
         }
     }
 
-    fn take_state(&mut self, episodes_done: u32, episodes_total: u32) -> Result<EvaluationState> {
+    fn take_state(
+        &mut self,
+        progress: RunProgress,
+        episodes_total: u32,
+    ) -> Result<EvaluationState> {
         let finished_at = || {
             self.finished_at
                 .map(|at| at.0)
@@ -216,7 +220,7 @@ impl EvaluationRow {
         Ok(match (self.state.as_str(), self.run_state) {
             ("open", RunState::Queued) => EvaluationState::Queued,
             ("open", RunState::Running) => EvaluationState::Running {
-                episodes_done: episodes_done.min(episodes_total),
+                progress,
                 episodes_total,
             },
             ("open", RunState::Complete) => EvaluationState::Finalising,
@@ -252,9 +256,9 @@ impl EvaluationRow {
     }
 
     /// For a row of a proposal.
-    pub(crate) fn into_proposed(mut self, episodes_done: u32) -> Result<ProposedEvaluation> {
+    pub(crate) fn into_proposed(mut self, progress: RunProgress) -> Result<ProposedEvaluation> {
         let episodes_total = self.take_plan().episodes_total();
-        let state = self.take_state(episodes_done, episodes_total)?;
+        let state = self.take_state(progress, episodes_total)?;
         Ok(ProposedEvaluation {
             id: self.id,
             submission: self.submission_id,
@@ -267,9 +271,9 @@ impl EvaluationRow {
     }
 
     /// For a row of `counting_evaluations`.
-    pub(crate) fn into_evaluation(mut self, episodes_done: u32) -> Result<Evaluation> {
+    pub(crate) fn into_evaluation(mut self, progress: RunProgress) -> Result<Evaluation> {
         let plan = self.take_plan();
-        let state = self.take_state(episodes_done, plan.episodes_total())?;
+        let state = self.take_state(progress, plan.episodes_total())?;
         let Some(day) = self.day else {
             return Err(self.damaged("without a day"));
         };

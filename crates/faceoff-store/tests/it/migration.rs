@@ -509,8 +509,14 @@ async fn migration_keeps_all_old_rows() {
         (
             1200,
             EvaluationState::Running {
-                // Two of the committed shard, and one of each of the five leased shards.
-                episodes_done: 2 + 5,
+                progress: RunProgress {
+                    // Two of the committed shard, and one of each of the five leased shards.
+                    episodes_done: 2 + 5,
+                    commits: vec![ShardProgress {
+                        committed_at: finished_at,
+                        episodes: 2,
+                    }],
+                },
                 episodes_total: 12,
             },
         ),
@@ -650,7 +656,10 @@ async fn migration_splits_old_ablations_into_runs() {
         (
             11,
             AblationState::Open {
-                episodes_done: 3,
+                progress: RunProgress {
+                    episodes_done: 3,
+                    commits: Vec::new(),
+                },
                 episodes_total: 36,
             },
         ),

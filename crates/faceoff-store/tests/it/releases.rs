@@ -173,7 +173,9 @@ async fn successful_rerun_releases_the_day() {
     let finished = f.store.evaluation(id).await.unwrap();
     assert_eq!(finished.rerun_of, Some(failed));
     assert_eq!(finished.released_at, Some(f.now));
-    assert_eq!(f.board().await[0].evaluation, finished.id);
+    let on_board = &f.board().await[0];
+    assert_eq!(on_board.evaluation, finished.id);
+    assert!(!on_board.rerun_after_release, "it began before the release");
 }
 
 #[tokio::test]
@@ -209,6 +211,10 @@ async fn rerun_after_release_uses_submission_of_cutoff() {
     let third_run = rerun(&f, second_run.id).await.unwrap();
     assert_eq!(third_run.submission, submission.id);
     f.finish_next_evaluation().await;
+    assert!(
+        f.board().await[0].rerun_after_release,
+        "the board says that the episodes were public"
+    );
     let repeated = rerun(&f, cancelled.id).await;
     assert!(
         matches!(repeated, Err(StoreError::Conflict(_))),

@@ -112,6 +112,11 @@ fn all_jobs_round_trip() {
         submission: SubmissionId::new(),
         agent: agent(),
         spec: ValidationSpec {
+            ruleset: faceoff_airhockey::RULESET,
+            profile: faceoff_airhockey::EVALUATION,
+            perturbations: Default::default(),
+            episodes_per_task: 1000,
+            episodes_per_shard: 50,
             tasks: TASKS.to_vec(),
             seed: Seed::from_number(3),
             mismatch_seed: Seed::from_number(4),
