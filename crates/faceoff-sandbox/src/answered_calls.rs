@@ -78,6 +78,8 @@ impl AnsweredCalls {
         let answers = FixedAnswers {
             blocks: free_blocks(scratch_bytes),
         };
+        // Read before the first agent starts.
+        FixedAnswers::host();
         Ok((
             Self {
                 program: seccomp::answered_calls()?,

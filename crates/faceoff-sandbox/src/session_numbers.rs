@@ -68,8 +68,9 @@ fn skip_one() -> bool {
     }
     // A stack is aligned to 16 bytes.
     let mut stack = vec![0_u128; STACK_BYTES / size_of::<u128>()];
-    // Without a signal at its end, so that no other code of this process waits for it.
-    let flags = libc::CLONE_VM | libc::CLONE_VFORK;
+    // Without a signal at its end, so that no other code of this process waits for it. It shares the open files and does not duplicate
+    // them: a program of a bundle that is just being written could not be started while it is open for writing elsewhere.
+    let flags = libc::CLONE_VM | libc::CLONE_VFORK | libc::CLONE_FILES | libc::CLONE_FS;
     #[expect(unsafe_code, reason = "a fork would copy all tables of this process")]
     // SAFETY: the process runs `start_session` on a stack of its own, and this thread waits until it has ended. The function
     // makes one system call, and neither allocates nor locks nor unwinds.

@@ -119,7 +119,8 @@ fn relayed_bits_change_no_reading() {
 
 #[test]
 fn refused_calls_have_the_errors_of_older_kernels() {
-    let found = read(&mut Subject::new("host_counters", &[]).spawn());
+    let subject = Subject::new("host_counters", &[]);
+    let found = read(&mut subject.spawn());
     for (errno, names) in [
         (
             "ENOSYS",
@@ -238,7 +239,8 @@ fn session_numbers_tell_a_later_agent_nothing() {
 
 #[test]
 fn subprocess_in_a_session_of_its_own_works() {
-    let mut agent = Subject::new("host_counters", &[]).spawn();
+    let subject = Subject::new("host_counters", &[]);
+    let mut agent = subject.spawn();
     assert!(
         ask(&mut agent, "session")
             .as_str()
