@@ -53,6 +53,7 @@ help:
 	@echo "make test-box   build the images' file systems without a container engine, and start the programs in them"
 	@echo "make test-engine   build the images with Docker, and run a day in containers; WHOLE=1 also compiles there"
 	@echo "make fuzz   fuzz the parsers with almost valid input: MINUTES=$(MINUTES)"
+	@echo "make channels   print the rates of the channels between agents that remain"
 	@echo "make busy   run agents beside other load: CPU, memory, I/O and processes"
 	@echo "make load   measure how many page views a server handles, and check that agents are not affected"
 	@echo "make remote-slot   measure the overhead of a remote worker, compared with the server's own slot"

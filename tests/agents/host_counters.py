@@ -71,10 +71,10 @@ def files_of(folder):
     """Numbers, sizes and modification times of the files below a folder."""
     found = []
     for parent, folders, names in os.walk(folder):
-        for name in sorted(folders + names):
+        for name in [".", *folders, *names]:
             status = os.lstat(os.path.join(parent, name))
             found.append([name, status.st_ino, status.st_size, status.st_mtime_ns, status.st_uid, status.st_nlink])
-    return sorted(found)
+    return found
 
 
 def lock(path):
@@ -130,6 +130,9 @@ readings = {
     "namespace_number": lambda: filled(16, os.open("/proc/self/ns/mnt", os.O_RDONLY), 0x8008B70D, address),
     "mount_namespace_number": lambda: filled(16, os.open("/proc/self/ns/mnt", os.O_RDONLY), 0x8008B705, address),
     "place_on_disk": lambda: filled(16, os.open(os.__file__, os.O_RDONLY), 0xC020660B, address),
+    "xfs_counts": lambda: filled(16, os.open(os.__file__, os.O_RDONLY), 0x80205871, address),
+    "btrfs_space": lambda: filled(16, os.open(os.__file__, os.O_RDONLY), 0xC0109414, address),
+    "named_socket": lambda: socket.socket(socket.AF_UNIX).bind(""),
     "entropy": lambda: filled(16, os.open("/dev/random", os.O_RDONLY), 0x80045200, address),
     "mergeable": lambda: call(28, address & ~4095, 4096, 12),
     "merge_all": lambda: call(157, 67, 1, 0, 0, 0),
@@ -242,6 +245,28 @@ def event_number():
     return int(lines[lines.index("eventfd-id:") + 1])
 
 
+def memory_number():
+    """The inode number of new shared memory: each CPU takes 1024 of them at a time."""
+    for _ in range(1100):
+        block = mmap.mmap(-1, 4096)
+        lines = [line for line in open("/proc/self/maps") if "/dev/zero" in line]
+        number = int(lines[-1].split()[4])
+        block.close()
+        if number % 1024 == 1:
+            return number
+    return 0
+
+
+def skipped_memory_numbers():
+    """How many numbers of shared memory others have used since the last call, in blocks."""
+    last = skipped_memory_numbers.last
+    skipped_memory_numbers.last = memory_number()
+    return skipped_memory_numbers.last - last
+
+
+skipped_memory_numbers.last = 0
+
+
 def map_library(path="pydoc_data/topics.py"):
     """A page of a file that agents share, in this process's memory."""
     file = os.open(os.path.join(os.path.dirname(os.__file__), path), os.O_RDONLY)
@@ -279,6 +304,7 @@ work = bytearray(8 << 20)
 # Channels that remain: how to send a one, and what the receiver reads.
 remaining = {
     "file_numbers": (lambda: [file_number() for _ in range(2200)], skipped_file_numbers),
+    "memory_numbers": (lambda: [mmap.mmap(-1, 4096).close() for _ in range(2200)], skipped_memory_numbers),
     "event_numbers": (lambda: held.extend(libc.eventfd(0, 0) for _ in range(50)), event_number),
     "mapped_pages": (lambda: held.append(("page", map_library())), mapped_by_others),
     "memory_bandwidth": (use_memory, lambda: min(pass_over_memory() for _ in range(2))),

@@ -17,7 +17,7 @@ fn killed_server_scores_evaluation_like_local_evaluator() {
 
     // The server is killed after so many of the 12 episodes of the evaluation, and restarted.
     for episodes in [1, 4, 8] {
-        let _ = server.poll(&evaluation, &team.token, |answer| {
+        let _ = server.poll(&evaluation, &server.admin_token, |answer| {
             answer["progress"]["episodes_done"].as_u64() >= Some(episodes)
         });
         server.kill();

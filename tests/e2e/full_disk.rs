@@ -1,7 +1,7 @@
 //! A disk that fills up while the server runs, and has free space again later: no data are lost, no agent gets a fault,
 //! and each result equals that of an undisturbed run.
 //!
-//! The agent of these tests waits before the episode that the file `wait_before` in its folder names. So a test controls when
+//! The agent of these tests waits before the episode that the file `wait_before` in its folder describes. So a test controls when
 //! the disk fills up.
 
 use crate::{Team, dataset, entry, score_locally, upgrade, without_times};
@@ -22,10 +22,13 @@ use std::{
 
 const KIB: u64 = 1 << 10;
 const MIB: u64 = 1 << 20;
-const DISK_BYTES: u64 = 48 * MIB;
+const DISK_BYTES: u64 = 96 * MIB;
+/// The size of a file with which an agent's bundle is not copied into memory, so that the agent sees changes of its files.
+const FILLING_BYTES: u64 = 33 * MIB;
 
-/// Source of an agent that keeps still. It waits before an episode as long as the file `wait_before` in its folder names that
-/// episode or all of its task: `hit 1` (episodes count from 0) or `hit *`.
+/// Source of an agent that keeps still. It waits before an episode as long as the file `wait_before` in its folder describes that
+/// episode. `prepare *`: each of the task. `first`: the first of a shard. `second N`: the second of a shard, if the file has not changed
+/// since the shard began. Shards of two episodes are played in an order that is drawn.
 const WAITING_AGENT: &str = r#"import json, os, sys, time
 
 WAIT_FILE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "wait_before")
@@ -34,17 +37,22 @@ def say(answer):
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
 
-def wait_while_named(task, episode):
-    while os.path.exists(WAIT_FILE):
-        try:
-            named = open(WAIT_FILE).read().split()
-        except FileNotFoundError:
-            return
-        if named not in ([task, str(episode)], [task, "*"]):
+def description():
+    try:
+        return open(WAIT_FILE).read().split()
+    except FileNotFoundError:
+        return []
+
+def wait_while_described(task, episode):
+    while True:
+        described = description()
+        is_second = episode % 2 == 1 and described[:1] == ["second"] and described == at_begin
+        if not (described == [task, "*"] or episode % 2 == 0 and described == ["first"] or is_second):
             return
         time.sleep(0.02)
 
 task = start_position = None
+at_begin = description()
 for line in sys.stdin:
     message = json.loads(line)
     kind = message["type"]
@@ -53,7 +61,7 @@ for line in sys.stdin:
         say({"type": "ready", "protocol": 1, "interpolation": 3})
     elif kind == "reset":
         start_position = None
-        wait_while_named(task, message["episode"])
+        wait_while_described(task, message["episode"])
         say({"type": "ready", "episode": message["episode"]})
     elif kind == "step":
         start_position = start_position or message["obs"][6:13]
@@ -61,6 +69,16 @@ for line in sys.stdin:
     elif kind == "bye":
         break
 "#;
+
+/// The bundle of the waiting agent.
+fn waiting_agent(folder: &Path) -> PathBuf {
+    let agent = python_bundle(folder, "waits", WAITING_AGENT);
+    let filling = fs::File::create(agent.join("filling")).expect("a scratch file can be made");
+    filling
+        .set_len(FILLING_BYTES)
+        .expect("a scratch file can be made");
+    agent
+}
 
 /// A configuration. With less than `min_free_bytes` of free space the server pauses the queue and refuses uploads.
 /// `worker_settings` are further lines of the section `[workers]`.
@@ -77,7 +95,7 @@ fn scratch_on_other_disk(folder: &Path) -> String {
     format!("scratch_dir = {:?}", folder.join("scratch"))
 }
 
-/// The file from which the agent, as its only slot has unpacked it, reads before which episode to wait.
+/// The file from which the agent, as its only slot has unpacked it, reads before which episodes to wait.
 struct WaitFile(PathBuf);
 
 impl WaitFile {
@@ -85,9 +103,9 @@ impl WaitFile {
         Self(scratch.join("slot-0/bundle-1/unpacked/wait_before"))
     }
 
-    fn write(&self, episode: &str) {
+    fn write(&self, episodes: &str) {
         let new_file = self.0.with_extension("new");
-        fs::write(&new_file, episode).expect("the agent is unpacked");
+        fs::write(&new_file, episodes).expect("the agent is unpacked");
         fs::rename(&new_file, &self.0).expect("the agent is unpacked");
     }
 
@@ -143,8 +161,9 @@ fn exhaust_database(server: &Server) -> u32 {
 }
 
 /// Waits until this many episodes of an evaluation have ended; its agent waits before the next.
-fn wait_for_episodes(disk: &SmallDisk, team: &Team, evaluation: &str, episodes: u64) {
-    let _ = disk.server.poll(evaluation, &team.token, |answer| {
+fn wait_for_episodes(disk: &SmallDisk, evaluation: &str, episodes: u64) {
+    let token = &disk.server.admin_token;
+    let _ = disk.server.poll(evaluation, token, |answer| {
         answer["progress"]["episodes_done"].as_u64() >= Some(episodes)
     });
 }
@@ -185,7 +204,7 @@ struct SmallDiskSetup {
 impl SmallDiskSetup {
     fn prepare(folder: &Path, config: &str, log: LogTarget) -> Self {
         let disk = SmallDisk::start(folder, DISK_BYTES, config, log);
-        let agent = python_bundle(folder, "waits", WAITING_AGENT);
+        let agent = waiting_agent(folder);
         let team = Team::create(&disk.server, "Phoenix");
         let submission = team.submit(&disk.server, &agent);
         assert_eq!(submission["state"], "valid", "{submission:#}");
@@ -363,14 +382,17 @@ fn validation_without_space_to_unpack_is_repeated() {
 
 /// Fills the disk while the agent waits before `episode`, such as `hit 1`, when `finished_episodes` have ended. Each task has
 /// four episodes in two shards (jobs).
-fn fill_disk_during_shard(episode: &str, finished_episodes: u64) {
+fn fill_disk_during_shard(episodes: &str, finished_episodes: u64) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 * MIB, ""), LogTarget::Test);
     let SmallDiskSetup { disk, team, .. } = &setup;
     let wait_file = WaitFile::in_scratch(&disk.data_dir.join("scratch"));
-    wait_file.write(episode);
+    wait_file.write(episodes);
     let evaluation = setup.evaluate();
-    wait_for_episodes(disk, team, &evaluation, finished_episodes);
+    let _ = disk.server.poll(&evaluation, &team.token, |answer| {
+        answer["state"] == "running"
+    });
+    wait_for_episodes(disk, &evaluation, finished_episodes);
     let filled = disk.fill();
     wait_file.remove();
     disk.server.wait_for_log("disk full: job released", 1);
@@ -384,13 +406,13 @@ fn fill_disk_during_shard(episode: &str, finished_episodes: u64) {
 
 #[test]
 fn shard_interrupted_by_full_disk_is_repeated_without_fault() {
-    fill_disk_during_shard("hit 1", 1);
+    fill_disk_during_shard("second", 1);
 }
 
 #[test]
 fn unrecorded_shard_is_repeated_after_full_disk() {
     // The first episode of a shard, before any of its episodes is recorded.
-    fill_disk_during_shard("defend 2", 6);
+    fill_disk_during_shard("first", 0);
 }
 
 #[test]
@@ -400,10 +422,14 @@ fn dataset_is_joined_once_space_is_free() {
     let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 * KIB, ""), LogTarget::Test);
     let SmallDiskSetup { disk, team, .. } = &setup;
     let wait_file = WaitFile::in_scratch(&disk.data_dir.join("scratch"));
-    wait_file.write("prepare 3");
+    wait_file.write("second 0");
     let evaluation = setup.evaluate();
-    // The last of 12 episodes.
-    wait_for_episodes(disk, team, &evaluation, 11);
+    // Each shard waits until the file changes. The last waits before the last of 12 episodes.
+    for shard in 0..5 {
+        wait_for_episodes(disk, &evaluation, 2 * shard + 1);
+        wait_file.write(&format!("second {}", shard + 1));
+    }
+    wait_for_episodes(disk, &evaluation, 11);
     let bytes = |folder| -> u64 {
         let files = disk.files(folder);
         files
@@ -439,9 +465,9 @@ fn block_database_writes(log: LogTarget, min_free_bytes: u64) {
     let SmallDiskSetup { disk, team, .. } = &setup;
     let server = &disk.server;
     let wait_file = WaitFile::in_scratch(&scratch.path().join("scratch"));
-    wait_file.write("hit 1");
+    wait_file.write("second");
     let evaluation = setup.evaluate();
-    wait_for_episodes(disk, team, &evaluation, 1);
+    wait_for_episodes(disk, &evaluation, 1);
 
     let filled = disk.fill();
     let filled_at = Instant::now();
@@ -505,7 +531,7 @@ fn verdict_is_committed_once_space_is_free() {
     let config = config(4 * MIB, &scratch_on_other_disk(folder));
     let disk = SmallDisk::start(folder, DISK_BYTES, &config, LogTarget::Test);
     let team = Team::create(&disk.server, "Phoenix");
-    let agent = python_bundle(folder, "waits", WAITING_AGENT);
+    let agent = waiting_agent(folder);
     fs::write(agent.join("wait_before"), "prepare *").expect("a scratch file can be written");
     let id = team.upload(&disk.server, pack(&agent));
     let wait_file = WaitFile::in_scratch(&folder.join("scratch"));

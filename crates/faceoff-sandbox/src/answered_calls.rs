@@ -9,6 +9,7 @@
 
 use crate::{
     SandboxError,
+    cpu_clock::own_cpu_time,
     error::IoContext,
     seccomp,
     session_numbers::{self, SessionBudget},
@@ -20,7 +21,7 @@ use rustix::{
         AddressFamily, RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendAncillaryBuffer,
         SendAncillaryMessage, SendFlags, SocketFlags, SocketType, recvmsg, sendmsg, socketpair,
     },
-    system::{Sysinfo, sysinfo},
+    system::sysinfo,
     thread::set_no_new_privs,
 };
 use seccompiler::BpfProgram;
@@ -33,6 +34,7 @@ use std::{
         unix::fs::FileExt,
     },
     sync::OnceLock,
+    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
@@ -46,10 +48,13 @@ const MAX_NAME_BYTES: u64 = 255;
 /// Flags in `statfs`: the flags are valid, no set-id programs, no devices.
 const MOUNT_FLAGS: u64 = 0x20 | 0x2 | 0x4;
 
-/// Number of answers without a pause.
-const QUICK_ANSWERS: u32 = 1000;
-/// Pause before each further answer.
+/// CPU time of all answers without a pause.
+const QUICK_ANSWERS: Duration = Duration::from_millis(20);
+/// Minimum pause before each further answer.
 const PAUSE: Duration = Duration::from_millis(1);
+/// The pause is at least this multiple of the CPU time of the last answer: an agent can make an answer expensive, by memory that has no
+/// pages yet.
+const PAUSE_PER_CPU_TIME: u32 = 20;
 
 /// The filter, and the socket through which the child sends the *listener* (the file descriptor that reports its calls).
 #[derive(Debug)]
@@ -110,19 +115,32 @@ impl AnsweredCalls {
 }
 
 impl CallAnswerer {
-    /// Starts the thread that answers, once the child has installed its filter. The thread ends with the last process of the agent.
-    pub(crate) fn start(self) -> Result<(), SandboxError> {
+    /// Starts the thread that answers, once the child has installed its filter.
+    pub(crate) fn start(self) -> Result<AnswerThread, SandboxError> {
         const ACTION: &str = "cannot watch the agent's system calls";
         let listener = receive_listener(&self.socket).context(ACTION)?;
         let answers = self.answers;
-        std::thread::Builder::new()
+        let thread = std::thread::Builder::new()
             .name("agent-calls".into())
             .spawn(move || {
-                answer_calls(&listener, answers);
-                session_numbers::skip_some();
+                let sessions = answer_calls(&listener, answers);
+                session_numbers::skip_some(sessions);
             })
             .context(ACTION)?;
-        Ok(())
+        Ok(AnswerThread(thread))
+    }
+}
+
+/// The thread that answers, which ends after the last process of the agent.
+#[derive(Debug)]
+pub(crate) struct AnswerThread(JoinHandle<()>);
+
+impl AnswerThread {
+    /// Waits until sessions have been skipped, before another agent starts. Call it when the process tree is dead.
+    pub(crate) fn join(self, deadline: Instant) {
+        while !self.0.is_finished() && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 }
 
@@ -184,10 +202,30 @@ impl FixedAnswers {
         ]
     }
 
-    /// The answer of `sysinfo`: the host's figures before the first agent started.
-    fn host() -> &'static Sysinfo {
-        static FIGURES: OnceLock<Sysinfo> = OnceLock::new();
-        FIGURES.get_or_init(sysinfo)
+    /// The answer of `sysinfo`: the host's figures before the first agent started. On 64-bit machines that put the lower byte first, the
+    /// fields of the kernel's structure and their padding are these integers.
+    fn host() -> &'static [u64; 14] {
+        static FIGURES: OnceLock<[u64; 14]> = OnceLock::new();
+        FIGURES.get_or_init(|| {
+            let host = sysinfo();
+            let [load_1, load_5, load_15] = host.loads;
+            [
+                host.uptime.cast_unsigned(),
+                load_1,
+                load_5,
+                load_15,
+                host.totalram,
+                host.freeram,
+                host.sharedram,
+                host.bufferram,
+                host.totalswap,
+                host.freeswap,
+                host.procs.into(),
+                host.totalhigh,
+                host.freehigh,
+                host.mem_unit.into(),
+            ]
+        })
     }
 }
 
@@ -200,37 +238,37 @@ enum Reply {
     Execute,
 }
 
-/// Answers the calls until the last process with the filter has ended.
-fn answer_calls(listener: &OwnedFd, answers: FixedAnswers) {
+/// Answers the calls until the last process with the filter has ended. Returns the number of its sessions.
+fn answer_calls(listener: &OwnedFd, answers: FixedAnswers) -> u32 {
     let mut sessions = SessionBudget::new(Instant::now());
-    let mut quick_answers = QUICK_ANSWERS;
+    let mut last_answer = Duration::ZERO;
     loop {
         let mut fds = [PollFd::new(listener, PollFlags::IN)];
         match poll(&mut fds, None) {
             Ok(_) | Err(Errno::INTR) => {}
-            Err(_) => return,
+            Err(_) => return sessions.started,
         }
         let events = fds[0].revents();
         if !events.contains(PollFlags::IN) {
             if events.is_empty() {
                 continue;
             }
-            return;
+            return sessions.started;
         }
-        if quick_answers == 0 {
-            std::thread::sleep(PAUSE);
-        } else {
-            quick_answers -= 1;
+        let begin = own_cpu_time();
+        if begin > QUICK_ANSWERS {
+            std::thread::sleep(PAUSE.max(last_answer * PAUSE_PER_CPU_TIME));
         }
         let call = match receive_call(listener) {
             Ok(call) => call,
             // The thread was killed or got a signal meanwhile.
             Err(Errno::NOENT | Errno::INTR) => continue,
-            Err(_) => return,
+            Err(_) => return sessions.started,
         };
         let reply = answer(listener, &call, answers, &mut sessions);
         // Fails if the thread is dead, or has got a signal; then it repeats its call.
         let _ = send_reply(listener, call.id, &reply);
+        last_answer = own_cpu_time().saturating_sub(begin);
     }
 }
 
@@ -243,25 +281,29 @@ fn answer(
     let [first, second, ..] = call.data.args;
     let written = match i64::from(call.data.nr) {
         libc::SYS_statfs | libc::SYS_fstatfs => {
-            write_to_caller(listener, call, second, bytes_of(&answers.file_system()))
+            write_to_caller(listener, call, second, &answers.file_system())
         }
-        libc::SYS_sysinfo => write_to_caller(listener, call, first, bytes_of(FixedAnswers::host())),
+        libc::SYS_sysinfo => write_to_caller(listener, call, first, FixedAnswers::host()),
         libc::SYS_setsid if sessions.take(Instant::now()) => return Reply::Execute,
         libc::SYS_setsid => return Reply::Failed(Errno::PERM),
         _ => return Reply::Failed(Errno::NOSYS),
     };
-    match written {
-        Ok(()) => Reply::Done,
-        // The kernel's answer for such an address.
-        Err(error) if error.raw_os_error() == Some(libc::EIO) => Reply::Failed(Errno::FAULT),
-        Err(error) => {
-            static WARNED: OnceLock<()> = OnceLock::new();
-            WARNED.get_or_init(|| {
-                tracing::error!(%error, "cannot answer an agent's system call: a root service needs CAP_SYS_PTRACE");
-            });
-            Reply::Failed(Errno::NOSYS)
-        }
+    let error = match written {
+        Ok(()) => return Reply::Done,
+        Err(error) => error,
+    };
+    if matches!(
+        error.kind(),
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+    ) {
+        static WARNED: OnceLock<()> = OnceLock::new();
+        WARNED.get_or_init(|| {
+            tracing::error!(%error, "cannot answer an agent's system call: a root service needs CAP_SYS_PTRACE");
+        });
+        return Reply::Failed(Errno::NOSYS);
     }
+    // There is no memory at this address, or the thread has ended meanwhile.
+    Reply::Failed(Errno::FAULT)
 }
 
 /// Writes into the memory of the calling thread.
@@ -269,23 +311,18 @@ fn write_to_caller(
     listener: &OwnedFd,
     call: &libc::seccomp_notif,
     address: u64,
-    bytes: &[u8],
+    figures: &[u64],
 ) -> io::Result<()> {
     let memory = File::options()
         .write(true)
         .open(format!("/proc/{}/mem", call.pid))?;
     // If the call still waits now, its pid belonged to the caller when the file was opened.
     check_waiting(listener, call.id)?;
-    memory.write_all_at(bytes, address)
-}
-
-fn bytes_of<T>(value: &T) -> &[u8] {
-    #[expect(unsafe_code, reason = "the kernel's structures are written as bytes")]
-    // SAFETY: the reference covers `size_of::<T>()` bytes. `T` is a structure of the kernel without padding that is
-    // not initialised: all of it was zeroed, or written by the kernel.
-    unsafe {
-        std::slice::from_raw_parts(std::ptr::from_ref(value).cast(), size_of::<T>())
-    }
+    let bytes: Vec<u8> = figures
+        .iter()
+        .flat_map(|figure| figure.to_ne_bytes())
+        .collect();
+    memory.write_all_at(&bytes, address)
 }
 
 /// Installs a filter in the calling process and returns its listener. With `WAIT_KILLABLE_RECV` (Linux 5.19) a call that this service has

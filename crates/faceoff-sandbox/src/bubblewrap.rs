@@ -4,7 +4,6 @@ use crate::{
     Layer, SandboxError, SpawnSpec,
     cpu_view::CpuView,
     error::IoContext,
-    file_tree,
     private_mounts::PrivateMounts,
     private_network::PrivateNetwork,
     seccomp::{self, Filters},
@@ -63,8 +62,6 @@ const VISIBLE_IN_PROC: [&[&str]; 4] = [
 ];
 /// Terminals, whose number all agents share.
 const TERMINALS: &str = "/dev/pts";
-/// A larger bundle is not copied into memory for each start of its agent, since copying would take long.
-const COPIED_BUNDLE_BYTES: u64 = 32 << 20;
 
 /// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because
 /// the live counters would show what other agents do (e.g. the number of started processes). The snapshots list only the agent's CPUs.
@@ -295,15 +292,15 @@ impl CommandLine {
 
     /// Covers files that show the whole host or other agents, and that no agent needs.
     fn hide_counters(&mut self) {
-        static HIDDEN: OnceLock<Hidden> = OnceLock::new();
-        let Hidden { folders, files } = HIDDEN.get_or_init(Hidden::in_proc);
+        // A module of the kernel may have been loaded or unloaded since the last start.
+        let Hidden { folders, files } = Hidden::in_proc();
         let folders = folders.iter().map(String::as_str).chain([TERMINALS]);
         for folder in folders {
             let cover = ["--perms", "0555", "--size", "4096", "--tmpfs", folder];
             self.args(cover.into_iter().chain(["--remount-ro", folder]));
         }
         for file in files {
-            self.args(["--ro-bind", "/dev/null", file]);
+            self.args(["--ro-bind", "/dev/null", &file]);
         }
     }
 
@@ -348,13 +345,7 @@ impl CommandLine {
         let Some(mounts) = &mut self.mounts else {
             return self.read_only(host, inside);
         };
-        let mut bytes = 0;
-        file_tree::add_size(host, COPIED_BUNDLE_BYTES, &mut bytes)
-            .context(format_args!("cannot look into {}", host.display()))?;
-        if bytes > COPIED_BUNDLE_BYTES {
-            return self.read_only(host, inside);
-        }
-        let source = mounts.add_copy(host)?;
+        let source = mounts.add_bundle(host)?;
         self.args
             .extend(["--ro-bind".into(), source, inside.into()]);
         Ok(())

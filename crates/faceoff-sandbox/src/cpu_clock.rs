@@ -1,6 +1,9 @@
-//! CPU time of a process tree by its processes' own clocks. It is used without a cgroup, and where the cgroup's counter lags behind.
+//! CPU time by the clocks of processes and threads. That of a process tree is used without a cgroup, and where the cgroup's counter lags behind.
 
-use rustix::process::Pid;
+use rustix::{
+    process::Pid,
+    time::{ClockId, clock_gettime},
+};
 use std::{cell::RefCell, collections::BTreeMap, fs, time::Duration};
 
 /// CPU time of every process ever seen in a tree, in nanoseconds. It misses the time that a process used after
@@ -75,4 +78,11 @@ fn process_clock_ns(pid: i32) -> Option<u64> {
     let seconds = u64::try_from(time.tv_sec).ok()?;
     let nanoseconds = u64::try_from(time.tv_nsec).ok()?;
     is_read.then_some(seconds * 1_000_000_000 + nanoseconds)
+}
+
+/// CPU time of the calling thread.
+pub(crate) fn own_cpu_time() -> Duration {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
+    Duration::new(seconds, u32::try_from(time.tv_nsec).unwrap_or(0))
 }

@@ -41,7 +41,8 @@ pub(crate) fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Re
     let Some(meta) = readable(fs::symlink_metadata(path))? else {
         return Ok(());
     };
-    *bytes += meta.len().next_multiple_of(PAGE_BYTES);
+    // An empty file takes memory for itself.
+    *bytes += meta.len().max(1).next_multiple_of(PAGE_BYTES);
     if meta.is_dir() {
         for entry in readable(fs::read_dir(path))?.into_iter().flatten() {
             if *bytes > limit_bytes {
@@ -53,7 +54,7 @@ pub(crate) fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Re
     Ok(())
 }
 
-/// Copies files, folders and links, with their modes. The folder `target` may exist.
+/// Copies files, folders and links, with their modes, in the order of their names. The folder `target` may exist.
 pub(crate) fn copy(source: &Path, target: &Path, times: Times) -> io::Result<()> {
     let Some(meta) = readable(fs::symlink_metadata(source))? else {
         return Ok(());
@@ -66,9 +67,13 @@ pub(crate) fn copy(source: &Path, target: &Path, times: Times) -> io::Result<()>
         }
     } else if meta.is_dir() {
         fs::create_dir_all(target)?;
+        let mut names = Vec::new();
         for entry in readable(fs::read_dir(source))?.into_iter().flatten() {
-            let entry = entry?;
-            copy(&entry.path(), &target.join(entry.file_name()), times)?;
+            names.push(entry?.file_name());
+        }
+        names.sort_unstable();
+        for name in names {
+            copy(&source.join(&name), &target.join(&name), times)?;
         }
         let mode = meta.permissions().mode() | 0o700;
         fs::set_permissions(target, fs::Permissions::from_mode(mode))?;

@@ -183,7 +183,7 @@ impl Launch {
         const WATCH_ACTION: &str = "cannot watch the agent";
         let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH_ACTION)?;
         if let Some(answerer) = answerer {
-            answerer.start()?;
+            tree.answer_thread = Some(answerer.start()?);
         }
         let mut stderr =
             StderrTail::drain(log, spec.limits.stderr_tail_bytes).context(WATCH_ACTION)?;

@@ -29,6 +29,9 @@ use std::{
 /// The folder over which the mounts' file system is mounted. Every host has it, and only the private namespace sees the change.
 const MOUNT_FOLDER: &CStr = c"/tmp";
 
+/// A larger bundle is not copied into memory for each start of its agent, since copying would take long.
+const COPIED_BUNDLE_BYTES: u64 = 32 << 20;
+
 /// The devices that bubblewrap shows, a name for them in [`MOUNT_FOLDER`], and their major and minor numbers. A lock of a device is a
 /// lock of its file, which every agent could see. So each agent gets files of its own.
 const DEVICES: [(&CStr, &CStr, u32, u32); 6] = [
@@ -50,20 +53,12 @@ pub(crate) struct PrivateMounts {
 
 #[derive(Debug)]
 struct Source {
-    origin: Origin,
+    /// The host's file or folder, which becomes a detached mount in the child; `None` for a copy.
+    path: Option<CString>,
     mount_point: CString,
     is_folder: bool,
-}
-
-/// What is mounted.
-#[derive(Debug)]
-enum Origin {
-    /// The host's file or folder. In the child it becomes a detached mount.
-    Path(CString),
-    /// A detached mount.
-    Detached(OwnedFd),
-    /// A mount that has been moved to its place.
-    Moved,
+    /// The detached mount, until it is moved to `mount_point`.
+    tree: Option<OwnedFd>,
 }
 
 impl PrivateMounts {
@@ -80,26 +75,39 @@ impl PrivateMounts {
         let failure = format!("cannot show {} to the agent", path.display());
         let path = fs::canonicalize(path).context(&failure)?;
         let is_folder = fs::metadata(&path).context(&failure)?.is_dir();
-        let origin = CString::new(path.as_os_str().as_bytes())
+        let path = CString::new(path.as_os_str().as_bytes())
             .map_err(io::Error::other)
             .context(&failure)?;
-        self.push(Origin::Path(origin), is_folder)
+        self.push(Some(path), None, is_folder)
     }
 
-    /// Adds a copy of the folder `path` in a file system of its own, in memory: its numbers of files, times and free space depend on
-    /// nothing else on the host. Returns the path at which bubblewrap will find it.
-    pub(crate) fn add_copy(&mut self, path: &Path) -> Result<OsString, SandboxError> {
+    /// Adds the folder `path` as a copy in a file system of its own, in memory, unless it is large: the numbers and times of its files
+    /// depend on nothing else on the host. Returns the path at which bubblewrap will find it.
+    pub(crate) fn add_bundle(&mut self, path: &Path) -> Result<OsString, SandboxError> {
+        let mut bytes = 0;
+        file_tree::add_size(path, COPIED_BUNDLE_BYTES, &mut bytes)
+            .context(format_args!("cannot look into {}", path.display()))?;
+        if bytes > COPIED_BUNDLE_BYTES {
+            return self.add(path);
+        }
         let mount = file_system_in_memory().context("cannot make a file system for the bundle")?;
-        let inside = PathBuf::from(format!("/proc/self/fd/{}", mount.as_raw_fd()));
+        // The folder itself, not the link to it.
+        let inside = PathBuf::from(format!("/proc/self/fd/{}/.", mount.as_raw_fd()));
         file_tree::copy(path, &inside, file_tree::Times::Fixed)
             .context(format_args!("cannot copy {} into memory", path.display()))?;
-        self.push(Origin::Detached(mount), true)
+        self.push(None, Some(mount), true)
     }
 
-    fn push(&mut self, origin: Origin, is_folder: bool) -> Result<OsString, SandboxError> {
+    fn push(
+        &mut self,
+        path: Option<CString>,
+        tree: Option<OwnedFd>,
+        is_folder: bool,
+    ) -> Result<OsString, SandboxError> {
         let mount_point = format!("/tmp/{}", self.sources.len());
         self.sources.push(Source {
-            origin,
+            path,
+            tree,
             mount_point: CString::new(mount_point.clone())
                 .map_err(io::Error::other)
                 .context("cannot name a mount point")?,
@@ -128,8 +136,8 @@ impl PrivateMounts {
             | OpenTreeFlags::OPEN_TREE_CLOEXEC
             | OpenTreeFlags::AT_RECURSIVE;
         for source in &mut self.sources {
-            if let Origin::Path(path) = &source.origin {
-                source.origin = Origin::Detached(open_tree(CWD, path, clone_flags)?);
+            if let Some(path) = &source.path {
+                source.tree = Some(open_tree(CWD, path, clone_flags)?);
             }
         }
         mount(
@@ -153,7 +161,7 @@ impl PrivateMounts {
                     Mode::from_raw_mode(0o644),
                 )?);
             }
-            if let Origin::Detached(tree) = std::mem::replace(&mut source.origin, Origin::Moved) {
+            if let Some(tree) = source.tree.take() {
                 move_mount(
                     tree,
                     c"",
@@ -189,6 +197,13 @@ fn make_devices() -> Result<(), Errno> {
 fn file_system_in_memory() -> Result<OwnedFd, Errno> {
     let settings = fsopen("tmpfs", FsOpenFlags::FSOPEN_CLOEXEC)?;
     fsconfig_set_string(&settings, "mode", "0755")?;
+    // More than a bundle that is copied may have; it may change meanwhile, if it is a developer's folder.
+    fsconfig_set_string(&settings, "size", (2 * COPIED_BUNDLE_BYTES).to_string())?;
+    fsconfig_set_string(
+        &settings,
+        "nr_inodes",
+        (2 * COPIED_BUNDLE_BYTES / 4096).to_string(),
+    )?;
     fsconfig_create(&settings)?;
     fsmount(
         &settings,

@@ -16,7 +16,6 @@ use std::{
     fs, io,
     mem::MaybeUninit,
     os::{fd::AsRawFd, unix::ffi::OsStrExt},
-    sync::OnceLock,
 };
 
 const FOLDER: &str = "/proc/self/net";
@@ -26,18 +25,13 @@ const OPEN_FILES: [&str; 4] = ["dev", "if_inet6", "ipv6_route", "route"];
 /// The network of one agent.
 #[derive(Debug)]
 pub(crate) struct PrivateNetwork {
-    closed_files: &'static [CString],
+    closed_files: Vec<CString>,
 }
 
 impl PrivateNetwork {
     pub(crate) fn new() -> Result<Self, SandboxError> {
-        static CLOSED: OnceLock<Vec<CString>> = OnceLock::new();
-        if CLOSED.get().is_none() {
-            let files = closed_files().context(format_args!("cannot read {FOLDER}"))?;
-            let _ = CLOSED.set(files);
-        }
         Ok(Self {
-            closed_files: CLOSED.get().map(Vec::as_slice).unwrap_or_default(),
+            closed_files: closed_files().context(format_args!("cannot read {FOLDER}"))?,
         })
     }
 
@@ -52,7 +46,7 @@ impl PrivateNetwork {
             unshare_unsafe(UnshareFlags::NEWNET)?;
         }
         start_loopback()?;
-        for file in self.closed_files {
+        for file in &self.closed_files {
             match chmodat(CWD, file, Mode::empty(), AtFlags::empty()) {
                 // A module of the kernel may have been loaded or unloaded since the names were read.
                 Ok(()) | Err(Errno::NOENT) => {}

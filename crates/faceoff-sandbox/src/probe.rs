@@ -313,6 +313,11 @@ fn fix_namespaces(error: &str) -> String {
     if Bubblewrap::find().is_err() {
         return bubblewrap::INSTALL_COMMAND.into();
     }
+    if error.contains("CAP_") || error.contains("file system for the bundle") {
+        return "give the root service CAP_SYS_ADMIN, CAP_MKNOD and CAP_SYS_PTRACE (in Docker: docker run --privileged \
+                --cgroupns=private), or run it as an ordinary user"
+            .into();
+    }
     // With this error the namespaces were created, and only the mount of /proc was refused.
     if error.contains("mount proc") {
         return "provide a /proc without masked files, so that agents can mount their own; in Docker: docker run \

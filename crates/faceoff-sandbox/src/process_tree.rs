@@ -1,8 +1,8 @@
 //! The process tree of one agent: waiting for its end, killing and cleaning up.
 
 use crate::{
-    Killer, cgroup::AgentCgroup, cpu_clock::TreeClock, line_socket::wait_for,
-    status_pipe::StatusPipe,
+    Killer, answered_calls::AnswerThread, cgroup::AgentCgroup, cpu_clock::TreeClock,
+    line_socket::wait_for, status_pipe::StatusPipe,
 };
 use rustix::{
     event::PollFlags,
@@ -20,6 +20,9 @@ const KILL_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long to wait for bubblewrap to exit after its sandbox has ended.
 const BUBBLEWRAP_EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// How long to wait for the thread that answers system calls. Without namespaces and a cgroup a process that is still alive may need it.
+const ANSWER_THREAD_TIMEOUT: Duration = Duration::from_secs(2);
+
 /// The child, its descendants, and the resources that contain them.
 #[derive(Debug)]
 pub(crate) struct ProcessTree {
@@ -32,6 +35,8 @@ pub(crate) struct ProcessTree {
     sandbox_init: Option<OwnedFd>,
     pub(crate) status: Option<StatusPipe>,
     pub(crate) cgroup: Option<AgentCgroup>,
+    /// Answers some system calls of the tree.
+    pub(crate) answer_thread: Option<AnswerThread>,
     /// The scratch folder on the host, for agents without a mount namespace.
     scratch: Option<tempfile::TempDir>,
     /// Set when the child has been reaped.
@@ -53,6 +58,7 @@ impl ProcessTree {
                 sandbox_init: None,
                 status,
                 cgroup,
+                answer_thread: None,
                 scratch,
                 exit_status: None,
             }),
@@ -194,6 +200,9 @@ impl ProcessTree {
     pub(crate) fn clean_up(&mut self) {
         if let Some(mut cgroup) = self.cgroup.take() {
             cgroup.remove();
+        }
+        if let Some(thread) = self.answer_thread.take() {
+            thread.join(Instant::now() + ANSWER_THREAD_TIMEOUT);
         }
         if let Some(scratch) = self.scratch.take()
             && let Err(error) = scratch.close()

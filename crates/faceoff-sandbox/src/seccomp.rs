@@ -133,11 +133,13 @@ const SO_NETNS_COOKIE: libc::c_int = 71;
 const SO_PASSPIDFD: libc::c_int = 76;
 const SO_PEERPIDFD: libc::c_int = 77;
 
-/// Requests of `ioctl` that are answered as for a file without them: where a file lies on the disk (`FS_IOC_FIEMAP`), and the entropy
-/// of the host (`RNDGETENTCNT`).
-const UNKNOWN_CONTROLS: [u32; 2] = [0xc020_660b, 0x8004_5200];
-/// Type of the requests about namespaces, whose numbers are counted for the whole host, and a mask for the type of a request.
-const NAMESPACE_CONTROLS: u32 = 0xb700;
+/// A request of `ioctl` that is answered as for a file without it: the entropy of the host (`RNDGETENTCNT`).
+const UNKNOWN_CONTROL: u32 = 0x8004_5200;
+/// Types of requests that are answered in the same way: about namespaces, whose numbers are counted for the whole host, and about a file's
+/// place on the disk, or the disk itself, for all file systems (`f`), for XFS (`X`) and for Btrfs.
+const UNKNOWN_CONTROL_TYPES: [u32; 4] =
+    [0xb7 << 8, (b'f' as u32) << 8, (b'X' as u32) << 8, 0x94 << 8];
+/// The bits of a request that are its type.
 const CONTROL_TYPE: u32 = 0xff00;
 
 #[cfg(target_arch = "x86_64")]
@@ -248,6 +250,11 @@ impl Filters {
             CLONE_PIDFD,
         )])?;
         unknown_requests.insert(libc::SYS_clone, vec![with_descriptor]);
+        // An address without a path asks for a name, which older kernels count for the whole host.
+        unknown_requests.insert(
+            libc::SYS_bind,
+            one_of(2, &[size_of::<libc::sa_family_t>() as libc::c_int])?,
+        );
         let options = UNKNOWN_SOCKET_OPTIONS.map(|option| {
             rule([
                 argument(1, SeccompCmpOp::Eq, libc::SOL_SOCKET),
@@ -259,13 +266,11 @@ impl Filters {
             (libc::SYS_getsockopt, options.clone()),
             (libc::SYS_setsockopt, options),
         ]);
-        let mut controls = one_of(1, &UNKNOWN_CONTROLS.map(u32::cast_signed))?;
-        let of_namespaces = SeccompCmpOp::MaskedEq(u64::from(CONTROL_TYPE));
-        controls.push(rule([argument(
-            1,
-            of_namespaces,
-            NAMESPACE_CONTROLS.cast_signed(),
-        )])?);
+        let mut controls = one_of(1, &[UNKNOWN_CONTROL.cast_signed()])?;
+        for kind in UNKNOWN_CONTROL_TYPES {
+            let is_of_kind = SeccompCmpOp::MaskedEq(u64::from(CONTROL_TYPE));
+            controls.push(rule([argument(1, is_of_kind, kind.cast_signed())])?);
+        }
         let unknown_controls = Rules::from([(libc::SYS_ioctl, controls)]);
         // `preadv2` with flags can read only what is in memory, or keep what it reads out of memory.
         let with_flags = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];

@@ -1,7 +1,8 @@
 //! Numbers of sessions, which the kernel counts for the whole host.
 //!
 //! A new session gets a scheduling group with the next number, which `/proc/self/autogroup` shows. An agent could count to a value that a
-//! later agent reads. So an agent may start few sessions, and after its end a random number of them is skipped, which is larger.
+//! later agent reads. So an agent may start few sessions, and after its end a random number of them is skipped, up to many times its own.
+//! Two agents that run at once can still see each other's sessions.
 
 use rustix::rand::{GetRandomFlags, getrandom};
 use std::time::{Duration, Instant};
@@ -10,11 +11,14 @@ use std::time::{Duration, Instant};
 const SESSIONS: f64 = 9.0;
 /// Time after which it may start another one.
 const TIME_PER_SESSION: Duration = Duration::from_secs(10);
-/// Number of sessions that are skipped at most.
-const MAX_SKIPPED: u8 = 127;
+/// At least so many sessions may be skipped, and at least so many for each session of the agent.
+const MAX_SKIPPED: u32 = 128;
+const MAX_SKIPPED_PER_SESSION: u32 = 16;
 
 /// Sessions that an agent may still start.
 pub(crate) struct SessionBudget {
+    /// Number of sessions started.
+    pub started: u32,
     left: f64,
     at: Instant,
 }
@@ -22,6 +26,7 @@ pub(crate) struct SessionBudget {
 impl SessionBudget {
     pub(crate) fn new(now: Instant) -> Self {
         Self {
+            started: 0,
             left: SESSIONS,
             at: now,
         }
@@ -36,19 +41,20 @@ impl SessionBudget {
         let may_start = self.left >= 1.0;
         if may_start {
             self.left -= 1.0;
+            self.started += 1;
         }
         may_start
     }
 }
 
-/// Starts a random number of sessions that end at once.
-pub(crate) fn skip_some() {
-    let mut byte = [0];
-    if getrandom(&mut byte, GetRandomFlags::empty()).is_err() {
+/// Starts a random number of sessions that end at once, after an agent that has started `started` sessions.
+pub(crate) fn skip_some(started: u32) {
+    let mut random = [0; 4];
+    if getrandom(&mut random, GetRandomFlags::empty()).is_err() {
         return;
     }
-    // The highest bit is dropped.
-    for _ in 0..byte[0] & MAX_SKIPPED {
+    let limit = MAX_SKIPPED.max(started.saturating_mul(MAX_SKIPPED_PER_SESSION));
+    for _ in 0..u32::from_ne_bytes(random) % limit {
         if !skip_one() {
             return;
         }

@@ -1,12 +1,11 @@
 //! Standard error of an agent, which is its log: a thread reads it and keeps its last bytes.
 
-use crate::sched_stat::SchedStat;
+use crate::{cpu_clock::own_cpu_time, sched_stat::SchedStat};
 use rustix::{
     event::{PollFd, PollFlags, poll},
     io::{Errno, ioctl_fionread},
     net::{RecvFlags, recv},
     pipe::{PipeFlags, pipe_with},
-    time::{ClockId, clock_gettime},
 };
 use std::{
     collections::VecDeque,
@@ -149,11 +148,4 @@ fn drain_until_closed(
             Err(_) => return,
         }
     }
-}
-
-/// CPU time of the calling thread.
-fn own_cpu_time() -> Duration {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
-    Duration::new(seconds, u32::try_from(time.tv_nsec).unwrap_or(0))
 }

@@ -70,15 +70,11 @@ fn random_kills_and_cuts_lose_and_repeat_no_result() {
     .map(|fault| (next_draw(), fault));
     faults.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     for (number, (_, fault)) in (1..).zip(faults) {
-        let _ = server.poll(
-            &reference_run.evaluation,
-            &reference_run.team.token,
-            |view| {
-                let done = view["progress"]["episodes_done"].as_u64();
-                // A finished evaluation has no progress.
-                done.is_none_or(|done| done >= SHARDS_BETWEEN_FAULTS * number)
-            },
-        );
+        let _ = server.poll(&reference_run.evaluation, &server.admin_token, |view| {
+            let done = view["progress"]["episodes_done"].as_u64();
+            // A finished evaluation has no progress.
+            done.is_none_or(|done| done >= SHARDS_BETWEEN_FAULTS * number)
+        });
         std::thread::sleep(Duration::from_secs_f64(next_draw()));
         match fault {
             Fault::Worker => {

@@ -78,7 +78,7 @@ fn running_job_is_released_and_started_by_another_worker() {
     let first = Worker::start(scratch.path(), "first", &worker_config(nats.address(), 1));
     let evaluation = evaluation_path(&start_day(&server), &submission);
     // The shard has started, and will never end.
-    let _ = server.poll(&evaluation, &team.token, |view| {
+    let _ = server.poll(&evaluation, &server.admin_token, |view| {
         view["progress"]["episodes_done"].as_u64() > Some(0)
     });
     first.request_stop();

@@ -125,9 +125,11 @@ async fn failed_evaluation_shows_its_faults_and_log() {
         fault["message"],
         "the action holds a number that is not finite"
     );
-    assert_eq!((&fault["task"], &fault["step"]), (&json!("hit"), &json!(3)));
+    // The first shard may be of any task.
+    let task = string(&fault["task"]);
+    assert_eq!(fault["step"], 3);
     assert_eq!(fault["line"], "{\"type\":\"act\"}");
-    assert!(string(&failed["log"]).contains("log of hit"));
+    assert!(string(&failed["log"]).contains(&format!("log of {task}")));
     assert!(failed.get("result").is_none());
     let list = site.get("/api/v1/evaluations", Some(&team.token)).await;
     let listed = &list.json(200)[0];

@@ -10,6 +10,7 @@ use super::{
     sink::{Sink, Special},
 };
 use fs_err::{self as fs, os::unix::fs::symlink};
+use rustix::fs::{AtFlags, CWD, Timespec, Timestamps, utimensat};
 use std::{
     collections::BTreeMap,
     fs::Permissions,
@@ -135,8 +136,28 @@ impl<'a> Tree<'a> {
                 symlink(target, self.dir.join(path))?;
             }
         }
-        Ok(())
+        // The content of a folder before the folder.
+        for path in nodes.keys().rev() {
+            self.budget.check()?;
+            set_fixed_time(&self.dir.join(path))?;
+        }
+        set_fixed_time(&self.dir)
     }
+}
+
+/// Sets the time of a file, folder or link to 2000-01-01 00:00 UTC: no agent can tell from its files when they were unpacked, and so whether
+/// it plays in a validation run.
+fn set_fixed_time(path: &Path) -> Result<(), BundleError> {
+    let time = Timespec {
+        tv_sec: 946_684_800,
+        tv_nsec: 0,
+    };
+    let times = Timestamps {
+        last_access: time,
+        last_modification: time,
+    };
+    utimensat(CWD, path, &times, AtFlags::SYMLINK_NOFOLLOW).map_err(io::Error::from)?;
+    Ok(())
 }
 
 impl Sink for Tree<'_> {

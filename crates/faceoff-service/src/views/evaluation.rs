@@ -216,11 +216,12 @@ fn evaluation_view(
         released_at: evaluation.released_at,
         deadline_at: evaluation.deadline_at,
         rerun_of: evaluation.rerun_of,
-        extra_evaluation: evaluation.extra_for,
         rerun_after_release: evaluation.rerun_of.is_some()
+            && evaluation.extra_for.is_none()
             && evaluation
                 .released_at
                 .is_some_and(|released_at| evaluation.created_at >= released_at),
+        extra_evaluation: evaluation.extra_for,
         voided: evaluation.voided.map(ruling::view),
         blind: is_hidden,
         public: is_public,

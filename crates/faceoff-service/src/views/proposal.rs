@@ -132,9 +132,9 @@ async fn board_record(
         run: evaluation.run,
         day: day.unwrap_or_else(|| stage.day(proposal.created_at).date),
         released_at,
+        rerun_after_release: extra_for.is_none()
+            && released_at.is_some_and(|released_at| evaluation.created_at >= released_at),
         extra_for,
-        rerun_after_release: released_at
-            .is_some_and(|released_at| evaluation.created_at >= released_at),
         finished_at: *finished_at,
         result: (**result).clone(),
     }))

@@ -3,13 +3,22 @@
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_api::views::queue::QueueView;
 use faceoff_store::{QueueForecast, QueuePosition};
+use jiff::{RoundMode, Timestamp, TimestampRound, Unit};
 
 pub fn view(position: QueuePosition) -> QueueView {
     QueueView {
         position: position.position,
         total: position.total,
-        expected_at: position.expected_at,
+        expected_at: position.expected_at.map(next_minute),
     }
+}
+
+/// The end of the minute: a finer forecast would show teams the pace of their agents' episodes.
+fn next_minute(at: Timestamp) -> Timestamp {
+    let minute = TimestampRound::new()
+        .smallest(Unit::Minute)
+        .mode(RoundMode::Ceil);
+    at.round(minute).unwrap_or(at)
 }
 
 /// Number of slots that run jobs now: the server's own and those of remote workers.

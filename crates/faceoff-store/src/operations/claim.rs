@@ -18,7 +18,8 @@ use crate::{
     tables::{
         runs as run_rows,
         runs::Run,
-        season, shards, stage_runtimes, stages,
+        season, shards, stage_runtimes,
+        stages::{self, StagePhase},
         submissions::{self, Submission},
     },
     write::Tx,
@@ -118,8 +119,22 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 mismatch: secret.model_mismatch(),
             };
             let all = stages::all(tx).await?;
-            let stage = stages::current(&all, tx.now)
-                .map(|stage| Box::new((stage.rules.rules.ruleset, stage.plan())));
+            let stage = stages::current(&all, tx.now).map(|stage| {
+                let mut plan = stage.plan();
+                // The submission can be evaluated in other stages, too. Each task has an agent of its own, which does not see the others.
+                for other in &all {
+                    if other.phase(tx.now) != StagePhase::Closed {
+                        plan.tasks.extend(&other.rules.rules.tasks);
+                    }
+                }
+                let mut tasks = Vec::new();
+                plan.tasks.retain(|task| {
+                    let is_new = !tasks.contains(task);
+                    tasks.push(*task);
+                    is_new
+                });
+                Box::new((stage.rules.rules.ruleset, plan))
+            });
             let runtimes = stage_runtimes::required_runtimes(&all, tx.now);
             Ok(Job::Validation {
                 submission,

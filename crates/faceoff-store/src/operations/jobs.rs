@@ -26,8 +26,8 @@ pub enum Job {
         submission: Submission,
         /// Seeds of the validation run's own episodes.
         seeds: RunSeeds,
-        /// The ruleset and the plan of an evaluation in the current stage, which the validation run resembles; `None` if no stage is
-        /// open.
+        /// The ruleset and the plan of an evaluation in the current stage, which the validation run resembles, with the tasks of all
+        /// stages that are not closed; `None` if there is no stage.
         stage: Option<Box<(Ruleset, RunPlan)>>,
         /// Accepted runtimes of each stage that the submission could be evaluated in; it is invalid if none of them
         /// accepts its runtime. Empty if a stage accepts any runtime.

@@ -74,8 +74,8 @@ pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Resu
         .ok_or_else(|| StoreError::Damaged(format!("run {run}: it has no owner")))
 }
 
-/// Adds a run, divides it into shards, and queues a job like `job` for each, in an order that is drawn for this run: no agent knows which
-/// episodes another team's agent has just played. Their slot time is charged to `team`. [`StoreError::Conflict`] if the bundle of a contestant was removed.
+/// Adds a run, divides it into shards, and queues a job like `job` for each, in an order that is drawn for this run: no
+/// agent knows which episodes another team's agent has just played. Their slot time is charged to `team`. [`StoreError::Conflict`] if the bundle of a contestant was removed.
 pub(crate) async fn queue_run(
     tx: &mut Tx,
     run: &Run,
@@ -119,7 +119,7 @@ pub(crate) async fn queue_run(
 /// A place in the order of play.
 fn random_number() -> Result<u64> {
     getrandom::u64()
-        .map_err(|error| StoreError::Damaged(format!("the host has no random numbers: {error}")))
+        .map_err(|error| StoreError::Database(sqlx::Error::Io(std::io::Error::other(error))))
 }
 
 /// Drops the open jobs of a run from the queue.

@@ -3,10 +3,10 @@
 use crate::{
     boxed,
     error::Result,
-    queries::progress::{self, RunProgress},
     store::Store,
     tables::{
         ablations::{self, Ablation, AblationRow, AblationState},
+        progress::{self, RunProgress},
         runs,
     },
 };

@@ -103,7 +103,8 @@ macro_rules! select_board {
             $name + r#"SELECT t.id AS team, t.name, t.created_at AS invited_at, t.affiliation, t.link, t.division,
                       t.retired_at, t.is_baseline, s.id AS submission, s.created_at AS submitted_at, s.agent_name,
                       e.id AS evaluation, e.run_id AS run, d.day, d.released_at, e.extra_for,
-                      e.rerun_of IS NOT NULL AND d.released_at IS NOT NULL AND e.created_at >= d.released_at
+                      e.rerun_of IS NOT NULL AND e.extra_for IS NULL AND d.released_at IS NOT NULL
+                          AND e.created_at >= d.released_at
                           AS "rerun_after_release!: bool",
                       e.finished_at AS "finished_at!", e.result AS "result!" "# + $tail,
             $($argument),*

@@ -3,9 +3,11 @@
 use crate::{
     boxed,
     error::{Result, StoreError},
-    queries::progress::{self, RunProgress},
     store::Store,
-    tables::evaluations::{self, Evaluation, EvaluationRow},
+    tables::{
+        evaluations::{self, Evaluation, EvaluationRow},
+        progress::{self, RunProgress},
+    },
 };
 use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::{Timestamp, civil::Date};

@@ -8,7 +8,6 @@ pub(crate) mod evaluations;
 mod events;
 pub(crate) mod gauges;
 mod leases;
-pub(crate) mod progress;
 pub(crate) mod proposals;
 pub(crate) mod queue_forecast;
 pub(crate) mod runs;

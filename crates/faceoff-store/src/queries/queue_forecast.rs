@@ -82,8 +82,6 @@ struct OpenJob {
     claimable_at: Instant,
     /// Slot time charged to the account so far, including the rest of the lease.
     charged_ms: i64,
-    /// Number of episodes done.
-    progress: u32,
     /// Urgency of its lane: smaller ones are served first.
     urgency: u32,
     /// Number of episodes of a shard.
@@ -102,7 +100,7 @@ async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
     Ok(sqlx::query_as!(
         OpenJob,
         r#"SELECT j.account_no AS "account!: i64", j.batch, j.queue_no, j.state = 'leased' AS "is_leased!: bool",
-                  j.claimable_at, j.charged_ms, j.progress, l.urgency,
+                  j.claimable_at, j.charged_ms, l.urgency,
                   s.end_episode - s.first_episode AS "episodes?: u32", a.holder, s.run_id AS "run?",
                   v.submission_id AS "validation_of?", c.evaluation_id AS "scoring_of?", g.id AS "game?",
                   json_extract(t.rules, '$.steps') AS "game_steps?: u32", t.paused_at IS NOT NULL AS "is_paused!: bool"
@@ -251,20 +249,13 @@ impl<'a> JobGroups<'a> {
 }
 
 impl OpenJob {
-    /// The remaining duration of a running job, from the share of it that is done: by the episodes that it has reported,
-    /// or else by the time since its claim.
+    /// The remaining duration of a running job, by the time since its claim. Not by the episodes that it has reported: teams see the
+    /// forecast, and an agent could speak to its team by the pace of its episodes.
     fn remaining_ms(&self, duration: DurationMs, now: Timestamp) -> DurationMs {
         let duration_ms = duration?;
-        let share_done = match self.episodes {
-            Some(episodes) if episodes > 0 && self.progress > 0 => {
-                f64::from(self.progress) / f64::from(episodes)
-            }
-            _ => {
-                let lease_rest_ms = self.claimable_at.0.as_millisecond() - now.as_millisecond();
-                (self.charged_ms - lease_rest_ms).max(0) as f64 / duration_ms.max(1.0)
-            }
-        };
-        Some((duration_ms * (1.0 - share_done)).max(0.0))
+        let lease_rest_ms = self.claimable_at.0.as_millisecond() - now.as_millisecond();
+        let elapsed_ms = (self.charged_ms - lease_rest_ms).max(0) as f64;
+        Some((duration_ms - elapsed_ms).max(0.0))
     }
 }
 

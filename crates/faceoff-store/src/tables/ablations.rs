@@ -3,7 +3,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
-    queries::progress::RunProgress,
+    tables::progress::RunProgress,
 };
 use faceoff_types::{AblationId, ProfileMap, RunId, SubmissionId};
 use jiff::Timestamp;

@@ -4,8 +4,7 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
-    queries::progress::RunProgress,
-    tables::{plan::RunPlan, rulings::Ruling, runs::RunState},
+    tables::{plan::RunPlan, progress::RunProgress, rulings::Ruling, runs::RunState},
 };
 use faceoff_types::{
     EvaluationId, EvaluationResult, Profile, ProposalId, RunId, StageDay, StageId, StageLimits,

@@ -26,6 +26,7 @@ pub(crate) mod invitations;
 pub(crate) mod job_durations;
 pub(crate) mod plan;
 pub(crate) mod programs;
+pub(crate) mod progress;
 pub(crate) mod proposals;
 pub(crate) mod questions;
 pub(crate) mod registrations;

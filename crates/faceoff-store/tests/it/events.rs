@@ -70,8 +70,8 @@ async fn events_record_each_step_of_a_submission() {
             run: evaluation.run,
             shard: shard.id,
             task: shard.task,
-            first_episode: 0,
-            end_episode: 2,
+            first_episode: shard.first_episode,
+            end_episode: shard.end_episode,
             agent_faults: 0,
         }
     );

@@ -658,7 +658,10 @@ async fn migration_splits_old_ablations_into_runs() {
             AblationState::Open {
                 progress: RunProgress {
                     episodes_done: 3,
-                    commits: Vec::new(),
+                    commits: vec![ShardProgress {
+                        committed_at: finished_at + jiff::SignedDuration::from_secs(2),
+                        episodes: 2,
+                    }],
                 },
                 episodes_total: 36,
             },
