@@ -4,10 +4,10 @@ use super::{
     fixture::*,
     intercepted_server::{InterceptedServer, Interception},
 };
-use faceoff_airhockey::HIT;
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
 use faceoff_testkit::shard_commit;
+use faceoff_types::Task;
 use std::{
     sync::{
         Arc, Mutex,
@@ -18,10 +18,10 @@ use std::{
 use tokio::sync::mpsc::UnboundedReceiver;
 
 /// An evaluator whose shards run until they are cancelled; the channel reports their starts.
-fn hanging_evaluator() -> (Arc<Scripted>, UnboundedReceiver<()>) {
+fn hanging_evaluator() -> (Arc<Scripted>, UnboundedReceiver<(Task, u32)>) {
     let (started, starts) = tokio::sync::mpsc::unbounded_channel();
-    let hanging = Scripted::new(move |_, observer| {
-        started.send(()).unwrap();
+    let hanging = Scripted::new(move |spec, observer| {
+        started.send((spec.task, spec.episodes.start)).unwrap();
         while !observer.cancelled() {
             std::thread::yield_now();
         }
@@ -70,7 +70,7 @@ async fn shutdown_releases_job_before_the_slot_ends() {
             Ok(())
         })
     });
-    starts.recv().await.unwrap();
+    let first = starts.recv().await;
     running.stop().await;
     let _ = worker_ended.send(());
     assert!(!ended_early.load(Ordering::SeqCst));
@@ -78,7 +78,7 @@ async fn shutdown_releases_job_before_the_slot_ends() {
     let Some(Job::Shard { shard, .. }) = claimed.unwrap().map(|claimed| claimed.job) else {
         panic!("the slot did not release its shard")
     };
-    assert_eq!((shard.task, shard.first_episode), (HIT, 0));
+    assert_eq!(Some((shard.task, shard.first_episode)), first);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -158,7 +158,7 @@ async fn result_of_a_lost_lease_is_discarded() {
                 (shard.task, shard.first_episode),
                 (spec.task, spec.episodes.start)
             );
-            *shared_claim.lock().unwrap() = Some(claim);
+            *shared_claim.lock().unwrap() = Some((claim, shard));
         }
         Ok(())
     });
@@ -168,7 +168,7 @@ async fn result_of_a_lost_lease_is_discarded() {
         let _ = events.recv().await;
     }
     // The second worker commits its recording of the shard.
-    let claim = second_claim.lock().unwrap().clone().unwrap();
+    let (claim, shard) = second_claim.lock().unwrap().clone().unwrap();
     let scratch = tempfile::tempdir().unwrap();
     std::fs::write(scratch.path().join("steps.parquet"), "by the second worker").unwrap();
     let run = server.store.evaluation(id).await.unwrap().run;
@@ -190,8 +190,10 @@ async fn result_of_a_lost_lease_is_discarded() {
         1,
         "the stalled slot has removed its own recording"
     );
-    let shard = server.store.shards(run).await.unwrap().remove(0);
-    let outcomes = (0..2).map(|episode| outcome(shard.task, episode)).collect();
+    let episodes = shard.first_episode..shard.end_episode;
+    let outcomes = episodes
+        .map(|episode| outcome(shard.task, episode))
+        .collect();
     let commit = shard_commit(outcomes, Some(recording));
     let committed = server
         .store
@@ -200,8 +202,10 @@ async fn result_of_a_lost_lease_is_discarded() {
         .unwrap();
     assert_eq!(committed, CommitOutcome::Stored);
     server.wait_for_result(id).await;
+    let shards = server.store.shards(run).await.unwrap();
+    let position = shards.iter().position(|other| other.id == shard.id);
     assert_eq!(
-        evaluator.assembled.lock().unwrap()[0],
+        evaluator.assembled.lock().unwrap()[position.unwrap()],
         "by the second worker"
     );
     running.stop().await;

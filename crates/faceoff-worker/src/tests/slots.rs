@@ -416,7 +416,10 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     // The evaluation has 6 shards; the ablation has one for each of 6 profiles and 3 tasks.
     assert_eq!((specs.len(), ablation_specs.len()), (6 + 18, 18));
     for (run, profile) in ablation_specs.chunks(3).zip(ABLATION_PROFILES) {
-        for (spec, task) in run.iter().zip(TASKS) {
+        // The order of a run's shards is drawn.
+        for task in TASKS {
+            let spec = run.iter().find(|spec| spec.task == task);
+            let spec = spec.expect("each task is played");
             assert_eq!(
                 (spec.profile, spec.task, &spec.episodes),
                 (profile, task, &(0..3))
