@@ -137,9 +137,11 @@ pub struct GameFiles {
 /// The episodes of a validation run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ValidationSpec {
-    /// The ruleset, profile, magnitudes, tasks and episodes are those of an evaluation: an agent cannot tell the runs apart.
+    /// The ruleset, as all that follows that of an evaluation: an agent cannot tell the runs apart.
     pub ruleset: Ruleset,
+    /// The perturbation profile.
     pub profile: Profile,
+    /// Magnitudes of perturbations that differ from the ruleset.
     pub perturbations: Magnitudes,
     /// The tasks in the order of play.
     pub tasks: Vec<Task>,
