@@ -408,7 +408,11 @@ impl Hidden {
                 continue;
             };
             let is_process = name.bytes().all(|byte| byte.is_ascii_digit());
-            if is_process || VISIBLE_IN_PROC.concat().contains(&name.as_str()) {
+            if is_process
+                || VISIBLE_IN_PROC
+                    .iter()
+                    .any(|names| names.contains(&name.as_str()))
+            {
                 continue;
             }
             let path = format!("/proc/{name}");

@@ -9,6 +9,7 @@ use std::{
     fs,
     os::unix::fs::{MetadataExt, PermissionsExt},
     path::Path,
+    time::SystemTime,
 };
 use tar::EntryType;
 use tempfile::TempDir;
@@ -56,6 +57,12 @@ fn archive_formats_are_detected_by_their_bytes() {
         assert_eq!(mode(&bundle.dir.join("agent.py")), 0o755);
         assert_eq!(mode(&bundle.dir.join("weights/w.bin")), 0o644);
         assert_eq!(mode(&bundle.dir.join("weights")), 0o755);
+        for path in ["", "agent.py", "weights", "weights/w.bin"] {
+            let modified = fs::metadata(bundle.dir.join(path)).unwrap().modified();
+            let since_1970 = modified.unwrap().duration_since(SystemTime::UNIX_EPOCH);
+            // 2000-01-01 00:00 UTC
+            assert_eq!(since_1970.unwrap().as_secs(), 946_684_800, "{path}");
+        }
     }
     assert_refused(b"", "expected .tar.gz, .tar.zst or .zip");
     assert_refused(b"#!/bin/sh\n", "expected .tar.gz, .tar.zst or .zip");

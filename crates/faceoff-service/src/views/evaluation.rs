@@ -16,6 +16,7 @@ use faceoff_api::{
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, StageDay, TeamId, TeamName};
+use jiff::Timestamp;
 use std::{collections::BTreeMap, sync::Arc};
 
 /// Text of the field `next`, which says what happens next, for a finished evaluation whose dataset was removed.
@@ -137,6 +138,15 @@ pub async fn all(
         .collect()
 }
 
+/// Was the seed of a repetition's day public when it was requested? An extra evaluation (`extra_for`: its reason) has a seed of its own.
+pub(super) fn used_public_episodes(
+    created_at: Timestamp,
+    released_at: Option<Timestamp>,
+    extra_for: Option<&str>,
+) -> bool {
+    extra_for.is_none() && released_at.is_some_and(|released_at| created_at >= released_at)
+}
+
 /// An evaluation without its position in the queue, and without faults and log.
 fn evaluation_view(
     visibility: &Visibility,
@@ -217,10 +227,11 @@ fn evaluation_view(
         deadline_at: evaluation.deadline_at,
         rerun_of: evaluation.rerun_of,
         rerun_after_release: evaluation.rerun_of.is_some()
-            && evaluation.extra_for.is_none()
-            && evaluation
-                .released_at
-                .is_some_and(|released_at| evaluation.created_at >= released_at),
+            && used_public_episodes(
+                evaluation.created_at,
+                evaluation.released_at,
+                evaluation.extra_for.as_deref(),
+            ),
         extra_evaluation: evaluation.extra_for,
         voided: evaluation.voided.map(ruling::view),
         blind: is_hidden,

@@ -8,6 +8,7 @@ use crate::{
     problem::Problem,
     views::{
         board::{self, BoardSelection},
+        evaluation::used_public_episodes,
         visibility::Visibility,
     },
 };
@@ -132,8 +133,11 @@ async fn board_record(
         run: evaluation.run,
         day: day.unwrap_or_else(|| stage.day(proposal.created_at).date),
         released_at,
-        rerun_after_release: extra_for.is_none()
-            && released_at.is_some_and(|released_at| evaluation.created_at >= released_at),
+        rerun_after_release: used_public_episodes(
+            evaluation.created_at,
+            released_at,
+            extra_for.as_deref(),
+        ),
         extra_for,
         finished_at: *finished_at,
         result: (**result).clone(),

@@ -122,17 +122,14 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
             let stage = stages::current(&all, tx.now).map(|stage| {
                 let mut plan = stage.plan();
                 // The submission can be evaluated in other stages, too. Each task has an agent of its own, which does not see the others.
-                for other in &all {
-                    if other.phase(tx.now) != StagePhase::Closed {
-                        plan.tasks.extend(&other.rules.rules.tasks);
+                let others = all
+                    .iter()
+                    .filter(|other| other.phase(tx.now) != StagePhase::Closed);
+                for task in others.flat_map(|other| &other.rules.rules.tasks) {
+                    if !plan.tasks.contains(task) {
+                        plan.tasks.push(*task);
                     }
                 }
-                let mut tasks = Vec::new();
-                plan.tasks.retain(|task| {
-                    let is_new = !tasks.contains(task);
-                    tasks.push(*task);
-                    is_new
-                });
                 Box::new((stage.rules.rules.ruleset, plan))
             });
             let runtimes = stage_runtimes::required_runtimes(&all, tx.now);
