@@ -201,9 +201,14 @@ impl RemoteSetup {
     }
 }
 
-/// Waits until the server lists this number of workers.
-fn wait_for_workers(server: &Server, workers: usize) {
+/// Waits until the server lists these workers.
+fn wait_for_workers<'a>(server: &Server, workers: impl IntoIterator<Item = &'a Worker>) {
+    let workers: Vec<&Worker> = workers.into_iter().collect();
     let _ = server.poll("/api/v1/workers", &server.admin_token, |view| {
-        view["workers"].as_array().map_or(0, Vec::len) == workers
+        assert!(
+            !workers.iter().any(|worker| worker.has_ended()),
+            "a worker has ended"
+        );
+        view["workers"].as_array().map_or(0, Vec::len) == workers.len()
     });
 }

@@ -17,8 +17,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long a test waits for an expected event before it fails: long enough for slow machines.
-pub const TIMEOUT: Duration = Duration::from_secs(1800);
+/// How long a test waits for an expected event before it fails: long enough for slow machines, and short enough that it fails, with
+/// the logs, before nextest ends it.
+pub const TIMEOUT: Duration = Duration::from_secs(1200);
 /// Size of the smallest pipe on Linux.
 const PAGE_BYTES: usize = 4096;
 
@@ -45,6 +46,12 @@ impl Process {
 impl Drop for Process {
     fn drop(&mut self) {
         self.kill();
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.log.show_on_failure("server");
     }
 }
 
@@ -377,6 +384,13 @@ impl Log {
             );
             // The pause keeps the CPU for the server.
             thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Prints the log if the test has failed.
+    pub(crate) fn show_on_failure(&self, process: &str) {
+        if thread::panicking() {
+            eprintln!("log of the {process}:\n{}", self.text());
         }
     }
 

@@ -2,19 +2,29 @@
 
 use crate::{
     program,
-    server::{Log, Process},
+    server::{Log, Process, TIMEOUT},
 };
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process, waitid};
 use std::{
     fs,
     path::Path,
     process::{Command, Stdio},
+    thread,
+    time::{Duration, Instant},
 };
 
 /// A remote worker. Dropping it kills it (SIGKILL).
 #[derive(Debug)]
 pub struct Worker {
+    name: String,
     process: Process,
     log: Log,
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.log.show_on_failure(&self.name);
+    }
 }
 
 impl Worker {
@@ -70,7 +80,8 @@ impl Worker {
             .spawn();
         let mut process = Process(child.expect("the program can be started"));
         let log = Log::collect(process.0.stderr.take().expect("standard error is piped"));
-        Self { process, log }
+        let name = name.to_owned();
+        Self { name, process, log }
     }
 
     /// Waits until the log contains `text` this many times.
@@ -104,17 +115,39 @@ impl Worker {
     /// # Panics
     /// If it was reaped.
     pub fn request_stop(&self) {
-        let id = rustix::process::Pid::from_child(&self.process.0);
-        rustix::process::kill_process(id, rustix::process::Signal::TERM)
-            .expect("a child can be signalled");
+        kill_process(self.id(), Signal::TERM).expect("a child can be signalled");
     }
 
     /// Waits until the worker has ended without a further signal.
     ///
     /// # Panics
-    /// If it ends with an error.
+    /// If it ends with an error, or not within [`TIMEOUT`].
     pub fn wait_for_exit(mut self) {
+        let started = Instant::now();
+        while !self.has_ended() {
+            assert!(
+                started.elapsed() < TIMEOUT,
+                "the worker {} does not end",
+                self.name
+            );
+            thread::sleep(Duration::from_millis(10));
+        }
         let status = self.process.0.wait().expect("a child can be reaped");
-        assert!(status.success(), "{status}:\n{}", self.log.text());
+        assert!(status.success(), "{status}");
+    }
+
+    /// Has the process ended? It is not reaped.
+    ///
+    /// # Panics
+    /// If it was reaped.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        let status = waitid(WaitId::Pid(self.id()), options);
+        status.expect("a child can be waited for").is_some()
+    }
+
+    fn id(&self) -> Pid {
+        Pid::from_child(&self.process.0)
     }
 }

@@ -123,6 +123,7 @@ impl CallAnswerer {
         let thread = std::thread::Builder::new()
             .name("agent-calls".into())
             .spawn(move || {
+                block_signals();
                 let sessions = answer_calls(&listener, answers);
                 session_numbers::skip_some(sessions);
             })
@@ -147,6 +148,18 @@ impl AnswerThread {
 /// Free blocks of every file system, as agents with so large a scratch folder see it.
 pub(crate) const fn free_blocks(scratch_bytes: u64) -> u64 {
     scratch_bytes / BLOCK_BYTES
+}
+
+/// Lets other threads handle the signals of this process. One that arrives here would end the waiting for a call, and its handler could
+/// run in a process that shares this process's memory ([`session_numbers::skip_some`]).
+fn block_signals() {
+    let mut all = MaybeUninit::uninit();
+    #[expect(unsafe_code, reason = "no library of this crate has masks of signals")]
+    // SAFETY: the first call initialises the set, which the second one reads; both only change this thread's mask.
+    unsafe {
+        libc::sigfillset(all.as_mut_ptr());
+        libc::pthread_sigmask(libc::SIG_SETMASK, all.as_ptr(), std::ptr::null_mut());
+    }
 }
 
 fn receive_listener(socket: &OwnedFd) -> io::Result<OwnedFd> {

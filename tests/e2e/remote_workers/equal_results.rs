@@ -66,7 +66,7 @@ fn remote_results_equal_local_results() {
             Worker::start(&folder, &format!("worker-{index}"), &config)
         });
         let workers: Vec<Worker> = workers.collect();
-        wait_for_workers(&server, workers.len());
+        wait_for_workers(&server, &workers);
         resume(&server);
         reference_run.assert_equal_result(&server);
         for (worker, slots) in workers.into_iter().zip(setup.worker_slots) {

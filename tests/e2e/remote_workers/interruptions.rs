@@ -91,7 +91,7 @@ fn worker_with_full_disk_releases_jobs_until_it_has_space() {
     let config = worker_config(setup.nats.address(), 1);
     let full_disk_worker =
         Worker::start_with_command(command, setup.scratch.path(), "full", &config, &[]);
-    wait_for_workers(&setup.server, 1);
+    wait_for_workers(&setup.server, [&full_disk_worker]);
     let filled_disk = FilledDisk::fill(&disk.outside_path());
     resume(&setup.server);
     full_disk_worker.wait_for_log("disk full: job released", 3);
@@ -142,7 +142,7 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
             &[],
         )
     });
-    wait_for_workers(&setup.server, workers.len());
+    wait_for_workers(&setup.server, &workers);
     resume(&setup.server);
     setup.assert_equal_result();
     for (worker, expected_offset_h) in workers.into_iter().zip([-1.0, 1.0]) {

@@ -94,7 +94,7 @@ impl NatsAdministrator {
 fn result_waits_while_stream_is_full() {
     let setup = RemoteSetup::start();
     let worker = setup.start_worker("worker");
-    wait_for_workers(&setup.server, 1);
+    wait_for_workers(&setup.server, [&worker]);
     let administrator = NatsAdministrator::connect(&setup.nats);
     let original_config = administrator.stream_config("faceoff-outcomes");
     administrator.update_stream(&Config {
@@ -308,7 +308,7 @@ fn stream_with_other_settings_is_reported_then_recreated() {
     }
     let server = start_server(&reference_run, &config, &file_relay);
     let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
-    wait_for_workers(&server, 1);
+    wait_for_workers(&server, [&worker]);
     resume(&server);
     for name in ["faceoff-orders", "faceoff-outcomes"] {
         let message = format!("the stream {name} has other settings than this server needs");
