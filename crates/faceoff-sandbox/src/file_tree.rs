@@ -2,40 +2,13 @@
 
 use rustix::fs::{AtFlags, CWD, Timespec, Timestamps, utimensat};
 use std::{
-    fs::{self, Metadata},
-    io,
+    fs, io,
     os::unix::fs::{MetadataExt, PermissionsExt, symlink},
     path::Path,
 };
 
 /// Memory is allocated in pages of this size.
 const PAGE_BYTES: u64 = 4096;
-/// The fixed time of files: 2000-01-01 00:00 UTC, in seconds since 1970.
-const FIXED_TIME_S: i64 = 946_684_800;
-
-/// Modification times of the copies.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Times {
-    /// Those of the originals. Python, for one, compares them with those in its compiled files.
-    Original,
-    /// The same for all files.
-    Fixed,
-}
-
-impl Times {
-    fn of(self, original: &Metadata) -> Timestamps {
-        let (tv_sec, tv_nsec) = match self {
-            Self::Original => (original.mtime(), original.mtime_nsec()),
-            Self::Fixed => (FIXED_TIME_S, 0),
-        };
-        let time = Timespec { tv_sec, tv_nsec };
-        Timestamps {
-            last_access: time,
-            last_modification: time,
-        }
-    }
-}
-
 /// Adds the size of the files below `path`, in memory; stops once the sum exceeds `limit_bytes`.
 pub(crate) fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Result<()> {
     let Some(meta) = readable(fs::symlink_metadata(path))? else {
@@ -54,8 +27,9 @@ pub(crate) fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Re
     Ok(())
 }
 
-/// Copies files, folders and links, with their modes, in the order of their names. The folder `target` may exist.
-pub(crate) fn copy(source: &Path, target: &Path, times: Times) -> io::Result<()> {
+/// Copies files, folders and links, with their modes and times of change (Python, for one, compares them with those in its compiled
+/// files), in the order of their names. The folder `target` may exist.
+pub(crate) fn copy(source: &Path, target: &Path) -> io::Result<()> {
     let Some(meta) = readable(fs::symlink_metadata(source))? else {
         return Ok(());
     };
@@ -73,14 +47,22 @@ pub(crate) fn copy(source: &Path, target: &Path, times: Times) -> io::Result<()>
         }
         names.sort_unstable();
         for name in names {
-            copy(&source.join(&name), &target.join(&name), times)?;
+            copy(&source.join(&name), &target.join(&name))?;
         }
         let mode = meta.permissions().mode() | 0o700;
         fs::set_permissions(target, fs::Permissions::from_mode(mode))?;
     } else {
         return Ok(());
     }
-    utimensat(CWD, target, &times.of(&meta), AtFlags::SYMLINK_NOFOLLOW)?;
+    let time = Timespec {
+        tv_sec: meta.mtime(),
+        tv_nsec: meta.mtime_nsec(),
+    };
+    let times = Timestamps {
+        last_access: time,
+        last_modification: time,
+    };
+    utimensat(CWD, target, &times, AtFlags::SYMLINK_NOFOLLOW)?;
     Ok(())
 }
 

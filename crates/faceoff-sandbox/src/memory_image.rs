@@ -61,7 +61,7 @@ impl MemoryImage {
         for path in paths(runtimes) {
             let target = path_in_image(folder.path(), &path);
             let copied = fs::create_dir_all(target.parent().unwrap_or(folder.path()))
-                .and_then(|()| file_tree::copy(&path, &target, file_tree::Times::Original));
+                .and_then(|()| file_tree::copy(&path, &target));
             copied.context(format_args!("cannot copy {} into memory", path.display()))?;
         }
         for runtime in runtimes.values_mut() {

@@ -93,7 +93,7 @@ impl PrivateMounts {
         let mount = file_system_in_memory().context("cannot make a file system for the bundle")?;
         // The folder itself, not the link to it.
         let inside = PathBuf::from(format!("/proc/self/fd/{}/.", mount.as_raw_fd()));
-        file_tree::copy(path, &inside, file_tree::Times::Fixed)
+        file_tree::copy(path, &inside)
             .context(format_args!("cannot copy {} into memory", path.display()))?;
         self.push(None, Some(mount), true)
     }

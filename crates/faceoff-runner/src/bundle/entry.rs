@@ -1,7 +1,8 @@
 //! Rules for an entry (file, folder or link) of an archive of any format, and the functions that write it to the disk.
 
-use super::{budget::Budget, error::BundleError};
+use super::{budget::Budget, error::BundleError, sink::FileAttributes};
 use fs_err::OpenOptions;
+use rustix::fs::{AtFlags, CWD, Timespec, Timestamps, utimensat};
 use std::{
     fs::Permissions,
     io::{self, Read, Write},
@@ -16,6 +17,9 @@ pub(super) const FOLDER_MODE: u32 = 0o755;
 pub(super) const PATH_MAX_BYTES: usize = 1024;
 /// Longest name of a file or folder on Linux, in bytes.
 const NAME_MAX_BYTES: usize = 255;
+/// The time of everything for which the archive states none: 2000-01-01 00:00 UTC, in seconds since 1970. No agent can tell from its
+/// files when they were unpacked, and so whether it plays in a validation run.
+const DEFAULT_TIME_S: u32 = 946_684_800;
 
 /// An error for an invalid entry.
 pub(super) fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
@@ -90,17 +94,18 @@ pub(super) fn add_hard_link(entry: &str, file: &Path, path: &Path) -> Result<(),
 pub(super) fn write_new(
     entry: &str,
     path: &Path,
-    mode: u32,
+    attributes: FileAttributes,
     content: &mut dyn Read,
     budget: &Budget<'_>,
 ) -> Result<(), BundleError> {
-    let file_mode = if mode & 0o111 == 0 { 0o644 } else { 0o755 };
+    let is_executable = attributes.mode & 0o111 != 0;
+    let file_mode = if is_executable { 0o755 } else { 0o644 };
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     file.set_permissions(Permissions::from_mode(file_mode))?;
     let mut buffer = vec![0; 64 << 10];
     loop {
         let read = match content.read(&mut buffer) {
-            Ok(0) => return Ok(()),
+            Ok(0) => break,
             Ok(read) => read,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
             Err(error) => return Err(BundleError::from_read_error(entry)(error)),
@@ -108,4 +113,23 @@ pub(super) fn write_new(
         budget.count_content(entry, read)?;
         file.write_all(&buffer[..read])?;
     }
+    set_time(path, attributes.modified_s.unwrap_or(DEFAULT_TIME_S))
+}
+
+/// Sets the time of a folder or a link, whose times in archives are not used.
+pub(super) fn set_default_time(path: &Path) -> Result<(), BundleError> {
+    set_time(path, DEFAULT_TIME_S)
+}
+
+fn set_time(path: &Path, seconds: u32) -> Result<(), BundleError> {
+    let time = Timespec {
+        tv_sec: seconds.into(),
+        tv_nsec: 0,
+    };
+    let times = Timestamps {
+        last_access: time,
+        last_modification: time,
+    };
+    utimensat(CWD, path, &times, AtFlags::SYMLINK_NOFOLLOW).map_err(io::Error::from)?;
+    Ok(())
 }

@@ -10,7 +10,7 @@ pub(super) trait Sink {
     fn add_file(
         &mut self,
         entry: &str,
-        mode: u32,
+        attributes: FileAttributes,
         content: &mut dyn Read,
     ) -> Result<(), BundleError>;
     fn add_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
@@ -18,6 +18,14 @@ pub(super) trait Sink {
     fn add_hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
     /// An entry of any other kind.
     fn add_special(&mut self, entry: &str, special: Special) -> Result<(), BundleError>;
+}
+
+/// What an archive says about a file, beside its content.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FileAttributes {
+    pub mode: u32,
+    /// Time of the last change in seconds since 1970, if the archive has one in UTC. Python compares it with those in its compiled files.
+    pub modified_s: Option<u32>,
 }
 
 /// The kind of an entry that is neither file, folder nor link.

@@ -4,7 +4,7 @@ use super::{
     budget::{Budget, MeteredReader},
     entry::unusable,
     error::BundleError,
-    sink::{Sink, Special},
+    sink::{FileAttributes, Sink, Special},
 };
 use std::io::{self, Read};
 use tar::{Archive, EntryType, Header};
@@ -82,7 +82,11 @@ pub(super) fn unpack<'a>(
                     }
                     EntryType::Regular | EntryType::Continuous => {
                         budget.allow(entry.size());
-                        sink.add_file(&name, mode, &mut entry)?;
+                        let attributes = FileAttributes {
+                            mode,
+                            modified_s: time_of(header),
+                        };
+                        sink.add_file(&name, attributes, &mut entry)?;
                         count_rest(&name, &mut entry, budget)?;
                     }
                     EntryType::Directory => sink.add_folder(&name, mode)?,
@@ -159,6 +163,12 @@ fn mode_of(header: &Header) -> io::Result<u32> {
         return Ok(0o644);
     }
     header.mode()
+}
+
+/// The time of an entry's last change, in seconds since 1970. Programs that pack the same bytes every time write 0 in its place.
+fn time_of(header: &Header) -> Option<u32> {
+    let seconds = header.mtime().ok()?.try_into().ok()?;
+    (seconds > 0).then_some(seconds)
 }
 
 fn sparse_error(name: &str) -> BundleError {

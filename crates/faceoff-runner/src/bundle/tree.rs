@@ -2,15 +2,17 @@
 
 use super::{
     budget::Budget,
-    entry::{FOLDER_MODE, add_hard_link, check_target, invalid, make_folder, unusable, write_new},
+    entry::{
+        FOLDER_MODE, add_hard_link, check_target, invalid, make_folder, set_default_time, unusable,
+        write_new,
+    },
     error::BundleError,
     links,
     node::Node,
     plan::Plan,
-    sink::{Sink, Special},
+    sink::{FileAttributes, Sink, Special},
 };
 use fs_err::{self as fs, os::unix::fs::symlink};
-use rustix::fs::{AtFlags, CWD, Timespec, Timestamps, utimensat};
 use std::{
     collections::BTreeMap,
     fs::Permissions,
@@ -137,27 +139,14 @@ impl<'a> Tree<'a> {
             }
         }
         // The content of a folder before the folder.
-        for path in nodes.keys().rev() {
-            self.budget.check()?;
-            set_fixed_time(&self.dir.join(path))?;
+        for (path, node) in nodes.iter().rev() {
+            if !matches!(node, Node::File) {
+                self.budget.check()?;
+                set_default_time(&self.dir.join(path))?;
+            }
         }
-        set_fixed_time(&self.dir)
+        set_default_time(&self.dir)
     }
-}
-
-/// Sets the time of a file, folder or link to 2000-01-01 00:00 UTC: no agent can tell from its files when they were unpacked, and so whether
-/// it plays in a validation run.
-fn set_fixed_time(path: &Path) -> Result<(), BundleError> {
-    let time = Timespec {
-        tv_sec: 946_684_800,
-        tv_nsec: 0,
-    };
-    let times = Timestamps {
-        last_access: time,
-        last_modification: time,
-    };
-    utimensat(CWD, path, &times, AtFlags::SYMLINK_NOFOLLOW).map_err(io::Error::from)?;
-    Ok(())
 }
 
 impl Sink for Tree<'_> {
@@ -169,12 +158,12 @@ impl Sink for Tree<'_> {
     fn add_file(
         &mut self,
         entry: &str,
-        mode: u32,
+        attributes: FileAttributes,
         content: &mut dyn Read,
     ) -> Result<(), BundleError> {
-        let path = self.plan.add_file(entry, mode)?;
+        let path = self.plan.add_file(entry, attributes.mode)?;
         let path_on_disk = self.make_parents(&path)?;
-        write_new(entry, &path_on_disk, mode, content, self.budget)
+        write_new(entry, &path_on_disk, attributes, content, self.budget)
     }
 
     /// The link is checked and created by [`Tree::finish`].

@@ -5,7 +5,7 @@ use super::{
     entry::unusable,
     error::BundleError,
     plan::Plan,
-    sink::Sink,
+    sink::{FileAttributes, Sink},
     tree::Tree,
 };
 use std::{
@@ -110,7 +110,14 @@ pub(super) fn unpack<'a>(
             .map_err(|error| damaged_entry(&name, error))?;
         match kind {
             Kind::Folder => tree.add_folder(&name, mode)?,
-            Kind::File => tree.add_file(&name, mode, &mut content)?,
+            Kind::File => {
+                // The times of a zip are those of an unknown time zone.
+                let attributes = FileAttributes {
+                    mode,
+                    modified_s: None,
+                };
+                tree.add_file(&name, attributes, &mut content)?;
+            }
             Kind::Link => {
                 let mut target = Vec::new();
                 (&mut content)

@@ -13,6 +13,9 @@ use zip::{ZipWriter, write::SimpleFileOptions};
 pub const MANIFEST: &str =
     "name = \"test\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
 
+/// Time of change of all entries, in seconds since 1970: 2009-02-13.
+pub const MODIFIED_S: u64 = 1_234_567_890;
+
 /// Builder of a tar archive; writes names and modes unchanged.
 #[derive(Clone)]
 pub struct Tar(Vec<u8>);
@@ -47,7 +50,7 @@ impl Tar {
         header.set_mode(mode);
         header.set_uid(0);
         header.set_gid(0);
-        header.set_mtime(0);
+        header.set_mtime(MODIFIED_S);
         header.set_size(content.len() as u64);
         header.set_cksum();
         self.0.extend_from_slice(header.as_bytes());

@@ -1,15 +1,14 @@
 //! Unpacking of bundles (archives with an agent and its `agent.toml`): accepted formats, and attacks that must fail.
 
 use crate::{
-    archives::{MANIFEST, Tar, write, zip},
-    unpacking::{assert_refused, assert_refused_with_limits, try_unpack},
+    archives::{MANIFEST, MODIFIED_S, Tar, write, zip},
+    unpacking::{DEFAULT_TIME_S, assert_refused, assert_refused_with_limits, time_of, try_unpack},
 };
 use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, open, unpack};
 use std::{
     fs,
     os::unix::fs::{MetadataExt, PermissionsExt},
     path::Path,
-    time::SystemTime,
 };
 use tar::EntryType;
 use tempfile::TempDir;
@@ -47,7 +46,11 @@ fn archive_formats_are_detected_by_their_bytes() {
         ("agent.py", 0o755, b"print()"),
         ("weights/w.bin", 0o600, &[7; 100_000]),
     ]);
-    for bytes in [tar().gz(), tar().zst(), zip] {
+    for (bytes, file_time) in [
+        (tar().gz(), MODIFIED_S),
+        (tar().zst(), MODIFIED_S),
+        (zip, DEFAULT_TIME_S),
+    ] {
         let (_dir, bundle) = unpack_valid(&bytes);
         assert_eq!(bundle.manifest.name, "test");
         assert_eq!(
@@ -57,11 +60,13 @@ fn archive_formats_are_detected_by_their_bytes() {
         assert_eq!(mode(&bundle.dir.join("agent.py")), 0o755);
         assert_eq!(mode(&bundle.dir.join("weights/w.bin")), 0o644);
         assert_eq!(mode(&bundle.dir.join("weights")), 0o755);
-        for path in ["", "agent.py", "weights", "weights/w.bin"] {
-            let modified = fs::metadata(bundle.dir.join(path)).unwrap().modified();
-            let since_1970 = modified.unwrap().duration_since(SystemTime::UNIX_EPOCH);
-            // 2000-01-01 00:00 UTC
-            assert_eq!(since_1970.unwrap().as_secs(), 946_684_800, "{path}");
+        for (path, time) in [
+            ("", DEFAULT_TIME_S),
+            ("weights", DEFAULT_TIME_S),
+            ("agent.py", file_time),
+            ("weights/w.bin", file_time),
+        ] {
+            assert_eq!(time_of(&bundle.dir.join(path)), time, "{path}");
         }
     }
     assert_refused(b"", "expected .tar.gz, .tar.zst or .zip");

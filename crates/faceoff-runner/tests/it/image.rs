@@ -1,12 +1,12 @@
 //! Bundles that are container images: accepted formats, and attacks that must fail.
 
 use crate::{
-    archives::{MANIFEST, Tar, write, zip},
+    archives::{MANIFEST, MODIFIED_S, Tar, write, zip},
     image_archives::{
         IMAGE_MANIFEST, Packing, TestImage, agent_layer, digest, empty_layout, host_folder,
         json_bytes, with_index,
     },
-    unpacking::{assert_refused, refusal, try_unpack},
+    unpacking::{DEFAULT_TIME_S, assert_refused, refusal, time_of, try_unpack},
 };
 use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, Image, open, unpack};
 use flate2::{Compression, write::GzEncoder};
@@ -154,6 +154,18 @@ fn modes_are_normalised_and_set_id_bits_dropped() {
     assert_eq!(image.mode("closed"), 0o755);
     assert_eq!(image.mode("closed/secret"), 0o644);
     assert_eq!(mode(&image.root), 0o755);
+}
+
+#[test]
+fn files_keep_the_times_of_their_layers() {
+    let (_dir, image) = unpack_layers([base()]);
+    for path in ["usr/bin/tool", "lib/deep/one"] {
+        assert_eq!(time_of(&image.path_of(path)), MODIFIED_S, "{path}");
+    }
+    // Nothing shows when the image was unpacked.
+    for path in ["", "lib/deep", "tmp", "bin", "etc/hosts"] {
+        assert_eq!(time_of(&image.path_of(path)), DEFAULT_TIME_S, "{path}");
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::archives::write;
 use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, unpack};
-use std::fs;
+use std::{fs, path::Path, time::SystemTime};
 use tempfile::TempDir;
 
 /// Unpacks an archive into the folder `out` of a new folder, and stops when `cancelled` returns true.
@@ -60,4 +60,16 @@ pub fn assert_refused_with_limits(bytes: &[u8], limits: BundleLimits, part: &str
 #[track_caller]
 pub fn assert_refused(bytes: &[u8], part: &str) -> TempDir {
     assert_refused_with_limits(bytes, BundleLimits::default(), part)
+}
+
+/// Time of everything whose archive states none, in seconds since 1970: 2000-01-01.
+pub const DEFAULT_TIME_S: u64 = 946_684_800;
+
+/// Time of change, in seconds since 1970. A link is not followed.
+pub fn time_of(path: &Path) -> u64 {
+    let modified = path.symlink_metadata().unwrap().modified().unwrap();
+    modified
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .unwrap()
+        .as_secs()
 }

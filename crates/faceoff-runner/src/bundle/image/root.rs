@@ -6,10 +6,10 @@ use crate::bundle::{
     budget::Budget,
     entry::{
         PATH_MAX_BYTES, add_hard_link, check_target, invalid as invalid_entry, make_folder,
-        normalise, write_new,
+        normalise, set_default_time, write_new,
     },
     error::BundleError,
-    sink::{Sink, Special},
+    sink::{FileAttributes, Sink, Special},
 };
 use fs_err::{self as fs, os::unix::fs::symlink};
 use std::{
@@ -451,10 +451,14 @@ impl<'a> Root<'a> {
                 name: name.to_owned(),
             };
             let disk_path = self.put(name, &location, Kind::File)?;
+            let attributes = FileAttributes {
+                mode: 0o644,
+                modified_s: None,
+            };
             write_new(
                 name,
                 &disk_path,
-                0o644,
+                attributes,
                 &mut content.as_bytes(),
                 self.budget,
             )?;
@@ -468,7 +472,7 @@ impl<'a> Root<'a> {
             self.add_folders(&[name.to_owned()])?;
         }
         make_folders(&mut self.top_folder, &self.disk_path, self.budget)?;
-        make_links(&self.top_folder, &self.disk_path)?;
+        make_links_and_set_times(&self.top_folder, &self.disk_path, self.budget)?;
         Ok(self.disk_path.join(AGENT_FOLDER))
     }
 }
@@ -497,14 +501,14 @@ impl Sink for Root<'_> {
     fn add_file(
         &mut self,
         entry: &str,
-        mode: u32,
+        attributes: FileAttributes,
         content: &mut dyn Read,
     ) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
         let disk_path = self.put(entry, &location, Kind::File)?;
-        write_new(entry, &disk_path, mode, content, self.budget)
+        write_new(entry, &disk_path, attributes, content, self.budget)
     }
 
     /// [`Root::finish`] creates the link on the disk. It may point anywhere, because it is followed only inside of the
@@ -605,14 +609,23 @@ fn make_folders(folder: &mut Folder, dir: &Path, budget: &Budget<'_>) -> Result<
     Ok(())
 }
 
-fn make_links(folder: &Folder, disk_path: &Path) -> Result<(), BundleError> {
+/// Completes a folder: nothing in it changes afterwards.
+fn make_links_and_set_times(
+    folder: &Folder,
+    disk_path: &Path,
+    budget: &Budget<'_>,
+) -> Result<(), BundleError> {
     for (name, node) in &folder.children {
         let disk_path = disk_path.join(name);
         match &node.kind {
-            Kind::Folder(folder) => make_links(folder, &disk_path)?,
+            Kind::Folder(folder) => make_links_and_set_times(folder, &disk_path, budget)?,
             Kind::File | Kind::Special => {}
-            Kind::Link(target) => symlink(target, disk_path)?,
+            Kind::Link(target) => {
+                symlink(target, &disk_path)?;
+                set_default_time(&disk_path)?;
+            }
         }
     }
-    Ok(())
+    budget.check()?;
+    set_default_time(disk_path)
 }
