@@ -56,6 +56,7 @@ mod unknown_task;
 mod validation_outcome;
 mod variation;
 mod violation;
+mod without_password;
 mod worker_name;
 mod zone;
 
@@ -116,5 +117,6 @@ pub use unknown_task::UnknownTask;
 pub use validation_outcome::{ValidationOutcome, ValidationTiming};
 pub use variation::{InvalidTierBounds, TierBounds, Variation};
 pub use violation::{ViolationCounts, ViolationName, Violations};
+pub use without_password::without_password;
 pub use worker_name::{ParseWorkerNameError, WorkerName};
 pub use zone::{UnknownZone, Zone};

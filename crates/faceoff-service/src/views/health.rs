@@ -104,10 +104,16 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
         .with("waiting", waiting))
 }
 
-/// Problems of a server whose jobs run on remote workers only.
+/// Problems of a server whose jobs run on remote workers only. Their causes name addresses and workers, which only organisers see.
 fn remote_problems(app: &AppState, waiting: u32) -> Vec<String> {
     let workers = workers::current(app);
-    let mut problems = workers.problems;
+    let mut problems = Vec::new();
+    if !workers.problems.is_empty() {
+        problems.push(
+            "remote workers and the server cannot exchange jobs or results; organisers see the cause (GET /api/v1/workers)"
+                .to_owned(),
+        );
+    }
     if workers.remote_slots == 0 && waiting > 0 {
         problems.push(format!(
             "{waiting} jobs are pending, the server has no slots of its own, and no remote worker can lease them"

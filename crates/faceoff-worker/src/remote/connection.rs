@@ -4,6 +4,7 @@
 use super::names::Names;
 use anyhow::Context as _;
 use async_nats::{Client, ConnectOptions, Event};
+use faceoff_types::without_password;
 use std::{
     path::PathBuf,
     sync::{Arc, Mutex, PoisonError},
@@ -37,7 +38,7 @@ impl NatsConfig {
         on_status: impl Fn(Option<&str>) + Send + Sync + 'static,
     ) -> anyhow::Result<Client> {
         let log = Arc::new(ConnectionLog {
-            url: self.url.clone(),
+            url: self.shown_url(),
             cause: Mutex::default(),
             on_status: Box::new(on_status),
         });
@@ -64,7 +65,13 @@ impl NatsConfig {
                 async move { log.record(&event) }
             });
         let connected = options.connect(&self.url).await;
-        connected.with_context(|| format!("connecting to NATS at {}", self.url))
+        connected.with_context(|| format!("connecting to NATS at {}", self.shown_url()))
+    }
+
+    /// The URL for logs and messages, without a password.
+    #[must_use]
+    pub fn shown_url(&self) -> String {
+        without_password(&self.url).into_owned()
     }
 
     /// Client name, credentials and trusted certificates.

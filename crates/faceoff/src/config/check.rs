@@ -4,7 +4,7 @@ use super::Config;
 use crate::competition::{competition, simulator};
 use anyhow::{Context as _, anyhow, bail, ensure};
 use faceoff_sandbox::affinity;
-use faceoff_types::{IMAGE_RUNTIME, Seed};
+use faceoff_types::{IMAGE_RUNTIME, Seed, without_password};
 use std::collections::HashSet;
 
 /// More slots per CPU than this would make no progress.
@@ -97,12 +97,16 @@ impl Config {
             .strip_prefix("https://")
             .or_else(|| url.strip_prefix("http://"));
         let is_address = rest.is_some_and(|rest| {
-            !rest.is_empty() && !rest.ends_with('/') && !rest.contains(char::is_whitespace)
+            !rest.is_empty()
+                && !rest.ends_with('/')
+                // Everybody sees the address, and so a password in it.
+                && !rest.contains(|char: char| char.is_whitespace() || char == '@')
         });
         ensure!(
             is_address,
-            "server.public_url: expected an address like https://faceoff.example.org, without a trailing \
-            slash, got {url:?}"
+            "server.public_url: expected an address like https://faceoff.example.org, without a password and a trailing \
+            slash, got {:?}",
+            without_password(url)
         );
         Ok(())
     }

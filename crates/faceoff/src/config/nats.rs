@@ -1,6 +1,7 @@
 //! `[nats]`: how server and remote workers (processes on other machines that run jobs) connect through a NATS message server.
 
 use anyhow::ensure;
+use faceoff_types::without_password;
 use faceoff_worker::NatsConfig;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -65,20 +66,23 @@ impl NatsSection {
                 })
             })
         };
+        let shown = |url: &Option<String>| {
+            without_password(url.as_deref().unwrap_or_default()).into_owned()
+        };
         ensure!(
             has_scheme(&self.url, &["nats://", "tls://"]),
             "nats.url: expected nats://HOST:PORT or tls://HOST:PORT, got {:?}",
-            self.url.as_deref().unwrap_or_default()
+            shown(&self.url)
         );
         ensure!(
             has_scheme(&self.files_url, &["http://", "https://"]),
             "nats.files_url: expected http://HOST:PORT or https://HOST without a trailing slash, got {:?}",
-            self.files_url.as_deref().unwrap_or_default()
+            shown(&self.files_url)
         );
         ensure!(
             has_scheme(&self.bucket, &["s3://"]),
             "nats.bucket: expected s3://BUCKET or s3://BUCKET/PREFIX without a trailing slash, got {:?}",
-            self.bucket.as_deref().unwrap_or_default()
+            shown(&self.bucket)
         );
         Ok(())
     }
