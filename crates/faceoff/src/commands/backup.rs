@@ -19,7 +19,7 @@ use jiff::Timestamp;
 use manifest::{ARTIFACTS, BackupFile, DATABASE, MANIFEST, Manifest, MissingFile};
 use std::{
     collections::BTreeMap,
-    fs,
+    io::Read as _,
     path::{Path, PathBuf},
 };
 
@@ -194,11 +194,14 @@ fn missing_files(
 /// If the folder is no backup, or a backup of a later version.
 pub fn read_manifest(folder: &Path) -> anyhow::Result<Manifest> {
     let file = folder.join(MANIFEST);
-    let text = fs::read(&file).with_context(|| {
-        format!(
-            "{} is not a backup made by `faceoff backup`: reading its {MANIFEST}",
-            folder.display()
-        )
-    })?;
+    let mut text = Vec::new();
+    files::open_regular(&file)
+        .and_then(|mut file| file.read_to_end(&mut text))
+        .with_context(|| {
+            format!(
+                "{} is not a backup made by `faceoff backup`: reading its {MANIFEST}",
+                folder.display()
+            )
+        })?;
     Manifest::parse(&text).with_context(|| format!("{}", file.display()))
 }

@@ -2,6 +2,7 @@
 
 use super::super::atomic_folder;
 use anyhow::Context;
+use rustix::fs::OFlags;
 use std::{
     collections::BTreeMap,
     fs::{self, File, OpenOptions, Permissions},
@@ -20,12 +21,31 @@ pub struct CopiedFile {
     pub blake3: String,
 }
 
+/// Opens a file for reading. Anything else, which a backup does not contain, is refused: a pipe would be waited for without end.
+///
+/// # Errors
+/// If it is no regular file, or cannot be read.
+pub fn open_regular(path: &Path) -> std::io::Result<File> {
+    // Opening a pipe would already wait.
+    let file = OpenOptions::new()
+        .read(true)
+        .custom_flags(OFlags::NONBLOCK.bits().cast_signed())
+        .open(path)?;
+    if file.metadata()?.is_file() {
+        return Ok(file);
+    }
+    Err(std::io::Error::new(
+        ErrorKind::InvalidInput,
+        "expected a regular file, got something else",
+    ))
+}
+
 /// Copies a file to a new one.
 ///
 /// # Errors
 /// If the source cannot be read, or the target exists or cannot be written.
 pub fn copy_file(from: &Path, to: &Path) -> anyhow::Result<CopiedFile> {
-    let source = File::open(from).with_context(|| format!("reading {}", from.display()))?;
+    let source = open_regular(from).with_context(|| format!("reading {}", from.display()))?;
     copy_open_file(source, from, to)
 }
 
@@ -81,7 +101,7 @@ pub fn write(path: &Path, text: &[u8]) -> anyhow::Result<()> {
 /// If the file cannot be read or changed.
 pub fn make_private(path: &Path) -> anyhow::Result<CopiedFile> {
     fs::set_permissions(path, Permissions::from_mode(0o600))
-        .and_then(|()| File::open(path)?.sync_all())
+        .and_then(|()| open_regular(path)?.sync_all())
         .with_context(|| format!("writing {}", path.display()))?;
     hash_file(path)
 }
@@ -92,7 +112,7 @@ pub fn make_private(path: &Path) -> anyhow::Result<CopiedFile> {
 /// If the file cannot be read.
 pub fn hash_file(path: &Path) -> anyhow::Result<CopiedFile> {
     let hash = || -> std::io::Result<CopiedFile> {
-        let file = File::open(path)?;
+        let file = open_regular(path)?;
         let mut hash = blake3::Hasher::new();
         hash.update_reader(&file)?;
         Ok(CopiedFile {
@@ -137,7 +157,7 @@ pub fn copy_tree(
         if kind.is_dir() {
             copy_tree(&source, &copy, &path, copied)?;
         } else if kind.is_file() {
-            match File::open(&source) {
+            match open_regular(&source) {
                 Err(error) if error.kind() == ErrorKind::NotFound => {}
                 file => {
                     let file = file.with_context(|| format!("reading {}", source.display()))?;
@@ -164,6 +184,27 @@ mod tests {
         assert!(is_half_written("bundle.tar.gz#3"));
         assert!(!is_half_written("bundle.tar.gz"));
         assert!(!is_half_written("a#b"));
+    }
+
+    #[test]
+    fn pipes_are_refused_and_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        rustix::fs::mknodat(
+            rustix::fs::CWD,
+            &pipe,
+            rustix::fs::FileType::Fifo,
+            rustix::fs::Mode::RUSR,
+            0,
+        )
+        .unwrap();
+        for refused in [
+            hash_file(&pipe),
+            copy_file(&pipe, &folder.path().join("copy")),
+        ] {
+            let error = format!("{:#}", refused.unwrap_err());
+            assert!(error.contains("expected a regular file"), "{error}");
+        }
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! The data folder: its lock and its secrets. The *host* is the person who runs the server; the *host's token* has all rights of
 //! an organiser.
 
-use super::super::atomic_folder::create_private;
+use super::super::{
+    atomic_folder::create_private,
+    backup::manifest::{ARTIFACTS, DATABASE},
+};
 use anyhow::{Context, bail};
 use faceoff_api::token::{Secret, SecretKind, hash_token};
 use faceoff_dataset::allow_missing;
@@ -9,9 +12,9 @@ use faceoff_http::LinkKey;
 use faceoff_store::Store;
 use jiff::Timestamp;
 use std::{
-    fs::{self, File, OpenOptions, TryLockError},
+    fs::{self, File, OpenOptions, Permissions, TryLockError},
     io::{Read as _, Seek as _, Write as _},
-    os::unix::fs::{MetadataExt, OpenOptionsExt},
+    os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt},
     path::Path,
     thread,
     time::{Duration, Instant},
@@ -87,6 +90,47 @@ pub fn lock(data_dir: &Path) -> anyhow::Result<File> {
         .and_then(|()| writeln!(file, "{}", std::process::id()))
         .with_context(context)?;
     Ok(file)
+}
+
+/// Closes the files of the data folder to other users: earlier versions, copies and other programs may have left them open. The mode
+/// of the folder itself, which may contain other things, stays.
+///
+/// # Errors
+/// If a mode cannot be read or changed.
+pub fn close_to_others(data_dir: &Path) -> anyhow::Result<()> {
+    const GROUP_AND_OTHERS: u32 = 0o077;
+    const NAMES: [&str; 7] = [
+        DATABASE,
+        concat!("faceoff.sqlite3", "-wal"),
+        concat!("faceoff.sqlite3", "-shm"),
+        ARTIFACTS,
+        ADMIN_TOKEN_FILE,
+        LINK_KEY_FILE,
+        LOCK_FILE,
+    ];
+    for name in NAMES {
+        let path = data_dir.join(name);
+        let close = || -> std::io::Result<()> {
+            let mode = fs::metadata(&path)?.permissions().mode() & 0o7777;
+            if mode & GROUP_AND_OTHERS == 0 {
+                return Ok(());
+            }
+            fs::set_permissions(&path, Permissions::from_mode(mode & !GROUP_AND_OTHERS))?;
+            tracing::warn!(
+                path = %path.display(),
+                mode = format!("{mode:04o}"),
+                "other users could read it; now only the server's user can"
+            );
+            Ok(())
+        };
+        allow_missing(close()).with_context(|| {
+            format!(
+                "closing {} to other users; run the server as its owner, or chmod go= it",
+                path.display()
+            )
+        })?;
+    }
+    Ok(())
 }
 
 /// The process id in the lock file. It only serves error messages; the lock itself is the file lock.
@@ -194,7 +238,28 @@ pub async fn set_admin_token(store: &Store, data_dir: &Path, now: Timestamp) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn files_are_closed_to_other_users() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::set_permissions(folder.path(), Permissions::from_mode(0o755)).unwrap();
+        let mode = |name: &str| {
+            let metadata = fs::metadata(folder.path().join(name)).unwrap();
+            metadata.permissions().mode() & 0o777
+        };
+        for name in [DATABASE, ADMIN_TOKEN_FILE, "notes.txt"] {
+            let file = folder.path().join(name);
+            fs::write(&file, "").unwrap();
+            fs::set_permissions(&file, Permissions::from_mode(0o644)).unwrap();
+        }
+        let artifacts = folder.path().join(ARTIFACTS);
+        fs::create_dir(&artifacts).unwrap();
+        fs::set_permissions(&artifacts, Permissions::from_mode(0o755)).unwrap();
+        close_to_others(folder.path()).unwrap();
+        assert_eq!((mode(DATABASE), mode(ADMIN_TOKEN_FILE)), (0o600, 0o600));
+        assert_eq!(mode(ARTIFACTS), 0o700);
+        assert_eq!((mode("notes.txt"), mode("")), (0o644, 0o755));
+    }
 
     #[test]
     fn data_folder_has_one_lock_holder_at_a_time() {

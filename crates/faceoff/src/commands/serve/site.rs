@@ -1,6 +1,8 @@
 //! What serving a season needs, whether it runs or is archived: the opened data folder, the address and the HTTP settings.
 
-use super::data_folder::{empty_folder, load_or_create_link_key, lock, set_admin_token};
+use super::data_folder::{
+    close_to_others, empty_folder, load_or_create_link_key, lock, set_admin_token,
+};
 use crate::competition::{competition, simulator};
 use crate::{config::Config, machine};
 use anyhow::{Context, anyhow};
@@ -43,6 +45,8 @@ impl Site {
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
+        // After the database and the folder of artifacts exist.
+        close_to_others(data_dir)?;
         let checked = competition().check();
         checked.map_err(|problem| anyhow!("the competition of this program: {problem}"))?;
         let bound = store
