@@ -425,8 +425,10 @@ fn server_start_replaces_revoked_host_token() {
     let host_token = list.iter().find(|token| token["name"] == "admin-token");
     let host_token_id = id(host_token.expect("the host has a token"));
     // The host's token cannot be rotated: the file would keep the old one, and the next start would use it.
-    admin_as(&server, &grace, &["token", "rotate", &host_token_id])
+    with_token_file(&server, &["token", "rotate", &host_token_id])
         .expect_refusal(REFUSED, &["data folder", "revoke it"]);
+    admin_as(&server, &grace, &["token", "rotate", &host_token_id])
+        .expect_refusal(NOT_ALLOWED, &["only with a token of the host"]);
     admin_as(&server, &grace, &["token", "revoke", &host_token_id]).expect_success();
     with_token_file(&server, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
     server.kill();

@@ -17,6 +17,7 @@ use faceoff_service::{
     answer_cache,
     app::AppState,
     conditions::Conditions,
+    network::Network,
     problem::Problem,
     request_log::{REQUEST_ID, log_request},
 };
@@ -121,12 +122,22 @@ pub(crate) async fn read_consistently(
 }
 
 /// Answers `TooManyRequests` to an address that exceeds its rate limit.
-async fn limit_rate(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
+async fn limit_rate(
+    State(app): State<Arc<AppState>>,
+    mut request: Request,
+    next: Next,
+) -> Response {
     let peer = request.extensions().get::<Peer>();
-    let checked = match peer.and_then(|peer| peer.client_address(request.headers())) {
+    let client = peer.and_then(|peer| peer.client_address(request.headers()));
+    let checked = match client {
         Some(address) => app.request_limiter.check_address(address),
         None => Ok(()),
     };
+    if let Some(address) = client {
+        request
+            .extensions_mut()
+            .insert(Network::from_address(address));
+    }
     match checked {
         Ok(()) => next.run(request).await,
         Err(problem) => {

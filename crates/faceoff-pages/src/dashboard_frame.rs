@@ -113,7 +113,7 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ("uninvited", "Invitation revoked. The link no longer works."),
     (
         "removed",
-        "User removed. All tokens and sessions are revoked.",
+        "User removed. All tokens and sessions are revoked; team tokens, invitations and webhooks that the user had made have ended.",
     ),
     ("asked", "Question sent. The answer appears below."),
     ("announced", "Announcement published."),

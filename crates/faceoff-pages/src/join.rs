@@ -17,6 +17,7 @@ use faceoff_api::{
 use faceoff_service::{
     app::App,
     extract::{PageForm, PathParam},
+    network::{ClientNetwork, Network},
     problem::{Problem, ProblemKind},
     services::{accounts::join, sessions::session_expiry},
     views::announcement,
@@ -162,9 +163,10 @@ pub(super) async fn page(
 pub(super) async fn submit(
     State(app): State<App>,
     PathParam(code): PathParam<String>,
+    ClientNetwork(client): ClientNetwork,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    match accept_invitation(&app, &code, &form).await {
+    match accept_invitation(&app, &code, &form, client).await {
         Ok(response) => Ok(response),
         // An invalid invitation has its own page; server errors are not shown beside the form.
         Err(PageProblem(problem)) if problem.kind() == ProblemKind::InvitationInvalid => {
@@ -180,7 +182,12 @@ pub(super) async fn submit(
     }
 }
 
-async fn accept_invitation(app: &App, code: &str, form: &Form) -> Result<Response, PageProblem> {
+async fn accept_invitation(
+    app: &App,
+    code: &str,
+    form: &Form,
+    client: Option<Network>,
+) -> Result<Response, PageProblem> {
     let name = non_empty(&form.name).map(|name| name.parse()).transpose();
     let request = JoinRequest {
         code: code.to_owned(),
@@ -195,6 +202,6 @@ async fn accept_invitation(app: &App, code: &str, form: &Form) -> Result<Respons
         accepted_terms: parse_accepted_terms(&form.accepted_terms)?,
     };
     let until = session_expiry(app.config.clock.now());
-    let (_, secret) = join(app, request, TokenKind::Session, Some(until)).await?;
+    let (_, secret) = join(app, request, TokenKind::Session, Some(until), client).await?;
     redirect_to_account(app, secret.as_str())
 }

@@ -11,7 +11,12 @@ use axum::{
     response::{AppendHeaders, IntoResponse, Redirect, Response},
 };
 use faceoff_service::{
-    app::App, auth::Caller, extract::PageForm, problem::ProblemKind, services::sessions::sign_in,
+    app::App,
+    auth::Caller,
+    extract::PageForm,
+    network::ClientNetwork,
+    problem::ProblemKind,
+    services::sessions::{self, sign_in},
     session,
 };
 use serde::Deserialize;
@@ -73,9 +78,10 @@ pub(super) async fn page(
 /// Signs in and redirects to the requested page or the account; shows an error on the same page.
 pub(super) async fn submit(
     State(app): State<App>,
+    ClientNetwork(client): ClientNetwork,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    match sign_in(&app, &form.name, form.password).await {
+    match sign_in(&app, &form.name, form.password, client).await {
         Ok((_, secret)) => {
             let target = return_path(&form.next).unwrap_or(ACCOUNT);
             redirect_with_session(&app, secret.as_str(), target)
@@ -112,10 +118,7 @@ pub(super) async fn sign_out(
     caller: Caller,
     State(app): State<App>,
 ) -> Result<Response, PageProblem> {
-    let now = app.config.clock.now();
-    let actor = caller.actor();
-    let ended = app.store.revoke_token(actor, caller.token.id, now).await;
-    ended?;
+    sessions::end(&app, &caller).await?;
     let cookie = session::set_cookie(&app.config, None)?;
     let cookie = AppendHeaders([(header::SET_COOKIE, cookie)]);
     Ok((cookie, Redirect::to("/")).into_response())

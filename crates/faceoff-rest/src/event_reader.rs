@@ -1,10 +1,11 @@
 //! A reader of the event stream, which is one connection of a client. It decides which events of the log the client gets
 //! next, and when. A client that reconnects continues at the id of its last event.
 
+use crate::sse::is_token_valid;
 use axum::response::sse::Event;
 use faceoff_notify::{Audience, Notice, NoticeFilter, Page};
 use faceoff_service::{app::App, problem::Problem, shutdown::Shutdown};
-use faceoff_store::{Change, StoreError};
+use faceoff_store::Change;
 use faceoff_types::TokenId;
 use std::time::Duration;
 use tokio::{
@@ -118,7 +119,7 @@ impl EventReader {
             sleep_until(self.next_read_at).await;
             let page = self.app.feed.page_after(self.last_read).await?;
             // Checked after the log is read: a token that was revoked meanwhile gets no further event.
-            if !self.is_token_valid().await? {
+            if !is_token_valid(&self.app, self.subscription.token).await? {
                 return Ok(None);
             }
             let Some(page) = page else {
@@ -132,18 +133,6 @@ impl EventReader {
             if !events.is_empty() {
                 return Ok(Some(events));
             }
-        }
-    }
-
-    /// Whether the token of the request is still valid.
-    async fn is_token_valid(&self) -> Result<bool, Problem> {
-        let Some(token) = self.subscription.token else {
-            return Ok(true);
-        };
-        match self.app.store.token(token).await {
-            Ok(token) => Ok(token.is_valid(self.app.config.clock.now())),
-            Err(StoreError::NotFound(_)) => Ok(false),
-            Err(error) => Err(error.into()),
         }
     }
 

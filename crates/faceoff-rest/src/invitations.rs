@@ -5,17 +5,18 @@ use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
     requests::{self, JoinRequest},
     views::{
+        credentials::NewAccountView,
         invitation::{InvitationView, NewInvitationView},
-        user::NewAccountView,
     },
 };
 use faceoff_service::{
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
+    network::ClientNetwork,
     problem::Problem,
     services::{accounts::join, invitations},
-    views::{invitation, token, user},
+    views::{credentials, invitation, token, user},
 };
 use faceoff_store::{Principal, TokenKind};
 use faceoff_types::InvitationId;
@@ -87,9 +88,10 @@ pub(crate) async fn revoke_invitation(
 )]
 pub(crate) async fn accept_invitation(
     State(app): State<App>,
+    ClientNetwork(client): ClientNetwork,
     Body(request): Body<JoinRequest>,
 ) -> Result<(StatusCode, Json<NewAccountView>), Problem> {
-    let (joined, secret) = join(&app, request, TokenKind::ApiToken, None).await?;
+    let (joined, secret) = join(&app, request, TokenKind::ApiToken, None, client).await?;
     let principal = match joined.team {
         Some(team) => Principal::Member(joined.user, team),
         None => Principal::Organiser(joined.user),
@@ -97,6 +99,7 @@ pub(crate) async fn accept_invitation(
     let view = NewAccountView {
         caller: user::caller(principal, token::view(joined.token)),
         secret: secret.as_str().to_owned(),
+        ended: credentials::ended(joined.ended, app.config.clock.now()),
     };
     Ok((StatusCode::CREATED, Json(view)))
 }

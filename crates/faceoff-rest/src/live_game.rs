@@ -5,6 +5,7 @@ use crate::live_reader::{LiveReader, parse_cursor};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_service::{
     app::App,
+    auth::OptionalCaller,
     extract::PathParam,
     problem::{Problem, ProblemKind},
     shutdown::Shutdown,
@@ -23,7 +24,7 @@ use std::sync::Arc;
 ///
 /// The id of a `happening` is `ATTEMPT.NUMBER`; a game that is run again has a new attempt. A client that reconnects with
 /// the header `Last-Event-ID` gets a snapshot and all happenings since that id; if a new attempt has begun, all happenings
-/// of it. A stream ends after at most an hour, and when the server shuts down.
+/// of it. A stream ends after at most an hour, when the server shuts down, and when the token becomes invalid.
 #[utoipa::path(
     get, path = "/games/{id}/live", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(
@@ -38,12 +39,13 @@ use std::sync::Arc;
     )
 )]
 pub(crate) async fn watch_game(
-    viewer: Viewer,
+    OptionalCaller(caller): OptionalCaller,
     State(app): State<App>,
     PathParam(id): PathParam<GameId>,
     shutdown: Option<Extension<Shutdown>>,
     headers: HeaderMap,
 ) -> Result<impl IntoResponse, Problem> {
+    let viewer = caller.as_ref().map_or(Viewer::Visitor, Viewer::new);
     game::find_visible(&app, viewer, id).await?;
     let last_event_id = headers
         .get(LAST_EVENT_ID)
@@ -60,7 +62,8 @@ pub(crate) async fn watch_game(
         ));
     };
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
-    let reader = LiveReader::new(app, id, last_event_id, shutdown, permit);
+    let token = caller.map(|caller| caller.token.id);
+    let reader = LiveReader::new(app, id, token, last_event_id, shutdown, permit);
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))

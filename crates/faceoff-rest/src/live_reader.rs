@@ -1,6 +1,7 @@
 //! A reader of a live game's stream, which is one connection of a client. It decides which events the client gets next, and
 //! when. A game that is run again has a new *attempt*; *live data* is what the running attempt reports to this process.
 
+use crate::sse::is_token_valid;
 use axum::response::sse::Event;
 use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
 use faceoff_live::{LiveCursor, LiveSubscription, LiveUpdate};
@@ -10,7 +11,7 @@ use faceoff_service::{
     shutdown::Shutdown,
 };
 use faceoff_store::{GameState, StoreError};
-use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame};
+use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame, TokenId};
 use serde::Serialize;
 use std::time::Duration;
 use tokio::{
@@ -22,6 +23,8 @@ use tokio::{
 const BATCH_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two checks whether the game has started or was cancelled.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);
+/// Time between two checks of the request's token.
+const TOKEN_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 /// Longest connection; a client that reconnects loses no event.
 const MAX_DURATION: Duration = Duration::from_secs(3600);
 
@@ -29,6 +32,10 @@ const MAX_DURATION: Duration = Duration::from_secs(3600);
 pub(crate) struct LiveReader {
     app: App,
     game: GameId,
+    /// The token of the request; the stream ends when it becomes invalid.
+    token: Option<TokenId>,
+    /// Time of the next check of the token.
+    next_token_check_at: Instant,
     /// The game's live data; `None` while there is none.
     subscription: Option<LiveSubscription>,
     /// The attempt and number of the last game event that the client has.
@@ -60,6 +67,7 @@ impl LiveReader {
     pub(crate) fn new(
         app: App,
         game: GameId,
+        token: Option<TokenId>,
         cursor: Option<LiveCursor>,
         shutdown: Option<Shutdown>,
         permit: OwnedSemaphorePermit,
@@ -68,6 +76,8 @@ impl LiveReader {
         Self {
             app,
             game,
+            token,
+            next_token_check_at: now,
             subscription: None,
             cursor,
             sent_attempt: None,
@@ -95,7 +105,7 @@ impl LiveReader {
         };
         self.next_batch_at = Instant::now() + BATCH_INTERVAL;
         match batch {
-            Ok(events) => Some(events),
+            Ok(events) => events,
             Err(problem) => {
                 // The response has begun, so an error can only end it; the cause is logged.
                 tracing::debug!(game = %self.game, detail = problem.detail(), "a game's stream ends");
@@ -104,9 +114,17 @@ impl LiveReader {
         }
     }
 
-    async fn next_batch(&mut self) -> Result<Vec<Event>, Problem> {
+    /// The next events; `None` once the token is invalid.
+    async fn next_batch(&mut self) -> Result<Option<Vec<Event>>, Problem> {
         sleep_until(self.next_batch_at).await;
         loop {
+            let now = Instant::now();
+            if now >= self.next_token_check_at {
+                if !is_token_valid(&self.app, self.token).await? {
+                    return Ok(None);
+                }
+                self.next_token_check_at = now + TOKEN_CHECK_INTERVAL;
+            }
             if self.subscription.is_none() {
                 self.subscription = self.app.live.games.subscribe(self.game);
             }
@@ -122,7 +140,7 @@ impl LiveReader {
                 None => (self.events_without_live_data().await?, false),
             };
             if !events.is_empty() {
-                return Ok(events);
+                return Ok(Some(events));
             }
             self.wait(is_live).await;
         }

@@ -8,8 +8,14 @@ use axum::{
 };
 use faceoff_api::{requests::SignInRequest, views::user::UserView};
 use faceoff_service::{
-    app::App, auth::Caller, extract::Json as Body, problem::Problem, services::sessions::sign_in,
-    session, views::user,
+    app::App,
+    auth::Caller,
+    extract::Json as Body,
+    network::ClientNetwork,
+    problem::Problem,
+    services::sessions::{self, sign_in},
+    session,
+    views::user,
 };
 
 /// Signs in with name and password. The response sets the session cookie for pages of this server.
@@ -24,6 +30,7 @@ use faceoff_service::{
 )]
 pub(crate) async fn create_session(
     State(app): State<App>,
+    ClientNetwork(client): ClientNetwork,
     headers: HeaderMap,
     Body(SignInRequest { name, password }): Body<SignInRequest>,
 ) -> Result<impl IntoResponse, Problem> {
@@ -31,7 +38,7 @@ pub(crate) async fn create_session(
     if headers.contains_key(header::ORIGIN) || headers.contains_key("sec-fetch-site") {
         session::check_same_origin(&headers)?;
     }
-    let (id, secret) = sign_in(&app, &name, password).await?;
+    let (id, secret) = sign_in(&app, &name, password, client).await?;
     let user = app.store.user(id).await?;
     let cookie = session::set_cookie(&app.config, Some(secret.as_str()))?;
     let cookie = AppendHeaders([(header::SET_COOKIE, cookie)]);
@@ -47,9 +54,7 @@ pub(crate) async fn end_session(
     caller: Caller,
     State(app): State<App>,
 ) -> Result<impl IntoResponse, Problem> {
-    let now = app.config.clock.now();
-    let actor = caller.actor();
-    app.store.revoke_token(actor, caller.token.id, now).await?;
+    sessions::end(&app, &caller).await?;
     let cookie = session::set_cookie(&app.config, None)?;
     Ok((
         StatusCode::NO_CONTENT,

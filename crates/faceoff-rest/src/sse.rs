@@ -7,6 +7,9 @@ use axum::{
         sse::{Event, KeepAlive, Sse},
     },
 };
+use faceoff_service::{app::App, problem::Problem};
+use faceoff_store::StoreError;
+use faceoff_types::TokenId;
 use futures::{Stream, StreamExt as _, stream};
 use std::{convert::Infallible, time::Duration};
 
@@ -14,6 +17,18 @@ use std::{convert::Infallible, time::Duration};
 pub(super) const LAST_EVENT_ID: &str = "last-event-id";
 /// Time between two messages that keep a silent connection open. Proxies close connections that are silent for a minute.
 const KEEP_ALIVE_INTERVAL: Duration = Duration::from_secs(15);
+
+/// Whether the token of a stream's request is still valid; without one, the stream is a visitor's.
+pub(super) async fn is_token_valid(app: &App, token: Option<TokenId>) -> Result<bool, Problem> {
+    let Some(token) = token else {
+        return Ok(true);
+    };
+    match app.store.token(token).await {
+        Ok(token) => Ok(token.is_valid(app.config.clock.now())),
+        Err(StoreError::NotFound(_)) => Ok(false),
+        Err(error) => Err(error.into()),
+    }
+}
 
 /// A streaming response with the events of all batches. It ends when `batches` ends.
 pub(super) fn sse_response(

@@ -39,7 +39,13 @@ pub(crate) async fn create_team(
     let now = app.config.clock.now();
     let team = app
         .store
-        .create_team(organiser.actor(), &name, token.hash(), now)
+        .create_team(
+            organiser.actor(),
+            &name,
+            token.hash(),
+            organiser.maker(),
+            now,
+        )
         .await?;
     tracing::info!(team = %team.name, id = %team.id, "team created");
     let view = TeamWithToken {
@@ -78,7 +84,7 @@ pub(crate) async fn replace_token(
     let token = Secret::generate(SecretKind::Team).map_err(Problem::internal)?;
     let now = app.config.clock.now();
     app.store
-        .set_team_token(organiser.actor(), id, token.hash(), now)
+        .set_team_token(organiser.actor(), id, token.hash(), organiser.maker(), now)
         .await?;
     tracing::info!(team = %team.name, id = %team.id, "team token replaced");
     Ok(Json(TeamWithToken {

@@ -5,6 +5,7 @@ use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
     requests,
     views::{
+        credentials::RevokedTokenView,
         token::{NewTokenView, TokenView},
         user::CallerView,
     },
@@ -82,16 +83,16 @@ pub(crate) async fn rotate_token(
     tokens::rotate_token(&app, &caller, id).await.map(Json)
 }
 
-/// Revokes a token, or ends a session.
+/// Revokes a token, or ends a session. If it is another user's, a team's or the host's, all that was made with it ends, too.
 #[utoipa::path(
     delete, path = "/tokens/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TokenId, Path)),
-    responses((status = 200, body = TokenView), (status = 404))
+    responses((status = 200, body = RevokedTokenView), (status = 404))
 )]
 pub(crate) async fn revoke_token(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<TokenId>,
-) -> Result<Json<TokenView>, Problem> {
+) -> Result<Json<RevokedTokenView>, Problem> {
     tokens::revoke_token(&app, &caller, id).await.map(Json)
 }

@@ -4,16 +4,18 @@ use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State};
 use faceoff_api::{
     requests::{Confirmation, NewPassword},
-    views::user::UserView,
+    views::{credentials::ChangedAccessView, user::UserView},
 };
 use faceoff_service::{
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
+    network::ClientNetwork,
     problem::{Problem, ProblemKind},
     services::users,
-    views::user,
+    views::{credentials, user},
 };
+use faceoff_store::{EndedCredentials, User};
 use faceoff_types::UserId;
 
 /// Lists the users whom the caller may see: organisers all, a team its members.
@@ -32,12 +34,13 @@ pub(crate) async fn list_people(
     Ok(page.map(user::view))
 }
 
-/// Closes a user's account at once: all tokens and sessions are revoked. For organisers and the user.
+/// Closes a user's account at once: all tokens and sessions are revoked, and the team tokens, invitations and webhooks that the user has
+/// made end. For organisers and the user.
 #[utoipa::path(
     post, path = "/people/{id}/remove", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = UserId, Path)), request_body = Confirmation,
     responses(
-        (status = 200, body = UserView),
+        (status = 200, body = ChangedAccessView),
         (status = 403), (status = 404),
         (status = 409, description = "not confirmed with the user's name (nothing is done), the account is closed, or it is the last organiser's"),
     )
@@ -47,17 +50,25 @@ pub(crate) async fn remove_person(
     State(app): State<App>,
     PathParam(id): PathParam<UserId>,
     Body(Confirmation { confirm }): Body<Confirmation>,
-) -> Result<Json<UserView>, Problem> {
+) -> Result<Json<ChangedAccessView>, Problem> {
     let removed = users::remove_user(&app, &caller, id, confirm.as_deref()).await?;
-    Ok(Json(user::view(removed)))
+    Ok(changed_access(removed, &app))
 }
 
-/// Sets the caller's password. All other tokens and sessions of the user are revoked.
+fn changed_access((user, ended): (User, EndedCredentials), app: &App) -> Json<ChangedAccessView> {
+    Json(ChangedAccessView {
+        user: user::view(user),
+        ended: credentials::ended(ended, app.config.clock.now()),
+    })
+}
+
+/// Sets the caller's password. All other tokens and sessions of the user are revoked, and the team tokens, invitations and webhooks that
+/// the user has made end.
 #[utoipa::path(
     put, path = "/people/{id}/password", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = UserId, Path)), request_body = NewPassword,
     responses(
-        (status = 200, body = UserView),
+        (status = 200, body = ChangedAccessView),
         (status = 403, description = "another user's password, or the old password is wrong"),
         (status = 404), (status = 422), (status = 429, description = "too many wrong passwords"),
     )
@@ -65,9 +76,10 @@ pub(crate) async fn remove_person(
 pub(crate) async fn set_password(
     caller: Caller,
     State(app): State<App>,
+    ClientNetwork(client): ClientNetwork,
     PathParam(id): PathParam<UserId>,
     Body(request): Body<NewPassword>,
-) -> Result<Json<UserView>, Problem> {
+) -> Result<Json<ChangedAccessView>, Problem> {
     let user = users::find(&app, &caller, id).await?;
     if caller
         .user()
@@ -86,19 +98,22 @@ pub(crate) async fn set_password(
     let stored_hash = app.store.password_hash_of(user.name.as_str()).await?;
     if stored_hash.is_some() {
         let old_password = request.old.unwrap_or_default();
-        let verified_user = app.passwords.verify(stored_hash, old_password, now).await?;
-        if verified_user != Some(id) {
+        let name = user.name.as_str();
+        let verified = app
+            .passwords
+            .verify(name, stored_hash, old_password, client, now);
+        if verified.await? != Some(id) {
             return Err(Problem::new(
                 ProblemKind::Forbidden,
                 "old: expected the current password, got another one; nothing was changed",
             ));
         }
     }
-    let hash = app.passwords.hash(request.password).await?;
-    let user = app
+    let hash = app.passwords.hash(request.password, client).await?;
+    let changed = app
         .store
         .set_password(caller.actor(), id, &hash, caller.token.id, now)
         .await?;
     tracing::info!(user = %id, "password set");
-    Ok(Json(user::view(user)))
+    Ok(changed_access(changed, &app))
 }

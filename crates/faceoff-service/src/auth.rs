@@ -13,7 +13,8 @@ use axum::{
 };
 use faceoff_api::token::hash_token;
 use faceoff_store::{
-    Actor, Principal, StoreError, Team, Token, TokenKind, TokenRejection, User, VerifiedToken,
+    Actor, Maker, Principal, StoreError, Team, Token, TokenKind, TokenRejection, User,
+    VerifiedToken,
 };
 use faceoff_types::TeamId;
 use jiff::Timestamp;
@@ -34,6 +35,14 @@ impl Caller {
             Principal::Host => Actor::Organiser,
             Principal::Team(team) => Actor::Team(team.id),
             Principal::Organiser(user) | Principal::Member(user, _) => Actor::User(user.id),
+        }
+    }
+
+    /// The maker of what the caller makes.
+    pub fn maker(&self) -> Maker {
+        Maker {
+            user: self.user().map(|user| user.id),
+            token: Some(self.token.id),
         }
     }
 
@@ -96,6 +105,11 @@ impl Caller {
 pub struct Organiser(Caller);
 
 impl Organiser {
+    /// The maker of what the caller makes.
+    pub fn maker(&self) -> Maker {
+        self.0.maker()
+    }
+
     /// # Errors
     /// `Forbidden`.
     pub fn new(caller: Caller) -> Result<Self, Problem> {

@@ -1,11 +1,12 @@
 //! Passwords: hashed by Argon2id, with a delay after wrong ones.
 //!
-//! A hash takes memory and tens of milliseconds, so only few are computed at a time. After several wrong passwords for
-//! a user each further attempt has to wait longer. The delay also affects the user, whose tokens, sessions and links keep
-//! working meanwhile.
+//! A hash takes memory and tens of milliseconds, so only few are computed at a time, in the order of the requests, and each client has
+//! few places in the queue. After several wrong passwords for a name each further attempt has to wait longer, whether or not there is a
+//! user of that name. The delay also affects the user, whose tokens, sessions and links keep working meanwhile.
 
 use crate::{
     boxed,
+    network::Network,
     problem::{Problem, ProblemKind},
 };
 use argon2::{
@@ -27,30 +28,65 @@ const MAX_BYTES: usize = 1024;
 /// Hashes that are computed in parallel; each takes 19 MiB.
 const MAX_PARALLEL: usize = 2;
 /// Requests that may wait for a hash at the same time; further ones are refused.
-const MAX_WAITING: usize = 16;
-/// Number of wrong passwords for a user that cause no delay.
+const MAX_WAITING: usize = 64;
+/// Requests of one client among them. Clients whose address is unknown, behind a proxy that does not name it, count as one.
+const MAX_WAITING_PER_CLIENT: usize = 2;
+const MAX_WAITING_UNKNOWN: usize = 16;
+/// Number of wrong passwords for a name that cause no delay.
 const FREE_ATTEMPTS: u32 = 5;
 /// Delay after the first wrong password beyond these; doubles with each further one.
 const FIRST_WAIT: SignedDuration = SignedDuration::from_secs(2);
 /// The delay does not grow beyond this.
 const LONGEST_WAIT: SignedDuration = SignedDuration::from_mins(5);
+/// Names whose wrong passwords are remembered. Beyond, those with the fewest are forgotten.
+const MAX_NAMES: usize = 10_000;
+/// Wrong passwords are forgotten this long after the last one.
+const REMEMBERED_FOR: SignedDuration = SignedDuration::from_hours(1);
 
-/// Limits concurrent hashing, and counts wrong passwords by user.
+/// Limits concurrent hashing, and counts wrong passwords by name.
 #[derive(Debug)]
 pub struct Passwords {
     /// One permit per hash that is being computed.
     hashing: Semaphore,
-    /// One permit per request that waits for a hash or computes one.
-    waiting: Semaphore,
-    failures: Mutex<HashMap<UserId, Failures>>,
+    /// Number of requests that wait for a hash or compute one, by client.
+    places: Mutex<HashMap<Option<Network>, usize>>,
+    failures: Mutex<HashMap<NameKey, Failures>>,
 }
 
-/// Wrong passwords since the last correct one.
+/// A hash of a name to sign in with, which is unique regardless of case. Names can be as long as a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct NameKey([u8; 32]);
+
+impl NameKey {
+    fn new(name: &str) -> Self {
+        Self(*blake3::hash(name.trim().to_ascii_lowercase().as_bytes()).as_bytes())
+    }
+}
+
+/// Attempts since the last correct password, the running ones included.
 #[derive(Debug, Clone, Copy)]
 struct Failures {
     count: u32,
-    /// When the newest one was entered.
+    /// When the newest one began.
     last_at: Timestamp,
+    /// The user of this name, if there is one.
+    user: Option<UserId>,
+}
+
+/// Wrong passwords in the last hour.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WrongPasswords {
+    /// For each user, the most first.
+    pub by_user: Vec<(UserId, u32)>,
+    /// For names that no user has, together.
+    pub unknown_names: u32,
+}
+
+impl WrongPasswords {
+    pub fn total(&self) -> u32 {
+        let of_users: u32 = self.by_user.iter().map(|(_, count)| count).sum();
+        of_users.saturating_add(self.unknown_names)
+    }
 }
 
 impl Failures {
@@ -69,10 +105,32 @@ impl Default for Passwords {
     fn default() -> Self {
         Self {
             hashing: Semaphore::new(MAX_PARALLEL),
-            waiting: Semaphore::new(MAX_WAITING),
-            failures: Mutex::new(HashMap::new()),
+            places: Mutex::default(),
+            failures: Mutex::default(),
         }
     }
+}
+
+/// A place in the queue for hashes, until it is dropped.
+struct Place<'a> {
+    places: &'a Mutex<HashMap<Option<Network>, usize>>,
+    client: Option<Network>,
+}
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        let mut places = lock(self.places);
+        if let Some(count) = places.get_mut(&self.client) {
+            *count -= 1;
+            if *count == 0 {
+                places.remove(&self.client);
+            }
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Refuses a password that is too short, or too long to hash.
@@ -88,17 +146,38 @@ pub fn check(password: &str) -> Result<(), Problem> {
 }
 
 impl Passwords {
-    /// Runs `compute_hash` on a blocking thread, [`MAX_PARALLEL`] at a time.
-    async fn run_hashing<T: Send + 'static>(
-        &self,
-        compute_hash: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T, Problem> {
-        let Ok(_waiting) = self.waiting.try_acquire() else {
+    /// A place in the queue for hashes.
+    fn take_place(&self, client: Option<Network>) -> Result<Place<'_>, Problem> {
+        let max = match client {
+            Some(_) => MAX_WAITING_PER_CLIENT,
+            None => MAX_WAITING_UNKNOWN,
+        };
+        let mut places = lock(&self.places);
+        let all: usize = places.values().sum();
+        let own = places.entry(client).or_default();
+        if *own >= max || all >= MAX_WAITING {
+            if *own == 0 {
+                places.remove(&client);
+            }
             return Err(Problem::new(
                 ProblemKind::Busy,
                 "too many sign-ins at the moment; try again in 2 s",
             ));
-        };
+        }
+        *own += 1;
+        Ok(Place {
+            places: &self.places,
+            client,
+        })
+    }
+
+    /// Runs `compute_hash` on a blocking thread, [`MAX_PARALLEL`] at a time.
+    async fn run_hashing<T: Send + 'static>(
+        &self,
+        _place: Place<'_>,
+        compute_hash: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Problem> {
+        // Permits are given in the order of the requests.
         let _permit = self.hashing.acquire().await.map_err(Problem::internal)?;
         tokio::task::spawn_blocking(compute_hash)
             .await
@@ -107,29 +186,33 @@ impl Passwords {
 
     /// Hashes a new password. The result is a PHC string: algorithm, parameters, salt and hash in one text.
     #[boxed]
-    pub async fn hash(&self, password: String) -> Result<String, Problem> {
+    pub async fn hash(&self, password: String, client: Option<Network>) -> Result<String, Problem> {
         check(&password)?;
-        let hashed = self.run_hashing(move || {
+        let place = self.take_place(client)?;
+        let hashed = self.run_hashing(place, move || {
             let hash = Argon2::default().hash_password(password.as_bytes());
             hash.map(|hash| hash.to_string())
         });
         hashed.await?.map_err(Problem::internal)
     }
 
-    /// Verifies a password; returns the user if it is correct. `account` is the user with the stored hash (PHC string), or
-    /// `None` if there is no user of that name; this takes the same time, so an attacker cannot find out names.
+    /// Verifies a password for a name; returns the user if it is correct. `account` is the user of that name with the stored hash (PHC
+    /// string), or `None`; then all takes the same time and has the same answers, so an attacker cannot find out names.
     #[boxed]
     pub async fn verify(
         &self,
+        name: &str,
         account: Option<(UserId, String)>,
         password: String,
+        client: Option<Network>,
         now: Timestamp,
     ) -> Result<Option<UserId>, Problem> {
-        if let Some((id, _)) = &account {
-            self.check_wait(*id, now)?;
-        }
         let (id, hash) = account.unzip();
-        let matches = self.run_hashing(move || match hash {
+        let name = NameKey::new(name);
+        let place = self.take_place(client)?;
+        // Counted before the hash is computed, since many attempts may run at once.
+        self.count_attempt(name, id, now)?;
+        let matches = self.run_hashing(place, move || match hash {
             Some(hash) => PasswordHash::new(&hash).is_ok_and(|hash| {
                 Argon2::default()
                     .verify_password(password.as_bytes(), &hash)
@@ -141,44 +224,73 @@ impl Passwords {
                 false
             }
         });
-        let matches = matches.await?;
-        let Some(id) = id else { return Ok(None) };
-        let mut failures = self.failures();
-        if matches {
-            failures.remove(&id);
-            return Ok(Some(id));
+        if !matches.await? {
+            return Ok(None);
         }
-        let count = failures.get(&id).map_or(0, |failures| failures.count) + 1;
+        lock(&self.failures).remove(&name);
+        Ok(id)
+    }
+
+    /// Counts an attempt as failed, which it is until its password turns out to be correct.
+    fn count_attempt(
+        &self,
+        name: NameKey,
+        user: Option<UserId>,
+        now: Timestamp,
+    ) -> Result<(), Problem> {
+        let mut failures = lock(&self.failures);
+        failures.retain(|_, failures| now.duration_since(failures.last_at) < REMEMBERED_FOR);
+        let earlier = failures.get(&name).copied();
+        let until = earlier.map(Failures::wait_until);
+        if let Some(until) = until.filter(|until| *until > now) {
+            let seconds = until.duration_since(now).as_secs().unsigned_abs() + 1;
+            let problem = Problem::new(
+                ProblemKind::TooManySignIns,
+                format!(
+                    "too many wrong passwords for this name; try again in {seconds} s, or ask an organiser for a link"
+                ),
+            );
+            return Err(problem.retry_after(seconds));
+        }
+        if earlier.is_none() && failures.len() >= MAX_NAMES {
+            let fewest = failures
+                .iter()
+                .min_by_key(|(_, failures)| (failures.count, failures.last_at));
+            if let Some(fewest) = fewest.map(|(name, _)| *name) {
+                failures.remove(&fewest);
+            }
+        }
+        let count = earlier.map_or(0, |earlier| earlier.count).saturating_add(1);
+        let last_at = now;
         failures.insert(
-            id,
+            name,
             Failures {
                 count,
-                last_at: now,
+                last_at,
+                user,
             },
         );
-        Ok(None)
+        Ok(())
     }
 
-    fn check_wait(&self, id: UserId, now: Timestamp) -> Result<(), Problem> {
-        let until = self
-            .failures()
-            .get(&id)
-            .map(|failures| failures.wait_until());
-        let Some(until) = until.filter(|until| *until > now) else {
-            return Ok(());
-        };
-        let seconds = until.duration_since(now).as_secs().unsigned_abs() + 1;
-        let problem = Problem::new(
-            ProblemKind::TooManySignIns,
-            format!(
-                "too many wrong passwords for this name; try again in {seconds} s, or ask an organiser for a link"
-            ),
-        );
-        Err(problem.retry_after(seconds))
-    }
-
-    fn failures(&self) -> MutexGuard<'_, HashMap<UserId, Failures>> {
-        self.failures.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The wrong passwords that are remembered at `now`, for organisers.
+    pub fn wrong_passwords(&self, now: Timestamp) -> WrongPasswords {
+        let mut found = WrongPasswords::default();
+        for failures in lock(&self.failures).values() {
+            if now.duration_since(failures.last_at) >= REMEMBERED_FOR {
+                continue;
+            }
+            match failures.user {
+                Some(user) => found.by_user.push((user, failures.count)),
+                None => {
+                    found.unknown_names = found.unknown_names.saturating_add(failures.count);
+                }
+            }
+        }
+        found
+            .by_user
+            .sort_by_key(|(user, count)| (std::cmp::Reverse(*count), *user));
+        found
     }
 }
 
@@ -186,19 +298,31 @@ impl Passwords {
 mod tests {
     use super::*;
 
+    const NAME: &str = "Ada";
+
+    fn now() -> Timestamp {
+        "2026-03-01T10:00:00Z".parse().unwrap()
+    }
+
+    fn client(last: u8) -> Option<Network> {
+        Some(Network::from_address([192, 0, 2, last].into()))
+    }
+
     #[tokio::test]
     async fn wrong_passwords_delay_further_attempts() {
         let passwords = Passwords::default();
-        let mut now: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
+        let mut now = now();
         let hash = passwords
-            .hash("correct horse battery".into())
+            .hash("correct horse battery".into(), None)
             .await
             .unwrap();
         assert!(hash.starts_with("$argon2id$"), "{hash}");
         let id = UserId::new();
         let account = || Some((id, hash.clone()));
-        let verify =
-            async |password: &str, now| passwords.verify(account(), password.into(), now).await;
+        let verify = async |password: &str, now| {
+            let password = password.to_owned();
+            passwords.verify(NAME, account(), password, None, now).await
+        };
         assert_eq!(
             verify("correct horse battery", now).await.unwrap(),
             Some(id)
@@ -206,6 +330,7 @@ mod tests {
         for _ in 0..FREE_ATTEMPTS {
             assert_eq!(verify("wrong", now).await.unwrap(), None);
         }
+        assert_eq!(passwords.wrong_passwords(now).by_user, [(id, 5)]);
         let refused = verify("correct horse battery", now).await.unwrap_err();
         assert_eq!(refused.kind(), ProblemKind::TooManySignIns);
         now += FIRST_WAIT;
@@ -222,17 +347,100 @@ mod tests {
             None,
             "the count restarts"
         );
-        let unknown = passwords.verify(None, "wrong".into(), now).await;
-        assert_eq!(unknown.unwrap(), None);
+        now += REMEMBERED_FOR;
+        assert_eq!(passwords.wrong_passwords(now), WrongPasswords::default());
+    }
+
+    #[tokio::test]
+    async fn unknown_name_has_the_same_answers() {
+        let passwords = Passwords::default();
+        let account = || Some((UserId::new(), "$argon2id$".to_owned()));
+        let mut answers = Vec::new();
+        for (name, account) in [("Ada", account()), ("Eve", None)] {
+            for attempt in 0..2 * FREE_ATTEMPTS {
+                // Names are equal regardless of case.
+                let name = if attempt % 2 == 0 {
+                    name
+                } else {
+                    &name.to_uppercase()
+                };
+                let verified = passwords
+                    .verify(name, account.clone(), "wrong".into(), None, now())
+                    .await;
+                answers.push(verified.map_err(|problem| problem.detail().to_owned()));
+            }
+        }
+        let (known, unknown) = answers.split_at(2 * FREE_ATTEMPTS as usize);
+        assert_eq!(known, unknown);
+        assert!(known[5].is_err(), "{known:?}");
+        let wrong = passwords.wrong_passwords(now());
+        assert_eq!((wrong.unknown_names, wrong.total()), (5, 10));
+    }
+
+    #[tokio::test]
+    async fn parallel_attempts_are_counted_before_they_are_checked() {
+        let passwords = Passwords::default();
+        let attempts = (0..40)
+            .map(|number| passwords.verify(NAME, None, "wrong".into(), client(number), now()));
+        let answers = futures::future::join_all(attempts).await;
+        let checked = answers.iter().filter(|answer| answer.is_ok()).count();
+        assert_eq!(checked, FREE_ATTEMPTS as usize);
+    }
+
+    #[tokio::test]
+    async fn client_has_few_places_and_leaves_others_theirs() {
+        let passwords = Passwords::default();
+        let places: Vec<_> = (0..2)
+            .map(|_| {
+                passwords
+                    .take_place(client(1))
+                    .unwrap_or_else(|_| panic!("a place"))
+            })
+            .collect();
+        for _ in 0..100 {
+            let refused = passwords.verify(NAME, None, "wrong".into(), client(1), now());
+            assert_eq!(refused.await.unwrap_err().kind(), ProblemKind::Busy);
+        }
+        // Requests without a place are not counted as attempts.
+        assert_eq!(passwords.wrong_passwords(now()).total(), 0);
+        assert!(
+            passwords
+                .hash("a long password".into(), client(2))
+                .await
+                .is_ok()
+        );
+        drop(places);
+        assert!(
+            passwords
+                .hash("a long password".into(), client(1))
+                .await
+                .is_ok()
+        );
+        assert!(lock(&passwords.places).is_empty());
+    }
+
+    #[test]
+    fn names_with_the_fewest_wrong_passwords_are_forgotten() {
+        let passwords = Passwords::default();
+        let count = |name: &str| passwords.count_attempt(NameKey::new(name), None, now());
+        for _ in 0..FREE_ATTEMPTS {
+            count(NAME).unwrap_or_else(|_| panic!("a free attempt"));
+        }
+        for number in 0..MAX_NAMES + 10 {
+            count(&number.to_string()).unwrap_or_else(|_| panic!("a free attempt"));
+        }
+        assert_eq!(lock(&passwords.failures).len(), MAX_NAMES);
+        assert!(count(NAME).is_err(), "it is remembered");
     }
 
     #[test]
     fn delay_is_bounded() {
-        let now = "2026-03-01T10:00:00Z".parse().unwrap();
+        let now = now();
         for count in [FREE_ATTEMPTS + 10, FREE_ATTEMPTS + 40, u32::MAX] {
             let failures = Failures {
                 count,
                 last_at: now,
+                user: None,
             };
             assert_eq!(failures.wait_until(), now + LONGEST_WAIT, "{count}");
         }

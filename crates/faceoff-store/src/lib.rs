@@ -55,6 +55,7 @@ pub use operations::{
     claim::MAX_LEASES,
     cleanup::{RECORDINGS_KEPT_FOR, UNCHECKED_KEPT_FOR},
     commit::CommitOutcome,
+    ended_credentials::EndedCredentials,
     invitations::{CodeStatus, JoinOutcome, JoinRequest, MAX_OPEN_INVITATIONS, NewInvitation},
     jobs::{ClaimedJob, Job, RunSeeds},
     lease_release::MAX_ATTEMPTS,
@@ -69,8 +70,8 @@ pub use operations::{
     submission_description::SubmissionDescription,
     teams::TeamChange,
     tokens::{
-        LAST_USE_INTERVAL, MAX_TOKENS, NewToken, Principal, SESSION_LIFETIME, TokenRejection,
-        VerifiedToken,
+        LAST_USE_INTERVAL, MAX_TOKENS, NewToken, Principal, RevokedToken, SESSION_LIFETIME,
+        TokenRejection, VerifiedToken,
     },
     tournament::{
         entrants::DepartureRequest,
@@ -131,7 +132,7 @@ pub use tables::{
     submissions::{Deletion, Submission, SubmissionState},
     teams::{Team, TeamProfile},
     terms::Terms,
-    tokens::{Token, TokenKind, TokenOwner},
+    tokens::{Maker, Token, TokenKind, TokenOwner},
     tournaments::Tournament,
     users::User,
     webhooks::{DisabledWebhook, Webhook, WebhookSecrets},

@@ -1,6 +1,6 @@
 //! Teams, their submissions, and the outcome of validation runs.
 
-use faceoff_store::{Actor, ClaimedJob, Job, Store, Submission, Team, UploadQuota};
+use faceoff_store::{Actor, ClaimedJob, Job, Maker, Store, Submission, Team, UploadQuota};
 use faceoff_types::{BundleRef, TeamId, ValidationOutcome};
 use jiff::Timestamp;
 
@@ -11,7 +11,13 @@ const LEASE_S: u32 = 60;
 pub async fn create_team(store: &Store, name: &str, now: Timestamp) -> Team {
     let token_hash = *blake3::hash(name.as_bytes()).as_bytes();
     store
-        .create_team(Actor::Organiser, &name.parse().unwrap(), token_hash, now)
+        .create_team(
+            Actor::Organiser,
+            &name.parse().unwrap(),
+            token_hash,
+            Maker::default(),
+            now,
+        )
         .await
         .unwrap()
 }

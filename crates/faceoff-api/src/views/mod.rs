@@ -11,6 +11,7 @@ pub mod capacity;
 pub mod champion_shares;
 pub mod clips;
 pub mod comparison;
+pub mod credentials;
 pub mod day;
 pub mod evaluation;
 mod evaluation_status;

@@ -21,6 +21,8 @@ pub struct TokenView {
     /// The user that it acts for, if it is a user's token. Without `team` and `person` it is the host's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub person: Option<UserId>,
+    /// The user who made it or rotated it last; null: the host, or the server.
+    pub made_by: Option<UserId>,
     /// When it was created.
     pub created_at: Timestamp,
     /// When it expires; null: never.

@@ -40,14 +40,3 @@ pub struct CallerView {
     /// The token or session of the request.
     pub token: TokenView,
 }
-
-/// A new user with a new token, which is shown only once.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct NewAccountView {
-    /// The user, as a caller.
-    #[serde(flatten)]
-    pub caller: CallerView,
-    /// The bearer token; the server stores only its hash.
-    #[schema(example = "fo_person_…")]
-    pub secret: String,
-}

@@ -19,6 +19,7 @@ mod clips;
 mod comparisons;
 mod confirmations;
 mod counting_evaluations;
+mod credentials;
 mod days;
 mod decisions;
 mod deprecated_names;

@@ -58,6 +58,10 @@ struct StageSummary {
 
 /// A team is listed if it uses at least this share of its upload quota, in percent.
 const NEARLY_FULL_PERCENT: u64 = 90;
+/// From so many wrong passwords on, organisers see them.
+const MANY_WRONG_PASSWORDS: u32 = 20;
+/// Users who are named with their number of wrong passwords.
+const MAX_LISTED_NAMES: usize = 5;
 
 async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem> {
     let mut items = Vec::new();
@@ -111,6 +115,7 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
     }
+    items.extend(wrong_passwords(app).await?);
     for team in storage::all(app).await? {
         if team.bundle_bytes.saturating_mul(100)
             >= team.quota_bytes.saturating_mul(NEARLY_FULL_PERCENT)
@@ -128,6 +133,38 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
         }
     }
     Ok((items, queue))
+}
+
+/// Many wrong passwords, which somebody may be guessing.
+async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
+    let wrong = app.passwords.wrong_passwords(app.config.clock.now());
+    if wrong.total() < MANY_WRONG_PASSWORDS {
+        return Ok(None);
+    }
+    let mut names = Vec::new();
+    for (user, count) in wrong.by_user.iter().take(MAX_LISTED_NAMES) {
+        names.push(format!("{count} for {}", app.store.user(*user).await?.name));
+    }
+    if wrong.by_user.len() > MAX_LISTED_NAMES {
+        names.push("others for further users".to_owned());
+    }
+    if wrong.unknown_names > 0 {
+        names.push(format!(
+            "{} for names that no user has",
+            wrong.unknown_names
+        ));
+    }
+    Ok(Some(Item {
+        class: "waiting",
+        title: "Somebody may be guessing passwords".to_owned(),
+        detail: format!(
+            "{} wrong ones since the last right one of each name, within about an hour: {}. Sign-ins with these names are delayed; tokens, \
+             sessions and new links work.",
+            wrong.total(),
+            names.join(", ")
+        ),
+        links: vec![("/organiser/access".into(), "Accounts".into())],
+    }))
 }
 
 async fn request_items(app: &App) -> Result<Vec<Item>, Problem> {

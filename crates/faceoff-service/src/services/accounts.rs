@@ -1,9 +1,9 @@
 //! Creation of a user's account: the user accepts an invitation by its code, and founds or joins a team, or becomes an
 //! organiser.
 
-use crate::{app::AppState, boxed, problem::Problem, text};
+use crate::{app::AppState, boxed, network::Network, problem::Problem, text};
 use faceoff_api::{
-    requests::{self, FoundedTeam},
+    requests::{self, FoundedTeam, InvitedRole},
     token::{Secret, SecretKind, hash_token},
 };
 use faceoff_store::{JoinOutcome, JoinRequest, TeamProfile, TokenKind};
@@ -12,13 +12,18 @@ use jiff::{SignedDuration, Timestamp};
 
 /// Default validity of an invitation.
 const DEFAULT_VALIDITY: SignedDuration = SignedDuration::from_hours(7 * 24);
+/// Validity of a link with which a user gets access again, by default and at most.
+pub(crate) const RETURN_VALIDITY: SignedDuration = SignedDuration::from_hours(24);
 /// Longest affiliation of a team.
 const MAX_AFFILIATION_CHARS: usize = 120;
 
 /// When an invitation that is created now expires by default.
-pub(crate) fn default_expiry(now: Timestamp) -> Timestamp {
-    now.saturating_add(DEFAULT_VALIDITY)
-        .unwrap_or(Timestamp::MAX)
+pub(crate) fn default_expiry(role: InvitedRole, now: Timestamp) -> Timestamp {
+    let validity = match role {
+        InvitedRole::Return => RETURN_VALIDITY,
+        InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => DEFAULT_VALIDITY,
+    };
+    now.saturating_add(validity).unwrap_or(Timestamp::MAX)
 }
 
 /// The page of an invitation code: a URL, or a path if the server's public URL is not configured.
@@ -52,6 +57,7 @@ pub async fn join(
     request: requests::JoinRequest,
     token_kind: TokenKind,
     expires_at: Option<Timestamp>,
+    client: Option<Network>,
 ) -> Result<(JoinOutcome, Secret), Problem> {
     let now = app.config.clock.now();
     let code_hash = hash_token(request.code.trim());
@@ -59,7 +65,7 @@ pub async fn join(
     app.store.code_status(code_hash, now).await?;
     let team = request.team.map(checked_profile).transpose()?;
     let password = match request.password {
-        Some(password) => Some(app.passwords.hash(password).await?),
+        Some(password) => Some(app.passwords.hash(password, client).await?),
         None => None,
     };
     let (secret_kind, token_name) = match token_kind {

@@ -1,7 +1,7 @@
 //! Invitations: creating, listing and revoking them. An *invitation* is a link with a secret code, by which a person gets an
 //! account as organiser, as member or founder of a team, or a new password.
 
-use super::accounts::{default_expiry, join_link};
+use super::accounts::{RETURN_VALIDITY, default_expiry, join_link};
 use crate::{
     app::AppState,
     auth::Caller,
@@ -94,11 +94,17 @@ pub async fn create_invitation(
     let role = invitation_role(caller, &new)?;
     let note = text::single_line("note", &new.note, MAX_NOTE_CHARS)?;
     let now = app.config.clock.now();
-    let expires_at = new.expires_at.unwrap_or_else(|| default_expiry(now));
-    if now.duration_until(expires_at) > MAX_VALIDITY {
+    let expires_at = new
+        .expires_at
+        .unwrap_or_else(|| default_expiry(new.role, now));
+    let max_validity = match new.role {
+        InvitedRole::Return => RETURN_VALIDITY,
+        InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => MAX_VALIDITY,
+    };
+    if now.duration_until(expires_at) > max_validity {
         let detail = format!(
-            "expected a time within {} days, got {expires_at}",
-            MAX_VALIDITY.as_hours() / 24
+            "expected a time within {} hours, got {expires_at}",
+            max_validity.as_hours()
         );
         return Err(Problem::invalid("expires_at", detail));
     }
@@ -107,6 +113,7 @@ pub async fn create_invitation(
         code_hash: secret.hash(),
         role,
         note,
+        maker: caller.maker(),
         expires_at,
     };
     let invitation = app.store.invite(caller.actor(), new, now).await?;

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{app::AppState, boxed, problem::Problem, text, views::invitation};
 use faceoff_api::{
-    requests::RegistrationRequest,
+    requests::{InvitedRole, RegistrationRequest},
     token::{Secret, SecretKind},
     views::invitation::NewRegistrationView,
 };
@@ -52,7 +52,7 @@ pub async fn approve_registration(
     let now = app.config.clock.now();
     let (registration, team) = app
         .store
-        .approve_registration(actor, id, default_expiry(now), now)
+        .approve_registration(actor, id, default_expiry(InvitedRole::Member, now), now)
         .await?;
     tracing::info!(registration = %id, team = %team.name, "registration approved");
     Ok(registration)

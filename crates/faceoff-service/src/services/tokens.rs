@@ -7,12 +7,12 @@ use crate::{
     boxed,
     problem::{Problem, ProblemKind},
     text,
-    views::token,
+    views::{credentials, token},
 };
 use faceoff_api::{
     requests,
     token::{Secret, SecretKind},
-    views::token::{NewTokenView, TokenView},
+    views::{credentials::RevokedTokenView, token::NewTokenView},
 };
 use faceoff_store::{NewToken, Principal, StoreError, Token, TokenKind, TokenOwner};
 use faceoff_types::{TeamId, TokenId};
@@ -20,15 +20,15 @@ use faceoff_types::{TeamId, TokenId};
 /// Longest name of a token.
 const MAX_NAME_CHARS: usize = 80;
 
-/// Whether the caller may see and revoke a token: organisers all, a member their own and the team's, a team's API client
-/// the team's.
+/// Whether the caller may see and revoke a token: organisers all, a member their own and the team's, a team's API client only the one
+/// that it has sent. A leaked token must not end others, or get the secret of one that lasts longer.
 fn may_manage(caller: &Caller, token: &Token) -> bool {
     match (&caller.principal, token.owner) {
         (Principal::Host | Principal::Organiser(_), _) => true,
-        (Principal::Team(team), TokenOwner::Team(id)) => team.id == id,
+        (Principal::Team(_), _) => caller.token.id == token.id,
         (Principal::Member(_, team), TokenOwner::Team(id)) => team.id == id,
         (Principal::Member(user, _), TokenOwner::User(id)) => user.id == id,
-        (Principal::Team(_) | Principal::Member(..), _) => false,
+        (Principal::Member(..), _) => false,
     }
 }
 
@@ -92,6 +92,7 @@ pub async fn create_token(
         kind: TokenKind::ApiToken,
         owner,
         name,
+        maker: caller.maker(),
         expires_at: new.expires_at,
     };
     let now = app.config.clock.now();
@@ -120,6 +121,13 @@ pub async fn rotate_token(
             "a user's token can be rotated only by that user; you can revoke it (DELETE /api/v1/tokens/ID)",
         ));
     }
+    // A user could act as the host after the end of the own account.
+    if token.owner == TokenOwner::Host && caller.principal != Principal::Host {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "the host's tokens can be rotated only with a token of the host; you can revoke it (DELETE /api/v1/tokens/ID)",
+        ));
+    }
     let kind = match token.owner {
         TokenOwner::Host => SecretKind::Admin,
         TokenOwner::Team(_) => SecretKind::Team,
@@ -127,9 +135,14 @@ pub async fn rotate_token(
     };
     let secret = Secret::generate(kind).map_err(Problem::internal)?;
     let (actor, now) = (caller.actor(), app.config.clock.now());
+    // A team's API client renews its own token, which stays what its maker has made.
+    let maker = match caller.principal {
+        Principal::Team(_) => token.maker,
+        Principal::Host | Principal::Organiser(_) | Principal::Member(..) => caller.maker(),
+    };
     let token = app
         .store
-        .rotate_token(actor, id, secret.hash(), now)
+        .rotate_token(actor, id, secret.hash(), maker, now)
         .await?;
     tracing::info!(token = %id, actor = %caller.actor(), "token rotated");
     Ok(NewTokenView {
@@ -138,16 +151,30 @@ pub async fn rotate_token(
     })
 }
 
-/// Revokes a token: it is invalid from now on.
+/// Revokes a token: it is invalid from now on. If it is not the caller's own, it may have been stolen, and all that was made with it ends.
 #[boxed]
 pub async fn revoke_token(
     app: &AppState,
     caller: &Caller,
     id: TokenId,
-) -> Result<TokenView, Problem> {
-    find(app, caller, id).await?;
+) -> Result<RevokedTokenView, Problem> {
+    let token = find(app, caller, id).await?;
+    let is_own = match (&caller.principal, token.owner) {
+        (Principal::Host, TokenOwner::Host) | (Principal::Team(_), _) => true,
+        (Principal::Organiser(user) | Principal::Member(user, _), TokenOwner::User(id)) => {
+            user.id == id
+        }
+        _ => false,
+    };
     let now = app.config.clock.now();
-    let token = app.store.revoke_token(caller.actor(), id, now).await?;
+    let used_token = Some(caller.token.id);
+    let revoked = app
+        .store
+        .revoke_token(caller.actor(), id, !is_own, used_token, now)
+        .await?;
     tracing::info!(token = %id, actor = %caller.actor(), "token revoked");
-    Ok(token::view(token))
+    Ok(RevokedTokenView {
+        token: token::view(revoked.token),
+        ended: credentials::ended(revoked.ended, now),
+    })
 }

@@ -6,7 +6,7 @@ use crate::{
     boxed,
     problem::{Problem, ProblemKind},
 };
-use faceoff_store::{Principal, StoreError, User};
+use faceoff_store::{EndedCredentials, Principal, StoreError, User};
 use faceoff_types::UserId;
 
 /// The users whom the caller may see: organisers all, a team its members.
@@ -44,25 +44,25 @@ pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, P
     }
 }
 
-/// Closes a user's account, if that is confirmed with the user's name.
+/// Closes a user's account, if that is confirmed with the user's name. Returns what ended with it, too.
 #[boxed]
 pub async fn remove_user(
     app: &AppState,
     caller: &Caller,
     id: UserId,
     confirm: Option<&str>,
-) -> Result<User, Problem> {
+) -> Result<(User, EndedCredentials), Problem> {
     let user = find(app, caller, id).await?;
     let effect = format!(
-        "the account of {} would be closed at once and for good, and all of its tokens and sessions revoked; the name \
-         stays in the event log",
+        "the account of {} would be closed at once and for good, and all of its tokens and sessions revoked, and the team \
+         tokens, invitations and webhooks that this user has made would end; the name stays in the event log",
         user.name
     );
     Problem::check_confirmed(confirm, user.name.as_str(), &effect)?;
     let now = app.config.clock.now();
-    let user = app.store.remove_user(caller.actor(), id, now).await?;
+    let removed = app.store.remove_user(caller.actor(), id, now).await?;
     tracing::info!(user = %id, actor = %caller.actor(), "user removed");
-    Ok(user)
+    Ok(removed)
 }
 
 /// Accepts the terms for the calling user.

@@ -16,6 +16,7 @@ pub mod capacity;
 pub mod clip_file;
 pub mod clips;
 pub mod comparison;
+pub mod credentials;
 pub mod day;
 mod division;
 pub mod evaluation;

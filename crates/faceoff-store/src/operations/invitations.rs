@@ -5,7 +5,10 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::tokens::{NewToken, add_token, revoke_all},
+    operations::{
+        ended_credentials::{self, EndedCredentials, end_made_by},
+        tokens::{NewToken, add_token, revoke_all},
+    },
     store::Store,
     tables::{
         divisions,
@@ -14,7 +17,7 @@ use crate::{
         season,
         teams::{self, Team, TeamProfile},
         terms,
-        tokens::{Token, TokenKind, TokenOwner},
+        tokens::{Maker, Token, TokenKind, TokenOwner},
         users::{self, User},
     },
     write::Tx,
@@ -33,6 +36,7 @@ pub struct NewInvitation {
     /// Role of the user who accepts it.
     pub role: InvitationRole,
     pub note: String,
+    pub maker: Maker,
     pub expires_at: Timestamp,
 }
 
@@ -62,6 +66,8 @@ pub struct JoinOutcome {
     /// The user's team; `None` for an organiser.
     pub team: Option<Team>,
     pub token: Token,
+    /// What a user who gets access again had made before.
+    pub ended: EndedCredentials,
 }
 
 /// Status of the code in an invitation link or a registration link.
@@ -105,6 +111,7 @@ pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation
         id: InvitationId::new(),
         role: new.role,
         note: new.note,
+        maker: new.maker,
         created_at: now,
         expires_at: new.expires_at,
         state: InvitationState::Open,
@@ -186,8 +193,12 @@ async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) 
     Ok(id)
 }
 
-/// Gives a user access again: all earlier tokens and sessions are revoked.
-async fn restore_access(tx: &mut Tx, id: UserId, request: &JoinRequest) -> Result<()> {
+/// Gives a user access again: all earlier tokens and sessions are revoked, and all that the user has made ends.
+async fn restore_access(
+    tx: &mut Tx,
+    id: UserId,
+    request: &JoinRequest,
+) -> Result<EndedCredentials> {
     let user = users::find(tx, id).await?;
     if request.name.as_ref().is_some_and(|name| *name != user.name) {
         return StoreError::conflict(format!(
@@ -203,7 +214,7 @@ async fn restore_access(tx: &mut Tx, id: UserId, request: &JoinRequest) -> Resul
         users::set_password(tx, id, password).await?;
         tx.record(Subject::User(id), Event::PasswordSet);
     }
-    Ok(())
+    end_made_by(tx, id, None, "the user who made it got new access").await
 }
 
 async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
@@ -231,6 +242,7 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
             "team: the link is not for the founder of a team; leave it out"
         });
     }
+    let mut ended = EndedCredentials::default();
     let user = match invitation.role {
         InvitationRole::Organiser => add_user(tx, &mut request, None).await?,
         InvitationRole::Member(team) => add_user(tx, &mut request, Some(team)).await?,
@@ -243,7 +255,7 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
             add_user(tx, &mut request, team).await?
         }
         InvitationRole::PasswordReset(user) => {
-            restore_access(tx, user, &request).await?;
+            ended = restore_access(tx, user, &request).await?;
             user
         }
     };
@@ -253,6 +265,10 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
         kind: request.token_kind,
         owner: TokenOwner::User(user),
         name: request.token_name,
+        maker: Maker {
+            user: Some(user),
+            token: None,
+        },
         expires_at: request.token_expires_at,
     };
     let token = add_token(tx, token).await?;
@@ -261,7 +277,12 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
         Some(team) => Some(teams::find(tx, team).await?),
         None => None,
     };
-    Ok(JoinOutcome { user, team, token })
+    Ok(JoinOutcome {
+        user,
+        team,
+        token,
+        ended,
+    })
 }
 
 async fn code_status(
@@ -291,9 +312,9 @@ async fn code_status(
 }
 
 impl Store {
-    /// Creates an invitation. [`StoreError::Conflict`] if it would be expired, if the team has
-    /// [`MAX_OPEN_INVITATIONS`] open ones, or the user has left; [`StoreError::NotFound`] if there is no such team or
-    /// user.
+    /// Creates an invitation. One with which a user gets access again revokes the user's earlier ones. [`StoreError::Conflict`] if it
+    /// would be expired, if the team has [`MAX_OPEN_INVITATIONS`] open ones, or the user has left; [`StoreError::NotFound`] if there
+    /// is no such team or user.
     #[boxed]
     pub async fn invite(
         &self,
@@ -326,6 +347,9 @@ impl Store {
                             user.name
                         ));
                     }
+                    for earlier in invitations::open_resets_of(tx, user.id, now).await? {
+                        ended_credentials::revoke_invitation(tx, earlier).await?;
+                    }
                 }
                 InvitationRole::Organiser | InvitationRole::Founder => {}
             }
@@ -352,16 +376,10 @@ impl Store {
                 }
                 InvitationState::Revoked { .. } => {}
                 InvitationState::Open => {
-                    invitations::set_revoked(tx, id, now).await?;
-                    let subject = match invitation.role {
-                        InvitationRole::Member(team) => Subject::Team(team),
-                        InvitationRole::PasswordReset(user) => Subject::User(user),
-                        InvitationRole::Organiser | InvitationRole::Founder => Subject::Season,
-                    };
-                    tx.record(subject, Event::InvitationRevoked { invitation: id });
+                    return ended_credentials::revoke_invitation(tx, invitation).await;
                 }
             }
-            invitations::find(tx, id).await
+            Ok(invitation)
         })
         .await
     }

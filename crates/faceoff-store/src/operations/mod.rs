@@ -12,6 +12,7 @@ pub(crate) mod commit;
 pub(crate) mod completion;
 mod deadlines;
 mod delete_submission;
+pub(crate) mod ended_credentials;
 mod extra_evaluation;
 mod finish;
 mod freeze;

@@ -12,6 +12,7 @@ use crate::{
         registrations::{self, Registration, RegistrationState},
         season, teams,
         teams::{Team, TeamProfile},
+        tokens::Maker,
     },
     write::Tx,
 };
@@ -119,6 +120,8 @@ impl Store {
                 code_hash: registrations::code_hash(tx, id).await?,
                 role: InvitationRole::Member(team),
                 note: registration.contact,
+                // Nobody but the team knows its code.
+                maker: Maker::default(),
                 expires_at,
             };
             invite(tx, invitation).await?;

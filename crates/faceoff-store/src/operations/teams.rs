@@ -12,7 +12,7 @@ use crate::{
     tables::{
         divisions, season,
         teams::{self, Team, TeamProfile},
-        tokens::{TokenKind, TokenOwner},
+        tokens::{Maker, TokenKind, TokenOwner},
         users,
     },
     write::Tx,
@@ -23,12 +23,13 @@ use jiff::Timestamp;
 /// Name of the token that is created with a team.
 const FIRST_TOKEN_NAME: &str = "first";
 
-async fn add_team_token(tx: &mut Tx, team: TeamId, hash: [u8; 32]) -> Result<()> {
+async fn add_team_token(tx: &mut Tx, team: TeamId, hash: [u8; 32], maker: Maker) -> Result<()> {
     let token = NewToken {
         hash,
         kind: TokenKind::ApiToken,
         owner: TokenOwner::Team(team),
         name: FIRST_TOKEN_NAME.to_owned(),
+        maker,
         expires_at: None,
     };
     add_token(tx, token).await?;
@@ -54,11 +55,12 @@ impl Store {
         actor: Actor,
         name: &TeamName,
         token_hash: [u8; 32],
+        maker: Maker,
         now: Timestamp,
     ) -> Result<Team> {
         self.write(actor, now, async |tx| {
             let id = add_team(tx, name.clone(), TeamProfile::default()).await?;
-            add_team_token(tx, id, token_hash).await?;
+            add_team_token(tx, id, token_hash, maker).await?;
             teams::find(tx, id).await
         })
         .await
@@ -71,12 +73,13 @@ impl Store {
         actor: Actor,
         id: TeamId,
         token_hash: [u8; 32],
+        maker: Maker,
         now: Timestamp,
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
             teams::find(tx, id).await?;
             revoke_all(tx, TokenOwner::Team(id), None).await?;
-            add_team_token(tx, id, token_hash).await?;
+            add_team_token(tx, id, token_hash, maker).await?;
             tx.record(Subject::Team(id), Event::TokenReplaced);
             Ok(())
         })

@@ -4,11 +4,12 @@
 use crate::{
     boxed,
     error::{Result, StoreError},
-    event::{Actor, Event, Subject},
+    event::{Actor, Event},
+    operations::ended_credentials::{EndedCredentials, end_made_with, revoke_token, subject},
     store::Store,
     tables::{
         teams::{self, Team},
-        tokens::{self, Token, TokenKind, TokenOwner},
+        tokens::{self, Maker, Token, TokenKind, TokenOwner},
         users::{self, User},
     },
     write::Tx,
@@ -52,20 +53,20 @@ pub struct NewToken {
     pub owner: TokenOwner,
     /// Label chosen by the owner.
     pub name: String,
+    pub maker: Maker,
     /// `None`: it does not expire.
     pub expires_at: Option<Timestamp>,
 }
 
+/// A token that was revoked, and what ended with it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RevokedToken {
+    pub token: Token,
+    pub ended: EndedCredentials,
+}
+
 /// Name of the host token that is kept in a file of the data folder.
 const HOST_TOKEN_NAME: &str = "admin-token";
-
-const fn subject(owner: TokenOwner) -> Subject {
-    match owner {
-        TokenOwner::Host => Subject::Season,
-        TokenOwner::Team(id) => Subject::Team(id),
-        TokenOwner::User(id) => Subject::User(id),
-    }
-}
 
 /// Adds a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`].
 pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
@@ -87,6 +88,7 @@ pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
         kind: new.kind,
         owner: new.owner,
         name: new.name,
+        maker: new.maker,
         created_at: now,
         expires_at: new.expires_at,
         last_used_at: None,
@@ -227,14 +229,16 @@ impl Store {
         .await
     }
 
-    /// Replaces the secret of a token; the old secret is invalid from now on. [`StoreError::Conflict`] if the token is a
-    /// session, is expired or revoked, or is the host's, whose file would still have the old secret.
+    /// Replaces the secret of a token; the old secret is invalid from now on, and the token's end remains. From now on it belongs to
+    /// what `maker` has made. [`StoreError::Conflict`] if the token is a session, is expired or revoked, or is the host's, whose file
+    /// would still have the old secret.
     #[boxed]
     pub async fn rotate_token(
         &self,
         actor: Actor,
         id: TokenId,
         hash: [u8; 32],
+        maker: Maker,
         now: Timestamp,
     ) -> Result<Token> {
         self.write(actor, now, async |tx| {
@@ -255,7 +259,7 @@ impl Store {
                     "the token is revoked or has expired, which is final: create another one",
                 );
             }
-            tokens::set_hash(tx, id, hash).await?;
+            tokens::set_hash(tx, id, hash, maker).await?;
             let name = token.name;
             tx.record(
                 subject(token.owner),
@@ -266,20 +270,32 @@ impl Store {
         .await
     }
 
-    /// Revokes a token, effective at once. A revoked token is left unchanged.
+    /// Revokes a token, effective at once. A revoked token is left unchanged. With `ends_made`, all that was made with the token ends,
+    /// except `used_token`, which authenticated this request.
     #[boxed]
-    pub async fn revoke_token(&self, actor: Actor, id: TokenId, now: Timestamp) -> Result<Token> {
+    pub async fn revoke_token(
+        &self,
+        actor: Actor,
+        id: TokenId,
+        ends_made: bool,
+        used_token: Option<TokenId>,
+        now: Timestamp,
+    ) -> Result<RevokedToken> {
         self.write(actor, now, async |tx| {
             let token = tokens::find(tx, id).await?;
             if token.revoked_at.is_none() {
-                tokens::revoke(tx, id, now).await?;
-                let name = token.name;
-                tx.record(
-                    subject(token.owner),
-                    Event::TokenRevoked { token: id, name },
-                );
+                revoke_token(tx, &token).await?;
             }
-            tokens::find(tx, id).await
+            let ended = if ends_made {
+                let reason = "the token with which it was made was revoked";
+                end_made_with(tx, id, used_token, reason).await?
+            } else {
+                EndedCredentials::default()
+            };
+            Ok(RevokedToken {
+                token: tokens::find(tx, id).await?,
+                ended,
+            })
         })
         .await
     }
@@ -298,15 +314,14 @@ impl Store {
                     && token.revoked_at.is_none()
             });
             for token in previous {
-                tokens::revoke(tx, token.id, now).await?;
-                let (token, name) = (token.id, token.name);
-                tx.record(Subject::Season, Event::TokenRevoked { token, name });
+                revoke_token(tx, &token).await?;
             }
             let new = NewToken {
                 hash,
                 kind: TokenKind::ApiToken,
                 owner: TokenOwner::Host,
                 name: HOST_TOKEN_NAME.to_owned(),
+                maker: Maker::default(),
                 expires_at: None,
             };
             add_token(tx, new).await?;

@@ -4,7 +4,10 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::tokens::revoke_all,
+    operations::{
+        ended_credentials::{EndedCredentials, end_made_by},
+        tokens::revoke_all,
+    },
     store::Store,
     tables::{
         terms::{self, Terms},
@@ -39,8 +42,8 @@ impl Store {
         users::find_with_password(&mut *self.database.read.acquire().await?, name).await
     }
 
-    /// Sets a user's password, as a PHC string (a hash with its parameters). All tokens and sessions of the user are
-    /// revoked, except `used_token`, which authenticated this request.
+    /// Sets a user's password, as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked, and all
+    /// that the user has made ends, except `used_token`, which authenticated this request.
     #[boxed]
     pub async fn set_password(
         &self,
@@ -49,21 +52,28 @@ impl Store {
         password: &str,
         used_token: TokenId,
         now: Timestamp,
-    ) -> Result<User> {
+    ) -> Result<(User, EndedCredentials)> {
         self.write(actor, now, async |tx| {
             users::set_password(tx, id, password).await?;
             revoke_all(tx, TokenOwner::User(id), Some(used_token)).await?;
             tx.record(Subject::User(id), Event::PasswordSet);
-            users::find(tx, id).await
+            let reason = "the user who made it has set a new password";
+            let ended = end_made_by(tx, id, Some(used_token), reason).await?;
+            Ok((users::find(tx, id).await?, ended))
         })
         .await
     }
 
-    /// Removes a user: all tokens and sessions are revoked at once. The name stays in the log.
+    /// Removes a user: all tokens and sessions are revoked at once, and all that the user has made ends. The name stays in the log.
     /// [`StoreError::Conflict`] if the user has left, or if no one could organise the season afterwards: there is no other
     /// organiser and no valid host token.
     #[boxed]
-    pub async fn remove_user(&self, actor: Actor, id: UserId, now: Timestamp) -> Result<User> {
+    pub async fn remove_user(
+        &self,
+        actor: Actor,
+        id: UserId,
+        now: Timestamp,
+    ) -> Result<(User, EndedCredentials)> {
         self.write(actor, now, async |tx| {
             let user = users::find(tx, id).await?;
             if user.left_at.is_some() {
@@ -80,7 +90,9 @@ impl Store {
             revoke_all(tx, TokenOwner::User(id), None).await?;
             let name = user.name;
             tx.record(Subject::User(id), Event::PersonLeft { name });
-            users::find(tx, id).await
+            let reason = "the account of the user who made it is closed";
+            let ended = end_made_by(tx, id, None, reason).await?;
+            Ok((users::find(tx, id).await?, ended))
         })
         .await
     }

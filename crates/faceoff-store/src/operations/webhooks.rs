@@ -9,6 +9,7 @@ use crate::{
     tables::{
         deliveries::{self, Delivery, DeliveryAttempt, DeliveryState},
         events,
+        tokens::Maker,
         webhooks::{self, DisabledWebhook, Webhook, WebhookSecrets},
     },
     write::Tx,
@@ -41,6 +42,7 @@ pub struct NewWebhook {
     pub topics: Vec<String>,
     /// Key that signs the messages.
     pub secret: [u8; 32],
+    pub maker: Maker,
 }
 
 /// Changes of a webhook; `None` leaves a value unchanged.
@@ -51,6 +53,8 @@ pub struct WebhookChange {
     pub topics: Option<Vec<String>>,
     /// Enables a disabled webhook again, for events from now on.
     pub enable: bool,
+    /// Whose webhook it is from now on, with another address or enabled again.
+    pub maker: Maker,
 }
 
 /// Deliveries of one webhook for a range of events.
@@ -106,7 +110,7 @@ fn new_delivery(
 }
 
 /// Disables a webhook and gives up its pending deliveries.
-async fn disable(tx: &mut Tx, mut webhook: Webhook, reason: String) -> Result<()> {
+pub(crate) async fn disable(tx: &mut Tx, mut webhook: Webhook, reason: String) -> Result<()> {
     let now = tx.now;
     deliveries::give_up(tx, webhook.id, now).await?;
     webhook.disabled = Some(DisabledWebhook {
@@ -165,6 +169,7 @@ impl Store {
                 name: new.name,
                 url: new.url,
                 topics: new.topics,
+                maker: new.maker,
                 created_at: now,
                 seen: events::newest_id(tx).await?,
                 failing_since: None,
@@ -199,11 +204,13 @@ impl Store {
             if webhook.url != current.url {
                 // Failures of the old address do not count for the new one.
                 webhook.failing_since = None;
+                webhook.maker = change.maker;
             }
             webhook.topics = change.topics.unwrap_or(webhook.topics);
             if change.enable && webhook.disabled.is_some() {
                 webhook.disabled = None;
                 webhook.failing_since = None;
+                webhook.maker = change.maker;
                 webhook.seen = events::newest_id(tx).await?;
             }
             if webhook != current {

@@ -3,8 +3,9 @@
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
+    tables::tokens::Maker,
 };
-use faceoff_types::{InvitationId, TeamId, UserId};
+use faceoff_types::{InvitationId, TeamId, TokenId, UserId};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
@@ -62,6 +63,7 @@ pub struct Invitation {
     pub role: InvitationRole,
     /// A note of its author, to recognise it in lists.
     pub note: String,
+    pub maker: Maker,
     pub created_at: Timestamp,
     pub expires_at: Timestamp,
     pub state: InvitationState,
@@ -73,6 +75,8 @@ struct InvitationRow {
     team_id: Option<TeamId>,
     person_id: Option<UserId>,
     note: String,
+    made_by: Option<UserId>,
+    made_with: Option<TokenId>,
     created_at: Instant,
     expires_at: Instant,
     accepted_at: Option<Instant>,
@@ -95,6 +99,10 @@ impl TryFrom<InvitationRow> for Invitation {
             id: row.id,
             role: InvitationRole::from_columns(&row.role, row.team_id, row.person_id)?,
             note: row.note,
+            maker: Maker {
+                user: row.made_by,
+                token: row.made_with,
+            },
             created_at: row.created_at.0,
             expires_at: row.expires_at.0,
             state,
@@ -107,7 +115,8 @@ macro_rules! select_invitations {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             InvitationRow,
-            "SELECT id, role, team_id, person_id, note, created_at, expires_at, accepted_at, accepted_by, revoked_at
+            "SELECT id, role, team_id, person_id, note, made_by, made_with, created_at, expires_at, accepted_at,
+                    accepted_by, revoked_at
              FROM invitations " + $tail
             $(, $argument)*
         )
@@ -144,6 +153,40 @@ pub(crate) async fn by_code(
     row.map(Invitation::try_from).transpose()
 }
 
+/// The valid, unused invitations at `now` that this user has made, or that were made with this token.
+pub(crate) async fn open_made(
+    connection: &mut SqliteConnection,
+    maker: Maker,
+    now: Timestamp,
+) -> Result<Vec<Invitation>> {
+    let rows = select_invitations!(
+        "WHERE (made_by = ?1 OR made_with = ?2) AND accepted_at IS NULL AND revoked_at IS NULL AND expires_at > ?3
+         ORDER BY created_at, id",
+        maker.user,
+        maker.token,
+        Instant(now)
+    )
+    .fetch_all(connection)
+    .await?;
+    rows.into_iter().map(Invitation::try_from).collect()
+}
+
+/// The valid, unused links at `now` with which this user gets access again.
+pub(crate) async fn open_resets_of(
+    connection: &mut SqliteConnection,
+    user: UserId,
+    now: Timestamp,
+) -> Result<Vec<Invitation>> {
+    let rows = select_invitations!(
+        "WHERE person_id = ? AND accepted_at IS NULL AND revoked_at IS NULL AND expires_at > ?",
+        user,
+        Instant(now)
+    )
+    .fetch_all(connection)
+    .await?;
+    rows.into_iter().map(Invitation::try_from).collect()
+}
+
 /// Number of valid, unused invitations for members of a team.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
@@ -167,14 +210,16 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let (role, team, user) = invitation.role.columns();
     sqlx::query!(
-        "INSERT INTO invitations (id, code_hash, role, team_id, person_id, note, created_at, expires_at)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO invitations (id, code_hash, role, team_id, person_id, note, made_by, made_with, created_at, expires_at)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         invitation.id,
         Bytes32(code_hash),
         role,
         team,
         user,
         invitation.note,
+        invitation.maker.user,
+        invitation.maker.token,
         Instant(invitation.created_at),
         Instant(invitation.expires_at),
     )

@@ -69,6 +69,15 @@ impl TokenKind {
     }
 }
 
+/// Who made a credential (a token, an invitation or a webhook), or gave it its current secret: it ends with that person's account.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Maker {
+    /// `None`: the host, a visitor or the server.
+    pub user: Option<UserId>,
+    /// The token or session of the request.
+    pub token: Option<TokenId>,
+}
+
 /// An API token or a browser's session. Only a hash of the secret is stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Token {
@@ -78,6 +87,7 @@ pub struct Token {
     pub owner: TokenOwner,
     /// A label, chosen by its owner.
     pub name: String,
+    pub maker: Maker,
     pub created_at: Timestamp,
     /// `None`: it does not expire.
     pub expires_at: Option<Timestamp>,
@@ -99,6 +109,8 @@ struct TokenRow {
     team_id: Option<TeamId>,
     person_id: Option<UserId>,
     name: String,
+    made_by: Option<UserId>,
+    made_with: Option<TokenId>,
     created_at: Instant,
     expires_at: Option<Instant>,
     last_used_at: Option<Instant>,
@@ -116,6 +128,10 @@ impl From<TokenRow> for Token {
             },
             owner: TokenOwner::from_columns(row.team_id, row.person_id),
             name: row.name,
+            maker: Maker {
+                user: row.made_by,
+                token: row.made_with,
+            },
             created_at: row.created_at.0,
             expires_at: row.expires_at.map(|at| at.0),
             last_used_at: row.last_used_at.map(|at| at.0),
@@ -129,8 +145,8 @@ macro_rules! select_tokens {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             TokenRow,
-            r#"SELECT id, kind = 'key' AS "is_key!: bool", team_id, person_id, name, created_at, expires_at,
-                      last_used_at, revoked_at
+            r#"SELECT id, kind = 'key' AS "is_key!: bool", team_id, person_id, name, made_by, made_with,
+                      created_at, expires_at, last_used_at, revoked_at
                FROM tokens "# + $tail
             $(, $argument)*
         )
@@ -173,6 +189,24 @@ pub(crate) async fn hash_of(connection: &mut SqliteConnection, id: TokenId) -> R
         .ok_or(StoreError::NotFound("token"))
 }
 
+/// The valid tokens and sessions at `now` that this user has made, or that were made with this token.
+pub(crate) async fn valid_made(
+    connection: &mut SqliteConnection,
+    maker: Maker,
+    now: Timestamp,
+) -> Result<Vec<Token>> {
+    let rows = select_tokens!(
+        "WHERE (made_by = ?1 OR made_with = ?2) AND revoked_at IS NULL AND (expires_at IS NULL OR expires_at > ?3)
+         ORDER BY created_at, id",
+        maker.user,
+        maker.token,
+        Instant(now)
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(Token::from).collect())
+}
+
 /// Number of an owner's valid tokens and sessions at `now`.
 pub(crate) async fn count_valid(
     connection: &mut SqliteConnection,
@@ -200,8 +234,8 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let owner = token.owner;
     sqlx::query!(
-        "INSERT INTO tokens (id, hash, kind, owner, team_id, person_id, name, created_at, expires_at)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO tokens (id, hash, kind, owner, team_id, person_id, name, made_by, made_with, created_at, expires_at)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         token.id,
         Bytes32(hash),
         token.kind.name(),
@@ -209,6 +243,8 @@ pub(crate) async fn insert(
         owner.team(),
         owner.user(),
         token.name,
+        token.maker.user,
+        token.maker.token,
         Instant(token.created_at),
         token.expires_at.map(Instant),
     )
@@ -223,10 +259,13 @@ pub(crate) async fn set_hash(
     connection: &mut SqliteConnection,
     id: TokenId,
     hash: [u8; 32],
+    maker: Maker,
 ) -> Result<()> {
     sqlx::query!(
-        "UPDATE tokens SET hash = ?, last_used_at = NULL WHERE id = ?",
+        "UPDATE tokens SET hash = ?, made_by = ?, made_with = ?, last_used_at = NULL WHERE id = ?",
         Bytes32(hash),
+        maker.user,
+        maker.token,
         id
     )
     .execute(connection)

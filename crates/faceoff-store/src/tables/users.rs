@@ -100,6 +100,22 @@ pub(crate) async fn find_with_password(
     Ok(row.map(|row| (row.id, row.password)))
 }
 
+/// The active users who joined by invitations of this user, by name.
+pub(crate) async fn invited_by(
+    connection: &mut SqliteConnection,
+    maker: UserId,
+) -> Result<Vec<User>> {
+    let rows = select_users!(
+        "WHERE left_at IS NULL AND id <> ?1
+           AND id IN (SELECT accepted_by FROM invitations WHERE made_by = ?1 AND role <> 'return')
+         ORDER BY name",
+        maker
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(User::from).collect())
+}
+
 /// Adds a user. [`StoreError::UserNameTaken`] if the name exists, regardless of case.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,

@@ -3,8 +3,9 @@
 use crate::{
     column::{Bytes32, Instant, Json},
     error::{Result, StoreError},
+    tables::tokens::Maker,
 };
-use faceoff_types::{TeamId, WebhookId};
+use faceoff_types::{TeamId, TokenId, UserId, WebhookId};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
@@ -19,6 +20,8 @@ pub struct Webhook {
     pub url: String,
     /// Topics of the events that are sent; empty: all events that its owner may see.
     pub topics: Vec<String>,
+    /// Who created it or chose its current address.
+    pub maker: Maker,
     pub created_at: Timestamp,
     /// Deliveries exist for all events up to this id.
     pub seen: i64,
@@ -59,6 +62,8 @@ struct WebhookRow {
     name: String,
     url: String,
     about: Json<Vec<String>>,
+    made_by: Option<UserId>,
+    made_with: Option<TokenId>,
     created_at: Instant,
     seen: i64,
     failing_since: Option<Instant>,
@@ -76,6 +81,10 @@ impl From<WebhookRow> for Webhook {
             name: row.name,
             url: row.url,
             topics: row.about.0,
+            maker: Maker {
+                user: row.made_by,
+                token: row.made_with,
+            },
             created_at: row.created_at.0,
             seen: row.seen,
             failing_since: row.failing_since.map(|at| at.0),
@@ -90,7 +99,7 @@ macro_rules! select_webhooks {
     ($tail:literal $(, $argument:expr)*) => {
         sqlx::query_as!(
             WebhookRow,
-            "SELECT id, team_id, name, url, about, created_at, seen, failing_since, dead_at, dead_for,
+            "SELECT id, team_id, name, url, about, made_by, made_with, created_at, seen, failing_since, dead_at, dead_for,
                     old_secret_until
              FROM webhooks " + $tail
             $(, $argument)*
@@ -133,6 +142,21 @@ pub(crate) async fn with_new_events(
     Ok(rows.into_iter().map(Webhook::from).collect())
 }
 
+/// The enabled webhooks that this user has made, or that were made with this token.
+pub(crate) async fn enabled_made(
+    connection: &mut SqliteConnection,
+    maker: Maker,
+) -> Result<Vec<Webhook>> {
+    let rows = select_webhooks!(
+        "WHERE (made_by = ? OR made_with = ?) AND dead_at IS NULL ORDER BY created_at, id",
+        maker.user,
+        maker.token
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(Webhook::from).collect())
+}
+
 /// Number of an owner's webhooks.
 pub(crate) async fn count(connection: &mut SqliteConnection, team: Option<TeamId>) -> Result<i64> {
     Ok(
@@ -148,13 +172,16 @@ pub(crate) async fn insert(
     secret: [u8; 32],
 ) -> Result<()> {
     sqlx::query!(
-        "INSERT INTO webhooks (id, team_id, name, url, about, secret, created_at, seen) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO webhooks (id, team_id, name, url, about, secret, made_by, made_with, created_at, seen)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         webhook.id,
         webhook.team,
         webhook.name,
         webhook.url,
         Json(&webhook.topics),
         Bytes32(secret),
+        webhook.maker.user,
+        webhook.maker.token,
         Instant(webhook.created_at),
         webhook.seen,
     )
@@ -170,10 +197,13 @@ pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook)
         None => (None, None),
     };
     sqlx::query!(
-        "UPDATE webhooks SET name = ?, url = ?, about = ?, seen = ?, failing_since = ?, dead_at = ?, dead_for = ? WHERE id = ?",
+        "UPDATE webhooks SET name = ?, url = ?, about = ?, made_by = ?, made_with = ?, seen = ?, failing_since = ?,
+                             dead_at = ?, dead_for = ? WHERE id = ?",
         webhook.name,
         webhook.url,
         Json(&webhook.topics),
+        webhook.maker.user,
+        webhook.maker.token,
         webhook.seen,
         webhook.failing_since.map(Instant),
         dead_at,

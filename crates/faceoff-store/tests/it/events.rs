@@ -30,7 +30,13 @@ async fn events_record_each_step_of_a_submission() {
         .await
         .unwrap();
     f.store
-        .set_team_token(Actor::Organiser, submission.team, [9; 32], f.now)
+        .set_team_token(
+            Actor::Organiser,
+            submission.team,
+            [9; 32],
+            Maker::default(),
+            f.now,
+        )
         .await
         .unwrap();
     let mut records = stored_events(&f).await;

@@ -17,7 +17,13 @@ async fn rolled_back_write_does_not_block_the_writer() {
         let name = "Full".parse().unwrap();
         let failed = f
             .store
-            .create_team(Actor::Organiser, &name, [attempt; 32], f.now)
+            .create_team(
+                Actor::Organiser,
+                &name,
+                [attempt; 32],
+                Maker::default(),
+                f.now,
+            )
             .await;
         assert!(failed.is_err());
         f.create_team(&format!("After {attempt}")).await;

@@ -13,7 +13,7 @@ async fn team_token_is_valid_until_replaced() {
     let name = "Zoë".parse().unwrap();
     let team = f
         .store
-        .create_team(Actor::Organiser, &name, TOKEN_HASH, f.now)
+        .create_team(Actor::Organiser, &name, TOKEN_HASH, Maker::default(), f.now)
         .await
         .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
@@ -26,7 +26,13 @@ async fn team_token_is_valid_until_replaced() {
         Ok(Principal::Team(team.clone()))
     );
     f.store
-        .set_team_token(Actor::Organiser, team.id, OTHER_TOKEN_HASH, f.now)
+        .set_team_token(
+            Actor::Organiser,
+            team.id,
+            OTHER_TOKEN_HASH,
+            Maker::default(),
+            f.now,
+        )
         .await
         .unwrap();
     assert_eq!(
@@ -44,6 +50,7 @@ async fn two_teams_cannot_share_a_token() {
             Actor::Organiser,
             &"Alpha".parse().unwrap(),
             TOKEN_HASH,
+            Maker::default(),
             f.now,
         )
         .await
@@ -54,6 +61,7 @@ async fn two_teams_cannot_share_a_token() {
             Actor::Organiser,
             &"Beta".parse().unwrap(),
             OTHER_TOKEN_HASH,
+            Maker::default(),
             f.now,
         )
         .await
@@ -64,6 +72,7 @@ async fn two_teams_cannot_share_a_token() {
             Actor::Organiser,
             &"Gamma".parse().unwrap(),
             TOKEN_HASH,
+            Maker::default(),
             f.now,
         )
         .await
@@ -71,7 +80,13 @@ async fn two_teams_cannot_share_a_token() {
     assert!(matches!(error, StoreError::Conflict(_)), "{error}");
     let error = f
         .store
-        .set_team_token(Actor::Organiser, beta.id, TOKEN_HASH, f.now)
+        .set_team_token(
+            Actor::Organiser,
+            beta.id,
+            TOKEN_HASH,
+            Maker::default(),
+            f.now,
+        )
         .await
         .unwrap_err();
     assert!(matches!(error, StoreError::Conflict(_)), "{error}");
@@ -87,7 +102,7 @@ async fn unknown_ids_are_not_found() {
     ));
     assert!(matches!(
         f.store
-            .set_team_token(Actor::Organiser, id, [1; 32], f.now)
+            .set_team_token(Actor::Organiser, id, [1; 32], Maker::default(), f.now)
             .await,
         Err(StoreError::NotFound("team"))
     ));

@@ -11,6 +11,7 @@ async fn invite(f: &TestStore, code: u8, role: InvitationRole) -> Invitation {
         code_hash: [code; 32],
         role,
         note: "a user".into(),
+        maker: Maker::default(),
         expires_at: f.now + SignedDuration::from_hours(1),
     };
     f.store
@@ -76,7 +77,7 @@ async fn removed_user_loses_all_access() {
     assert_contains(&error, &["Grace", "the last who can organise"]);
     f.store.set_host_token([7; 32], f.now).await.unwrap();
     remove(grace.id).await.unwrap();
-    let removed = remove(ada.id).await.unwrap();
+    let (removed, _) = remove(ada.id).await.unwrap();
     assert_eq!(removed.left_at, Some(f.now));
     for code in [1, 2] {
         assert_eq!(
@@ -92,6 +93,7 @@ async fn removed_user_loses_all_access() {
         code_hash: [3; 32],
         role: InvitationRole::PasswordReset(ada.id),
         note: "Ada".into(),
+        maker: Maker::default(),
         expires_at: f.now + SignedDuration::from_hours(1),
     };
     let error = f.store.invite(Actor::Organiser, invitation, f.now).await;

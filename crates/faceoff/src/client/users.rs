@@ -9,11 +9,12 @@ use faceoff_api::{
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
+        credentials::{ChangedAccessView, NewAccountView, RevokedTokenView},
         invitation::{InvitationView, NewInvitationView, NewRegistrationView, RegistrationView},
         season::SeasonView,
         team::{TeamView, TeamWithToken},
         token::{NewTokenView, TokenView},
-        user::{CallerView, NewAccountView, UserView},
+        user::{CallerView, UserView},
     },
 };
 use faceoff_types::{InvitationId, QuestionId, RegistrationId, TeamId, TokenId, UserId};
@@ -39,7 +40,7 @@ impl Client {
         self.post_empty(&format!("/tokens/{id}/rotate")).await
     }
 
-    pub async fn revoke_token(&self, id: TokenId) -> anyhow::Result<TokenView> {
+    pub async fn revoke_token(&self, id: TokenId) -> anyhow::Result<RevokedTokenView> {
         self.call(Method::DELETE, &format!("/tokens/{id}")).await
     }
 
@@ -53,13 +54,17 @@ impl Client {
         &self,
         id: UserId,
         confirm: Option<String>,
-    ) -> anyhow::Result<UserView> {
+    ) -> anyhow::Result<ChangedAccessView> {
         let path = format!("/people/{id}/remove");
         self.post(&path, &Confirmation { confirm }).await
     }
 
     /// Sets the caller's password and revokes all their other tokens and sessions.
-    pub async fn set_password(&self, id: UserId, new: &NewPassword) -> anyhow::Result<UserView> {
+    pub async fn set_password(
+        &self,
+        id: UserId,
+        new: &NewPassword,
+    ) -> anyhow::Result<ChangedAccessView> {
         self.call_with_body(Method::PUT, &format!("/people/{id}/password"), new)
             .await
     }

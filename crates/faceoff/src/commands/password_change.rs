@@ -1,6 +1,6 @@
 //! `faceoff password`: sets the user's password.
 
-use super::{output::print, password, people::user_line, server::ServerArgs};
+use super::{output::print, password, people::changed_access_text, server::ServerArgs};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::requests::NewPassword;
@@ -33,7 +33,7 @@ impl PasswordCommand {
             };
             let person = client.set_password(person.id, &change).await?;
             print(self.server.json, &person, |person| {
-                format!("password set\n{}", user_line(person))
+                format!("password set\n{}", changed_access_text(person))
             })
         })
     }

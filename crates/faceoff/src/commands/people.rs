@@ -5,6 +5,7 @@ use crate::client::Client;
 use faceoff_api::{
     requests::{InvitedRole, NewInvitation},
     views::{
+        credentials::{ChangedAccessView, EndedCredentialsView},
         invitation::{InvitationView, NewInvitationView},
         user::UserView,
     },
@@ -26,6 +27,43 @@ pub(super) fn user_line(person: &UserView) -> String {
         person.name,
         person.joined_at.strftime("%Y-%m-%d")
     )
+}
+
+/// A user whose access has changed, and what ended with it.
+pub(super) fn changed_access_text(changed: &ChangedAccessView) -> String {
+    user_line(&changed.user) + &ended_text(changed.ended.as_ref())
+}
+
+/// Lines about what ended with the rights of its maker; empty if nothing did.
+pub(super) fn ended_text(ended: Option<&EndedCredentialsView>) -> String {
+    let Some(ended) = ended else {
+        return String::new();
+    };
+    let tokens = ended.tokens.iter();
+    let invitations = ended.invitations.iter();
+    let webhooks = ended.webhooks.iter();
+    let mut lines: Vec<String> = tokens
+        .map(|token| format!("ended: token {} ({})", token.name, token.id))
+        .chain(invitations.map(|invitation| {
+            format!(
+                "ended: invitation for {} ({})",
+                invitation.note, invitation.id
+            )
+        }))
+        .chain(webhooks.map(|webhook| {
+            format!(
+                "ended: webhook {} ({}), which can be enabled again",
+                webhook.name, webhook.id
+            )
+        }))
+        .collect();
+    lines.extend(ended.remaining_people.iter().map(|user| {
+        format!(
+            "stays: the account of {}, who joined by an invitation of this user",
+            user.name
+        )
+    }));
+    lines.iter().map(|line| format!("\n{line}")).collect()
 }
 
 /// An invitation as one line.

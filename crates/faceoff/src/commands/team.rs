@@ -2,7 +2,7 @@
 
 use super::{
     output::{lines_or, print, print_list, time_text},
-    people::{invite, list_invitations, new_invitation, uninvite, user_line},
+    people::{changed_access_text, invite, list_invitations, new_invitation, uninvite, user_line},
     server::ServerArgs,
     storage::storage_line,
 };
@@ -158,7 +158,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
         Action::Leave { confirm } => {
             let id = own_person(client).await?;
             let person = client.remove_user(id, confirm).await?;
-            print(json, &person, user_line)
+            print(json, &person, changed_access_text)
         }
         Action::Retire { confirm } => {
             let team = own_team(client).await?;

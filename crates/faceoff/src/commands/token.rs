@@ -2,6 +2,7 @@
 
 use super::{
     output::{print, print_list, time_text},
+    people::ended_text,
     server::ServerArgs,
 };
 use crate::client::Client;
@@ -102,7 +103,7 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
         TokenAction::Revoke { token } => {
             let revoked = client.revoke_token(token).await?;
             print(json, &revoked, |revoked| {
-                token_line(revoked, Timestamp::now())
+                token_line(&revoked.token, Timestamp::now()) + &ended_text(revoked.ended.as_ref())
             })
         }
     }

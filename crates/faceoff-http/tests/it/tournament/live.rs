@@ -3,13 +3,13 @@
 
 use super::{cup::Cup, fake_slot::GameOutcome};
 use crate::{
-    site::{Answer, Site},
+    site::{ADMIN, Answer, Site, string},
     sse::{Event, Stream},
 };
 use faceoff_http::HttpLimits;
 use faceoff_types::{GameEvent, GameId, LiveEvent, LivePosition, Side};
 use reqwest::Method;
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// Control steps of a game: 15 minutes.
 const GAME_STEPS: u32 = 45_000;
@@ -218,6 +218,31 @@ async fn live_stream_of_a_finished_game_has_its_result() {
         "invalid-request",
         &["Last-Event-ID", "seventeen"],
     );
+}
+
+#[tokio::test]
+async fn live_stream_of_a_private_game_ends_with_its_token() {
+    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let team_token = cup.token("A");
+    let path = format!("{}/friendly-games", cup.path);
+    let game = cup
+        .site
+        .post(&path, Some(team_token), &json!({ "opponent": "B" }))
+        .await
+        .json(201);
+    let path = format!("/api/v1/games/{}/live", string(&game["id"]));
+    let mut stream = Stream::open(&cup.site, &path, Some(team_token), None).await;
+    assert_eq!(stream.next().await.unwrap().name, "waiting");
+    let caller = cup.site.get("/api/v1/whoami", Some(team_token)).await;
+    let path = format!(
+        "/api/v1/tokens/{}",
+        string(&caller.json(200)["token"]["id"])
+    );
+    let revoked = cup
+        .site
+        .send(Method::DELETE, &path, Some(ADMIN), &Value::Null);
+    revoked.await.json(200);
+    assert_eq!(stream.next().await, None);
 }
 
 #[tokio::test]

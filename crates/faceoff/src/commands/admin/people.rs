@@ -6,7 +6,9 @@ use crate::{
     client::Client,
     commands::{
         output::{print, print_list},
-        people::{invite, list_invitations, new_invitation, uninvite, user_line},
+        people::{
+            changed_access_text, invite, list_invitations, new_invitation, uninvite, user_line,
+        },
     },
 };
 use anyhow::bail;
@@ -138,7 +140,7 @@ pub(super) async fn people(
         PeopleAction::Remove { person, confirm } => {
             let id = find_user(client, &person).await?;
             let removed = client.remove_user(id, confirm).await?;
-            print(json, &removed, user_line)
+            print(json, &removed, changed_access_text)
         }
     }
 }

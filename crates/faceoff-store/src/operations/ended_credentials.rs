@@ -1,0 +1,128 @@
+//! The end of credentials with the rights of the person who made them. A *credential* is what gives access, or knowledge, without a
+//! password: a token, an invitation, a webhook.
+
+use crate::{
+    error::Result,
+    event::{Event, Subject},
+    operations::webhooks::disable,
+    tables::{
+        invitations::{self, Invitation, InvitationRole},
+        tokens::{self, Maker, Token, TokenOwner},
+        users::{self, User},
+        webhooks::{self, Webhook},
+    },
+    write::Tx,
+};
+use faceoff_types::{TokenId, UserId};
+
+/// What ended with a person's rights, and what did not.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EndedCredentials {
+    pub tokens: Vec<Token>,
+    pub invitations: Vec<Invitation>,
+    pub webhooks: Vec<Webhook>,
+    /// The users who joined by invitations of this person: their accounts stay.
+    pub remaining_users: Vec<User>,
+}
+
+/// Ends all that a user has made. `kept` is the token of the request, which stays valid.
+pub(crate) async fn end_made_by(
+    tx: &mut Tx,
+    user: UserId,
+    kept: Option<TokenId>,
+    reason: &str,
+) -> Result<EndedCredentials> {
+    let maker = Maker {
+        user: Some(user),
+        token: None,
+    };
+    let mut ended = end_made(tx, maker, kept, reason).await?;
+    ended.remaining_users = users::invited_by(tx, user).await?;
+    Ok(ended)
+}
+
+/// Ends all that was made with a token.
+pub(crate) async fn end_made_with(
+    tx: &mut Tx,
+    token: TokenId,
+    kept: Option<TokenId>,
+    reason: &str,
+) -> Result<EndedCredentials> {
+    let maker = Maker {
+        user: None,
+        token: Some(token),
+    };
+    end_made(tx, maker, kept, reason).await
+}
+
+/// Ends what this maker has made, and what was made with the tokens among it.
+async fn end_made(
+    tx: &mut Tx,
+    maker: Maker,
+    kept: Option<TokenId>,
+    reason: &str,
+) -> Result<EndedCredentials> {
+    let now = tx.now;
+    let mut ended = EndedCredentials::default();
+    let mut makers = vec![maker];
+    while let Some(maker) = makers.pop() {
+        for token in tokens::valid_made(tx, maker, now).await? {
+            if Some(token.id) == kept {
+                continue;
+            }
+            revoke_token(tx, &token).await?;
+            makers.push(Maker {
+                user: None,
+                token: Some(token.id),
+            });
+            ended.tokens.push(tokens::find(tx, token.id).await?);
+        }
+        for invitation in invitations::open_made(tx, maker, now).await? {
+            let revoked = revoke_invitation(tx, invitation).await?;
+            ended.invitations.push(revoked);
+        }
+        for webhook in webhooks::enabled_made(tx, maker).await? {
+            let id = webhook.id;
+            disable(tx, webhook, reason.to_owned()).await?;
+            ended.webhooks.push(webhooks::find(tx, id).await?);
+        }
+    }
+    Ok(ended)
+}
+
+/// The subject of events about a token of this owner.
+pub(crate) const fn subject(owner: TokenOwner) -> Subject {
+    match owner {
+        TokenOwner::Host => Subject::Season,
+        TokenOwner::Team(id) => Subject::Team(id),
+        TokenOwner::User(id) => Subject::User(id),
+    }
+}
+
+/// Revokes a valid token.
+pub(crate) async fn revoke_token(tx: &mut Tx, token: &Token) -> Result<()> {
+    let now = tx.now;
+    tokens::revoke(tx, token.id, now).await?;
+    let event = Event::TokenRevoked {
+        token: token.id,
+        name: token.name.clone(),
+    };
+    tx.record(subject(token.owner), event);
+    Ok(())
+}
+
+/// Revokes an open invitation.
+pub(crate) async fn revoke_invitation(tx: &mut Tx, invitation: Invitation) -> Result<Invitation> {
+    let now = tx.now;
+    invitations::set_revoked(tx, invitation.id, now).await?;
+    let subject = match invitation.role {
+        InvitationRole::Member(team) => Subject::Team(team),
+        InvitationRole::PasswordReset(user) => Subject::User(user),
+        InvitationRole::Organiser | InvitationRole::Founder => Subject::Season,
+    };
+    let event = Event::InvitationRevoked {
+        invitation: invitation.id,
+    };
+    tx.record(subject, event);
+    invitations::find(tx, invitation.id).await
+}
