@@ -118,6 +118,10 @@ limits() {
 attacks() {
     "$runner_tests" --test-threads 1 early_cpu_time:: supervision:: unread_questions:: waits_of_helpers
 }
+# Counters of the host and shared files as channels between agents.
+channels() {
+    "$tests" --test-threads 1 host_counters:: covert_channels::
+}
 # All checks of doctor, three of them with cgroup v2. The exit status alone does not show the version.
 doctor() {
     cd "$TMPDIR" && "$program" doctor >doctor.$$
@@ -162,6 +166,10 @@ expect leaf-tests sh -c "echo 0 >$top/leaf-tests/cgroup.procs; exec sh '$0' run 
 case_is "leaf: agents that attack the evaluator's clock, as root in a busy cgroup"
 mkdir $top/leaf-attacks
 expect leaf-attacks sh -c "echo 0 >$top/leaf-attacks/cgroup.procs; exec sh '$0' run attacks"
+
+case_is "leaf: channels between agents, as root in a busy cgroup"
+mkdir $top/leaf-channels
+expect leaf-channels sh -c "echo 0 >$top/leaf-channels/cgroup.procs; exec sh '$0' run channels"
 
 case_is "container: the same in the root of a cgroup namespace"
 mkdir $top/container

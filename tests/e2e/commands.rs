@@ -44,6 +44,11 @@ impl CommandOutput {
         self.stderr
     }
 
+    /// Standard output and standard error of a command with any status.
+    pub fn text(self) -> String {
+        self.stdout + &self.stderr
+    }
+
     /// Standard output, as JSON, of a command that must succeed.
     #[track_caller]
     pub fn json(self) -> Value {

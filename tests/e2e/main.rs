@@ -25,6 +25,7 @@ mod large_uploads;
 mod live_pages;
 mod local_evaluation;
 mod log_growth;
+mod marked_secrets;
 mod pictures;
 mod python_packages;
 mod reference_result;

@@ -4,7 +4,6 @@
 use super::names::Names;
 use anyhow::Context as _;
 use async_nats::{Client, ConnectOptions, Event};
-use faceoff_types::without_password;
 use std::{
     path::PathBuf,
     sync::{Arc, Mutex, PoisonError},
@@ -38,7 +37,7 @@ impl NatsConfig {
         on_status: impl Fn(Option<&str>) + Send + Sync + 'static,
     ) -> anyhow::Result<Client> {
         let log = Arc::new(ConnectionLog {
-            url: self.shown_url(),
+            url: self.url.clone(),
             cause: Mutex::default(),
             on_status: Box::new(on_status),
         });
@@ -65,13 +64,7 @@ impl NatsConfig {
                 async move { log.record(&event) }
             });
         let connected = options.connect(&self.url).await;
-        connected.with_context(|| format!("connecting to NATS at {}", self.shown_url()))
-    }
-
-    /// The URL for logs and messages, without a password.
-    #[must_use]
-    pub fn shown_url(&self) -> String {
-        without_password(&self.url).into_owned()
+        connected.with_context(|| format!("connecting to NATS at {}", self.url))
     }
 
     /// Client name, credentials and trusted certificates.

@@ -120,7 +120,7 @@ impl WorkerCommand {
         tracing::info!(
             name = worker.name,
             slots = worker.slots.cpus.slots.len(),
-            nats = worker.nats.shown_url(),
+            nats = worker.nats.url,
             "worker started"
         );
         super::block_on_all_cpus(run_until_signal(worker))

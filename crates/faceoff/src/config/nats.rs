@@ -62,7 +62,10 @@ impl NatsSection {
             url.as_ref().is_none_or(|url| {
                 let rest = schemes.iter().find_map(|scheme| url.strip_prefix(scheme));
                 rest.is_some_and(|rest| {
-                    !rest.is_empty() && !rest.ends_with('/') && !rest.contains(char::is_whitespace)
+                    !rest.is_empty()
+                        && !rest.ends_with('/')
+                        // Addresses stand in logs and errors, and so would a password.
+                        && !rest.contains(|char: char| char.is_whitespace() || char == '@')
                 })
             })
         };
@@ -71,12 +74,13 @@ impl NatsSection {
         };
         ensure!(
             has_scheme(&self.url, &["nats://", "tls://"]),
-            "nats.url: expected nats://HOST:PORT or tls://HOST:PORT, got {:?}",
+            "nats.url: expected nats://HOST:PORT or tls://HOST:PORT without user and password (nats.nkey_file identifies this \
+             program), got {:?}",
             shown(&self.url)
         );
         ensure!(
             has_scheme(&self.files_url, &["http://", "https://"]),
-            "nats.files_url: expected http://HOST:PORT or https://HOST without a trailing slash, got {:?}",
+            "nats.files_url: expected http://HOST:PORT or https://HOST without a password and a trailing slash, got {:?}",
             shown(&self.files_url)
         );
         ensure!(

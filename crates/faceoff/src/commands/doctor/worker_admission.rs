@@ -29,11 +29,11 @@ pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec
             cure: is_old(&version).then(|| {
                 "it works, but 2.12 or later is recommended: see docs/workers.md, Versions of NATS".to_owned()
             }),
-            found: format!("nats-server {version} at {}", nats.shown_url()),
+            found: format!("nats-server {version} at {}", nats.url),
         },
         Err(error) => Check {
             name: "NATS",
-            found: format!("cannot be reached at {}: {error}", nats.shown_url()),
+            found: format!("cannot be reached at {}: {error}", nats.url),
             cure: Some("start nats-server -js, or correct nats.url, nats.nkey_file and nats.ca_file".to_owned()),
         },
     }];
