@@ -20,6 +20,21 @@ pub(crate) const MANIFEST_FILE: &str = "manifest.json";
 pub const CLIPS_FILE: &str = "clips";
 /// The end of the agent's standard error.
 pub(crate) const LOG_FILE: &str = "agent.log";
+/// The report of a shard, in its folder.
+pub(crate) const REPORT_FILE: &str = "report.json";
+/// Description of a shard and the hashes of its files. Written last: a folder with this file is complete.
+pub(crate) const SHARD_FILE: &str = "shard.json";
+
+/// The largest accepted file of a recording with this name, in bytes: far more than any shard or game writes.
+#[must_use]
+pub fn max_file_bytes(name: &str) -> u64 {
+    match name {
+        SHARD_FILE => 1 << 20,
+        // Read into memory.
+        REPORT_FILE | LOG_FILE => 64 << 20,
+        _ => 4 << 30,
+    }
+}
 
 /// The result of a removal, which has also succeeded if there was nothing to remove.
 ///

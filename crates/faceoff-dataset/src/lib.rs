@@ -34,7 +34,7 @@ pub use assemble::{AssembledDataset, assemble};
 pub use conditions::shard_conditions;
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
-pub use files::{ARCHIVE_FILE, CLIPS_FILE, allow_missing};
+pub use files::{ARCHIVE_FILE, CLIPS_FILE, allow_missing, max_file_bytes};
 pub use granted_files::writable_files;
 pub use recorder::Recorder;
 pub use shard::ShardReport;

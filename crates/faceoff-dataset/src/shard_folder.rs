@@ -4,13 +4,16 @@
 use crate::{
     digest,
     error::RecordingError,
-    files::{CLIPS_FILE, EPISODES_FILE, LOG_FILE, STEPS_FILE, allow_missing},
+    files::{
+        CLIPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE, SHARD_FILE, STEPS_FILE, allow_missing,
+        max_file_bytes,
+    },
     shard::ShardReport,
     simulator::simulator_id,
     table::ShardTable,
 };
 use faceoff_episode::Simulator;
-use faceoff_types::Ruleset;
+use faceoff_types::{Ruleset, printable_excerpt};
 use faceoff_wire::{
     dataset::{FileDigest, SimulatorId},
     job::ShardSpec,
@@ -19,13 +22,10 @@ use fs_err::{self as fs, File};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
-    io::{ErrorKind, Write},
+    io::{self, ErrorKind, Read, Write},
     path::{Path, PathBuf},
 };
 
-const REPORT_FILE: &str = "report.json";
-/// Written last: a folder with this file is complete.
-const SHARD_FILE: &str = "shard.json";
 /// Name and version of a shard folder's layout; private to the platform.
 const SHARD_SCHEMA: &str = "faceoff-shard/5";
 /// The previous layout, which has no clips.
@@ -34,6 +34,9 @@ const WITHOUT_CLIPS_SCHEMA: &str = "faceoff-shard/4";
 /// for host interference (time that other programs on the evaluator's machine took). Evaluations that run during an
 /// upgrade of the program have such shards.
 const OLD_SHARD_SCHEMAS: [&str; 2] = ["faceoff-shard/2", "faceoff-shard/3"];
+
+/// Characters that messages quote of a text in a recording.
+const MAX_SHOWN_CHARS: usize = 80;
 
 /// The files of a recorded shard.
 pub const SHARD_FILES: [&str; 6] = [
@@ -132,6 +135,21 @@ fn json<T: Serialize>(value: &T) -> Result<Vec<u8>, RecordingError> {
     Ok(bytes)
 }
 
+/// Reads a file that is held in memory, up to its [largest size](max_file_bytes).
+fn read_small(path: &Path) -> io::Result<Vec<u8>> {
+    let name = path.file_name().and_then(|name| name.to_str());
+    let max = max_file_bytes(name.unwrap_or_default());
+    let mut text = Vec::new();
+    File::open(path)?.take(max + 1).read_to_end(&mut text)?;
+    if text.len() as u64 > max {
+        return Err(io::Error::new(
+            ErrorKind::FileTooLarge,
+            format!("larger than {max} bytes"),
+        ));
+    }
+    Ok(text)
+}
+
 /// A complete shard folder whose files match their hashes.
 #[derive(Debug)]
 pub(crate) struct ShardRecording {
@@ -155,8 +173,8 @@ impl ShardRecording {
         let unreadable = |name: &'static str| {
             move |error: &dyn std::fmt::Display| damaged(format!("{name}: {error}"))
         };
-        let text = fs::read(dir.join(SHARD_FILE)).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => unreadable(SHARD_FILE)(&error),
+        let text = read_small(&dir.join(SHARD_FILE)).map_err(|error| match error.kind() {
+            ErrorKind::NotFound | ErrorKind::FileTooLarge => unreadable(SHARD_FILE)(&error),
             // An I/O error does not mean that the recording is damaged.
             _ => error.into(),
         })?;
@@ -167,7 +185,8 @@ impl ShardRecording {
             old if OLD_SHARD_SCHEMAS.contains(&old) => ShardTable::Earlier,
             other => {
                 return Err(damaged(format!(
-                    "its layout is {other}; this version joins {}, {WITHOUT_CLIPS_SCHEMA} and {SHARD_SCHEMA}",
+                    "its layout is {:?}; this version joins {}, {WITHOUT_CLIPS_SCHEMA} and {SHARD_SCHEMA}",
+                    printable_excerpt(other, MAX_SHOWN_CHARS),
                     OLD_SHARD_SCHEMAS.join(", ")
                 )));
             }
@@ -181,7 +200,7 @@ impl ShardRecording {
         if shard.simulator != simulator_id(simulator) {
             return Err(damaged(format!(
                 "it was played by another build of the simulator, {}",
-                shard.simulator.version
+                printable_excerpt(&shard.simulator.version, MAX_SHOWN_CHARS)
             )));
         }
         let has_clips = shard.schema == SHARD_SCHEMA;
@@ -202,7 +221,10 @@ impl ShardRecording {
                 )));
             }
         }
-        let text = fs::read(dir.join(REPORT_FILE))?;
+        let text = read_small(&dir.join(REPORT_FILE)).map_err(|error| match error.kind() {
+            ErrorKind::FileTooLarge => unreadable(REPORT_FILE)(&error),
+            _ => error.into(),
+        })?;
         let report = serde_json::from_slice(&text).map_err(|e| unreadable(REPORT_FILE)(&e))?;
         Ok(Self {
             spec: shard.spec,

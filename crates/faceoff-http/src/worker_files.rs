@@ -11,7 +11,7 @@ use axum::{
     response::{IntoResponse, Response},
     routing::{get, put},
 };
-use faceoff_dataset::writable_files;
+use faceoff_dataset::{max_file_bytes, writable_files};
 use faceoff_service::{
     app::App,
     free_space,
@@ -21,9 +21,6 @@ use faceoff_service::{
 use faceoff_store::Store;
 use faceoff_types::WorkerName;
 use faceoff_wire::grant::Grant;
-
-/// The largest file of a recording, in bytes: far more than any shard writes.
-const MAX_FILE_BYTES: u64 = 4 << 30;
 
 pub(crate) fn router() -> Router<App> {
     Router::new()
@@ -94,7 +91,7 @@ async fn store_file(
         return Err(problem);
     }
     let (dir, rate) = (&app.config.upload_dir, app.config.limits.min_upload_rate);
-    let file = bundle_stream::receive_file(body, dir, MAX_FILE_BYTES, rate).await?;
+    let file = bundle_stream::receive_file(body, dir, max_file_bytes(&name), rate).await?;
     // A body takes time to arrive. So the lease, and whether files may still change, are checked when it is complete. From
     // then on the storing is a task of its own, which a closed connection does not interrupt.
     let stored = tokio::spawn(async move {

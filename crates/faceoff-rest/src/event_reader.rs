@@ -1,12 +1,11 @@
 //! A reader of the event stream, which is one connection of a client. It decides which events of the log the client gets
 //! next, and when. A client that reconnects continues at the id of its last event.
 
-use crate::sse::is_token_valid;
+use crate::sse::is_still_valid;
 use axum::response::sse::Event;
 use faceoff_notify::{Audience, Notice, NoticeFilter, Page};
 use faceoff_service::{app::App, problem::Problem, shutdown::Shutdown};
-use faceoff_store::Change;
-use faceoff_types::TokenId;
+use faceoff_store::{Change, Requester};
 use std::time::Duration;
 use tokio::{
     sync::{
@@ -32,8 +31,8 @@ const MAX_SKIPPED: i64 = 1000;
 pub(crate) struct Subscription {
     /// As whom the client may see events.
     pub(crate) audience: Audience,
-    /// The token of the request; the stream ends when it becomes invalid.
-    pub(crate) token: Option<TokenId>,
+    /// Who has made the request; the stream ends when the token becomes invalid.
+    pub(crate) requester: Option<Requester>,
     /// Which events the client wants.
     pub(crate) filter: NoticeFilter,
 }
@@ -119,7 +118,7 @@ impl EventReader {
             sleep_until(self.next_read_at).await;
             let page = self.app.feed.page_after(self.last_read).await?;
             // Checked after the log is read: a token that was revoked meanwhile gets no further event.
-            if !is_token_valid(&self.app, self.subscription.token).await? {
+            if !is_still_valid(&self.app, self.subscription.requester.as_ref()).await? {
                 return Ok(None);
             }
             let Some(page) = page else {

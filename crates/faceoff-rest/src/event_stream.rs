@@ -66,7 +66,7 @@ pub(crate) async fn follow_events(
     let viewer = caller.as_ref().map_or(Viewer::Visitor, Viewer::new);
     let subscription = Subscription {
         audience: viewer.into(),
-        token: caller.map(|caller| caller.token.id),
+        requester: caller.map(|caller| caller.requester()),
         filter,
     };
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);

@@ -165,7 +165,7 @@ async fn verify(
     match app.store.verify_token_id(creator_token, now).await? {
         Ok(VerifiedToken { token, principal }) => {
             app.check_rate(token.id)?;
-            let creator = Caller { token, principal };
+            let creator = Caller::new(token, token_hash, principal);
             request_log::record_actor(&creator.actor());
             Ok(creator)
         }

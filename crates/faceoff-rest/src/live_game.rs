@@ -62,8 +62,8 @@ pub(crate) async fn watch_game(
         ));
     };
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
-    let token = caller.map(|caller| caller.token.id);
-    let reader = LiveReader::new(app, id, token, last_event_id, shutdown, permit);
+    let requester = caller.map(|caller| caller.requester());
+    let reader = LiveReader::new(app, id, requester, last_event_id, shutdown, permit);
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))

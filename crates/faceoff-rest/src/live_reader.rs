@@ -1,7 +1,7 @@
 //! A reader of a live game's stream, which is one connection of a client. It decides which events the client gets next, and
 //! when. A game that is run again has a new *attempt*; *live data* is what the running attempt reports to this process.
 
-use crate::sse::is_token_valid;
+use crate::sse::is_still_valid;
 use axum::response::sse::Event;
 use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
 use faceoff_live::{LiveCursor, LiveSubscription, LiveUpdate};
@@ -10,8 +10,8 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     shutdown::Shutdown,
 };
-use faceoff_store::{GameState, StoreError};
-use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame, TokenId};
+use faceoff_store::{GameState, Requester, StoreError};
+use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame};
 use serde::Serialize;
 use std::time::Duration;
 use tokio::{
@@ -32,8 +32,8 @@ const MAX_DURATION: Duration = Duration::from_secs(3600);
 pub(crate) struct LiveReader {
     app: App,
     game: GameId,
-    /// The token of the request; the stream ends when it becomes invalid.
-    token: Option<TokenId>,
+    /// Who has made the request; the stream ends when the token becomes invalid.
+    requester: Option<Requester>,
     /// Time of the next check of the token.
     next_token_check_at: Instant,
     /// The game's live data; `None` while there is none.
@@ -67,7 +67,7 @@ impl LiveReader {
     pub(crate) fn new(
         app: App,
         game: GameId,
-        token: Option<TokenId>,
+        requester: Option<Requester>,
         cursor: Option<LiveCursor>,
         shutdown: Option<Shutdown>,
         permit: OwnedSemaphorePermit,
@@ -76,7 +76,7 @@ impl LiveReader {
         Self {
             app,
             game,
-            token,
+            requester,
             next_token_check_at: now,
             subscription: None,
             cursor,
@@ -120,7 +120,7 @@ impl LiveReader {
         loop {
             let now = Instant::now();
             if now >= self.next_token_check_at {
-                if !is_token_valid(&self.app, self.token).await? {
+                if !is_still_valid(&self.app, self.requester.as_ref()).await? {
                     return Ok(None);
                 }
                 self.next_token_check_at = now + TOKEN_CHECK_INTERVAL;

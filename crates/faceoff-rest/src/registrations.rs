@@ -65,7 +65,9 @@ pub(crate) async fn approve_registration(
     State(app): State<App>,
     PathParam(id): PathParam<RegistrationId>,
 ) -> Result<Json<RegistrationView>, Problem> {
-    let approved = registrations::approve_registration(&app, organiser.actor(), id).await?;
+    let approved =
+        registrations::approve_registration(&app, organiser.actor(), organiser.requester(), id)
+            .await?;
     Ok(Json(invitation::registration(approved)))
 }
 

@@ -8,8 +8,7 @@ use axum::{
     },
 };
 use faceoff_service::{app::App, problem::Problem};
-use faceoff_store::StoreError;
-use faceoff_types::TokenId;
+use faceoff_store::Requester;
 use futures::{Stream, StreamExt as _, stream};
 use std::{convert::Infallible, time::Duration};
 
@@ -18,15 +17,17 @@ pub(super) const LAST_EVENT_ID: &str = "last-event-id";
 /// Time between two messages that keep a silent connection open. Proxies close connections that are silent for a minute.
 const KEEP_ALIVE_INTERVAL: Duration = Duration::from_secs(15);
 
-/// Whether the token of a stream's request is still valid; without one, the stream is a visitor's.
-pub(super) async fn is_token_valid(app: &App, token: Option<TokenId>) -> Result<bool, Problem> {
-    let Some(token) = token else {
-        return Ok(true);
-    };
-    match app.store.token(token).await {
-        Ok(token) => Ok(token.is_valid(app.config.clock.now())),
-        Err(StoreError::NotFound(_)) => Ok(false),
-        Err(error) => Err(error.into()),
+/// Whether the token of a stream's request is still valid, with the secret that was sent; without one, the stream is a visitor's.
+pub(super) async fn is_still_valid(
+    app: &App,
+    requester: Option<&Requester>,
+) -> Result<bool, Problem> {
+    match requester {
+        Some(requester) => Ok(app
+            .store
+            .is_valid(requester, app.config.clock.now())
+            .await?),
+        None => Ok(true),
     }
 }
 

@@ -43,7 +43,7 @@ pub(crate) async fn create_team(
             organiser.actor(),
             &name,
             token.hash(),
-            organiser.maker(),
+            organiser.requester(),
             now,
         )
         .await?;
@@ -84,7 +84,13 @@ pub(crate) async fn replace_token(
     let token = Secret::generate(SecretKind::Team).map_err(Problem::internal)?;
     let now = app.config.clock.now();
     app.store
-        .set_team_token(organiser.actor(), id, token.hash(), organiser.maker(), now)
+        .set_team_token(
+            organiser.actor(),
+            id,
+            token.hash(),
+            organiser.requester(),
+            now,
+        )
         .await?;
     tracing::info!(team = %team.name, id = %team.id, "team token replaced");
     Ok(Json(TeamWithToken {

@@ -13,7 +13,7 @@ use faceoff_api::{
 use faceoff_service::{
     app::App,
     auth::Caller,
-    extract::{Json as Body, PathParam},
+    extract::{Json as Body, PathParam, QueryParams},
     problem::Problem,
     services::tokens,
     views::{token, user},
@@ -71,7 +71,7 @@ pub(crate) async fn create_token(
     params(("id" = TokenId, Path)),
     responses(
         (status = 200, body = NewTokenView),
-        (status = 404),
+        (status = 403, description = "another user's token, or one of the host"), (status = 404),
         (status = 409, description = "it is a session, is revoked or expired, or is the host's token in the data folder"),
     )
 )]
@@ -83,16 +83,18 @@ pub(crate) async fn rotate_token(
     tokens::rotate_token(&app, &caller, id).await.map(Json)
 }
 
-/// Revokes a token, or ends a session. If it is another user's, a team's or the host's, all that was made with it ends, too.
+/// Revokes a token, or ends a session. Unless it is your own, all that was made with it ends, too; `made` says otherwise.
 #[utoipa::path(
     delete, path = "/tokens/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
-    params(("id" = TokenId, Path)),
+    params(("id" = TokenId, Path), requests::RevocationQuery),
     responses((status = 200, body = RevokedTokenView), (status = 404))
 )]
 pub(crate) async fn revoke_token(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<TokenId>,
+    QueryParams(query): QueryParams<requests::RevocationQuery>,
 ) -> Result<Json<RevokedTokenView>, Problem> {
-    tokens::revoke_token(&app, &caller, id).await.map(Json)
+    let revoked = tokens::revoke_token(&app, &caller, id, query.made);
+    revoked.await.map(Json)
 }

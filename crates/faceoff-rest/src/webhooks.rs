@@ -110,7 +110,7 @@ pub(crate) async fn create_webhook(
         url: checked_url(&app, &request.url)?,
         topics: checked_filter(&request.about)?,
         secret: secret.bytes(),
-        maker: caller.maker(),
+        requester: caller.requester(),
     };
     let now = app.config.clock.now();
     let webhook = app
@@ -175,7 +175,7 @@ pub(crate) async fn change_webhook(
         url: url.map(|url| checked_url(&app, url)).transpose()?,
         topics: changes.about.as_deref().map(checked_filter).transpose()?,
         enable: changes.state.is_some(),
-        maker: caller.maker(),
+        requester: caller.requester(),
     };
     let now = app.config.clock.now();
     let webhook = app

@@ -37,6 +37,8 @@ pub(crate) struct ChildSetup {
     pub answered_calls: Option<AnsweredCalls>,
     /// Filters that the child installs itself; used without bubblewrap.
     pub filters: Option<Filters>,
+    /// Files that the agent makes have the usual modes, whatever the service's umask.
+    pub has_usual_umask: bool,
     /// Makes the agent the first victim of the OOM killer when the host runs out of memory.
     pub raise_oom_score: bool,
 }
@@ -141,6 +143,9 @@ impl ChildSetup {
 
     fn run(&mut self, parent: process::Pid) -> Result<(), (Step, Errno)> {
         close_rest_on_exec().map_err(|error| (Step::CloseDescriptors, error))?;
+        if self.has_usual_umask {
+            process::umask(Mode::WGRP | Mode::WOTH);
+        }
         for procs in &self.cgroup_procs {
             write(procs, b"0").map_err(|error| (Step::EnterCgroup, error))?;
         }

@@ -92,6 +92,7 @@ impl Launch {
             },
             user,
             answered_calls,
+            has_usual_umask: true,
             raise_oom_score: true,
             ..ChildSetup::default()
         };

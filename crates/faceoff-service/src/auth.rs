@@ -13,7 +13,7 @@ use axum::{
 };
 use faceoff_api::token::hash_token;
 use faceoff_store::{
-    Actor, Maker, Principal, StoreError, Team, Token, TokenKind, TokenRejection, User,
+    Actor, Principal, Requester, StoreError, Team, Token, TokenKind, TokenRejection, User,
     VerifiedToken,
 };
 use faceoff_types::TeamId;
@@ -25,10 +25,21 @@ use std::sync::Arc;
 pub struct Caller {
     /// The token or session of the request.
     pub token: Token,
+    /// Hash of the token's secret.
+    secret_hash: [u8; 32],
     pub principal: Principal,
 }
 
 impl Caller {
+    /// A caller whose token has been verified. `secret_hash` is the hash of its secret.
+    pub const fn new(token: Token, secret_hash: [u8; 32], principal: Principal) -> Self {
+        Self {
+            token,
+            secret_hash,
+            principal,
+        }
+    }
+
     /// The caller as the event log writes it.
     pub const fn actor(&self) -> Actor {
         match &self.principal {
@@ -38,11 +49,11 @@ impl Caller {
         }
     }
 
-    /// The maker of what the caller makes.
-    pub fn maker(&self) -> Maker {
-        Maker {
+    /// Who makes the request, for checks in the transaction of a change.
+    pub fn requester(&self) -> Requester {
+        Requester {
             user: self.user().map(|user| user.id),
-            token: Some(self.token.id),
+            token: Some((self.token.id, self.secret_hash)),
         }
     }
 
@@ -105,9 +116,9 @@ impl Caller {
 pub struct Organiser(Caller);
 
 impl Organiser {
-    /// The maker of what the caller makes.
-    pub fn maker(&self) -> Maker {
-        self.0.maker()
+    /// Who makes the request, for checks in the transaction of a change.
+    pub fn requester(&self) -> Requester {
+        self.0.requester()
     }
 
     /// # Errors
@@ -215,7 +226,8 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     let now = app.config.clock.now();
     // The time of a look-up by hash may depend on the hash. That is safe: a token whose hash shares a prefix with
     // another one cannot be chosen.
-    let verified = app.store.verify_token(hash_token(token), kind, now).await?;
+    let secret_hash = hash_token(token);
+    let verified = app.store.verify_token(secret_hash, kind, now).await?;
     let VerifiedToken { token, principal } = match verified {
         Ok(verified) => verified,
         // With an expired session cookie the caller is a visitor.
@@ -224,7 +236,7 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     };
     app.check_rate(token.id)?;
     record_use(app, &token, now);
-    let caller = Caller { token, principal };
+    let caller = Caller::new(token, secret_hash, principal);
     request_log::record_actor(&caller.actor());
     Ok(Some(caller))
 }

@@ -17,7 +17,7 @@ use faceoff_types::UserId;
 use jiff::{SignedDuration, Timestamp};
 use std::{
     collections::HashMap,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use tokio::sync::Semaphore;
 
@@ -30,7 +30,7 @@ const MAX_PARALLEL: usize = 2;
 /// Requests that may wait for a hash at the same time; further ones are refused.
 const MAX_WAITING: usize = 64;
 /// Requests of one client among them. Clients whose address is unknown, behind a proxy that does not name it, count as one.
-const MAX_WAITING_PER_CLIENT: usize = 2;
+const MAX_WAITING_PER_CLIENT: usize = 8;
 const MAX_WAITING_UNKNOWN: usize = 16;
 /// Number of wrong passwords for a name that cause no delay.
 const FREE_ATTEMPTS: u32 = 5;
@@ -47,9 +47,9 @@ const REMEMBERED_FOR: SignedDuration = SignedDuration::from_hours(1);
 #[derive(Debug)]
 pub struct Passwords {
     /// One permit per hash that is being computed.
-    hashing: Semaphore,
+    hashing: Arc<Semaphore>,
     /// Number of requests that wait for a hash or compute one, by client.
-    places: Mutex<HashMap<Option<Network>, usize>>,
+    places: Arc<Mutex<HashMap<Option<Network>, usize>>>,
     failures: Mutex<HashMap<NameKey, Failures>>,
 }
 
@@ -104,22 +104,22 @@ impl Failures {
 impl Default for Passwords {
     fn default() -> Self {
         Self {
-            hashing: Semaphore::new(MAX_PARALLEL),
-            places: Mutex::default(),
+            hashing: Arc::new(Semaphore::new(MAX_PARALLEL)),
+            places: Arc::default(),
             failures: Mutex::default(),
         }
     }
 }
 
 /// A place in the queue for hashes, until it is dropped.
-struct Place<'a> {
-    places: &'a Mutex<HashMap<Option<Network>, usize>>,
+struct Place {
+    places: Arc<Mutex<HashMap<Option<Network>, usize>>>,
     client: Option<Network>,
 }
 
-impl Drop for Place<'_> {
+impl Drop for Place {
     fn drop(&mut self) {
-        let mut places = lock(self.places);
+        let mut places = lock(&self.places);
         if let Some(count) = places.get_mut(&self.client) {
             *count -= 1;
             if *count == 0 {
@@ -147,7 +147,7 @@ pub fn check(password: &str) -> Result<(), Problem> {
 
 impl Passwords {
     /// A place in the queue for hashes.
-    fn take_place(&self, client: Option<Network>) -> Result<Place<'_>, Problem> {
+    fn take_place(&self, client: Option<Network>) -> Result<Place, Problem> {
         let max = match client {
             Some(_) => MAX_WAITING_PER_CLIENT,
             None => MAX_WAITING_UNKNOWN,
@@ -166,22 +166,26 @@ impl Passwords {
         }
         *own += 1;
         Ok(Place {
-            places: &self.places,
+            places: Arc::clone(&self.places),
             client,
         })
     }
 
-    /// Runs `compute_hash` on a blocking thread, [`MAX_PARALLEL`] at a time.
+    /// Runs `compute_hash` on a blocking thread, [`MAX_PARALLEL`] at a time. It holds its place to the end, also if the client has closed
+    /// the connection.
     async fn run_hashing<T: Send + 'static>(
         &self,
-        _place: Place<'_>,
+        place: Place,
         compute_hash: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
         // Permits are given in the order of the requests.
-        let _permit = self.hashing.acquire().await.map_err(Problem::internal)?;
-        tokio::task::spawn_blocking(compute_hash)
-            .await
-            .map_err(Problem::internal)
+        let permit = Arc::clone(&self.hashing).acquire_owned().await;
+        let permit = permit.map_err(Problem::internal)?;
+        let computed = tokio::task::spawn_blocking(move || {
+            let _held = (place, permit);
+            compute_hash()
+        });
+        computed.await.map_err(Problem::internal)
     }
 
     /// Hashes a new password. The result is a PHC string: algorithm, parameters, salt and hash in one text.
@@ -390,7 +394,7 @@ mod tests {
     #[tokio::test]
     async fn client_has_few_places_and_leaves_others_theirs() {
         let passwords = Passwords::default();
-        let places: Vec<_> = (0..2)
+        let places: Vec<_> = (0..MAX_WAITING_PER_CLIENT)
             .map(|_| {
                 passwords
                     .take_place(client(1))
@@ -417,6 +421,32 @@ mod tests {
                 .is_ok()
         );
         assert!(lock(&passwords.places).is_empty());
+    }
+
+    #[tokio::test]
+    async fn closed_connection_keeps_its_place_while_the_hash_is_computed() {
+        let passwords = Passwords::default();
+        let (started, is_started) = std::sync::mpsc::channel();
+        let (end, ended) = std::sync::mpsc::channel::<()>();
+        let place = passwords
+            .take_place(client(1))
+            .unwrap_or_else(|_| panic!("a place"));
+        let computing = passwords.run_hashing(place, move || {
+            let _ = started.send(());
+            let _ = ended.recv();
+        });
+        let mut computing = Box::pin(computing);
+        while is_started.try_recv().is_err() {
+            let pause = std::time::Duration::from_millis(1);
+            let _ = tokio::time::timeout(pause, &mut computing).await;
+        }
+        drop(computing);
+        assert_eq!(lock(&passwords.places).len(), 1);
+        assert_eq!(passwords.hashing.available_permits(), MAX_PARALLEL - 1);
+        drop(end);
+        while !lock(&passwords.places).is_empty() {
+            tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+        }
     }
 
     #[test]

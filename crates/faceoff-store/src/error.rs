@@ -66,6 +66,9 @@ pub enum StoreError {
     /// No member of the team has accepted the current terms.
     #[error("no member of the team has accepted version {version} of the terms")]
     TermsNotAccepted { version: u32 },
+    /// The request's token was revoked or replaced, or its user removed, while the request was under way.
+    #[error("the token of the request is no longer valid")]
+    TokenInvalid,
     /// Names that differ only in case count as the same.
     #[error("a user named {0:?} exists already")]
     UserNameTaken(String),

@@ -62,6 +62,7 @@ pub use operations::{
     proposals::Reevaluation,
     purpose::JobFilter,
     registrations::{MAX_PENDING_REGISTRATIONS, NewRegistration},
+    requester::Requester,
     rerun::RERUN_PAUSES_S,
     retention::{FILES_KEPT_FOR, RemovalSummary},
     runs::RunOwner,
@@ -70,8 +71,8 @@ pub use operations::{
     submission_description::SubmissionDescription,
     teams::TeamChange,
     tokens::{
-        LAST_USE_INTERVAL, MAX_TOKENS, NewToken, Principal, RevokedToken, SESSION_LIFETIME,
-        TokenRejection, VerifiedToken,
+        EndMade, LAST_USE_INTERVAL, MAX_TOKENS, NewToken, Principal, RevokedToken,
+        SESSION_LIFETIME, TokenRejection, VerifiedToken,
     },
     tournament::{
         entrants::DepartureRequest,

@@ -1,6 +1,6 @@
 //! Teams, their submissions, and the outcome of validation runs.
 
-use faceoff_store::{Actor, ClaimedJob, Job, Maker, Store, Submission, Team, UploadQuota};
+use faceoff_store::{Actor, ClaimedJob, Job, Requester, Store, Submission, Team, UploadQuota};
 use faceoff_types::{BundleRef, TeamId, ValidationOutcome};
 use jiff::Timestamp;
 
@@ -15,7 +15,7 @@ pub async fn create_team(store: &Store, name: &str, now: Timestamp) -> Team {
             Actor::Organiser,
             &name.parse().unwrap(),
             token_hash,
-            Maker::default(),
+            Requester::default(),
             now,
         )
         .await

@@ -87,7 +87,7 @@ pub use magnitudes::{InvalidMagnitude, Magnitude, MagnitudeInfo, Magnitudes};
 pub use millionths::{Millionths, NotMillionths};
 pub use names::{DivisionName, InvalidName, StageName, TeamName, UserName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
-pub use printable::{escape_unprintable, is_printable};
+pub use printable::{escape_unprintable, is_printable, printable_excerpt};
 pub use profile::{Profile, ProfileMap};
 pub use recording::{RecordingColumn, RecordingColumns};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult};

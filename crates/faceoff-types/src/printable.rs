@@ -45,9 +45,29 @@ pub fn escape_unprintable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// The first characters of a text from outside, such as a worker's message, safe to show.
+#[must_use]
+pub fn printable_excerpt(text: &str, max_chars: usize) -> String {
+    let end = text.char_indices().nth(max_chars);
+    let excerpt = end.map_or(text, |(end, _)| &text[..end]);
+    escape_unprintable(excerpt).into_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn excerpt_has_at_most_so_many_characters() {
+        for (text, excerpt) in [
+            ("", ""),
+            ("größer", "größ"),
+            ("größ", "größ"),
+            ("a\u{1b}bcd", "a\\u001bbc"),
+        ] {
+            assert_eq!(printable_excerpt(text, 4), excerpt);
+        }
+    }
 
     #[test]
     fn control_and_bidi_characters_are_escaped() {

@@ -2,18 +2,15 @@
 
 use std::borrow::Cow;
 
-/// The URL without the user and password that it may contain.
+/// The URL without what may be a user and a password. The text may be malformed, as in the message of an error.
 #[must_use]
 pub fn without_password(url: &str) -> Cow<'_, str> {
-    let Some((scheme, rest)) = url.split_once("://") else {
+    let Some(at) = url.rfind('@') else {
         return url.into();
     };
-    let end = rest.find(['/', '?', '#']).unwrap_or(rest.len());
-    // A password may contain @.
-    match rest[..end].rfind('@') {
-        Some(at) => format!("{scheme}://…{}", &rest[at..]).into(),
-        None => url.into(),
-    }
+    let scheme = url.find("://").filter(|end| *end < at);
+    let scheme = scheme.map_or("", |end| &url[..end + 3]);
+    format!("{scheme}…{}", &url[at..]).into()
 }
 
 #[cfg(test)]
@@ -25,9 +22,10 @@ mod tests {
         for (url, expected) in [
             ("nats://127.0.0.1:4222", "nats://127.0.0.1:4222"),
             ("nats://user:p@ss@host:4222", "nats://…@host:4222"),
-            ("https://token@host/a@b?c@d", "https://…@host/a@b?c@d"),
-            ("https://host/a@b", "https://host/a@b"),
-            ("no URL @", "no URL @"),
+            ("nats://user:p/a?s#s@host", "nats://…@host"),
+            ("user:secret@host:4222", "…@host:4222"),
+            ("https://host/a@b", "https://…@b"),
+            ("a@b://c", "…@b://c"),
         ] {
             assert_eq!(without_password(url), expected);
         }

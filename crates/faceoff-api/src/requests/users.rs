@@ -4,7 +4,7 @@ use super::double_option::{deserialize_some, serialize_option};
 use faceoff_types::{DivisionName, TeamId, TeamName, UserId, UserName};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
 /// An API token to create.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
@@ -19,6 +19,27 @@ pub struct NewToken {
     /// clients. Default: the token acts for the caller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub team: Option<TeamId>,
+}
+
+/// What happens to the tokens, invitations and webhooks that were made with a revoked token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Made {
+    /// They stay.
+    Keep,
+    /// They end.
+    End,
+}
+
+/// The extent of a revocation.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
+#[serde(default, deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct RevocationQuery {
+    /// What happens to all that was made with the token. Default: it ends, unless the token is your own: others may have used it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[param(inline)]
+    pub made: Option<Made>,
 }
 
 /// The role that an invitation gives.
@@ -49,7 +70,7 @@ pub struct NewInvitation {
     pub person: Option<UserId>,
     /// A label for lists, e.g. the invited person's name. 1 to 80 characters.
     pub note: String,
-    /// When the invitation expires, at most 90 days from now. Default: in seven days.
+    /// When the invitation expires, at most 90 days from now, for `return` 24 hours. Default: in seven days, for `return` in 24 hours.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expires_at: Option<Timestamp>,
 }

@@ -9,17 +9,54 @@ use crate::views::{
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What ended beside the user's own tokens and sessions, and what stays.
+/// What ended beside the token itself, or beside the user's own tokens and sessions; and which accounts stay.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EndedCredentialsView {
-    /// Revoked tokens of teams and of the host.
+    /// Revoked tokens.
     pub tokens: Vec<TokenView>,
     /// Revoked invitations.
     pub invitations: Vec<InvitationView>,
-    /// Disabled webhooks. They can be enabled again.
+    /// Disabled webhooks. They can be enabled again; check the address and rotate the secret before.
     pub webhooks: Vec<WebhookView>,
-    /// Users who joined by invitations of the user. Their accounts stay: close them, if they are unknown to you.
+    /// Users who joined by these invitations, or by invitations of such users. Their accounts stay: close those that you do not know.
     pub remaining_people: Vec<UserView>,
+    /// Users who got access again by a link of this user. Their accounts stay: unless it was they who asked for it, make a new link for
+    /// them (the role `return`), which ends everything else.
+    #[serde(default)]
+    pub restored_people: Vec<UserView>,
+}
+
+impl EndedCredentialsView {
+    /// What ended and what stays, a line each, for people.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let tokens = self.tokens.iter();
+        let invitations = self.invitations.iter();
+        let webhooks = self.webhooks.iter();
+        let remaining = self.remaining_people.iter();
+        let restored = self.restored_people.iter();
+        tokens
+            .map(|token| format!("ended: token {} ({})", token.name, token.id))
+            .chain(invitations.map(|invitation| {
+                format!("ended: invitation for {} ({})", invitation.note, invitation.id)
+            }))
+            .chain(webhooks.map(|webhook| {
+                format!(
+                    "ended: webhook {} ({}); before you enable it again, check its address and rotate its secret",
+                    webhook.name, webhook.id
+                )
+            }))
+            .chain(remaining.map(|user| {
+                format!("stays: the account of {}, who joined by such an invitation", user.name)
+            }))
+            .chain(restored.map(|user| {
+                format!(
+                    "stays: the account of {0}, who got access again by such a link; unless {0} asked for it, make a new link",
+                    user.name
+                )
+            }))
+            .collect()
+    }
 }
 
 /// A revoked token.

@@ -270,6 +270,18 @@ fn damaged_shards_are_refused() {
     assert_refused(&evaluation, "damaged or incomplete: shard.json");
     fs::remove_file(&path).unwrap();
     assert_refused(&evaluation, "damaged or incomplete: shard.json");
+    // It would be read whole.
+    let text = String::from_utf8(intact.clone()).unwrap();
+    fs::write(&path, text.clone() + &" ".repeat(1 << 20)).unwrap();
+    assert_refused(&evaluation, "shard.json: larger than 1048576 bytes");
+    let schema = text.replace("faceoff-shard/5", &"long".repeat(10_000));
+    fs::write(&path, schema).unwrap();
+    let Err(error) = evaluation.assemble("dataset.zip") else {
+        panic!("a shard of an unknown layout is refused");
+    };
+    let error = error.to_string();
+    assert!(error.contains("its layout is \"longlong"), "{error}");
+    assert!(error.len() < 1000, "{} bytes", error.len());
     fs::write(&path, &intact).unwrap();
     evaluation.assemble("whole.zip").unwrap();
     assert!(evaluation.dir.path().join("whole.zip").exists());

@@ -1,7 +1,7 @@
 //! Tests of the end of credentials (tokens, invitations, webhooks) with the rights of the user who made them.
 
 use crate::{
-    browser::PASSWORD,
+    browser::{Browser, PASSWORD},
     site::{ADMIN, Answer, Site, string},
     users::{User, get, invite, join, member, organiser, post},
 };
@@ -255,6 +255,12 @@ async fn token_revoked_by_others_ends_what_it_made() {
         assert_revoked(&site, &string(&token["secret"])).await;
     }
     get(&site, "/whoami", &string(&own["secret"])).await;
+    // Another choice is possible.
+    let path = format!("/tokens/{}?made=keep", string(&own["id"]));
+    let revoked = delete(&site, &path, ADMIN).await.json(200);
+    assert_eq!(revoked.get("ended"), None, "{revoked:#}");
+    let refused = delete(&site, &path.replace("keep", "all"), ADMIN).await;
+    refused.problem(400, "invalid-request", &["made"]);
     // A user who ends an own token or session keeps what was made with it.
     let laptop = new_token(&site, &ada.token, json!({ "name": "laptop" })).await;
     let robot = new_token(&site, &string(&laptop["secret"]), of_team("robot")).await;
@@ -262,4 +268,111 @@ async fn token_revoked_by_others_ends_what_it_made() {
     let revoked = delete(&site, &path, &ada.token).await.json(200);
     assert_eq!(revoked.get("ended"), None, "{revoked:#}");
     get(&site, "/whoami", &string(&robot["secret"])).await;
+}
+
+#[tokio::test]
+async fn stolen_token_cannot_cut_off_what_it_made() {
+    let site = Site::start().await;
+    let alpha = site.team("Alpha").await;
+    let ada = member(&site, &alpha.id, "Ada").await;
+    let make = async |token: &str, name: &str| {
+        let made = new_token(&site, token, json!({ "name": name })).await;
+        (string(&made["id"]), string(&made["secret"]))
+    };
+    let (stolen_id, stolen) = make(&ada.token, "stolen").await;
+    // Its own end, or a new secret, does not separate a token from what made it.
+    let (middle_id, middle) = make(&stolen, "middle").await;
+    let (_, last) = make(&middle, "last").await;
+    delete(&site, &format!("/tokens/{middle_id}"), &middle)
+        .await
+        .json(200);
+    let (rotated_id, rotated) = make(&stolen, "rotated").await;
+    let rotate = format!("/tokens/{rotated_id}/rotate");
+    let rotated = post(&site, &rotate, &rotated, &json!({})).await.json(200);
+    let own = json!({ "role": "member", "note": "Eve" });
+    let eve = join(&site, &invite(&site, &stolen, &own).await, "Eve").await;
+    let puppet = join(&site, &invite(&site, &eve.token, &own).await, "Puppet").await;
+    remove(&site, ADMIN, &eve, "Eve").await;
+
+    let path = format!("/tokens/{stolen_id}");
+    let revoked = delete(&site, &path, ADMIN).await.json(200);
+    let ended = &revoked["ended"];
+    assert_eq!(field(&ended["tokens"], "name"), ["rotated", "last"]);
+    assert_eq!(field(&ended["remaining_people"], "name"), ["Puppet"]);
+    assert_revoked(&site, &last).await;
+    assert_revoked(&site, &string(&rotated["secret"])).await;
+    get(&site, "/whoami", &puppet.token).await;
+}
+
+#[tokio::test]
+async fn restored_users_are_listed() {
+    let site = Site::start().await;
+    let alice = organiser(&site, "Alice").await;
+    let mallory = organiser(&site, "Mallory").await;
+    let link = |user: &User| json!({ "role": "return", "person": user.id, "note": "a link" });
+    let code = invite(&site, &mallory.token, &link(&alice)).await;
+    let request = json!({ "code": code, "password": PASSWORD });
+    site.post("/api/v1/invitations/accept", None, &request)
+        .await
+        .json(201);
+    // A link for oneself works.
+    let code = invite(&site, &mallory.token, &link(&mallory)).await;
+    let request = json!({ "code": code, "password": PASSWORD });
+    let restored = site
+        .post("/api/v1/invitations/accept", None, &request)
+        .await;
+    let restored = restored.json(201);
+    get(&site, "/whoami", &string(&restored["secret"])).await;
+    let removed = remove(&site, ADMIN, &mallory, "Mallory").await;
+    let ended = &removed["ended"];
+    assert_eq!(
+        field(&ended["restored_people"], "name"),
+        ["Alice"],
+        "{ended:#}"
+    );
+    assert_eq!(ended["remaining_people"], json!([]));
+}
+
+#[tokio::test]
+async fn approved_registration_ends_with_its_organiser() {
+    let site = Site::start().await;
+    let grace = organiser(&site, "Grace").await;
+    site.patch(
+        "/api/v1/season",
+        Some(ADMIN),
+        &json!({ "takes_registrations": true }),
+    )
+    .await
+    .json(200);
+    let request = json!({ "team": { "name": "Own" }, "contact": "grace@example.org" });
+    let registered = site.post("/api/v1/registrations", None, &request).await;
+    let registered = registered.json(201);
+    let approve = format!("/registrations/{}/approve", string(&registered["id"]));
+    post(&site, &approve, &grace.token, &json!({}))
+        .await
+        .json(200);
+    let removed = remove(&site, ADMIN, &grace, "Grace").await;
+    let notes = field(&removed["ended"]["invitations"], "note");
+    assert_eq!(notes, ["grace@example.org"]);
+    assert_invitation_revoked(&site, &string(&registered["code"])).await;
+}
+
+#[tokio::test]
+async fn page_lists_what_ended() {
+    let site = Site::start().await;
+    let alpha = site.team("Alpha").await;
+    let ada = member(&site, &alpha.id, "Ada").await;
+    let of_team = json!({ "name": "robot", "team": alpha.id });
+    new_token(&site, &ada.token, of_team).await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut browser = Browser::join(&site, "Grace", role).await;
+    let path = format!("/organiser/access/people/{}/remove", ada.id);
+    let page = browser.submit(&path, &[("confirm", "Ada")]).await;
+    for words in ["What ended with it", "ended: token robot", "User removed"] {
+        assert!(
+            page.body.contains(words),
+            "{words:?} is not in {}",
+            page.body
+        );
+    }
 }

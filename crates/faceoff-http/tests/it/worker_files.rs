@@ -8,14 +8,20 @@ use faceoff_wire::{
     game::GameSpec,
     grant::{ExpectedRecording, Grant, GrantKey, WriteScope},
 };
-use reqwest::Method;
+use reqwest::{Body, Method};
 use serde_json::json;
 
 /// How long a worker's lease lasts, in seconds.
 const WORKER_LEASE_S: u32 = 30;
 
 /// Sends a request with a grant.
-async fn send(site: &Site, method: Method, path: &str, grant: &str, body: &'static [u8]) -> Answer {
+async fn send(
+    site: &Site,
+    method: Method,
+    path: &str,
+    grant: &str,
+    body: impl Into<Body>,
+) -> Answer {
     let request = site
         .request(method, path, None)
         .header("authorization", format!("Grant {grant}"))
@@ -68,15 +74,15 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
         (Method::GET, bundle_path(&bundle)),
         (Method::PUT, "/work/files/game.zip".to_owned()),
     ] {
-        let answer = send(&site, method, &path, &sealed, b"").await;
+        let answer = send(&site, method, &path, &sealed, "").await;
         answer.problem(403, "forbidden", &["no worker has started the job"]);
     }
     start_job(&site, &claim).await;
-    let fetched = send(&site, Method::GET, &bundle_path(&bundle), &sealed, b"").await;
+    let fetched = send(&site, Method::GET, &bundle_path(&bundle), &sealed, "").await;
     assert_eq!(fetched.status, 200, "{}", fetched.body);
     assert_eq!(fetched.header("content-length"), GZIP.len().to_string());
     let other_bundle = format!("/work/bundles/{}", "0".repeat(64));
-    send(&site, Method::GET, &other_bundle, &sealed, b"")
+    send(&site, Method::GET, &other_bundle, &sealed, "")
         .await
         .problem(404, "not-found", &["bundle of this job"]);
     let put = async |name: &str, grant: &str| {
@@ -85,7 +91,7 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
             Method::PUT,
             &format!("/work/files/{name}"),
             grant,
-            b"rows",
+            "rows",
         )
         .await
     };
@@ -123,12 +129,37 @@ async fn grant_opens_its_files_while_the_lease_is_held() {
         (Method::GET, bundle_path(&bundle)),
         (Method::PUT, "/work/files/game.zip".to_owned()),
     ] {
-        send(&site, method, &path, &sealed, b"").await.problem(
+        send(&site, method, &path, &sealed, "").await.problem(
             403,
             "forbidden",
             &["no longer holds the lease"],
         );
     }
+}
+
+#[tokio::test]
+async fn files_that_are_read_whole_are_small() {
+    let site = Site::start().await;
+    let (claim, _, grant) = claim_shard(&site).await;
+    let spec = json!({
+        "task": "hit", "episodes": { "start": 0, "end": 1 }, "profile": "ideal", "seed": "0".repeat(64),
+        "mismatch_seed": "0".repeat(64), "max_faults": 3,
+    });
+    let grant = Grant {
+        write_scope: WriteScope::Folder("runs/of-this/lease".into()),
+        expected_recording: ExpectedRecording::Shard(serde_json::from_value(spec).unwrap()),
+        ..grant
+    };
+    let sealed = grant.seal(&site.grant_key()).unwrap();
+    start_job(&site, &claim).await;
+    let put = async |bytes| {
+        let path = "/work/files/shard.json";
+        send(&site, Method::PUT, path, &sealed, vec![b' '; bytes]).await
+    };
+    assert_eq!(put(1 << 20).await.status, 204);
+    put((1 << 20) + 1)
+        .await
+        .problem(413, "too-large", &["1048576"]);
 }
 
 /// A worker may report a job as done while it still sends a file. Such a file must not replace the one that was checked.
@@ -198,7 +229,7 @@ async fn banned_worker_loses_access() {
     let path = format!("/work/bundles/{}", bundle.blake3);
     start_job(&site, &claim).await;
     assert_eq!(
-        send(&site, Method::GET, &path, &sealed, b"").await.status,
+        send(&site, Method::GET, &path, &sealed, "").await.status,
         200
     );
     let worker = "rack-1".parse().unwrap();
@@ -206,7 +237,7 @@ async fn banned_worker_loses_access() {
         .store
         .ban_worker(Actor::Organiser, &worker, "it lies", site.now());
     ban.await.unwrap();
-    send(&site, Method::GET, &path, &sealed, b"").await.problem(
+    send(&site, Method::GET, &path, &sealed, "").await.problem(
         403,
         "forbidden",
         &["no longer holds the lease"],
@@ -220,7 +251,7 @@ async fn banned_worker_loses_access() {
         ..grant
     };
     let sealed = grant.seal(&site.grant_key()).unwrap();
-    send(&site, Method::GET, &path, &sealed, b"").await.problem(
+    send(&site, Method::GET, &path, &sealed, "").await.problem(
         403,
         "forbidden",
         &["this worker is banned"],

@@ -18,7 +18,7 @@ use axum::{
 };
 use faceoff_api::{
     requests::{InvitedRole, NewInvitation, NewToken},
-    views::{invitation::InvitationView, token::TokenView},
+    views::{credentials::EndedCredentialsView, invitation::InvitationView, token::TokenView},
 };
 use faceoff_service::{
     app::App,
@@ -26,7 +26,7 @@ use faceoff_service::{
     extract::{PageForm, PathParam},
     problem::Problem,
     services::{invitations, tokens, users},
-    views::{event, invitation, token, user},
+    views::{credentials, event, invitation, token, user},
 };
 use faceoff_types::{InvitationId, TeamId, TeamName, TokenId, UserId};
 use jiff::{SignedDuration, Timestamp};
@@ -55,6 +55,8 @@ struct Page {
     is_organiser: bool,
     /// Title and value of a secret, shown only once.
     secret: Option<(String, String)>,
+    /// What has ended by the change before, and what stays.
+    ended: Vec<String>,
     users: Vec<UserRow>,
     tokens: Vec<TokenRow>,
     /// Expired and revoked tokens.
@@ -106,10 +108,11 @@ fn access_path(caller: &Caller) -> &'static str {
     }
 }
 
-/// A secret to show, and values of a refused form.
+/// A secret or the effects of a change to show, and values of a refused form.
 #[derive(Default)]
 struct PageState {
     secret: Option<(String, String)>,
+    ended: Vec<String>,
     token_name: String,
     note: String,
 }
@@ -235,6 +238,7 @@ async fn page_with(
         closed_invitations,
         teams: teams.into_iter().map(|team| (team.id, team.name)).collect(),
         secret: state.secret,
+        ended: state.ended,
         token_name: state.token_name,
         note: state.note,
     };
@@ -333,6 +337,28 @@ async fn after_change<T>(
     }
 }
 
+/// As [`after_change`]; if anything else has ended, the page lists it.
+async fn after_ending(
+    app: &App,
+    caller: &Caller,
+    changed: Result<Option<EndedCredentialsView>, Problem>,
+    key: &'static str,
+) -> Result<Response, PageProblem> {
+    match changed {
+        Ok(Some(ended)) => {
+            let state = PageState {
+                ended: ended.lines(),
+                ..PageState::default()
+            };
+            let done = DoneQuery {
+                done: Some(key.to_owned()),
+            };
+            page_with(app, caller, Notice::Done(&done), state).await
+        }
+        changed => after_change(app, caller, changed, key).await,
+    }
+}
+
 async fn revoke_token(
     PageUser(caller): PageUser,
     State(app): State<App>,
@@ -340,8 +366,9 @@ async fn revoke_token(
     form: Result<PageForm<EmptyForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
-    let changed = tokens::revoke_token(&app, &caller, id).await;
-    after_change(&app, &caller, changed, "revoked").await
+    let changed = tokens::revoke_token(&app, &caller, id, None).await;
+    let ended = changed.map(|revoked| revoked.ended);
+    after_ending(&app, &caller, ended, "revoked").await
 }
 
 #[derive(Deserialize)]
@@ -442,5 +469,7 @@ async fn remove_user(
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let confirm = Some(form.confirm.trim());
     let changed = users::remove_user(&app, &caller, id, confirm).await;
-    after_change(&app, &caller, changed, "removed").await
+    let now = app.config.clock.now();
+    let ended = changed.map(|(_, ended)| credentials::ended(ended, now));
+    after_ending(&app, &caller, ended, "removed").await
 }

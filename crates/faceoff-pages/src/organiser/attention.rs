@@ -145,21 +145,23 @@ async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
     for (user, count) in wrong.by_user.iter().take(MAX_LISTED_NAMES) {
         names.push(format!("{count} for {}", app.store.user(*user).await?.name));
     }
-    if wrong.by_user.len() > MAX_LISTED_NAMES {
-        names.push("others for further users".to_owned());
+    let others = wrong.by_user.iter().skip(MAX_LISTED_NAMES);
+    let others: u32 = others.map(|(_, count)| count).sum();
+    if others > 0 {
+        names.push(format!("{others} for other users"));
     }
     if wrong.unknown_names > 0 {
         names.push(format!(
-            "{} for names that no user has",
+            "{} for names without a password",
             wrong.unknown_names
         ));
     }
     Ok(Some(Item {
         class: "waiting",
-        title: "Somebody may be guessing passwords".to_owned(),
+        title: "Many wrong passwords".to_owned(),
         detail: format!(
-            "{} wrong ones since the last right one of each name, within about an hour: {}. Sign-ins with these names are delayed; tokens, \
-             sessions and new links work.",
+            "{} within about an hour: {}. After five wrong ones, sign-ins with a name have to wait; tokens, sessions and new \
+             links work.",
             wrong.total(),
             names.join(", ")
         ),

@@ -11,8 +11,7 @@ mod worker;
 use day::DayDecision;
 use evaluation::EvaluationDecision;
 use faceoff_api::requests;
-use faceoff_service::{app::AppState, problem::Problem};
-use faceoff_store::Actor;
+use faceoff_service::{app::AppState, auth::Organiser, problem::Problem};
 pub(super) use preview::DecisionPreview;
 use preview::Done;
 use queue::QueueDecision;
@@ -97,14 +96,15 @@ impl Decision {
     pub(super) async fn carry_out(
         &self,
         app: &AppState,
-        actor: Actor,
+        organiser: &Organiser,
         request: requests::Decision,
     ) -> Result<Done, Problem> {
+        let actor = organiser.actor();
         match self {
             Self::Day(decision) => decision.carry_out(app, actor, request).await,
             Self::Queue(decision) => decision.carry_out(app, actor, request).await,
             Self::Evaluation(decision) => decision.carry_out(app, actor, request).await,
-            Self::Team(decision) => decision.carry_out(app, actor, request).await,
+            Self::Team(decision) => decision.carry_out(app, organiser, request).await,
             Self::Stage(decision) => decision.carry_out(app, actor, request).await,
             Self::Worker(decision) => decision.carry_out(app, actor, request).await,
         }

@@ -71,8 +71,7 @@ pub(super) async fn submit(
         reason: form.reason.clone(),
         confirm: Some(form.confirm).filter(|confirm| !confirm.is_empty()),
     };
-    let actor = user.organiser.actor();
-    match decision.carry_out(&app, actor, request).await {
+    match decision.carry_out(&app, &user.organiser, request).await {
         Ok(done) => Ok(redirect_done(&done.return_path, done.notice)),
         Err(problem) => {
             page_with(

@@ -78,6 +78,9 @@ impl From<StoreError> for Problem {
                 ProblemKind::UserNameTaken,
                 format!("a user named {name:?} exists already; choose another name"),
             ),
+            error @ StoreError::TokenInvalid => {
+                Self::new(ProblemKind::Unauthenticated, error.to_string())
+            }
             error @ StoreError::InvitationInvalid(_) => {
                 Self::new(ProblemKind::InvitationInvalid, error.to_string())
             }

@@ -102,10 +102,11 @@ pub async fn create_invitation(
         InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => MAX_VALIDITY,
     };
     if now.duration_until(expires_at) > max_validity {
-        let detail = format!(
-            "expected a time within {} hours, got {expires_at}",
-            max_validity.as_hours()
-        );
+        let max = match max_validity.as_hours() {
+            hours @ ..=48 => format!("{hours} hours"),
+            hours => format!("{} days", hours / 24),
+        };
+        let detail = format!("expected a time within {max}, got {expires_at}");
         return Err(Problem::invalid("expires_at", detail));
     }
     let secret = Secret::generate(SecretKind::Invitation).map_err(Problem::internal)?;
@@ -113,7 +114,7 @@ pub async fn create_invitation(
         code_hash: secret.hash(),
         role,
         note,
-        maker: caller.maker(),
+        requester: caller.requester(),
         expires_at,
     };
     let invitation = app.store.invite(caller.actor(), new, now).await?;

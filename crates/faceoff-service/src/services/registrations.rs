@@ -10,7 +10,7 @@ use faceoff_api::{
     token::{Secret, SecretKind},
     views::invitation::NewRegistrationView,
 };
-use faceoff_store::{Actor, NewRegistration, Registration};
+use faceoff_store::{Actor, NewRegistration, Registration, Requester};
 use faceoff_types::RegistrationId;
 
 /// Longest contact of a team.
@@ -47,12 +47,19 @@ pub async fn register(
 pub async fn approve_registration(
     app: &AppState,
     actor: Actor,
+    requester: Requester,
     id: RegistrationId,
 ) -> Result<Registration, Problem> {
     let now = app.config.clock.now();
     let (registration, team) = app
         .store
-        .approve_registration(actor, id, default_expiry(InvitedRole::Member, now), now)
+        .approve_registration(
+            actor,
+            id,
+            default_expiry(InvitedRole::Member, now),
+            requester,
+            now,
+        )
         .await?;
     tracing::info!(registration = %id, team = %team.name, "registration approved");
     Ok(registration)

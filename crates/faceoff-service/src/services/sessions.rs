@@ -8,7 +8,7 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use faceoff_api::token::{Secret, SecretKind};
-use faceoff_store::{Actor, Maker, NewToken, SESSION_LIFETIME, TokenKind, TokenOwner};
+use faceoff_store::{EndMade, NewToken, Requester, SESSION_LIFETIME, TokenKind, TokenOwner};
 use faceoff_types::UserId;
 use jiff::Timestamp;
 
@@ -24,9 +24,9 @@ pub fn session_expiry(now: Timestamp) -> Timestamp {
 /// Ends the session, or revokes the token, of the caller's request.
 #[boxed]
 pub async fn end(app: &AppState, caller: &Caller) -> Result<(), Problem> {
-    let (ends_made, now) = (false, app.config.clock.now());
+    let (token, now) = (caller.token.id, app.config.clock.now());
     app.store
-        .revoke_token(caller.actor(), caller.token.id, ends_made, None, now)
+        .revoke_token(caller.actor(), token, EndMade::Keep, now)
         .await?;
     Ok(())
 }
@@ -41,26 +41,31 @@ pub async fn sign_in(
 ) -> Result<(UserId, Secret), Problem> {
     let now = app.config.clock.now();
     let account = app.store.password_hash_of(name.trim()).await?;
+    let stored = account.as_ref().map(|(_, hash)| hash.clone());
     let verified = app.passwords.verify(name, account, password, client, now);
-    let Some(id) = verified.await? else {
-        return Err(Problem::new(
+    let wrong = || {
+        Problem::new(
             ProblemKind::Unauthenticated,
             "wrong name or password; if you have lost it, ask an organiser for a new link",
-        ));
+        )
     };
+    let (id, stored) = verified.await?.zip(stored).ok_or_else(wrong)?;
     let secret = Secret::generate(SecretKind::Session).map_err(Problem::internal)?;
     let new = NewToken {
         hash: secret.hash(),
         kind: TokenKind::Session,
         owner: TokenOwner::User(id),
         name: SESSION_NAME.to_owned(),
-        maker: Maker {
+        requester: Requester {
             user: Some(id),
             token: None,
         },
         expires_at: Some(session_expiry(now)),
     };
-    app.store.create_token(Actor::User(id), new, now).await?;
+    // The user may have another password by now.
+    if !app.store.sign_in(id, &stored, new, now).await? {
+        return Err(wrong());
+    }
     tracing::info!(user = %id, "signed in");
     Ok((id, secret))
 }

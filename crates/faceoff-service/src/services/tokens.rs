@@ -10,11 +10,11 @@ use crate::{
     views::{credentials, token},
 };
 use faceoff_api::{
-    requests,
+    requests::{self, Made},
     token::{Secret, SecretKind},
     views::{credentials::RevokedTokenView, token::NewTokenView},
 };
-use faceoff_store::{NewToken, Principal, StoreError, Token, TokenKind, TokenOwner};
+use faceoff_store::{EndMade, NewToken, Principal, StoreError, Token, TokenKind, TokenOwner};
 use faceoff_types::{TeamId, TokenId};
 
 /// Longest name of a token.
@@ -92,7 +92,7 @@ pub async fn create_token(
         kind: TokenKind::ApiToken,
         owner,
         name,
-        maker: caller.maker(),
+        requester: caller.requester(),
         expires_at: new.expires_at,
     };
     let now = app.config.clock.now();
@@ -135,14 +135,9 @@ pub async fn rotate_token(
     };
     let secret = Secret::generate(kind).map_err(Problem::internal)?;
     let (actor, now) = (caller.actor(), app.config.clock.now());
-    // A team's API client renews its own token, which stays what its maker has made.
-    let maker = match caller.principal {
-        Principal::Team(_) => token.maker,
-        Principal::Host | Principal::Organiser(_) | Principal::Member(..) => caller.maker(),
-    };
     let token = app
         .store
-        .rotate_token(actor, id, secret.hash(), maker, now)
+        .rotate_token(actor, id, secret.hash(), caller.requester(), now)
         .await?;
     tracing::info!(token = %id, actor = %caller.actor(), "token rotated");
     Ok(NewTokenView {
@@ -151,12 +146,14 @@ pub async fn rotate_token(
     })
 }
 
-/// Revokes a token: it is invalid from now on. If it is not the caller's own, it may have been stolen, and all that was made with it ends.
+/// Revokes a token: it is invalid from now on. What was made with it ends, too, or stays, as `made` says; otherwise it ends unless the token
+/// is the caller's own, because it may have been stolen.
 #[boxed]
 pub async fn revoke_token(
     app: &AppState,
     caller: &Caller,
     id: TokenId,
+    made: Option<Made>,
 ) -> Result<RevokedTokenView, Problem> {
     let token = find(app, caller, id).await?;
     let is_own = match (&caller.principal, token.owner) {
@@ -167,10 +164,14 @@ pub async fn revoke_token(
         _ => false,
     };
     let now = app.config.clock.now();
-    let used_token = Some(caller.token.id);
+    let default = if is_own { Made::Keep } else { Made::End };
+    let made = match made.unwrap_or(default) {
+        Made::Keep => EndMade::Keep,
+        Made::End => EndMade::Except(Some(caller.token.id)),
+    };
     let revoked = app
         .store
-        .revoke_token(caller.actor(), id, !is_own, used_token, now)
+        .revoke_token(caller.actor(), id, made, now)
         .await?;
     tracing::info!(token = %id, actor = %caller.actor(), "token revoked");
     Ok(RevokedTokenView {

@@ -5,7 +5,7 @@ use faceoff_api::views::credentials::EndedCredentialsView;
 use faceoff_store::EndedCredentials;
 use jiff::Timestamp;
 
-/// What ended; `None` if nothing did and nobody stays.
+/// What ended and which accounts stay; `None` if there is nothing of either.
 pub fn ended(ended: EndedCredentials, now: Timestamp) -> Option<EndedCredentialsView> {
     if ended == EndedCredentials::default() {
         return None;
@@ -21,5 +21,6 @@ pub fn ended(ended: EndedCredentials, now: Timestamp) -> Option<EndedCredentials
             .map(|webhook| webhook::view(webhook, now))
             .collect(),
         remaining_people: ended.remaining_users.into_iter().map(user::view).collect(),
+        restored_people: ended.restored_users.into_iter().map(user::view).collect(),
     })
 }

@@ -1,4 +1,4 @@
-//! The end of credentials with the rights of the person who made them. A *credential* is what gives access, or knowledge, without a
+//! The end of credentials with the rights of the user who made them. A *credential* is what gives access, or knowledge, without a
 //! password: a token, an invitation, a webhook.
 
 use crate::{
@@ -14,15 +14,18 @@ use crate::{
     write::Tx,
 };
 use faceoff_types::{TokenId, UserId};
+use std::collections::{BTreeMap, HashSet};
 
-/// What ended with a person's rights, and what did not.
+/// What ended with a user's rights or a token, and what did not.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EndedCredentials {
     pub tokens: Vec<Token>,
     pub invitations: Vec<Invitation>,
     pub webhooks: Vec<Webhook>,
-    /// The users who joined by invitations of this person: their accounts stay.
+    /// The users who joined by the invitations, or by those of such users: their accounts stay.
     pub remaining_users: Vec<User>,
+    /// The users who got access again by the links: their new passwords and tokens stay.
+    pub restored_users: Vec<User>,
 }
 
 /// Ends all that a user has made. `kept` is the token of the request, which stays valid.
@@ -36,9 +39,7 @@ pub(crate) async fn end_made_by(
         user: Some(user),
         token: None,
     };
-    let mut ended = end_made(tx, maker, kept, reason).await?;
-    ended.remaining_users = users::invited_by(tx, user).await?;
-    Ok(ended)
+    end_made(tx, maker, kept, reason).await
 }
 
 /// Ends all that was made with a token.
@@ -55,7 +56,7 @@ pub(crate) async fn end_made_with(
     end_made(tx, maker, kept, reason).await
 }
 
-/// Ends what this maker has made, and what was made with the tokens among it.
+/// Ends what this maker has made, and what was made with the tokens among it, also with those that had ended before.
 async fn end_made(
     tx: &mut Tx,
     maker: Maker,
@@ -65,17 +66,23 @@ async fn end_made(
     let now = tx.now;
     let mut ended = EndedCredentials::default();
     let mut makers = vec![maker];
+    let mut visited = HashSet::new();
     while let Some(maker) = makers.pop() {
-        for token in tokens::valid_made(tx, maker, now).await? {
+        if !visited.insert(maker) {
+            continue;
+        }
+        for token in tokens::made(tx, maker).await? {
             if Some(token.id) == kept {
                 continue;
             }
-            revoke_token(tx, &token).await?;
             makers.push(Maker {
                 user: None,
                 token: Some(token.id),
             });
-            ended.tokens.push(tokens::find(tx, token.id).await?);
+            if token.is_valid(now) {
+                revoke_token(tx, &token).await?;
+                ended.tokens.push(tokens::find(tx, token.id).await?);
+            }
         }
         for invitation in invitations::open_made(tx, maker, now).await? {
             let revoked = revoke_invitation(tx, invitation).await?;
@@ -87,7 +94,45 @@ async fn end_made(
             ended.webhooks.push(webhooks::find(tx, id).await?);
         }
     }
+    let makers: Vec<Maker> = visited.into_iter().collect();
+    ended.restored_users = restored_by(tx, &makers).await?;
+    ended.remaining_users = joined_by(tx, makers).await?;
     Ok(ended)
+}
+
+/// The active users who got access again by links of these makers, other than the makers themselves, by name.
+async fn restored_by(tx: &mut Tx, makers: &[Maker]) -> Result<Vec<User>> {
+    let mut found = BTreeMap::new();
+    for maker in makers {
+        for user in users::invited(tx, *maker, true).await? {
+            let is_maker = makers.iter().any(|maker| maker.user == Some(user.id));
+            if user.left_at.is_none() && !is_maker {
+                found.insert(user.name.to_string(), user);
+            }
+        }
+    }
+    Ok(found.into_values().collect())
+}
+
+/// The active users who joined by invitations of these makers, or of users who had joined so, by name.
+async fn joined_by(tx: &mut Tx, mut makers: Vec<Maker>) -> Result<Vec<User>> {
+    let mut visited: HashSet<UserId> = makers.iter().filter_map(|maker| maker.user).collect();
+    let mut found = BTreeMap::new();
+    while let Some(maker) = makers.pop() {
+        for user in users::invited(tx, maker, false).await? {
+            if !visited.insert(user.id) {
+                continue;
+            }
+            makers.push(Maker {
+                user: Some(user.id),
+                token: None,
+            });
+            if user.left_at.is_none() {
+                found.insert(user.name.to_string(), user);
+            }
+        }
+    }
+    Ok(found.into_values().collect())
 }
 
 /// The subject of events about a token of this owner.

@@ -101,6 +101,9 @@ async fn check(connection: &mut SqliteConnection, now: Timestamp) -> Result<Arch
     sqlx::query!("DELETE FROM invitations")
         .execute(&mut *tx)
         .await?;
+    sqlx::query!("DELETE FROM webhooks")
+        .execute(&mut *tx)
+        .await?;
     sqlx::query!("UPDATE people SET password = NULL")
         .execute(&mut *tx)
         .await?;

@@ -7,6 +7,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         ended_credentials::{self, EndedCredentials, end_made_by},
+        requester::{self, Requester},
         tokens::{NewToken, add_token, revoke_all},
     },
     store::Store,
@@ -17,7 +18,7 @@ use crate::{
         season,
         teams::{self, Team, TeamProfile},
         terms,
-        tokens::{Maker, Token, TokenKind, TokenOwner},
+        tokens::{Token, TokenKind, TokenOwner},
         users::{self, User},
     },
     write::Tx,
@@ -36,7 +37,7 @@ pub struct NewInvitation {
     /// Role of the user who accepts it.
     pub role: InvitationRole,
     pub note: String,
-    pub maker: Maker,
+    pub requester: Requester,
     pub expires_at: Timestamp,
 }
 
@@ -107,11 +108,12 @@ fn check_open(invitation: &Invitation, now: Timestamp) -> Result<()> {
 /// Adds an invitation whose expiry has been checked.
 pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation> {
     let now = tx.now;
+    let maker = requester::check(tx, &new.requester, now).await?;
     let invitation = Invitation {
         id: InvitationId::new(),
         role: new.role,
         note: new.note,
-        maker: new.maker,
+        maker,
         created_at: now,
         expires_at: new.expires_at,
         state: InvitationState::Open,
@@ -255,17 +257,21 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
             add_user(tx, &mut request, team).await?
         }
         InvitationRole::PasswordReset(user) => {
+            // Before all that the user has made ends, which may include this link.
+            invitations::set_accepted(tx, invitation.id, user, now).await?;
             ended = restore_access(tx, user, &request).await?;
             user
         }
     };
-    invitations::set_accepted(tx, invitation.id, user, now).await?;
+    if !matches!(invitation.role, InvitationRole::PasswordReset(_)) {
+        invitations::set_accepted(tx, invitation.id, user, now).await?;
+    }
     let token = NewToken {
         hash: request.token_hash,
         kind: request.token_kind,
         owner: TokenOwner::User(user),
         name: request.token_name,
-        maker: Maker {
+        requester: Requester {
             user: Some(user),
             token: None,
         },

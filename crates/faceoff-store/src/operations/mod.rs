@@ -29,6 +29,7 @@ mod publish;
 pub(crate) mod purpose;
 pub(crate) mod registrations;
 mod release_day;
+pub(crate) mod requester;
 pub(crate) mod rerun;
 pub(crate) mod retention;
 mod rulings;

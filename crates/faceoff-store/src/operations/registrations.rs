@@ -4,7 +4,10 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::invitations::{NewInvitation, add_team, check_terms, invite},
+    operations::{
+        invitations::{NewInvitation, add_team, check_terms, invite},
+        requester::Requester,
+    },
     store::Store,
     tables::{
         divisions,
@@ -12,7 +15,6 @@ use crate::{
         registrations::{self, Registration, RegistrationState},
         season, teams,
         teams::{Team, TeamProfile},
-        tokens::Maker,
     },
     write::Tx,
 };
@@ -105,6 +107,7 @@ impl Store {
         actor: Actor,
         id: RegistrationId,
         expires_at: Timestamp,
+        requester: Requester,
         now: Timestamp,
     ) -> Result<(Registration, Team)> {
         self.write(actor, now, async |tx| {
@@ -120,8 +123,8 @@ impl Store {
                 code_hash: registrations::code_hash(tx, id).await?,
                 role: InvitationRole::Member(team),
                 note: registration.contact,
-                // Nobody but the team knows its code.
-                maker: Maker::default(),
+                // The organiser who approves it may have registered the team.
+                requester,
                 expires_at,
             };
             invite(tx, invitation).await?;

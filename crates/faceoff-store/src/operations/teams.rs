@@ -6,13 +6,14 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         invitations::add_team,
+        requester::Requester,
         tokens::{NewToken, add_token, revoke_all},
     },
     store::Store,
     tables::{
         divisions, season,
         teams::{self, Team, TeamProfile},
-        tokens::{Maker, TokenKind, TokenOwner},
+        tokens::{TokenKind, TokenOwner},
         users,
     },
     write::Tx,
@@ -23,13 +24,18 @@ use jiff::Timestamp;
 /// Name of the token that is created with a team.
 const FIRST_TOKEN_NAME: &str = "first";
 
-async fn add_team_token(tx: &mut Tx, team: TeamId, hash: [u8; 32], maker: Maker) -> Result<()> {
+async fn add_team_token(
+    tx: &mut Tx,
+    team: TeamId,
+    hash: [u8; 32],
+    requester: Requester,
+) -> Result<()> {
     let token = NewToken {
         hash,
         kind: TokenKind::ApiToken,
         owner: TokenOwner::Team(team),
         name: FIRST_TOKEN_NAME.to_owned(),
-        maker,
+        requester,
         expires_at: None,
     };
     add_token(tx, token).await?;
@@ -55,12 +61,12 @@ impl Store {
         actor: Actor,
         name: &TeamName,
         token_hash: [u8; 32],
-        maker: Maker,
+        requester: Requester,
         now: Timestamp,
     ) -> Result<Team> {
         self.write(actor, now, async |tx| {
             let id = add_team(tx, name.clone(), TeamProfile::default()).await?;
-            add_team_token(tx, id, token_hash, maker).await?;
+            add_team_token(tx, id, token_hash, requester).await?;
             teams::find(tx, id).await
         })
         .await
@@ -73,13 +79,13 @@ impl Store {
         actor: Actor,
         id: TeamId,
         token_hash: [u8; 32],
-        maker: Maker,
+        requester: Requester,
         now: Timestamp,
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
             teams::find(tx, id).await?;
             revoke_all(tx, TokenOwner::Team(id), None).await?;
-            add_team_token(tx, id, token_hash, maker).await?;
+            add_team_token(tx, id, token_hash, requester).await?;
             tx.record(Subject::Team(id), Event::TokenReplaced);
             Ok(())
         })

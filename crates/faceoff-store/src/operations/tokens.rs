@@ -5,16 +5,19 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event},
-    operations::ended_credentials::{EndedCredentials, end_made_with, revoke_token, subject},
+    operations::{
+        ended_credentials::{EndedCredentials, end_made_with, revoke_token, subject},
+        requester::{self, Requester},
+    },
     store::Store,
     tables::{
         teams::{self, Team},
-        tokens::{self, Maker, Token, TokenKind, TokenOwner},
+        tokens::{self, Token, TokenKind, TokenOwner},
         users::{self, User},
     },
     write::Tx,
 };
-use faceoff_types::TokenId;
+use faceoff_types::{TokenId, UserId};
 use jiff::{SignedDuration, Timestamp};
 use sqlx::SqliteConnection;
 
@@ -53,9 +56,18 @@ pub struct NewToken {
     pub owner: TokenOwner,
     /// Label chosen by the owner.
     pub name: String,
-    pub maker: Maker,
+    pub requester: Requester,
     /// `None`: it does not expire.
     pub expires_at: Option<Timestamp>,
+}
+
+/// What happens to all that was made with a revoked token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EndMade {
+    /// It stays.
+    Keep,
+    /// It ends, except the token of the request.
+    Except(Option<TokenId>),
 }
 
 /// A token that was revoked, and what ended with it.
@@ -71,6 +83,7 @@ const HOST_TOKEN_NAME: &str = "admin-token";
 /// Adds a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`].
 pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
     let now = tx.now;
+    let maker = requester::check(tx, &new.requester, now).await?;
     if tokens::count_valid(tx, new.owner, now).await? >= MAX_TOKENS {
         return StoreError::conflict(format!(
             "there are {MAX_TOKENS} tokens already, which is the limit: revoke one that is not needed \
@@ -88,7 +101,7 @@ pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
         kind: new.kind,
         owner: new.owner,
         name: new.name,
-        maker: new.maker,
+        maker,
         created_at: now,
         expires_at: new.expires_at,
         last_used_at: None,
@@ -229,20 +242,53 @@ impl Store {
         .await
     }
 
-    /// Replaces the secret of a token; the old secret is invalid from now on, and the token's end remains. From now on it belongs to
-    /// what `maker` has made. [`StoreError::Conflict`] if the token is a session, is expired or revoked, or is the host's, whose file
-    /// would still have the old secret.
+    /// Creates the session of a user whose password has been verified as `verified`, its stored form. False if the user has another
+    /// password by now, or has left.
+    #[boxed]
+    pub async fn sign_in(
+        &self,
+        id: UserId,
+        verified: &str,
+        new: NewToken,
+        now: Timestamp,
+    ) -> Result<bool> {
+        self.write(Actor::User(id), now, async |tx| {
+            if let Ok(listed_since) = now.checked_sub(SESSION_LISTED_FOR) {
+                tokens::delete_old_sessions(tx, listed_since).await?;
+            }
+            if users::password_of(tx, id).await?.as_deref() != Some(verified) {
+                return Ok(false);
+            }
+            add_token(tx, new).await?;
+            Ok(true)
+        })
+        .await
+    }
+
+    /// Is the requester's token still valid, and has its user an account?
+    #[boxed]
+    pub async fn is_valid(&self, requester: &Requester, now: Timestamp) -> Result<bool> {
+        requester::is_valid(&mut *self.database.read.acquire().await?, requester, now).await
+    }
+
+    /// Replaces the secret of a token; the old secret is invalid from now on, and its expiry remains. From now on it belongs to
+    /// what the requester has made, unless its maker is the same or it renews itself. [`StoreError::Conflict`] if the token is a session,
+    /// is expired or revoked, or is the host's, whose file would still have the old secret.
     #[boxed]
     pub async fn rotate_token(
         &self,
         actor: Actor,
         id: TokenId,
         hash: [u8; 32],
-        maker: Maker,
+        requester: Requester,
         now: Timestamp,
     ) -> Result<Token> {
         self.write(actor, now, async |tx| {
+            let new_maker = requester::check(tx, &requester, now).await?;
             let token = tokens::find(tx, id).await?;
+            // Otherwise tokens made with a stolen one could cut themselves off from it.
+            let is_same = new_maker.token == Some(id) || new_maker.user == token.maker.user;
+            let maker = if is_same { token.maker } else { new_maker };
             if token.kind == TokenKind::Session {
                 return StoreError::conflict(
                     "a session has no secret that could be rotated: end it, or sign in again",
@@ -270,15 +316,13 @@ impl Store {
         .await
     }
 
-    /// Revokes a token, effective at once. A revoked token is left unchanged. With `ends_made`, all that was made with the token ends,
-    /// except `used_token`, which authenticated this request.
+    /// Revokes a token, effective at once. A revoked token is left unchanged.
     #[boxed]
     pub async fn revoke_token(
         &self,
         actor: Actor,
         id: TokenId,
-        ends_made: bool,
-        used_token: Option<TokenId>,
+        made: EndMade,
         now: Timestamp,
     ) -> Result<RevokedToken> {
         self.write(actor, now, async |tx| {
@@ -286,11 +330,12 @@ impl Store {
             if token.revoked_at.is_none() {
                 revoke_token(tx, &token).await?;
             }
-            let ended = if ends_made {
-                let reason = "the token with which it was made was revoked";
-                end_made_with(tx, id, used_token, reason).await?
-            } else {
-                EndedCredentials::default()
+            let ended = match made {
+                EndMade::Keep => EndedCredentials::default(),
+                EndMade::Except(kept) => {
+                    let reason = "the token with which it was made was revoked";
+                    end_made_with(tx, id, kept, reason).await?
+                }
             };
             Ok(RevokedToken {
                 token: tokens::find(tx, id).await?,
@@ -321,7 +366,7 @@ impl Store {
                 kind: TokenKind::ApiToken,
                 owner: TokenOwner::Host,
                 name: HOST_TOKEN_NAME.to_owned(),
-                maker: Maker::default(),
+                requester: Requester::default(),
                 expires_at: None,
             };
             add_token(tx, new).await?;

@@ -42,8 +42,8 @@ impl Store {
         users::find_with_password(&mut *self.database.read.acquire().await?, name).await
     }
 
-    /// Sets a user's password, as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked, and all
-    /// that the user has made ends, except `used_token`, which authenticated this request.
+    /// Sets a user's password, as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked, and, if the
+    /// user had a password before, all that the user has made ends, except `used_token`, which authenticated this request.
     #[boxed]
     pub async fn set_password(
         &self,
@@ -54,11 +54,19 @@ impl Store {
         now: Timestamp,
     ) -> Result<(User, EndedCredentials)> {
         self.write(actor, now, async |tx| {
+            let had_password = users::password_of(tx, id).await?.is_some();
             users::set_password(tx, id, password).await?;
             revoke_all(tx, TokenOwner::User(id), Some(used_token)).await?;
             tx.record(Subject::User(id), Event::PasswordSet);
             let reason = "the user who made it has set a new password";
-            let ended = end_made_by(tx, id, Some(used_token), reason).await?;
+            let mut ended = if had_password {
+                end_made_by(tx, id, Some(used_token), reason).await?
+            } else {
+                EndedCredentials::default()
+            };
+            // The user is the same, so accounts of others are no news.
+            ended.remaining_users.clear();
+            ended.restored_users.clear();
             Ok((users::find(tx, id).await?, ended))
         })
         .await
@@ -80,18 +88,19 @@ impl Store {
                 return StoreError::conflict(format!("{} has left", user.name));
             }
             let is_last = user.team.is_none() && users::count_organisers(tx).await? == 1;
+            users::set_left(tx, id, now).await?;
+            revoke_all(tx, TokenOwner::User(id), None).await?;
+            let reason = "the account of the user who made it is closed";
+            let ended = end_made_by(tx, id, None, reason).await?;
+            // Checked last: a token of the host may have ended, too.
             if is_last && tokens::count_valid(tx, TokenOwner::Host, now).await? == 0 {
                 return StoreError::conflict(format!(
                     "{} is the last who can organise: invite another organiser first",
                     user.name
                 ));
             }
-            users::set_left(tx, id, now).await?;
-            revoke_all(tx, TokenOwner::User(id), None).await?;
             let name = user.name;
             tx.record(Subject::User(id), Event::PersonLeft { name });
-            let reason = "the account of the user who made it is closed";
-            let ended = end_made_by(tx, id, None, reason).await?;
             Ok((users::find(tx, id).await?, ended))
         })
         .await

@@ -4,12 +4,14 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::cleanup::earlier,
+    operations::{
+        cleanup::earlier,
+        requester::{self, Requester},
+    },
     store::Store,
     tables::{
         deliveries::{self, Delivery, DeliveryAttempt, DeliveryState},
         events,
-        tokens::Maker,
         webhooks::{self, DisabledWebhook, Webhook, WebhookSecrets},
     },
     write::Tx,
@@ -42,7 +44,7 @@ pub struct NewWebhook {
     pub topics: Vec<String>,
     /// Key that signs the messages.
     pub secret: [u8; 32],
-    pub maker: Maker,
+    pub requester: Requester,
 }
 
 /// Changes of a webhook; `None` leaves a value unchanged.
@@ -54,7 +56,7 @@ pub struct WebhookChange {
     /// Enables a disabled webhook again, for events from now on.
     pub enable: bool,
     /// Whose webhook it is from now on, with another address or enabled again.
-    pub maker: Maker,
+    pub requester: Requester,
 }
 
 /// Deliveries of one webhook for a range of events.
@@ -153,6 +155,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Webhook> {
         self.write(actor, now, async |tx| {
+            let maker = requester::check(tx, &new.requester, now).await?;
             let limit = match new.team {
                 Some(_) => MAX_TEAM_WEBHOOKS,
                 None => MAX_ORGANISER_WEBHOOKS,
@@ -169,7 +172,7 @@ impl Store {
                 name: new.name,
                 url: new.url,
                 topics: new.topics,
-                maker: new.maker,
+                maker,
                 created_at: now,
                 seen: events::newest_id(tx).await?,
                 failing_since: None,
@@ -197,6 +200,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Webhook> {
         self.write(actor, now, async |tx| {
+            let maker = requester::check(tx, &change.requester, now).await?;
             let current = webhooks::find(tx, id).await?;
             let mut webhook = current.clone();
             webhook.name = change.name.unwrap_or(webhook.name);
@@ -204,13 +208,13 @@ impl Store {
             if webhook.url != current.url {
                 // Failures of the old address do not count for the new one.
                 webhook.failing_since = None;
-                webhook.maker = change.maker;
+                webhook.maker = maker;
             }
             webhook.topics = change.topics.unwrap_or(webhook.topics);
             if change.enable && webhook.disabled.is_some() {
                 webhook.disabled = None;
                 webhook.failing_since = None;
-                webhook.maker = change.maker;
+                webhook.maker = maker;
                 webhook.seen = events::newest_id(tx).await?;
             }
             if webhook != current {

@@ -1,7 +1,7 @@
 //! Queries of leases: the right of a worker to run a job for a time. The nonce is unique to each lease.
 
-use crate::{boxed, error::Result, queue, store::Store};
-use faceoff_types::WorkerName;
+use crate::{boxed, error::Result, queue, store::Store, tables::games};
+use faceoff_types::{GameId, WorkerName};
 use uuid::Uuid;
 
 impl Store {
@@ -24,5 +24,11 @@ impl Store {
         let holder = self.lease_holder(job, nonce).await?;
         let slots = worker.slot_holder("");
         Ok(holder.is_some_and(|holder| holder.starts_with(&slots)))
+    }
+
+    /// The game that a job plays; `None` for other jobs.
+    #[boxed]
+    pub async fn game_of_job(&self, job: Uuid) -> Result<Option<GameId>> {
+        games::of_job(&mut *self.database.read.acquire().await?, job).await
     }
 }

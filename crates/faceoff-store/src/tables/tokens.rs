@@ -69,8 +69,9 @@ impl TokenKind {
     }
 }
 
-/// Who made a credential (a token, an invitation or a webhook), or gave it its current secret: it ends with that person's account.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// Who made a credential (a token, an invitation or a webhook), or gave it its current secret. It ends with that user's account, and
+/// when the user gets a new password or new access.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Maker {
     /// `None`: the host, a visitor or the server.
     pub user: Option<UserId>,
@@ -189,18 +190,12 @@ pub(crate) async fn hash_of(connection: &mut SqliteConnection, id: TokenId) -> R
         .ok_or(StoreError::NotFound("token"))
 }
 
-/// The valid tokens and sessions at `now` that this user has made, or that were made with this token.
-pub(crate) async fn valid_made(
-    connection: &mut SqliteConnection,
-    maker: Maker,
-    now: Timestamp,
-) -> Result<Vec<Token>> {
+/// The tokens and sessions that this user has made, or that were made with this token, also those that are no longer valid.
+pub(crate) async fn made(connection: &mut SqliteConnection, maker: Maker) -> Result<Vec<Token>> {
     let rows = select_tokens!(
-        "WHERE (made_by = ?1 OR made_with = ?2) AND revoked_at IS NULL AND (expires_at IS NULL OR expires_at > ?3)
-         ORDER BY created_at, id",
+        "WHERE made_by = ? OR made_with = ? ORDER BY created_at, id",
         maker.user,
-        maker.token,
-        Instant(now)
+        maker.token
     )
     .fetch_all(connection)
     .await?;

@@ -3,6 +3,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
+    tables::tokens::Maker,
 };
 use faceoff_types::{TeamId, UserId, UserName};
 use jiff::Timestamp;
@@ -100,16 +101,20 @@ pub(crate) async fn find_with_password(
     Ok(row.map(|row| (row.id, row.password)))
 }
 
-/// The active users who joined by invitations of this user, by name.
-pub(crate) async fn invited_by(
+/// The users who joined by invitations that this user has made, or that were made with this token. With `restored`, those who got
+/// access again by them. By name; also those who have left.
+pub(crate) async fn invited(
     connection: &mut SqliteConnection,
-    maker: UserId,
+    maker: Maker,
+    restored: bool,
 ) -> Result<Vec<User>> {
     let rows = select_users!(
-        "WHERE left_at IS NULL AND id <> ?1
-           AND id IN (SELECT accepted_by FROM invitations WHERE made_by = ?1 AND role <> 'return')
+        "WHERE id IN (SELECT accepted_by FROM invitations
+                      WHERE (made_by = ? OR made_with = ?) AND (role = 'return') = ?)
          ORDER BY name",
-        maker
+        maker.user,
+        maker.token,
+        restored
     )
     .fetch_all(connection)
     .await?;
@@ -137,6 +142,20 @@ pub(crate) async fn insert(
         StoreError::UserNameTaken(user.name.to_string())
     }))?;
     Ok(())
+}
+
+/// The hash of an active user's password, if there is one.
+pub(crate) async fn password_of(
+    connection: &mut SqliteConnection,
+    id: UserId,
+) -> Result<Option<String>> {
+    let password = sqlx::query_scalar!(
+        "SELECT password FROM people WHERE id = ? AND left_at IS NULL",
+        id
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(password.flatten())
 }
 
 pub(crate) async fn set_password(

@@ -151,7 +151,7 @@ async fn season_with_queued_day() -> (TestStore, EvaluationId) {
         code_hash: CODE_HASH,
         role: InvitationRole::Member(alpha.team),
         note: "Ada".into(),
-        maker: Maker::default(),
+        requester: Requester::default(),
         expires_at: f.now + jiff::SignedDuration::from_hours(1),
     };
     f.store
@@ -168,7 +168,7 @@ async fn season_with_queued_day() -> (TestStore, EvaluationId) {
         url: "https://example.org/".into(),
         topics: Vec::new(),
         secret: [9; 32],
-        maker: Maker::default(),
+        requester: Requester::default(),
     };
     let webhook = f.store.create_webhook(Actor::Organiser, webhook, f.now);
     let webhook = webhook.await.unwrap().id;

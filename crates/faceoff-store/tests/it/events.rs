@@ -34,7 +34,7 @@ async fn events_record_each_step_of_a_submission() {
             Actor::Organiser,
             submission.team,
             [9; 32],
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await

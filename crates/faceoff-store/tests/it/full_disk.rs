@@ -21,7 +21,7 @@ async fn rolled_back_write_does_not_block_the_writer() {
                 Actor::Organiser,
                 &name,
                 [attempt; 32],
-                Maker::default(),
+                Requester::default(),
                 f.now,
             )
             .await;

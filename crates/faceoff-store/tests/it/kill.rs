@@ -66,7 +66,13 @@ async fn child_process_writes_until_killed() {
         token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
         let name: TeamName = format!("t {} {round}", process.simple()).parse().unwrap();
         let team = store
-            .create_team(Actor::Organiser, &name, token_hash, Maker::default(), now)
+            .create_team(
+                Actor::Organiser,
+                &name,
+                token_hash,
+                Requester::default(),
+                now,
+            )
             .await
             .unwrap();
         report(format!("team {}", team.id));
@@ -76,7 +82,7 @@ async fn child_process_writes_until_killed() {
             code_hash,
             role: InvitationRole::Member(team.id),
             note: "a test".into(),
-            maker: Maker::default(),
+            requester: Requester::default(),
             expires_at: now + jiff::SignedDuration::from_hours(1),
         };
         store

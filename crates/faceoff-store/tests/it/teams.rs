@@ -13,7 +13,13 @@ async fn team_token_is_valid_until_replaced() {
     let name = "Zoë".parse().unwrap();
     let team = f
         .store
-        .create_team(Actor::Organiser, &name, TOKEN_HASH, Maker::default(), f.now)
+        .create_team(
+            Actor::Organiser,
+            &name,
+            TOKEN_HASH,
+            Requester::default(),
+            f.now,
+        )
         .await
         .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
@@ -30,7 +36,7 @@ async fn team_token_is_valid_until_replaced() {
             Actor::Organiser,
             team.id,
             OTHER_TOKEN_HASH,
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await
@@ -50,7 +56,7 @@ async fn two_teams_cannot_share_a_token() {
             Actor::Organiser,
             &"Alpha".parse().unwrap(),
             TOKEN_HASH,
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await
@@ -61,7 +67,7 @@ async fn two_teams_cannot_share_a_token() {
             Actor::Organiser,
             &"Beta".parse().unwrap(),
             OTHER_TOKEN_HASH,
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await
@@ -72,7 +78,7 @@ async fn two_teams_cannot_share_a_token() {
             Actor::Organiser,
             &"Gamma".parse().unwrap(),
             TOKEN_HASH,
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await
@@ -84,7 +90,7 @@ async fn two_teams_cannot_share_a_token() {
             Actor::Organiser,
             beta.id,
             TOKEN_HASH,
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await
@@ -102,7 +108,7 @@ async fn unknown_ids_are_not_found() {
     ));
     assert!(matches!(
         f.store
-            .set_team_token(Actor::Organiser, id, [1; 32], Maker::default(), f.now)
+            .set_team_token(Actor::Organiser, id, [1; 32], Requester::default(), f.now)
             .await,
         Err(StoreError::NotFound("team"))
     ));

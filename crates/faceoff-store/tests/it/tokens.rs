@@ -12,7 +12,7 @@ fn new_token(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewT
         kind: TokenKind::ApiToken,
         owner,
         name: "laptop".into(),
-        maker: Maker::default(),
+        requester: Requester::default(),
         expires_at,
     }
 }
@@ -59,7 +59,7 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
             Actor::Organiser,
             unlimited.id,
             [5; 32],
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await
@@ -77,7 +77,7 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
             Actor::Organiser,
             expiring.id,
             [6; 32],
-            Maker::default(),
+            Requester::default(),
             f.now,
         )
         .await;
@@ -85,14 +85,14 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     for _ in 0..2 {
         let revoked = f
             .store
-            .revoke_token(Actor::Organiser, unlimited.id, false, None, f.now)
+            .revoke_token(Actor::Organiser, unlimited.id, EndMade::Keep, f.now)
             .await;
         assert_eq!(revoked.unwrap().token.revoked_at, Some(f.now));
     }
     assert_eq!(rejection(&f, 5).await, Some(TokenRejection::Revoked(f.now)));
     let unknown = f
         .store
-        .revoke_token(Actor::Organiser, TokenId::new(), false, None, f.now)
+        .revoke_token(Actor::Organiser, TokenId::new(), EndMade::Keep, f.now)
         .await;
     assert!(matches!(unknown, Err(StoreError::NotFound("token"))));
     let events = f.store.events_after(0, 100).await.unwrap();
@@ -127,7 +127,7 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
     assert_eq!(used.last_used_at, Some(f.now));
     // A revoked token does not count towards the limit.
     f.store
-        .revoke_token(Actor::Organiser, used.id, false, None, f.now)
+        .revoke_token(Actor::Organiser, used.id, EndMade::Keep, f.now)
         .await
         .unwrap();
     f.store
@@ -165,7 +165,13 @@ async fn host_token_follows_its_file_and_stays_revoked() {
         .find(|token| token.name == "admin-token" && token.revoked_at.is_none());
     let rotate = async |id, hash| {
         f.store
-            .rotate_token(Actor::Organiser, id, [hash; 32], Maker::default(), f.now)
+            .rotate_token(
+                Actor::Organiser,
+                id,
+                [hash; 32],
+                Requester::default(),
+                f.now,
+            )
             .await
     };
     let error = rotate(file_token.unwrap().id, 3).await.unwrap_err();
@@ -175,7 +181,7 @@ async fn host_token_follows_its_file_and_stays_revoked() {
     rotate(other_host_token.id, 9).await.unwrap();
     assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
     f.store
-        .revoke_token(Actor::Organiser, other_host_token.id, false, None, f.now)
+        .revoke_token(Actor::Organiser, other_host_token.id, EndMade::Keep, f.now)
         .await
         .unwrap();
     assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());

@@ -11,7 +11,7 @@ async fn invite(f: &TestStore, code: u8, role: InvitationRole) -> Invitation {
         code_hash: [code; 32],
         role,
         note: "a user".into(),
-        maker: Maker::default(),
+        requester: Requester::default(),
         expires_at: f.now + SignedDuration::from_hours(1),
     };
     f.store
@@ -93,7 +93,7 @@ async fn removed_user_loses_all_access() {
         code_hash: [3; 32],
         role: InvitationRole::PasswordReset(ada.id),
         note: "Ada".into(),
-        maker: Maker::default(),
+        requester: Requester::default(),
         expires_at: f.now + SignedDuration::from_hours(1),
     };
     let error = f.store.invite(Actor::Organiser, invitation, f.now).await;
@@ -246,4 +246,117 @@ async fn team_can_be_renamed_described_and_retired() {
         .unwrap();
     let started = f.store.start_day(Actor::Organiser, stage, f.now).await;
     assert_eq!(started.unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn requests_under_way_end_with_the_rights_of_their_user() {
+    let f = TestStore::new().await;
+    f.store.set_host_token([7; 32], f.now).await.unwrap();
+    let grace = add_user(&f, 1, "Grace", InvitationRole::Organiser).await;
+    let hash = *blake3::hash(&[1; 32]).as_bytes();
+    let verified = f.store.verify_token(hash, TokenKind::ApiToken, f.now).await;
+    let token = verified.unwrap().unwrap().token.id;
+    let requester = Requester {
+        user: Some(grace.id),
+        token: Some((token, hash)),
+    };
+    let new_token = |hash: u8, requester| NewToken {
+        hash: [hash; 32],
+        kind: TokenKind::ApiToken,
+        owner: TokenOwner::Host,
+        name: "late".into(),
+        requester,
+        expires_at: None,
+    };
+    let create = async |hash, requester| {
+        let new = new_token(hash, requester);
+        let created = f
+            .store
+            .create_token(Actor::User(grace.id), new, f.now)
+            .await;
+        created.map(drop)
+    };
+    let invite = async |code: u8| {
+        let invitation = NewInvitation {
+            code_hash: [code; 32],
+            role: InvitationRole::Organiser,
+            note: "again".into(),
+            requester,
+            expires_at: f.now + SignedDuration::from_hours(1),
+        };
+        let invited = f
+            .store
+            .invite(Actor::User(grace.id), invitation, f.now)
+            .await;
+        invited.map(drop)
+    };
+    create(20, requester).await.unwrap();
+    invite(21).await.unwrap();
+    // The secret was replaced.
+    let rotated = f
+        .store
+        .rotate_token(Actor::User(grace.id), token, [8; 32], requester, f.now)
+        .await;
+    rotated.unwrap();
+    for refused in [create(22, requester).await, invite(23).await] {
+        assert!(
+            matches!(refused, Err(StoreError::TokenInvalid)),
+            "{refused:?}"
+        );
+    }
+    let requester = Requester {
+        token: Some((token, [8; 32])),
+        ..requester
+    };
+    create(24, requester).await.unwrap();
+    f.store
+        .remove_user(Actor::Organiser, grace.id, f.now)
+        .await
+        .unwrap();
+    let without_token = Requester {
+        token: None,
+        ..requester
+    };
+    for requester in [requester, without_token] {
+        let refused = create(25, requester).await;
+        assert!(
+            matches!(refused, Err(StoreError::TokenInvalid)),
+            "{refused:?}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn sign_in_under_way_fails_after_a_new_password() {
+    let f = TestStore::new().await;
+    let alpha = f.create_team("Alpha").await;
+    let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
+    let token = f.store.tokens().await.unwrap()[0].id;
+    let set_password = async |password| {
+        f.store
+            .set_password(Actor::User(ada.id), ada.id, password, token, f.now)
+            .await
+            .unwrap();
+    };
+    set_password("old").await;
+    let sign_in = async |hash: u8, verified: &str| {
+        let new = NewToken {
+            hash: [hash; 32],
+            kind: TokenKind::Session,
+            owner: TokenOwner::User(ada.id),
+            name: "browser".into(),
+            requester: Requester::default(),
+            expires_at: Some(f.now + SESSION_LIFETIME),
+        };
+        f.store.sign_in(ada.id, verified, new, f.now).await.unwrap()
+    };
+    assert!(sign_in(30, "old").await);
+    set_password("new").await;
+    assert!(!sign_in(31, "old").await);
+    assert!(sign_in(32, "new").await);
+    f.store
+        .remove_user(Actor::Organiser, ada.id, f.now)
+        .await
+        .unwrap();
+    assert!(!sign_in(33, "new").await);
 }

@@ -12,7 +12,7 @@ use anyhow::Context as _;
 use async_nats::jetstream::{self, AckKind};
 use faceoff_store::{Actor, StoreError};
 use faceoff_types::WorkerName;
-use faceoff_types::escape_unprintable;
+use faceoff_types::printable_excerpt;
 use faceoff_wire::{
     grant::Grant,
     remote::{JobEnd, ResultMessage},
@@ -196,10 +196,7 @@ impl Dispatcher {
             result.end = JobEnd::Shutdown;
         }
         if let JobEnd::PlatformFault { reason } = &mut result.end {
-            *reason = escape_unprintable(reason)
-                .chars()
-                .take(MAX_REASON_CHARS)
-                .collect();
+            *reason = printable_excerpt(reason, MAX_REASON_CHARS);
         }
         let has_failed = matches!(result.end, JobEnd::PlatformFault { .. });
         let was_played = matches!(result.end, JobEnd::Done { .. });
@@ -303,6 +300,8 @@ impl Dispatcher {
 
     /// Bans a worker: its results are ignored, and its jobs are queued again. Returns how to acknowledge the message.
     async fn ban(&self, worker: &WorkerName, difference: &str) -> AckKind {
+        // It may quote the recording.
+        let difference = &printable_excerpt(difference, MAX_REASON_CHARS);
         let reason = format!("its recording differs from the simulation: {difference}");
         let (store, now) = (&self.server.store, self.server.clock.now());
         match store.ban_worker(Actor::Server, worker, &reason, now).await {

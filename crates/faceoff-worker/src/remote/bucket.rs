@@ -2,7 +2,7 @@
 //! expire, but no credentials.
 
 use anyhow::Context as _;
-use faceoff_dataset::writable_files;
+use faceoff_dataset::{max_file_bytes, writable_files};
 use faceoff_store::Artifacts;
 use faceoff_types::BundleRef;
 use faceoff_wire::{grant::Grant, remote::ObjectLinks};
@@ -36,8 +36,6 @@ const RECHECK_AFTER: Duration = Duration::from_secs(600);
 const PART_BYTES: usize = 8 << 20;
 /// Maximum number of parts that are uploaded at the same time.
 const MAX_CONCURRENT_PARTS: usize = 4;
-/// Largest accepted file of a recording, in bytes; far larger than the files of any shard.
-const MAX_RECORDING_FILE_BYTES: u64 = 4 << 30;
 
 /// Configuration of a bucket.
 #[derive(Debug, Clone)]
@@ -189,7 +187,7 @@ impl Bucket {
                 Err(object_store::Error::NotFound { .. }) => continue,
                 Err(error) => return Err(error).context("fetching a recording from the bucket"),
             };
-            if object.meta.size > MAX_RECORDING_FILE_BYTES {
+            if object.meta.size > max_file_bytes(name) {
                 let bytes = object.meta.size;
                 tracing::error!(%object_key, bytes, "the file is too large for a recording; ignored");
                 continue;

@@ -11,10 +11,10 @@ use crate::{game_broadcast::show_update, local::claim};
 use async_nats::{Client, Message};
 use faceoff_live::{LiveState, SlotReport, WorkerInfo};
 use faceoff_store::{Store, StoreError};
-use faceoff_types::{Clock, WorkerName, escape_unprintable};
+use faceoff_types::{Clock, WorkerName, printable_excerpt};
 use faceoff_wire::{
     job::Lease,
-    remote::{LiveGameMessage, WorkerCapabilities, WorkerRequest, WorkerResponse},
+    remote::{LiveGameMessage, LiveGameUpdate, WorkerCapabilities, WorkerRequest, WorkerResponse},
 };
 use futures::StreamExt as _;
 use std::{
@@ -45,6 +45,10 @@ const MAX_CONCURRENT: usize = 64;
 
 /// Maximum length of a worker's problem description, in characters.
 const MAX_PROBLEM_CHARS: usize = 300;
+/// Maximum length of the reason why a worker gets no jobs, in characters.
+const MAX_REFUSAL_CHARS: usize = 1000;
+/// Maximum length of a worker's program version, in characters.
+const MAX_VERSION_CHARS: usize = 40;
 
 /// Minimum interval between writes of progress, since each is a transaction that waits for the disk.
 const PROGRESS_INTERVAL: Duration = Duration::from_secs(2);
@@ -149,7 +153,9 @@ impl RequestHandler {
             WorkerRequest::Register(capabilities) => {
                 let reason = ban
                     .or_else(|| incompatibility(&capabilities, &self.required))
-                    .or_else(backoff);
+                    .or_else(backoff)
+                    // It may quote the worker.
+                    .map(|reason| printable_excerpt(&reason, MAX_REFUSAL_CHARS));
                 let info = worker_info(&capabilities);
                 let workers = &self.live.workers;
                 workers.record_poll(worker.as_str(), info, reason.as_deref(), now);
@@ -173,12 +179,7 @@ impl RequestHandler {
                 episodes_done,
                 trouble,
             } => {
-                let trouble = trouble.map(|problem| -> String {
-                    escape_unprintable(&problem)
-                        .chars()
-                        .take(MAX_PROBLEM_CHARS)
-                        .collect()
-                });
+                let trouble = trouble.map(|problem| printable_excerpt(&problem, MAX_PROBLEM_CHARS));
                 let held = self.renew(&worker, &lease, episodes_done, renewals).await;
                 self.record_renewal(&worker, &lease, held, trouble.as_deref())
             }
@@ -308,6 +309,7 @@ impl RequestHandler {
         shutdown: &CancellationToken,
     ) -> anyhow::Result<()> {
         let mut updates = self.client.subscribe(self.names.live_games(ALL)).await?;
+        let mut events = LiveEventBytes::default();
         loop {
             let message = tokio::select! {
                 () = shutdown.cancelled() => return Ok(()),
@@ -318,18 +320,48 @@ impl RequestHandler {
             let Ok(update) = serde_json::from_slice::<LiveGameMessage>(&message.payload) else {
                 continue;
             };
-            // Only the holder of a lease may send updates. Whether the game is that of the lease is not checked, since
-            // updates have no influence on results.
+            // Only the holder of a lease may send updates, of its own game.
             let Some(worker) = names::worker_of(&message.subject) else {
                 continue;
             };
             let (job_id, nonce) = (update.lease.job_id, update.lease.nonce);
             let has_lease = self.store.is_leased_by(&worker, job_id, nonce).await;
-            if self.streams.are_owned() && has_lease.unwrap_or_default() {
+            if !self.streams.are_owned()
+                || !has_lease.unwrap_or_default()
+                || self.store.game_of_job(job_id).await.ok().flatten() != Some(update.game)
+            {
+                continue;
+            }
+            let has_events = matches!(
+                &update.update,
+                LiveGameUpdate::Progress { events, .. } if !events.is_empty()
+            );
+            if !has_events || events.is_allowed(nonce, message.payload.len()) {
                 let attempt = (update.game, update.attempt);
                 show_update(&self.live.games, attempt, update.update);
             }
         }
+    }
+}
+
+/// Bytes of the messages with events that were forwarded, by the nonce of their lease. Events are kept in memory as long as their game.
+#[derive(Debug, Default)]
+struct LiveEventBytes(HashMap<Uuid, usize>);
+
+impl LiveEventBytes {
+    /// Far more than the events of any game.
+    const MAX: usize = 4 << 20;
+    /// More leases than slots; then the counts begin again.
+    const MAX_LEASES: usize = 10_000;
+
+    /// Counts a message; false if its lease has sent too much.
+    fn is_allowed(&mut self, nonce: Uuid, bytes: usize) -> bool {
+        if self.0.len() >= Self::MAX_LEASES && !self.0.contains_key(&nonce) {
+            self.0.clear();
+        }
+        let sent = self.0.entry(nonce).or_default();
+        *sent = sent.saturating_add(bytes);
+        *sent <= Self::MAX
     }
 }
 
@@ -353,15 +385,10 @@ fn worker_info(capabilities: &WorkerCapabilities) -> WorkerInfo {
         .iter()
         .take(WorkerCapabilities::MAX_LABELS);
     WorkerInfo {
-        version: capabilities.version.clone(),
+        version: printable_excerpt(&capabilities.version, MAX_VERSION_CHARS),
         slots: capabilities.slots,
         labels: labels
-            .map(|label| {
-                escape_unprintable(label)
-                    .chars()
-                    .take(WorkerCapabilities::MAX_LABEL_CHARS)
-                    .collect()
-            })
+            .map(|label| printable_excerpt(label, WorkerCapabilities::MAX_LABEL_CHARS))
             .collect(),
     }
 }
@@ -369,6 +396,19 @@ fn worker_info(capabilities: &WorkerCapabilities) -> WorkerInfo {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn events_of_a_lease_are_bounded() {
+        let mut events = LiveEventBytes::default();
+        let [first, second] = [1, 2].map(Uuid::from_u128);
+        assert!(events.is_allowed(first, LiveEventBytes::MAX));
+        assert!(!events.is_allowed(first, 1));
+        assert!(events.is_allowed(second, 1));
+        for nonce in 3..=LiveEventBytes::MAX_LEASES as u128 + 2 {
+            assert!(events.is_allowed(Uuid::from_u128(nonce), 1));
+        }
+        assert!(events.0.len() <= LiveEventBytes::MAX_LEASES);
+    }
 
     #[test]
     fn renewals_are_written_after_progress_or_time() {

@@ -1,6 +1,7 @@
 //! The address of a server, and the HTTP client that connects to it.
 
 use anyhow::{Context, bail};
+use faceoff_types::without_password;
 use reqwest::redirect::Policy;
 use rustls::ClientConfig;
 use std::{path::Path, time::Duration};
@@ -18,12 +19,18 @@ impl Address {
     /// If `server` is no address, its scheme is neither `http` nor `https`, or no certificate authority is available.
     pub(super) fn new(server: &str, ca_file: Option<&Path>) -> anyhow::Result<Self> {
         let url = reqwest::Url::parse(server).with_context(|| {
-            format!("{server:?} is not an address; expected e.g. https://faceoff.example.org or http://127.0.0.1:8080")
+            format!(
+                "{:?} is not an address; expected e.g. https://faceoff.example.org or http://127.0.0.1:8080",
+                without_password(server)
+            )
         })?;
         let tls = match url.scheme() {
             "https" => super::tls::tls_client_config(ca_file)?,
             "http" => super::tls::plain_client_config(),
-            other => bail!("{server}: expected http:// or https://, got {other}://"),
+            other => bail!(
+                "{}: expected http:// or https://, got {other}://",
+                without_password(server)
+            ),
         };
         Ok(Self {
             base: server.trim_end_matches('/').to_owned(),

@@ -1,11 +1,11 @@
 //! Requests about users, their teams and their tokens. The API's routes call users *people*.
 
-use super::Client;
+use super::{Client, read_json};
 use faceoff_api::{
     requests::{
-        Confirmation, Decision, JoinRequest, NewAnnouncement, NewAnswer, NewInvitation,
+        Confirmation, Decision, JoinRequest, Made, NewAnnouncement, NewAnswer, NewInvitation,
         NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason, RegistrationRequest,
-        SeasonChange, TeamChange,
+        RevocationQuery, SeasonChange, TeamChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
@@ -40,8 +40,15 @@ impl Client {
         self.post_empty(&format!("/tokens/{id}/rotate")).await
     }
 
-    pub async fn revoke_token(&self, id: TokenId) -> anyhow::Result<RevokedTokenView> {
-        self.call(Method::DELETE, &format!("/tokens/{id}")).await
+    /// Revokes a token. `made` says what happens to all that was made with it.
+    pub async fn revoke_token(
+        &self,
+        id: TokenId,
+        made: Option<Made>,
+    ) -> anyhow::Result<RevokedTokenView> {
+        let request = self.request(Method::DELETE, &format!("/tokens/{id}"));
+        let request = request.query(&RevocationQuery { made });
+        read_json(self.send(request).await?).await
     }
 
     /// The users that the caller may see.

@@ -6,8 +6,9 @@ use clap::Args;
 use faceoff_api::requests::NewPassword;
 use std::io::IsTerminal;
 
-/// Sets your password and revokes all your other tokens and sessions. Prompts for the old and the new password;
-/// without a terminal, reads them as two lines of standard input, the old one first (empty if there is none).
+/// Sets your password and revokes all your other tokens and sessions. If you had a password before, the team tokens, invitations and
+/// webhooks that you have made end, too, and are printed. Prompts for the old and the new password; without a terminal, reads them as two
+/// lines of standard input, the old one first (empty if there is none).
 #[derive(Debug, Args)]
 pub struct PasswordCommand {
     #[command(flatten)]

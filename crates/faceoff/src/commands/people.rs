@@ -39,31 +39,8 @@ pub(super) fn ended_text(ended: Option<&EndedCredentialsView>) -> String {
     let Some(ended) = ended else {
         return String::new();
     };
-    let tokens = ended.tokens.iter();
-    let invitations = ended.invitations.iter();
-    let webhooks = ended.webhooks.iter();
-    let mut lines: Vec<String> = tokens
-        .map(|token| format!("ended: token {} ({})", token.name, token.id))
-        .chain(invitations.map(|invitation| {
-            format!(
-                "ended: invitation for {} ({})",
-                invitation.note, invitation.id
-            )
-        }))
-        .chain(webhooks.map(|webhook| {
-            format!(
-                "ended: webhook {} ({}), which can be enabled again",
-                webhook.name, webhook.id
-            )
-        }))
-        .collect();
-    lines.extend(ended.remaining_people.iter().map(|user| {
-        format!(
-            "stays: the account of {}, who joined by an invitation of this user",
-            user.name
-        )
-    }));
-    lines.iter().map(|line| format!("\n{line}")).collect()
+    let lines = ended.lines().into_iter();
+    lines.map(|line| format!("\n{line}")).collect()
 }
 
 /// An invitation as one line.

@@ -24,6 +24,7 @@ use clap::Args;
 use faceoff_http::ConnectionLimits;
 use faceoff_sandbox::probe_host;
 use faceoff_store::{ArchivedSeason, Store};
+use rustix::fs::Mode;
 use std::{
     net::SocketAddr,
     path::{Path, PathBuf},
@@ -55,6 +56,8 @@ impl ServeCommand {
     /// If the configuration, the data folder, the address or the sandbox is unusable.
     pub fn run(self) -> anyhow::Result<()> {
         self.log_format.start()?;
+        // What the server writes is closed to other users; what agents read gets its modes explicitly.
+        rustix::process::umask(Mode::RWXG | Mode::RWXO);
         let config = self.load_config()?;
         let archived = super::block_on(archived_season(&config.server.data_dir))?;
         if archived.is_none() {

@@ -8,7 +8,10 @@ use super::{
 use crate::client::Client;
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use faceoff_api::{requests::NewToken, views::token::TokenView};
+use faceoff_api::{
+    requests::{Made, NewToken},
+    views::token::TokenView,
+};
 use faceoff_types::{TeamId, TokenId};
 use jiff::{SignedDuration, Timestamp};
 
@@ -42,11 +45,17 @@ pub(super) enum TokenAction {
         #[arg(id = "id", value_name = "ID")]
         token: TokenId,
     },
-    /// Revoke a token or end a session
+    /// Revoke a token or end a session. Unless it is your own, the tokens, invitations and webhooks that were made with it end, too
     Revoke {
         /// The token's id
         #[arg(id = "id", value_name = "ID")]
         token: TokenId,
+        /// Keep what was made with it
+        #[arg(long)]
+        keep_made: bool,
+        /// End what was made with it, also if it is your own
+        #[arg(long, conflicts_with = "keep_made")]
+        end_made: bool,
     },
 }
 
@@ -100,8 +109,17 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
                 )
             })
         }
-        TokenAction::Revoke { token } => {
-            let revoked = client.revoke_token(token).await?;
+        TokenAction::Revoke {
+            token,
+            keep_made,
+            end_made,
+        } => {
+            let made = match (keep_made, end_made) {
+                (true, _) => Some(Made::Keep),
+                (false, true) => Some(Made::End),
+                (false, false) => None,
+            };
+            let revoked = client.revoke_token(token, made).await?;
             print(json, &revoked, |revoked| {
                 token_line(&revoked.token, Timestamp::now()) + &ended_text(revoked.ended.as_ref())
             })

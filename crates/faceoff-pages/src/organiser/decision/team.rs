@@ -4,10 +4,10 @@ use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
+    auth::Organiser,
     problem::Problem,
     services::{registrations, rulings},
 };
-use faceoff_store::Actor;
 use faceoff_types::{RegistrationId, TeamId};
 
 #[derive(Debug, Clone, Copy)]
@@ -71,9 +71,10 @@ impl TeamDecision {
     pub(super) async fn carry_out(
         self,
         app: &AppState,
-        actor: Actor,
+        organiser: &Organiser,
         request: requests::Decision,
     ) -> Result<Done, Problem> {
+        let actor = organiser.actor();
         let reason = request.reason.as_str();
         let notice = match self {
             Self::Disqualify(id) => {
@@ -85,7 +86,8 @@ impl TeamDecision {
                 "reinstated"
             }
             Self::Approve(id) => {
-                registrations::approve_registration(app, actor, id).await?;
+                let requester = organiser.requester();
+                registrations::approve_registration(app, actor, requester, id).await?;
                 "approved"
             }
             Self::Refuse(id) => {

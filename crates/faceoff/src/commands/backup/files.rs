@@ -26,10 +26,11 @@ pub struct CopiedFile {
 /// # Errors
 /// If it is no regular file, or cannot be read.
 pub fn open_regular(path: &Path) -> std::io::Result<File> {
-    // Opening a pipe would already wait.
+    // Opening a pipe would already wait, and a link could lead out of the backup.
+    let flags = OFlags::NONBLOCK | OFlags::NOFOLLOW;
     let file = OpenOptions::new()
         .read(true)
-        .custom_flags(OFlags::NONBLOCK.bits().cast_signed())
+        .custom_flags(flags.bits().cast_signed())
         .open(path)?;
     if file.metadata()?.is_file() {
         return Ok(file);

@@ -101,8 +101,8 @@ pub fn close_to_others(data_dir: &Path) -> anyhow::Result<()> {
     const GROUP_AND_OTHERS: u32 = 0o077;
     const NAMES: [&str; 7] = [
         DATABASE,
-        concat!("faceoff.sqlite3", "-wal"),
-        concat!("faceoff.sqlite3", "-shm"),
+        "faceoff.sqlite3-wal",
+        "faceoff.sqlite3-shm",
         ARTIFACTS,
         ADMIN_TOKEN_FILE,
         LINK_KEY_FILE,

@@ -1,0 +1,67 @@
+//! Who makes a request, checked in the transaction of the change: a body takes time to arrive, and meanwhile the token may have been
+//! revoked.
+
+use crate::{
+    error::{Result, StoreError},
+    tables::{
+        tokens::{self, Maker},
+        users,
+    },
+};
+use faceoff_types::{TokenId, UserId};
+use jiff::Timestamp;
+use sqlx::SqliteConnection;
+
+/// The user and the token of a request. The default is the server itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Requester {
+    /// `None`: the host, a team's API client or the server.
+    pub user: Option<UserId>,
+    /// The token or session, with the hash of its secret: another secret makes requests with the old one invalid.
+    pub token: Option<(TokenId, [u8; 32])>,
+}
+
+impl Requester {
+    /// The maker of what the requester makes.
+    #[must_use]
+    pub fn maker(&self) -> Maker {
+        Maker {
+            user: self.user,
+            token: self.token.map(|(id, _)| id),
+        }
+    }
+}
+
+/// Is the token of the requester valid at `now`, with this secret, and has the user an account?
+pub(crate) async fn is_valid(
+    connection: &mut SqliteConnection,
+    requester: &Requester,
+    now: Timestamp,
+) -> Result<bool> {
+    if let Some((id, hash)) = requester.token {
+        let token = match tokens::find(connection, id).await {
+            Err(StoreError::NotFound(_)) => return Ok(false),
+            token => token?,
+        };
+        if !token.is_valid(now) || tokens::hash_of(connection, id).await? != hash {
+            return Ok(false);
+        }
+    }
+    match requester.user {
+        Some(user) => Ok(users::find(connection, user).await?.left_at.is_none()),
+        None => Ok(true),
+    }
+}
+
+/// Returns the maker of what the requester makes. [`StoreError::TokenInvalid`] if the requester has lost the right to it.
+pub(crate) async fn check(
+    connection: &mut SqliteConnection,
+    requester: &Requester,
+    now: Timestamp,
+) -> Result<Maker> {
+    if is_valid(connection, requester, now).await? {
+        Ok(requester.maker())
+    } else {
+        Err(StoreError::TokenInvalid)
+    }
+}
