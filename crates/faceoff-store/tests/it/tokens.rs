@@ -186,3 +186,94 @@ async fn host_token_follows_its_file_and_stays_revoked() {
         .unwrap();
     assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());
 }
+
+#[tokio::test]
+async fn makers_of_earlier_versions_come_from_the_log() {
+    let f = TestStore::new().await;
+    let team = f.create_team("Alpha").await;
+    let owner = TokenOwner::Team(team.id);
+    let users = [1, 2].map(|code| (code, InvitationRole::Organiser));
+    let mut ids = Vec::new();
+    for (code, role) in users {
+        let invitation = NewInvitation {
+            code_hash: [code; 32],
+            role,
+            note: "an organiser".into(),
+            requester: Requester::default(),
+            expires_at: f.now + SignedDuration::from_hours(1),
+        };
+        let invited = f.store.invite(Actor::Organiser, invitation, f.now).await;
+        invited.unwrap();
+        let request = join_request([code; 32], &format!("User {code}"));
+        ids.push(f.store.join(request, f.now).await.unwrap().user.id);
+    }
+    let [first, second] = ids[..] else {
+        unreachable!()
+    };
+    let create = async |hash, actor| {
+        let created = f
+            .store
+            .create_token(actor, new_token(hash, owner, None), f.now);
+        created.await.unwrap().id
+    };
+    let by_first = create(11, Actor::User(first)).await;
+    let rotated_by_second = create(12, Actor::User(first)).await;
+    let rotated_by_team = create(13, Actor::User(first)).await;
+    let by_host = create(14, Actor::Organiser).await;
+    for (token, actor, hash) in [
+        (rotated_by_second, Actor::User(second), 22),
+        (rotated_by_team, Actor::Team(team.id), 23),
+    ] {
+        let requester = Requester::default();
+        let rotated = f
+            .store
+            .rotate_token(actor, token, [hash; 32], requester, f.now);
+        rotated.await.unwrap();
+    }
+    let link = |code| NewInvitation {
+        code_hash: [code; 32],
+        role: InvitationRole::PasswordReset(first),
+        note: "a link".into(),
+        requester: Requester::default(),
+        expires_at: f.now + SignedDuration::from_hours(24 * 90),
+    };
+    let link = f.store.invite(Actor::User(second), link(30), f.now).await;
+    let link = link.unwrap();
+
+    // As the earlier version left them.
+    let mut connection = f.connection().await;
+    let mut execute = async |sql: &str| {
+        sqlx::raw_sql(sqlx::AssertSqlSafe(sql.to_owned()))
+            .execute(&mut connection)
+            .await
+            .unwrap();
+    };
+    for table in ["tokens", "invitations", "webhooks"] {
+        execute(&format!(
+            "UPDATE {table} SET made_by = NULL, made_with = NULL"
+        ))
+        .await;
+    }
+    let migration = include_str!("../../../../migrations/0049_makers.sql");
+    let (_, updates) = migration.split_once("UPDATE").unwrap();
+    execute(&format!("UPDATE{updates}")).await;
+
+    let tokens = f.store.tokens().await.unwrap();
+    let maker = |id| {
+        let token = tokens.iter().find(|token| token.id == id);
+        token.unwrap().maker.user
+    };
+    assert_eq!(maker(by_first), Some(first));
+    assert_eq!(maker(rotated_by_second), Some(second));
+    assert_eq!(maker(rotated_by_team), Some(first));
+    assert_eq!(maker(by_host), None);
+    let own = tokens
+        .iter()
+        .filter(|token| token.owner == TokenOwner::User(first));
+    assert!(own.clone().count() == 1 && own.clone().all(|token| token.maker.user == Some(first)));
+    let invitations = f.store.invitations().await.unwrap();
+    let link = invitations.iter().find(|found| found.id == link.id);
+    let link = link.unwrap();
+    assert_eq!(link.maker.user, Some(second));
+    assert_eq!(link.expires_at, f.now + SignedDuration::from_hours(24));
+}
