@@ -390,7 +390,10 @@ impl Log {
     /// Prints the log if the test has failed.
     pub(crate) fn show_on_failure(&self, process: &str) {
         if thread::panicking() {
-            eprintln!("log of the {process}:\n{}", self.text());
+            #[expect(clippy::print_stderr, reason = "a panic shows its own message only")]
+            {
+                eprintln!("log of the {process}:\n{}", self.text());
+            }
         }
     }
 

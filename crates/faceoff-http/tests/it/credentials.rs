@@ -124,7 +124,7 @@ async fn removed_member_leaves_no_team_token_behind() {
     let by_ada = new_token(&site, &ada.token, of_team("ci")).await;
     assert_eq!(by_ada["made_by"], json!(ada.id));
     let by_bob = new_token(&site, &bob.token, of_team("robot")).await;
-    // Whoever rotates a token knows its secret.
+    // The user who rotates a token knows its secret.
     let rotate = format!("/tokens/{}/rotate", string(&by_bob["id"]));
     let rotated = post(&site, &rotate, &ada.token, &json!({})).await.json(200);
     let own = json!({ "role": "member", "note": "a friend" });

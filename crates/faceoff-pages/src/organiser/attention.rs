@@ -135,7 +135,7 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
     Ok((items, queue))
 }
 
-/// Many wrong passwords, which somebody may be guessing.
+/// Many wrong passwords: attempts to guess them, perhaps.
 async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
     let wrong = app.passwords.wrong_passwords(app.config.clock.now());
     if wrong.total() < MANY_WRONG_PASSWORDS {
