@@ -105,12 +105,12 @@ fn result_waits_while_stream_is_full() {
     let message = "the result is not stored by NATS yet; trying again";
     worker.wait_for_log(message, 1);
     assert!(worker.log().contains("maximum bytes"), "{}", worker.log());
-    // The page of workers and the health endpoints report the problem, too.
+    // The page of workers reports the problem, too, and the health endpoints that there is one.
     wait_for_problem(&setup.server, "maximum bytes");
     for path in ["/api/v1/health", "/readyz"] {
         let _ = setup.server.poll(path, &setup.server.admin_token, |view| {
             let detail = view["detail"].as_str();
-            detail.is_some_and(|detail| detail.contains("maximum bytes"))
+            detail.is_some_and(|detail| detail.contains("cannot exchange jobs or results"))
         });
     }
     // A lease (the worker's right to run the job) lasts 10 s. The worker must renew it during this pause.
