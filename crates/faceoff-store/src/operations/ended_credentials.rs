@@ -2,6 +2,7 @@
 //! password: a token, an invitation, a webhook.
 
 use crate::{
+    boxed,
     error::Result,
     event::{Event, Subject},
     operations::webhooks::disable,
@@ -57,6 +58,7 @@ pub(crate) async fn end_made_with(
 }
 
 /// Ends what this maker has made, and what was made with the tokens among it, also with those that had ended before.
+#[boxed]
 async fn end_made(
     tx: &mut Tx,
     maker: Maker,

@@ -2,6 +2,7 @@
 //! revoked.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     tables::{
         tokens::{self, Maker},
@@ -33,6 +34,7 @@ impl Requester {
 }
 
 /// Is the token of the requester valid at `now`, with this secret, and has the user an account?
+#[boxed]
 pub(crate) async fn is_valid(
     connection: &mut SqliteConnection,
     requester: &Requester,
@@ -54,6 +56,7 @@ pub(crate) async fn is_valid(
 }
 
 /// Returns the maker of what the requester makes. [`StoreError::TokenInvalid`] if the requester has lost the right to it.
+#[boxed]
 pub(crate) async fn check(
     connection: &mut SqliteConnection,
     requester: &Requester,
