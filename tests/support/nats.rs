@@ -11,6 +11,8 @@ use std::{
 };
 
 const CONFIG: &str = "nats-server.conf";
+/// Setting that keeps results of tests from depending on the free disk space, by which NATS otherwise limits its streams.
+pub const ENOUGH_SPACE: &str = "jetstream: {max_file_store: 16GB}\n";
 
 /// A NATS server on a free port. Dropping it kills it (SIGKILL).
 #[derive(Debug)]
@@ -27,7 +29,7 @@ impl Nats {
     /// If `nats-server` is not installed, or does not start.
     #[must_use]
     pub fn start(folder: &Path) -> Self {
-        Self::start_with_config(folder, "")
+        Self::start_with_config(folder, ENOUGH_SPACE)
     }
 
     /// Starts a server with this configuration; port and folder are set here.

@@ -12,7 +12,7 @@ use async_nats::jetstream::{
 };
 use faceoff_tests::{
     bundle,
-    nats::Nats,
+    nats::{ENOUGH_SPACE, Nats},
     relay::Relay,
     repository,
     server::{Server, TIMEOUT},
@@ -285,6 +285,27 @@ fn nats_certificate_is_verified_with_configured_authority() {
     resume(&server);
     reference_run.assert_equal_result(&server);
     assert!(!worker.log().contains(refusal), "{}", worker.log());
+}
+
+#[test]
+fn nats_without_space_for_results_is_reported() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let mut nats = Nats::start_with_config(
+        &scratch.path().join("nats"),
+        "jetstream: {max_file_store: 100MB}\n",
+    );
+    let file_relay = Relay::start();
+    let config = server_config(&nats, file_relay.address());
+    let server = start_server(&reference_run, &config, &file_relay);
+    let problem = "NATS has no space for the stream faceoff-outcomes, which needs 256 MiB";
+    wait_for_problem(&server, problem);
+    resume(&server);
+    let worker = Worker::start(scratch.path(), "worker", &worker_config(nats.address(), 1));
+    nats.configure(ENOUGH_SPACE);
+    nats.kill_and_restart();
+    reference_run.assert_equal_result(&server);
+    assert!(worker.log().contains("committed"), "{}", worker.log());
 }
 
 #[test]

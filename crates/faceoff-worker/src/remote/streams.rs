@@ -9,8 +9,9 @@ use anyhow::Context as _;
 use async_nats::{
     header::NATS_MESSAGE_ID,
     jetstream::{
-        self,
+        self, ErrorCode,
         consumer::{self, AckPolicy, PullConsumer, pull},
+        context::{CreateStreamError, CreateStreamErrorKind},
         stream::{self, DiscardPolicy, RawMessageErrorKind, RetentionPolicy, Stream},
     },
 };
@@ -22,8 +23,8 @@ use std::{
 
 /// Maximum number of jobs in the stream; there are never more than free slots.
 const MAX_JOBS: i64 = 100_000;
-/// Maximum size of all pending results, in bytes.
-const MAX_RESULT_BYTES: i64 = 1 << 30;
+/// Maximum size of all pending results, in bytes. NATS reserves it on its disk when the stream is created.
+const MAX_RESULT_BYTES: i64 = 256 << 20;
 /// Time within which NATS drops repeated results. The server commits a result once in any case.
 const DUPLICATE_WINDOW: Duration = Duration::from_secs(120);
 /// Time after which a result that the server has not acknowledged is delivered again.
@@ -163,7 +164,7 @@ impl Streams {
     ) -> anyhow::Result<Stream> {
         let name = &requested.name;
         let stream = self.jetstream.get_or_create_stream(requested.clone()).await;
-        let stream = stream.with_context(|| format!("setting up the stream {name}"))?;
+        let stream = stream.map_err(|error| stream_error(name, error))?;
         let owner = &stream.cached_info().config.description;
         let is_owned = *owner == requested.description;
         is_known_as_own.store(is_owned, Ordering::Relaxed);
@@ -199,6 +200,24 @@ impl Streams {
             ..stream::Config::default()
         }
     }
+}
+
+/// The error for a stream that cannot be set up. If NATS has no space for it, says how much it needs.
+fn stream_error(name: &str, error: CreateStreamError) -> anyhow::Error {
+    let has_no_space = matches!(
+        error.kind(),
+        CreateStreamErrorKind::JetStream(reason)
+            if reason.error_code() == ErrorCode::STORAGE_RESOURCES_EXCEEDED
+    );
+    let context = match has_no_space {
+        true => format!(
+            "NATS has no space for the stream {name}, which needs {} MiB: free disk space and restart NATS, or raise max_file_store \
+             in its configuration (by default, three quarters of the disk space that was free when it started)",
+            MAX_RESULT_BYTES >> 20
+        ),
+        false => format!("setting up the stream {name}"),
+    };
+    anyhow::Error::new(error).context(context)
 }
 
 /// Has the consumer received more messages than its stream has ever had (by their sequence numbers)? Then NATS has lost
