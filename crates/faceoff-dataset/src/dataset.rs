@@ -30,13 +30,12 @@ use crate::{
     table::HOST_TIME,
 };
 use arrow_array::RecordBatch;
-use faceoff_types::{Competition, EvaluationResult, Task};
+use faceoff_types::{Competition, EvaluationResult, MAX_EPISODES_PER_TASK, Task};
 use faceoff_wire::dataset::{CalibrationFile, DatasetManifest, FileDigest, ViolationsFile};
 use fs_err as fs;
 use serde::Deserialize;
 use std::{
     collections::BTreeSet,
-    io,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -112,7 +111,7 @@ impl Dataset {
                 )));
             }
             let container = Container::archive(&archive)?;
-            check_results_copy(&path.join(RESULTS_FILE), &container)?;
+            container.check_results_copy(&path.join(RESULTS_FILE), ARCHIVE_FILE)?;
             (archive, container)
         };
         let (layout, manifest) = read_manifest(&container)?;
@@ -205,7 +204,9 @@ impl Dataset {
 
     /// The table of episodes as Arrow batches.
     pub(crate) fn episode_batches(&self) -> Result<Vec<RecordBatch>, DatasetError> {
-        episodes::batches(self.table(EPISODES_FILE)?, &self.competition)
+        let counts = self.manifest.episodes.values();
+        let expected_rows = counts.map(|count| u64::from(*count)).sum();
+        episodes::batches(self.table(EPISODES_FILE)?, expected_rows, &self.competition)
     }
 
     /// The table of control steps.
@@ -304,20 +305,13 @@ fn read_manifest(container: &Container) -> Result<(Layout, DatasetManifest), Dat
             Layout::schema_list()
         )));
     };
-    let manifest =
+    let manifest: DatasetManifest =
         serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
-    Ok((layout, manifest))
-}
-
-/// Checks that a `results.json` beside the archive equals the one inside.
-fn check_results_copy(path: &Path, container: &Container) -> Result<(), DatasetError> {
-    match fs::read(path) {
-        Ok(copy) if copy == container.bytes(RESULTS_FILE)? => Ok(()),
-        Ok(_) => Err(DatasetError::Altered(format!(
-            "{} is not the {RESULTS_FILE} in {ARCHIVE_FILE}",
-            path.display()
-        ))),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(error.into()),
+    let mut counts = manifest.episodes.iter();
+    if let Some((task, count)) = counts.find(|(_, count)| **count > MAX_EPISODES_PER_TASK) {
+        return Err(DatasetError::Unreadable(format!(
+            "{MANIFEST_FILE} states {count} episodes of {task}; at most {MAX_EPISODES_PER_TASK} are possible"
+        )));
     }
+    Ok((layout, manifest))
 }

@@ -36,6 +36,17 @@ pub fn max_file_bytes(name: &str) -> u64 {
     }
 }
 
+/// The largest accepted file of a dataset or a game that is read into memory as a whole, in bytes. Archives of strangers can
+/// hold gigabytes in a few kilobytes.
+pub(crate) fn max_json_bytes(name: &str) -> u64 {
+    match name {
+        MANIFEST_FILE => 1 << 20,
+        // These grow with the number of episodes.
+        VIOLATIONS_FILE | CALIBRATION_FILE => 128 << 20,
+        _ => 16 << 20,
+    }
+}
+
 /// The result of a removal, which has also succeeded if there was nothing to remove.
 ///
 /// # Errors

@@ -4,7 +4,11 @@ use super::{
     file_range::{FileRange, open},
     seal::{self, Seal},
 };
-use crate::{digest, error::DatasetError, files::MANIFEST_FILE};
+use crate::{
+    digest,
+    error::DatasetError,
+    files::{MANIFEST_FILE, RESULTS_FILE, max_json_bytes},
+};
 use faceoff_wire::dataset::FileDigest;
 use std::{
     fs::File,
@@ -13,9 +17,6 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 use zip::{CompressionMethod, ZipArchive};
-
-/// Size limit of files that are read into memory as a whole. Tables are read in parts and have no limit.
-const SMALL_FILE_BYTES: u64 = 512 << 20;
 
 /// The folder or archive of a dataset's files.
 #[derive(Debug)]
@@ -84,18 +85,38 @@ impl Container {
         Ok(())
     }
 
-    /// Reads a file into memory.
+    /// Reads a file into memory, of bounded size. Tables are read in parts and are not bounded.
     pub fn bytes(&self, name: &str) -> Result<Vec<u8>, DatasetError> {
+        let max_bytes = max_json_bytes(name);
         let mut bytes = Vec::new();
         self.read(name, |reader| {
-            reader.take(SMALL_FILE_BYTES + 1).read_to_end(&mut bytes)
+            reader.take(max_bytes + 1).read_to_end(&mut bytes)
         })?;
-        if bytes.len() as u64 > SMALL_FILE_BYTES {
+        if bytes.len() as u64 > max_bytes {
             return Err(DatasetError::Unreadable(format!(
-                "{name} is larger than {SMALL_FILE_BYTES} bytes"
+                "{name} is larger than {max_bytes} bytes, more than any dataset needs"
             )));
         }
         Ok(bytes)
+    }
+
+    /// Checks that a `results.json` beside the archive, if there is one, equals the one inside. `archive_name` is for the error.
+    pub fn check_results_copy(&self, path: &Path, archive_name: &str) -> Result<(), DatasetError> {
+        if !path.exists() {
+            return Ok(());
+        }
+        let inside = self.bytes(RESULTS_FILE)?;
+        let mut copy = Vec::new();
+        open(path)?
+            .take(inside.len() as u64 + 1)
+            .read_to_end(&mut copy)?;
+        if copy == inside {
+            return Ok(());
+        }
+        Err(DatasetError::Altered(format!(
+            "{} is not the {RESULTS_FILE} in {archive_name}",
+            path.display()
+        )))
     }
 
     /// Size and hash of a file, streamed.

@@ -12,6 +12,9 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Serialize;
 use std::sync::Arc;
 
+/// Number of rows that a table of few episodes may have more than twice the expected ones, and still be read.
+const SURPLUS_ROWS: u64 = 1000;
+
 /// One row of `episodes.parquet`, without the states and hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeRecord {
@@ -33,9 +36,11 @@ pub struct EpisodeRecord {
     pub initial_state: Vec<Option<f64>>,
 }
 
-/// The table as Arrow batches, after a check of its columns.
+/// The table as Arrow batches, after a check of its columns and that it has not many more rows than expected, since all of
+/// it is held in memory.
 pub(crate) fn batches(
     table: FileRange,
+    expected_rows: u64,
     competition: &Arc<Competition>,
 ) -> Result<Vec<RecordBatch>, DatasetError> {
     let bytes = table.bytes;
@@ -45,6 +50,14 @@ pub(crate) fn batches(
             Ok(builder)
         })
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;
+    let groups = builder.metadata().row_groups().iter();
+    let rows: u64 = groups.map(|group| group.num_rows().unsigned_abs()).sum();
+    // Of a few rows too many or too few the caller says where.
+    if rows > expected_rows.saturating_mul(2).saturating_add(SURPLUS_ROWS) {
+        return Err(DatasetError::Unreadable(format!(
+            "{EPISODES_FILE} has {rows} rows, expected {expected_rows}"
+        )));
+    }
     check_columns(
         EPISODES_FILE,
         builder.schema(),

@@ -6,7 +6,14 @@ use parquet::{
     file::metadata::{ColumnChunkMetaData, ParquetMetaData},
 };
 
-/// Refuses negative numbers, and columns that are not within the table, whose size is `table_bytes`.
+/// Mean size of a value (a number, a short text or a list of up to a few hundred numbers) up to which a column is read, in bytes
+/// before compression.
+const MAX_VALUE_BYTES: u64 = 4096;
+/// Size of a column of a row group that is always read: a few values may be longer.
+const SMALL_COLUMN_BYTES: u64 = 1 << 20;
+
+/// Refuses negative numbers, columns that are not within the table, whose size is `table_bytes`, and columns that a small table
+/// states as far larger than such values are.
 pub(crate) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
     for (number, group) in footer.row_groups().iter().enumerate() {
         let columns = group.columns().iter();
@@ -17,6 +24,24 @@ pub(crate) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
         {
             return Err(ParquetError::General(format!(
                 "the columns of row group {number} do not lie within the table"
+            )));
+        }
+        let max_bytes = SMALL_COLUMN_BYTES.saturating_add(
+            group
+                .num_rows()
+                .unsigned_abs()
+                .saturating_mul(MAX_VALUE_BYTES),
+        );
+        let large = group
+            .columns()
+            .iter()
+            .find(|column| column.uncompressed_size().unsigned_abs() > max_bytes);
+        if let Some(column) = large {
+            return Err(ParquetError::General(format!(
+                "the column {} of row group {number} has {} bytes for {} rows",
+                column.column_path().string(),
+                column.uncompressed_size(),
+                group.num_rows()
             )));
         }
     }
@@ -77,6 +102,27 @@ mod tests {
             .unwrap();
         let file = FileMetaData::new(2, rows, None, None, schema, None);
         ParquetMetaData::new(file, vec![group])
+    }
+
+    #[test]
+    fn columns_of_gigabytes_are_refused() {
+        let column_of = |rows: i64, bytes: i64| {
+            let footer = footer(rows, 4, 96, None);
+            let [group] = footer.row_groups() else {
+                panic!("{footer:?}")
+            };
+            let column = group.column(0).clone().into_builder();
+            let column = column.set_total_uncompressed_size(bytes).build().unwrap();
+            let group = group.clone().into_builder();
+            let group = group.set_column_metadata(vec![column]).build().unwrap();
+            ParquetMetaData::new(footer.file_metadata().clone(), vec![group])
+        };
+        assert!(check(&column_of(1000, 4 << 20), TABLE_BYTES).is_ok());
+        let refused = check(&column_of(1000, 8 << 20), TABLE_BYTES).unwrap_err();
+        assert!(
+            refused.to_string().contains("the column puck_x"),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -23,7 +23,6 @@ use fs_err as fs;
 use serde::Deserialize;
 use std::{
     collections::BTreeSet,
-    io,
     path::{Path, PathBuf},
 };
 
@@ -98,7 +97,7 @@ impl GameRecording {
         } else {
             let archive = path.join(GAME_FILE);
             let container = Container::archive(&archive)?;
-            check_results_copy(&path.join(RESULTS_FILE), &container)?;
+            container.check_results_copy(&path.join(RESULTS_FILE), GAME_FILE)?;
             (archive, container)
         };
         let manifest = read_manifest(&container)?;
@@ -189,18 +188,5 @@ fn read_manifest(container: &Container) -> Result<GameManifest, DatasetError> {
         other => Err(DatasetError::Foreign(format!(
             "the recording's layout is {other:?}, this version reads {GAME_SCHEMA}"
         ))),
-    }
-}
-
-/// Checks that a `results.json` beside the archive equals the one inside.
-fn check_results_copy(path: &Path, container: &Container) -> Result<(), DatasetError> {
-    match fs::read(path) {
-        Ok(copy) if copy == container.bytes(RESULTS_FILE)? => Ok(()),
-        Ok(_) => Err(DatasetError::Altered(format!(
-            "{} is not the {RESULTS_FILE} in {GAME_FILE}",
-            path.display()
-        ))),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(error.into()),
     }
 }

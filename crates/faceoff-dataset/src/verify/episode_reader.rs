@@ -80,7 +80,7 @@ impl<'a> EpisodeReader<'a> {
         let steps = StepTable::open(FileRange::whole(steps)?, competition)?;
         Ok(Self::new(
             Box::new(expected.map(move |episode| (task, episode))),
-            episode_batches(FileRange::whole(episodes)?, competition)?,
+            episode_batches(FileRange::whole(episodes)?, played as u64, competition)?,
             steps.read(None)?,
             competition,
         ))

@@ -704,3 +704,48 @@ fn steps_of_an_agent_that_had_not_started_are_found() {
     assert_eq!((&*found.field, found.step), ("step", Some(0)), "{found}");
     assert!(found.expected.contains("had not started"), "{found}");
 }
+
+#[test]
+fn oversized_files_are_refused_before_they_are_parsed() {
+    let open = |forgery: &Forgery| Dataset::open(forgery.dir.path(), simulator().competition());
+    let append_spaces = |forgery: &Forgery, name: &str, bytes: usize| {
+        let mut text = fs::read(forgery.path(name)).unwrap();
+        text.resize(text.len() + bytes, b' ');
+        fs::write(forgery.path(name), text).unwrap();
+    };
+    let forged = forgery();
+    append_spaces(&forged, "manifest.json", 1 << 20);
+    let error = open(&forged).unwrap_err().to_string();
+    assert!(error.contains("manifest.json is larger than"), "{error}");
+
+    let forged = forgery();
+    append_spaces(&forged, "results.json", 16 << 20);
+    let forged = forged.update_manifest();
+    let dataset = open(&forged).unwrap();
+    let error = dataset.results().unwrap_err().to_string();
+    assert!(error.contains("results.json is larger than"), "{error}");
+
+    let forged = forgery();
+    append_spaces(&forged, "violations.json", 1 << 20);
+    let forged = forged.update_manifest();
+    let difference = difference(forged.dir.path(), 1);
+    assert_eq!(difference.file, "violations.json");
+    assert!(difference.field.starts_with("byte "), "{difference}");
+
+    let forged = forgery();
+    forged.replace_text("manifest.json", "\"hit\": 2", "\"hit\": 100001");
+    let error = open(&forged).unwrap_err().to_string();
+    assert!(error.contains("at most 100000 are possible"), "{error}");
+}
+
+#[test]
+fn tables_with_more_rows_than_episodes_are_not_read() {
+    let forged = forgery();
+    forged.change_table("episodes.parquet", |episodes| concat(&vec![episodes; 1000]));
+    let forged = forged.update_manifest();
+    let error = check(forged.dir.path(), 1).unwrap_err().to_string();
+    assert!(
+        error.contains("episodes.parquet has 4000 rows, expected 4"),
+        "{error}"
+    );
+}
