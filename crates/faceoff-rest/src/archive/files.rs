@@ -5,6 +5,7 @@ use faceoff_service::{free_space, problem::Problem};
 use serde::Serialize;
 use std::{
     fs::File,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -55,7 +56,8 @@ impl Files {
 
     /// Adds an existing local file to the archive as `path`, after reading it for its hash.
     pub(super) async fn add(&mut self, path: &str, local_path: PathBuf) -> Result<(), Problem> {
-        let (bytes, blake3) = hash(local_path.clone()).await?;
+        let hashed = hash(local_path.clone()).await?;
+        let (bytes, blake3) = hashed.map_err(Problem::internal)?;
         self.add_hashed(path, local_path, bytes, blake3);
         Ok(())
     }
@@ -82,15 +84,14 @@ impl Files {
     }
 }
 
-/// Length and hash of a file.
-pub(super) async fn hash(path: PathBuf) -> Result<(u64, String), Problem> {
+/// Length and hash of a file, or the error of reading it.
+pub(super) async fn hash(path: PathBuf) -> Result<io::Result<(u64, String)>, Problem> {
     let read = move || {
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(File::open(path)?)?;
-        Ok::<_, std::io::Error>((hasher.count(), hasher.finalize().to_string()))
+        Ok((hasher.count(), hasher.finalize().to_string()))
     };
     tokio::task::spawn_blocking(read)
         .await
-        .map_err(Problem::internal)?
         .map_err(Problem::internal)
 }

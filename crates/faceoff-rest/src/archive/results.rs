@@ -259,7 +259,8 @@ pub(super) async fn put_questions(
     files.put_json("results/questions.json", &included).await
 }
 
-/// Adds the artifacts, and `datasets.csv`, the table of them. Artifacts that no longer exist are listed in `left_out`.
+/// Adds the artifacts, and `datasets.csv`, the table of them. Artifacts that no longer exist, cannot be read or differ from their
+/// hash are listed in `left_out`. Each is read for that before the archive begins: a damaged one would break it off later.
 pub(super) async fn add_artifacts(
     app: &AppState,
     artifacts: Vec<ArtifactRow>,
@@ -281,9 +282,26 @@ pub(super) async fn add_artifacts(
             continue;
         };
         let source = app.store.artifacts().local_path(&artifact.key)?;
-        let blake3 = match artifact.blake3 {
-            Some(blake3) => blake3,
-            None => files::hash(source.clone()).await?.1,
+        let problem = match files::hash(source.clone()).await? {
+            Ok((hashed_bytes, blake3))
+                if hashed_bytes == bytes
+                    && artifact.blake3.is_none_or(|expected| expected == blake3) =>
+            {
+                Ok(blake3)
+            }
+            Ok(_) => Err("the file is damaged".to_owned()),
+            Err(error) => Err(format!("the file cannot be read ({error})")),
+        };
+        let blake3 = match problem {
+            Ok(blake3) => blake3,
+            Err(problem) => {
+                tracing::error!(%path, problem, "left out of the season archive");
+                left_out.push(format!(
+                    "{path}, of the {} {}: {problem}",
+                    artifact.kind, artifact.id
+                ));
+                continue;
+            }
         };
         table.row([
             path.clone(),
@@ -304,8 +322,13 @@ pub(super) async fn add_artifacts(
         let clips_bytes = app.store.artifacts().size_bytes(&clips_key).await?;
         if clips_bytes.is_some() {
             let source = app.store.artifacts().local_path(&clips_key)?;
-            let (bytes, blake3) = files::hash(source.clone()).await?;
-            sources.insert(format!("artifacts/{clips_key}"), (source, bytes, blake3));
+            let path = format!("artifacts/{clips_key}");
+            match files::hash(source.clone()).await? {
+                Ok((bytes, blake3)) => {
+                    sources.insert(path, (source, bytes, blake3));
+                }
+                Err(error) => left_out.push(format!("{path}: the file cannot be read ({error})")),
+            }
         }
         sources.insert(path, (source, bytes, blake3));
     }
