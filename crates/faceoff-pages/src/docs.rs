@@ -29,6 +29,7 @@ use search::{Index, MAX_RESULTS, SearchResult};
 use serde::Deserialize;
 use serde_json::Value;
 use std::sync::{Arc, OnceLock};
+use tokio::sync::Mutex;
 
 /// Browsers revalidate each page by its ETag, since the frame of a page shows problems of the server.
 const CACHE_CONTROL: &str = "public, no-cache";
@@ -48,6 +49,8 @@ struct Documentation {
     api: Arc<Value>,
     reference: OnceLock<Reference>,
     index: OnceLock<Index>,
+    /// Held during a search.
+    search_turn: Mutex<()>,
 }
 
 impl Documentation {
@@ -70,6 +73,7 @@ pub(super) fn router(api: Arc<Value>) -> Router<App> {
         api,
         reference: OnceLock::new(),
         index: OnceLock::new(),
+        search_turn: Mutex::new(()),
     });
     Router::new()
         .route("/docs", get(contents))
@@ -273,7 +277,13 @@ async fn search_page(
         return Err(Problem::new(ProblemKind::InvalidRequest, detail).into());
     }
     let search_query = search_query.trim().to_owned();
-    let (results, count) = documentation.index().search(&search_query);
+    // A search takes milliseconds of CPU time. Only one runs at a time, off the threads that handle requests, so that searching
+    // visitors wait for each other and not everybody for them.
+    let _turn = documentation.search_turn.lock().await;
+    let searched = Arc::clone(&documentation);
+    let query = search_query.clone();
+    let search = tokio::task::spawn_blocking(move || searched.index().search(&query));
+    let (results, count) = search.await.map_err(Problem::internal)?;
     respond(
         &conditions,
         &SearchPage {

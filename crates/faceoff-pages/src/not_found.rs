@@ -3,19 +3,18 @@
 use super::frame::PageProblem;
 use axum::{
     extract::Request,
-    http::{HeaderMap, Method, Uri, header},
+    http::{HeaderMap, Method, Uri},
     response::{IntoResponse, Response},
 };
 use faceoff_api::paths::API_BASE;
-use faceoff_service::problem::{Problem, ProblemKind};
+use faceoff_service::{
+    accept::wants_page,
+    problem::{Problem, ProblemKind},
+};
 
 /// A page if the client accepts HTML and the path is not below `/api`; else problem details.
 pub fn problem_response(path: &str, headers: &HeaderMap, problem: Problem) -> Response {
-    let wants_page = headers
-        .get(header::ACCEPT)
-        .and_then(|accept| accept.to_str().ok())
-        .is_some_and(|accept| accept.contains("text/html"));
-    if wants_page && !path.starts_with("/api") {
+    if wants_page(headers) && !path.starts_with("/api") {
         PageProblem::from(problem).into_response()
     } else {
         problem.into_response()

@@ -12,6 +12,7 @@ use faceoff_api::{
     views::{board::BoardView, history::HistoryView},
 };
 use faceoff_service::{
+    accept::wants_csv,
     app::App,
     conditions::{Conditions, ETag},
     csv::MEDIA_TYPE,
@@ -134,17 +135,9 @@ fn tag(
 
 /// The format in the query, else the one that `Accept` prefers: CSV only if the client does not accept JSON.
 fn choose_format(requested: Option<BoardFormat>, headers: &HeaderMap) -> BoardFormat {
-    let accepts = |media_type: &str| {
-        let values = headers.get_all(header::ACCEPT).into_iter();
-        values
-            .filter_map(|value| value.to_str().ok())
-            .flat_map(|value| value.split(','))
-            .filter_map(|accepted| accepted.split(';').next())
-            .any(|accepted| accepted.trim().eq_ignore_ascii_case(media_type))
-    };
     match requested {
         Some(format) => format,
-        None if accepts("text/csv") && !accepts("application/json") => BoardFormat::Csv,
+        None if wants_csv(headers) => BoardFormat::Csv,
         None => BoardFormat::Json,
     }
 }

@@ -8,6 +8,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_service::{
+    accept::accepts_gzip,
     conditions::{Conditions, ETag},
     problem::Problem,
 };
@@ -46,38 +47,4 @@ pub(super) async fn send(
     let request_headers = HeaderValue::from_static("authorization, cookie, accept-encoding");
     response_headers.insert(header::VARY, request_headers);
     Ok(response)
-}
-
-/// Whether the client accepts gzip, whatever its preference.
-fn accepts_gzip(headers: &HeaderMap) -> bool {
-    let values = headers.get_all(header::ACCEPT_ENCODING).iter();
-    values
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','))
-        .any(|encoding| {
-            let (name, weight) = encoding.split_once(';').unwrap_or((encoding, ""));
-            let refused = weight
-                .trim()
-                .strip_prefix("q=")
-                .is_some_and(|weight| weight.trim().parse() == Ok(0.0));
-            matches!(name.trim(), "gzip" | "x-gzip" | "*") && !refused
-        })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn gzip_is_sent_if_accepted() {
-        let accepts = |text: &'static str| {
-            let value = HeaderValue::from_static(text);
-            accepts_gzip(&HeaderMap::from_iter([(header::ACCEPT_ENCODING, value)]))
-        };
-        assert!(accepts("deflate, gzip;q=0.5"));
-        assert!(accepts("br,*"));
-        assert!(!accepts("br, gzip;q=0"));
-        assert!(!accepts("identity"));
-        assert!(!accepts_gzip(&HeaderMap::new()));
-    }
 }

@@ -1,11 +1,11 @@
 //! Cached public responses, valid until the season changes and for one second at most. Without it, many visitors of a board
 //! would take CPU time from the agents that run on the same machine.
 
-use crate::{problem::Problem, shared_cache::SharedCache};
+use crate::{accept, problem::Problem, shared_cache::SharedCache};
 use axum::{
     body::{self, Body, Bytes},
     extract::Request,
-    http::{HeaderMap, HeaderName, Method, StatusCode, header},
+    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use faceoff_api::paths::API_BASE;
@@ -47,20 +47,14 @@ const PERSONAL_HEADERS: [HeaderName; 7] = [
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct AnswerKey {
     uri: String,
-    /// Values of the headers `Accept` and `Accept-Encoding`.
-    accept: Option<Vec<u8>>,
-    accept_encoding: Option<Vec<u8>>,
+    /// What the client accepts, as far as responses differ by it: any other spelling of the headers has the same response.
+    wants_page: bool,
+    wants_csv: bool,
+    accepts_gzip: bool,
     /// Number of changes of the season so far.
     changes: u64,
     /// The current time as a Unix timestamp: some responses depend on it.
     second: i64,
-}
-
-impl AnswerKey {
-    fn length(&self) -> usize {
-        let length = |value: &Option<Vec<u8>>| value.as_ref().map_or(0, Vec::len);
-        self.uri.len() + length(&self.accept) + length(&self.accept_encoding)
-    }
 }
 
 /// A response in memory.
@@ -133,26 +127,33 @@ pub async fn get(
 }
 
 /// The key of a request's response; `None` if the response depends on the caller. `second` is the current time as a Unix
-/// timestamp.
-pub fn cache_key(request: &Request, store: &Store, second: i64) -> Option<AnswerKey> {
+/// timestamp. The request's `Accept-Encoding` is replaced by what the key says of it, so that the encoder cannot read it
+/// differently.
+pub fn cache_key(request: &mut Request, store: &Store, second: i64) -> Option<AnswerKey> {
     let headers = request.headers();
     let is_public = request.method() == Method::GET
         && is_public_path(request.uri().path())
         && !PERSONAL_HEADERS
             .iter()
             .any(|name| headers.contains_key(name));
-    let header_bytes = |name| headers.get(name).map(|value| value.as_bytes().to_vec());
-    if !is_public {
+    let uri = request.uri().to_string();
+    if !is_public || uri.len() > MAX_KEY_BYTES {
         return None;
     }
     let key = AnswerKey {
-        uri: request.uri().to_string(),
-        accept: header_bytes(header::ACCEPT),
-        accept_encoding: header_bytes(header::ACCEPT_ENCODING),
+        uri,
+        wants_page: accept::wants_page(headers),
+        wants_csv: accept::wants_csv(headers),
+        accepts_gzip: accept::accepts_gzip(headers),
         changes: store.change_count(),
         second,
     };
-    (key.length() <= MAX_KEY_BYTES).then_some(key)
+    let headers = request.headers_mut();
+    headers.remove(header::ACCEPT_ENCODING);
+    if key.accepts_gzip {
+        headers.insert(header::ACCEPT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    Some(key)
 }
 
 /// Whether a path is a board's page. For these pages the server checks `If-None-Match` before it uses this cache.
@@ -173,6 +174,43 @@ fn is_public_path(path: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[tokio::test]
+    async fn requests_share_a_response_unless_they_accept_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        let key = |headers: &[(HeaderName, &'static str)]| {
+            let mut request = Request::new(Body::empty());
+            for (name, value) in headers {
+                request
+                    .headers_mut()
+                    .append(name, HeaderValue::from_static(value));
+            }
+            let key = cache_key(&mut request, &store, 0).unwrap();
+            let encoding = request.headers().get(header::ACCEPT_ENCODING).cloned();
+            (key, encoding)
+        };
+        let (accept, encoding) = (header::ACCEPT, header::ACCEPT_ENCODING);
+        let plain = key(&[]);
+        assert_eq!(plain.1, None);
+        let spellings = ["*/*", "image/*", "image/*;q=0.123", "x/y"];
+        for spelling in spellings {
+            assert_eq!(key(&[(accept.clone(), spelling)]), plain);
+            assert_eq!(key(&[(encoding.clone(), spelling)]), plain);
+        }
+        let compressed = key(&[(encoding.clone(), "gzip")]);
+        assert_eq!(compressed.1.as_ref().unwrap(), "gzip");
+        assert_eq!(key(&[(encoding.clone(), "br, gzip;q=0.1")]), compressed);
+        let others = [
+            plain,
+            compressed,
+            key(&[(accept.clone(), "text/html,*/*")]),
+            key(&[(accept, "text/csv")]),
+        ];
+        for (index, other) in others.iter().enumerate() {
+            assert!(!others[..index].contains(other), "{other:?}");
+        }
+    }
 
     #[test]
     fn personal_paths_are_not_cached() {

@@ -1,8 +1,35 @@
 //! Tests of the OpenAPI document, and of requests that it does not allow.
 
 use crate::site::{ADMIN, Answer, GZIP, Site};
+use flate2::read::GzDecoder;
 use reqwest::Method;
 use serde_json::{Value, json};
+use std::io::Read;
+
+#[tokio::test]
+async fn document_is_compressed_and_sent_once_per_client() {
+    let site = Site::start().await;
+    let get = async |name: &str, value: &str| {
+        let request = site.request(Method::GET, "/api/v1/openapi.json", None);
+        request.header(name, value).send().await.unwrap()
+    };
+    let plain = get("accept-encoding", "identity").await;
+    assert_eq!(plain.headers().get("content-encoding"), None);
+    assert_eq!(plain.headers()["vary"], "accept-encoding");
+    let tag = plain.headers()["etag"].to_str().unwrap().to_owned();
+    let plain = plain.bytes().await.unwrap();
+    let compressed = get("accept-encoding", "gzip").await;
+    assert_eq!(compressed.headers()["content-encoding"], "gzip");
+    assert_eq!(compressed.headers()["content-type"], "application/json");
+    let compressed = compressed.bytes().await.unwrap();
+    let mut unpacked = Vec::new();
+    GzDecoder::new(&compressed[..])
+        .read_to_end(&mut unpacked)
+        .unwrap();
+    assert!(unpacked == plain, "the document is the same");
+    let repeated = get("if-none-match", &tag).await;
+    assert_eq!(repeated.status(), 304);
+}
 
 #[tokio::test]
 async fn document_lists_all_operations() {

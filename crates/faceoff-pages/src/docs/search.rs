@@ -1,6 +1,7 @@
 //! Full-text search: sections that contain all words of a query, ranked.
 
 use super::sections::Section;
+use memchr::memmem::Finder;
 use std::{cmp::Reverse, ops::Range};
 
 /// Largest number of results on the page.
@@ -55,10 +56,13 @@ impl Index {
         if words.is_empty() {
             return (Vec::new(), 0);
         }
+        // Long words first: they are rare, and a section without one of the words needs no further search.
+        let mut finders: Vec<Finder> = words.iter().map(Finder::new).collect();
+        finders.sort_by_key(|finder| Reverse(finder.needle().len()));
         let mut results: Vec<(Reverse<(usize, usize)>, &IndexedSection)> = self
             .0
             .iter()
-            .filter_map(|section| section.rank(&words).map(|rank| (Reverse(rank), section)))
+            .filter_map(|section| section.rank(&finders).map(|rank| (Reverse(rank), section)))
             .collect();
         results.sort_by_key(|(rank, _)| *rank);
         let shown = results
@@ -71,11 +75,11 @@ impl Index {
 
 impl IndexedSection {
     /// Number of words in the heading, and number of matches in the text; `None` if a word is missing.
-    fn rank(&self, words: &[&str]) -> Option<(usize, usize)> {
+    fn rank(&self, words: &[Finder]) -> Option<(usize, usize)> {
         let (mut words_in_heading, mut matches_in_text) = (0, 0);
         for word in words {
-            let is_in_heading = self.heading.contains(word);
-            let count = self.text.matches(word).count();
+            let is_in_heading = word.find(self.heading.as_bytes()).is_some();
+            let count = word.find_iter(self.text.as_bytes()).count();
             if !is_in_heading && count == 0 {
                 return None;
             }
