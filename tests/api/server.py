@@ -17,6 +17,7 @@ HOLD = Path(__file__).resolve().parents[2] / "agents" / "hold"
 CONFIG = """
 [rates]
 token_per_s = 0
+team_changes_per_day = 0
 [server]
 listen = "127.0.0.1:0"
 min_free_bytes = 0

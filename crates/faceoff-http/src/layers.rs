@@ -16,12 +16,13 @@ use faceoff_pages::Embeddable;
 use faceoff_service::{
     answer_cache,
     app::AppState,
+    change_quota::RemainingChangesSlot,
     conditions::Conditions,
     network::Network,
     problem::Problem,
     request_log::{REQUEST_ID, log_request},
 };
-use std::{any::Any, sync::Arc};
+use std::{any::Any, num::NonZeroU32, sync::Arc};
 use tower_http::{
     catch_panic::CatchPanicLayer,
     compression::{
@@ -47,6 +48,7 @@ pub(crate) fn wrap(site: Router, app: &Arc<AppState>) -> Router {
             in_flight::limit,
         ))
         .layer(middleware::from_fn_with_state(Arc::clone(app), limit_rate))
+        .layer(middleware::from_fn(tell_remaining_changes))
         .layer(middleware::map_response(security_headers))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(middleware::from_fn_with_state(Arc::clone(app), log_request))
@@ -100,9 +102,13 @@ async fn revalidate(mut request: Request, next: Next) -> Response {
 }
 
 /// Answers requests that have a cache key (`answer_cache.rs`) from the cache of recent responses.
-async fn serve_cached(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
+async fn serve_cached(
+    State(app): State<Arc<AppState>>,
+    mut request: Request,
+    next: Next,
+) -> Response {
     let second = app.config.clock.now().as_second();
-    match answer_cache::cache_key(&request, &app.store, second) {
+    match answer_cache::cache_key(&mut request, &app.store, second) {
         Some(key) => answer_cache::get(&app.answer_cache, key, next.run(request)).await,
         None => next.run(request).await,
     }
@@ -121,6 +127,27 @@ pub(crate) async fn read_consistently(
     }
 }
 
+/// Adds the headers about the team's quota of changes to the response to a change.
+async fn tell_remaining_changes(mut request: Request, next: Next) -> Response {
+    if request.method().is_safe() {
+        return next.run(request).await;
+    }
+    let slot = RemainingChangesSlot::default();
+    request.extensions_mut().insert(slot.clone());
+    let mut response = next.run(request).await;
+    slot.add_headers(response.headers_mut());
+    response
+}
+
+/// As how many requests one with this path counts. A search reads all of the documentation.
+fn request_cost(path: &str) -> NonZeroU32 {
+    const SEARCH: NonZeroU32 = NonZeroU32::new(10).unwrap();
+    match path {
+        "/docs/search" => SEARCH,
+        _ => NonZeroU32::MIN,
+    }
+}
+
 /// Answers `TooManyRequests` to an address that exceeds its rate limit.
 async fn limit_rate(
     State(app): State<Arc<AppState>>,
@@ -130,7 +157,10 @@ async fn limit_rate(
     let peer = request.extensions().get::<Peer>();
     let client = peer.and_then(|peer| peer.client_address(request.headers()));
     let checked = match client {
-        Some(address) => app.request_limiter.check_address(address),
+        Some(address) => {
+            let cost = request_cost(request.uri().path());
+            app.request_limiter.check_address(address, cost)
+        }
         None => Ok(()),
     };
     if let Some(address) = client {

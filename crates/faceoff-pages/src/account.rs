@@ -18,8 +18,11 @@ use faceoff_service::{
     auth::OptionalCaller,
     views::{token, user as user_view},
 };
-use faceoff_store::TokenOwner;
+use faceoff_store::TokensOf;
 use jiff::Timestamp;
+
+/// Number of tokens and sessions on the page, the newest ones.
+const MAX_LISTED: u32 = 100;
 
 #[derive(Template)]
 #[template(path = "account.html")]
@@ -49,13 +52,11 @@ pub(super) async fn page(
     }) else {
         return Ok(Redirect::to("/sign-in").into_response());
     };
-    let tokens = app.store.tokens().await?;
-    let own = tokens
-        .into_iter()
-        .filter(|token| token.owner == TokenOwner::User(user.id));
+    let own = TokensOf::User(user.id);
+    let own = app.store.tokens_after(own, None, MAX_LISTED).await?;
     render(&Page {
         frame: Frame::load(&app, "/account").await?,
-        tokens: own.map(token::view).collect(),
+        tokens: own.into_iter().flatten().map(token::view).collect(),
         account: user_view::caller(caller.principal, token::view(caller.token)),
         user: user_view::view(user),
         now: app.config.clock.now(),

@@ -53,8 +53,9 @@ pub(crate) async fn list_invitations(
     State(app): State<App>,
 ) -> Result<Paged<InvitationView>, Problem> {
     let now = app.config.clock.now();
-    let invitations = invitations::invitations(&app, &caller).await?;
-    let page = page.select(invitations, |invitation| invitation.id)?;
+    let rows = invitations::invitations_after(&app, &caller, page.after, page.limit + 1).await?;
+    let rows = rows.ok_or_else(|| page.unknown_row())?;
+    let page = page.page(rows, |invitation| invitation.id);
     Ok(page.map(|invitation| invitation::view(invitation, now)))
 }
 

@@ -44,6 +44,7 @@ mod rulings;
 mod runtimes;
 mod season;
 mod season_archive;
+mod served_document;
 mod sessions;
 mod sign_off;
 mod sse;
@@ -60,12 +61,13 @@ mod users;
 mod webhooks;
 mod workers;
 
-use axum::{Json, Router, extract::DefaultBodyLimit, middleware, routing::get};
+use axum::{Router, extract::DefaultBodyLimit, http::HeaderMap, middleware, routing::get};
 use document::Document;
 use faceoff_api::paths::API_BASE;
-use faceoff_service::{app::App, extract::MAX_JSON_BYTES, timeouts};
+use faceoff_service::{app::App, conditions::Conditions, extract::MAX_JSON_BYTES, timeouts};
 use faceoff_types::Competition;
 use serde_json::Value;
+use served_document::ServedDocument;
 use std::{sync::Arc, time::Duration};
 use utoipa::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -95,12 +97,11 @@ pub fn router(timeout: Duration, competition: &Competition) -> (Router<App>, Arc
     document.info = Document::openapi().info;
     deprecated_routes::describe(&mut document);
     let document = Arc::new(document::complete(document, competition));
-    let served = Arc::clone(&document);
+    let served = ServedDocument::new(&document);
     let router = router.route(
         &format!("{API_BASE}/openapi.json"),
-        get(move || {
-            let document = Arc::clone(&served);
-            async move { Json((*document).clone()) }
+        get(async move |conditions: Conditions, headers: HeaderMap| {
+            served.respond(&conditions, &headers)
         }),
     );
     (router, document)

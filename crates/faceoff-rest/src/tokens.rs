@@ -40,8 +40,9 @@ pub(crate) async fn list_tokens(
     page: Page<TokenId>,
     State(app): State<App>,
 ) -> Result<Paged<TokenView>, Problem> {
-    let page = page.select(tokens::tokens(&app, &caller).await?, |token| token.id)?;
-    Ok(page.map(token::view))
+    let rows = tokens::tokens_after(&app, &caller, page.after, page.limit + 1).await?;
+    let rows = rows.ok_or_else(|| page.unknown_row())?;
+    Ok(page.page(rows, |token| token.id).map(token::view))
 }
 
 /// Creates a token. Its secret is returned only once.

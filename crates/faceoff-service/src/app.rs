@@ -3,6 +3,7 @@
 use crate::{
     aggregated_rows::{AggregatedRow, RowsKey},
     answer_cache::{self, AnswerCache},
+    change_quota::ChangeQuota,
     config::HttpConfig,
     passwords::Passwords,
     problem::Problem,
@@ -64,6 +65,8 @@ pub struct AppState {
     pub passwords: Passwords,
     /// Counts recent requests by address and by token.
     pub request_limiter: RequestLimiter,
+    /// Changes per team and day.
+    pub change_quota: ChangeQuota,
     /// Random per process. Part of entity tags (header `ETag`), because the database may be another one after a restart.
     pub process_id: Uuid,
 }
@@ -108,6 +111,7 @@ impl AppState {
             feed: Feed::new(store.clone()),
             passwords: Passwords::default(),
             request_limiter: RequestLimiter::new(config.rate_limits),
+            change_quota: ChangeQuota::new(config.rate_limits.team_changes_per_day),
             process_id: Uuid::now_v7(),
             store,
             live,

@@ -4,6 +4,7 @@
 use crate::{
     app::App,
     boxed,
+    change_quota::RemainingChangesSlot,
     problem::{Problem, ProblemKind},
     request_log, session,
 };
@@ -237,6 +238,13 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     app.check_rate(token.id)?;
     record_use(app, &token, now);
     let caller = Caller::new(token, secret_hash, principal);
+    if let Some(team) = caller.team()
+        && !parts.method.is_safe()
+    {
+        let slot = parts.extensions.get::<RemainingChangesSlot>().cloned();
+        let slot = slot.unwrap_or_default();
+        slot.count(&app.change_quota, team.id, now)?;
+    }
     request_log::record_actor(&caller.actor());
     Ok(Some(caller))
 }

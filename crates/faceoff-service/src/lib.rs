@@ -4,12 +4,14 @@
 //! This crate unpacks no bundle, runs no agent and computes no score; workers and `faceoff-scoring` do. It reads no clock
 //! and no environment that is not passed in, and defines no routes.
 
+pub mod accept;
 pub mod agent_resources;
 mod aggregated_rows;
 pub mod answer_cache;
 pub mod app;
 pub mod archive_contents;
 pub mod auth;
+pub mod change_quota;
 pub mod conditions;
 pub mod config;
 pub mod csv;

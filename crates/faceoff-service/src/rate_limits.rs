@@ -1,4 +1,4 @@
-//! Rate limits: how many requests per second one network address and one token may make.
+//! Rate limits: how many requests per second one network address and one token may make. A costly request counts as several.
 
 use crate::{
     network::Network,
@@ -32,6 +32,8 @@ pub struct RateLimits {
     pub address: Option<RateLimit>,
     /// Per token or session, from any address.
     pub token: Option<RateLimit>,
+    /// Changes of a team per UTC day.
+    pub team_changes_per_day: Option<NonZeroU32>,
 }
 
 /// Number of requests after which clients without recent requests are removed from memory.
@@ -53,13 +55,13 @@ impl RequestLimiter {
         }
     }
 
-    /// Counts a request from an address.
+    /// Counts a request from an address, as `cost` requests.
     ///
     /// # Errors
     /// [`ProblemKind::TooManyRequests`].
-    pub fn check_address(&self, address: IpAddr) -> Result<(), Problem> {
+    pub fn check_address(&self, address: IpAddr, cost: NonZeroU32) -> Result<(), Problem> {
         match &self.addresses {
-            Some(limiter) => limiter.check(&Network::from_address(address), "an address"),
+            Some(limiter) => limiter.check(&Network::from_address(address), cost, "an address"),
             None => Ok(()),
         }
     }
@@ -70,7 +72,7 @@ impl RequestLimiter {
     /// [`ProblemKind::TooManyRequests`].
     pub(crate) fn check_token(&self, token: TokenId) -> Result<(), Problem> {
         match &self.tokens {
-            Some(limiter) => limiter.check(&token, "a token"),
+            Some(limiter) => limiter.check(&token, NonZeroU32::MIN, "a token"),
             None => Ok(()),
         }
     }
@@ -95,20 +97,23 @@ impl<K: Hash + Eq + Clone> KeyedLimiter<K> {
         }
     }
 
-    /// Counts a request; `client_kind` names the client in the message of a refusal.
-    fn check(&self, client: &K, client_kind: &str) -> Result<(), Problem> {
+    /// Counts a request as `cost` requests, at most as many as are allowed at once; `client_kind` names the client in the message
+    /// of a refusal.
+    fn check(&self, client: &K, cost: NonZeroU32, client_kind: &str) -> Result<(), Problem> {
         if self.since_cleanup.fetch_add(1, Ordering::Relaxed) >= CLEANUP_INTERVAL {
             self.since_cleanup.store(0, Ordering::Relaxed);
             self.limiter.retain_recent();
         }
-        self.limiter.check_key(client).map_err(|rejection| {
+        let RateLimit { per_s, burst } = self.rate;
+        let checked = self.limiter.check_key_n(client, cost.min(burst));
+        let checked = checked.expect("the cost is at most the burst");
+        checked.map_err(|rejection| {
             let wait = rejection.wait_time_from(DefaultClock::default().now());
-            let RateLimit { per_s, burst } = self.rate;
             Problem::new(
                 ProblemKind::TooManyRequests,
                 format!(
-                    "{client_kind} may make {per_s} requests per second on average, and {burst} at once; wait, and poll less often: \
-                     follow the event stream (GET /api/v1/events/stream) instead"
+                    "{client_kind} may make {per_s} requests per second on average, and {burst} at once (costly ones count as several); \
+                     wait, and poll less often: follow the event stream (GET /api/v1/events/stream) instead"
                 ),
             )
             .with("limit_per_s", per_s.get())
@@ -129,9 +134,10 @@ mod tests {
         };
         let limiter = RequestLimiter::new(RateLimits {
             address: Some(rate),
-            token: None,
+            ..RateLimits::default()
         });
-        let check = |address: &str| limiter.check_address(address.parse().unwrap());
+        let check =
+            |address: &str| limiter.check_address(address.parse().unwrap(), NonZeroU32::MIN);
         // The loop takes much less than the thousand seconds after which a burst is available again.
         let refused = (0..1500).filter(|_| check("2001:db8::1").is_err()).count();
         assert!((1..=500).contains(&refused), "{refused}");
@@ -140,5 +146,13 @@ mod tests {
         assert!(check("192.0.2.1").is_ok());
         let problem = check("2001:db8::1").unwrap_err();
         assert_eq!(problem.kind(), ProblemKind::TooManyRequests);
+        // A costly request counts as several, and one that costs more than the burst can still be made.
+        for (address, cost, expected) in [("192.0.2.2", 10, 50..=150), ("192.0.2.3", 5000, 1..=2)] {
+            let cost = NonZeroU32::new(cost).unwrap();
+            let address = address.parse().unwrap();
+            let made = (0..1500).filter(|_| limiter.check_address(address, cost).is_ok());
+            let made = made.count();
+            assert!(expected.contains(&made), "{address} made {made}");
+        }
     }
 }

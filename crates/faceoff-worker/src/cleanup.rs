@@ -27,6 +27,14 @@ pub async fn clean_up(store: &Store, competition: &Arc<Competition>, now: Timest
     if let Err(error) = store.delete_old_deliveries(now).await {
         tracing::warn!(%error, "old webhook deliveries could not be removed");
     }
+    match store.forget_ended_credentials(now).await {
+        Ok(0) => {}
+        Ok(rows) => tracing::info!(
+            rows,
+            "tokens, sessions and invitations that ended long ago were removed"
+        ),
+        Err(error) => tracing::warn!(%error, "ended tokens and invitations could not be removed"),
+    }
     ablation_clips::join_parts(store, competition.ideal_profile).await;
     apply_retentions(store, now).await;
     if let Err(error) = store.checkpoint().await {

@@ -159,6 +159,7 @@ url = "{}"
 [rates]
 address_per_s = 0
 token_per_s = 0
+team_changes_per_day = 0
 [sandbox]
 resident_bytes = 0
 "#,

@@ -4,6 +4,7 @@
 use crate::site::*;
 use faceoff_http::{RateLimit, RateLimits};
 use reqwest::Method;
+use serde_json::json;
 use std::num::NonZeroU32;
 
 /// A limit of `burst` requests at once and one per second. A request takes less than a second.
@@ -46,7 +47,7 @@ async fn request_from(site: &Site, address: &str) -> u16 {
 async fn rate_limit_applies_per_address() {
     let rates = RateLimits {
         address: limit_with_burst(5),
-        token: None,
+        ..RateLimits::default()
     };
     let site = Site::start().await.with_rates(rates).await;
     // The server trusts the test's loopback address as a proxy.
@@ -72,8 +73,8 @@ async fn rate_limit_applies_per_token() {
     let site = Site::start().await;
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let rates = RateLimits {
-        address: None,
         token: limit_with_burst(5),
+        ..RateLimits::default()
     };
     let site = site.with_rates(rates).await;
     let refused = request_until_refused(&site, Some(&alpha.token), None).await;
@@ -82,4 +83,73 @@ async fn rate_limit_applies_per_token() {
         .await
         .json(200);
     site.get("/api/v1/season", None).await.json(200);
+}
+
+#[tokio::test]
+async fn search_counts_as_several_requests() {
+    let rates = RateLimits {
+        address: limit_with_burst(1000),
+        ..RateLimits::default()
+    };
+    let site = Site::start().await.with_rates(rates).await;
+    let mut answered = 0;
+    loop {
+        let request = site.request(Method::GET, "/docs/search?q=puck", None);
+        let request = request.header("x-forwarded-for", "192.0.2.1");
+        match request.send().await.unwrap().status().as_u16() {
+            200 => answered += 1,
+            status => {
+                assert_eq!(status, 429);
+                break;
+            }
+        }
+        assert!(
+            answered < 500,
+            "as requests that count once, 1000 are answered"
+        );
+    }
+    assert!(answered >= 100);
+}
+
+#[tokio::test]
+async fn team_has_a_daily_quota_of_changes() {
+    let site = Site::start().await;
+    let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
+    let rates = RateLimits {
+        team_changes_per_day: NonZeroU32::new(3),
+        ..RateLimits::default()
+    };
+    let site = site.with_rates(rates).await;
+    let ask = async |token: &str| {
+        let question = json!({ "text": "When does the stage end?" });
+        site.post("/api/v1/questions", Some(token), &question).await
+    };
+    let first = ask(&alpha.token).await;
+    assert_eq!(first.status, 201, "{}", first.body);
+    assert_eq!(first.header("ratelimit-policy"), "\"changes\";q=3;w=86400");
+    let remaining = first.header("ratelimit");
+    assert!(remaining.starts_with("\"changes\";r=2;t="), "{remaining}");
+    // A refused change counts, too.
+    let invalid = site
+        .post("/api/v1/questions", Some(&alpha.token), &json!({}))
+        .await;
+    assert_eq!(invalid.status, 422);
+    assert_eq!(ask(&alpha.token).await.status, 201);
+    let refused = ask(&alpha.token).await;
+    let problem = refused.problem(429, "daily-change-quota-exceeded", &["3 changes today"]);
+    assert_eq!(problem["limit"], 3);
+    let wait: u32 = refused.header("retry-after").parse().unwrap();
+    assert!((1..=24 * 3600).contains(&wait), "{wait}");
+    // Reads are not limited, and neither are other teams and organisers.
+    let me = site.get("/api/v1/me", Some(&alpha.token)).await;
+    me.json(200);
+    assert_eq!(ask(&beta.token).await.status, 201);
+    for _ in 0..5 {
+        let announcement = json!({ "title": "News", "text": "Nothing new" });
+        let answer = site
+            .post("/api/v1/announcements", Some(ADMIN), &announcement)
+            .await;
+        assert_eq!(answer.status, 201, "{}", answer.body);
+        assert!(answer.headers.get("ratelimit").is_none());
+    }
 }

@@ -45,6 +45,9 @@ pub(crate) fn router(dashboard_path: &str) -> Router<App> {
         .route(&path("/people/{id}/remove"), post(remove_user))
 }
 
+/// Number of tokens, and of invitations, on the page: the newest ones.
+const MAX_LISTED: u32 = 500;
+
 #[derive(Template)]
 #[template(path = "dashboard_access.html")]
 struct Page {
@@ -59,6 +62,8 @@ struct Page {
     ended: Vec<String>,
     users: Vec<UserRow>,
     tokens: Vec<TokenRow>,
+    /// May there be tokens or invitations that the page does not list?
+    is_shortened: bool,
     /// Expired and revoked tokens.
     inactive_tokens: Vec<TokenRow>,
     invitations: Vec<InvitationRow>,
@@ -182,7 +187,8 @@ async fn page_with(
     let path = access_path(caller);
     let mut tokens = Vec::new();
     let mut inactive_tokens = Vec::new();
-    for token in tokens::tokens(app, caller).await? {
+    let newest = tokens::tokens_after(app, caller, None, MAX_LISTED).await?;
+    for token in newest.unwrap_or_default() {
         let is_active = token.revoked_at.is_none()
             && token.expires_at.is_none_or(|expires_at| expires_at > now);
         let row = token_row(token::view(token), &names, caller, now);
@@ -191,11 +197,12 @@ async fn page_with(
             false => inactive_tokens.push(row),
         }
     }
-    let listed = invitations::invitations(app, caller).await?;
+    let listed = invitations::invitations_after(app, caller, None, MAX_LISTED).await?;
     let listed = listed
         .into_iter()
+        .flatten()
         .map(|invitation| invitation_row(invitation::view(invitation, now), &names));
-    let (invitations, closed_invitations) =
+    let (invitations, closed_invitations): (Vec<_>, Vec<_>) =
         listed.partition(|invitation| invitation.state == "open");
     let is_organiser = caller.is_organiser();
     let own = caller.user().map(|person| person.id);
@@ -232,6 +239,8 @@ async fn page_with(
         path,
         is_organiser,
         users: users.collect(),
+        is_shortened: tokens.len() + inactive_tokens.len() >= MAX_LISTED as usize
+            || invitations.len() + closed_invitations.len() >= MAX_LISTED as usize,
         tokens,
         inactive_tokens,
         invitations,

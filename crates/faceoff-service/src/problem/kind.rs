@@ -132,6 +132,9 @@ kinds! {
     DailyUploadQuotaExceeded "day-quota-spent" TOO_MANY_REQUESTS
         "The daily upload quota is used up"
         "“limit_bytes” is the team's quota per UTC day, “used_bytes” what it has used. “Retry-After” is the time to midnight UTC."
+    DailyChangeQuotaExceeded "daily-change-quota-exceeded" TOO_MANY_REQUESTS
+        "The team's daily quota of changes is used up"
+        "“limit” is the number of changes that a team may make per UTC day: requests of its members and tokens that are not only reads. “Retry-After” is the time to midnight UTC."
     StorageQuotaExceeded "stored-quota-spent" CONFLICT
         "The team's storage is full"
         "“limit_bytes” is the quota of stored bundles, “used_bytes” what the team has used. Delete old submissions, or ask an organiser for a higher quota."

@@ -15,7 +15,7 @@ use faceoff_api::{
     token::{Secret, SecretKind},
     views::invitation::{InvitationView, NewInvitationView},
 };
-use faceoff_store::{Invitation, InvitationRole, NewInvitation, Principal};
+use faceoff_store::{Invitation, InvitationRole, NewInvitation, Principal, StoreError};
 use faceoff_types::InvitationId;
 use jiff::SignedDuration;
 
@@ -76,12 +76,21 @@ fn invitation_role(
     }
 }
 
-/// The invitations that the caller may manage, newest first.
+/// At most `limit` of the invitations that the caller may manage, newest first. With `after`, those that come after this invitation;
+/// `None` if it is not in the list.
 #[boxed]
-pub async fn invitations(app: &AppState, caller: &Caller) -> Result<Vec<Invitation>, Problem> {
-    let mut invitations = app.store.invitations().await?;
-    invitations.retain(|invitation| may_manage(caller, invitation));
-    Ok(invitations)
+pub async fn invitations_after(
+    app: &AppState,
+    caller: &Caller,
+    after: Option<InvitationId>,
+    limit: u32,
+) -> Result<Option<Vec<Invitation>>, Problem> {
+    let team = match &caller.principal {
+        Principal::Host | Principal::Organiser(_) => None,
+        Principal::Member(_, own_team) => Some(own_team.id),
+        Principal::Team(_) => return Ok(after.is_none().then(Vec::new)),
+    };
+    Ok(app.store.invitations_after(team, after, limit).await?)
 }
 
 /// Creates an invitation. Only this response contains its link.
@@ -133,12 +142,10 @@ pub async fn revoke_invitation(
     caller: &Caller,
     id: InvitationId,
 ) -> Result<InvitationView, Problem> {
-    let invitations = app.store.invitations().await?;
-    let is_manageable = invitations
-        .iter()
-        .any(|invitation| invitation.id == id && may_manage(caller, invitation));
-    if !is_manageable {
-        return Err(Problem::not_found("invitation"));
+    match app.store.invitation(id).await {
+        Ok(invitation) if may_manage(caller, &invitation) => {}
+        Ok(_) | Err(StoreError::NotFound(_)) => return Err(Problem::not_found("invitation")),
+        Err(error) => return Err(error.into()),
     }
     let now = app.config.clock.now();
     let invitation = app.store.revoke_invitation(caller.actor(), id, now).await?;

@@ -14,21 +14,28 @@ use faceoff_api::{
     token::{Secret, SecretKind},
     views::{credentials::RevokedTokenView, token::NewTokenView},
 };
-use faceoff_store::{EndMade, NewToken, Principal, StoreError, Token, TokenKind, TokenOwner};
+use faceoff_store::{
+    EndMade, NewToken, Principal, StoreError, Token, TokenKind, TokenOwner, TokensOf,
+};
 use faceoff_types::{TeamId, TokenId};
 
 /// Longest name of a token.
 const MAX_NAME_CHARS: usize = 80;
 
-/// Whether the caller may see and revoke a token: organisers all, a member their own and the team's, a team's API client only the one
-/// that it has sent. A leaked token must not end others, or get the secret of one that lasts longer.
+/// The tokens that the caller may see and revoke: organisers all, a member their own and the team's. `None`: only the one that the
+/// request was sent with, for a team's API client. A leaked token must not end others, or get the secret of one that lasts longer.
+const fn manageable(caller: &Caller) -> Option<TokensOf> {
+    match &caller.principal {
+        Principal::Host | Principal::Organiser(_) => Some(TokensOf::Everyone),
+        Principal::Member(user, team) => Some(TokensOf::Member(user.id, team.id)),
+        Principal::Team(_) => None,
+    }
+}
+
 fn may_manage(caller: &Caller, token: &Token) -> bool {
-    match (&caller.principal, token.owner) {
-        (Principal::Host | Principal::Organiser(_), _) => true,
-        (Principal::Team(_), _) => caller.token.id == token.id,
-        (Principal::Member(_, team), TokenOwner::Team(id)) => team.id == id,
-        (Principal::Member(user, _), TokenOwner::User(id)) => user.id == id,
-        (Principal::Member(..), _) => false,
+    match manageable(caller) {
+        Some(manageable) => manageable.includes(token),
+        None => caller.token.id == token.id,
     }
 }
 
@@ -40,12 +47,20 @@ async fn find(app: &AppState, caller: &Caller, id: TokenId) -> Result<Token, Pro
     }
 }
 
-/// The tokens and sessions that the caller may manage, newest first.
+/// At most `limit` of the tokens and sessions that the caller may manage, newest first. With `after`, those that come after this
+/// token; `None` if it is not in the list.
 #[boxed]
-pub async fn tokens(app: &AppState, caller: &Caller) -> Result<Vec<Token>, Problem> {
-    let mut tokens = app.store.tokens().await?;
-    tokens.retain(|token| may_manage(caller, token));
-    Ok(tokens)
+pub async fn tokens_after(
+    app: &AppState,
+    caller: &Caller,
+    after: Option<TokenId>,
+    limit: u32,
+) -> Result<Option<Vec<Token>>, Problem> {
+    match (manageable(caller), after) {
+        (Some(manageable), _) => Ok(app.store.tokens_after(manageable, after, limit).await?),
+        (None, None) => Ok(Some(vec![caller.token.clone()])),
+        (None, Some(after)) => Ok((after == caller.token.id).then(Vec::new)),
+    }
 }
 
 /// The owner of a new token: the given team, or otherwise the caller.

@@ -1,4 +1,4 @@
-//! Periodic deletion of files that are not needed any more: recordings, dropped datasets and refused bundles.
+//! Periodic deletion of what is not needed any more: recordings, dropped datasets, refused bundles, and ended credentials.
 
 use crate::{
     boxed,
@@ -6,7 +6,7 @@ use crate::{
     event::Actor,
     queue::JobClaim,
     store::Store,
-    tables::{bundles, retentions, runs},
+    tables::{bundles, invitations, retentions, runs, submissions, tokens},
 };
 use faceoff_types::RunId;
 use jiff::{SignedDuration, Timestamp};
@@ -19,6 +19,15 @@ pub const RECORDINGS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
 
 /// Time for which a bundle is kept after a platform fault in its validation run, for investigation.
 pub const UNCHECKED_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
+
+/// Time for which tokens, sessions and invitations are kept after their end. The log keeps their events.
+pub const ENDED_CREDENTIALS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(30 * 24);
+
+/// Number of ended credentials that one transaction deletes. Other changes wait for it only briefly.
+const FORGOTTEN_AT_ONCE: u32 = 500;
+
+/// Number of a team's invalid submissions whose logs are kept, the newest ones. A bundle of a few bytes can have a long log.
+pub const REFUSED_LOGS_KEPT: u32 = 50;
 
 /// The time this much before `now`: what ended until then is not kept any more.
 pub(super) fn earlier(now: Timestamp, kept_for: SignedDuration) -> Timestamp {
@@ -78,8 +87,8 @@ impl Store {
     }
 
     /// Deletes the bundles of submissions that did not pass their validation run: at once if they are invalid, and
-    /// [`UNCHECKED_KEPT_FOR`] after a platform fault. Reason and log stay. Returns the number of bundles. An interrupted
-    /// call is completed by the next one.
+    /// [`UNCHECKED_KEPT_FOR`] after a platform fault. The reason stays, and the log of a team's last [`REFUSED_LOGS_KEPT`].
+    /// Returns the number of bundles. An interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
         let ended_before = earlier(now, UNCHECKED_KEPT_FOR);
@@ -89,11 +98,30 @@ impl Store {
         for (id, key) in &refused {
             self.artifacts().delete(key).await?;
             self.write(Actor::Server, now, async |tx| {
-                bundles::set_refused_removed(tx, *id, now).await
+                bundles::set_refused_removed(tx, *id, now).await?;
+                submissions::forget_old_logs(tx, *id, REFUSED_LOGS_KEPT).await
             })
             .await?;
         }
         Ok(refused.len())
+    }
+
+    /// Deletes tokens, sessions and invitations that ended at least [`ENDED_CREDENTIALS_KEPT_FOR`] ago. Accepted invitations stay:
+    /// they say who invited whom. Returns the number of deleted rows. An interrupted call is completed by the next one.
+    #[boxed]
+    pub async fn forget_ended_credentials(&self, now: Timestamp) -> Result<usize> {
+        let ended_before = earlier(now, ENDED_CREDENTIALS_KEPT_FOR);
+        let mut forgotten = 0;
+        loop {
+            let deleted = self.write(Actor::Server, now, async |tx| {
+                let tokens = tokens::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?;
+                Ok(tokens + invitations::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?)
+            });
+            match deleted.await? {
+                0 => return Ok(forgotten),
+                deleted => forgotten += deleted,
+            }
+        }
     }
 
     /// Deletes bundles that no submission refers to and that were stored at `stored_before` or earlier: a process

@@ -405,9 +405,33 @@ impl Store {
             .await
     }
 
-    /// All invitations ever created, the newest first.
+    /// At most `limit` invitations, the newest first: all, or those to be a member of a team. With `after`, those that come after
+    /// this invitation; `None` if it is not in the list.
     #[boxed]
-    pub async fn invitations(&self) -> Result<Vec<Invitation>> {
-        invitations::all(&mut *self.database.read.acquire().await?).await
+    pub async fn invitations_after(
+        &self,
+        team: Option<TeamId>,
+        after: Option<InvitationId>,
+        limit: u32,
+    ) -> Result<Option<Vec<Invitation>>> {
+        let mut connection = self.database.read.acquire().await?;
+        let is_listed = |invitation: &Invitation| {
+            team.is_none_or(|team| invitation.role == InvitationRole::Member(team))
+        };
+        let after = match after {
+            None => None,
+            Some(id) => match invitations::find(&mut connection, id).await {
+                Ok(invitation) if is_listed(&invitation) => Some(invitation),
+                Ok(_) | Err(StoreError::NotFound(_)) => return Ok(None),
+                Err(error) => return Err(error),
+            },
+        };
+        let listed = invitations::list(&mut connection, team, after.as_ref(), limit).await?;
+        Ok(Some(listed))
+    }
+
+    #[boxed]
+    pub async fn invitation(&self, id: InvitationId) -> Result<Invitation> {
+        invitations::find(&mut *self.database.read.acquire().await?, id).await
     }
 }

@@ -12,7 +12,7 @@ use crate::{
     store::Store,
     tables::{
         teams::{self, Team},
-        tokens::{self, Token, TokenKind, TokenOwner},
+        tokens::{self, Token, TokenKind, TokenOwner, TokensOf},
         users::{self, User},
     },
     write::Tx,
@@ -27,8 +27,6 @@ pub const MAX_TOKENS: i64 = 50;
 pub const LAST_USE_INTERVAL: SignedDuration = SignedDuration::from_mins(1);
 /// Time from a session's start to its expiry.
 pub const SESSION_LIFETIME: SignedDuration = SignedDuration::from_hours(14 * 24);
-/// Time for which a user's expired or revoked sessions are still listed.
-const SESSION_LISTED_FOR: SignedDuration = SignedDuration::from_hours(30 * 24);
 
 /// A valid token with its principal.
 #[derive(Debug, Clone, PartialEq)]
@@ -233,13 +231,8 @@ impl Store {
     /// Creates a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`], or it would be expired.
     #[boxed]
     pub async fn create_token(&self, actor: Actor, new: NewToken, now: Timestamp) -> Result<Token> {
-        self.write(actor, now, async |tx| {
-            if let Ok(listed_since) = now.checked_sub(SESSION_LISTED_FOR) {
-                tokens::delete_old_sessions(tx, listed_since).await?;
-            }
-            add_token(tx, new).await
-        })
-        .await
+        self.write(actor, now, async |tx| add_token(tx, new).await)
+            .await
     }
 
     /// Creates the session of a user whose password has been verified as `verified`, its stored form. False if the user has another
@@ -253,9 +246,6 @@ impl Store {
         now: Timestamp,
     ) -> Result<bool> {
         self.write(Actor::User(id), now, async |tx| {
-            if let Ok(listed_since) = now.checked_sub(SESSION_LISTED_FOR) {
-                tokens::delete_old_sessions(tx, listed_since).await?;
-            }
             if users::password_of(tx, id).await?.as_deref() != Some(verified) {
                 return Ok(false);
             }
@@ -353,7 +343,7 @@ impl Store {
             if let Some(existing) = tokens::by_hash(tx, hash).await? {
                 return Ok(existing.owner == TokenOwner::Host && existing.is_valid(now));
             }
-            let previous = tokens::all(tx).await?.into_iter().filter(|token| {
+            let previous = tokens::of_host(tx).await?.into_iter().filter(|token| {
                 token.owner == TokenOwner::Host
                     && token.name == HOST_TOKEN_NAME
                     && token.revoked_at.is_none()
@@ -375,10 +365,26 @@ impl Store {
         .await
     }
 
-    /// All tokens and sessions, the newest first.
+    /// At most `limit` tokens and sessions, the newest first. With `after`, those that come after this token; `None` if it is not
+    /// in the list.
     #[boxed]
-    pub async fn tokens(&self) -> Result<Vec<Token>> {
-        tokens::all(&mut *self.database.read.acquire().await?).await
+    pub async fn tokens_after(
+        &self,
+        of: TokensOf,
+        after: Option<TokenId>,
+        limit: u32,
+    ) -> Result<Option<Vec<Token>>> {
+        let mut connection = self.database.read.acquire().await?;
+        let after = match after {
+            None => None,
+            Some(id) => match tokens::find(&mut connection, id).await {
+                Ok(token) if of.includes(&token) => Some(token),
+                Ok(_) | Err(StoreError::NotFound(_)) => return Ok(None),
+                Err(error) => return Err(error),
+            },
+        };
+        let listed = tokens::list(&mut connection, of, after.as_ref(), limit).await?;
+        Ok(Some(listed))
     }
 
     #[boxed]

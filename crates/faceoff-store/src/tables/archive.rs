@@ -155,7 +155,7 @@ pub enum ArtifactOwner {
 /// All artifacts of an organiser's archive, except the datasets of evaluations.
 pub(crate) async fn artifacts(connection: &mut SqliteConnection) -> Result<Vec<ArchivedArtifact>> {
     let bundles = sqlx::query!(
-        "SELECT id, bundle_key, bundle_blake3 FROM submissions
+        "/* archive */ SELECT id, bundle_key, bundle_blake3 FROM submissions
          WHERE bundle_removed_at IS NULL
            AND (state = 'valid'
                 OR team_id IN (SELECT id FROM teams WHERE disqualified_at IS NOT NULL OR retired_by_organiser = 1))

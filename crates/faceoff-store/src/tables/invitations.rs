@@ -123,12 +123,58 @@ macro_rules! select_invitations {
     };
 }
 
-/// All invitations, including used and expired ones, the newest first.
-pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Invitation>> {
-    let rows = select_invitations!("ORDER BY created_at DESC, id DESC")
-        .fetch_all(connection)
-        .await?;
+/// At most `limit` invitations, including used and expired ones, the newest first: all, or those to be a member of a team. Only
+/// those that come after the invitation `after` in this order.
+pub(crate) async fn list(
+    connection: &mut SqliteConnection,
+    team: Option<TeamId>,
+    after: Option<&Invitation>,
+    limit: u32,
+) -> Result<Vec<Invitation>> {
+    let created_at = Instant(after.map_or(Timestamp::MAX, |invitation| invitation.created_at));
+    let id = after.map(|invitation| invitation.id);
+    let rows = match team {
+        None => {
+            select_invitations!(
+                "WHERE (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
+                created_at,
+                id,
+                limit
+            )
+            .fetch_all(connection)
+            .await?
+        }
+        Some(team) => {
+            select_invitations!(
+                "WHERE team_id = ? AND (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
+                team,
+                created_at,
+                id,
+                limit
+            )
+            .fetch_all(connection)
+            .await?
+        }
+    };
     rows.into_iter().map(Invitation::try_from).collect()
+}
+
+/// Deletes at most `limit` invitations that were revoked, or expired unused, at `ended_before` or earlier. Returns their number.
+pub(crate) async fn forget_ended(
+    connection: &mut SqliteConnection,
+    ended_before: Timestamp,
+    limit: u32,
+) -> Result<usize> {
+    let deleted = sqlx::query!(
+        "DELETE FROM invitations WHERE id IN (
+             SELECT id FROM invitations
+             WHERE accepted_at IS NULL AND coalesce(revoked_at, expires_at) <= ? LIMIT ?)",
+        Instant(ended_before),
+        limit
+    )
+    .execute(connection)
+    .await?;
+    Ok(usize::try_from(deleted.rows_affected()).unwrap_or(usize::MAX))
 }
 
 pub(crate) async fn find(

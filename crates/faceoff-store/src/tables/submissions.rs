@@ -262,6 +262,25 @@ pub(crate) async fn log(
         .ok_or(StoreError::NotFound("submission"))
 }
 
+/// Empties the logs of this submission's team's invalid submissions, except the newest `kept`.
+pub(crate) async fn forget_old_logs(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    kept: u32,
+) -> Result<()> {
+    sqlx::query!(
+        "UPDATE submissions SET log = '' WHERE id IN (
+             SELECT id FROM submissions
+             WHERE team_id = (SELECT team_id FROM submissions WHERE id = ?) AND state = 'invalid' AND log <> ''
+             ORDER BY created_at DESC, id DESC LIMIT -1 OFFSET ?)",
+        id,
+        kept
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
 /// Adds an uploaded submission that is to be validated.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,

@@ -7,6 +7,7 @@ use crate::{
 use faceoff_types::{TeamId, TokenId, UserId};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
+use std::cmp::Reverse;
 
 /// The owner of a token, as whom its requests act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,12 +155,127 @@ macro_rules! select_tokens {
     };
 }
 
-/// All API tokens and sessions, the newest first.
-pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Token>> {
-    let rows = select_tokens!("ORDER BY created_at DESC, id DESC")
+/// Whose tokens and sessions a list has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TokensOf {
+    Everyone,
+    /// Those of a user.
+    User(UserId),
+    /// Those of a user, and those of the user's team.
+    Member(UserId, TeamId),
+}
+
+impl TokensOf {
+    /// Is the token in the list?
+    #[must_use]
+    pub fn includes(self, token: &Token) -> bool {
+        match (self, token.owner) {
+            (Self::Everyone, _) => true,
+            (Self::User(user) | Self::Member(user, _), TokenOwner::User(id)) => user == id,
+            (Self::Member(_, team), TokenOwner::Team(id)) => team == id,
+            _ => false,
+        }
+    }
+}
+
+/// At most `limit` API tokens and sessions, the newest first; only those that come after the token `after` in this order.
+pub(crate) async fn list(
+    connection: &mut SqliteConnection,
+    of: TokensOf,
+    after: Option<&Token>,
+    limit: u32,
+) -> Result<Vec<Token>> {
+    let created_at = Instant(after.map_or(Timestamp::MAX, |token| token.created_at));
+    let id = after.map(|token| token.id);
+    let rows = match of {
+        TokensOf::Everyone => {
+            select_tokens!(
+                "WHERE (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
+                created_at,
+                id,
+                limit
+            )
+            .fetch_all(connection)
+            .await?
+        }
+        TokensOf::User(user) | TokensOf::Member(user, _) => {
+            let mut rows = select_tokens!(
+                "WHERE person_id = ? AND (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
+                user,
+                created_at,
+                id,
+                limit
+            )
+            .fetch_all(&mut *connection)
+            .await?;
+            if let TokensOf::Member(_, team) = of {
+                let rows_of_team = select_tokens!(
+                    "WHERE team_id = ? AND (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
+                    team,
+                    created_at,
+                    id,
+                    limit
+                );
+                rows.extend(rows_of_team.fetch_all(connection).await?);
+                rows.sort_by_key(|row| Reverse((row.created_at.0, row.id)));
+                rows.truncate(limit as usize);
+            }
+            rows
+        }
+    };
+    Ok(rows.into_iter().map(Token::from).collect())
+}
+
+/// The host's tokens, valid or not.
+pub(crate) async fn of_host(connection: &mut SqliteConnection) -> Result<Vec<Token>> {
+    let rows = select_tokens!("WHERE owner = 'host' ORDER BY created_at")
         .fetch_all(connection)
         .await?;
     Ok(rows.into_iter().map(Token::from).collect())
+}
+
+/// Deletes at most `limit` tokens and sessions that ended at `ended_before` or earlier. What was made with them counts as made with
+/// what they were made with, so that it still ends with that. Returns the number of tokens.
+pub(crate) async fn forget_ended(
+    connection: &mut SqliteConnection,
+    ended_before: Timestamp,
+    limit: u32,
+) -> Result<usize> {
+    let ended = sqlx::query!(
+        r#"SELECT id AS "id!: TokenId", made_with AS "made_with: TokenId" FROM tokens
+           WHERE coalesce(revoked_at, expires_at) <= ? ORDER BY coalesce(revoked_at, expires_at) LIMIT ?"#,
+        Instant(ended_before),
+        limit
+    )
+    .fetch_all(&mut *connection)
+    .await?;
+    for row in &ended {
+        sqlx::query!(
+            "UPDATE tokens SET made_with = ? WHERE made_with = ?",
+            row.made_with,
+            row.id
+        )
+        .execute(&mut *connection)
+        .await?;
+        sqlx::query!(
+            "UPDATE invitations SET made_with = ? WHERE made_with = ?",
+            row.made_with,
+            row.id
+        )
+        .execute(&mut *connection)
+        .await?;
+        sqlx::query!(
+            "UPDATE webhooks SET made_with = ? WHERE made_with = ?",
+            row.made_with,
+            row.id
+        )
+        .execute(&mut *connection)
+        .await?;
+        sqlx::query!("DELETE FROM tokens WHERE id = ?", row.id)
+            .execute(&mut *connection)
+            .await?;
+    }
+    Ok(ended.len())
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: TokenId) -> Result<Token> {
@@ -314,20 +430,6 @@ pub(crate) async fn revoke_others(
         owner.team(),
         owner.user(),
         kept,
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
-/// Deletes the sessions that expired or were revoked before `ended_before`. The events still record them.
-pub(crate) async fn delete_old_sessions(
-    connection: &mut SqliteConnection,
-    ended_before: Timestamp,
-) -> Result<()> {
-    sqlx::query!(
-        "DELETE FROM tokens WHERE kind = 'session' AND (expires_at < ?1 OR revoked_at < ?1)",
-        Instant(ended_before)
     )
     .execute(connection)
     .await?;

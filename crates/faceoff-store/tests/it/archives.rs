@@ -5,7 +5,7 @@ use crate::fixture::*;
 use faceoff_store::*;
 use faceoff_types::*;
 use sqlx::{AssertSqlSafe, Connection, SqliteConnection};
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, time::Duration};
 
 /// Columns of the tables in the public archive. A new column must be reviewed in `scrub.rs` (is it public?) and then
 /// listed here. A table that is not listed is emptied there.
@@ -489,6 +489,91 @@ async fn import_refuses_manipulated_database() {
 }
 
 #[tokio::test]
+async fn import_reads_no_view_in_place_of_a_table() {
+    let (f, _) = season_with_queued_day().await;
+    let endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)";
+    let migrations = format!(
+        "PRAGMA foreign_keys = OFF; DROP TABLE _sqlx_migrations; CREATE VIEW _sqlx_migrations AS {endless}
+         SELECT i AS version, 'more' AS description, 0 AS installed_on, 1 AS success, zeroblob(48) AS checksum,
+         0 AS execution_time FROM n"
+    );
+    let archived = format!(
+        "DROP TABLE archived; CREATE VIEW archived AS {endless} SELECT i AS id, 'public' AS edition FROM n"
+    );
+    let teams = format!(
+        "PRAGMA foreign_keys = OFF; PRAGMA legacy_alter_table = ON; ALTER TABLE teams RENAME TO other_teams;
+         CREATE VIEW teams AS {endless} SELECT i AS id FROM n"
+    );
+    for (sql, phrase) in [
+        (&migrations, "its table of migrations is not as"),
+        (&archived, "not that of an archived season"),
+        (&teams, "is not as this program makes it"),
+    ] {
+        let folder = export(&f, Edition::Organiser).await;
+        exec(&database(&folder), sql).await;
+        let before = std::fs::read(database(&folder)).unwrap();
+        let error = Store::import(folder.path(), f.now).await.unwrap_err();
+        assert!(error.to_string().contains(phrase), "{sql}: {error}");
+        assert_eq!(
+            std::fs::read(database(&folder)).unwrap(),
+            before,
+            "a refused database is not written to"
+        );
+    }
+}
+
+#[tokio::test]
+async fn import_ends_at_its_deadline() {
+    let (f, _) = season_with_queued_day().await;
+    let folder = export(&f, Edition::Organiser).await;
+    let rows = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 100000)
+        INSERT INTO events (at, actor, subject_kind, subject_id, kind, payload)
+        SELECT 0, 'server', 'season', '', 'season_opened', '{}' FROM n";
+    exec(&database(&folder), rows).await;
+    let imported = Store::import_within(folder.path(), f.now, Duration::ZERO).await;
+    let error = imported.unwrap_err().to_string();
+    assert!(error.contains("takes longer than"), "{error}");
+}
+
+#[tokio::test]
+async fn import_of_an_earlier_schema_migrates_it() {
+    let (f, _) = season_with_queued_day().await;
+    let folder = export(&f, Edition::Organiser).await;
+    let newest = "SELECT MAX(version) FROM _sqlx_migrations";
+    let mut connection = open(&database(&folder)).await;
+    let newest: i64 = sqlx::query_scalar(newest)
+        .fetch_one(&mut connection)
+        .await
+        .unwrap();
+    // A database that claims to be older than its schema is.
+    let sql = format!("DELETE FROM _sqlx_migrations WHERE version = {newest}");
+    exec(&database(&folder), &sql).await;
+    let error = Store::import(folder.path(), f.now).await.unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("is not as this program makes it"),
+        "{error}"
+    );
+    for index in [
+        "tokens_by_age",
+        "tokens_of_team_by_age",
+        "tokens_of_person_by_age",
+        "tokens_by_end",
+        "tokens_of_host",
+        "tokens_valid_of_owner",
+        "bundles_stored",
+        "submissions_invalid_with_log",
+        "invitations_by_age",
+        "invitations_of_team_by_age",
+        "invitations_by_end",
+    ] {
+        exec(&database(&folder), &format!("DROP INDEX {index}")).await;
+    }
+    Store::import(folder.path(), f.now).await.unwrap();
+}
+
+#[tokio::test]
 async fn import_removes_planted_credentials() {
     let (f, _) = season_with_queued_day().await;
     let folder = export(&f, Edition::Organiser).await;
@@ -498,7 +583,8 @@ async fn import_removes_planted_credentials() {
     exec(&database(&folder), planted).await;
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
-    assert!(imported.tokens().await.unwrap().is_empty());
+    let tokens = imported.tokens_after(TokensOf::Everyone, None, 10).await;
+    assert!(tokens.unwrap().unwrap().is_empty());
     let verified = imported
         .verify_token([0; 32], TokenKind::ApiToken, f.now)
         .await

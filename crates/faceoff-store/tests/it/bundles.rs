@@ -87,6 +87,27 @@ async fn invalid_bundle_is_deleted_but_reason_and_log_stay() {
 }
 
 #[tokio::test]
+async fn logs_of_the_last_invalid_submissions_are_kept() {
+    let mut f = TestStore::new().await;
+    let [alpha, beta] = [f.create_team("Alpha").await, f.create_team("Beta").await];
+    let of_beta = upload_stored(&f, &beta, "beta", 10).await;
+    commit_invalid(&f).await;
+    let mut uploaded = Vec::new();
+    for number in 0..REFUSED_LOGS_KEPT + 2 {
+        f.advance_clock_s(1);
+        uploaded.push(upload_stored(&f, &alpha, &format!("bundle-{number}"), 10).await);
+        commit_invalid(&f).await;
+    }
+    f.store.remove_refused_bundles(f.now).await.unwrap();
+    let has_log = async |id| f.store.submission_log(id).await.unwrap().unwrap() != "";
+    assert!(!has_log(uploaded[0].id).await && !has_log(uploaded[1].id).await);
+    for submission in &uploaded[2..] {
+        assert!(has_log(submission.id).await);
+    }
+    assert!(has_log(of_beta.id).await, "teams are counted separately");
+}
+
+#[tokio::test]
 async fn unchecked_bundle_is_kept_a_day_outside_the_quota() {
     let mut f = TestStore::new().await;
     let team = f.create_team("Alpha").await;

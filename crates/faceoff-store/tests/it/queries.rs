@@ -4,8 +4,8 @@
 use crate::fixture::*;
 use sqlx::{Row, SqlSafeStr};
 
-/// Tables that grow with teams × days.
-const LARGE: [&str; 8] = [
+/// Tables that grow with teams × days, or with what teams and visitors do.
+const LARGE: [&str; 11] = [
     "evaluations",
     "runs",
     "shards",
@@ -14,10 +14,13 @@ const LARGE: [&str; 8] = [
     "events",
     "episode_summaries",
     "webhook_deliveries",
+    "tokens",
+    "invitations",
+    "submissions",
 ];
 
 /// Partial indexes, which contain few rows of a large table: a scan of such an index reads only these rows.
-const SMALL_INDEXES: [&str; 8] = [
+const SMALL_INDEXES: [&str; 12] = [
     "jobs_open",
     "evaluations_open",
     "evaluations_of_proposal",
@@ -26,10 +29,22 @@ const SMALL_INDEXES: [&str; 8] = [
     "datasets_unmeasured",
     "runs_to_clear",
     "webhook_deliveries_due",
+    "bundles_going",
+    "bundles_stored",
+    "refused_bundles",
+    "tokens_of_host",
 ];
 
 /// Queries that may read a whole index or table, identified by a fragment, each with its reason.
-const MAY_SCAN: [(&str, &str); 4] = [
+const MAY_SCAN: [(&str, &str); 6] = [
+    (
+        "/* import */",
+        "a separate command, which makes a new data folder",
+    ),
+    (
+        "/* archive */",
+        "an organiser's request, for a copy of the season",
+    ),
     ("/* backup */", "a separate command, which copies all rows"),
     (
         "substr(worker, 1",
@@ -50,6 +65,7 @@ async fn queries_do_not_scan_growing_tables() {
     let f = TestStore::new().await;
     let mut connection = f.connection().await;
     let mut board_queries = 0;
+    let mut scans = Vec::new();
     for (_, data) in query_data() {
         let sql = data["query"].as_str().unwrap().to_owned();
         board_queries += usize::from(sql.contains("/* board */"));
@@ -69,10 +85,13 @@ async fn queries_do_not_scan_growing_tables() {
             });
             let is_small = SMALL_INDEXES.iter().any(|index| step.ends_with(index));
             if let Some(table) = scanned.filter(|_| !is_small) {
-                assert!(!LARGE.contains(&table.as_str()), "{step} in {sql}");
+                if LARGE.contains(&table.as_str()) {
+                    scans.push(format!("{step} in {sql}"));
+                }
             }
         }
     }
+    assert!(scans.is_empty(), "{}", scans.join("\n"));
     assert_eq!(board_queries, 1, "the board query is checked, too");
 }
 

@@ -1,6 +1,6 @@
 //! Tokens: validity, expiry, rotation and revocation.
 
-use crate::fixture::*;
+use crate::{fixture::*, users::add_user};
 use faceoff_store::*;
 use faceoff_types::TokenId;
 use jiff::{SignedDuration, Timestamp};
@@ -15,6 +15,17 @@ fn new_token(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewT
         requester: Requester::default(),
         expires_at,
     }
+}
+
+/// All tokens and sessions, the newest first.
+pub async fn all_tokens(f: &TestStore) -> Vec<Token> {
+    let listed = f.store.tokens_after(TokensOf::Everyone, None, u32::MAX);
+    listed.await.unwrap().unwrap()
+}
+
+async fn all_invitations(f: &TestStore) -> Vec<Invitation> {
+    let listed = f.store.invitations_after(None, None, u32::MAX);
+    listed.await.unwrap().unwrap()
 }
 
 /// Why the token with this hash is rejected; `None` if it is valid.
@@ -119,7 +130,7 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
         .await
         .unwrap_err();
     assert!(error.to_string().contains("which is the limit"), "{error}");
-    let used = f.store.tokens().await.unwrap().remove(3);
+    let used = all_tokens(&f).await.remove(3);
     assert_eq!(used.last_used_at, None);
     f.advance_clock_s(90);
     f.store.record_token_use(&used, f.now).await.unwrap();
@@ -159,7 +170,7 @@ async fn host_token_follows_its_file_and_stays_revoked() {
         "other host tokens are not affected"
     );
     // The token whose secret is in a file cannot be rotated: the next start would restore the old secret from the file.
-    let tokens = f.store.tokens().await.unwrap();
+    let tokens = all_tokens(&f).await;
     let file_token = tokens
         .iter()
         .find(|token| token.name == "admin-token" && token.revoked_at.is_none());
@@ -258,7 +269,7 @@ async fn makers_of_earlier_versions_come_from_the_log() {
     let (_, updates) = migration.split_once("UPDATE").unwrap();
     execute(&format!("UPDATE{updates}")).await;
 
-    let tokens = f.store.tokens().await.unwrap();
+    let tokens = all_tokens(&f).await;
     let maker = |id| {
         let token = tokens.iter().find(|token| token.id == id);
         token.unwrap().maker.user
@@ -271,9 +282,186 @@ async fn makers_of_earlier_versions_come_from_the_log() {
         .iter()
         .filter(|token| token.owner == TokenOwner::User(first));
     assert!(own.clone().count() == 1 && own.clone().all(|token| token.maker.user == Some(first)));
-    let invitations = f.store.invitations().await.unwrap();
+    let invitations = all_invitations(&f).await;
     let link = invitations.iter().find(|found| found.id == link.id);
     let link = link.unwrap();
     assert_eq!(link.maker.user, Some(second));
     assert_eq!(link.expires_at, f.now + SignedDuration::from_hours(24));
+}
+
+#[tokio::test]
+async fn tokens_and_invitations_are_listed_page_by_page() {
+    let mut f = TestStore::new().await;
+    let teams = [
+        f.create_team("Alpha").await.id,
+        f.create_team("Beta").await.id,
+    ];
+    let ada = add_user(&f, 100, "Ada", InvitationRole::Member(teams[0])).await;
+    let mut created = Vec::new();
+    for hash in 1..=9 {
+        // Several are created at one time.
+        f.advance_clock_s(i64::from(hash % 2));
+        let owner = match hash % 3 {
+            0 => TokenOwner::User(ada.id),
+            1 => TokenOwner::Team(teams[0]),
+            _ => TokenOwner::Team(teams[1]),
+        };
+        let new = new_token(hash, owner, None);
+        created.push(
+            f.store
+                .create_token(Actor::Organiser, new, f.now)
+                .await
+                .unwrap(),
+        );
+    }
+    let everyone = all_tokens(&f).await;
+    for of in [
+        TokensOf::Everyone,
+        TokensOf::User(ada.id),
+        TokensOf::Member(ada.id, teams[0]),
+    ] {
+        let expected: Vec<TokenId> = everyone
+            .iter()
+            .filter(|token| of.includes(token))
+            .map(|token| token.id)
+            .collect();
+        assert!(expected.len() > 2, "{of:?}");
+        let mut found = Vec::new();
+        loop {
+            let page = f.store.tokens_after(of, found.last().copied(), 2);
+            let page = page.await.unwrap().unwrap();
+            assert!(page.len() <= 2);
+            if page.is_empty() {
+                break;
+            }
+            found.extend(page.iter().map(|token| token.id));
+        }
+        assert_eq!(found, expected, "{of:?}");
+    }
+    // A token of another team, and one that does not exist.
+    let of_alpha = TokensOf::Member(ada.id, teams[0]);
+    for after in [created[1].id, TokenId::new()] {
+        let page = f
+            .store
+            .tokens_after(of_alpha, Some(after), 2)
+            .await
+            .unwrap();
+        assert_eq!(page, None);
+    }
+
+    let invited = async |hash: u8, role| {
+        let invitation = NewInvitation {
+            code_hash: [hash; 32],
+            role,
+            note: "Bob".into(),
+            requester: Requester::default(),
+            expires_at: f.now + SignedDuration::from_hours(1),
+        };
+        f.store
+            .invite(Actor::Organiser, invitation, f.now)
+            .await
+            .unwrap()
+            .id
+    };
+    let to_beta = invited(101, InvitationRole::Member(teams[1])).await;
+    let mut to_alpha = Vec::new();
+    for hash in 102..=104 {
+        to_alpha.insert(0, invited(hash, InvitationRole::Member(teams[0])).await);
+    }
+    let alpha = Some(teams[0]);
+    let first = f
+        .store
+        .invitations_after(alpha, None, 2)
+        .await
+        .unwrap()
+        .unwrap();
+    let second = f.store.invitations_after(alpha, Some(first[1].id), 10);
+    let second = second.await.unwrap().unwrap();
+    let listed: Vec<_> = first
+        .iter()
+        .chain(&second)
+        .map(|listed| listed.id)
+        .collect();
+    // Ada's own one, already accepted, is the oldest.
+    assert_eq!(listed[..3], to_alpha);
+    assert_eq!(listed.len(), 4);
+    let page = f
+        .store
+        .invitations_after(alpha, Some(to_beta), 2)
+        .await
+        .unwrap();
+    assert_eq!(page, None);
+}
+
+#[tokio::test]
+async fn ended_credentials_are_forgotten_after_a_month() {
+    let mut f = TestStore::new().await;
+    let team = f.create_team("Alpha").await.id;
+    add_user(&f, 100, "Ada", InvitationRole::Member(team)).await;
+    let create = async |f: &TestStore, hash, made_with: Option<(TokenId, [u8; 32])>| {
+        let new = NewToken {
+            requester: Requester {
+                user: None,
+                token: made_with,
+            },
+            ..new_token(hash, TokenOwner::Team(team), None)
+        };
+        f.store
+            .create_token(Actor::Organiser, new, f.now)
+            .await
+            .unwrap()
+            .id
+    };
+    let root = create(&f, 1, None).await;
+    let middle = create(&f, 2, Some((root, [1; 32]))).await;
+    let leaf = create(&f, 3, Some((middle, [2; 32]))).await;
+    f.store
+        .revoke_token(Actor::Organiser, middle, EndMade::Keep, f.now)
+        .await
+        .unwrap();
+    let expires_at = f.now + SignedDuration::from_hours(1);
+    let expired = new_token(4, TokenOwner::Team(team), Some(expires_at));
+    f.store
+        .create_token(Actor::Organiser, expired, f.now)
+        .await
+        .unwrap();
+    let invitation = NewInvitation {
+        code_hash: [5; 32],
+        role: InvitationRole::Member(team),
+        note: "Bob".into(),
+        requester: Requester::default(),
+        expires_at,
+    };
+    f.store
+        .invite(Actor::Organiser, invitation, f.now)
+        .await
+        .unwrap();
+
+    f.advance_clock_s(30 * 24 * 3600 - 1);
+    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
+    f.advance_clock_s(1);
+    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 1);
+    f.advance_clock_s(3600);
+    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 2);
+    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
+
+    let tokens = all_tokens(&f).await;
+    let of_team: Vec<TokenId> = tokens
+        .iter()
+        .filter(|token| token.owner == TokenOwner::Team(team))
+        .map(|token| token.id)
+        .collect();
+    // The third one is that of the team's creation.
+    assert_eq!((of_team.len(), &of_team[..2]), (3, &[leaf, root][..]));
+    let invitations = all_invitations(&f).await;
+    let [accepted] = invitations.as_slice() else {
+        panic!("{invitations:?}");
+    };
+    assert!(matches!(accepted.state, InvitationState::Accepted { .. }));
+    // What was made with the forgotten token still ends with the token that made that one.
+    f.store
+        .revoke_token(Actor::Organiser, root, EndMade::Except(None), f.now)
+        .await
+        .unwrap();
+    assert_eq!(rejection(&f, 3).await, Some(TokenRejection::Revoked(f.now)));
 }

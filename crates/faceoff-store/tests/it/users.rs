@@ -21,7 +21,7 @@ async fn invite(f: &TestStore, code: u8, role: InvitationRole) -> Invitation {
 }
 
 /// A user who has joined with this code.
-async fn add_user(f: &TestStore, code: u8, name: &str, role: InvitationRole) -> User {
+pub async fn add_user(f: &TestStore, code: u8, name: &str, role: InvitationRole) -> User {
     invite(f, code, role).await;
     let joined = f.store.join(join_request([code; 32], name), f.now).await;
     joined.unwrap().user
@@ -331,7 +331,7 @@ async fn sign_in_under_way_fails_after_a_new_password() {
     let f = TestStore::new().await;
     let alpha = f.create_team("Alpha").await;
     let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
-    let token = f.store.tokens().await.unwrap()[0].id;
+    let token = crate::tokens::all_tokens(&f).await[0].id;
     let set_password = async |password| {
         f.store
             .set_password(Actor::User(ada.id), ada.id, password, token, f.now)

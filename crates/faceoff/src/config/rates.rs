@@ -1,4 +1,4 @@
-//! `[rates]`: how many requests an address or a token may send.
+//! `[rates]`: how many requests an address or a token, and how many changes a team may send.
 
 use faceoff_http::{RateLimit, RateLimits};
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,8 @@ pub struct RatesConfig {
     pub token_per_s: u32,
     /// Largest burst.
     pub token_burst: NonZeroU32,
+    /// Number of changes (requests other than reads) that a team may make per UTC day; 0: no limit.
+    pub team_changes_per_day: u32,
 }
 
 impl Default for RatesConfig {
@@ -26,6 +28,7 @@ impl Default for RatesConfig {
             address_burst: BURST,
             token_per_s: 100,
             token_burst: BURST,
+            team_changes_per_day: 2000,
         }
     }
 }
@@ -38,6 +41,7 @@ impl RatesConfig {
         RateLimits {
             address: rate(self.address_per_s, self.address_burst),
             token: rate(self.token_per_s, self.token_burst),
+            team_changes_per_day: NonZeroU32::new(self.team_changes_per_day),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use faceoff_types::Magnitude;
-use std::time::Duration;
+use std::{num::NonZeroU32, time::Duration};
 
 /// The error of an invalid configuration.
 fn error(text: &str) -> String {
@@ -68,6 +68,14 @@ fn all_sections_are_read() {
     assert!(config.webhooks.check_address(private_address).is_ok());
     assert_eq!(config.webhooks.ports, [443, 8443]);
     assert_eq!(config.rates.limits().token, None);
+    assert_eq!(
+        config
+            .rates
+            .limits()
+            .team_changes_per_day
+            .map(NonZeroU32::get),
+        Some(2000)
+    );
     assert_eq!(config.season.name.as_deref(), Some("Practice"));
     assert_eq!(config.rules().episodes_per_task, 7);
     assert_eq!(config.evaluation.at, Some(jiff::civil::time(0, 30, 0, 0)));

@@ -1,0 +1,158 @@
+//! The number of changes that a team may make per UTC day: requests of its members and API clients that are not only reads. Each
+//! leaves rows in the database, such as events, for the whole season, so a team must not be able to make any number of them.
+
+use crate::problem::{Problem, ProblemKind};
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use faceoff_types::TeamId;
+use jiff::{Timestamp, civil::Date, tz::TimeZone};
+use std::{
+    collections::HashMap,
+    num::NonZeroU32,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
+};
+
+/// Headers of draft-ietf-httpapi-ratelimit-headers: the quota, and what is left of it.
+const POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+const REMAINING: HeaderName = HeaderName::from_static("ratelimit");
+
+/// Counts the changes of each team on the current day. The counts start again with the server.
+#[derive(Debug)]
+pub struct ChangeQuota {
+    /// `None`: unlimited.
+    per_day: Option<NonZeroU32>,
+    counted: Mutex<Counted>,
+}
+
+#[derive(Debug, Default)]
+struct Counted {
+    day: Date,
+    changes: HashMap<TeamId, u32>,
+}
+
+/// What is left of a team's quota after a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RemainingChanges {
+    per_day: NonZeroU32,
+    remaining: u32,
+    seconds_to_midnight: i64,
+}
+
+/// Place in a request for what is left of the team's quota, once the caller is authenticated; the response's headers have it.
+#[derive(Debug, Clone, Default)]
+pub struct RemainingChangesSlot(Arc<OnceLock<RemainingChanges>>);
+
+impl ChangeQuota {
+    /// A quota of this many changes per team and day.
+    pub fn new(per_day: Option<NonZeroU32>) -> Self {
+        Self {
+            per_day,
+            counted: Mutex::default(),
+        }
+    }
+
+    /// Counts a change; `None` if changes are not limited.
+    ///
+    /// # Errors
+    /// `DailyChangeQuotaExceeded`.
+    pub(crate) fn count(
+        &self,
+        team: TeamId,
+        now: Timestamp,
+    ) -> Result<Option<RemainingChanges>, Problem> {
+        let Some(per_day) = self.per_day else {
+            return Ok(None);
+        };
+        let time = now.to_zoned(TimeZone::UTC);
+        let seconds_to_midnight = 24 * 3600 - now.as_second().rem_euclid(24 * 3600);
+        let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+        if counted.day != time.date() {
+            *counted = Counted {
+                day: time.date(),
+                changes: HashMap::new(),
+            };
+        }
+        let changes = counted.changes.entry(team).or_default();
+        if *changes >= per_day.get() {
+            let detail = format!(
+                "the team has made {per_day} changes today, as many as a team may make per UTC day; reading is not limited. Try again \
+                 after midnight UTC"
+            );
+            let problem = Problem::new(ProblemKind::DailyChangeQuotaExceeded, detail);
+            return Err(problem
+                .with("limit", per_day.get())
+                .retry_after(seconds_to_midnight.unsigned_abs()));
+        }
+        *changes += 1;
+        Ok(Some(RemainingChanges {
+            per_day,
+            remaining: per_day.get() - *changes,
+            seconds_to_midnight,
+        }))
+    }
+}
+
+impl RemainingChangesSlot {
+    /// Counts a change of the team for this request, once.
+    ///
+    /// # Errors
+    /// `DailyChangeQuotaExceeded`.
+    pub(crate) fn count(
+        &self,
+        quota: &ChangeQuota,
+        team: TeamId,
+        now: Timestamp,
+    ) -> Result<(), Problem> {
+        if self.0.get().is_none()
+            && let Some(remaining) = quota.count(team, now)?
+        {
+            // Set only here, by extractors that run one after the other.
+            let _ = self.0.set(remaining);
+        }
+        Ok(())
+    }
+
+    /// Adds the headers that tell the quota, if a change was counted.
+    pub fn add_headers(&self, headers: &mut HeaderMap) {
+        let Some(RemainingChanges {
+            per_day,
+            remaining,
+            seconds_to_midnight,
+        }) = self.0.get()
+        else {
+            return;
+        };
+        for (name, value) in [
+            (POLICY, format!("\"changes\";q={per_day};w=86400")),
+            (
+                REMAINING,
+                format!("\"changes\";r={remaining};t={seconds_to_midnight}"),
+            ),
+        ] {
+            if let Ok(value) = HeaderValue::try_from(value) {
+                headers.insert(name, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quota_is_per_team_and_day() {
+        let quota = ChangeQuota::new(NonZeroU32::new(2));
+        let [alpha, beta] = [TeamId::new(), TeamId::new()];
+        let at = |text: &str| text.parse::<Timestamp>().unwrap();
+        let evening = at("2026-03-01T23:59:50Z");
+        let first = quota.count(alpha, evening).unwrap().unwrap();
+        assert_eq!((first.remaining, first.seconds_to_midnight), (1, 10));
+        assert!(quota.count(alpha, evening).is_ok());
+        let refused = quota.count(alpha, evening).unwrap_err();
+        assert_eq!(refused.kind(), ProblemKind::DailyChangeQuotaExceeded);
+        assert!(quota.count(beta, evening).is_ok());
+        assert!(quota.count(alpha, at("2026-03-02T00:00:00Z")).is_ok());
+        let unlimited = ChangeQuota::new(None);
+        assert_eq!(unlimited.count(alpha, evening).unwrap(), None);
+    }
+}
