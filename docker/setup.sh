@@ -45,7 +45,10 @@ if [ "$purpose" = test ] || [ "$purpose" = steady ]; then
     # To check the examples for organisers: the systemd units and the proxies.
     need systemd-analyze systemd
     need nginx nginx-light
+    [ -e /usr/lib/nginx/modules/ngx_stream_module.so ] || missing="$missing libnginx-mod-stream"
     need caddy caddy
+    # A common client, for refused uploads.
+    need curl curl
 fi
 if [ "$purpose" = load ]; then
     need wrk wrk

@@ -29,6 +29,7 @@ mod marked_secrets;
 mod pictures;
 mod python_packages;
 mod reference_result;
+mod refused_uploads;
 mod remote_workers;
 mod replay;
 mod retention;

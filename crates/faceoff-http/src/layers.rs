@@ -1,8 +1,10 @@
-//! Layers around every request: id, log line, rate limit, cache, compression, security headers, and a handler for panics.
+//! Layers around every request: unread bodies, id, log line, rate limit, cache, compression, security headers, and a handler
+//! for panics.
 
 use crate::{
     in_flight::{self, InFlight},
     peer::Peer,
+    unread_body::discard_unread,
 };
 use axum::{
     Router,
@@ -54,6 +56,10 @@ pub(crate) fn wrap(site: Router, app: &Arc<AppState>) -> Router {
         .layer(middleware::from_fn_with_state(Arc::clone(app), log_request))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
         .layer(middleware::map_request(drop_foreign_request_id))
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(app),
+            discard_unread,
+        ))
 }
 
 /// Smaller responses are not compressed, because they would gain nothing. This includes all responses with a secret, whose

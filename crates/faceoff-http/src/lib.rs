@@ -11,6 +11,7 @@ mod peer;
 mod probes;
 mod read_only;
 mod serve;
+mod unread_body;
 mod worker_files;
 
 pub use axum::Router;

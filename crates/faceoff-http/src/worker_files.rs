@@ -86,10 +86,7 @@ async fn store_file(
     let is_expected = writable_files(&grant).contains(&&*name);
     let key = grant.storage_key(&name).filter(|_| is_expected);
     let key = key.ok_or_else(|| Problem::not_found("file of this job's recording"))?;
-    if let Err(problem) = free_space::check(&app) {
-        bundle_stream::discard(body, app.config.limits.min_upload_rate).await;
-        return Err(problem);
-    }
+    free_space::check(&app)?;
     let (dir, rate) = (&app.config.upload_dir, app.config.limits.min_upload_rate);
     let file = bundle_stream::receive_file(body, dir, max_file_bytes(&name), rate).await?;
     // A body takes time to arrive. So the lease, and whether files may still change, are checked when it is complete. From

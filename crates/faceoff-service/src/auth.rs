@@ -193,7 +193,7 @@ enum Credential<'a> {
     Cookie(&'a str),
 }
 
-fn credential<'a>(parts: &'a Parts) -> Result<Option<Credential<'a>>, Problem> {
+fn credential<'a>(parts: &'a Parts, app: &App) -> Result<Option<Credential<'a>>, Problem> {
     if let Some(value) = parts.headers.get(header::AUTHORIZATION) {
         return match value.to_str().ok().and_then(|value| value.split_once(' ')) {
             Some((scheme, token))
@@ -207,7 +207,7 @@ fn credential<'a>(parts: &'a Parts) -> Result<Option<Credential<'a>>, Problem> {
             )),
         };
     }
-    let Some(cookie) = session::session_cookie(&parts.headers) else {
+    let Some(cookie) = session::session_cookie(&app.config, &parts.headers) else {
         return Ok(None);
     };
     // Browsers also attach cookies to requests that a page of another site triggers.
@@ -219,7 +219,7 @@ fn credential<'a>(parts: &'a Parts) -> Result<Option<Credential<'a>>, Problem> {
 
 #[boxed]
 async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
-    let (token, kind) = match credential(parts)? {
+    let (token, kind) = match credential(parts, app)? {
         None => return Ok(None),
         Some(Credential::Bearer(token)) => (token, TokenKind::ApiToken),
         Some(Credential::Cookie(token)) => (token, TokenKind::Session),

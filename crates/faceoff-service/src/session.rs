@@ -7,12 +7,23 @@ use crate::{
 use axum::http::{HeaderMap, HeaderValue, header};
 use faceoff_store::SESSION_LIFETIME;
 
-/// Name of the session cookie.
+/// Name of the session cookie of a server without TLS.
 const COOKIE_NAME: &str = "faceoff_session";
+/// Name of the session cookie over TLS. Browsers accept a name with this prefix only from this host itself, over TLS and for all
+/// paths. So no other host of the domain, and no one on the way, can put a session of their own in its place.
+const TLS_COOKIE_NAME: &str = "__Host-faceoff_session";
 
 /// The session's secret from the request's cookies.
-pub fn session_cookie(headers: &HeaderMap) -> Option<&str> {
-    cookie_value(headers, COOKIE_NAME)
+pub fn session_cookie<'a>(config: &HttpConfig, headers: &'a HeaderMap) -> Option<&'a str> {
+    cookie_value(headers, cookie_name(config))
+}
+
+fn cookie_name(config: &HttpConfig) -> &'static str {
+    if uses_tls(config) {
+        TLS_COOKIE_NAME
+    } else {
+        COOKIE_NAME
+    }
 }
 
 /// Value of the cookie with this name; `None` if it is missing or empty.
@@ -31,24 +42,26 @@ pub fn cookie_value<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
 /// # Errors
 /// `Internal`: the value is not valid in a header.
 pub fn set_cookie(config: &HttpConfig, session: Option<&str>) -> Result<HeaderValue, Problem> {
-    let secure = secure_attribute(config);
+    let (name, secure) = (cookie_name(config), secure_attribute(config));
     let (value, max_age_s) = match session {
         Some(session) => (session, SESSION_LIFETIME.as_secs()),
         None => ("", 0),
     };
     HeaderValue::try_from(format!(
-        "{COOKIE_NAME}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={max_age_s}{secure}"
+        "{name}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={max_age_s}{secure}"
     ))
     .map_err(Problem::internal)
 }
 
 /// The cookie attribute that restricts a cookie to TLS, if the server is reached over TLS.
 pub fn secure_attribute(config: &HttpConfig) -> &'static str {
-    let uses_tls = config
-        .public_url
-        .as_deref()
-        .is_some_and(|url| url.starts_with("https://"));
-    if uses_tls { "; Secure" } else { "" }
+    if uses_tls(config) { "; Secure" } else { "" }
+}
+
+/// Whether browsers reach the server over TLS.
+fn uses_tls(config: &HttpConfig) -> bool {
+    let public_url = config.public_url.as_deref();
+    public_url.is_some_and(|url| url.starts_with("https://"))
 }
 
 /// Refuses a request that a page of another site triggered. Browsers name the requesting site in a header. A request without
@@ -87,16 +100,14 @@ mod tests {
     #[test]
     fn session_is_found_among_other_cookies() {
         let cookies = headers(&[("cookie", "a=b; faceoff_session=x; c=d")]);
-        assert_eq!(session_cookie(&cookies), Some("x"));
-        assert_eq!(
-            session_cookie(&headers(&[("cookie", "faceoff_session=")])),
-            None
-        );
-        assert_eq!(
-            session_cookie(&headers(&[("cookie", "other_faceoff_session=x")])),
-            None
-        );
-        assert_eq!(session_cookie(&HeaderMap::new()), None);
+        assert_eq!(cookie_value(&cookies, COOKIE_NAME), Some("x"));
+        for without_session in [
+            headers(&[("cookie", "faceoff_session=")]),
+            headers(&[("cookie", "other_faceoff_session=x")]),
+            HeaderMap::new(),
+        ] {
+            assert_eq!(cookie_value(&without_session, COOKIE_NAME), None);
+        }
     }
 
     #[test]

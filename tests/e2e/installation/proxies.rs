@@ -1,17 +1,21 @@
 //! The example configurations of TLS proxies in `docker/proxy`, each in front of a real server. Tests change only the site's
 //! name, addresses and certificate.
 
-use crate::{CONFIG, Team};
+use crate::{CONFIG, Team, refused_uploads};
 use faceoff_tests::{
     bundle, repository,
     server::{Server, TIMEOUT},
 };
 use reqwest::{blocking::Client, redirect::Policy};
+use rustix::{
+    net::{AddressFamily, SocketType, bind, connect, socket},
+    process::{Resource, Rlimit, getrlimit, setrlimit},
+};
 use rustls::{ClientConfig, RootCertStore};
 use std::{
     fs,
-    io::Read as _,
-    net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream},
+    io::{ErrorKind, Read as _, Write as _},
+    net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, TcpListener, TcpStream},
     path::Path,
     process::{Child, Command, Stdio},
     thread,
@@ -39,6 +43,12 @@ fn free_port() -> u16 {
     let address = listener.local_addr().expect("it has an address");
     address.port()
 }
+
+/// The module of nginx that the configuration needs, as Debian installs it.
+const NGINX_STREAM_MODULE: &str = "/usr/lib/nginx/modules/ngx_stream_module.so";
+/// Connections with half a request, on two ports together. With nginx's defaults, 1529 of them from one address shut everyone
+/// else out.
+const HALF_REQUESTS: usize = 1600;
 
 // Files of a proxy's scratch folder. Configurations name them relative to that folder, since its path may have spaces.
 const CERTIFICATE: &str = "certificate.pem";
@@ -75,31 +85,45 @@ fn replace_all(text: &str, replacements: &[(&str, String)]) -> String {
 
 impl Proxy {
     fn nginx(server: &Server, scratch: &Path) -> Self {
+        Self::nginx_with(server, scratch, &[])
+    }
+
+    /// nginx with further replacements in its configuration.
+    fn nginx_with(server: &Server, scratch: &Path, replacements: &[(&str, String)]) -> Self {
         let certificate = make_certificate(scratch);
         let (http_port, https_port) = (free_port(), free_port());
-        let site = replace_all(
-            &example("nginx.conf"),
-            &[
-                ("listen 80;", format!("listen 127.0.0.1:{http_port};")),
-                ("listen 443 ", format!("listen 127.0.0.1:{https_port} ")),
-                ("faceoff.example.org", "localhost".to_owned()),
-                ("/var/log/nginx/", String::new()),
-                ("127.0.0.1:8080", server.address().to_string()),
-                ("/etc/ssl/faceoff/fullchain.pem", CERTIFICATE.to_owned()),
-                ("/etc/ssl/faceoff/privkey.pem", KEY.to_owned()),
-            ],
-        );
-        fs::write(scratch.join("site.conf"), site).expect("a scratch file can be written");
-        // The main configuration, which a distribution provides and which includes the site's.
-        let main_config = "daemon off; master_process off; pid pid; error_log stderr;\n\
-                     events {}\n\
-                     http {\n\
-                     access_log off; client_body_temp_path body; proxy_temp_path proxy;\n\
-                     fastcgi_temp_path fastcgi; uwsgi_temp_path uwsgi; scgi_temp_path scgi;\n\
-                     include site.conf;\n\
-                     }\n";
+        let own_replacements = [
+            // One process, which ends with the test.
+            (
+                "user www-data;",
+                "daemon off; master_process off;".to_owned(),
+            ),
+            ("/run/nginx.pid", "pid".to_owned()),
+            // The line loads Debian's modules by paths that are relative to the folder of nginx.
+            (
+                "include /etc/nginx/modules-enabled/*.conf;",
+                format!("load_module {NGINX_STREAM_MODULE};"),
+            ),
+            (
+                "\nhttp {",
+                "\nhttp {\nclient_body_temp_path body; proxy_temp_path proxy; fastcgi_temp_path fastcgi; \
+                 uwsgi_temp_path uwsgi; scgi_temp_path scgi;\n"
+                    .to_owned(),
+            ),
+            ("listen 80;", format!("listen 127.0.0.1:{http_port};")),
+            ("listen 443;", format!("listen 127.0.0.1:{https_port};")),
+            ("127.0.0.1:8079", format!("127.0.0.1:{}", free_port())),
+            ("127.0.0.1:8442", format!("127.0.0.1:{}", free_port())),
+            ("faceoff.example.org", "localhost".to_owned()),
+            ("/var/log/nginx/", String::new()),
+            ("127.0.0.1:8080", server.address().to_string()),
+            ("/etc/ssl/faceoff/fullchain.pem", CERTIFICATE.to_owned()),
+            ("/etc/ssl/faceoff/privkey.pem", KEY.to_owned()),
+        ];
+        let config = replace_all(&example("nginx.conf"), &own_replacements);
+        let config = replace_all(&config, replacements);
         let config_file = scratch.join("nginx.conf");
-        fs::write(&config_file, main_config).expect("a scratch file can be written");
+        fs::write(&config_file, config).expect("a scratch file can be written");
         let mut nginx = Command::new("nginx");
         // Debian installs nginx in /usr/sbin, which is not in the PATH of ordinary users.
         let path = std::env::var("PATH").unwrap_or_default();
@@ -119,11 +143,18 @@ impl Proxy {
                     // Without the line `tls`, Caddy requests a certificate from an authority.
                     format!("\nlocalhost {{\n\tbind 127.0.0.1\n\ttls {CERTIFICATE} {KEY}\n"),
                 ),
+                (
+                    "\nhttp://faceoff.example.org {",
+                    "\nhttp://localhost {\n\tbind 127.0.0.1\n".to_owned(),
+                ),
+                (
+                    "\n{\n",
+                    format!(
+                        "\n{{\n\tadmin off\n\thttp_port {http_port}\n\thttps_port {https_port}\n"
+                    ),
+                ),
                 ("127.0.0.1:8080", server.address().to_string()),
             ],
-        );
-        let site = format!(
-            "{{\n\tadmin off\n\thttp_port {http_port}\n\thttps_port {https_port}\n}}\n{site}"
         );
         let config_file = scratch.join("Caddyfile");
         fs::write(&config_file, site).expect("a scratch file can be written");
@@ -189,6 +220,22 @@ impl Proxy {
             .timeout(TIMEOUT)
             .build()
             .expect("an HTTP client can be made")
+    }
+
+    /// Sends a request without TLS to this port, and returns the response.
+    fn send_unencrypted(port: u16, path: &str) -> String {
+        let mut stream =
+            TcpStream::connect((Ipv4Addr::LOCALHOST, port)).expect("the proxy listens");
+        let request =
+            format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+        stream
+            .write_all(request.as_bytes())
+            .expect("the proxy reads it");
+        let mut answer = String::new();
+        stream
+            .read_to_string(&mut answer)
+            .expect("the proxy answers and closes the connection");
+        answer
     }
 
     fn url(&self, path: &str) -> String {
@@ -280,6 +327,16 @@ fn check_proxy(start_proxy: impl Fn(&Server, &Path) -> Proxy) {
         .expect("the proxy answers");
     assert_eq!(downloaded.bytes().expect("a file"), archive);
 
+    // A client that sends a large upload before it reads gets the refusal.
+    let upload = refused_uploads::large_file(scratch.path());
+    let refusal = refused_uploads::upload_by_python(
+        &proxy.url("/api/v1/submissions"),
+        ("fo_unknown", "application/octet-stream"),
+        &upload,
+        &[("SSL_CERT_FILE", scratch.path().join(CERTIFICATE))],
+    );
+    assert!(refusal.starts_with("401 "), "{refusal}");
+
     // The rate limit applies to the visitor's real address, whatever address the visitor claims in
     // X-Forwarded-For, and not to other visitors.
     let request_status = |visitor: &Client, claimed_address: u32| {
@@ -295,6 +352,157 @@ fn check_proxy(start_proxy: impl Fn(&Server, &Path) -> Proxy) {
         .find(|status| *status != 200);
     assert_eq!(refused, Some(429));
     assert_eq!(request_status(&proxy.visitor(3), 0), 200);
+}
+
+/// A connection from 127.0.0.2 that sends the beginning of a request or of a TLS handshake, and then nothing.
+fn send_half_request(port: u16, first_bytes: &[u8]) -> TcpStream {
+    let client = SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 2), 0);
+    let stream = socket(AddressFamily::INET, SocketType::STREAM, None).expect("a socket");
+    bind(&stream, &client).expect("each address 127.x.x.x is this host");
+    let proxy = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port);
+    connect(&stream, &proxy).expect("the system accepts the connection");
+    let mut stream = TcpStream::from(stream);
+    // The proxy may have closed the connection already.
+    let _ = stream.write_all(first_bytes);
+    stream
+}
+
+/// Whether the proxy has closed the connection.
+fn is_closed(mut stream: &TcpStream) -> bool {
+    stream
+        .set_nonblocking(true)
+        .expect("a socket can be made non-blocking");
+    match stream.read(&mut [0; 1000]) {
+        Ok(read) => read == 0,
+        Err(error) => error.kind() != ErrorKind::WouldBlock,
+    }
+}
+
+/// Checks that half requests of one address do not shut out another one, and returns their connections.
+fn check_half_requests(proxy: &Proxy) -> Vec<TcpStream> {
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit {
+        current: limit.maximum,
+        ..limit
+    };
+    setrlimit(Resource::Nofile, raised).expect("a process may raise its limit");
+    let half_requests: Vec<_> = (0..HALF_REQUESTS / 2)
+        .flat_map(|_| {
+            [
+                send_half_request(proxy.http_port, b"GET /season HTT"),
+                send_half_request(proxy.https_port, &[0x16, 3, 1]),
+            ]
+        })
+        .collect();
+    let visitor = proxy.visitor(3);
+    let season = visitor.get(proxy.url("/api/v1/season")).send();
+    assert_eq!(season.expect("the proxy answers").status(), 200);
+    let redirect = Proxy::send_unencrypted(proxy.http_port, "/season");
+    assert!(redirect.starts_with("HTTP/1.1 30"), "{redirect}");
+    half_requests
+}
+
+/// Waits until the proxy has closed all but `expected` of these connections.
+fn wait_until_closed(mut connections: Vec<TcpStream>, expected: usize) {
+    let started = Instant::now();
+    loop {
+        connections.retain(|connection| !is_closed(connection));
+        if connections.len() <= expected {
+            break;
+        }
+        assert!(
+            started.elapsed() < TIMEOUT,
+            "{} are open",
+            connections.len()
+        );
+        // The proxy does not say when it closes a connection.
+        thread::sleep(Duration::from_millis(100));
+    }
+    assert_eq!(connections.len(), expected);
+}
+
+/// Checks a proxy with its own time limits.
+fn check_half_requests_end(start_proxy: impl Fn(&Server, &Path) -> Proxy) {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let proxy = start_proxy(&server, scratch.path());
+    let half_requests = check_half_requests(&proxy);
+    wait_until_closed(half_requests, 0);
+}
+
+#[test]
+fn half_requests_to_nginx_end_in_time() {
+    check_half_requests_end(Proxy::nginx);
+}
+
+#[test]
+fn half_requests_to_caddy_end_in_time() {
+    check_half_requests_end(Proxy::caddy);
+}
+
+#[test]
+fn nginx_limits_half_requests_of_an_address() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    // Only the number is limited.
+    let no_timeout = [(
+        "client_header_timeout 10s",
+        "client_header_timeout 1d".to_owned(),
+    )];
+    let proxy = Proxy::nginx_with(&server, scratch.path(), &no_timeout);
+    let half_requests = check_half_requests(&proxy);
+    wait_until_closed(half_requests, 128);
+}
+
+/// Checks that no file of a proxy has a secret part of an address. Returns the text of the files.
+fn check_logs(start_proxy: impl Fn(&Server, &Path) -> Proxy) -> String {
+    const SECRET: &str = "fo_secret";
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let data = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(data.path(), CONFIG);
+    let proxy = start_proxy(&server, scratch.path());
+    let visitor = proxy.visitor(2);
+    let request_all = || {
+        for path in ["/join/", "//join/", "/api/v1/season?signature="] {
+            let path = format!("{path}{SECRET}");
+            let answer = visitor.get(proxy.url(&path)).send();
+            answer.expect("the proxy answers");
+            for port in [proxy.http_port, proxy.https_port] {
+                let answer = Proxy::send_unencrypted(port, &path);
+                assert!(answer.starts_with("HTTP/1."), "{answer}");
+            }
+        }
+    };
+    request_all();
+    // Now the proxy has no server.
+    server.kill();
+    request_all();
+    let answer = visitor.get(proxy.url("/season")).send();
+    assert_eq!(answer.expect("the proxy answers").status(), 502);
+    drop(proxy);
+    let mut text = String::new();
+    for entry in fs::read_dir(scratch.path()).expect("a folder can be read") {
+        let path = entry.expect("a folder can be read").path();
+        if path.is_file() {
+            text += &fs::read_to_string(path).expect("a file is text");
+        }
+    }
+    assert!(!text.contains(SECRET), "{text}");
+    text
+}
+
+#[test]
+fn logs_of_nginx_have_no_secrets() {
+    let logs = check_logs(Proxy::nginx);
+    assert!(logs.contains("\"GET /join/\" "), "{logs}");
+    assert!(logs.contains("\"GET /api/v1/season\" 200 "), "{logs}");
+    assert!(logs.contains("\"GET /season\" 502 "), "{logs}");
+}
+
+#[test]
+fn logs_of_caddy_have_no_secrets() {
+    let logs = check_logs(Proxy::caddy);
+    assert!(logs.contains("connection refused"), "{logs}");
 }
 
 #[test]

@@ -62,6 +62,7 @@ mod team_dashboard;
 mod team_page;
 mod teams;
 mod tournament;
+mod unread_bodies;
 mod upload_quotas;
 mod users;
 mod webhook_receiver;

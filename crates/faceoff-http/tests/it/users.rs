@@ -355,6 +355,43 @@ async fn session_works_from_pages_of_the_server_only() {
 }
 
 #[tokio::test]
+async fn session_cookie_is_bound_to_its_host_over_tls() {
+    let site = Site::start().await;
+    let alpha = site.team("Alpha").await;
+    member(&site, &alpha.id, "Ada").await;
+    let site = site.with_public_url("https://faceoff.example.org").await;
+    let body = json!({ "name": "Ada", "password": PASSWORD });
+    let signed_in = send(&site, Method::POST, "/sessions", None, &body).await;
+    let cookie = signed_in.header("set-cookie").to_owned();
+    let (pair, attributes) = cookie.split_once(';').unwrap();
+    let secret = pair.strip_prefix("__Host-faceoff_session=").unwrap();
+    // Browsers require these attributes for the prefix.
+    let assert_attributes = |attributes: &str| {
+        assert!(attributes.contains("; Secure"), "{attributes}");
+        assert!(attributes.contains(" Path=/;"), "{attributes}");
+        assert!(!attributes.contains("Domain"), "{attributes}");
+    };
+    assert_attributes(attributes);
+    let send_cookie = async |method: Method, path: &str, name: &str| {
+        let request = site
+            .request(method, &format!("/api/v1{path}"), None)
+            .header("cookie", format!("{name}={secret}"))
+            .header("origin", &site.url);
+        Answer::read(request.send().await.unwrap()).await
+    };
+    let (name, plain_name) = ("__Host-faceoff_session", "faceoff_session");
+    let whoami = send_cookie(Method::GET, "/whoami", name).await.json(200);
+    assert_eq!(whoami["role"], "member");
+    let refused = send_cookie(Method::GET, "/whoami", plain_name).await;
+    refused.problem(401, "unauthenticated", &[]);
+    let ended = send_cookie(Method::DELETE, "/sessions/current", name).await;
+    let removed = ended.header("set-cookie");
+    assert!(removed.starts_with("__Host-faceoff_session=;"), "{removed}");
+    assert!(removed.contains("Max-Age=0"), "{removed}");
+    assert_attributes(removed);
+}
+
+#[tokio::test]
 async fn session_expires_and_ends_with_a_new_password() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;

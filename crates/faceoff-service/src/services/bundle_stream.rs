@@ -14,10 +14,6 @@ use std::path::Path;
 use tempfile::NamedTempFile;
 use tokio::{io::AsyncWriteExt, time::Instant};
 
-/// After a refusal the server reads and discards up to this number of bytes. A client that is still sending then gets the
-/// response instead of a broken connection.
-const DRAIN_BYTES: u64 = 64 * 1024 * 1024;
-
 /// Number of first bytes that the message about an unknown format quotes. A format is recognised by its first bytes, and all but
 /// a plain tar by the first four.
 const QUOTED_BYTES: usize = 4;
@@ -64,7 +60,6 @@ pub(crate) async fn receive(
     let max_bytes = limit.max_bytes;
     let mut body = RateGuardedBody::new(body, rate);
     if let Some(bytes) = announced_bytes.filter(|bytes| *bytes > max_bytes) {
-        body.drain(bytes).await;
         return Err((limit.make_problem)(Some(bytes)));
     }
 
@@ -77,7 +72,6 @@ pub(crate) async fn receive(
     while let Some(chunk) = body.next_chunk().await? {
         bytes += chunk.len() as u64;
         if bytes > max_bytes {
-            body.drain(DRAIN_BYTES).await;
             return Err((limit.make_problem)(None));
         }
         if format.is_none() {
@@ -85,15 +79,12 @@ pub(crate) async fn receive(
             first_bytes.extend_from_slice(&chunk[..missing_bytes.min(chunk.len())]);
             format = ArchiveFormat::detect(&first_bytes);
             if format.is_none() && first_bytes.len() == ArchiveFormat::LONGEST_MAGIC {
-                body.drain(announced_bytes.unwrap_or(DRAIN_BYTES)).await;
                 return Err(not_an_archive(&first_bytes));
             }
         }
         hasher.update(&chunk);
-        if let Err(error) = writer.write_all(&chunk).await {
-            body.drain(announced_bytes.unwrap_or(DRAIN_BYTES)).await;
-            return Err(free_space::write_problem(error));
-        }
+        let written = writer.write_all(&chunk).await;
+        written.map_err(free_space::write_problem)?;
     }
     if bytes == 0 {
         return Err(Problem::new(
@@ -131,13 +122,10 @@ pub async fn receive_file(
     while let Some(chunk) = body.next_chunk().await? {
         bytes += chunk.len() as u64;
         if bytes > max_bytes {
-            body.drain(DRAIN_BYTES).await;
             return Err(too_large(max_bytes, None));
         }
-        if let Err(error) = writer.write_all(&chunk).await {
-            body.drain(DRAIN_BYTES).await;
-            return Err(free_space::write_problem(error));
-        }
+        let written = writer.write_all(&chunk).await;
+        written.map_err(free_space::write_problem)?;
     }
     writer.flush().await.map_err(free_space::write_problem)?;
     Ok(file)
@@ -150,10 +138,17 @@ fn create_temp_file(dir: &Path) -> Result<NamedTempFile, Problem> {
         .map_err(free_space::write_problem)
 }
 
-/// Reads and discards the body of a refused request.
+/// Reads and discards a body until its end, until `max_bytes` are discarded, or until it is slower than `rate`.
 #[boxed]
-pub async fn discard(body: Body, rate: MinTransferRate) {
-    RateGuardedBody::new(body, rate).drain(DRAIN_BYTES).await;
+pub async fn discard(body: Body, rate: MinTransferRate, max_bytes: u64) {
+    let mut body = RateGuardedBody::new(body, rate);
+    let mut left = max_bytes;
+    while left > 0 {
+        match body.next_chunk().await {
+            Ok(Some(chunk)) => left = left.saturating_sub(chunk.len() as u64),
+            Ok(None) | Err(_) => return,
+        }
+    }
 }
 
 impl RateGuardedBody {
@@ -180,17 +175,6 @@ impl RateGuardedBody {
                 format!("the upload was interrupted ({error}); nothing was stored; send it again"),
             )),
             Err(_) => Err(too_slow(self.rate)),
-        }
-    }
-
-    /// Reads and discards up to `max_bytes` bytes that the client still sends, but at most [`DRAIN_BYTES`].
-    async fn drain(&mut self, max_bytes: u64) {
-        let mut left = max_bytes.min(DRAIN_BYTES);
-        while left > 0 {
-            match self.next_chunk().await {
-                Ok(Some(chunk)) => left = left.saturating_sub(chunk.len() as u64),
-                Ok(None) | Err(_) => return,
-            }
         }
     }
 }

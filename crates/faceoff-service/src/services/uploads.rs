@@ -34,10 +34,7 @@ pub async fn upload(
     incoming: IncomingBundle,
 ) -> Result<Submission, Problem> {
     let (team, actor) = (caller.team.clone(), caller.actor());
-    if let Err(problem) = free_space::check(app) {
-        bundle_stream::discard(incoming.body, app.config.limits.min_upload_rate).await;
-        return Err(problem);
-    }
+    free_space::check(app)?;
     let slot = app.upload_slots.acquire(team.id).ok_or_else(|| {
         let limit = app.config.limits.team_uploads;
         Problem::new(
