@@ -9,6 +9,7 @@ mod axe;
 mod backup;
 mod busy_host;
 mod cheating_agents;
+mod clock;
 mod command_line;
 mod commands;
 mod connection_limits;

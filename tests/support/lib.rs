@@ -4,6 +4,7 @@
 pub mod browser;
 pub mod bucket;
 pub mod bundle;
+pub mod faketime;
 pub mod nats;
 pub mod packages;
 pub mod relay;

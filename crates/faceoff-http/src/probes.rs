@@ -75,6 +75,11 @@ async fn gauges(app: &AppState) -> Result<GaugeValues, Problem> {
                 completed_at.duration_since(now).as_secs_f64()
             }),
         },
+        clock_step_s: app
+            .config
+            .clock
+            .step()
+            .map_or(0.0, |step| step.by.as_secs_f64()),
         open_evaluations: gauges.open_evaluations,
         slots: app.config.capacity.slots,
         remote_slots: app.live.workers.available_slots(now),

@@ -144,7 +144,8 @@ impl WorkerStatus {
     /// Has the worker contacted the server within [`WORKER_TIMEOUT`]?
     #[must_use]
     pub fn is_online(&self, now: Timestamp) -> bool {
-        now.duration_since(self.last_seen_at) < WORKER_TIMEOUT
+        // The absolute value, since the clock may have been set back.
+        now.duration_since(self.last_seen_at).abs() < WORKER_TIMEOUT
     }
 }
 

@@ -15,6 +15,8 @@ pub struct GaugeValues {
     /// Result of the latest write test.
     pub database_writable: bool,
     pub queue: Queue,
+    /// How far the system clock was set and is ahead, seconds; negative: behind; 0 if it was not set.
+    pub clock_step_s: f64,
     /// Evaluations that are queued or running.
     pub open_evaluations: u32,
     /// Slots of this process.
@@ -85,7 +87,7 @@ enum Reading {
 }
 
 /// All gauges. Their names, and the names and values of labels, are part of the published metrics.
-const GAUGES: [Gauge; 15] = [
+const GAUGES: [Gauge; 16] = [
     Gauge {
         name: "database_writable",
         help: "1 if the latest write test of the database succeeded",
@@ -115,6 +117,12 @@ const GAUGES: [Gauge; 15] = [
         help: "Expected time until everything that counts is done with the current slots; NaN if it was never measured, or the queue is paused",
         unit: Some(Unit::Seconds),
         read: |values| Seconds(values.queue.expected_s),
+    },
+    Gauge {
+        name: "clock_step",
+        help: "How far the system clock was set and is ahead (negative: behind); 0 if it was not set",
+        unit: Some(Unit::Seconds),
+        read: |values| Seconds(values.clock_step_s),
     },
     Gauge {
         name: "evaluations_open",

@@ -129,6 +129,7 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ),
     ("paused", "The queue is paused: no new jobs start."),
     ("resumed", "The queue has resumed."),
+    ("clock-accepted", "The server uses the system clock again."),
     (
         "worker-banned",
         "The worker is banned: its results are rejected.",

@@ -5,9 +5,9 @@ use faceoff_api::views::health::{HealthView, LiveView};
 use faceoff_service::{app::App, problem::Problem, views::health};
 
 /// Readiness: checks that the database is writable (by a test write, at most once a second), the queue makes progress,
-/// and the disks have free space.
+/// the disks have free space, and the system clock was not set.
 ///
-/// Otherwise the response is a problem whose `database`, `queue` and `free_space` say what is wrong.
+/// Otherwise the response is a problem whose `database`, `queue`, `free_space` and `clock` say what is wrong.
 #[utoipa::path(
     get, path = "/health", tag = "public",
     responses(

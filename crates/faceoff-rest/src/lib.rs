@@ -11,6 +11,7 @@ mod bundles;
 mod capacity;
 mod clip_response;
 mod clips;
+mod clock;
 mod comparisons;
 mod datasets;
 mod deprecated_routes;
@@ -195,6 +196,7 @@ fn stage_routes() -> OpenApiRouter<App> {
         .routes(routes!(rulings::disqualify_team))
         .routes(routes!(rulings::pause_queue))
         .routes(routes!(rulings::resume_queue))
+        .routes(routes!(clock::accept_clock))
         .routes(routes!(rulings::reinstate_team))
 }
 

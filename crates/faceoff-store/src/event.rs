@@ -498,6 +498,11 @@ pub enum Event {
         reason: String,
     },
     QueueResumed,
+    /// The server's time follows the system clock, which was set.
+    ClockStepAccepted {
+        /// How far it was ahead or behind.
+        size: String,
+    },
     /// Results of a remote worker are rejected from now on.
     WorkerBanned {
         worker: String,

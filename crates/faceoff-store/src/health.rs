@@ -114,9 +114,11 @@ impl Store {
                 ruling,
             });
         }
+        // The absolute value, since the clock may have been set back after the poll.
         let since_poll_ms = now
             .as_millisecond()
-            .saturating_sub(self.probes.last_poll_ms.load(Ordering::Relaxed));
+            .saturating_sub(self.probes.last_poll_ms.load(Ordering::Relaxed))
+            .saturating_abs();
         let is_overdue = |since: Timestamp| now.duration_since(since) > STUCK_AFTER;
         Ok(match waiting_since {
             Some(since)

@@ -64,7 +64,7 @@ pub use action_space::{ActionLayout, ActionSpace};
 pub use agent_task::{AgentTask, Side};
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
-pub use clock::Clock;
+pub use clock::{Clock, ClockStart, ClockStep, StepCause};
 pub use competition::{Competition, EndInfo, ProfileInfo, RulesetInfo, TaskInfo, ViolationInfo};
 pub use computation_time::ComputationTime;
 pub use day_deadline::{DayDeadline, MAX_DEADLINE_H, ParseDayDeadlineError};

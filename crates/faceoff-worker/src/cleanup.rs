@@ -3,7 +3,7 @@
 use crate::{ablation_clips, boxed, episode_summaries};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Store, StoreError};
-use faceoff_types::Competition;
+use faceoff_types::{Clock, Competition};
 use jiff::{SignedDuration, Timestamp};
 use std::sync::Arc;
 
@@ -13,7 +13,8 @@ const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 /// Removes obsolete recordings, the data of old runs and half-written files, and keeps the database's write-ahead log short.
 /// Failures are logged, and retried by the next call.
 #[boxed]
-pub async fn clean_up(store: &Store, competition: &Arc<Competition>, now: Timestamp) {
+pub async fn clean_up(store: &Store, competition: &Arc<Competition>, clock: &Clock) {
+    let now = clock.now();
     if let Err(error) = store.remove_old_recordings(now).await {
         tracing::warn!(%error, "old recordings could not be removed");
     }
@@ -40,12 +41,14 @@ pub async fn clean_up(store: &Store, competition: &Arc<Competition>, now: Timest
     if let Err(error) = store.checkpoint().await {
         tracing::warn!(%error, "the database's write-ahead log could not be copied into the database");
     }
-    let abandoned = store.artifacts().remove_abandoned(now - LONGEST_WRITE);
+    // Files have the time of the system clock, which may have been set.
+    let written_before = clock.earliest() - LONGEST_WRITE;
+    let abandoned = store.artifacts().remove_abandoned(written_before);
     if let Err(error) = abandoned.await {
         tracing::warn!(%error, "half-written artifacts could not be removed");
     }
     remove_invalid_bundles(store, now).await;
-    match store.remove_orphaned_bundles(now - LONGEST_WRITE).await {
+    match store.remove_orphaned_bundles(written_before).await {
         Ok(0) => {}
         Ok(bundles) => tracing::info!(bundles, "bundles without a submission were removed"),
         Err(error) => tracing::warn!(%error, "bundles without a submission could not be removed"),

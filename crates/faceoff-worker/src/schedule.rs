@@ -4,15 +4,14 @@
 use crate::boxed;
 use anyhow::Context as _;
 use faceoff_store::{Actor, Evaluation, RunPlan, Stage, Store};
-use faceoff_types::Clock;
-use faceoff_types::{Competition, Profile};
+use faceoff_types::{Clock, Competition, Profile, StepCause};
 use jiff::Timestamp;
 use std::sync::Arc;
 use std::{num::NonZeroU32, time::Duration};
 use tokio_util::sync::CancellationToken;
 
-/// The longest sleep. A stage may be changed, the clock set or the machine suspended meanwhile, and a day must start in
-/// the second that pages show.
+/// The longest sleep. A stage may be changed, a step of the clock accepted or the machine suspended meanwhile, and a day
+/// must start in the second that pages show.
 const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
 /// Ends days whose deadline has passed and starts scheduled days at their cutoffs, each once, until `shutdown` is
@@ -28,7 +27,7 @@ pub async fn run_schedule(
     let mut failed = false;
     loop {
         let now = clock.now();
-        let next_start = match start_due(&store, &competition, now).await {
+        let next_start = match start_unless_behind(&store, &competition, &clock, now).await {
             Ok(next_start) => {
                 failed = false;
                 next_start
@@ -52,6 +51,20 @@ pub async fn run_schedule(
             () = shutdown.cancelled() => return Ok(()),
             () = tokio::time::sleep(wait.min(LONGEST_SLEEP)) => {}
         }
+    }
+}
+
+/// As [`start_due`], but nothing is due as long as the clock is before the newest change of the database: no clock says then what
+/// time it is.
+pub(crate) async fn start_unless_behind(
+    store: &Store,
+    competition: &Competition,
+    clock: &Clock,
+    now: Timestamp,
+) -> anyhow::Result<Option<Timestamp>> {
+    match clock.step() {
+        Some(step) if step.cause == StepCause::NewestChange => Ok(None),
+        _ => start_due(store, competition, now).await,
     }
 }
 
@@ -107,11 +120,8 @@ async fn next_cutoff(
     stage: &Stage,
     now: Timestamp,
 ) -> anyhow::Result<Option<Timestamp>> {
-    let newest = store
-        .newest_day(stage.id)
-        .await
-        .context("reading the days")?;
-    let next = stage.next_cutoff(newest.map(|day| day.stage_day.date), now);
+    let next = store.next_cutoff(stage, now).await;
+    let next = next.context("reading the days")?;
     Ok(next.and_then(|(_, at)| at))
 }
 

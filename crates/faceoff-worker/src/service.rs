@@ -312,7 +312,7 @@ async fn report_stalled_slots(metrics: Metrics, stop: CancellationToken) {
 /// Removes obsolete data periodically.
 async fn run_cleanup(server: LocalServer, interval: Duration, shutdown: CancellationToken) {
     loop {
-        cleanup::clean_up(&server.store, server.competition(), server.clock.now()).await;
+        cleanup::clean_up(&server.store, server.competition(), &server.clock).await;
         tokio::select! {
             () = shutdown.cancelled() => return,
             () = tokio::time::sleep(interval) => {}

@@ -8,5 +8,6 @@ mod intercepted_server;
 mod interrupted;
 mod jobs;
 mod runtimes;
+mod schedule;
 mod scripted_game;
 mod slots;

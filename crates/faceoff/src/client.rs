@@ -27,7 +27,7 @@ use anyhow::{Context, anyhow, bail};
 pub use download::DownloadedFile;
 use faceoff_api::{
     API_BASE,
-    requests::{BoardFormat, BoardQuery, CloseSeason, Reason},
+    requests::{BoardFormat, BoardQuery, CloseSeason, Confirmation, Reason},
     views::{
         board::BoardView, event::EventsView, health::HealthView, me::MeView,
         runtimes::RuntimesView, season::SeasonView,
@@ -168,6 +168,14 @@ impl Client {
     pub async fn resume(&self) -> anyhow::Result<()> {
         let request = self.request(Method::POST, "/queue/resume");
         self.send(request).await.map(drop)
+    }
+
+    /// Organiser: accepts the step of the server's system clock; `confirm` is its size.
+    pub async fn accept_clock(&self, confirm: Option<String>) -> anyhow::Result<()> {
+        let request = self.request(Method::POST, "/clock/accept");
+        self.send(request.json(&Confirmation { confirm }))
+            .await
+            .map(drop)
     }
 
     /// Team: its name and limits, today's evaluations and its active submission.

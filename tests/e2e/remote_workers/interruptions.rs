@@ -3,13 +3,13 @@
 
 use super::{RemoteSetup, resume, wait_for_workers, worker_config};
 use faceoff_tests::{
-    program,
+    faketime, program,
     relay::{ConnectionBreaks, Relay},
     small_disk::{FilledDisk, MountedDisk},
     worker::Worker,
 };
 use jiff::Timestamp;
-use std::{fs, path::PathBuf, process::Command, time::Duration};
+use std::{process::Command, time::Duration};
 
 /// Size of the small disk for a worker's temporary files.
 const SCRATCH_DISK_BYTES: u64 = 64 << 20;
@@ -111,16 +111,6 @@ fn worker_with_full_disk_releases_jobs_until_it_has_space() {
     setup.reference_run.assert_no_retries(&setup.server);
 }
 
-/// The library that gives a program a wrong clock when it is preloaded.
-fn faketime_library() -> PathBuf {
-    let folders = fs::read_dir("/usr/lib").expect("/usr/lib can be read");
-    folders
-        .flatten()
-        .map(|folder| folder.path().join("faketime/libfaketime.so.1"))
-        .find(|library| library.exists())
-        .expect("libfaketime is installed; `make setup-test` installs it")
-}
-
 #[test]
 fn workers_with_wrong_clocks_run_jobs_normally() {
     let setup = RemoteSetup::start();
@@ -128,7 +118,7 @@ fn workers_with_wrong_clocks_run_jobs_normally() {
     let workers = [("behind", "-3600"), ("ahead", "+3600")].map(|(name, offset_s)| {
         let mut command = Command::new(program("faceoff"));
         command
-            .env("LD_PRELOAD", faketime_library())
+            .env("LD_PRELOAD", faketime::library())
             .env("FAKETIME", offset_s)
             // Only the wall clock is wrong; the monotonic clock is right.
             .env("FAKETIME_DONT_FAKE_MONOTONIC", "1")

@@ -179,7 +179,7 @@ async fn viewing_an_ablation_stores_nothing_and_reads_the_summary() {
     faceoff_worker::clean_up(
         &site.store,
         faceoff_airhockey::simulator().competition(),
-        site.now(),
+        &site.clock(),
     )
     .await;
     let stored = read_stored().await;

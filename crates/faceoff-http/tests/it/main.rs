@@ -16,6 +16,7 @@ mod browser;
 mod capacity;
 mod capacity_log;
 mod clips;
+mod clock;
 mod comparisons;
 mod confirmations;
 mod counting_evaluations;

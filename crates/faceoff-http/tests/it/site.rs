@@ -66,6 +66,8 @@ pub struct Site {
     config: HttpConfig,
     /// The time of the server's clock.
     now: Arc<Mutex<Timestamp>>,
+    /// By how much the system clock is set, for [`with_steady_clock`](Self::with_steady_clock).
+    system_ahead: Arc<Mutex<SignedDuration>>,
     http: reqwest::Client,
     server: JoinHandle<()>,
     /// Sends the signal for an orderly shutdown.
@@ -237,6 +239,25 @@ impl Site {
         self
     }
 
+    /// Restarts the server with a clock that compares the system clock with a monotonic clock. [`advance`](Self::advance) is
+    /// the time that passes, [`set_system_clock`](Self::set_system_clock) a step.
+    pub async fn with_steady_clock(mut self, start: ClockStart) -> Self {
+        let (system, monotonic) = (Arc::clone(&self.now), Arc::clone(&self.now));
+        let ahead = Arc::clone(&self.system_ahead);
+        self.config.clock = Clock::steady(
+            move || *system.lock().unwrap() + *ahead.lock().unwrap(),
+            move || monotonic.lock().unwrap().as_duration(),
+            start,
+        );
+        self.restart().await;
+        self
+    }
+
+    /// Sets the system clock to be this far ahead of the right time.
+    pub fn set_system_clock(&self, ahead: SignedDuration) {
+        *self.system_ahead.lock().unwrap() = ahead;
+    }
+
     /// Restarts the server with a public URL.
     pub async fn with_public_url(mut self, public_url: &str) -> Self {
         self.config.public_url = Some(public_url.to_owned());
@@ -322,6 +343,7 @@ impl Site {
             folder,
             config,
             now,
+            system_ahead: Arc::default(),
             http: client_builder().build().unwrap(),
             server,
             shutdown: Some(shutdown),

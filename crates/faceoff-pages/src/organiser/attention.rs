@@ -90,6 +90,14 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
             links: vec![("/organiser/storage".into(), "Storage".into())],
         }),
     }
+    if let Some(step) = app.config.clock.step() {
+        items.push(Item {
+            class: "bad",
+            title: format!("The system clock is {}", step.size()),
+            detail: format!("{step}."),
+            links: vec![("/organiser/decide/accept-clock".into(), "Accept it".into())],
+        });
+    }
     for ban in app.store.worker_bans().await? {
         items.push(Item {
             class: "bad",
@@ -279,6 +287,19 @@ async fn stage_items(app: &App, stage: Stage) -> Result<(Vec<Item>, StageSummary
             title: format!("{} has closed; its result is provisional", stage.name),
             detail: "It is provisional until you sign it off.".to_owned(),
             links: vec![(format!("/organiser/stages/{}", stage.id), "Stage".into())],
+        });
+    }
+    if phase == StagePhase::Open
+        && let Some(day) = app.store.future_day(&stage, now).await?
+    {
+        let day = day.stage_day;
+        items.push(Item {
+            class: "bad",
+            title: format!("Evaluation day {} of {} is in the future", day.date, stage.name),
+            detail: "It was started when the clock was ahead. No other day starts until its date has passed, unless you \
+                     void it."
+                .to_owned(),
+            links: vec![(format!("/organiser/decide/void-day/{day}"), "Void it".into())],
         });
     }
     let latest = app

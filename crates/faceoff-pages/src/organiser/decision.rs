@@ -1,5 +1,6 @@
 //! Decisions of organisers: a preview of the effects, and the execution.
 
+mod clock;
 mod day;
 mod evaluation;
 mod preview;
@@ -8,6 +9,7 @@ mod stage;
 mod team;
 mod worker;
 
+use clock::ClockDecision;
 use day::DayDecision;
 use evaluation::EvaluationDecision;
 use faceoff_api::requests;
@@ -29,6 +31,7 @@ pub(super) enum Decision {
     Team(TeamDecision),
     Stage(StageDecision),
     Worker(WorkerDecision),
+    Clock(ClockDecision),
 }
 
 #[derive(Debug)]
@@ -57,6 +60,7 @@ fn find(name: &str, subject: &str) -> Option<Decision> {
         "void-day" => Decision::Day(DayDecision::Void(subject.parse().ok()?)),
         "pause" if subject.is_empty() => Decision::Queue(QueueDecision::Pause),
         "resume" if subject.is_empty() => Decision::Queue(QueueDecision::Resume),
+        "accept-clock" if subject.is_empty() => Decision::Clock(ClockDecision),
         "void" => Decision::Evaluation(EvaluationDecision::Void(subject.parse().ok()?)),
         "cancel" => Decision::Evaluation(EvaluationDecision::Cancel(subject.parse().ok()?)),
         "rerun" => Decision::Evaluation(EvaluationDecision::Rerun(subject.parse().ok()?)),
@@ -89,6 +93,7 @@ impl Decision {
             Self::Team(decision) => decision.preview(app).await,
             Self::Stage(decision) => decision.preview(app).await,
             Self::Worker(decision) => Ok(decision.preview()),
+            Self::Clock(decision) => decision.preview(app),
         }
     }
 
@@ -107,6 +112,7 @@ impl Decision {
             Self::Team(decision) => decision.carry_out(app, organiser, request).await,
             Self::Stage(decision) => decision.carry_out(app, actor, request).await,
             Self::Worker(decision) => decision.carry_out(app, actor, request).await,
+            Self::Clock(decision) => decision.carry_out(app, actor, request).await,
         }
     }
 }

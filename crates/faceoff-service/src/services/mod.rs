@@ -4,6 +4,7 @@
 pub mod accounts;
 pub mod announcements;
 pub mod bundle_stream;
+pub mod clock;
 pub mod decisions;
 pub mod entrants;
 pub mod evaluations;

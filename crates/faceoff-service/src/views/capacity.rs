@@ -196,9 +196,8 @@ pub async fn forecast(
         .iter()
         .map(|day| open_load(day, &backlog, capacity, now))
         .collect();
-    let newest = store.newest_day(id).await?;
     let season_is_open = store.season().await?.closed_at.is_none();
-    let next = stage.next_cutoff(newest.map(|day| day.stage_day.date), now);
+    let next = store.next_cutoff(&stage, now).await?;
     if let Some((day, at)) = next.filter(|_| season_is_open) {
         let mut active = store.active_submissions().await?;
         active.retain(|submission| stage.check_accepts(submission).is_ok());

@@ -43,8 +43,8 @@ pub async fn next_cutoff(app: &AppState, stage: &Stage) -> Result<Option<NextCut
     if app.store.season().await?.closed_at.is_some() {
         return Ok(None);
     }
-    let newest = app.store.newest_day(stage.id).await?;
-    let next = stage.next_cutoff(newest.map(|day| day.stage_day.date), app.config.clock.now());
+    let now = app.config.clock.now();
+    let next = app.store.next_cutoff(stage, now).await?;
     Ok(next.map(|(day, at)| NextCutoff {
         stage: stage.id,
         stage_name: stage.name.clone(),

@@ -1,4 +1,4 @@
-//! Health check: whether the server is ready, that is, whether database, queue and disks work.
+//! Health check: whether the server is ready, that is, whether database, queue, disks and clock work.
 
 use crate::{
     app::AppState,
@@ -9,11 +9,11 @@ use crate::{
 use faceoff_api::views::health::HealthView;
 use faceoff_store::QueueHealth;
 
-/// Checks that the database is writable (by a test write, at most once a second), the queue makes progress, and the
-/// disks have free space.
+/// Checks that the database is writable (by a test write, at most once a second), the queue makes progress, the disks have free
+/// space, and the system clock was not set.
 ///
 /// # Errors
-/// [`ProblemKind::NotReady`]; its `database`, `queue` and `free_space` say what is wrong.
+/// [`ProblemKind::NotReady`]; its `database`, `queue`, `free_space` and `clock` say what is wrong.
 #[boxed]
 pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
     let free_space = app.store.free_space();
@@ -38,6 +38,8 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
     if !health.database_writable {
         problems.push("the database cannot be written".to_owned());
     }
+    let clock_step = app.config.clock.step();
+    problems.extend(clock_step.map(|step| step.to_string()));
     if is_short {
         problems.push(format!(
             "less than {} bytes are free on the disk, so the queue pauses and uploads are refused",
@@ -98,6 +100,14 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
                 (true, _) => "short",
                 (false, true) => "too little for some work",
                 (false, false) => "enough",
+            },
+        )
+        .with(
+            "clock",
+            if clock_step.is_some() {
+                "set"
+            } else {
+                "steady"
             },
         )
         .with("min_free_bytes", free_space.min_free_bytes())

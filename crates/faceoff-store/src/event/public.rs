@@ -57,7 +57,8 @@ impl Event {
             | Self::QueueResumed
             | Self::SeasonNamed { .. }
             | Self::SeasonClosed => true,
-            Self::WorkerBanned { .. }
+            Self::ClockStepAccepted { .. }
+            | Self::WorkerBanned { .. }
             | Self::WorkerReadmitted { .. }
             | Self::TokenReplaced
             | Self::TokenCreated { .. }

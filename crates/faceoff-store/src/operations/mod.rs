@@ -8,6 +8,7 @@ pub(crate) mod cancel;
 pub(crate) mod claim;
 pub(crate) mod cleanup;
 pub(crate) mod clear;
+mod clock;
 pub(crate) mod commit;
 pub(crate) mod completion;
 mod deadlines;

@@ -4,9 +4,13 @@ use crate::{
     boxed,
     error::Result,
     store::Store,
-    tables::days::{self, Day},
+    tables::{
+        days::{self, Day},
+        stages::Stage,
+    },
 };
 use faceoff_types::{StageDay, StageId};
+use jiff::{Timestamp, civil::Date};
 
 impl Store {
     /// All days whose cutoff has passed, the newest first, each with the number of its finished
@@ -32,5 +36,44 @@ impl Store {
     #[boxed]
     pub async fn newest_day(&self, stage: StageId) -> Result<Option<Day>> {
         days::newest(&mut *self.database.read.acquire().await?, stage).await
+    }
+
+    /// The newest day of a stage after the current date, if the schedule waits for its date to pass: it was started when a
+    /// clock was ahead, and has evaluations that are open or count.
+    #[boxed]
+    pub async fn future_day(&self, stage: &Stage, now: Timestamp) -> Result<Option<Day>> {
+        let today = stage.day(now).date;
+        let mut connection = self.database.read.acquire().await?;
+        let newest = days::newest_binding(&mut connection, stage.id, today).await?;
+        Ok(newest.filter(|day| day.stage_day.date > today))
+    }
+
+    /// The date of the stage's next day, if it has one, and its scheduled cutoff, as
+    /// [`Stage::next_cutoff`]. Dates that had a cutoff are left out.
+    #[boxed]
+    pub async fn next_cutoff(
+        &self,
+        stage: &Stage,
+        now: Timestamp,
+    ) -> Result<Option<(Date, Option<Timestamp>)>> {
+        let today = stage.day(now).date;
+        let mut connection = self.database.read.acquire().await?;
+        let newest = days::newest_binding(&mut connection, stage.id, today).await?;
+        let mut newest = newest.map(|day| day.stage_day.date);
+        loop {
+            let next = stage.next_cutoff(newest, now);
+            let Some((date, _)) = next else {
+                return Ok(None);
+            };
+            // A future day of which nothing counts has been started, and its seed is public.
+            let stage_day = StageDay {
+                stage: stage.id,
+                date,
+            };
+            if !days::exists(&mut connection, stage_day).await? {
+                return Ok(next);
+            }
+            newest = Some(date);
+        }
     }
 }

@@ -7,6 +7,7 @@ use crate::{
     store::Store,
     tables::events::{self, EventFilter},
 };
+use jiff::Timestamp;
 
 impl Store {
     /// The events after the one with id `after` (0: from the beginning), the oldest first, at most `limit`.
@@ -19,6 +20,12 @@ impl Store {
     #[boxed]
     pub async fn newest_event(&self) -> Result<i64> {
         events::newest_id(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// When the newest event was recorded; `None` if there is none.
+    #[boxed]
+    pub async fn newest_event_at(&self) -> Result<Option<Timestamp>> {
+        events::newest_at(&mut *self.database.read.acquire().await?).await
     }
 
     /// The id of the newest event that does not only report the progress of a run; 0 if there is none.

@@ -287,7 +287,7 @@ pub(crate) async fn unpark(tx: &mut Tx, job: Uuid) -> Result<()> {
 }
 
 /// When parked jobs can be claimed: in the year 9999, in milliseconds since 1970.
-const PARKED_UNTIL_MS: i64 = 253_402_207_200_000;
+pub(super) const PARKED_UNTIL_MS: i64 = 253_402_207_200_000;
 
 /// An instant some seconds later.
 pub(crate) fn seconds_later(now: Timestamp, seconds: u32) -> Timestamp {

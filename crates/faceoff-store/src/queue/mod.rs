@@ -2,11 +2,13 @@
 //! done. The purpose of a job is in the tables that refer to it. To the queue, its kind and the owner of
 //! its account are opaque labels.
 
+mod due_times;
 pub(crate) mod forecast;
 mod jobs;
 mod lease;
 mod shares;
 
+pub(crate) use due_times::{shift, shorten};
 pub(crate) use jobs::{
     LeasedJob, NewJob, QueueGauges, claim_next, drop_jobs, end_leases, gauges, insert, requeue,
     resume,

@@ -111,6 +111,26 @@ pub(crate) async fn newest(
     Ok(row.map(Day::from))
 }
 
+/// The newest day of a stage that prevents days before it: each day is after all others, so that none is started twice after
+/// a clock was set back. A day after `today` exists only because a clock was ahead; it is ignored if nothing of it counts.
+pub(crate) async fn newest_binding(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+    today: Date,
+) -> Result<Option<Day>> {
+    let row = select_days!(
+        "WHERE stage_id = ?1 AND (day <= ?2 OR EXISTS (
+             SELECT 1 FROM counting_evaluations e WHERE e.stage_id = ?1 AND e.day = days.day
+             AND (e.state = 'open' OR e.state IN ('finished', 'agent_failed') AND e.voided_at IS NULL)))
+         ORDER BY day DESC LIMIT 1",
+        stage,
+        Text(today)
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(row.map(Day::from))
+}
+
 /// The day; [`StoreError::NotFound`] if its cutoff has not passed.
 pub(crate) async fn find(connection: &mut SqliteConnection, stage_day: StageDay) -> Result<Day> {
     select_days!(
@@ -191,15 +211,14 @@ pub(crate) async fn exists(connection: &mut SqliteConnection, stage_day: StageDa
     .await?)
 }
 
-/// Adds a day whose cutoff is now. [`StoreError::CutoffPassed`] if the day, or a later one, exists: no day is started twice
-/// after a clock was set back.
+/// Adds a day whose cutoff is now. [`StoreError::CutoffPassed`] if the day, or a later one with counting evaluations, exists.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
     deadline_at: Option<Timestamp>,
     now: Timestamp,
 ) -> Result<()> {
-    if let Some(newest) = newest(connection, stage_day.stage).await?
+    if let Some(newest) = newest_binding(connection, stage_day.stage, stage_day.date).await?
         && newest.stage_day.date >= stage_day.date
     {
         return Err(StoreError::CutoffPassed {

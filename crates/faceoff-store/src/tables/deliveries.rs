@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
 };
 use faceoff_types::{DeliveryId, WebhookId};
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use sqlx::SqliteConnection;
 
 /// A message to a webhook.
@@ -243,4 +243,32 @@ pub(crate) async fn delete_ended(
     .execute(connection)
     .await?;
     Ok(deleted.rows_affected())
+}
+
+/// Moves the times of the next attempts.
+pub(crate) async fn shift(connection: &mut SqliteConnection, by: SignedDuration) -> Result<()> {
+    let by_ms = i64::try_from(by.as_millis()).unwrap_or_default();
+    sqlx::query!(
+        "UPDATE webhook_deliveries SET next_at = next_at + ? WHERE state = 'waiting'",
+        by_ms
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Makes deliveries due whose next attempt is after `latest`.
+pub(crate) async fn shorten(
+    connection: &mut SqliteConnection,
+    latest: Timestamp,
+    now: Timestamp,
+) -> Result<()> {
+    sqlx::query!(
+        "UPDATE webhook_deliveries SET next_at = ? WHERE state = 'waiting' AND next_at > ?",
+        Instant(now),
+        Instant(latest),
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
 }

@@ -7,6 +7,7 @@ use crate::{
     event::{Actor, Event, EventRecord, Subject},
 };
 use faceoff_types::RunId;
+use jiff::Timestamp;
 use serde_json::{Map, Value};
 use sqlx::SqliteConnection;
 
@@ -90,6 +91,12 @@ pub(crate) async fn newest_change(connection: &mut SqliteConnection) -> Result<i
 pub(crate) async fn newest_id(connection: &mut SqliteConnection) -> Result<i64> {
     let newest = sqlx::query_scalar!(r#"SELECT id AS "id!" FROM events ORDER BY id DESC LIMIT 1"#);
     Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
+}
+
+/// When the newest event was recorded; `None` if there is none.
+pub(crate) async fn newest_at(connection: &mut SqliteConnection) -> Result<Option<Timestamp>> {
+    let newest = sqlx::query_scalar!(r#"SELECT at AS "at!" FROM events ORDER BY id DESC LIMIT 1"#);
+    Ok(newest.fetch_optional(connection).await?.map(|at| at.0))
 }
 
 /// Deletes the events about a run's progress.

@@ -7,6 +7,7 @@ mod archives;
 mod artifacts;
 mod bundles;
 mod cleared_runs;
+mod clock;
 mod competition;
 mod consistent_reads;
 mod day_operations;

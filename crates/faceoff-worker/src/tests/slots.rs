@@ -431,7 +431,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     // scripted clips these are the episodes 1.
     let artifacts = server.store.artifacts();
     for _ in 0..2 {
-        cleanup::clean_up(&server.store, server.local().competition(), server.now()).await;
+        cleanup::clean_up(&server.store, server.local().competition(), &server.clock()).await;
         assert_eq!(artifacts.ablations_with_parts().await.unwrap(), []);
         for profile in ABLATION_PROFILES {
             let key = Artifacts::ablation_clips_key(ablation.id, profile);

@@ -2,6 +2,7 @@
 //! agent or a game; the *schedule* starts evaluation days.
 
 mod archived_season;
+mod clock;
 mod data_folder;
 mod http;
 mod live_season;

@@ -228,7 +228,7 @@ impl Season {
         clean_up(
             &self.site.store,
             faceoff_airhockey::simulator().competition(),
-            self.site.now(),
+            &self.site.clock(),
         )
         .await;
     }

@@ -1,4 +1,5 @@
-//! `faceoff admin pause`, `resume`, `export` and `season`: the queue of all jobs, the archive and the end of the season.
+//! `faceoff admin pause`, `resume`, `accept-clock`, `export` and `season`: the queue of all jobs, the server's clock, the archive and the
+//! end of the season.
 
 use super::export::export;
 use crate::{
@@ -19,6 +20,12 @@ pub(super) enum SeasonAction {
     },
     /// Resume a paused queue
     Resume,
+    /// Accept the server's system clock after it was set; without --confirm, only say what that changes
+    AcceptClock {
+        /// The size of the step, as confirmation, e.g. "3600 s ahead"
+        #[arg(long, value_name = "SIZE")]
+        confirm: Option<String>,
+    },
     /// Download the season as one archive, which `faceoff import` shows read-only on another server
     Export {
         /// The file to write, e.g. season.tar.zst; an existing file is not overwritten
@@ -54,6 +61,10 @@ pub(super) async fn act(client: &Client, json: bool, action: SeasonAction) -> an
         }
         SeasonAction::Resume => {
             client.resume().await?;
+            client.season().await?
+        }
+        SeasonAction::AcceptClock { confirm } => {
+            client.accept_clock(confirm).await?;
             client.season().await?
         }
         SeasonAction::Export { file, public } => return export(client, json, &file, public).await,

@@ -1,6 +1,7 @@
 //! Serves a season that is not archived: API, pages, worker slots and schedule in one process.
 
 use super::{
+    clock,
     http::serve_http,
     monitoring,
     priority::low_priority_runtime,
@@ -16,7 +17,7 @@ use faceoff_http::{AgentResources, Capacity, CapacityMonitor, ConnectionLimits};
 use faceoff_live::LiveState;
 use faceoff_notify::Deliverer;
 use faceoff_runner::AgentEnvironment;
-use faceoff_store::{Actor, JobFilter, Store};
+use faceoff_store::{Actor, JobFilter, Store, StoreError};
 use faceoff_types::Clock;
 use faceoff_worker::{CpuLayout, SlotThreads, SlotsConfig, WorkerConfig};
 use jiff::Timestamp;
@@ -69,8 +70,9 @@ async fn serve(
     create_private(&scratch_dir)?;
     let site = Site::open(&config, vec![data_dir.clone(), scratch_dir.clone()]).await?;
     let (store, address) = (site.store.clone(), site.address);
-    let clock = Clock::new(Timestamp::now);
+    let clock = site.clock.clone();
     log_upgrade(&store);
+    shorten_due_times(&config, &store, clock.now()).await?;
     configure_season(&config, &store, clock.now()).await?;
 
     let mut agent = config.agent_environment();
@@ -133,6 +135,7 @@ async fn serve(
             shutdown,
         )
     });
+    tasks.spawn(|shutdown| clock::watch(clock.clone(), data_dir, shutdown));
     tasks.spawn(|shutdown| {
         faceoff_worker::run_schedule(store.clone(), Arc::clone(competition()), clock, shutdown)
     });
@@ -164,6 +167,25 @@ fn log_upgrade(store: &Store) {
             "database upgraded"
         );
     }
+}
+
+/// Jobs must not wait for a time that was stored when the clock was ahead.
+async fn shorten_due_times(config: &Config, store: &Store, now: Timestamp) -> anyhow::Result<()> {
+    match store.shorten_due_times(config.workers.lease_s, now).await {
+        Ok(0) => {}
+        Ok(jobs) => {
+            tracing::warn!(
+                jobs,
+                "jobs were due too far in the future, as if the clock had been ahead; they are due now"
+            );
+        }
+        // The server must start nevertheless.
+        Err(error @ StoreError::DiskFull(_)) => {
+            tracing::warn!(%error, "the due times of jobs could not be checked");
+        }
+        Err(error) => return Err(error).context("checking the due times of jobs"),
+    }
+    Ok(())
 }
 
 /// Applies the configured name of the season, and the configured rules and settings of its first stage.

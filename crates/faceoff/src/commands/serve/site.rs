@@ -1,7 +1,8 @@
 //! What serving a season needs, whether it runs or is archived: the opened data folder, the address and the HTTP settings.
 
-use super::data_folder::{
-    close_to_others, empty_folder, load_or_create_link_key, lock, set_admin_token,
+use super::{
+    clock::server_clock,
+    data_folder::{close_to_others, empty_folder, load_or_create_link_key, lock, set_admin_token},
 };
 use crate::competition::{competition, simulator};
 use crate::{config::Config, machine};
@@ -10,7 +11,6 @@ use faceoff_http::{AgentResources, Capacity, HttpConfig, LinkKey};
 use faceoff_metrics::Metrics;
 use faceoff_store::{FreeSpace, Store};
 use faceoff_types::Clock;
-use jiff::Timestamp;
 use std::{
     fs::File,
     io::Write as _,
@@ -24,6 +24,7 @@ pub(super) struct Site {
     pub(super) listener: TcpListener,
     pub(super) address: SocketAddr,
     pub(super) link_key: LinkKey,
+    pub(super) clock: Clock,
     upload_dir: PathBuf,
     /// Held as long as the season is served.
     _lock: File,
@@ -45,15 +46,15 @@ impl Site {
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
+        // Before any change of the database.
+        let clock = server_clock(data_dir, &store).await?;
         // After the database and the folder of artifacts exist.
         close_to_others(data_dir)?;
         let checked = competition().check();
         checked.map_err(|problem| anyhow!("the competition of this program: {problem}"))?;
-        let bound = store
-            .bind_competition(competition(), Timestamp::now())
-            .await;
+        let bound = store.bind_competition(competition(), clock.now()).await;
         bound.with_context(|| format!("opening the data folder {}", data_dir.display()))?;
-        set_admin_token(&store, data_dir, Timestamp::now()).await?;
+        set_admin_token(&store, data_dir, clock.now()).await?;
         let listen = config.server.listen;
         let listener = TcpListener::bind(listen).await.with_context(|| {
             format!("listening on {listen}; choose another address with --listen")
@@ -63,6 +64,7 @@ impl Site {
             address: listener.local_addr().context("reading the bound address")?,
             listener,
             link_key: load_or_create_link_key(data_dir)?,
+            clock,
             upload_dir,
             _lock: lock,
         })

@@ -1,0 +1,32 @@
+//! The decision that the system clock is right after it was set.
+
+use super::preview::{DecisionPreview, Done};
+use faceoff_api::requests;
+use faceoff_service::{app::AppState, problem::Problem, services::clock};
+use faceoff_store::Actor;
+
+#[derive(Debug, Clone, Copy)]
+pub(in crate::organiser) struct ClockDecision;
+
+/// Page to return to.
+const ATTENTION_PATH: &str = "/organiser";
+
+impl ClockDecision {
+    pub(super) fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
+        Ok(DecisionPreview {
+            title: "Accept the system clock".to_owned(),
+            button: "Accept the clock",
+            ..DecisionPreview::confirmed(clock::preview_accepted_step(app)?, ATTENTION_PATH)
+        })
+    }
+
+    pub(super) async fn carry_out(
+        self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<Done, Problem> {
+        clock::accept_step(app, actor, request.confirm.as_deref()).await?;
+        Ok(Done::new("clock-accepted", ATTENTION_PATH))
+    }
+}

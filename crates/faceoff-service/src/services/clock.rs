@@ -1,0 +1,66 @@
+//! The step of the system clock, which an organiser accepts if the clock is right now.
+
+use super::decisions::Preview;
+use crate::{
+    app::AppState,
+    boxed,
+    problem::{Problem, ProblemKind},
+};
+use faceoff_store::Actor;
+use faceoff_types::ClockStep;
+
+/// Leases get at least this time after the change, because some may have been renewed by the time before it.
+const MIN_LEASE_S: u32 = 60;
+
+/// The step that is not accepted.
+fn current_step(app: &AppState) -> Result<ClockStep, Problem> {
+    app.config.clock.step().ok_or_else(|| {
+        Problem::new(
+            ProblemKind::Conflict,
+            "the system clock has no step that could be accepted: it agrees with the server\u{2019}s time",
+        )
+    })
+}
+
+/// Preview of accepting the step of the system clock. Its size is the name that confirms it.
+///
+/// # Errors
+/// `Conflict` if there is no step.
+pub fn preview_accepted_step(app: &AppState) -> Result<Preview, Problem> {
+    Ok(preview(&current_step(app)?))
+}
+
+fn preview(step: &ClockStep) -> Preview {
+    let server_at = step.server_at + step.shift();
+    Preview {
+        name: step.size(),
+        effect: format!(
+            "{step}. If it is accepted, the server\u{2019}s time is {server_at:.0}; cutoffs, deadlines and closing times until then \
+             take effect at once and cannot be undone, leases and retries of jobs move with the clock"
+        ),
+    }
+}
+
+/// Accepts the step of the system clock, if that is confirmed with its size.
+#[boxed]
+pub async fn accept_step(
+    app: &AppState,
+    actor: Actor,
+    confirmed: Option<&str>,
+) -> Result<(), Problem> {
+    let step = current_step(app)?;
+    preview(&step).check_confirmed(confirmed)?;
+    let clock = app.config.clock.clone();
+    let (size, now) = (step.size(), step.server_at + step.shift());
+    let accept = Box::new(move || clock.accept(&step));
+    app.store
+        .accept_clock_step(actor, step.shift(), size, now, accept)
+        .await?;
+    let now = app.config.clock.now();
+    app.store.renew_all_leases(MIN_LEASE_S, now).await?;
+    tracing::info!(
+        step = step.size(),
+        "the step of the system clock was accepted"
+    );
+    Ok(())
+}
