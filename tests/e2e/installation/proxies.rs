@@ -327,16 +327,6 @@ fn check_proxy(start_proxy: impl Fn(&Server, &Path) -> Proxy) {
         .expect("the proxy answers");
     assert_eq!(downloaded.bytes().expect("a file"), archive);
 
-    // A client that sends a large upload before it reads gets the refusal.
-    let upload = refused_uploads::large_file(scratch.path());
-    let refusal = refused_uploads::upload_by_python(
-        &proxy.url("/api/v1/submissions"),
-        ("fo_unknown", "application/octet-stream"),
-        &upload,
-        &[("SSL_CERT_FILE", scratch.path().join(CERTIFICATE))],
-    );
-    assert!(refusal.starts_with("401 "), "{refusal}");
-
     // The rate limit applies to the visitor's real address, whatever address the visitor claims in
     // X-Forwarded-For, and not to other visitors.
     let request_status = |visitor: &Client, claimed_address: u32| {
@@ -508,6 +498,20 @@ fn logs_of_caddy_have_no_secrets() {
 #[test]
 fn nginx_configuration_serves_a_server() {
     check_proxy(Proxy::nginx);
+}
+
+#[test]
+fn client_that_sends_first_gets_refusal_through_nginx() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let proxy = Proxy::nginx(&server, scratch.path());
+    let refusal = refused_uploads::upload_by_python(
+        &proxy.url("/api/v1/submissions"),
+        ("fo_unknown", "application/octet-stream"),
+        &refused_uploads::large_file(scratch.path()),
+        &[("SSL_CERT_FILE", scratch.path().join(CERTIFICATE))],
+    );
+    assert!(refusal.starts_with("401 "), "{refusal}");
 }
 
 #[test]

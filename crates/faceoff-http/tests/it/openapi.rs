@@ -126,6 +126,7 @@ async fn document_lists_all_operations() {
         "PATCH /api/v1/tournaments/{id}",
         "PATCH /api/v1/webhooks/{id}",
         "POST /api/v1/announcements",
+        "POST /api/v1/clock/accept",
         "POST /api/v1/days",
         "POST /api/v1/evaluations/{id}/cancel",
         "POST /api/v1/evaluations/{id}/dataset/link",

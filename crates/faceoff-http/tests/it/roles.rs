@@ -29,6 +29,7 @@ const ACCESS_TABLE: &[(&str, &str)] = &[
     ("GET /board", "+++++++"),
     ("GET /board/history", "+++++++"),
     ("GET /board/{task}", "+++++++"),
+    ("POST /clock/accept", "?----++"),
     ("POST /days", "?----++"),
     ("GET /evaluations", "?++++++"),
     ("GET /evaluations/{id}", "?00++++"),
