@@ -3,6 +3,7 @@ CREATE INDEX tokens_by_age ON tokens (created_at, id);
 CREATE INDEX tokens_of_team_by_age ON tokens (team_id, created_at, id) WHERE team_id IS NOT NULL;
 CREATE INDEX tokens_of_person_by_age ON tokens (person_id, created_at, id) WHERE person_id IS NOT NULL;
 CREATE INDEX tokens_valid_of_owner ON tokens (owner, team_id, person_id) WHERE revoked_at IS NULL;
+CREATE INDEX tokens_not_revoked ON tokens (created_at) WHERE revoked_at IS NULL;
 CREATE INDEX tokens_of_host ON tokens (created_at) WHERE owner = 'host';
 CREATE INDEX invitations_by_age ON invitations (created_at, id);
 CREATE INDEX invitations_of_team_by_age ON invitations (team_id, created_at, id) WHERE team_id IS NOT NULL;

@@ -21,7 +21,7 @@ use faceoff_service::{
 use faceoff_store::TokensOf;
 use jiff::Timestamp;
 
-/// Number of tokens and sessions on the page, the newest ones.
+/// Number of tokens and sessions of which the ended ones are listed, the newest ones.
 const MAX_LISTED: u32 = 100;
 
 #[derive(Template)]
@@ -52,13 +52,16 @@ pub(super) async fn page(
     }) else {
         return Ok(Redirect::to("/sign-in").into_response());
     };
-    let own = TokensOf::User(user.id);
-    let own = app.store.tokens_after(own, None, MAX_LISTED).await?;
+    let (own, now) = (TokensOf::User(user.id), app.config.clock.now());
+    let mut tokens = app.store.valid_tokens(own, now).await?;
+    let newest = app.store.tokens_after(own, None, MAX_LISTED).await?;
+    let newest = newest.into_iter().flatten();
+    tokens.extend(newest.filter(|token| !token.is_valid(now)));
     render(&Page {
         frame: Frame::load(&app, "/account").await?,
-        tokens: own.into_iter().flatten().map(token::view).collect(),
+        tokens: tokens.into_iter().map(token::view).collect(),
         account: user_view::caller(caller.principal, token::view(caller.token)),
         user: user_view::view(user),
-        now: app.config.clock.now(),
+        now,
     })
 }

@@ -50,7 +50,7 @@ struct Documentation {
     reference: OnceLock<Reference>,
     index: OnceLock<Index>,
     /// Held during a search.
-    search_turn: Mutex<()>,
+    search_turn: Arc<Mutex<()>>,
 }
 
 impl Documentation {
@@ -73,7 +73,7 @@ pub(super) fn router(api: Arc<Value>) -> Router<App> {
         api,
         reference: OnceLock::new(),
         index: OnceLock::new(),
-        search_turn: Mutex::new(()),
+        search_turn: Arc::default(),
     });
     Router::new()
         .route("/docs", get(contents))
@@ -279,10 +279,14 @@ async fn search_page(
     let search_query = search_query.trim().to_owned();
     // A search takes milliseconds of CPU time. Only one runs at a time, off the threads that handle requests, so that searching
     // visitors wait for each other and not everybody for them.
-    let _turn = documentation.search_turn.lock().await;
+    let turn = Arc::clone(&documentation.search_turn).lock_owned().await;
     let searched = Arc::clone(&documentation);
     let query = search_query.clone();
-    let search = tokio::task::spawn_blocking(move || searched.index().search(&query));
+    let search = tokio::task::spawn_blocking(move || {
+        // Held until the search has ended, even if the visitor does not wait for it.
+        let _turn = turn;
+        searched.index().search(&query)
+    });
     let (results, count) = search.await.map_err(Problem::internal)?;
     respond(
         &conditions,

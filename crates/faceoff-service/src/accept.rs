@@ -23,14 +23,26 @@ pub fn wants_csv(headers: &HeaderMap) -> bool {
 
 /// Whether the client accepts gzip, whatever its preference.
 pub fn accepts_gzip(headers: &HeaderMap) -> bool {
-    elements(headers, header::ACCEPT_ENCODING).any(|encoding| {
+    let (mut named, mut any) = (None, false);
+    for encoding in elements(headers, header::ACCEPT_ENCODING) {
         let (name, weight) = encoding.split_once(';').unwrap_or((encoding, ""));
         let refused = weight
             .trim()
             .strip_prefix("q=")
             .is_some_and(|weight| weight.trim().parse() == Ok(0.0));
-        matches!(name.trim(), "gzip" | "x-gzip" | "*") && !refused
-    })
+        match name.trim() {
+            "*" => any = !refused,
+            name if ["gzip", "x-gzip"]
+                .iter()
+                .any(|gzip| name.eq_ignore_ascii_case(gzip)) =>
+            {
+                named = Some(!refused);
+            }
+            _ => {}
+        }
+    }
+    // An encoding that is named is not meant by `*`.
+    named.unwrap_or(any)
 }
 
 /// The elements of a header's list, over all its values.
@@ -55,6 +67,8 @@ mod tests {
         let accepts = |value| accepts_gzip(&with(header::ACCEPT_ENCODING, value));
         assert!(accepts("deflate, gzip;q=0.5"));
         assert!(accepts("br,*"));
+        assert!(accepts("GZIP"));
+        assert!(!accepts("gzip;q=0, *"));
         assert!(!accepts("br, gzip;q=0"));
         assert!(!accepts("identity"));
         assert!(!accepts_gzip(&HeaderMap::new()));

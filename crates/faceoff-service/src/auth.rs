@@ -4,7 +4,7 @@
 use crate::{
     app::App,
     boxed,
-    change_quota::RemainingChangesSlot,
+    change_quota::{self, RemainingChangesSlot},
     problem::{Problem, ProblemKind},
     request_log, session,
 };
@@ -239,11 +239,11 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     record_use(app, &token, now);
     let caller = Caller::new(token, secret_hash, principal);
     if let Some(team) = caller.team()
-        && !parts.method.is_safe()
+        && change_quota::is_counted(&parts.method, parts.uri.path())
     {
         let slot = parts.extensions.get::<RemainingChangesSlot>().cloned();
         let slot = slot.unwrap_or_default();
-        slot.count(&app.change_quota, team.id, now)?;
+        slot.count(&app.change_quota, team.id, caller.token.id, now)?;
     }
     request_log::record_actor(&caller.actor());
     Ok(Some(caller))

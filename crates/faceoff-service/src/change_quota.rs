@@ -1,9 +1,10 @@
 //! The number of changes that a team may make per UTC day: requests of its members and API clients that are not only reads. Each
 //! leaves rows in the database, such as events, for the whole season, so a team must not be able to make any number of them.
+//! Deletions and revocations are not counted: what they end was counted, and a team must always be able to revoke a token.
 
 use crate::problem::{Problem, ProblemKind};
-use axum::http::{HeaderMap, HeaderName, HeaderValue};
-use faceoff_types::TeamId;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method};
+use faceoff_types::{TeamId, TokenId};
 use jiff::{Timestamp, civil::Date, tz::TimeZone};
 use std::{
     collections::HashMap,
@@ -27,6 +28,13 @@ pub struct ChangeQuota {
 struct Counted {
     day: Date,
     changes: HashMap<TeamId, u32>,
+    of_tokens: HashMap<TokenId, u32>,
+}
+
+/// Whether a request with this method and path is counted.
+pub(crate) fn is_counted(method: &Method, path: &str) -> bool {
+    let ends = path == "/sign-out" || path.ends_with("/revoke");
+    !method.is_safe() && method != Method::DELETE && !ends
 }
 
 /// What is left of a team's quota after a request.
@@ -50,13 +58,15 @@ impl ChangeQuota {
         }
     }
 
-    /// Counts a change; `None` if changes are not limited.
+    /// Counts a change; `None` if changes are not limited. One token can use half of the quota, so that a leaked one cannot stop its
+    /// team.
     ///
     /// # Errors
     /// `DailyChangeQuotaExceeded`.
     pub(crate) fn count(
         &self,
         team: TeamId,
+        token: TokenId,
         now: Timestamp,
     ) -> Result<Option<RemainingChanges>, Problem> {
         let Some(per_day) = self.per_day else {
@@ -68,14 +78,30 @@ impl ChangeQuota {
         if counted.day != time.date() {
             *counted = Counted {
                 day: time.date(),
-                changes: HashMap::new(),
+                ..Counted::default()
             };
         }
-        let changes = counted.changes.entry(team).or_default();
-        if *changes >= per_day.get() {
+        let Counted {
+            changes, of_tokens, ..
+        } = &mut *counted;
+        let (changes, of_token) = (
+            changes.entry(team).or_default(),
+            of_tokens.entry(token).or_default(),
+        );
+        let per_token = per_day.get().div_ceil(2);
+        let exceeded = match (*changes >= per_day.get(), *of_token >= per_token) {
+            (true, _) => Some(format!(
+                "the team has made {per_day} changes today, as many as a team may make per UTC day"
+            )),
+            (false, true) => Some(format!(
+                "this token has made {per_token} changes today, half of what its team may make per UTC day; other tokens of the team \
+                 can still make some"
+            )),
+            (false, false) => None,
+        };
+        if let Some(exceeded) = exceeded {
             let detail = format!(
-                "the team has made {per_day} changes today, as many as a team may make per UTC day; reading is not limited. Try again \
-                 after midnight UTC"
+                "{exceeded}. Reading, deleting and revoking is not limited. Try again after midnight UTC"
             );
             let problem = Problem::new(ProblemKind::DailyChangeQuotaExceeded, detail);
             return Err(problem
@@ -83,6 +109,7 @@ impl ChangeQuota {
                 .retry_after(seconds_to_midnight.unsigned_abs()));
         }
         *changes += 1;
+        *of_token += 1;
         Ok(Some(RemainingChanges {
             per_day,
             remaining: per_day.get() - *changes,
@@ -100,10 +127,11 @@ impl RemainingChangesSlot {
         &self,
         quota: &ChangeQuota,
         team: TeamId,
+        token: TokenId,
         now: Timestamp,
     ) -> Result<(), Problem> {
         if self.0.get().is_none()
-            && let Some(remaining) = quota.count(team, now)?
+            && let Some(remaining) = quota.count(team, token, now)?
         {
             // Set only here, by extractors that run one after the other.
             let _ = self.0.set(remaining);
@@ -140,19 +168,45 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quota_is_per_team_and_day() {
-        let quota = ChangeQuota::new(NonZeroU32::new(2));
+    fn quota_is_per_team_token_and_day() {
+        let quota = ChangeQuota::new(NonZeroU32::new(3));
         let [alpha, beta] = [TeamId::new(), TeamId::new()];
+        let [first, second] = [TokenId::new(), TokenId::new()];
         let at = |text: &str| text.parse::<Timestamp>().unwrap();
         let evening = at("2026-03-01T23:59:50Z");
-        let first = quota.count(alpha, evening).unwrap().unwrap();
-        assert_eq!((first.remaining, first.seconds_to_midnight), (1, 10));
-        assert!(quota.count(alpha, evening).is_ok());
-        let refused = quota.count(alpha, evening).unwrap_err();
+        let remaining = quota.count(alpha, first, evening).unwrap().unwrap();
+        assert_eq!(
+            (remaining.remaining, remaining.seconds_to_midnight),
+            (2, 10)
+        );
+        assert!(quota.count(alpha, first, evening).is_ok());
+        let refused = quota.count(alpha, first, evening).unwrap_err();
         assert_eq!(refused.kind(), ProblemKind::DailyChangeQuotaExceeded);
-        assert!(quota.count(beta, evening).is_ok());
-        assert!(quota.count(alpha, at("2026-03-02T00:00:00Z")).is_ok());
+        assert!(refused.detail().contains("this token has made 2"));
+        assert!(quota.count(alpha, second, evening).is_ok());
+        let refused = quota.count(alpha, second, evening).unwrap_err();
+        assert!(refused.detail().contains("the team has made 3"));
+        assert!(quota.count(beta, TokenId::new(), evening).is_ok());
+        assert!(
+            quota
+                .count(alpha, first, at("2026-03-02T00:00:00Z"))
+                .is_ok()
+        );
         let unlimited = ChangeQuota::new(None);
-        assert_eq!(unlimited.count(alpha, evening).unwrap(), None);
+        assert_eq!(unlimited.count(alpha, first, evening).unwrap(), None);
+    }
+
+    #[test]
+    fn revoking_is_not_counted() {
+        assert!(is_counted(&Method::POST, "/api/v1/tokens"));
+        assert!(is_counted(&Method::PATCH, "/api/v1/teams/x"));
+        for (method, path) in [
+            (Method::GET, "/api/v1/tokens"),
+            (Method::DELETE, "/api/v1/tokens/x"),
+            (Method::POST, "/dashboard/access/tokens/x/revoke"),
+            (Method::POST, "/sign-out"),
+        ] {
+            assert!(!is_counted(&method, path), "{method} {path}");
+        }
     }
 }

@@ -69,12 +69,20 @@ impl Clock {
         }
     }
 
-    /// Accepts a step: the clock's time changes by it. False, without a change, if another step has been accepted since.
+    /// Accepts a step: the clock's time changes by it. False, without a change, if the system clock was set again, or a step was
+    /// accepted, since.
     #[must_use]
     pub fn accept(&self, step: &ClockStep) -> bool {
         match &self.0 {
             Source::Plain(_) => false,
             Source::Steady(steady) => steady.accept(step),
+        }
+    }
+
+    /// Undoes the acceptance of a step, because it could not be stored.
+    pub fn revert(&self, step: &ClockStep) {
+        if let Source::Steady(steady) = &self.0 {
+            steady.revert(step);
         }
     }
 

@@ -102,7 +102,7 @@ impl Container {
 
     /// Checks that a `results.json` beside the archive, if there is one, equals the one inside. `archive_name` is for the error.
     pub fn check_results_copy(&self, path: &Path, archive_name: &str) -> Result<(), DatasetError> {
-        if !path.exists() {
+        if !path.try_exists()? {
             return Ok(());
         }
         let inside = self.bytes(RESULTS_FILE)?;

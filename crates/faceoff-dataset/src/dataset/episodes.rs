@@ -51,7 +51,9 @@ pub(crate) fn batches(
         })
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;
     let groups = builder.metadata().row_groups().iter();
-    let rows: u64 = groups.map(|group| group.num_rows().unsigned_abs()).sum();
+    let rows = groups
+        .map(|group| group.num_rows().unsigned_abs())
+        .fold(0, u64::saturating_add);
     // Of a few rows too many or too few the caller says where.
     if rows > expected_rows.saturating_mul(2).saturating_add(SURPLUS_ROWS) {
         return Err(DatasetError::Unreadable(format!(

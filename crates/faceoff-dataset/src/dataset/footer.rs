@@ -6,6 +6,8 @@ use parquet::{
     file::metadata::{ColumnChunkMetaData, ParquetMetaData},
 };
 
+/// Number of rows of a row group up to which it is read; this program writes some ten thousand.
+const MAX_GROUP_ROWS: i64 = 1 << 24;
 /// Mean size of a value (a number, a short text or a list of up to a few hundred numbers) up to which a column is read, in bytes
 /// before compression.
 const MAX_VALUE_BYTES: u64 = 4096;
@@ -17,6 +19,12 @@ const SMALL_COLUMN_BYTES: u64 = 1 << 20;
 pub(crate) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
     for (number, group) in footer.row_groups().iter().enumerate() {
         let columns = group.columns().iter();
+        if group.num_rows() > MAX_GROUP_ROWS {
+            return Err(ParquetError::General(format!(
+                "row group {number} has {} rows, more than any table needs",
+                group.num_rows()
+            )));
+        }
         if group.num_rows() < 0
             || !columns
                 .into_iter()
@@ -118,6 +126,8 @@ mod tests {
             ParquetMetaData::new(footer.file_metadata().clone(), vec![group])
         };
         assert!(check(&column_of(1000, 4 << 20), TABLE_BYTES).is_ok());
+        let refused = check(&column_of(1 << 62, 8 << 20), TABLE_BYTES).unwrap_err();
+        assert!(refused.to_string().contains("row group 0 has"), "{refused}");
         let refused = check(&column_of(1000, 8 << 20), TABLE_BYTES).unwrap_err();
         assert!(
             refused.to_string().contains("the column puck_x"),

@@ -116,7 +116,7 @@ async fn team_has_a_daily_quota_of_changes() {
     let site = Site::start().await;
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let rates = RateLimits {
-        team_changes_per_day: NonZeroU32::new(3),
+        team_changes_per_day: NonZeroU32::new(6),
         ..RateLimits::default()
     };
     let site = site.with_rates(rates).await;
@@ -126,9 +126,9 @@ async fn team_has_a_daily_quota_of_changes() {
     };
     let first = ask(&alpha.token).await;
     assert_eq!(first.status, 201, "{}", first.body);
-    assert_eq!(first.header("ratelimit-policy"), "\"changes\";q=3;w=86400");
+    assert_eq!(first.header("ratelimit-policy"), "\"changes\";q=6;w=86400");
     let remaining = first.header("ratelimit");
-    assert!(remaining.starts_with("\"changes\";r=2;t="), "{remaining}");
+    assert!(remaining.starts_with("\"changes\";r=5;t="), "{remaining}");
     // A refused change counts, too.
     let invalid = site
         .post("/api/v1/questions", Some(&alpha.token), &json!({}))
@@ -136,8 +136,12 @@ async fn team_has_a_daily_quota_of_changes() {
     assert_eq!(invalid.status, 422);
     assert_eq!(ask(&alpha.token).await.status, 201);
     let refused = ask(&alpha.token).await;
-    let problem = refused.problem(429, "daily-change-quota-exceeded", &["3 changes today"]);
-    assert_eq!(problem["limit"], 3);
+    let problem = refused.problem(
+        429,
+        "daily-change-quota-exceeded",
+        &["this token has made 3 changes today"],
+    );
+    assert_eq!(problem["limit"], 6);
     let wait: u32 = refused.header("retry-after").parse().unwrap();
     assert!((1..=24 * 3600).contains(&wait), "{wait}");
     // Reads are not limited, and neither are other teams and organisers.

@@ -45,7 +45,7 @@ pub(crate) fn router(dashboard_path: &str) -> Router<App> {
         .route(&path("/people/{id}/remove"), post(remove_user))
 }
 
-/// Number of tokens, and of invitations, on the page: the newest ones.
+/// Number of invitations, and of tokens of which the ended ones are listed: the newest ones.
 const MAX_LISTED: u32 = 500;
 
 #[derive(Template)]
@@ -62,7 +62,7 @@ struct Page {
     ended: Vec<String>,
     users: Vec<UserRow>,
     tokens: Vec<TokenRow>,
-    /// May there be tokens or invitations that the page does not list?
+    /// May there be ended tokens, or invitations, that the page does not list?
     is_shortened: bool,
     /// Expired and revoked tokens.
     inactive_tokens: Vec<TokenRow>,
@@ -185,18 +185,15 @@ async fn page_with(
     let now = app.config.clock.now();
     let names = event::actor_names(app).await?;
     let path = access_path(caller);
-    let mut tokens = Vec::new();
-    let mut inactive_tokens = Vec::new();
+    let row = |token| token_row(token, &names, caller, now);
+    // All valid ones, so that none can be hidden behind many that have ended.
+    let tokens = tokens::valid_tokens(app, caller).await?;
+    let tokens: Vec<TokenRow> = tokens.into_iter().map(token::view).map(row).collect();
     let newest = tokens::tokens_after(app, caller, None, MAX_LISTED).await?;
-    for token in newest.unwrap_or_default() {
-        let is_active = token.revoked_at.is_none()
-            && token.expires_at.is_none_or(|expires_at| expires_at > now);
-        let row = token_row(token::view(token), &names, caller, now);
-        match is_active {
-            true => tokens.push(row),
-            false => inactive_tokens.push(row),
-        }
-    }
+    let newest = newest.unwrap_or_default();
+    let is_shortened = newest.len() >= MAX_LISTED as usize;
+    let inactive_tokens = newest.into_iter().filter(|token| !token.is_valid(now));
+    let inactive_tokens = inactive_tokens.map(token::view).map(row).collect();
     let listed = invitations::invitations_after(app, caller, None, MAX_LISTED).await?;
     let listed = listed
         .into_iter()
@@ -239,7 +236,7 @@ async fn page_with(
         path,
         is_organiser,
         users: users.collect(),
-        is_shortened: tokens.len() + inactive_tokens.len() >= MAX_LISTED as usize
+        is_shortened: is_shortened
             || invitations.len() + closed_invitations.len() >= MAX_LISTED as usize,
         tokens,
         inactive_tokens,

@@ -8,6 +8,10 @@ use crate::{
 };
 use faceoff_store::Actor;
 use faceoff_types::ClockStep;
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
 
 /// Leases get at least this time after the change, because some may have been renewed by the time before it.
 const MIN_LEASE_S: u32 = 60;
@@ -52,10 +56,22 @@ pub async fn accept_step(
     preview(&step).check_confirmed(confirmed)?;
     let clock = app.config.clock.clone();
     let (size, now) = (step.size(), step.server_at + step.shift());
-    let accept = Box::new(move || clock.accept(&step));
-    app.store
-        .accept_clock_step(actor, step.shift(), size, now, accept)
-        .await?;
+    let is_accepted = Arc::new(AtomicBool::new(false));
+    let accepted = Arc::clone(&is_accepted);
+    let accept = Box::new(move || {
+        accepted.store(clock.accept(&step), Ordering::SeqCst);
+        accepted.load(Ordering::SeqCst)
+    });
+    let stored = app
+        .store
+        .accept_clock_step(actor, step.shift(), size, now, accept);
+    if let Err(error) = stored.await {
+        // Leases and due times were not moved.
+        if is_accepted.load(Ordering::SeqCst) {
+            app.config.clock.revert(&step);
+        }
+        return Err(error.into());
+    }
     let now = app.config.clock.now();
     app.store.renew_all_leases(MIN_LEASE_S, now).await?;
     tracing::info!(

@@ -63,6 +63,18 @@ pub async fn tokens_after(
     }
 }
 
+/// The valid tokens and sessions that the caller may manage, newest first.
+#[boxed]
+pub async fn valid_tokens(app: &AppState, caller: &Caller) -> Result<Vec<Token>, Problem> {
+    match manageable(caller) {
+        Some(manageable) => {
+            let now = app.config.clock.now();
+            Ok(app.store.valid_tokens(manageable, now).await?)
+        }
+        None => Ok(vec![caller.token.clone()]),
+    }
+}
+
 /// The owner of a new token: the given team, or otherwise the caller.
 ///
 /// # Errors

@@ -25,7 +25,7 @@ const MIGRATION_TABLE: &str = "_sqlx_migrations";
 const PROGRESS_INTERVAL: i32 = 100_000;
 /// How many times its size an archive's database can become by its migrations, which may copy each of its tables, ...
 const MAX_GROWTH: u32 = 3;
-/// ... and the number of pages (4 KiB) that may come on top, for small databases.
+/// ... and the number of pages (mostly of 4 KiB) that may come on top, for small databases.
 const MAX_ADDED_PAGES: u32 = 1 << 14;
 
 /// The database of a data folder.
@@ -89,7 +89,9 @@ impl Store {
         connection.close().await?;
         let page_count = deadline.judge(checked)?;
 
-        let max_page_count = page_count.saturating_mul(MAX_GROWTH) + MAX_ADDED_PAGES;
+        let max_page_count = page_count
+            .saturating_mul(MAX_GROWTH)
+            .saturating_add(MAX_ADDED_PAGES);
         let writable = options
             .foreign_keys(true)
             .journal_mode(SqliteJournalMode::Delete)

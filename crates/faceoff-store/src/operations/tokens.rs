@@ -365,6 +365,13 @@ impl Store {
         .await
     }
 
+    /// The tokens and sessions that are valid at `now`, the newest first. Their number is bounded: an owner has at most
+    /// [`MAX_TOKENS`].
+    #[boxed]
+    pub async fn valid_tokens(&self, of: TokensOf, now: Timestamp) -> Result<Vec<Token>> {
+        tokens::valid(&mut *self.database.read.acquire().await?, of, now).await
+    }
+
     /// At most `limit` tokens and sessions, the newest first. With `after`, those that come after this token; `None` if it is not
     /// in the list.
     #[boxed]

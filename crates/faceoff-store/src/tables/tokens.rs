@@ -234,39 +234,87 @@ pub(crate) async fn of_host(connection: &mut SqliteConnection) -> Result<Vec<Tok
     Ok(rows.into_iter().map(Token::from).collect())
 }
 
+/// The tokens and sessions that are valid at `now`, the newest first.
+pub(crate) async fn valid(
+    connection: &mut SqliteConnection,
+    of: TokensOf,
+    now: Timestamp,
+) -> Result<Vec<Token>> {
+    let now = Instant(now);
+    let mut rows = match of {
+        TokensOf::Everyone => {
+            select_tokens!(
+                "WHERE revoked_at IS NULL AND (expires_at IS NULL OR expires_at > ?)",
+                now
+            )
+            .fetch_all(connection)
+            .await?
+        }
+        TokensOf::User(user) | TokensOf::Member(user, _) => {
+            let mut rows = select_tokens!(
+                "WHERE owner = 'person' AND team_id IS NULL AND person_id = ? AND revoked_at IS NULL
+                 AND (expires_at IS NULL OR expires_at > ?)",
+                user,
+                now
+            )
+            .fetch_all(&mut *connection)
+            .await?;
+            if let TokensOf::Member(_, team) = of {
+                let rows_of_team = select_tokens!(
+                    "WHERE owner = 'team' AND team_id = ? AND revoked_at IS NULL AND (expires_at IS NULL OR expires_at > ?)",
+                    team,
+                    now
+                );
+                rows.extend(rows_of_team.fetch_all(connection).await?);
+            }
+            rows
+        }
+    };
+    rows.sort_by_key(|row| Reverse((row.created_at.0, row.id)));
+    Ok(rows.into_iter().map(Token::from).collect())
+}
+
 /// Deletes at most `limit` tokens and sessions that ended at `ended_before` or earlier. What was made with them counts as made with
-/// what they were made with, so that it still ends with that. Returns the number of tokens.
+/// what they were made with, so that it still ends with that. Tokens of the host stay: a revoked one in the file of a restored data
+/// folder must be recognised. Returns the number of tokens.
 pub(crate) async fn forget_ended(
     connection: &mut SqliteConnection,
     ended_before: Timestamp,
     limit: u32,
 ) -> Result<usize> {
     let ended = sqlx::query!(
-        r#"SELECT id AS "id!: TokenId", made_with AS "made_with: TokenId" FROM tokens
-           WHERE coalesce(revoked_at, expires_at) <= ? ORDER BY coalesce(revoked_at, expires_at) LIMIT ?"#,
+        r#"SELECT id AS "id!: TokenId" FROM tokens
+           WHERE coalesce(revoked_at, expires_at) <= ? AND owner <> 'host' ORDER BY coalesce(revoked_at, expires_at) LIMIT ?"#,
         Instant(ended_before),
         limit
     )
     .fetch_all(&mut *connection)
     .await?;
     for row in &ended {
+        // Read for each row: the one that it was made with may have just been deleted, too.
+        let made_with = sqlx::query_scalar!(
+            r#"SELECT made_with AS "made_with: TokenId" FROM tokens WHERE id = ?"#,
+            row.id
+        )
+        .fetch_one(&mut *connection)
+        .await?;
         sqlx::query!(
             "UPDATE tokens SET made_with = ? WHERE made_with = ?",
-            row.made_with,
+            made_with,
             row.id
         )
         .execute(&mut *connection)
         .await?;
         sqlx::query!(
             "UPDATE invitations SET made_with = ? WHERE made_with = ?",
-            row.made_with,
+            made_with,
             row.id
         )
         .execute(&mut *connection)
         .await?;
         sqlx::query!(
             "UPDATE webhooks SET made_with = ? WHERE made_with = ?",
-            row.made_with,
+            made_with,
             row.id
         )
         .execute(&mut *connection)

@@ -561,6 +561,7 @@ async fn import_of_an_earlier_schema_migrates_it() {
         "tokens_of_person_by_age",
         "tokens_by_end",
         "tokens_of_host",
+        "tokens_not_revoked",
         "tokens_valid_of_owner",
         "bundles_stored",
         "submissions_invalid_with_log",

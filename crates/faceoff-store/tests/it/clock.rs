@@ -139,7 +139,7 @@ async fn voided_future_day_frees_the_schedule() {
         .void_day(Actor::Organiser, future.stage_day, "clock", f.now);
     assert_eq!(voided.await.unwrap(), 1);
     assert_eq!(f.store.future_day(&first, f.now).await.unwrap(), None);
-    assert_eq!(next_date(&f).await, Some(date(2026, 3, 1)));
+    assert_eq!(next_date(&f).await, Some(date(2026, 3, 2)));
     assert_eq!(start(&f).await, Some(1));
     assert_eq!(start(&f).await, None, "a day has one cutoff");
     for day in [2, 3] {

@@ -414,9 +414,20 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     };
     let root = create(&f, 1, None).await;
     let middle = create(&f, 2, Some((root, [1; 32]))).await;
-    let leaf = create(&f, 3, Some((middle, [2; 32]))).await;
+    let next = create(&f, 9, Some((middle, [2; 32]))).await;
+    let leaf = create(&f, 3, Some((next, [9; 32]))).await;
+    for ended in [middle, next] {
+        f.store
+            .revoke_token(Actor::Organiser, ended, EndMade::Keep, f.now)
+            .await
+            .unwrap();
+    }
+    // A revoked token in the file of a data folder must not become valid again.
+    assert!(f.store.set_host_token([7; 32], f.now).await.unwrap());
+    let of_host = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
+    let of_host = of_host.await.unwrap().unwrap().token.id;
     f.store
-        .revoke_token(Actor::Organiser, middle, EndMade::Keep, f.now)
+        .revoke_token(Actor::Organiser, of_host, EndMade::Keep, f.now)
         .await
         .unwrap();
     let expires_at = f.now + SignedDuration::from_hours(1);
@@ -440,7 +451,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     f.advance_clock_s(30 * 24 * 3600 - 1);
     assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
     f.advance_clock_s(1);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 1);
+    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 2);
     f.advance_clock_s(3600);
     assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 2);
     assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
@@ -458,7 +469,8 @@ async fn ended_credentials_are_forgotten_after_a_month() {
         panic!("{invitations:?}");
     };
     assert!(matches!(accepted.state, InvitationState::Accepted { .. }));
-    // What was made with the forgotten token still ends with the token that made that one.
+    assert!(!f.store.set_host_token([7; 32], f.now).await.unwrap());
+    // What was made with the forgotten tokens still ends with the token that made that one.
     f.store
         .revoke_token(Actor::Organiser, root, EndMade::Except(None), f.now)
         .await

@@ -145,19 +145,26 @@ impl SteadyClock {
     }
 
     pub(super) fn accept(&self, step: &ClockStep) -> bool {
-        let mut state = self.lock();
-        let shifted = timestamp(state.zero).duration_since(step.zero_at);
-        let is_obsolete = match step.cause {
-            StepCause::MonotonicClock => shifted.abs() > TOLERANCE,
-            StepCause::NewestChange => state.behind.is_none(),
-        };
-        if is_obsolete {
+        // The system clock may have been set again since.
+        let is_current = self.read().step.is_some_and(|current| {
+            current.cause == step.cause
+                && (current.by - step.by).abs() <= TOLERANCE
+                && current.zero_at.duration_since(step.zero_at).abs() <= TOLERANCE
+        });
+        if !is_current {
             return false;
         }
+        let mut state = self.lock();
         state.zero = state.zero.saturating_add(step.shift());
         state.expected_zero = state.zero;
         state.behind = None;
         true
+    }
+
+    pub(super) fn revert(&self, step: &ClockStep) {
+        let mut state = self.lock();
+        state.zero = state.zero.saturating_sub(step.shift());
+        state.expected_zero = state.zero;
     }
 
     pub(super) fn zero_at(&self) -> Timestamp {

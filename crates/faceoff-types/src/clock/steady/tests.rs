@@ -176,7 +176,7 @@ fn clock_before_the_newest_change_is_reported() {
     assert_eq!(step.cause, StepCause::NewestChange);
     assert_eq!(step.size(), "3600 s behind");
     assert_eq!(clock.now(), at(1000), "there is no better time");
-    // It catches up by itself, or is accepted. Either holds, even if the clock is set afterwards.
+    // It catches up automatically, or is accepted. Either holds, even if the clock is set afterwards.
     let (waiting, accepting) = (clock.clone(), machine.clock(start));
     let step = accepting.step().unwrap();
     assert!(accepting.accept(&step));
@@ -196,4 +196,23 @@ fn clock_before_the_newest_change_is_reported() {
         ..start
     };
     assert_eq!(Machine::default().clock(nearly).step(), None);
+}
+
+#[test]
+fn past_step_is_not_accepted_and_acceptance_can_be_undone() {
+    let machine = Machine::default();
+    let clock = machine.clock(ClockStart::default());
+    machine.set(DAY_MS);
+    let step = clock.step().unwrap();
+    machine.set(-DAY_MS);
+    assert!(!clock.accept(&step), "the clock is right again");
+    assert_eq!((clock.now(), clock.step()), (at(0), None));
+    machine.set(2 * DAY_MS);
+    assert!(!clock.accept(&step), "it is another step");
+    let step = clock.step().unwrap();
+    assert!(clock.accept(&step));
+    assert_eq!(clock.now(), at(2 * DAY_MS));
+    clock.revert(&step);
+    assert_eq!(clock.now(), at(0));
+    assert_eq!(clock.step().unwrap().by, step.by);
 }

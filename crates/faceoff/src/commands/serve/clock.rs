@@ -78,16 +78,20 @@ pub(super) async fn watch(
 ) -> anyhow::Result<()> {
     let boot_id = boot_id();
     let (mut logged, mut recorded) = (None, None);
+    let mut has_failed = false;
     loop {
         logged = log_change(logged, clock.step());
         if let (Some(boot_id), Some(zero_at)) = (&boot_id, clock.zero_at())
             && recorded.is_none_or(|at| zero_at.duration_since(at).abs() > MIN_CHANGE)
         {
             let boot_id = boot_id.clone();
-            // After a failure the next change is recorded.
-            recorded = Some(zero_at);
-            if let Err(error) = record(&data_dir, &ClockRecord { boot_id, zero_at }) {
-                tracing::warn!(%error, "the clock could not be recorded: if the server is restarted, a step of the clock meanwhile is not noticed");
+            match record(&data_dir, &ClockRecord { boot_id, zero_at }) {
+                Ok(()) => (recorded, has_failed) = (Some(zero_at), false),
+                Err(error) if !has_failed => {
+                    has_failed = true;
+                    tracing::warn!(%error, "the clock could not be recorded, trying again: if the server is restarted before, a step of the clock meanwhile is not noticed");
+                }
+                Err(_) => {}
             }
         }
         tokio::select! {
