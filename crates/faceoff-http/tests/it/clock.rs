@@ -120,14 +120,15 @@ async fn organiser_accepts_a_clock_step() {
     assert_eq!(post(one_day.clone()).await.status, 204);
     site.get("/api/v1/health", None).await.json(200);
     post(one_day).await.problem(409, "conflict", &["no step"]);
-    // The cutoff of the second day is due, and the running job keeps its lease.
+    // The running job keeps its lease, and no other worker gets it.
     let now = site.clock().now();
     assert_eq!(now, time("2026-03-02T10:00:00Z"));
-    assert_eq!(start_due(&site).await, 2);
     let other = site.store.claim("other", LEASE_S, now).await.unwrap();
     assert_ne!(other.unwrap().claim.job, claim.job);
     let renewed = site.store.heartbeat(&claim, 0, LEASE_S, now).await;
     assert!(renewed.unwrap());
+    // The cutoff of the second day is due, which is also the deadline of the first.
+    assert_eq!(start_due(&site).await, 2);
     let path = "/api/v1/events?limit=1&kind=clock_step_accepted";
     let log = site.get(path, Some(ADMIN)).await;
     assert_contains(&log.body, &["86400 s ahead"]);
