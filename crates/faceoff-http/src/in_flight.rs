@@ -1,5 +1,5 @@
 //! Limits the number of requests in flight, which are those that the server is answering. Under overload it refuses requests
-//! at once, and refuses requests that only read first.
+//! at once: first visitors' requests that only read, then those of all visitors, then those of teams, and last those of organisers.
 
 use axum::{
     extract::{Request, State},
@@ -9,37 +9,32 @@ use axum::{
 use faceoff_api::paths::LIVE_PATH;
 use faceoff_service::{
     app::AppState,
+    places::{Places, Precedence},
     problem::{Problem, ProblemKind},
 };
 use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
-use tokio::sync::Semaphore;
 
 /// With fewer requests in flight, no request is refused because of its wait: so few requests do not cause a long wait.
 const MIN_CROWDED_REQUESTS: usize = 64;
-/// Longest time that a reading request may wait until the async runtime continues it. After a longer wait it is refused.
+/// Longest time that a visitor's reading request may wait until the async runtime continues it. After a longer wait it is refused.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
-/// Counts the requests in flight, with one permit for each.
+/// Counts the requests in flight.
 #[derive(Debug, Clone)]
 pub(crate) struct InFlight {
     app: Arc<AppState>,
-    permits: Arc<Semaphore>,
+    places: Places,
 }
 
 impl InFlight {
     pub(crate) fn new(app: &Arc<AppState>) -> Self {
         Self {
             app: Arc::clone(app),
-            permits: Arc::new(Semaphore::new(app.config.limits.requests)),
+            places: Places::new(app.config.limits.requests),
         }
-    }
-
-    fn is_crowded(&self) -> bool {
-        let limit = self.app.config.limits.requests;
-        limit.saturating_sub(self.permits.available_permits()) >= MIN_CROWDED_REQUESTS
     }
 
     /// The response to a refused request. `cause` is its label in the metrics.
@@ -53,7 +48,8 @@ impl InFlight {
     }
 }
 
-/// Answers `Busy` when the limit is reached. Requests that only read also get `Busy` after a wait longer than [`MAX_WAIT`].
+/// Answers `Busy` when the limit for such callers is reached. Visitors' requests that only read also get `Busy` after a wait longer
+/// than [`MAX_WAIT`].
 pub(crate) async fn limit(
     State(in_flight): State<InFlight>,
     request: Request,
@@ -63,14 +59,15 @@ pub(crate) async fn limit(
     if request.uri().path() == LIVE_PATH {
         return next.run(request).await;
     }
-    let Ok(_permit) = in_flight.permits.try_acquire() else {
+    let precedence = in_flight.app.precedence(request.headers()).await;
+    let Some(_place) = in_flight.places.take(precedence) else {
         return in_flight.refuse("in_flight");
     };
-    if request.method().is_safe() {
+    if request.method().is_safe() && precedence == Precedence::Visitor {
         // The runtime polls all other ready tasks before this one continues, so the elapsed time is the delay that they cause.
         let yielded_at = Instant::now();
         tokio::task::yield_now().await;
-        if yielded_at.elapsed() > MAX_WAIT && in_flight.is_crowded() {
+        if yielded_at.elapsed() > MAX_WAIT && in_flight.places.taken() >= MIN_CROWDED_REQUESTS {
             return in_flight.refuse("late");
         }
     }

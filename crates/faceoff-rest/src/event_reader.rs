@@ -53,7 +53,7 @@ pub(crate) struct EventReader {
     /// When the stream ends.
     ends_at: Instant,
     shutdown: Option<Shutdown>,
-    _permit: OwnedSemaphorePermit,
+    _place: Place,
 }
 
 impl EventReader {
@@ -63,7 +63,7 @@ impl EventReader {
         subscription: Subscription,
         last_received: Option<i64>,
         shutdown: Option<Shutdown>,
-        permit: OwnedSemaphorePermit,
+        place: Place,
     ) -> Result<Self, Problem> {
         // Subscribed before the log is read, so that no event is missed.
         let changes = app.store.events();
@@ -84,7 +84,7 @@ impl EventReader {
             next_read_at: now,
             ends_at: now + MAX_DURATION,
             shutdown,
-            _permit: permit,
+            _place: place,
         })
     }
 

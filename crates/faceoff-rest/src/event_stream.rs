@@ -1,6 +1,6 @@
 //! The event stream: changes of the season as server-sent events.
 
-use super::sse::{LAST_EVENT_ID, sse_response};
+use super::sse::{LAST_EVENT_ID, sse_response, take_place};
 use crate::event_reader::{EventReader, Subscription};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_api::requests::FollowQuery;
@@ -14,7 +14,6 @@ use faceoff_service::{
     viewer::Viewer,
 };
 use futures::stream;
-use std::sync::Arc;
 
 /// Streams events as they happen (server-sent events), as far as the caller may see them.
 ///
@@ -54,15 +53,12 @@ pub(crate) async fn follow_events(
         .get(LAST_EVENT_ID)
         .map(|value| parse_id(value.to_str().unwrap_or_default()))
         .transpose()?;
-    let Ok(permit) = Arc::clone(&app.event_reader_permits).try_acquire_owned() else {
-        return Err(Problem::new(
-            ProblemKind::Busy,
-            format!(
-                "the server has {} readers of the event stream, which is the maximum; try again later, or poll the resources",
-                app.config.limits.event_readers
-            ),
-        ));
-    };
+    let place = take_place(
+        &app.event_readers,
+        caller.as_ref(),
+        "the event stream",
+        "the resources",
+    )?;
     let viewer = caller.as_ref().map_or(Viewer::Visitor, Viewer::new);
     let subscription = Subscription {
         audience: viewer.into(),
@@ -70,7 +66,7 @@ pub(crate) async fn follow_events(
         filter,
     };
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
-    let reader = EventReader::open(app, subscription, last_received, shutdown, permit).await?;
+    let reader = EventReader::open(app, subscription, last_received, shutdown, place).await?;
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))

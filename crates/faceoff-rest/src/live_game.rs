@@ -1,6 +1,6 @@
 //! The stream of a live game: positions, goals and fouls as server-sent events while it is played.
 
-use super::sse::{LAST_EVENT_ID, sse_response};
+use super::sse::{LAST_EVENT_ID, sse_response, take_place};
 use crate::live_reader::{LiveReader, parse_cursor};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_service::{
@@ -14,7 +14,6 @@ use faceoff_service::{
 };
 use faceoff_types::GameId;
 use futures::stream;
-use std::sync::Arc;
 
 /// Streams a live game (server-sent events).
 ///
@@ -51,19 +50,11 @@ pub(crate) async fn watch_game(
         .get(LAST_EVENT_ID)
         .map(|value| parse_cursor(value.to_str().unwrap_or_default()))
         .transpose()?;
-    let Ok(permit) = Arc::clone(&app.live_reader_permits).try_acquire_owned() else {
-        return Err(Problem::new(
-            ProblemKind::Busy,
-            format!(
-                "the server has {} readers of live games, which is the maximum; try again later, or poll GET \
-                 /api/v1/games/{id}",
-                app.config.limits.live_readers
-            ),
-        ));
-    };
+    let polled = format!("GET /api/v1/games/{id}");
+    let place = take_place(&app.live_readers, caller.as_ref(), "live games", &polled)?;
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
     let requester = caller.map(|caller| caller.requester());
-    let reader = LiveReader::new(app, id, requester, last_event_id, shutdown, permit);
+    let reader = LiveReader::new(app, id, requester, last_event_id, shutdown, place);
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))

@@ -53,7 +53,7 @@ pub(crate) struct LiveReader {
     /// When the stream ends, even if the game has not.
     ends_at: Instant,
     shutdown: Option<Shutdown>,
-    _permit: OwnedSemaphorePermit,
+    _place: Place,
 }
 
 /// State of a game in the database.
@@ -70,7 +70,7 @@ impl LiveReader {
         requester: Option<Requester>,
         cursor: Option<LiveCursor>,
         shutdown: Option<Shutdown>,
-        permit: OwnedSemaphorePermit,
+        place: Place,
     ) -> Self {
         let now = Instant::now();
         Self {
@@ -87,7 +87,7 @@ impl LiveReader {
             next_batch_at: now,
             ends_at: now + MAX_DURATION,
             shutdown,
-            _permit: permit,
+            _place: place,
         }
     }
 

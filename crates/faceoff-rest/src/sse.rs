@@ -7,7 +7,12 @@ use axum::{
         sse::{Event, KeepAlive, Sse},
     },
 };
-use faceoff_service::{app::App, problem::Problem};
+use faceoff_service::{
+    app::App,
+    auth::Caller,
+    places::{Place, Places, Precedence},
+    problem::{Problem, ProblemKind},
+};
 use faceoff_store::Requester;
 use futures::{Stream, StreamExt as _, stream};
 use std::{convert::Infallible, time::Duration};
@@ -29,6 +34,27 @@ pub(super) async fn is_still_valid(
             .await?),
         None => Ok(true),
     }
+}
+
+/// Takes a place for the reader of a stream. The message of a refusal says what can be polled instead.
+pub(super) fn take_place(
+    readers: &Places,
+    caller: Option<&Caller>,
+    stream: &str,
+    polled: &str,
+) -> Result<Place, Problem> {
+    let precedence = caller.map_or(Precedence::Visitor, Caller::precedence);
+    readers.take(precedence).ok_or_else(|| {
+        Problem::new(
+            ProblemKind::Busy,
+            format!(
+                "{} of the {} places for readers of {stream} are taken, and the last ones are kept for teams and organisers; try \
+                 again later, or poll {polled}",
+                readers.taken(),
+                readers.max()
+            ),
+        )
+    })
 }
 
 /// A streaming response with the events of all batches. It ends when `batches` ends.

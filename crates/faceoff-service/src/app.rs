@@ -5,13 +5,16 @@ use crate::{
     answer_cache::{self, AnswerCache},
     change_quota::ChangeQuota,
     config::HttpConfig,
+    credential,
     passwords::Passwords,
+    places::{Places, Precedence},
     problem::Problem,
     rate_limits::RequestLimiter,
     shared_cache::SharedCache,
     summaries::Summaries,
     upload_slots::UploadSlots,
 };
+use axum::http::HeaderMap;
 use faceoff_api::views::champion_shares::ChampionSharesView;
 use faceoff_live::LiveState;
 use faceoff_notify::Feed;
@@ -55,10 +58,10 @@ pub struct AppState {
     tournament_computation: Semaphore,
     /// Whether the season has a tournament; false until this process has seen one. Tournaments are never removed.
     pub has_tournaments: AtomicBool,
-    /// One permit per reader of a live game.
-    pub live_reader_permits: Arc<Semaphore>,
-    /// One permit per reader of the event stream.
-    pub event_reader_permits: Arc<Semaphore>,
+    /// Readers of live games.
+    pub live_readers: Places,
+    /// Readers of the event stream.
+    pub event_readers: Places,
     /// Source of all event streams.
     pub feed: Feed,
     /// Verifies passwords and counts wrong ones.
@@ -67,6 +70,8 @@ pub struct AppState {
     pub request_limiter: RequestLimiter,
     /// Changes per team and day.
     pub change_quota: ChangeQuota,
+    /// Whose tokens were verified recently, by the hash of their secret.
+    recent_callers: SharedCache<[u8; 32], Precedence>,
     /// Random per process. Part of entity tags (header `ETag`), because the database may be another one after a restart.
     pub process_id: Uuid,
 }
@@ -84,6 +89,9 @@ const MAX_TOURNAMENTS: u64 = 20;
 /// Size of the analyses in memory. Most have some ten kilobytes; those of a robot that violates a limit again and again have
 /// some hundred.
 const MAX_ANALYSIS_BYTES: u64 = 16 << 20;
+
+/// Verified tokens in memory: those of a large season's teams, programs and browsers.
+const MAX_RECENT_CALLERS: u64 = 10_000;
 
 /// Answers about a tournament by the newest change of the season that they include.
 type TournamentAnswers<T> = SharedCache<(i64, TournamentId), T>;
@@ -106,12 +114,13 @@ impl AppState {
             champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
             tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),
-            live_reader_permits: Arc::new(Semaphore::new(config.limits.live_readers)),
-            event_reader_permits: Arc::new(Semaphore::new(config.limits.event_readers)),
+            live_readers: Places::new(config.limits.live_readers),
+            event_readers: Places::new(config.limits.event_readers),
             feed: Feed::new(store.clone()),
             passwords: Passwords::default(),
             request_limiter: RequestLimiter::new(config.rate_limits),
             change_quota: ChangeQuota::new(config.rate_limits.team_changes_per_day),
+            recent_callers: SharedCache::with_entries(MAX_RECENT_CALLERS),
             process_id: Uuid::now_v7(),
             store,
             live,
@@ -137,6 +146,24 @@ impl AppState {
         answers
             .get(key, async { compute.await.map(Arc::new) })
             .await
+    }
+
+    /// Whose request it is, as far as this is known without reading the database: a token that was not verified recently counts as a
+    /// visitor's. This gives no rights.
+    pub async fn precedence(&self, headers: &HeaderMap) -> Precedence {
+        let Some(hash) = credential::secret_hash(&self.config, headers) else {
+            return Precedence::Visitor;
+        };
+        let caller = self.recent_callers.cached(&hash).await;
+        caller.map_or(Precedence::Visitor, |caller| *caller)
+    }
+
+    /// Remembers whose token it is that was just verified, or, with `None`, that it is not valid.
+    pub(crate) async fn remember_caller(&self, hash: [u8; 32], caller: Option<Precedence>) {
+        match caller {
+            Some(caller) => self.recent_callers.insert(hash, Arc::new(caller)).await,
+            None => self.recent_callers.remove(&hash).await,
+        }
     }
 
     /// Counts a request with a token.

@@ -5,8 +5,10 @@ use crate::{
     app::App,
     boxed,
     change_quota::{self, RemainingChangesSlot},
+    credential::Credential,
+    places::Precedence,
     problem::{Problem, ProblemKind},
-    request_log, session,
+    request_log,
 };
 use axum::{
     extract::FromRequestParts,
@@ -77,6 +79,15 @@ impl Caller {
     /// The host, or an organiser.
     pub const fn is_organiser(&self) -> bool {
         matches!(self.principal, Principal::Host | Principal::Organiser(_))
+    }
+
+    /// Before whom the caller has a place under overload.
+    pub const fn precedence(&self) -> Precedence {
+        if self.is_organiser() {
+            Precedence::Organiser
+        } else {
+            Precedence::Team
+        }
     }
 
     /// Whether the caller acts for this team or is an organiser.
@@ -187,39 +198,9 @@ impl TeamCaller {
     }
 }
 
-/// The credential of a request: an API token, or the secret of a browser's session.
-enum Credential<'a> {
-    Bearer(&'a str),
-    Cookie(&'a str),
-}
-
-fn credential<'a>(parts: &'a Parts, app: &App) -> Result<Option<Credential<'a>>, Problem> {
-    if let Some(value) = parts.headers.get(header::AUTHORIZATION) {
-        return match value.to_str().ok().and_then(|value| value.split_once(' ')) {
-            Some((scheme, token))
-                if scheme.eq_ignore_ascii_case("bearer") && !token.trim().is_empty() =>
-            {
-                Ok(Some(Credential::Bearer(token.trim())))
-            }
-            _ => Err(Problem::new(
-                ProblemKind::Unauthenticated,
-                "the header Authorization is not of the form “Bearer TOKEN”",
-            )),
-        };
-    }
-    let Some(cookie) = session::session_cookie(&app.config, &parts.headers) else {
-        return Ok(None);
-    };
-    // Browsers also attach cookies to requests that a page of another site triggers.
-    if !parts.method.is_safe() {
-        session::check_same_origin(&parts.headers)?;
-    }
-    Ok(Some(Credential::Cookie(cookie)))
-}
-
 #[boxed]
 async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
-    let (token, kind) = match credential(parts, app)? {
+    let (token, kind) = match Credential::read(parts, &app.config)? {
         None => return Ok(None),
         Some(Credential::Bearer(token)) => (token, TokenKind::ApiToken),
         Some(Credential::Cookie(token)) => (token, TokenKind::Session),
@@ -231,13 +212,20 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     let verified = app.store.verify_token(secret_hash, kind, now).await?;
     let VerifiedToken { token, principal } = match verified {
         Ok(verified) => verified,
-        // With an expired session cookie the caller is a visitor.
-        Err(_) if kind == TokenKind::Session => return Ok(None),
-        Err(rejection) => return Err(token_problem(rejection)),
+        Err(rejection) => {
+            app.remember_caller(secret_hash, None).await;
+            return match kind {
+                // With an expired session cookie the caller is a visitor.
+                TokenKind::Session => Ok(None),
+                TokenKind::ApiToken => Err(token_problem(rejection)),
+            };
+        }
     };
     app.check_rate(token.id)?;
     record_use(app, &token, now);
     let caller = Caller::new(token, secret_hash, principal);
+    app.remember_caller(secret_hash, Some(caller.precedence()))
+        .await;
     if let Some(team) = caller.team()
         && change_quota::is_counted(&parts.method, parts.uri.path())
     {

@@ -316,7 +316,7 @@ async fn number_of_event_readers_is_limited() {
     let mut stream = Stream::open(&site, STREAM_PATH, None, None).await;
     assert_eq!(stream.next().await.unwrap().name, "now");
     let busy = site.get(STREAM_PATH, None).await;
-    busy.problem(503, "busy", &["1 readers"]);
+    busy.problem(503, "busy", &["1 of the 1 places"]);
     assert_eq!(busy.header("retry-after"), "2");
     site.shut_down().await;
     assert_eq!(

@@ -38,6 +38,7 @@ mod html;
 mod invitations;
 mod openapi;
 mod organiser_dashboard;
+mod overload;
 mod pagination;
 mod probes;
 mod problems;

@@ -11,16 +11,16 @@ use tokio::{
 const LARGE_BYTES: usize = 200 << 20;
 
 /// A connection whose client writes and reads when the test says so.
-struct Connection(BufReader<TcpStream>);
+pub struct Connection(BufReader<TcpStream>);
 
 impl Connection {
-    async fn open(site: &Site) -> Self {
+    pub async fn open(site: &Site) -> Self {
         let address = site.url.trim_start_matches("http://");
         Self(BufReader::new(TcpStream::connect(address).await.unwrap()))
     }
 
     /// Sends the head of a request with this method, path and other headers.
-    async fn send_head(&mut self, request: &str, headers: &[&str]) {
+    pub async fn send_head(&mut self, request: &str, headers: &[&str]) {
         let mut head = format!("{request} HTTP/1.1\r\nHost: faceoff\r\n");
         for header in headers {
             head += &format!("{header}\r\n");
@@ -39,13 +39,19 @@ impl Connection {
         }
     }
 
-    /// Reads the head of a response and its body, which must have a `Content-Length`.
-    async fn read_response(&mut self) -> String {
+    /// Reads the head of a response.
+    pub async fn read_head(&mut self) -> String {
         let mut head = String::new();
         while !head.ends_with("\r\n\r\n") {
             let read = self.0.read_line(&mut head).await.unwrap();
             assert!(read > 0, "the connection was closed after {head:?}");
         }
+        head
+    }
+
+    /// Reads the head of a response and its body, which must have a `Content-Length`.
+    async fn read_response(&mut self) -> String {
+        let head = self.read_head().await;
         let length = head
             .lines()
             .find_map(|line| line.strip_prefix("content-length: "));

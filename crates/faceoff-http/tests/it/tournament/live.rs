@@ -260,7 +260,7 @@ async fn number_of_live_readers_is_limited() {
     assert_eq!(stream.next().await.unwrap().name, "waiting");
     let path = format!("/api/v1/games/{game}/live");
     let busy = cup.site.get(&path, None).await;
-    busy.problem(503, "busy", &["1 readers"]);
+    busy.problem(503, "busy", &["1 of the 1 places"]);
     assert_eq!(busy.header("retry-after"), "2");
     // The stream of a cancelled game ends.
     let departure = json!({ "team": "A", "as": "disqualified", "reason": "x", "confirm": "A" });
