@@ -25,7 +25,7 @@ use serde_json::{Value, json};
 use std::{
     collections::BTreeMap,
     fmt::Display,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex},
     time::Duration,
 };
@@ -148,6 +148,20 @@ impl Answer {
             assert!(detail.contains(word), "{word:?} is not in {detail:?}");
         }
         problem
+    }
+}
+
+/// Copies the files below one folder into another one, which exists.
+fn copy_folder(from: &Path, to: &Path) {
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let (source, target) = (entry.path(), to.join(entry.file_name()));
+        if source.is_dir() {
+            std::fs::create_dir(&target).unwrap();
+            copy_folder(&source, &target);
+        } else {
+            std::fs::copy(&source, &target).unwrap();
+        }
     }
 }
 
@@ -364,6 +378,24 @@ impl Site {
         );
         let config = config_without_slots(upload_dir, Clock::new(move || made_at));
         Self::serve(store, folder, config, Arc::new(Mutex::new(made_at))).await
+    }
+
+    /// Shuts the server down and closes its season, so that [`copy`](Self::copy) can copy it.
+    pub async fn close(&mut self) {
+        self.shut_down().await;
+        self.store.close().await;
+    }
+
+    /// Another server on a copy of a closed season, with the same clock.
+    pub async fn copy(&self) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        copy_folder(self.folder.path(), folder.path());
+        let store = Store::open(folder.path()).await.unwrap();
+        let config = HttpConfig {
+            upload_dir: folder.path().join("uploads"),
+            ..self.config.clone()
+        };
+        Self::serve(store, folder, config, Arc::clone(&self.now)).await
     }
 
     /// The metrics of the server.
