@@ -64,11 +64,7 @@ mod tests {
 
     #[test]
     fn last_places_are_kept_for_teams_and_organisers() {
-        let order = [
-            Precedence::Visitor,
-            Precedence::Team,
-            Precedence::Organiser,
-        ];
+        let order = [Precedence::Visitor, Precedence::Team, Precedence::Organiser];
         for (max, expected) in [
             (0, [0, 0, 0]),
             (1, [1, 1, 1]),

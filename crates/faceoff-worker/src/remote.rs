@@ -40,6 +40,7 @@ mod result_sender;
 mod server_client;
 mod streams;
 mod transfer;
+mod unfinished_checks;
 mod worker;
 mod worker_link;
 

@@ -23,7 +23,14 @@ use faceoff_tests::{
 };
 use futures::StreamExt as _;
 use serde_json::{Value, json};
-use std::{collections::BTreeSet, fs, path::Path, time::Duration};
+use std::{
+    collections::BTreeSet,
+    fs,
+    io::{BufRead as _, BufReader},
+    path::Path,
+    process::{Child, Command, Stdio},
+    time::Duration,
+};
 use tokio::runtime::Runtime;
 
 /// A client that uses the workers' protocol and runs no jobs.
@@ -135,6 +142,15 @@ impl FakeWorker {
         let ids = [&lease["unit"], &lease["nonce"]].map(|id| id.as_str().expect("an id is a text"));
         self.publish("faceoff.outcomes.liar", &ids.join("/"), &message)
             .await;
+    }
+
+    /// Reports that the job failed. Each label makes another message.
+    async fn report_failure(&self, job: &Value, label: &str) {
+        let message = json!({
+            "lease": job["order"]["lease"], "grant": job["grant"],
+            "outcome": { "kind": "platform_fault", "reason": "nothing works" },
+        });
+        self.publish("faceoff.outcomes.liar", label, &message).await;
     }
 
     async fn publish(&self, subject: &'static str, message_id: &str, message: &Value) {
@@ -443,6 +459,89 @@ fn false_result_bans_worker_and_requeues_its_jobs() {
         "a readmitted worker is checked like any other: {answer:#}"
     );
     honest.stop();
+}
+
+/// A process that keeps others from writing to a database.
+struct WriteLock {
+    process: Child,
+}
+
+impl WriteLock {
+    fn take(database: &Path) -> Self {
+        let script = "import sqlite3, sys\n\
+                      database = sqlite3.connect(sys.argv[1], timeout=600, isolation_level=None)\n\
+                      database.execute('BEGIN IMMEDIATE')\n\
+                      print('locked', flush=True)\n\
+                      sys.stdin.read()";
+        let mut process = Command::new("python3")
+            .args(["-c", script])
+            .arg(database)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("python3 starts");
+        let output = process.stdout.as_mut().expect("its output is a pipe");
+        let mut line = String::new();
+        BufReader::new(output)
+            .read_line(&mut line)
+            .expect("python3 prints text");
+        assert_eq!(line, "locked\n");
+        Self { process }
+    }
+}
+
+impl Drop for WriteLock {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+#[test]
+fn result_whose_checks_never_end_bans_its_worker() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let reference_run = ReferenceRun::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let file_relay = Relay::start();
+    let config = server_config(&nats, file_relay.address());
+    let start = || {
+        let server = Server::start(&reference_run.data_dir, &config);
+        file_relay.set_target(server.address().into());
+        server
+    };
+    let mut server = start();
+    resume(&server);
+    let runtime = Runtime::new().expect("a runtime starts");
+    let fake = runtime.block_on(FakeWorker::connect(&nats));
+    let job = runtime.block_on(fake.take_job());
+    let nonce = job["order"]["lease"]["nonce"].as_str();
+    let check = reference_run
+        .data_dir
+        .join("result-checks")
+        .join(nonce.expect("a lease has a nonce"));
+    let database = reference_run.data_dir.join("faceoff.sqlite3");
+    for label in ["first", "second", "third"] {
+        // The check cannot store the result while the database is locked, and is interrupted by the end of the server.
+        let lock = WriteLock::take(&database);
+        runtime.block_on(fake.report_failure(&job, label));
+        while !check.exists() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        server.kill();
+        drop(lock);
+        assert!(check.exists(), "the {label} check has not ended");
+        server = start();
+    }
+    runtime.block_on(fake.report_failure(&job, "fourth"));
+    server.wait_for_log("a worker is banned", 1);
+    let view = server.get("/api/v1/workers", Some(&server.admin_token));
+    let view: Value = view.json().expect("the API speaks JSON");
+    let reason = view["bans"][0]["reason"].as_str().unwrap_or_default();
+    assert!(reason.contains("did not survive three checks"), "{view:#}");
+    let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
+    reference_run.assert_equal_result(&server);
+    honest.stop();
+    assert!(!check.exists(), "the number of checks is forgotten");
 }
 
 #[test]

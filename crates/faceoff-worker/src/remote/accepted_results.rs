@@ -6,6 +6,7 @@ use super::{
     grants::{Acceptance, open_grant, store_result},
     names,
     pending_results::PendingResult,
+    unfinished_checks::CheckStart,
 };
 use crate::server::{JobServer, LeaseStatus, ReleaseReason};
 use anyhow::Context as _;
@@ -207,7 +208,7 @@ impl Dispatcher {
         };
         // Dropped at the end of this function.
         let _processing = self.pending_results.start_processing(nonce);
-        let acknowledgement = match self.check_and_store(message, grant, result).await {
+        let acknowledgement = match self.check_once_more(message, grant, result).await {
             // A repeated result has no effect.
             Ok(Acceptance::Accepted | Acceptance::Unusable) if is_job_over => {
                 tracing::info!(job = %id, %worker, "the job is over already; result ignored");
@@ -234,20 +235,58 @@ impl Dispatcher {
                 tracing::info!(job = %id, %worker, "lease lost; result ignored");
                 AckKind::Ack
             }
-            Ok(Acceptance::Rejected(difference)) => match self.ban(&worker, &difference).await {
-                retry @ AckKind::Nak(_) => return retry,
-                acknowledgement => acknowledgement,
-            },
+            Ok(Acceptance::Rejected(difference)) => {
+                // It may quote the recording.
+                let difference = printable_excerpt(&difference, MAX_REASON_CHARS);
+                let reason = format!("its recording differs from the simulation: {difference}");
+                match self.ban(&worker, &reason).await {
+                    retry @ AckKind::Nak(_) => return retry,
+                    acknowledgement => acknowledgement,
+                }
+            }
+            Ok(Acceptance::Unchecked) => {
+                let reason = format!(
+                    "the server did not survive three checks of its result of job {id}; if the server was ended from outside each \
+                     time, readmit the worker"
+                );
+                match self.ban(&worker, &reason).await {
+                    retry @ AckKind::Nak(_) => return retry,
+                    acknowledgement => acknowledgement,
+                }
+            }
             Ok(Acceptance::FilesPending) => return AckKind::Nak(Some(FILES_RETRY_AFTER)),
             Err(error) => {
                 tracing::error!(job = %id, %worker, cause = format!("{error:#}"), "a result could not be stored; trying again");
                 return AckKind::Nak(Some(RETRY_AFTER));
             }
         };
+        self.unfinished_checks.finish(nonce);
         // Results that are delivered again (the early returns above) stay pending.
         self.pending_results.remove(nonce);
         workers.forget_files(nonce);
         acknowledgement
+    }
+
+    /// Checks and stores a result, unless too many earlier checks of it did not end: they ended the process, or panicked.
+    async fn check_once_more(
+        &self,
+        message: &jetstream::Message,
+        grant: Grant,
+        result: ResultMessage,
+    ) -> anyhow::Result<Acceptance> {
+        let nonce = result.lease.nonce;
+        if self.unfinished_checks.begin(nonce)? == CheckStart::Refused {
+            return Ok(Acceptance::Unchecked);
+        }
+        let checked = self.check_and_store(message, grant, result).await;
+        let is_panic = |error: &anyhow::Error| {
+            let join_error = error.downcast_ref::<JoinError>();
+            join_error.is_some_and(JoinError::is_panic)
+        };
+        if !checked.as_ref().is_err_and(is_panic) {
+            self.unfinished_checks.finish(nonce);
+        }
+        checked
     }
 
     /// Checks and stores a result. Meanwhile its lease is renewed, and NATS gets notices that the message is being processed.
@@ -299,26 +338,18 @@ impl Dispatcher {
     }
 
     /// Bans a worker: its results are ignored, and its jobs are queued again. Returns how to acknowledge the message.
-    async fn ban(&self, worker: &WorkerName, difference: &str) -> AckKind {
-        // It may quote the recording.
-        let difference = &printable_excerpt(difference, MAX_REASON_CHARS);
-        let reason = format!("its recording differs from the simulation: {difference}");
+    async fn ban(&self, worker: &WorkerName, reason: &str) -> AckKind {
         let (store, now) = (&self.server.store, self.server.clock.now());
-        match store.ban_worker(Actor::Server, worker, &reason, now).await {
+        match store.ban_worker(Actor::Server, worker, reason, now).await {
             Ok(requeued) => {
                 self.server.live.workers.end_jobs_of(worker.as_str());
-                tracing::error!(
-                    %worker,
-                    difference,
-                    requeued,
-                    "a worker is banned: its recording differs from the simulation"
-                );
+                tracing::error!(%worker, reason, requeued, "a worker is banned");
                 AckKind::Ack
             }
             // Another result of this worker has caused the ban at the same time.
             Err(StoreError::Conflict(_)) => AckKind::Ack,
             Err(error) => {
-                tracing::error!(%worker, %error, difference, "a worker could not be banned; trying again");
+                tracing::error!(%worker, %error, reason, "a worker could not be banned; trying again");
                 AckKind::Nak(Some(RETRY_AFTER))
             }
         }

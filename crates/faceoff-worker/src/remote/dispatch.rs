@@ -11,6 +11,7 @@ use super::{
     requests::RequestHandler,
     result_checks::ResultChecks,
     streams::{MESSAGES_LOST, Streams, is_ahead},
+    unfinished_checks::UnfinishedChecks,
 };
 use crate::{
     boxed,
@@ -34,6 +35,7 @@ use faceoff_wire::{
 };
 use futures::StreamExt as _;
 use std::{
+    path::PathBuf,
     pin::pin,
     sync::Arc,
     time::{Duration, Instant},
@@ -66,6 +68,8 @@ pub struct RemoteConfig {
     pub checked_episodes: u32,
     /// Bucket for the transfer of bundles and recordings, if not over this server's HTTP.
     pub bucket: Option<BucketConfig>,
+    /// Folder with the numbers of unfinished checks of results, which survive this process.
+    pub checks_dir: PathBuf,
 }
 
 impl RemoteConfig {
@@ -120,6 +124,7 @@ pub async fn dispatch(
             names.clone(),
             format!("Faceoff, season {season_commitment}"),
         )),
+        unfinished_checks: UnfinishedChecks::open(remote.checks_dir.clone())?,
         published_jobs: Arc::default(),
         pending_results: Arc::default(),
         client,
@@ -243,6 +248,7 @@ pub(super) struct Dispatcher {
     pub(super) bucket: Option<Arc<Bucket>>,
     published_jobs: Arc<PublishedJobs>,
     pub(super) pending_results: Arc<PendingResults>,
+    pub(super) unfinished_checks: UnfinishedChecks,
 }
 
 impl Dispatcher {

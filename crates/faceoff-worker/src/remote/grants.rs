@@ -73,6 +73,8 @@ pub(super) enum Acceptance {
     Rejected(String),
     /// Some of the result's files are still being uploaded.
     FilesPending,
+    /// The result was not checked, since too many earlier checks of it did not end.
+    Unchecked,
 }
 
 impl From<LeaseStatus> for Acceptance {

@@ -39,6 +39,7 @@ pub(super) fn remote_config(
         files_url: files_url.unwrap_or_else(|| format!("http://{address}")),
         key: link_key.grant_key(),
         bucket,
+        checks_dir: config.server.data_dir.join("result-checks"),
         checked_episodes: config.workers.checked_episodes,
         required: own_capabilities(agent, config.slots())?,
     }))
