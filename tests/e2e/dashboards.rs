@@ -4,7 +4,7 @@
 use crate::{CONFIG, Team};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use faceoff_tests::{
-    browser::{Browser, Page},
+    browser::{Browser, LAN_HOST, Page},
     bundle, repository,
     server::Server,
 };
@@ -34,12 +34,22 @@ impl<'a> InvitedUser<'a> {
 
 /// Invites the user. Returns a page on which the user has accepted the invitation and is signed in.
 pub fn sign_in<'a>(browser: &'a Browser, server: &Server, user: InvitedUser<'_>) -> Page<'a> {
+    sign_in_at(browser, server, &server.url, user)
+}
+
+/// [`sign_in`] on a server under this URL.
+fn sign_in_at<'a>(
+    browser: &'a Browser,
+    server: &Server,
+    url: &str,
+    user: InvitedUser<'_>,
+) -> Page<'a> {
     let answer = server.post("/api/v1/invitations", &server.admin_token, &user.invitation);
     let invitation: Value = answer.json().expect("the API speaks JSON");
     let code = invitation["code"]
         .as_str()
         .expect("an invitation has a code");
-    let page = browser.open(&format!("{}/join/{code}", server.url));
+    let page = browser.open(&format!("{url}/join/{code}"));
     let fields = [("name", user.name), ("password", "correct horse battery")];
     page.send_form("main form", &fields);
     assert!(
@@ -129,4 +139,40 @@ fn dashboards_suffice_to_join_upload_and_start_a_day() {
             .filter(|error| !error.contains("/dashboard/upload"));
         assert_eq!(unexpected.count(), 0, "{errors:?}");
     }
+}
+
+#[test]
+fn forms_work_without_tls_in_the_local_network() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let url = server.url.replace("127.0.0.1", LAN_HOST);
+    assert_ne!(url, server.url);
+    let browser = Browser::start(scratch.path());
+    let grace = sign_in_at(&browser, &server, &url, InvitedUser::organiser("Grace"));
+    assert_eq!(
+        grace.evaluate("window.isSecureContext"),
+        json!(false),
+        "the browser does not treat {url} as the loopback"
+    );
+    grace.go_to(&format!("{url}/organiser/messages"));
+    let announcement = [("title", "Welcome"), ("text", "The season begins.")];
+    grace.send_form("form[action='/organiser/messages']", &announcement);
+    let view: Value = server
+        .get("/api/v1/announcements", Some(&server.admin_token))
+        .json()
+        .expect("the API speaks JSON");
+    assert_eq!(view[0]["title"], "Welcome", "{}", grace.text("main"));
+    grace.go_to(&format!("{url}/account"));
+    grace.send_form("form[action='/sign-out']", &[]);
+    grace.go_to(&format!("{url}/sign-in"));
+    grace.send_form(
+        "main form",
+        &[("name", "Grace"), ("password", "correct horse battery")],
+    );
+    grace.go_to(&format!("{url}/organiser"));
+    assert!(
+        grace.text("body").contains("Grace"),
+        "{}",
+        grace.text("body")
+    );
 }

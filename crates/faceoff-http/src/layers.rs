@@ -216,7 +216,9 @@ async fn security_headers(mut response: Response) -> Response {
             },
         ),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
+        // With "no-referrer" browsers would also hide the origin of this server's own forms (`Origin: null`). Over plain http they say
+        // nothing else about where a form comes from, so all forms would be refused as those of other sites.
+        (header::REFERRER_POLICY, "same-origin"),
         (
             HeaderName::from_static("cross-origin-opener-policy"),
             "same-origin",
