@@ -35,7 +35,7 @@ export CARGO_INCREMENTAL := 0
 endif
 DEMO       := $(TARGET_DIR)/demo
 
-.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load route-costs remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   run a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -56,6 +56,7 @@ help:
 	@echo "make channels   print the rates of the channels between agents that remain"
 	@echo "make busy   run agents beside other load: CPU, memory, I/O and processes"
 	@echo "make load   measure how many page views a server handles, and check that agents are not affected"
+	@echo "make route-costs   measure the CPU time of each public page and API route"
 	@echo "make remote-slot   measure the overhead of a remote worker, compared with the server's own slot"
 	@echo "make crowd   measure the throughput of one server with many workers: SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S)"
 	@echo "make objects   compare file transfer by JetStream's object store and by HTTP, on a link of 200 ms"
@@ -200,6 +201,11 @@ load:
 	@docker/setup.sh load
 	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
 	python3 tests/load/load.py "$(RELEASE)/faceoff" "$(RELEASE)/striker"
+
+# What each public page and API route costs; run it on an idle machine.
+route-costs: setup-test
+	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
+	python3 tests/load/route_costs.py "$(RELEASE)/faceoff" "$(RELEASE)/striker"
 
 # Compares a slot of a remote worker with a slot of the server; run it on an idle machine.
 remote-slot: setup-test

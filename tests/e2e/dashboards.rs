@@ -176,3 +176,39 @@ fn forms_work_without_tls_in_the_local_network() {
         grace.text("body")
     );
 }
+
+#[test]
+fn scripts_of_other_sites_read_what_visitors_may() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let browser = Browser::start(scratch.path());
+    let grace = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
+    // A page without an address belongs to no site, so every server is another site.
+    grace.go_to("data:text/html,<title>Another site</title>");
+    let fetch = |path: &str, options: Value| {
+        grace.evaluate(&format!(
+            "fetch('{}{path}', {options}).then(answer => answer.text(), () => 'refused')",
+            server.url
+        ))
+    };
+    let text = |path: &str, options: Value| fetch(path, options).to_string();
+    assert!(text("/api/v1/season", json!({})).contains("commitment"));
+    assert!(text("/api/v1/no-such-resource", json!({})).contains("problems#"));
+    // No token, no cookie, no change, and no pages.
+    let token = json!({ "headers": { "Authorization": format!("Bearer {}", server.admin_token) } });
+    let cookie = json!({ "credentials": "include" });
+    let change = json!({ "method": "POST", "body": "{}", "headers": { "Content-Type": "application/json" } });
+    for (path, options) in [
+        ("/api/v1/season", token),
+        ("/api/v1/season", cookie),
+        ("/api/v1/days", change),
+        ("/", json!({})),
+        ("/organiser", json!({})),
+    ] {
+        assert_eq!(
+            fetch(path, options.clone()),
+            json!("refused"),
+            "{path} {options}"
+        );
+    }
+}

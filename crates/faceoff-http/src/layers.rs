@@ -14,6 +14,7 @@ use axum::{
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
+use faceoff_api::paths::API_BASE;
 use faceoff_pages::Embeddable;
 use faceoff_service::{
     answer_cache,
@@ -51,6 +52,7 @@ pub(crate) fn wrap(site: Router, app: &Arc<AppState>) -> Router {
         ))
         .layer(middleware::from_fn_with_state(Arc::clone(app), limit_rate))
         .layer(middleware::from_fn(tell_remaining_changes))
+        .layer(middleware::from_fn(share_public_api))
         .layer(middleware::map_response(security_headers))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(middleware::from_fn_with_state(Arc::clone(app), log_request))
@@ -131,6 +133,25 @@ pub(crate) async fn read_consistently(
         Method::GET | Method::HEAD => app.store.read_consistently(next.run(request)).await,
         _ => next.run(request).await,
     }
+}
+
+/// Lets scripts of other sites read the API as visitors (CORS). They cannot send a token or a cookie: browsers would ask for
+/// permission first, which no route gives, and `*` does not cover requests with cookies.
+async fn share_public_api(request: Request, next: Next) -> Response {
+    let path = request.uri().path().strip_prefix(API_BASE);
+    let is_shared = request.method().is_safe() && path.is_some_and(|path| path.starts_with('/'));
+    let mut response = next.run(request).await;
+    if is_shared {
+        for name in [
+            header::ACCESS_CONTROL_ALLOW_ORIGIN,
+            header::ACCESS_CONTROL_EXPOSE_HEADERS,
+        ] {
+            response
+                .headers_mut()
+                .insert(name, HeaderValue::from_static("*"));
+        }
+    }
+    response
 }
 
 /// Adds the headers about the team's quota of changes to the response to a change.
