@@ -5,6 +5,7 @@
 mod ablation;
 mod bucket;
 mod equal_results;
+pub(crate) mod fake_worker;
 mod false_results;
 mod incompatible_workers;
 mod interruptions;

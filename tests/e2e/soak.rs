@@ -1,19 +1,22 @@
-//! A soak test, a long run of everything at once: evaluations, valid and invalid uploads, visitors of pages, a disk that fills up
-//! and is freed, and `kill -9`. At the end each result equals that of an undisturbed run, each upload has the right verdict, and no
-//! files are left over.
+//! A soak test, a long run of everything at once: evaluations, valid and invalid uploads, visitors of pages and costly ones, tokens
+//! that are revoked, a remote worker that sends false results, a system clock that is set, a disk that fills up and is freed, and
+//! `kill -9`. At the end each result equals that of an undisturbed run, each upload has the right verdict, no revoked token was
+//! accepted, and no files are left over.
 #![expect(clippy::print_stdout, reason = "it prints a summary of its run")]
 
 use crate::{
-    Team, dataset, entry, evaluation_path, kills::draw, log_growth::WAL_LIMIT_BYTES, score_locally,
-    start_day, upgrade, without_times,
+    Team, dataset, entry, evaluation_path, kills::draw, log_growth::WAL_LIMIT_BYTES,
+    remote_workers::fake_worker::FakeWorker, score_locally, start_day, upgrade, without_times,
 };
 use faceoff_tests::{
     bundle::{pack, python_agent, python_bundle, reference},
-    server::{Server, http},
+    faketime::SystemClock,
+    nats::Nats,
+    server::{Server, TIMEOUT, http},
     small_disk::{FilledDisk, LogTarget, SmallDisk},
 };
 use reqwest::blocking::{Client, RequestBuilder};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::{
     collections::{BTreeMap, BTreeSet},
     env, fs,
@@ -22,6 +25,7 @@ use std::{
     thread,
     time::{Duration, Instant},
 };
+use tokio::{runtime::Runtime, time::timeout};
 
 /// Code for each step of an agent that holds still.
 const HOLD: &str = "say(hold)";
@@ -126,6 +130,122 @@ impl SoakState {
         }
     }
 
+    /// Fetches what costs the server most until the end. Each query is another one, so no answer is cached.
+    fn fetch_costly_pages(&self) {
+        let paths = [
+            "/docs/search?q=puck",
+            "/?",
+            "/api/v1/openapi.json?",
+            "/season?",
+        ];
+        for (number, path) in paths.iter().cycle().enumerate() {
+            if self.is_over() {
+                return;
+            }
+            self.send("costly page", |client, url| {
+                client.get(format!("{url}{path}&n={number}"))
+            });
+            thread::sleep(Duration::from_millis(100));
+        }
+    }
+
+    /// Creates tokens, uses them, revokes them and tries them again, until the end. `token` is that of the user who does so.
+    fn revoke_tokens(&self, token: &str) {
+        let mut number = 0;
+        while !self.is_over() {
+            number += 1;
+            let name = json!({ "name": format!("token {number}") });
+            let made = self.send("token", |client, url| {
+                let request = client.post(format!("{url}/api/v1/tokens"));
+                request.bearer_auth(token).json(&name)
+            });
+            if let Some((201, body)) = made {
+                let made: Value = serde_json::from_str(&body).expect("the API speaks JSON");
+                self.revoke(token, &made);
+            }
+            thread::sleep(Duration::from_secs(4));
+        }
+    }
+
+    /// Uses a token, revokes it until that has succeeded, and asserts that it does not work any more.
+    fn revoke(&self, token: &str, made: &Value) {
+        let secret = made["secret"].as_str().expect("a token has a secret");
+        let id = made["id"].as_str().expect("a token has an id");
+        let use_token = |action: &str| {
+            self.send(action, |client, url| {
+                client
+                    .get(format!("{url}/api/v1/whoami"))
+                    .bearer_auth(secret)
+            })
+        };
+        use_token("valid token");
+        while !self.is_over() {
+            let revoked = self.send("revocation", |client, url| {
+                client
+                    .delete(format!("{url}/api/v1/tokens/{id}"))
+                    .bearer_auth(token)
+            });
+            if revoked.is_some_and(|(status, _)| status < 300) {
+                break;
+            }
+            thread::sleep(Duration::from_secs(1));
+        }
+        if self.is_over() {
+            return;
+        }
+        let answer = use_token("revoked token");
+        assert!(
+            answer.is_none_or(|(status, _)| status != 200),
+            "a revoked token is accepted"
+        );
+    }
+
+    /// Sets the system clock now and then, until the end. Then it is right.
+    fn set_clock(&self, clock: &SystemClock, mut random: Random) {
+        let steps_s = [3600, -3600, 5 * 86_400, -86_400, 0];
+        while !self.is_over() {
+            let index = random.below(steps_s.len() as u64);
+            clock.set(steps_s[index as usize]);
+            self.tally.count("clock set");
+            thread::sleep(Duration::from_secs(5) + random.millis_below(20_000));
+        }
+        clock.set(0);
+    }
+
+    /// Takes jobs like a remote worker until the end. It runs none, and sends false, unreadable or no results. An organiser readmits
+    /// it each time.
+    fn send_false_results(&self, nats: &Nats, admin_token: &str, mut random: Random) {
+        let runtime = Runtime::new().expect("a runtime starts");
+        let worker = runtime.block_on(FakeWorker::connect(nats));
+        while !self.is_over() {
+            self.send("readmission", |client, url| {
+                let request = client.post(format!("{url}/api/v1/workers/liar/readmit"));
+                request.bearer_auth(admin_token).json(&json!({}))
+            });
+            let taken = runtime
+                .block_on(async { timeout(Duration::from_secs(20), worker.take_job()).await });
+            let Ok(job) = taken else {
+                self.tally.count("no job for the false worker");
+                continue;
+            };
+            match random.below(3) {
+                0 => {
+                    runtime.block_on(worker.report_shard(&job));
+                    self.tally.count("false result");
+                }
+                1 => {
+                    let id = job["order"]["lease"]["nonce"].to_string();
+                    let bytes = vec![b'['; 100_000];
+                    let sent = worker.publish_bytes("faceoff.outcomes.liar", &id, bytes);
+                    runtime.block_on(sent);
+                    self.tally.count("unreadable result");
+                }
+                _ => self.tally.count("no result"),
+            }
+            thread::sleep(random.millis_below(10_000));
+        }
+    }
+
     /// Uploads archives in turn until the end. Returns the ids of the accepted submissions with their expected states.
     fn upload(
         &self,
@@ -186,6 +306,18 @@ impl Contestant {
     }
 }
 
+/// Token of a new organiser.
+fn organiser_token(server: &Server) -> String {
+    let invitation = json!({ "role": "organiser", "note": "Grace" });
+    let invitation = server.post("/api/v1/invitations", &server.admin_token, &invitation);
+    let invitation: Value = invitation.json().expect("the API speaks JSON");
+    let join = json!({ "code": invitation["code"], "name": "Grace" });
+    let joined = server.post("/api/v1/invitations/accept", &server.admin_token, &join);
+    let joined: Value = joined.json().expect("the API speaks JSON");
+    let secret = joined["secret"].as_str();
+    secret.expect("a new user gets a token").to_owned()
+}
+
 /// Asserts that a log shows no error beyond the disturbances.
 fn assert_no_unexpected_errors(log: &str) {
     for word in ["panicked", "begin_with", "poisoned"] {
@@ -230,13 +362,22 @@ fn disturbed_server_reaches_undisturbed_results() {
     let folder = scratch.path();
     // Episodes of each task. The agents of two teams need more than a second for each, so there is work until the end.
     let episodes = u32::try_from(4 * minutes).expect("some hours") + 6;
+    let nats = Nats::start(&folder.join("nats"));
     let config = format!(
         "{}\n[server]\nmin_free_bytes = {}\n[evaluation]\nepisodes_per_task = {episodes}\n\
-         episodes_per_shard = 3\n[workers]\nslots = 1\nlease_s = 5\n",
+         episodes_per_shard = 3\n[workers]\nslots = 1\nlease_s = 5\n[nats]\nurl = \"{}\"\n",
         include_str!("../long_time_limits.toml"),
         8 << 20,
+        nats.url(),
     );
-    let mut disk = SmallDisk::start(folder, (256 + 24 * minutes) << 20, &config, LogTarget::Test);
+    let clock = SystemClock::new(folder);
+    let mut disk = SmallDisk::start_with_environment(
+        folder,
+        (256 + 24 * minutes) << 20,
+        &config,
+        LogTarget::Test,
+        clock.environment(),
+    );
     let server = &disk.server;
     let striker = reference("striker", folder);
     let contestants = [
@@ -250,6 +391,7 @@ fn disturbed_server_reaches_undisturbed_results() {
         .map(|contestant| evaluation_path(&day, &contestant.submission))
         .collect();
     let uploading_teams: Vec<Team> = ["Ann", "Bob"].map(|name| Team::create(server, name)).into();
+    let organiser = organiser_token(server);
     let unknown_runtime = python_bundle(folder, "unknown", &python_agent(HOLD));
     let manifest = "name = \"unknown\"\ncommand = [\"python3\"]\nruntime = \"none\"\n";
     fs::write(unknown_runtime.join("agent.toml"), manifest).expect("a scratch file can be written");
@@ -294,6 +436,14 @@ fn disturbed_server_reaches_undisturbed_results() {
         for _ in 0..3 {
             scope.spawn(|| state.fetch_pages(&pages));
         }
+        scope.spawn(|| state.fetch_costly_pages());
+        scope.spawn(|| state.revoke_tokens(&organiser));
+        let [clock_random, worker_random] =
+            [(); 2].map(|()| Random::from_seed(random.below(1 << 31)));
+        scope.spawn(|| state.set_clock(&clock, clock_random));
+        let admin_token = server.admin_token.clone();
+        let (state_ref, nats) = (&state, &nats);
+        scope.spawn(move || state_ref.send_false_results(nats, &admin_token, worker_random));
         let upload_threads: Vec<_> = uploading_teams
             .iter()
             .map(|team| scope.spawn(|| state.upload(&team.token, &archives)))
@@ -334,7 +484,11 @@ fn disturbed_server_reaches_undisturbed_results() {
         let finished = contestant.team.wait_until_finished(server, evaluation);
         assert_eq!(without_times(&finished["result"]), without_times(&local));
     }
-    assert_eq!(server.get("/api/v1/health", None).status(), 200);
+    let started = Instant::now();
+    while server.get("/api/v1/health", None).status() != 200 {
+        assert!(started.elapsed() < TIMEOUT, "{}", server.log());
+        thread::sleep(Duration::from_secs(1));
+    }
     assert_no_unexpected_errors(&server.log());
     let wal = fs::metadata(disk.data_dir.join("faceoff.sqlite3-wal"));
     let wal_bytes = wal.map_or(0, |file| file.len());
@@ -344,20 +498,43 @@ fn disturbed_server_reaches_undisturbed_results() {
         "{minutes} minutes: {tally:#?}; {} accepted uploads, {episodes} episodes of each task",
         accepted.len()
     );
-    let actions: BTreeSet<&str> = tally.keys().map(String::as_str).collect();
+    // Requests may also be refused under load (503), by a rate limit (429) or on the full disk (507), and be broken off.
     let expected_actions = BTreeSet::from([
         "disk filled",
         "server killed",
+        "clock set",
         "page 200",
-        "page 503",
-        "page broken off",
+        "costly page 200",
         "upload 201",
         "upload 415",
-        "upload 429",
-        "upload 503",
-        "upload 507",
-        "upload broken off",
+        "token 201",
+        "valid token 200",
+        "revocation 200",
+        "revoked token 401",
+        "readmission 204",
+        "readmission 404",
+        "readmission 409",
+        "false result",
+        "unreadable result",
+        "no result",
+        "no job for the false worker",
     ]);
-    assert!(actions.is_subset(&expected_actions), "{actions:?}");
-    assert!(tally.contains_key("upload 201"), "{actions:?}");
+    let unexpected: Vec<&String> = tally
+        .keys()
+        .filter(|action| {
+            let is_disturbed = ["429", "503", "507", "broken off"]
+                .iter()
+                .any(|end| action.ends_with(end));
+            !is_disturbed && !expected_actions.contains(action.as_str())
+        })
+        .collect();
+    assert!(unexpected.is_empty(), "{unexpected:?}");
+    for action in [
+        "upload 201",
+        "revoked token 401",
+        "costly page 200",
+        "clock set",
+    ] {
+        assert!(tally.contains_key(action), "{action}: {tally:?}");
+    }
 }

@@ -113,6 +113,8 @@ struct ServerDisk {
     disk: MountedDisk,
     config_file: PathBuf,
     log: LogTarget,
+    /// Environment variables of the server.
+    environment: Vec<(&'static str, String)>,
 }
 
 impl ServerDisk {
@@ -124,6 +126,7 @@ impl ServerDisk {
             disk: MountedDisk::at(&folder.join("disk"), bytes),
             config_file,
             log,
+            environment: Vec::new(),
         }
     }
 
@@ -142,6 +145,7 @@ impl ServerDisk {
             })
             .arg(program("faceoff"));
         add_serve_arguments(&mut command, &self.disk.mount, &self.config_file);
+        command.envs(self.environment.iter().cloned());
         // Each program executes the next one in its place, so the process id stays.
         Server::start_command(command, |_| self.data_dir())
     }
@@ -154,7 +158,25 @@ impl SmallDisk {
     /// If it does not start: this needs root, as the sandbox does.
     #[must_use]
     pub fn start(folder: &Path, bytes: u64, config: &str, log: LogTarget) -> Self {
-        let disk = ServerDisk::mount(folder, bytes, config, log);
+        Self::start_with_environment(folder, bytes, config, log, Vec::new())
+    }
+
+    /// The same for a server with these environment variables.
+    ///
+    /// # Panics
+    /// As [`start`](Self::start).
+    #[must_use]
+    pub fn start_with_environment(
+        folder: &Path,
+        bytes: u64,
+        config: &str,
+        log: LogTarget,
+        environment: Vec<(&'static str, String)>,
+    ) -> Self {
+        let disk = ServerDisk {
+            environment,
+            ..ServerDisk::mount(folder, bytes, config, log)
+        };
         Self {
             server: disk.start_server(),
             data_dir: disk.data_dir(),

@@ -52,7 +52,7 @@ async fn visitors_leave_places_to_teams_and_organisers() {
     // A token that is not valid gives no place, nor does the team's after it was revoked.
     let unknown = site.get("/api/v1/me", Some("fo_team_unknown")).await;
     unknown.problem(503, "busy", &["in flight"]);
-    held.push(hold_place(&site, "/api/v1/tokens", tokens[1]).await);
+    held.push(hold_place(&site, "/api/v1/questions", tokens[1]).await);
     assert_eq!(statuses().await, [503, 503, 200]);
     // A change by an organiser still finds a place.
     let announcement = json!({ "title": "The server is full", "text": "Visitors wait." });
@@ -77,26 +77,37 @@ async fn revoked_token_has_the_places_of_visitors() {
     };
     let site = Site::start_with(limits).await;
     let team = site.team("Alpha").await;
-    let made = json!({ "name": "robot", "days": 1 });
-    let made = site.post("/api/v1/tokens", Some(&team.token), &made).await;
+    let invitation = json!({ "role": "member", "team": team.id, "note": "Ada" });
+    let invitation = site
+        .post("/api/v1/invitations", Some(ADMIN), &invitation)
+        .await
+        .json(201);
+    let join = json!({ "code": invitation["code"], "name": "Ada" });
+    let ada = site
+        .post("/api/v1/invitations/accept", None, &join)
+        .await
+        .json(201);
+    let ada = &string(&ada["secret"]);
+    let made = json!({ "name": "robot" });
+    let made = site.post("/api/v1/tokens", Some(ada), &made).await;
     let made = made.json(201);
-    let robot = &string(&made["token"]);
-    site.get("/api/v1/me", Some(robot)).await.json(200);
+    let robot = &string(&made["secret"]);
+    site.get("/api/v1/whoami", Some(robot)).await.json(200);
     let held = [
         hold_place(&site, "/api/v1/sessions", None).await,
         hold_place(&site, "/api/v1/sessions", None).await,
         hold_place(&site, "/api/v1/sessions", None).await,
     ];
-    site.get("/api/v1/me", Some(robot)).await.json(200);
+    site.get("/api/v1/whoami", Some(robot)).await.json(200);
     let path = format!("/api/v1/tokens/{}", string(&made["id"]));
     let revoked = site
-        .send(Method::DELETE, &path, Some(&team.token), &Value::Null)
+        .send(Method::DELETE, &path, Some(ada), &Value::Null)
         .await;
     assert!(revoked.status.is_success(), "{revoked:?}");
     // The first request finds out that the token is not valid any more.
-    let refused = site.get("/api/v1/me", Some(robot)).await;
+    let refused = site.get("/api/v1/whoami", Some(robot)).await;
     refused.problem(401, "unauthenticated", &["revoked"]);
-    let refused = site.get("/api/v1/me", Some(robot)).await;
+    let refused = site.get("/api/v1/whoami", Some(robot)).await;
     refused.problem(503, "busy", &[]);
     drop(held);
 }
