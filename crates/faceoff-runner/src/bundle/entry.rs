@@ -27,6 +27,16 @@ pub(super) fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleErr
     BundleError::Invalid(format!("entry {shown:?} {problem}"))
 }
 
+/// Whether an operating system has put the entry into the archive, beside the team's files. macOS adds metadata (`__MACOSX`, `._NAME`,
+/// `.DS_Store`), Windows settings of folders.
+pub(super) fn is_system_file(entry: &str) -> bool {
+    let is_system_name = |part: &str| {
+        part.starts_with("._")
+            || ["__MACOSX", ".DS_Store", "Thumbs.db", "desktop.ini"].contains(&part)
+    };
+    entry.split('/').any(is_system_name)
+}
+
 /// The entry's path without `.` parts; empty for the archive's root.
 pub(super) fn normalise(entry: &str) -> Result<String, BundleError> {
     if entry.is_empty() {

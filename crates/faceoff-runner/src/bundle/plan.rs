@@ -37,8 +37,7 @@ impl Plan {
     }
 
     /// Adds a folder that has its own entry.
-    pub fn add_folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
-        check_mode(entry, mode)?;
+    pub fn add_folder(&mut self, entry: &str) -> Result<(), BundleError> {
         let path = normalise(entry)?;
         if path.is_empty() {
             return Ok(());

@@ -5,7 +5,8 @@ use std::io::Read;
 
 /// Receives the entries of an archive.
 pub(super) trait Sink {
-    fn add_folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError>;
+    /// A folder. Its mode is not kept.
+    fn add_folder(&mut self, entry: &str) -> Result<(), BundleError>;
     /// A file, its content streamed.
     fn add_file(
         &mut self,

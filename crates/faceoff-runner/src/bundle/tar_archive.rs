@@ -78,7 +78,7 @@ pub(super) fn unpack<'a>(
                 match kind {
                     EntryType::Regular | EntryType::Continuous if name.ends_with('/') => {
                         // Old archives mark a folder by its name only.
-                        sink.add_folder(&name, mode)?;
+                        sink.add_folder(&name)?;
                     }
                     EntryType::Regular | EntryType::Continuous => {
                         budget.allow(entry.size());
@@ -89,7 +89,7 @@ pub(super) fn unpack<'a>(
                         sink.add_file(&name, attributes, &mut entry)?;
                         count_rest(&name, &mut entry, budget)?;
                     }
-                    EntryType::Directory => sink.add_folder(&name, mode)?,
+                    EntryType::Directory => sink.add_folder(&name)?,
                     EntryType::Symlink => {
                         sink.add_link(&name, &utf8_name(link.unwrap_or_default())?)?
                     }

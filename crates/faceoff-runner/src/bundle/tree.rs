@@ -3,8 +3,8 @@
 use super::{
     budget::Budget,
     entry::{
-        FOLDER_MODE, add_hard_link, check_target, invalid, make_folder, set_default_time, unusable,
-        write_new,
+        FOLDER_MODE, add_hard_link, check_target, invalid, is_system_file, make_folder,
+        set_default_time, unusable, write_new,
     },
     error::BundleError,
     links,
@@ -151,8 +151,11 @@ impl<'a> Tree<'a> {
 
 impl Sink for Tree<'_> {
     /// The folder is created by [`Tree::finish`], or with the first file in it.
-    fn add_folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
-        self.plan.add_folder(entry, mode)
+    fn add_folder(&mut self, entry: &str) -> Result<(), BundleError> {
+        if is_system_file(entry) {
+            return Ok(());
+        }
+        self.plan.add_folder(entry)
     }
 
     fn add_file(
@@ -161,6 +164,9 @@ impl Sink for Tree<'_> {
         attributes: FileAttributes,
         content: &mut dyn Read,
     ) -> Result<(), BundleError> {
+        if is_system_file(entry) {
+            return Ok(());
+        }
         let path = self.plan.add_file(entry, attributes.mode)?;
         let path_on_disk = self.make_parents(&path)?;
         write_new(entry, &path_on_disk, attributes, content, self.budget)

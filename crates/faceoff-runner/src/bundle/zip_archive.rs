@@ -2,7 +2,7 @@
 
 use super::{
     budget::{Budget, MeteredReader},
-    entry::unusable,
+    entry::{invalid, is_system_file, unusable},
     error::BundleError,
     plan::Plan,
     sink::{FileAttributes, Sink},
@@ -52,7 +52,11 @@ impl Header {
             })?
             .to_owned();
         if name.contains('\\') {
-            return Err(unusable(&name, "named with a backslash"));
+            return Err(invalid(
+                &name,
+                "is named with a backslash, as Compress-Archive of Windows PowerShell names the files of folders: send the folder \
+                 itself (`faceoff submit FOLDER`), or pack it with tar, which Windows has (`tar -czf agent.tar.gz FOLDER`)",
+            ));
         }
         if entry.encrypted() {
             return Err(unusable(&name, "encrypted"));
@@ -109,7 +113,7 @@ pub(super) fn unpack<'a>(
             .with_reader(files.reader_mut(), ZipReadOptions::new())
             .map_err(|error| damaged_entry(&name, error))?;
         match kind {
-            Kind::Folder => tree.add_folder(&name, mode)?,
+            Kind::Folder => tree.add_folder(&name)?,
             Kind::File => {
                 // The times of a zip are those of an unknown time zone.
                 let attributes = FileAttributes {
@@ -144,8 +148,11 @@ fn check_directory<R: Read + Seek>(
         let entry = entry.map_err(damaged_archive)?;
         budget.count_entry()?;
         let Header { name, mode, kind } = Header::from_entry(&entry)?;
+        if is_system_file(&name) {
+            continue;
+        }
         match kind {
-            Kind::Folder => plan.add_folder(&name, mode)?,
+            Kind::Folder => plan.add_folder(&name)?,
             Kind::File => {
                 plan.add_file(&name, mode)?;
                 budget.count_stated(&name, entry.size())?;

@@ -14,7 +14,7 @@ pub const IGNORE_FILE: &str = ".faceoffignore";
 /// Files that no agent needs: version control, caches, environments, builds, files of editors and operating systems,
 /// and results and temporary files of `faceoff eval` and `play` in the folder. Links with these names are also left
 /// out.
-pub const DEFAULTS: [&str; 25] = [
+pub const DEFAULTS: [&str; 28] = [
     ".git",
     ".hg",
     ".svn",
@@ -29,7 +29,10 @@ pub const DEFAULTS: [&str; 25] = [
     "node_modules",
     "/target",
     ".DS_Store",
+    "._*",
+    "__MACOSX",
     "Thumbs.db",
+    "desktop.ini",
     ".idea",
     ".vscode",
     "*.swp",
@@ -61,6 +64,10 @@ impl Rules {
             Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
             text => text.with_context(reading)?,
         };
+        // Editors of Windows may write a byte order mark, which is no part of the first rule.
+        let custom_rules = custom_rules
+            .strip_prefix('\u{feff}')
+            .unwrap_or(&custom_rules);
         for (number, line) in custom_rules.lines().enumerate() {
             rules
                 .add_line(None, line)

@@ -44,6 +44,8 @@ fn default_rules_apply_unless_overridden() {
         "notes/plan.md",
         "agent.py~",
         ".DS_Store",
+        "skills/._hit.py",
+        "desktop.ini",
     ]);
     let (packed, left_out) = names(folder.path());
     assert_eq!(
@@ -63,12 +65,15 @@ fn default_rules_apply_unless_overridden() {
             ".git",
             ".venv",
             "agent.py~",
+            "desktop.ini",
             "node_modules",
+            "skills/._hit.py",
             "skills/__pycache__",
             "target"
         ]
     );
-    let rules = "# not needed on the server\nnotes/\n!target/\n*.npz\n";
+    // An editor of Windows has written it.
+    let rules = "\u{feff}notes/\r\n# not needed on the server\r\n!target/\r\n*.npz\r\n";
     fs::write(folder.path().join(IGNORE_FILE), rules).unwrap();
     let (packed, left_out) = names(folder.path());
     assert_eq!(

@@ -479,7 +479,7 @@ impl<'a> Root<'a> {
 
 impl Sink for Root<'_> {
     /// An existing folder stays unchanged, because all folders have the same mode.
-    fn add_folder(&mut self, entry: &str, _mode: u32) -> Result<(), BundleError> {
+    fn add_folder(&mut self, entry: &str) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
             return Ok(());
         };
