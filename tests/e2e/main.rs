@@ -27,6 +27,7 @@ mod live_pages;
 mod local_evaluation;
 mod log_growth;
 mod marked_secrets;
+mod ordinary_user;
 mod pictures;
 mod python_packages;
 mod reference_result;

@@ -58,7 +58,7 @@ pub use isolation::{Isolation, Layer};
 pub use killer::Killer;
 pub use line_socket::ReadLine;
 pub use memory_image::{MEMORY_FOLDER, MemoryImage, MemoryImageError};
-pub use probe::{HostFeature, probe_host};
+pub use probe::{HostFeature, probe_host, unavailable_layers};
 pub use process::{AgentProcess, Usage};
 pub use runtime::{Runtime, RuntimeFiles};
 pub use spawn_spec::SpawnSpec;

@@ -37,6 +37,15 @@ pub fn probe_host() -> Vec<HostFeature> {
     Layer::ALL.into_iter().map(probe).collect()
 }
 
+/// Those of these layers that this user cannot get on this host. One process suffices to see that there are none.
+pub fn unavailable_layers(layers: &[Layer]) -> Vec<HostFeature> {
+    if run(layers, "cat", &["/dev/null"]).is_ok() {
+        return Vec::new();
+    }
+    let probed = layers.iter().copied().map(probe);
+    probed.filter(|feature| !feature.available).collect()
+}
+
 fn probe(layer: Layer) -> HostFeature {
     let result = match layer {
         Layer::Namespaces => probe_namespaces(),
@@ -110,7 +119,7 @@ fn probe_seccomp() -> Result<String, String> {
         return Err("a filter was installed, but it is not active".to_owned());
     }
     // Free blocks, as the service answers for the kernel.
-    let answer = run(Layer::Seccomp, "stat", &["-f", "-c", "%a", "/"])?;
+    let answer = run(&[Layer::Seccomp], "stat", &["-f", "-c", "%a", "/"])?;
     let expected = answered_calls::free_blocks(Limits::default().scratch_bytes);
     if answer.trim() != expected.to_string() {
         return Err(
@@ -176,21 +185,21 @@ fn probe_by_file(
 
 /// Starts `cat file` with only `layer` enabled, and returns its output.
 fn run_cat(layer: Layer, file: &str) -> Result<String, String> {
-    run(layer, "cat", &[file])
+    run(&[layer], "cat", &[file])
 }
 
-/// Starts a program of the system with only `layer` enabled, and returns its output.
-fn run(layer: Layer, program: &str, arguments: &[&str]) -> Result<String, String> {
+/// Starts a program of the system with only these layers enabled, and returns its output.
+fn run(layers: &[Layer], program: &str, arguments: &[&str]) -> Result<String, String> {
     let candidates = ["/usr/bin", "/bin"].map(|folder| Path::new(folder).join(program));
     let found = candidates.iter().find(|path| path.is_file());
     let program = found.ok_or_else(|| format!("the probe needs /usr/bin/{program}"))?;
-    let (_private, bundle) = make_bundle(layer)
+    let (_private, bundle) = make_bundle(layers)
         .map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
     let mut runtime = Runtime::native();
     runtime.read_only_paths.push(program.clone());
     let disabled_layers = Layer::ALL
         .into_iter()
-        .filter(|other| *other != layer)
+        .filter(|other| !layers.contains(other))
         .collect();
     let spec = SpawnSpec {
         bundle_dir: bundle,
@@ -238,11 +247,11 @@ fn run(layer: Layer, program: &str, arguments: &[&str]) -> Result<String, String
 
 /// An empty bundle. With namespaces it is, like real bundles, in a folder that only the service may enter. The other
 /// layers are probed without namespaces, so their bundle must be reachable.
-fn make_bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
+fn make_bundle(layers: &[Layer]) -> io::Result<(tempfile::TempDir, PathBuf)> {
     let outer = tempfile::Builder::new()
         .prefix("faceoff-probe-")
         .tempdir()?;
-    let outer_mode = if layer == Layer::Namespaces {
+    let outer_mode = if layers.contains(&Layer::Namespaces) {
         0o700
     } else {
         0o755

@@ -127,6 +127,11 @@ impl EvalCommand {
                 ..config.rules()
             },
         };
+        if !self.no_sandbox
+            && let Some(note) = local_bundle::give_up_unavailable_layers(&mut config)
+        {
+            self.notes().print(format_args!("{note}"));
+        }
         if self.tasks.is_empty() {
             self.tasks = rules.tasks;
         }

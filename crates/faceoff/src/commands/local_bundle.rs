@@ -6,7 +6,7 @@ use faceoff_runner::{
     AgentEnvironment,
     bundle::{self, Bundle, BundleLimits},
 };
-use faceoff_sandbox::{Isolation, Runtime, RuntimeFiles};
+use faceoff_sandbox::{Isolation, Layer, Runtime, RuntimeFiles, unavailable_layers};
 use std::{
     fs::{self, File},
     path::Path,
@@ -45,6 +45,29 @@ pub(super) fn open(
     let bundle = open(&archive)?;
     fs::remove_file(&archive).with_context(|| format!("removing {}", archive.display()))?;
     Ok(bundle)
+}
+
+/// Gives up the layers of the sandbox that this user cannot get on this host: developers run their own agents, which they could also
+/// run without a sandbox. Returns the note that says which layers are missing, if any are.
+pub(super) fn give_up_unavailable_layers(config: &mut Config) -> Option<String> {
+    let given_up = &mut config.sandbox.given_up;
+    let wanted: Vec<Layer> = Layer::ALL
+        .into_iter()
+        .filter(|layer| !given_up.contains(layer))
+        .collect();
+    let missing: Vec<Layer> = unavailable_layers(&wanted)
+        .into_iter()
+        .map(|feature| feature.layer)
+        .collect();
+    given_up.extend(&missing);
+    let names: Vec<&str> = missing.iter().map(|layer| layer.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "note: your agent runs without these layers of the server's sandbox, which this user cannot get here: {}; `faceoff doctor` \
+             says how",
+            names.join(", ")
+        )
+    })
 }
 
 /// The environment of an agent: with the server's limits and isolation, or without isolation if `no_sandbox`.

@@ -39,7 +39,13 @@ fn mismatch_seed(options: &PlayOptions) -> Seed {
 }
 
 impl Matchup {
-    pub(super) fn open(options: &PlayOptions, config: Config) -> anyhow::Result<Self> {
+    pub(super) fn open(options: &PlayOptions, mut config: Config) -> anyhow::Result<Self> {
+        if !options.no_sandbox
+            && let Some(note) = local_bundle::give_up_unavailable_layers(&mut config)
+            && !options.json
+        {
+            println!("{note}");
+        }
         let scratch = local_bundle::create_scratch(&options.out)?;
         let open = |path: &Path, name: &str| -> anyhow::Result<Bundle> {
             let scratch = scratch.path().join(name);

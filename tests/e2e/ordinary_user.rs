@@ -1,0 +1,106 @@
+//! Commands of an ordinary user, who may not make control groups: their own agents run with the other layers of the sandbox.
+
+use crate::{kills::copy_folder, without_times};
+use faceoff_tests::{program, repository};
+use serde_json::Value;
+use std::{
+    fs::{self, Permissions},
+    os::unix::fs::{PermissionsExt as _, chown},
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+use tempfile::TempDir;
+
+const USER: u32 = 1234;
+
+/// A folder of an ordinary user, with the program: others may not be able to enter the target folder.
+struct Home {
+    folder: TempDir,
+    program: PathBuf,
+}
+
+impl Home {
+    fn create() -> Self {
+        let folder = tempfile::tempdir().expect("a scratch folder can be made");
+        fs::set_permissions(folder.path(), Permissions::from_mode(0o755)).expect("it is ours");
+        chown(folder.path(), Some(USER), Some(USER)).expect("the tests run as root");
+        let copy = folder.path().join("faceoff");
+        let original = program("faceoff");
+        if fs::hard_link(&original, &copy).is_err() {
+            fs::copy(&original, &copy).expect("the program can be copied");
+        }
+        Self {
+            program: copy,
+            folder,
+        }
+    }
+
+    /// Runs the program as the ordinary user.
+    fn run(&self, args: &[&str]) -> Output {
+        let user = USER.to_string();
+        Command::new("setpriv")
+            .args(["--reuid", &user, "--regid", &user, "--clear-groups"])
+            .arg(&self.program)
+            .args(args)
+            .current_dir(self.folder.path())
+            .env("HOME", self.folder.path())
+            .output()
+            .expect("setpriv starts")
+    }
+}
+
+/// Asserts success, and returns the output.
+#[track_caller]
+fn expect_success(output: &Output) -> String {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let (out, errors) = (text(&output.stdout), text(&output.stderr));
+    assert!(output.status.success(), "{out}{errors}");
+    out
+}
+
+fn results(folder: &Path) -> Value {
+    let text = fs::read(folder.join("results.json")).expect("there is a result");
+    serde_json::from_slice(&text).expect("it is JSON")
+}
+
+#[test]
+fn ordinary_user_evaluates_and_plays_own_agents() {
+    let home = Home::create();
+    let bundle = home.folder.path().join("hold");
+    copy_folder(&repository().join("agents/hold"), &bundle);
+    let bundle = bundle.to_str().expect("the path is text");
+    let args = ["eval", bundle, "--task", "hit", "--episodes", "2"];
+    let output = expect_success(&home.run(&args));
+    let note = output
+        .lines()
+        .next()
+        .expect("the first line names what is missing");
+    assert!(
+        note.contains("cgroup-memory") && note.contains("`faceoff doctor`"),
+        "{output}"
+    );
+    // The same result as with the whole sandbox.
+    let own = results(&home.folder.path().join("faceoff-eval"));
+    let complete = tempfile::tempdir().expect("a scratch folder can be made");
+    let done = Command::new(program("faceoff"))
+        .args(args)
+        .current_dir(complete.path())
+        .output()
+        .expect("the program starts");
+    let output = expect_success(&done);
+    assert!(!output.contains("cgroup-memory"), "{output}");
+    assert_eq!(
+        without_times(&own),
+        without_times(&results(&complete.path().join("faceoff-eval")))
+    );
+
+    let output = home.run(&["play", bundle, bundle, "--steps", "500"]);
+    let output = expect_success(&output);
+    assert!(output.contains("cgroup-memory"), "{output}");
+
+    // A server does not run strangers' agents so.
+    let output = home.run(&["serve", "--listen", "127.0.0.1:0"]);
+    assert!(!output.status.success());
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(errors.contains("cgroup-memory"), "{errors}");
+}
