@@ -250,7 +250,6 @@ lint:
 	python3 tests/words/words.py
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
-	$(CARGO) build --locked --workspace --benches --examples
 
 format:
 	$(CARGO) fmt --all

@@ -16,8 +16,8 @@ use std::{
 /// The server's limit of 16 MiB for the WAL, plus 4 MiB that may be written while the server empties the WAL.
 pub(crate) const WAL_LIMIT_BYTES: u64 = (16 + 4) << 20;
 
-/// Number of writes whose total exceeds the limit more than twice: each adds about 70 KB to the WAL.
-const WRITES: u32 = 600;
+/// Number of writes whose total exceeds the limit: each adds about 70 KB to the WAL.
+const WRITES: u32 = 350;
 
 const CONFIG: &str = concat!(
     include_str!("../long_time_limits.toml"),
