@@ -432,6 +432,7 @@ fn disturbed_server_reaches_undisturbed_results() {
             .build()
             .expect("a client needs nothing"),
     };
+    let admin_token = server.admin_token.clone();
     let accepted: Vec<(usize, String, &str)> = thread::scope(|scope| {
         for _ in 0..3 {
             scope.spawn(|| state.fetch_pages(&pages));
@@ -441,9 +442,7 @@ fn disturbed_server_reaches_undisturbed_results() {
         let [clock_random, worker_random] =
             [(); 2].map(|()| Random::from_seed(random.below(1 << 31)));
         scope.spawn(|| state.set_clock(&clock, clock_random));
-        let admin_token = server.admin_token.clone();
-        let (state_ref, nats) = (&state, &nats);
-        scope.spawn(move || state_ref.send_false_results(nats, &admin_token, worker_random));
+        scope.spawn(|| state.send_false_results(&nats, &admin_token, worker_random));
         let upload_threads: Vec<_> = uploading_teams
             .iter()
             .map(|team| scope.spawn(|| state.upload(&team.token, &archives)))

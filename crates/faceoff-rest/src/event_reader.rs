@@ -4,14 +4,11 @@
 use crate::sse::is_still_valid;
 use axum::response::sse::Event;
 use faceoff_notify::{Audience, Notice, NoticeFilter, Page};
-use faceoff_service::{app::App, problem::Problem, shutdown::Shutdown};
+use faceoff_service::{app::App, places::Place, problem::Problem, shutdown::Shutdown};
 use faceoff_store::{Change, Requester};
 use std::time::Duration;
 use tokio::{
-    sync::{
-        OwnedSemaphorePermit,
-        broadcast::{self, error::RecvError},
-    },
+    sync::broadcast::{self, error::RecvError},
     time::{Instant, sleep, sleep_until},
 };
 

@@ -4,13 +4,8 @@ use super::sse::{LAST_EVENT_ID, sse_response, take_place};
 use crate::live_reader::{LiveReader, parse_cursor};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_service::{
-    app::App,
-    auth::OptionalCaller,
-    extract::PathParam,
-    problem::{Problem, ProblemKind},
-    shutdown::Shutdown,
-    viewer::Viewer,
-    views::game,
+    app::App, auth::OptionalCaller, extract::PathParam, problem::Problem, shutdown::Shutdown,
+    viewer::Viewer, views::game,
 };
 use faceoff_types::GameId;
 use futures::stream;

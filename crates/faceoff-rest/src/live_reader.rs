@@ -7,6 +7,7 @@ use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
 use faceoff_live::{LiveCursor, LiveSubscription, LiveUpdate};
 use faceoff_service::{
     app::App,
+    places::Place,
     problem::{Problem, ProblemKind},
     shutdown::Shutdown,
 };
@@ -14,10 +15,7 @@ use faceoff_store::{GameState, Requester, StoreError};
 use faceoff_types::{GameEvent, GameId, LiveEvent, LiveGame};
 use serde::Serialize;
 use std::time::Duration;
-use tokio::{
-    sync::OwnedSemaphorePermit,
-    time::{Instant, sleep, sleep_until},
-};
+use tokio::time::{Instant, sleep, sleep_until};
 
 /// Minimum time between two batches of events, and so between two `position` events.
 const BATCH_INTERVAL: Duration = Duration::from_millis(100);

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// A client that uses the workers' protocol and runs no jobs.
 pub(crate) struct FakeWorker {
-    client: Client,
+    pub(crate) client: Client,
 }
 
 impl FakeWorker {

@@ -11,6 +11,7 @@ use crate::{
     commands::admin,
     tournament::{OPEN_CUP, create_teams_with_hold},
 };
+use async_nats::jetstream;
 use faceoff_tests::{
     nats::Nats,
     relay::Relay,
