@@ -9,6 +9,11 @@ use faceoff_tests::{
     server::Server,
 };
 use serde_json::{Value, json};
+use std::{
+    io::{BufRead as _, BufReader, Write as _},
+    net::TcpListener,
+    thread,
+};
 
 /// A user and the invitation that is created for them.
 pub struct InvitedUser<'a> {
@@ -177,14 +182,31 @@ fn forms_work_without_tls_in_the_local_network() {
     );
 }
 
+/// A server of one empty page. Returns its URL.
+fn start_other_site() -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
+    let address = listener.local_addr().expect("it listens");
+    thread::spawn(move || {
+        for connection in listener.incoming().flatten() {
+            let mut reader = BufReader::new(&connection);
+            let mut line = String::new();
+            while reader.read_line(&mut line).is_ok_and(|read| read > 2) {
+                line.clear();
+            }
+            let answer = "HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+            let _ = (&connection).write_all(answer.as_bytes());
+        }
+    });
+    format!("http://{address}")
+}
+
 #[test]
 fn scripts_of_other_sites_read_what_visitors_may() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let browser = Browser::start(scratch.path());
     let grace = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
-    // A page without an address belongs to no site, so every server is another site.
-    grace.go_to("data:text/html,<title>Another site</title>");
+    grace.go_to(&start_other_site());
     let fetch = |path: &str, options: Value| {
         grace.evaluate(&format!(
             "fetch('{}{path}', {options}).then(answer => answer.text(), () => 'refused')",

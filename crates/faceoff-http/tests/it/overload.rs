@@ -36,7 +36,7 @@ async fn visitors_leave_places_to_teams_and_organisers() {
     let statuses = async || {
         let mut statuses = Vec::new();
         for token in tokens {
-            let answer = site.get("/api/v1/events?limit=1", token).await;
+            let answer = site.get("/api/v1/season", token).await;
             statuses.push(answer.status.as_u16());
         }
         statuses
