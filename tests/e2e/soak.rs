@@ -134,7 +134,7 @@ impl SoakState {
     fn fetch_costly_pages(&self) {
         let paths = [
             "/docs/search?q=puck",
-            "/?",
+            "/tournaments?",
             "/api/v1/openapi.json?",
             "/season?",
         ];
