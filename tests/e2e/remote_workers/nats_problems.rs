@@ -134,12 +134,12 @@ fn result_waits_while_stream_is_full() {
     );
 }
 
-/// The configuration with all 60 episodes in one shard (job), so that its result is the only message over the payload limit.
+/// The configuration with all 30 episodes in one shard (job), so that its result is the only message over the payload limit.
 /// All episodes may end with an agent fault.
 fn with_one_shard(config: &str) -> String {
-    with_episodes(config, 60, 60).replace(
+    with_episodes(config, 30, 30).replace(
         "[evaluation]",
-        "[evaluation]\ntasks = [\"hit\"]\nmax_faults = 60",
+        "[evaluation]\ntasks = [\"hit\"]\nmax_faults = 30",
     )
 }
 
