@@ -7,6 +7,7 @@ use super::{
 use askama::Template;
 use axum::{
     extract::State,
+    http::HeaderMap,
     response::{IntoResponse, Response},
 };
 use faceoff_api::{
@@ -20,6 +21,7 @@ use faceoff_service::{
     network::{ClientNetwork, Network},
     problem::{Problem, ProblemKind},
     services::{accounts::join, sessions::session_expiry},
+    session,
     views::announcement,
 };
 use faceoff_store::{CodeStatus, InvitationRole, RegistrationState, TokenKind};
@@ -164,9 +166,14 @@ pub(super) async fn submit(
     State(app): State<App>,
     PathParam(code): PathParam<String>,
     ClientNetwork(client): ClientNetwork,
+    headers: HeaderMap,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    match accept_invitation(&app, &code, &form, client).await {
+    let accepted = match session::check_cookie_is_kept(&app.config, &headers) {
+        Ok(()) => accept_invitation(&app, &code, &form, client).await,
+        Err(problem) => Err(problem.into()),
+    };
+    match accepted {
         Ok(response) => Ok(response),
         // An invalid invitation has its own page; server errors are not shown beside the form.
         Err(PageProblem(problem)) if problem.kind() == ProblemKind::InvitationInvalid => {

@@ -7,7 +7,7 @@ use super::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    http::header,
+    http::{HeaderMap, header},
     response::{AppendHeaders, IntoResponse, Redirect, Response},
 };
 use faceoff_service::{
@@ -79,9 +79,14 @@ pub(super) async fn page(
 pub(super) async fn submit(
     State(app): State<App>,
     ClientNetwork(client): ClientNetwork,
+    headers: HeaderMap,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    match sign_in(&app, &form.name, form.password, client).await {
+    let signed_in = match session::check_cookie_is_kept(&app.config, &headers) {
+        Ok(()) => sign_in(&app, &form.name, form.password, client).await,
+        Err(problem) => Err(problem),
+    };
+    match signed_in {
         Ok((_, secret)) => {
             let target = return_path(&form.next).unwrap_or(ACCOUNT);
             redirect_with_session(&app, secret.as_str(), target)
@@ -89,7 +94,7 @@ pub(super) async fn submit(
         Err(problem)
             if matches!(
                 problem.kind(),
-                ProblemKind::Unauthenticated | ProblemKind::TooManySignIns
+                ProblemKind::Unauthenticated | ProblemKind::TooManySignIns | ProblemKind::Forbidden
             ) =>
         {
             let status = problem.kind().status();

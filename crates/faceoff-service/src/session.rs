@@ -64,6 +64,31 @@ fn uses_tls(config: &HttpConfig) -> bool {
     public_url.is_some_and(|url| url.starts_with("https://"))
 }
 
+/// Refuses a sign-in from which the browser would not keep the cookie: over plain http, if the server is reached over https. The user
+/// would be asked to sign in again and again.
+///
+/// # Errors
+/// `Forbidden`, with the address at which signing in works.
+pub fn check_cookie_is_kept(config: &HttpConfig, headers: &HeaderMap) -> Result<(), Problem> {
+    let Some(public_url) = config.public_url.as_deref().filter(|_| uses_tls(config)) else {
+        return Ok(());
+    };
+    let origin = headers.get(header::ORIGIN);
+    let origin = origin.and_then(|value| value.to_str().ok());
+    let host = origin.and_then(|origin| origin.strip_prefix("http://"));
+    // Browsers trust the loopback without TLS.
+    let is_loopback = |host: &str| {
+        host.starts_with("localhost") || host.starts_with("127.") || host.starts_with("[::1]")
+    };
+    if host.is_none_or(is_loopback) {
+        return Ok(());
+    }
+    Err(Problem::new(
+        ProblemKind::Forbidden,
+        format!("browsers keep a session of this server over https only: sign in at {public_url}"),
+    ))
+}
+
 /// Refuses a request that a page of another site triggered. Browsers name the requesting site in a header. A request without
 /// this header is refused, too: it comes from an API client, and these use tokens.
 pub fn check_same_origin(headers: &HeaderMap) -> Result<(), Problem> {

@@ -392,6 +392,41 @@ async fn session_cookie_is_bound_to_its_host_over_tls() {
 }
 
 #[tokio::test]
+async fn sign_in_without_tls_says_where_it_works() {
+    let site = Site::start().await;
+    let alpha = site.team("Alpha").await;
+    member(&site, &alpha.id, "Ada").await;
+    let site = site.with_public_url("https://faceoff.example.org").await;
+    let sign_in = async |scheme: &str, host: &str| {
+        let request = site
+            .request(Method::POST, "/sign-in", None)
+            .header("accept", "text/html")
+            .header("host", host)
+            .header("origin", format!("{scheme}://{host}"))
+            .form(&[("name", "Ada"), ("password", PASSWORD)]);
+        Answer::read(request.send().await.unwrap()).await
+    };
+    // The browser would not keep the cookie.
+    let refused = sign_in("http", "192.0.2.1:8080").await;
+    refused.html(403);
+    assert!(
+        refused
+            .body
+            .contains("sign in at https://faceoff.example.org"),
+        "{}",
+        refused.body
+    );
+    assert!(!refused.headers.contains_key("set-cookie"));
+    for (scheme, host) in [("https", "faceoff.example.org"), ("http", "127.0.0.1:8080")] {
+        let signed_in = sign_in(scheme, host).await;
+        assert!(
+            signed_in.headers.contains_key("set-cookie"),
+            "{signed_in:?}"
+        );
+    }
+}
+
+#[tokio::test]
 async fn session_expires_and_ends_with_a_new_password() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
