@@ -1,7 +1,7 @@
 //! Tests of users in the API: invitations, sessions, removal, tokens, terms, registrations, questions and announcements.
 
 use crate::{
-    browser::PASSWORD,
+    browser::{Browser, PASSWORD},
     site::{ADMIN, Answer, Site, string},
 };
 use reqwest::Method;
@@ -398,12 +398,15 @@ async fn sign_in_without_tls_says_where_it_works() {
     member(&site, &alpha.id, "Ada").await;
     let site = site.with_public_url("https://faceoff.example.org").await;
     let sign_in = async |scheme: &str, host: &str| {
-        let request = site
-            .request(Method::POST, "/sign-in", None)
+        let browser = Browser::new(&site);
+        let request = browser
+            .http
+            .post(format!("{}/sign-in", site.url))
             .header("accept", "text/html")
             .header("host", host)
             .header("origin", format!("{scheme}://{host}"))
-            .form(&[("name", "Ada"), ("password", PASSWORD)]);
+            .header("content-type", "application/x-www-form-urlencoded")
+            .body(format!("name=Ada&password={}", PASSWORD.replace(' ', "+")));
         Answer::read(request.send().await.unwrap()).await
     };
     // The browser would not keep the cookie.
