@@ -59,7 +59,7 @@ pub(crate) async fn limit(
     if request.uri().path() == LIVE_PATH {
         return next.run(request).await;
     }
-    let precedence = in_flight.app.precedence(request.headers()).await;
+    let precedence = in_flight.app.precedence(request.headers());
     let Some(_place) = in_flight.places.take(precedence) else {
         return in_flight.refuse("in_flight");
     };

@@ -10,6 +10,7 @@ use crate::{
     places::{Places, Precedence},
     problem::Problem,
     rate_limits::RequestLimiter,
+    recent_callers::RecentCallers,
     shared_cache::SharedCache,
     summaries::Summaries,
     upload_slots::UploadSlots,
@@ -70,8 +71,8 @@ pub struct AppState {
     pub request_limiter: RequestLimiter,
     /// Changes per team and day.
     pub change_quota: ChangeQuota,
-    /// Whose tokens were verified recently, by the hash of their secret.
-    recent_callers: SharedCache<[u8; 32], Precedence>,
+    /// Whose tokens were verified recently.
+    pub(crate) recent_callers: RecentCallers,
     /// Random per process. Part of entity tags (header `ETag`), because the database may be another one after a restart.
     pub process_id: Uuid,
 }
@@ -89,9 +90,6 @@ const MAX_TOURNAMENTS: u64 = 20;
 /// Size of the analyses in memory. Most have some ten kilobytes; those of a robot that violates a limit again and again have
 /// some hundred.
 const MAX_ANALYSIS_BYTES: u64 = 16 << 20;
-
-/// Verified tokens in memory: those of a large season's teams, programs and browsers.
-const MAX_RECENT_CALLERS: u64 = 10_000;
 
 /// Answers about a tournament by the newest change of the season that they include.
 type TournamentAnswers<T> = SharedCache<(i64, TournamentId), T>;
@@ -120,7 +118,7 @@ impl AppState {
             passwords: Passwords::default(),
             request_limiter: RequestLimiter::new(config.rate_limits),
             change_quota: ChangeQuota::new(config.rate_limits.team_changes_per_day),
-            recent_callers: SharedCache::with_entries(MAX_RECENT_CALLERS),
+            recent_callers: RecentCallers::default(),
             process_id: Uuid::now_v7(),
             store,
             live,
@@ -150,20 +148,10 @@ impl AppState {
 
     /// Whose request it is, as far as this is known without reading the database: a token that was not verified recently counts as a
     /// visitor's. This gives no rights.
-    pub async fn precedence(&self, headers: &HeaderMap) -> Precedence {
-        let Some(hash) = credential::secret_hash(&self.config, headers) else {
-            return Precedence::Visitor;
-        };
-        let caller = self.recent_callers.cached(&hash).await;
-        caller.map_or(Precedence::Visitor, |caller| *caller)
-    }
-
-    /// Remembers whose token it is that was just verified, or, with `None`, that it is not valid.
-    pub(crate) async fn remember_caller(&self, hash: [u8; 32], caller: Option<Precedence>) {
-        match caller {
-            Some(caller) => self.recent_callers.insert(hash, Arc::new(caller)).await,
-            None => self.recent_callers.remove(&hash).await,
-        }
+    pub fn precedence(&self, headers: &HeaderMap) -> Precedence {
+        let hash = credential::secret_hash(&self.config, headers);
+        let caller = hash.and_then(|hash| self.recent_callers.find(&hash));
+        caller.unwrap_or(Precedence::Visitor)
     }
 
     /// Counts a request with a token.

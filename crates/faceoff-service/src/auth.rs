@@ -213,7 +213,7 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     let VerifiedToken { token, principal } = match verified {
         Ok(verified) => verified,
         Err(rejection) => {
-            app.remember_caller(secret_hash, None).await;
+            app.recent_callers.remove(&secret_hash);
             return match kind {
                 // With an expired session cookie the caller is a visitor.
                 TokenKind::Session => Ok(None),
@@ -224,8 +224,7 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     app.check_rate(token.id)?;
     record_use(app, &token, now);
     let caller = Caller::new(token, secret_hash, principal);
-    app.remember_caller(secret_hash, Some(caller.precedence()))
-        .await;
+    app.recent_callers.insert(secret_hash, caller.precedence());
     if let Some(team) = caller.team()
         && change_quota::is_counted(&parts.method, parts.uri.path())
     {

@@ -25,6 +25,7 @@ pub mod passwords;
 pub mod places;
 pub mod problem;
 pub mod rate_limits;
+mod recent_callers;
 pub mod release;
 pub mod request_log;
 pub mod services;

@@ -57,11 +57,6 @@ where
     pub(crate) async fn insert(&self, key: K, answer: Arc<V>) {
         self.0.insert(key, answer).await;
     }
-
-    /// Forgets an answer.
-    pub(crate) async fn remove(&self, key: &K) {
-        self.0.invalidate(key).await;
-    }
 }
 
 #[cfg(test)]
