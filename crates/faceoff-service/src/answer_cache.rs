@@ -113,7 +113,7 @@ pub(crate) fn new() -> AnswerCache {
 pub async fn get(
     cache: &AnswerCache,
     key: AnswerKey,
-    compute: impl Future<Output = Response>,
+    compute: impl Future<Output = Response> + Send,
 ) -> Response {
     let computed = async {
         let response = Arc::new(CachedResponse::read(compute.await).await);

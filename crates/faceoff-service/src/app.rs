@@ -45,7 +45,7 @@ pub struct AppState {
     /// Episode summaries of runs, from which boards compute their statistics.
     pub summaries: Summaries,
     /// Rows of boards that are aggregated over many days.
-    pub(crate) board_rows: SharedCache<RowsKey, [AggregatedRow]>,
+    pub(crate) board_rows: SharedCache<RowsKey, Vec<AggregatedRow>>,
     /// Responses that are the same for all visitors.
     pub answer_cache: AnswerCache,
     /// Ratings of the submissions of a tournament.
@@ -131,7 +131,7 @@ impl AppState {
         &self,
         answers: &TournamentAnswers<T>,
         tournament: TournamentId,
-        compute: impl Future<Output = Result<T, Problem>>,
+        compute: impl Future<Output = Result<T, Problem>> + Send,
     ) -> Result<Arc<T>, Problem> {
         let key = (self.store.newest_change().await?, tournament);
         if let Some(answer) = answers.cached(&key).await {

@@ -66,7 +66,7 @@ pub(super) async fn rows(
     };
     let rows = app
         .board_rows
-        .get(key, async { compute().await.map(Arc::from) });
+        .get(key, async { compute().await.map(Arc::new) });
     Ok(rows.await?.to_vec())
 }
 
