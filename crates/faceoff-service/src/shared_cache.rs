@@ -118,14 +118,14 @@ fn downcast<T: Send + Sync + 'static>(anything: &Anything) -> Arc<T> {
     typed.expect("a cache has answers and errors of one type each")
 }
 
-/// What a key tells its hasher. Keys of one type that differ tell it something different.
+/// What a key writes into its hasher. Different keys of one type write different bytes.
 fn key_bytes(key: &impl Hash) -> Vec<u8> {
     let mut bytes = KeyBytes(Vec::new());
     key.hash(&mut bytes);
     bytes.0
 }
 
-/// A hasher that keeps all that it is told.
+/// A hasher that keeps all that is written into it.
 struct KeyBytes(Vec<u8>);
 
 impl Hasher for KeyBytes {
