@@ -1,13 +1,18 @@
 //! Probes for monitoring: liveness, readiness and metrics. They have their conventional paths, outside of the API's versions.
 
 use axum::{
-    Json, Router, extract::State, http::header, middleware, response::IntoResponse, routing::get,
+    Json, Router,
+    extract::State,
+    http::{HeaderMap, header},
+    middleware,
+    response::IntoResponse,
+    routing::get,
 };
 use faceoff_api::{
     paths::LIVE_PATH,
     views::health::{HealthView, LiveView},
 };
-use faceoff_metrics::{Disk, GaugeValues, MEDIA_TYPE, Queue};
+use faceoff_metrics::{Disk, Format, GaugeValues, Queue};
 use faceoff_service::{
     app::{App, AppState},
     auth::Organiser,
@@ -46,14 +51,23 @@ async fn ready(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
     health::check(&app).await.map(Json)
 }
 
-async fn metrics(_: Organiser, app: State<App>) -> Result<impl IntoResponse, Problem> {
-    unauthenticated_metrics(app).await
+async fn metrics(
+    _: Organiser,
+    app: State<App>,
+    headers: HeaderMap,
+) -> Result<impl IntoResponse, Problem> {
+    unauthenticated_metrics(app, headers).await
 }
 
-async fn unauthenticated_metrics(State(app): State<App>) -> Result<impl IntoResponse, Problem> {
-    let text = app.config.metrics.text(&gauges(&app).await?);
+async fn unauthenticated_metrics(
+    State(app): State<App>,
+    headers: HeaderMap,
+) -> Result<impl IntoResponse, Problem> {
+    let accept = headers.get(header::ACCEPT);
+    let format = Format::accepted(accept.and_then(|accept| accept.to_str().ok()));
+    let text = app.config.metrics.text(format, &gauges(&app).await?);
     let text = text.map_err(Problem::internal)?;
-    Ok(([(header::CONTENT_TYPE, MEDIA_TYPE)], text))
+    Ok(([(header::CONTENT_TYPE, format.media_type())], text))
 }
 
 async fn gauges(app: &AppState) -> Result<GaugeValues, Problem> {

@@ -1,4 +1,4 @@
-//! Metrics of a server for Prometheus (OpenMetrics text).
+//! Metrics of a server for Prometheus.
 //!
 //! Requests ([`RequestMetrics`]), jobs of slots ([`SlotMetrics`]) and events ([`Metrics::record_event`]) are counted as
 //! they happen. The state of the queue, disks and the process is passed as [`GaugeValues`] when the metrics are read.
@@ -6,10 +6,12 @@
 //! and nothing is stored; counters start at 0 with the process, as Prometheus expects.
 
 mod declaration;
+mod format;
 mod gauges;
 mod request_metrics;
 mod slot_metrics;
 
+pub use format::Format;
 pub use gauges::{Disk, GaugeValues, Process, Queue};
 pub use request_metrics::RequestMetrics;
 pub use slot_metrics::{BusySlot, JobEnd, SlotMetrics};
@@ -21,9 +23,6 @@ use prometheus_client::{
     registry::Registry,
 };
 use std::{fmt, sync::Arc};
-
-/// The media type of [`Metrics::text`].
-pub const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// Begins the name of every metric.
 const PREFIX: &str = "faceoff";
@@ -93,16 +92,16 @@ impl Metrics {
             .inc_by(count);
     }
 
-    /// All metrics as text ([`MEDIA_TYPE`]), with the current gauge values.
+    /// All metrics as text in this format, with the current gauge values.
     ///
     /// # Errors
     /// If the library cannot format one of them.
-    pub fn text(&self, gauge_values: &GaugeValues) -> Result<String, fmt::Error> {
+    pub fn text(&self, format: Format, gauge_values: &GaugeValues) -> Result<String, fmt::Error> {
         let mut text = String::new();
         text::encode_registry(&mut text, &self.registry)?;
         text::encode_registry(&mut text, &gauges::registry(PREFIX, gauge_values))?;
         text::encode_eof(&mut text)?;
-        Ok(text)
+        Ok(format.convert(text))
     }
 }
 
@@ -127,7 +126,9 @@ mod tests {
             .web()
             .record_response("GET", Some("/board"), 200, duration);
         metrics.web().record_response("PUT", None, 404, duration);
-        let text = metrics.text(&GaugeValues::default()).unwrap();
+        let text = metrics
+            .text(Format::OpenMetrics, &GaugeValues::default())
+            .unwrap();
         for line in [
             "faceoff_build_info{version=\"1.2.3\"} 1",
             "faceoff_events_total{kind=\"evaluation_finished\"} 2",
@@ -144,7 +145,9 @@ mod tests {
     #[test]
     fn metrics_text_has_the_current_gauge_values() {
         let metrics = Metrics::new("1.2.3");
-        let without_disks = metrics.text(&GaugeValues::default()).unwrap();
+        let without_disks = metrics
+            .text(Format::OpenMetrics, &GaugeValues::default())
+            .unwrap();
         assert!(!without_disks.contains("disk_free"), "{without_disks}");
         let values = GaugeValues {
             database_writable: true,
@@ -168,7 +171,7 @@ mod tests {
             },
             ..GaugeValues::default()
         };
-        let text = metrics.text(&values).unwrap();
+        let text = metrics.text(Format::OpenMetrics, &values).unwrap();
         for line in [
             "# HELP faceoff_queue_units Jobs: running, waiting, or waiting for disk space.",
             "# TYPE faceoff_queue_units gauge",

@@ -3,6 +3,7 @@
 use crate::site::*;
 use faceoff_http::HttpLimits;
 use faceoff_store::FreeSpace;
+use reqwest::Method;
 
 /// The value of a metric, by name and labels.
 fn metric(text: &str, name: &str) -> f64 {
@@ -67,12 +68,21 @@ async fn metrics_are_for_organisers_only() {
         .problem(403, "forbidden", &[]);
     let text = site.get("/metrics", Some(ADMIN)).await;
     assert_eq!(text.status, 200);
-    let media_type = text.header("content-type");
     assert!(
-        media_type.starts_with("application/openmetrics-text"),
-        "{media_type}"
+        text.header("content-type")
+            .starts_with("text/plain; version=0.0.4")
     );
-    assert!(text.body.ends_with("# EOF\n"));
+    assert!(text.body.contains("# TYPE faceoff_build_info gauge\n"));
+    let open_metrics = site
+        .request(Method::GET, "/metrics", Some(ADMIN))
+        .header("accept", "application/openmetrics-text;version=1.0.0");
+    let open_metrics = Answer::read(open_metrics.send().await.unwrap()).await;
+    assert!(
+        open_metrics
+            .header("content-type")
+            .starts_with("application/openmetrics-text")
+    );
+    assert!(open_metrics.body.ends_with("# EOF\n"));
 }
 
 #[tokio::test]
