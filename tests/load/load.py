@@ -48,10 +48,10 @@ slots = 1
 class Season:
     """A server with a season of its own."""
 
-    def __init__(self, program: Path, folder: Path):
+    def __init__(self, program: Path, folder: Path, settings: str = CONFIG):
         self.data = folder / "data"
         config = folder / "faceoff.toml"
-        config.write_text(CONFIG)
+        config.write_text(settings)
         self.process = subprocess.Popen(
             [program, "serve", "--config", config, "--data-dir", self.data],
             stdout=subprocess.PIPE,

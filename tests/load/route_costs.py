@@ -26,6 +26,19 @@ from urllib.parse import urlsplit
 
 from load import Season, is_over, pack_bundle, percentile
 
+CONFIG = """
+[server]
+listen = "127.0.0.1:0"
+[season]
+name = "Costs"
+[evaluation]
+episodes_per_task = 10
+[workers]
+slots = 1
+[rates]
+address_per_s = 1000000
+address_burst = 1000000
+"""
 TEAMS = 20
 CUP_TEAMS = 4
 MEASURED_CPU_S = 0.3
@@ -106,7 +119,8 @@ def page_paths(visitor: Visitor) -> dict[str, str]:
         for link in re.findall(r'(?:href|src)="(/[^"]*)"', body.decode(errors="replace")):
             path = link.split("#")[0].replace("&amp;", "&")
             pattern = re.sub(r"\d+(?=$|/)", "{n}", UUID.sub("{id}", path.split("?")[0]))
-            if path.startswith("/api/") or pattern in paths:
+            pattern = re.sub(r"/schemas/\w+", "/schemas/{name}", pattern)
+            if path.startswith(("/api/", "/static/")) or "/images/" in path or pattern in paths:
                 continue
             paths[pattern] = path
             waiting.append(path)
@@ -142,7 +156,7 @@ def measure(season: Season, visitor: Visitor, path: str) -> tuple[int, float, fl
     ignores_queries = visitor.get(f"{path}{separator}n=")[0] == status
     while count < MAX_REQUESTS and cpu_s(season) - idle < MEASURED_CPU_S:
         answer = visitor.get(f"{path}{separator}n={count}" if ignores_queries else path)
-        assert answer[0] in (status, 429), (path, answer[0])
+        assert answer[0] == status, (path, answer[0])
         count += 1
     spent = cpu_s(season) - idle
     done.set()
@@ -154,7 +168,7 @@ def main() -> None:
     program, striker = (Path(word).resolve() for word in sys.argv[1:3])
     with tempfile.TemporaryDirectory(prefix="faceoff-costs-") as name:
         folder = Path(name)
-        season = Season(program, folder)
+        season = Season(program, folder, CONFIG)
         try:
             ids = create_season(season, pack_bundle(striker, folder))
             visitor = Visitor(season)
