@@ -11,8 +11,8 @@ use std::{
     net::TcpStream,
 };
 
-/// Number of event streams that a server allows at the same time.
-const MAX_STREAMS: usize = 512;
+/// Number of event streams that visitors may have at the same time: three quarters of all.
+const MAX_STREAMS: usize = 384;
 
 /// A script that records each event stream that a page opens, and how many milliseconds it waits before it opens the next.
 const RECORD_STREAMS: &str = "
