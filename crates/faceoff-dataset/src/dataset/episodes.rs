@@ -1,6 +1,6 @@
 //! Reads `episodes.parquet`, a dataset's table with one row per episode.
 
-use super::{file_range::FileRange, footer, steps::check_columns};
+use super::{check_table, file_range::FileRange, steps::check_columns};
 use crate::{error::DatasetError, files::EPISODES_FILE, table::EpisodeRows};
 use arrow_array::{
     Array, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array,
@@ -43,10 +43,9 @@ pub(crate) fn batches(
     expected_rows: u64,
     competition: &Arc<Competition>,
 ) -> Result<Vec<RecordBatch>, DatasetError> {
-    let bytes = table.bytes;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(table)
+    let builder = ParquetRecordBatchReaderBuilder::try_new(table.clone())
         .and_then(|builder| {
-            footer::check(builder.metadata(), bytes)?;
+            check_table(&table, builder.metadata())?;
             Ok(builder)
         })
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;

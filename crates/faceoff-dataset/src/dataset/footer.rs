@@ -16,7 +16,7 @@ const SMALL_COLUMN_BYTES: u64 = 1 << 20;
 
 /// Refuses negative numbers, columns that are not within the table, whose size is `table_bytes`, and columns that a small table
 /// states as far larger than such values are.
-pub(crate) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
+pub(super) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
     for (number, group) in footer.row_groups().iter().enumerate() {
         let columns = group.columns().iter();
         if group.num_rows() > MAX_GROUP_ROWS {

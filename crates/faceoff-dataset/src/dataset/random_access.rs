@@ -4,7 +4,7 @@
 //! `episode` select the row groups, the values of these columns the rows, and the page index the pages. Tables without
 //! bounds or index need more reading.
 
-use super::{footer, steps::reader};
+use super::{footer, pages::IndexedPages, steps::reader};
 use crate::{error::DatasetError, files::STEPS_FILE};
 use arrow_array::{
     BooleanArray, RecordBatch, RecordBatchReader, StringArray, UInt32Array, cast::AsArray,
@@ -34,6 +34,7 @@ pub(super) fn episode<R: ChunkReader + Clone + 'static>(
 ) -> std::result::Result<RecordBatch, DatasetError> {
     let unreadable = || DatasetError::unreadable::<ParquetError>(STEPS_FILE);
     let (metadata, groups) = row_groups(&table, task, episode).map_err(unreadable())?;
+    let table = IndexedPages::new(table, metadata.metadata(), &groups).map_err(unreadable())?;
 
     let key_columns = ["task".to_owned(), "episode".to_owned()];
     let keys = reader(table.clone(), &metadata, Some(&key_columns), competition)?

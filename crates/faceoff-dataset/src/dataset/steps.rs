@@ -1,6 +1,6 @@
 //! Reads `steps.parquet`, a dataset's table with one row per control step.
 
-use super::{file_range::FileRange, footer};
+use super::{check_table, file_range::FileRange};
 use crate::{
     error::DatasetError,
     files::STEPS_FILE,
@@ -116,7 +116,7 @@ impl StepTable {
     ) -> Result<Self, DatasetError> {
         let metadata = ArrowReaderMetadata::load(&table, Default::default())
             .and_then(|metadata| {
-                footer::check(metadata.metadata(), table.bytes)?;
+                check_table(&table, metadata.metadata())?;
                 Ok(metadata)
             })
             .map_err(DatasetError::unreadable(STEPS_FILE))?;

@@ -1,7 +1,7 @@
 //! Reads a table of a game's recording row by row.
 
 use crate::{
-    dataset::{BATCH_ROWS, FileRange, check_columns, check_footer},
+    dataset::{BATCH_ROWS, FileRange, check_columns, check_table},
     error::DatasetError,
 };
 use arrow_array::RecordBatch;
@@ -23,9 +23,9 @@ impl GameTable {
         expected: &Schema,
     ) -> Result<Self, DatasetError> {
         let unreadable = || DatasetError::unreadable(name);
-        let bytes = table.bytes;
-        let builder = ParquetRecordBatchReaderBuilder::try_new(table).map_err(unreadable())?;
-        check_footer(builder.metadata(), bytes).map_err(unreadable())?;
+        let builder =
+            ParquetRecordBatchReaderBuilder::try_new(table.clone()).map_err(unreadable())?;
+        check_table(&table, builder.metadata()).map_err(unreadable())?;
         let found = builder.schema();
         check_columns(name, found, expected)?;
         if found.fields().len() != expected.fields().len() {
