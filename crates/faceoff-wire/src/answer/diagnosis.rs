@@ -49,9 +49,30 @@ pub(super) fn diagnose(
     }
     // The text is a single line, so only the column helps.
     let detail = message.replace(" at line 1 column ", " at character ");
+    let hint = hint(text).map_or(String::new(), |hint| format!(" ({hint})"));
     AgentFaultKind::NotJson {
-        detail: shorten(&detail),
+        detail: shorten(&detail) + &hint,
     }
+}
+
+/// What a line that is not JSON probably is.
+fn hint(text: &str) -> Option<&'static str> {
+    let text = text.trim_start();
+    if !text.starts_with('{') {
+        return Some("standard output is for answers; print everything else to standard error");
+    }
+    let first_key = text[1..].trim_start();
+    let has_word = |words: &[&str]| words.iter().any(|word| text.contains(word));
+    if first_key.starts_with('\'') || has_word(&[": None", ": True", ": False"]) {
+        return Some("this looks like a printed Python dict; in Python, print json.dumps(answer)");
+    }
+    if has_word(&["array(", "tensor(", "float64(", "float32("]) {
+        return Some("this looks like a printed array; convert it to a list of numbers first");
+    }
+    if first_key.starts_with(|first: char| first.is_alphabetic()) {
+        return Some("names need double quotes in JSON");
+    }
+    None
 }
 
 /// The fault for a repeated key.
@@ -95,7 +116,7 @@ fn too_large(index_and_value: &str, layout: ActionLayout) -> AgentFaultKind {
 
 fn wrong_shape(text: &str, layout: ActionLayout) -> AgentFaultKind {
     let got = match serde_json::from_str::<Value>(text) {
-        Ok(value) => describe_action(&value["action"]),
+        Ok(value) => describe_action(&value["action"], layout.shape()),
         Err(error) if error.to_string().starts_with("number out of range") => {
             return AgentFaultKind::NonFinite;
         }
@@ -115,7 +136,7 @@ fn shape_text(shape: &[usize]) -> String {
 
 /// A description of an action of a wrong shape: its shape, such as `[2][6]`, if it is regular; otherwise the first element that
 /// breaks the shape.
-fn describe_action(action: &Value) -> String {
+fn describe_action(action: &Value, expected: &[usize]) -> String {
     let mut shape = Vec::new();
     let mut inner = action;
     while let Value::Array(items) = inner {
@@ -129,9 +150,38 @@ fn describe_action(action: &Value) -> String {
         return kind_of(action).to_owned();
     }
     match irregularity(action, &shape, &mut Vec::new()) {
-        None => shape_text(&shape),
+        None => {
+            let hint = shape_hint(&shape, expected);
+            shape_text(&shape) + &hint.map_or(String::new(), |hint| format!(" ({hint})"))
+        }
         Some(text) => text,
     }
+}
+
+/// The probable reason why an action has the shape `got`.
+fn shape_hint(got: &[usize], expected: &[usize]) -> Option<&'static str> {
+    let count = |shape: &[usize]| {
+        shape
+            .iter()
+            .try_fold(1_usize, |all, len| all.checked_mul(*len))
+    };
+    let numbers = count(expected);
+    if got.iter().rev().eq(expected) {
+        return Some("transposed; send a list per row");
+    }
+    if got.first() == Some(&1) && got.get(1..) == Some(expected) {
+        return Some("a batch of one; send its only element");
+    }
+    if got.len() == 1 && count(got) == numbers {
+        return Some("one flat list; send a list per row");
+    }
+    if count(got) == numbers.and_then(|numbers| numbers.checked_mul(2))
+        && got.len() == expected.len()
+        && got.last() == expected.last().map(|len| len * 2).as_ref()
+    {
+        return Some("perhaps with decimal commas; JSON has decimal points");
+    }
+    None
 }
 
 /// Describes the first element, below the element at `path`, that does not fit `shape`; `None` if all fit.

@@ -41,6 +41,8 @@ impl<'a> Fields<'a> {
         let text = std::str::from_utf8(line).map_err(|error| AgentFaultKind::NotJson {
             detail: format!("not UTF-8 after byte {}", error.valid_up_to()),
         })?;
+        // Some languages begin their output with a byte order mark.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let layout = sink.as_ref().map(|(layout, _)| *layout);
         let mut json = serde_json::Deserializer::from_str(text);
         let fields = json

@@ -13,7 +13,7 @@ pub enum Scalar<'a> {
     Null,
     /// `true` or `false`
     Bool(bool),
-    /// A number without fraction and exponent that fits into `i64`.
+    /// A whole number that fits into `i64`, in any notation: some languages write all numbers with a fraction, such as `3.0`.
     Integer(i64),
     /// Any other number.
     Number(f64),
@@ -74,7 +74,13 @@ impl<'de> Visitor<'de> for ScalarVisitor {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Self::Value, E> {
-        Ok(Scalar::Number(value))
+        // Up to 2^53 each whole number has its own double.
+        let is_whole = value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0;
+        Ok(if is_whole {
+            Scalar::Integer(value as i64)
+        } else {
+            Scalar::Number(value)
+        })
     }
 
     fn visit_borrowed_str<E>(self, value: &'de str) -> Result<Self::Value, E> {

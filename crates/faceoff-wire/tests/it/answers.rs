@@ -95,6 +95,18 @@ fn field_order_spaces_and_extra_fields_do_not_matter() {
 }
 
 #[test]
+fn notations_of_other_languages_are_read() {
+    for step in ["4.0", "4e0", "40e-1"] {
+        let line = valid_act().replace(":4,", &format!(":{step},"));
+        assert!(parse(&line).is_ok(), "{line}");
+    }
+    assert!(parse(&format!("\u{feff}{}", valid_act())).is_ok());
+    let ready = r#"{"type":"ready","protocol":1.0,"interpolation":3.0}"#;
+    let interpolation = parse_ready(ready.as_bytes(), &actions()).unwrap().layout;
+    assert_eq!(interpolation.code(), Some(3));
+}
+
+#[test]
 fn all_action_shapes_are_read() {
     let nest = |n: usize, inner: &str| format!("[{}]", vec![inner; n].join(","));
     for (code, text) in [
@@ -131,7 +143,11 @@ fn wrong_message_or_step_is_named() {
         "an object without type",
     );
     assert_wrong_message(&valid_act().replace(":4,", ":3,"), "act with step 3");
-    assert_wrong_message(&valid_act().replace(":4,", ":4.0,"), "act with step 4.0");
+    assert_wrong_message(&valid_act().replace(":4,", ":4.5,"), "act with step 4.5");
+    assert_wrong_message(
+        &valid_act().replace(":4,", ":4e300,"),
+        "act with step 4e300",
+    );
     assert_wrong_message(&valid_act().replace(":4,", ":-1,"), "act with step -1");
     assert_wrong_message(
         &valid_act().replace(":4,", ":[[4]],"),
@@ -148,6 +164,18 @@ fn wrong_message_or_step_is_named() {
 fn wrong_shape_is_named() {
     assert_wrong_shape(&row("1"), "[7]");
     assert_wrong_shape(&format!("[{}]", row("1")), "[1][7]");
+    let flat = format!("[{}]", ["1"; 14].join(","));
+    assert_wrong_shape(&flat, "[14] (one flat list; send a list per row)");
+    let transposed = format!("[{}]", ["[1,2]"; 7].join(","));
+    assert_wrong_shape(&transposed, "[7][2] (transposed; send a list per row)");
+    assert_wrong_shape(
+        &format!("[[{0},{0}]]", row("1")),
+        "[1][2][7] (a batch of one; send its only element)",
+    );
+    assert_wrong_shape(
+        &format!("[{0},{0}]", row("0,5")),
+        "[2][14] (perhaps with decimal commas; JSON has decimal points)",
+    );
     assert_wrong_shape(&format!("[{0},{0},{0}]", row("1")), "[3][7]");
     assert_wrong_shape("[[1,2],[3,4]]", "[2][2]");
     assert_wrong_shape("[]", "[0]");
@@ -260,7 +288,15 @@ fn too_large_number_is_refused_with_its_place() {
 fn invalid_json_is_refused_with_a_reason() {
     assert_not_json("", "the line is empty");
     assert_not_json("   ", "the line is empty");
-    assert_not_json("hello", "at character 1");
+    assert_not_json("hello", "at character 1 (standard output is for answers");
+    assert_not_json("{'type': 'act'}", "(this looks like a printed Python dict");
+    let with_none = "{\"type\": \"act\", \"note\": None}";
+    assert_not_json(with_none, "(this looks like a printed Python dict");
+    assert_not_json(
+        "{\"type\": \"act\", \"action\": [array([1.0])]}",
+        "(this looks like a printed array",
+    );
+    assert_not_json("{type: \"act\"}", "(names need double quotes in JSON)");
     assert_not_json("[1,2]", "expected an object");
     assert_not_json("null", "expected an object");
     assert_not_json("\"act\"", "expected an object");
@@ -279,7 +315,7 @@ fn invalid_json_is_refused_with_a_reason() {
         let Err(AgentFaultKind::NotJson { detail }) = parse(&line) else {
             panic!("expected NotJson");
         };
-        assert!(detail.chars().count() < 260, "{detail}");
+        assert!(detail.chars().count() < 340, "{detail}");
     }
     let mut action = Vec::new();
     let fault = parse_act(
