@@ -1,5 +1,6 @@
 //! Checks the bundle's command before the start, so that common mistakes get a clear message.
 
+use crate::program_file::ProgramFile;
 use faceoff_types::AgentFaultKind;
 use rustix::{
     fs::{FileType, Mode, OFlags, ResolveFlags, Stat, fstat, open, openat2},
@@ -13,12 +14,14 @@ const MAX_WORD_BYTES: usize = 32 << 10;
 const MAX_TOTAL_BYTES: usize = 256 << 10;
 
 /// Refuses an empty command, arguments or variables that no program can be given, and a program of the bundle
-/// that is missing or not executable. A program of the runtime is looked up inside the sandbox only.
+/// that is missing, not executable or of another system. A program of the runtime is looked up inside the sandbox only.
+///
+/// Returns what the start of a program of the bundle needs, for the error if it fails.
 pub(crate) fn check_command(
     bundle_dir: &Path,
     command: &[String],
     env: &BTreeMap<String, String>,
-) -> Result<(), AgentFaultKind> {
+) -> Result<Option<String>, AgentFaultKind> {
     let refuse = |detail: String| Err(AgentFaultKind::CannotStart { detail });
     let Some(program) = command.first().filter(|program| !program.is_empty()) else {
         return refuse("the command is empty".into());
@@ -45,7 +48,7 @@ pub(crate) fn check_command(
     }
     let path_in_bundle = match program.strip_prefix("/agent/") {
         Some(rest) => rest.trim_start_matches('/'),
-        None if program.starts_with('/') || !program.contains('/') => return Ok(()),
+        None if program.starts_with('/') || !program.contains('/') => return Ok(None),
         None => program.as_str(),
     };
     if climbs_out(path_in_bundle) {
@@ -57,15 +60,22 @@ pub(crate) fn check_command(
             return refuse(format!("`{program}` is not in the bundle"));
         }
         // A link leads out of the bundle, or the kernel lacks the call: the start in the sandbox decides.
-        Err(_) => return Ok(()),
+        Err(_) => return Ok(None),
     };
     match FileType::from_raw_mode(found.st_mode) {
-        FileType::Directory => refuse(format!("`{program}` is a folder")),
-        FileType::RegularFile if found.st_mode & 0o111 == 0 => refuse(format!(
-            "`{program}` is not executable (mode {:o})",
-            found.st_mode & 0o777
-        )),
-        _ => Ok(()),
+        FileType::Directory => return refuse(format!("`{program}` is a folder")),
+        FileType::RegularFile if found.st_mode & 0o111 == 0 => {
+            return refuse(format!(
+                "`{program}` is not executable (mode {:o})",
+                found.st_mode & 0o777
+            ));
+        }
+        _ => {}
+    }
+    match ProgramFile::read(bundle_dir, path_in_bundle) {
+        Some(ProgramFile::Unusable(reason)) => refuse(format!("`{program}` {reason}")),
+        Some(ProgramFile::Needs(needs)) => Ok(needs),
+        None => Ok(None),
     }
 }
 
@@ -110,7 +120,7 @@ mod tests {
 
     fn check(bundle_dir: &Path, program: &str) -> Option<String> {
         match check_command(bundle_dir, &[program.to_owned()], &BTreeMap::new()) {
-            Ok(()) => None,
+            Ok(_) => None,
             Err(AgentFaultKind::CannotStart { detail }) => Some(detail),
             Err(other) => panic!("{other:?}"),
         }

@@ -39,6 +39,7 @@ mod private_network;
 mod probe;
 mod process;
 mod process_tree;
+mod program_file;
 mod runtime;
 mod sched_stat;
 mod seccomp;

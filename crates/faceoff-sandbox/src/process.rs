@@ -40,6 +40,8 @@ pub struct AgentProcess {
     /// The threads whose scheduling counters are read.
     threads: TrackedThreads,
     is_frozen: bool,
+    /// What the start of the program needs, for the error if it fails.
+    start_needs: Option<String>,
     end: Option<ExitCause>,
 }
 
@@ -74,7 +76,8 @@ impl AgentProcess {
             "cannot find the bundle {}",
             spec.bundle_dir.display()
         ))?;
-        check_command(&bundle_dir, &spec.command, &spec.env).map_err(SpawnError::Agent)?;
+        let start_needs =
+            check_command(&bundle_dir, &spec.command, &spec.env).map_err(SpawnError::Agent)?;
         let spec = SpawnSpec {
             bundle_dir,
             ..spec.clone()
@@ -84,7 +87,14 @@ impl AgentProcess {
             output_name,
             stderr,
             tree,
-        } = Launch::new(&spec)?.start(&spec)?;
+        } = Launch::new(&spec)?
+            .start(&spec)
+            .map_err(|error| match error {
+                SpawnError::Agent(fault) => {
+                    SpawnError::Agent(with_start_needs(fault, &start_needs))
+                }
+                platform => platform,
+            })?;
         Ok(Self {
             lines,
             output_name,
@@ -94,6 +104,7 @@ impl AgentProcess {
             output_poll: PollInterval::start(Instant::now()),
             threads: TrackedThreads::default(),
             is_frozen: false,
+            start_needs,
             end: None,
         })
     }
@@ -407,9 +418,24 @@ impl AgentProcess {
                 stderr: &self.stderr.text(),
                 limits: &self.limits,
             };
-            self.end = Some(report.cause());
+            self.end = Some(match report.cause() {
+                ExitCause::Agent(fault) => {
+                    ExitCause::Agent(with_start_needs(fault, &self.start_needs))
+                }
+                other => other,
+            });
         }
         self.end.as_ref()
+    }
+}
+
+/// Adds to the fault of a failed start what the start needs.
+fn with_start_needs(fault: AgentFaultKind, start_needs: &Option<String>) -> AgentFaultKind {
+    match (fault, start_needs) {
+        (AgentFaultKind::CannotStart { detail }, Some(needs)) => AgentFaultKind::CannotStart {
+            detail: format!("{detail}; {needs}"),
+        },
+        (fault, _) => fault,
     }
 }
 

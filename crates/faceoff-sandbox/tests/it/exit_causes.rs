@@ -142,9 +142,12 @@ fn command_that_cannot_be_executed_is_an_agent_fault() {
         start_error(&["/usr/sbin/no-such"]),
         "/usr/sbin/no-such: No such file or directory"
     );
-    assert_eq!(
-        start_error(&["./script"]),
-        "./script: No such file or directory"
+    let script = start_error(&["./script"]);
+    assert!(
+        script.starts_with(
+            "./script: No such file or directory; it is a script for /no/such/interpreter,"
+        ),
+        "{script}"
     );
     // A program of the runtime that starts, but cannot run, is an exit.
     let mut subject = Subject::new("echo", &[]);
