@@ -1,15 +1,16 @@
 //! `faceoff activate`: makes a submission active.
 
-use super::{next_cutoff::next_cutoff_text, output::print, server::ServerArgs};
+use super::{
+    next_cutoff::next_cutoff_text, output::print, references::SubmissionArg, server::ServerArgs,
+};
 use clap::Args;
-use faceoff_types::SubmissionId;
 
 /// Makes one of the team's valid submissions active. It is evaluated at the next cutoff and at every later
 /// one, until a newer upload becomes valid or another submission is activated.
 #[derive(Debug, Args)]
 pub struct ActivateCommand {
-    /// The submission's id, as `faceoff submit` printed it
-    submission: SubmissionId,
+    #[command(flatten)]
+    submission: SubmissionArg,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -25,7 +26,8 @@ impl ActivateCommand {
 
     async fn activate(self) -> anyhow::Result<()> {
         let client = self.server.client()?;
-        let active = client.activate(self.submission).await?;
+        let id = self.submission.find(&client).await?;
+        let active = client.activate(id).await?;
         let me = client.me().await?;
         print(self.server.json, &active, |active| {
             format!(

@@ -3,14 +3,14 @@
 
 mod table;
 
-use super::{ca_file::CaFile, output::print_json, server::Connection};
+use super::{ca_file::CaFile, output::print_json, references::find_evaluation, server::Connection};
 use crate::competition::competition;
 use anyhow::Context;
 use clap::Args;
 use faceoff_api::requests::ComparisonQuery;
 use faceoff_dataset::Dataset;
 use faceoff_scoring::{ComparedEvaluation, Comparison, EpisodeSummary, SolvedEpisodes};
-use faceoff_types::{EpisodeOutcome, EvaluationId, Profile, TaskMap, TaskWeights};
+use faceoff_types::{EpisodeOutcome, Profile, TaskMap, TaskWeights};
 use faceoff_wire::dataset::DatasetManifest;
 use serde::Serialize;
 use std::path::Path;
@@ -19,12 +19,12 @@ use std::path::Path;
 /// with its 95 % interval, by task and overall.
 #[derive(Debug, Args)]
 pub struct CompareCommand {
-    /// A dataset.zip, an unpacked dataset, or the folder of `faceoff eval --out`; with --server, the id
-    /// of an evaluation
+    /// A dataset.zip, an unpacked dataset, or the folder of `faceoff eval --out`; with --server, an
+    /// evaluation of that server: its id, `latest`, or "TEAM DAY"
     a: String,
     /// The other evaluation, given in the same way
     b: String,
-    /// Compare two evaluations of this server, by their ids
+    /// Compare two evaluations of this server, by their ids or "TEAM DAY"
     #[arg(long, value_name = "URL")]
     server: Option<String>,
     #[command(flatten)]
@@ -103,17 +103,14 @@ impl CompareCommand {
     }
 
     async fn compare_on_server(&self, server: &str) -> anyhow::Result<()> {
-        let id = |text: &str| -> anyhow::Result<EvaluationId> {
-            text.parse().with_context(|| {
-                format!("{text:?}: expected the id of an evaluation, as with --server")
-            })
-        };
         // With a login, results that are not public yet can be compared, too.
         let client = Connection::resolve(Some(server), None, self.ca.path())?.client()?;
+        let a = find_evaluation(&client, &self.a).await?;
+        let b = find_evaluation(&client, &self.b).await?;
         let query = ComparisonQuery {
             episodes: self.episodes,
         };
-        let view = client.compare(id(&self.a)?, id(&self.b)?, query).await?;
+        let view = client.compare(a, b, query).await?;
         if self.json {
             return print_json(&view);
         }

@@ -4,6 +4,7 @@
 use super::{
     evaluation_text::{status_text, task_table},
     output::print,
+    references::EvaluationArg,
     server::ServerArgs,
 };
 use crate::client::Client;
@@ -12,7 +13,6 @@ use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     violations::ViolationsView,
 };
-use faceoff_types::EvaluationId;
 
 /// Shows an evaluation: its progress, or its result by task.
 #[derive(Debug, Args)]
@@ -25,8 +25,8 @@ pub struct EvaluationCommand {
 
 #[derive(Debug, Args)]
 pub(super) struct EvaluationArgs {
-    /// The evaluation's id
-    evaluation: EvaluationId,
+    #[command(flatten)]
+    evaluation: EvaluationArg,
     /// Show the episodes with constraint violations or slow answers instead
     #[arg(long)]
     violations: bool,
@@ -52,11 +52,12 @@ impl EvaluationCommand {
 
 /// Prints an evaluation, requested with the client's token.
 pub(super) async fn show(client: &Client, json: bool, args: &EvaluationArgs) -> anyhow::Result<()> {
+    let id = args.evaluation.find(client).await?;
     if args.violations {
-        let violations = client.violations(args.evaluation).await?;
+        let violations = client.violations(id).await?;
         return print(json, &violations, violations_text);
     }
-    let evaluation = client.evaluation(args.evaluation).await?;
+    let evaluation = client.evaluation(id).await?;
     print(json, &evaluation, evaluation_text)
 }
 

@@ -3,12 +3,13 @@
 use super::{
     game::own_side,
     output::{print, time_text},
+    references::{EvaluationArg, SubmissionArg},
     server::ServerArgs,
 };
 use crate::client::LinkTarget;
 use clap::{Args, Subcommand};
 use faceoff_api::requests::NewLink;
-use faceoff_types::{EvaluationId, GameId, Side, SubmissionId};
+use faceoff_types::{GameId, Side};
 
 /// Creates a link that downloads a file without a token, until the link expires or your token becomes invalid.
 #[derive(Debug, Args)]
@@ -26,13 +27,13 @@ pub struct LinkCommand {
 enum Target {
     /// The dataset of an evaluation
     Dataset {
-        /// The evaluation's id
-        evaluation: EvaluationId,
+        #[command(flatten)]
+        evaluation: EvaluationArg,
     },
     /// The bundle of a submission
     Submission {
-        /// The submission's id
-        submission: SubmissionId,
+        #[command(flatten)]
+        submission: SubmissionArg,
     },
     /// Your side's dataset of a game
     Game {
@@ -56,8 +57,12 @@ impl LinkCommand {
         super::block_on(async {
             let client = self.server.client()?;
             let target = match self.target {
-                Target::Dataset { evaluation } => LinkTarget::Dataset(evaluation),
-                Target::Submission { submission } => LinkTarget::Submission(submission),
+                Target::Dataset { evaluation } => {
+                    LinkTarget::Dataset(evaluation.find(&client).await?)
+                }
+                Target::Submission { submission } => {
+                    LinkTarget::Submission(submission.find(&client).await?)
+                }
                 Target::Game { game, both, .. } if both => LinkTarget::Recording(game),
                 Target::Game { game, side, .. } => {
                     let found = client.game(game).await?;

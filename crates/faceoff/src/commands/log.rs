@@ -16,7 +16,7 @@ use serde::Serialize;
 /// that the agent failed, or of a game.
 #[derive(Debug, Args)]
 pub struct LogCommand {
-    /// The id of a submission, an evaluation or a game
+    /// The id of a submission, an evaluation or a game; or `latest`, your team's newest submission or evaluation
     id: String,
     /// For organisers, with a game: the side, 1 (home) or 2 (away)
     #[arg(long, value_parser = super::game::parse_side)]
@@ -51,9 +51,12 @@ impl LogCommand {
     ///
     /// # Errors
     /// If the id is unknown, or the caller may not see it.
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(mut self) -> anyhow::Result<()> {
         super::block_on(async {
             let client = self.server.client()?;
+            if self.id == "latest" {
+                self.id = latest(&client).await?;
+            }
             let log = self.find(&client).await?;
             print(self.server.json, &log, |log| log.text())
         })
@@ -92,6 +95,18 @@ impl LogCommand {
             next: None,
         })
     }
+}
+
+/// The id of the team's newest submission or evaluation, whichever was created later.
+async fn latest(client: &Client) -> anyhow::Result<String> {
+    let submissions = client.submissions().await?;
+    let evaluations = client.newest_evaluations(1).await?;
+    let submission = submissions.first().map(|found| found.id.to_string());
+    let evaluation = evaluations.first().map(|found| found.id.to_string());
+    // Ids begin with the time of their creation.
+    submission
+        .max(evaluation)
+        .context("your team has no submission yet")
 }
 
 /// Turns the error of an unknown id into `None`.

@@ -37,6 +37,7 @@ mod people;
 pub mod play;
 pub mod publish;
 mod queue;
+mod references;
 pub mod register;
 pub mod replay;
 pub mod restore;

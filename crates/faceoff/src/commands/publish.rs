@@ -1,16 +1,15 @@
 //! `faceoff publish`: publishes an evaluation of the team before its stage does.
 
-use super::{output::print, server::ServerArgs};
+use super::{output::print, references::EvaluationArg, server::ServerArgs};
 use clap::Args;
 use faceoff_api::views::evaluation::EvaluationStatus;
-use faceoff_types::EvaluationId;
 
 /// Publishes a finished evaluation of the team with its dataset: everyone can see it without a token. This
 /// cannot be undone.
 #[derive(Debug, Args)]
 pub struct PublishCommand {
-    /// The evaluation's id
-    evaluation: EvaluationId,
+    #[command(flatten)]
+    evaluation: EvaluationArg,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -25,7 +24,9 @@ impl PublishCommand {
     }
 
     async fn publish(self) -> anyhow::Result<()> {
-        let published = self.server.client()?.publish(self.evaluation).await?;
+        let client = self.server.client()?;
+        let id = self.evaluation.find(&client).await?;
+        let published = client.publish(id).await?;
         print(self.server.json, &published, |published| {
             let mut text = format!(
                 "published: the evaluation of {} ({})",

@@ -5,6 +5,7 @@ use super::{
     next_cutoff::next_cutoff_text,
     output::{print, print_download, print_list, time_text},
     queue::queue_text,
+    references::SubmissionArg,
     server::ServerArgs,
 };
 use crate::client::Client;
@@ -36,30 +37,30 @@ enum Action {
     Status,
     /// Set the label of a submission, visible to the team and organisers only
     Label {
-        /// The submission's id
-        submission: SubmissionId,
+        #[command(flatten)]
+        submission: SubmissionArg,
         /// 1 to 80 characters; without it, the label is removed
         label: Option<String>,
     },
     /// Set the note of a submission, visible to the team and organisers only
     Note {
-        /// The submission's id
-        submission: SubmissionId,
+        #[command(flatten)]
+        submission: SubmissionArg,
         /// 1 to 2000 characters; without it, the note is removed
         note: Option<String>,
     },
     /// Download the bundle of a submission as it was uploaded
     Download {
-        /// The submission's id
-        submission: SubmissionId,
+        #[command(flatten)]
+        submission: SubmissionArg,
         /// The file to write; an existing file is replaced
         file: PathBuf,
     },
     /// Delete the bundle of a submission permanently; its results are kept; without --confirm, only list the
     /// effects
     Delete {
-        /// The submission's id
-        submission: SubmissionId,
+        #[command(flatten)]
+        submission: SubmissionArg,
         /// Reason, 1 to 500 characters
         #[arg(long)]
         reason: Option<String>,
@@ -69,13 +70,13 @@ enum Action {
     },
     /// Show the effect of each perturbation on a submission, if the organisers have requested an ablation
     Ablation {
-        /// The submission's id
-        submission: SubmissionId,
+        #[command(flatten)]
+        submission: SubmissionArg,
     },
     /// Withdraw a submission: it is not evaluated any more, unless `faceoff activate` makes it active again
     Withdraw {
-        /// The submission's id
-        submission: SubmissionId,
+        #[command(flatten)]
+        submission: SubmissionArg,
     },
 }
 
@@ -110,17 +111,18 @@ impl SubmissionsCommand {
                     label: Some(label),
                     ..SubmissionChange::default()
                 };
-                describe(&client, json, submission, &change).await
+                describe(&client, json, submission.find(&client).await?, &change).await
             }
             Action::Note { submission, note } => {
                 let change = SubmissionChange {
                     note: Some(note),
                     ..SubmissionChange::default()
                 };
-                describe(&client, json, submission, &change).await
+                describe(&client, json, submission.find(&client).await?, &change).await
             }
             Action::Download { submission, file } => {
-                download(&client, json, submission, &file).await
+                let id = submission.find(&client).await?;
+                download(&client, json, id, &file).await
             }
             Action::Delete {
                 submission,
@@ -128,14 +130,19 @@ impl SubmissionsCommand {
                 confirm,
             } => {
                 let deletion = DeleteSubmission { confirm, reason };
-                let deleted = client.delete_submission(submission, &deletion).await?;
+                let deleted = client
+                    .delete_submission(submission.find(&client).await?, &deletion)
+                    .await?;
                 print(json, &deleted, submission_line)
             }
             Action::Ablation { submission } => {
-                let newest = client.ablation(submission).await?;
+                let newest = client.ablation(submission.find(&client).await?).await?;
                 print(json, &newest, ablation_text)
             }
-            Action::Withdraw { submission } => withdraw(&client, json, submission).await,
+            Action::Withdraw { submission } => {
+                let id = submission.find(&client).await?;
+                withdraw(&client, json, id).await
+            }
         }
     }
 }

@@ -1,14 +1,13 @@
 //! `faceoff withdraw`: withdraws a submission.
 
-use super::{server::ServerArgs, submissions::withdraw};
+use super::{references::SubmissionArg, server::ServerArgs, submissions::withdraw};
 use clap::Args;
-use faceoff_types::SubmissionId;
 
 /// Withdraws a submission: it is not evaluated any more, unless `faceoff activate` makes it active again.
 #[derive(Debug, Args)]
 pub struct WithdrawCommand {
-    /// The submission's id
-    submission: SubmissionId,
+    #[command(flatten)]
+    submission: SubmissionArg,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -21,7 +20,8 @@ impl WithdrawCommand {
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
             let client = self.server.client()?;
-            withdraw(&client, self.server.json, self.submission).await
+            let id = self.submission.find(&client).await?;
+            withdraw(&client, self.server.json, id).await
         })
     }
 }

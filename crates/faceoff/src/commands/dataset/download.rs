@@ -2,7 +2,7 @@
 
 use crate::{
     client::Client,
-    commands::{block_on, output::print_download, server::ServerArgs},
+    commands::{block_on, output::print_download, references::EvaluationArg, server::ServerArgs},
 };
 use anyhow::bail;
 use clap::Args;
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 /// FILE.part; the same command resumes it, unless the dataset has changed.
 #[derive(Debug, Args)]
 pub(super) struct DownloadArgs {
-    /// The evaluation's id
-    evaluation: EvaluationId,
+    #[command(flatten)]
+    evaluation: EvaluationArg,
     /// The file to write; an existing file is replaced [default: EVALUATION.zip in the working folder]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -31,10 +31,11 @@ impl DownloadArgs {
     async fn download(self) -> anyhow::Result<()> {
         // Public datasets need no token.
         let client = self.server.client_or_visitor()?;
+        let id = self.evaluation.find(&client).await?;
         let file = self
             .out
-            .unwrap_or_else(|| PathBuf::from(format!("{}.zip", self.evaluation)));
-        download(&client, self.server.json, self.evaluation, &file).await
+            .unwrap_or_else(|| PathBuf::from(format!("{id}.zip")));
+        download(&client, self.server.json, id, &file).await
     }
 }
 
