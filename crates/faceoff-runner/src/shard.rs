@@ -22,6 +22,8 @@ pub trait Observer {
     /// The end of the agent's standard error with its faults. Called exactly once, even if there is no report because
     /// the shard was cancelled or the platform failed.
     fn log(&mut self, _log: &str) {}
+    /// The agent has answered the announcement of an episode. Called before each step, so it must be cheap.
+    fn on_answer(&self) {}
     /// Should the shard stop? Called before each step, so it must be cheap.
     fn cancelled(&self) -> bool;
 }
@@ -133,7 +135,10 @@ fn play(
         if observer.cancelled() {
             return Err(PlatformFault::Cancelled);
         }
-        let outcome = player.play(episode, max_steps, sink, &|| observer.cancelled())?;
+        let outcome = player.play(episode, max_steps, sink, &|| {
+            observer.on_answer();
+            observer.cancelled()
+        })?;
         calibration.measure_between_episodes()?;
         observer.on_episode_end(&outcome);
         faults += u32::from(outcome.fault.is_some());

@@ -109,6 +109,48 @@ fn failed_agent_is_reported_with_fault_and_log() {
 }
 
 #[test]
+fn silent_agent_is_stopped_after_its_first_start() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = dir.path().join("bundle");
+    fs::create_dir(&bundle).unwrap();
+    fs::copy(hold().join("agent.toml"), bundle.join("agent.toml")).unwrap();
+    let source = "import sys\nprint('reading', file=sys.stderr)\nanswers = sys.stdin.read()\n";
+    fs::write(bundle.join("agent.py"), source).unwrap();
+    fs::write(
+        dir.path().join("faceoff.toml"),
+        "[time]\nstartup_s = 10.0\n",
+    )
+    .unwrap();
+    let output = command(&[
+        "eval",
+        "bundle",
+        "--episodes",
+        "100",
+        "--config",
+        "faceoff.toml",
+    ])
+    .current_dir(dir.path())
+    .output()
+    .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(stdout.matches("fault: ").count(), 1, "{stdout}");
+    for expected in [
+        "note: the agent has not answered `hello` for 5 s",
+        "it reads all of its input before it answers",
+        "  reading",
+    ] {
+        assert!(stdout.contains(expected), "{expected:?} is not in {stdout}");
+    }
+    assert!(
+        stderr.contains(
+            "the agent never answered, so the evaluation was stopped after its first start"
+        ),
+        "{stderr}"
+    );
+}
+
+#[test]
 fn fault_with_a_result_has_traceback_and_status_1() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
@@ -134,6 +176,9 @@ fn fault_with_a_result_has_traceback_and_status_1() {
     ] {
         assert!(stdout.contains(expected), "{expected:?} is not in {stdout}");
     }
+    // Equal faults are printed once, as they happen, and counted at the end.
+    assert_eq!(stdout.matches("fault: defend").count(), 1, "{stdout}");
+    assert!(stdout.contains("2 episodes had this fault"), "{stdout}");
     assert!(stderr.contains("the agent had 2 faults"), "{stderr}");
     assert!(out.join("results.json").exists() && out.join("dataset.zip").exists());
     let log = fs::read_to_string(out.join("agent.log")).unwrap();

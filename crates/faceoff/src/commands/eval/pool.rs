@@ -1,21 +1,33 @@
 //! Threads that run the shards of an evaluation in parallel. A *shard* is a range of episodes of one task.
 
-use super::logs::Logs;
+use super::{logs::Logs, notes::Notes};
 use anyhow::Context;
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardSpec, bundle::Bundle, run_shard,
 };
-use faceoff_types::{AgentFault, EpisodeOutcome, Task};
+use faceoff_types::{AgentFault, AgentFaultKind, EpisodeOutcome, Phase, Task};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     collections::VecDeque,
+    fmt,
     path::PathBuf,
     sync::{
         Mutex, PoisonError,
         atomic::{AtomicBool, AtomicU32, Ordering},
+        mpsc,
     },
     thread,
+    time::Duration,
 };
+
+/// Time without any answer after which the likely causes are printed.
+const EXPLAINED_SILENCE: Duration = Duration::from_secs(5);
+pub(super) const LIKELY_CAUSES: &str = "\
+Likely causes:
+  its output stays in a buffer: flush after every line (Python: print(line, flush=True))
+  it reads all of its input before it answers: read one line at a time
+  it prints to standard error or to a file: answers go to standard output
+  it is still loading: that may take as long as the start-up limit";
 
 /// A shard and the folder for its recording.
 #[derive(Debug)]
@@ -37,6 +49,11 @@ pub(super) enum Verdict {
         faults: Vec<AgentFault>,
         logs: Logs,
     },
+    /// The agent's first start timed out, and none answered before.
+    NeverAnswered {
+        fault: AgentFault,
+        logs: Logs,
+    },
 }
 
 /// State that the worker threads share.
@@ -48,7 +65,12 @@ struct Pool {
     fault_count: AtomicU32,
     max_faults: u32,
     stop: AtomicBool,
+    /// The agent has answered something.
+    has_answered: AtomicBool,
+    /// The kinds of the faults that were printed.
+    printed: Mutex<Vec<AgentFaultKind>>,
     bar: ProgressBar,
+    notes: Notes,
 }
 
 /// Runs all shards, with one thread and one agent process per environment.
@@ -56,6 +78,7 @@ pub(super) fn run_shards(
     bundle: &Bundle,
     envs: &[AgentEnvironment],
     jobs: Vec<Job>,
+    notes: Notes,
 ) -> anyhow::Result<Verdict> {
     let episodes: u64 = jobs.iter().map(|job| job.spec.episodes.len() as u64).sum();
     let max_faults = jobs.first().map_or(0, |job| job.spec.max_faults);
@@ -76,9 +99,14 @@ pub(super) fn run_shards(
         fault_count: AtomicU32::new(0),
         max_faults,
         stop: AtomicBool::new(false),
+        has_answered: AtomicBool::new(false),
+        printed: Mutex::default(),
         bar,
+        notes,
     };
     let results: Vec<Result<(), PlatformFault>> = thread::scope(|scope| {
+        let (running, has_ended) = mpsc::channel::<()>();
+        scope.spawn(|| pool.explain_silence(has_ended));
         let workers: Vec<_> = envs
             .iter()
             .enumerate()
@@ -88,7 +116,7 @@ pub(super) fn run_shards(
                     .spawn_scoped(scope, || pool.run_jobs(bundle, env))
             })
             .collect();
-        workers
+        let results = workers
             .into_iter()
             .map(|worker| match worker {
                 Ok(worker) => worker
@@ -99,7 +127,9 @@ pub(super) fn run_shards(
                     source,
                 }),
             })
-            .collect()
+            .collect();
+        drop(running);
+        results
     });
     pool.bar.finish_and_clear();
     for result in results {
@@ -115,6 +145,12 @@ pub(super) fn run_shards(
     let order = |task: Task| tasks.iter().position(|other| *other == task);
     faults.sort_by_key(|fault| (order(fault.agent_task.name()), fault.episode));
     let logs = into_inner(pool.logs);
+    if !pool.has_answered.load(Ordering::Relaxed)
+        && let Some(position) = faults.iter().position(is_silent_start)
+    {
+        let fault = faults.swap_remove(position);
+        return Ok(Verdict::NeverAnswered { fault, logs });
+    }
     if faults.len() > max_faults as usize {
         Ok(Verdict::Failed { faults, logs })
     } else {
@@ -128,7 +164,44 @@ pub(super) fn run_shards(
     }
 }
 
+/// Whether the agent's process ran and did not answer `hello`.
+const fn is_silent_start(fault: &AgentFault) -> bool {
+    matches!(
+        fault.fault,
+        AgentFaultKind::TimedOut {
+            phase: Phase::StartUp,
+            ..
+        }
+    )
+}
+
 impl Pool {
+    /// Prints the likely causes if the agent has not answered after a while and the run has not ended.
+    fn explain_silence(&self, has_ended: mpsc::Receiver<()>) {
+        let is_running =
+            has_ended.recv_timeout(EXPLAINED_SILENCE) == Err(mpsc::RecvTimeoutError::Timeout);
+        if is_running && !self.has_answered.load(Ordering::Relaxed) {
+            self.print(format_args!(
+                "note: the agent has not answered `hello` for {} s. {LIKELY_CAUSES}",
+                EXPLAINED_SILENCE.as_secs()
+            ));
+        }
+    }
+
+    /// Prints a line without disturbing the progress bar.
+    fn print(&self, line: fmt::Arguments<'_>) {
+        self.bar.suspend(|| self.notes.print(line));
+    }
+
+    /// Prints a fault, unless one of the same kind was printed.
+    fn print_fault(&self, fault: &AgentFault) {
+        let mut printed = lock(&self.printed);
+        if !printed.contains(&fault.fault) {
+            self.print(format_args!("fault: {fault}"));
+            printed.push(fault.fault.clone());
+        }
+    }
+
     fn run_jobs(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<(), PlatformFault> {
         loop {
             let job = lock(&self.jobs).pop_front();
@@ -155,7 +228,12 @@ impl Observer for PoolObserver<'_> {
         self.0.bar.inc(1);
         lock(&self.0.outcomes).push(outcome.clone());
         if let Some(fault) = &outcome.fault {
+            self.0.print_fault(fault);
             lock(&self.0.faults).push(fault.clone());
+            // Every other start would be as silent.
+            if is_silent_start(fault) && !self.0.has_answered.load(Ordering::Relaxed) {
+                self.0.stop.store(true, Ordering::Relaxed);
+            }
             if self.0.fault_count.fetch_add(1, Ordering::Relaxed) >= self.0.max_faults {
                 self.0.stop.store(true, Ordering::Relaxed);
             }
@@ -164,6 +242,10 @@ impl Observer for PoolObserver<'_> {
 
     fn log(&mut self, log: &str) {
         lock(&self.0.logs).add(log);
+    }
+
+    fn on_answer(&self) {
+        self.0.has_answered.store(true, Ordering::Relaxed);
     }
 
     fn cancelled(&self) -> bool {

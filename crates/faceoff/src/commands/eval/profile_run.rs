@@ -4,7 +4,7 @@ use super::{
     files::{LOG, RESULTS, remove_earlier, write_json},
     logs::Logs,
     notes::Notes,
-    pool::{Job, Verdict, run_shards},
+    pool::{Job, LIKELY_CAUSES, Verdict, run_shards},
 };
 use crate::competition::{competition, simulator};
 use anyhow::{Context, bail};
@@ -53,7 +53,7 @@ pub(super) fn run_profile(
     remove_earlier(out)?;
     let jobs = jobs(setup, profile);
     let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
-    let (outcomes, faults) = match run_shards(&setup.bundle, &setup.envs, jobs)? {
+    let (outcomes, faults) = match run_shards(&setup.bundle, &setup.envs, jobs, setup.notes)? {
         Verdict::Finished {
             faults,
             outcomes,
@@ -67,6 +67,15 @@ pub(super) fn run_profile(
                     .print(format_args!("the agent's log is in {}", path.display()));
             }
             (outcomes, faults)
+        }
+        Verdict::NeverAnswered { fault, logs } => {
+            let path = write_log(out, &logs)?;
+            print_first_output(setup.notes, &fault, &logs);
+            bail!(
+                "the agent never answered, so the evaluation was stopped after its first start: {fault}. {LIKELY_CAUSES}\n\
+                 The agent's log is in {}",
+                path.display()
+            );
         }
         Verdict::Failed { faults, logs } => {
             let path = write_log(out, &logs)?;
@@ -140,15 +149,32 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
     jobs
 }
 
-/// Prints all faults, and the agent's output before the first one.
+/// Prints how often each fault happened that was printed once, and the agent's output before the first one.
 fn print_faults(notes: Notes, faults: &[AgentFault], logs: &Logs) {
-    const MAX_LINES: usize = 40;
+    let mut counts: Vec<(&AgentFault, u32)> = Vec::new();
     for fault in faults {
-        notes.print(format_args!("fault: {fault}"));
+        match counts
+            .iter_mut()
+            .find(|(other, _)| other.fault == fault.fault)
+        {
+            Some((_, count)) => *count += 1,
+            None => counts.push((fault, 1)),
+        }
     }
-    let Some(first) = faults.first() else {
-        return;
-    };
+    for (fault, count) in counts.iter().filter(|(_, count)| *count > 1) {
+        notes.print(format_args!(
+            "{count} episodes had this fault: {}",
+            fault.fault
+        ));
+    }
+    if let Some(first) = faults.first() {
+        print_first_output(notes, first, logs);
+    }
+}
+
+/// Prints the agent's output before its first fault.
+fn print_first_output(notes: Notes, first: &AgentFault, logs: &Logs) {
+    const MAX_LINES: usize = 40;
     let lines = logs.lines_before(first);
     if lines.is_empty() {
         notes.print(format_args!(
