@@ -1,7 +1,7 @@
 //! Commands of an ordinary user, who may not make control groups: their own agents run with the other layers of the sandbox.
 
 use crate::{kills::copy_folder, without_times};
-use faceoff_tests::{program, repository};
+use faceoff_tests::{bundle::pack, program, repository};
 use serde_json::Value;
 use std::{
     fs::{self, Permissions},
@@ -37,8 +37,23 @@ impl Home {
 
     /// Runs the program as the ordinary user.
     fn run(&self, args: &[&str]) -> Output {
+        self.run_by(Command::new("setpriv"), args)
+    }
+
+    /// Runs the program as the ordinary user where bubblewrap, which makes namespaces, is not installed.
+    fn run_without_bubblewrap(&self, args: &[&str]) -> Output {
+        let hidden = "for file in /usr/bin/bwrap /usr/local/bin/bwrap /bin/bwrap; do \
+             if [ -f $file ]; then mount --bind /dev/null $file; fi; done && exec \"$@\"";
+        let mut command = Command::new("unshare");
+        command.args(["--mount", "--propagation", "private"]);
+        command.args(["sh", "-ec", hidden, "sh", "setpriv"]);
+        self.run_by(command, args)
+    }
+
+    /// `command` ends with the program `setpriv`, without its arguments.
+    fn run_by(&self, mut command: Command, args: &[&str]) -> Output {
         let user = USER.to_string();
-        Command::new("setpriv")
+        command
             .args(["--reuid", &user, "--regid", &user, "--clear-groups"])
             .arg(&self.program)
             .args(args)
@@ -103,4 +118,30 @@ fn ordinary_user_evaluates_and_plays_own_agents() {
     assert!(!output.status.success());
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(errors.contains("cgroup-memory"), "{errors}");
+}
+
+#[test]
+fn other_teams_archives_need_namespaces() {
+    let home = Home::create();
+    let bundle = home.folder.path().join("hold");
+    copy_folder(&repository().join("agents/hold"), &bundle);
+    let archive = home.folder.path().join("rival.tar.gz");
+    fs::write(&archive, pack(&bundle)).expect("a scratch file can be written");
+    let [bundle, archive] = [&bundle, &archive].map(|path| path.to_str().expect("it is text"));
+    for args in [
+        &["play", bundle, archive, "--steps", "500"] as &[&str],
+        &["eval", archive, "--task", "hit", "--episodes", "1"],
+    ] {
+        let refused = home.run_without_bubblewrap(args);
+        let errors = String::from_utf8_lossy(&refused.stderr);
+        assert!(!refused.status.success(), "{args:?}");
+        assert!(
+            errors.contains("namespaces") && errors.contains("--no-sandbox"),
+            "{errors}"
+        );
+    }
+    // One's own folder, in which programs run anyway.
+    let args = ["eval", bundle, "--task", "hit", "--episodes", "1"];
+    let output = expect_success(&home.run_without_bubblewrap(&args));
+    assert!(output.contains("namespaces"), "{output}");
 }

@@ -27,3 +27,6 @@ pub fn game(id: GameId) -> String {
 
 /// Path of the liveness probe.
 pub const LIVE_PATH: &str = "/livez";
+
+/// Path of the readiness probe.
+pub const READY_PATH: &str = "/readyz";

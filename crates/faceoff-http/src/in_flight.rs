@@ -6,7 +6,7 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
-use faceoff_api::paths::LIVE_PATH;
+use faceoff_api::paths::{LIVE_PATH, READY_PATH};
 use faceoff_service::{
     app::AppState,
     places::{Places, Precedence},
@@ -59,7 +59,11 @@ pub(crate) async fn limit(
     if request.uri().path() == LIVE_PATH {
         return next.run(request).await;
     }
-    let precedence = in_flight.app.precedence(request.headers());
+    let precedence = match request.uri().path() {
+        // A balancer would take a server that is not ready from teams and organisers, too.
+        READY_PATH => Precedence::Team,
+        _ => in_flight.app.precedence(request.headers()),
+    };
     let Some(_place) = in_flight.places.take(precedence) else {
         return in_flight.refuse("in_flight");
     };

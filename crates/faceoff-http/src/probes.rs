@@ -9,7 +9,7 @@ use axum::{
     routing::get,
 };
 use faceoff_api::{
-    paths::LIVE_PATH,
+    paths::{LIVE_PATH, READY_PATH},
     views::health::{HealthView, LiveView},
 };
 use faceoff_metrics::{Disk, Format, GaugeValues, Queue};
@@ -39,7 +39,7 @@ pub(crate) fn unauthenticated_router(timeout: Duration) -> Router<App> {
 fn with_probes(router: Router<App>, timeout: Duration) -> Router<App> {
     router
         .route(LIVE_PATH, get(live))
-        .route("/readyz", get(ready))
+        .route(READY_PATH, get(ready))
         .layer(middleware::from_fn_with_state(timeout, timeouts::time_out))
 }
 

@@ -14,7 +14,7 @@ use axum::{
 use faceoff_dataset::{max_file_bytes, writable_files};
 use faceoff_service::{
     app::App,
-    free_space,
+    credential, free_space,
     problem::{Problem, ProblemKind},
     services::bundle_stream,
 };
@@ -36,11 +36,8 @@ impl FromRequestParts<App> for LeaseHolder {
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
         let forbidden = |reason| Problem::new(ProblemKind::Forbidden, reason);
-        let authorization = parts.headers.get(header::AUTHORIZATION);
-        let sealed_grant =
-            authorization.and_then(|value| value.to_str().ok()?.strip_prefix("Grant "));
-        let grant =
-            sealed_grant.and_then(|text| Grant::open(text, &app.config.link_key.grant_key()));
+        let grant = credential::sealed_grant(&parts.headers)
+            .and_then(|text| Grant::open(text, &app.config.link_key.grant_key()));
         let grant = grant.ok_or_else(|| {
             forbidden("expected the grant of a job of this server (Authorization: Grant …)")
         })?;

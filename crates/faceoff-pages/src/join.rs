@@ -7,7 +7,7 @@ use super::{
 use askama::Template;
 use axum::{
     extract::State,
-    http::HeaderMap,
+    http::{HeaderMap, Uri},
     response::{IntoResponse, Response},
 };
 use faceoff_api::{
@@ -166,10 +166,11 @@ pub(super) async fn submit(
     State(app): State<App>,
     PathParam(code): PathParam<String>,
     ClientNetwork(client): ClientNetwork,
+    uri: Uri,
     headers: HeaderMap,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    let accepted = match session::check_cookie_is_kept(&app.config, &headers) {
+    let accepted = match session::check_cookie_is_kept(&app.config, &headers, uri.path()) {
         Ok(()) => accept_invitation(&app, &code, &form, client).await,
         Err(problem) => Err(problem.into()),
     };

@@ -7,7 +7,7 @@ use super::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    http::{HeaderMap, header},
+    http::{HeaderMap, Uri, header},
     response::{AppendHeaders, IntoResponse, Redirect, Response},
 };
 use faceoff_service::{
@@ -79,10 +79,11 @@ pub(super) async fn page(
 pub(super) async fn submit(
     State(app): State<App>,
     ClientNetwork(client): ClientNetwork,
+    uri: Uri,
     headers: HeaderMap,
     PageForm(form): PageForm<Form>,
 ) -> Result<Response, PageProblem> {
-    let signed_in = match session::check_cookie_is_kept(&app.config, &headers) {
+    let signed_in = match session::check_cookie_is_kept(&app.config, &headers, uri.path()) {
         Ok(()) => sign_in(&app, &form.name, form.password, client).await,
         Err(problem) => Err(problem),
     };

@@ -45,13 +45,16 @@ pub(super) fn take_place(
 ) -> Result<Place, Problem> {
     let precedence = caller.map_or(Precedence::Visitor, Caller::precedence);
     readers.take(precedence).ok_or_else(|| {
+        let (taken, max) = (readers.taken(), readers.max());
+        let kept = if taken < max {
+            ", and the last ones are kept for teams and organisers"
+        } else {
+            ""
+        };
         Problem::new(
             ProblemKind::Busy,
             format!(
-                "{} of the {} places for readers of {stream} are taken, and the last ones are kept for teams and organisers; try \
-                 again later, or poll {polled}",
-                readers.taken(),
-                readers.max()
+                "{taken} of the {max} places for readers of {stream} are taken{kept}; try again later, or poll {polled}"
             ),
         )
     })

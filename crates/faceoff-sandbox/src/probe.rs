@@ -38,12 +38,16 @@ pub fn probe_host() -> Vec<HostFeature> {
 }
 
 /// Those of these layers that this user cannot get on this host. One process suffices to see that there are none.
-pub fn unavailable_layers(layers: &[Layer]) -> Vec<HostFeature> {
+///
+/// # Errors
+/// If not even a process without any layer can be started: then the cause is none of the layers.
+pub fn unavailable_layers(layers: &[Layer]) -> Result<Vec<HostFeature>, String> {
     if run(layers, "cat", &["/dev/null"]).is_ok() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
+    run(&[], "cat", &["/dev/null"])?;
     let probed = layers.iter().copied().map(probe);
-    probed.filter(|feature| !feature.available).collect()
+    Ok(probed.filter(|feature| !feature.available).collect())
 }
 
 fn probe(layer: Layer) -> HostFeature {

@@ -23,6 +23,7 @@ use faceoff_replay::GameAnalysis;
 use faceoff_scoring::tournament::rating::Ratings;
 use faceoff_store::Store;
 use faceoff_types::{TokenId, TournamentId};
+use faceoff_wire::grant::Grant;
 use std::sync::{Arc, atomic::AtomicBool};
 use tokio::sync::Semaphore;
 use uuid::Uuid;
@@ -149,6 +150,12 @@ impl AppState {
     /// Whose request it is, as far as this is known without reading the database: a token that was not verified recently counts as a
     /// visitor's. This gives no rights.
     pub fn precedence(&self, headers: &HeaderMap) -> Precedence {
+        // The grant of a job: a remote worker transfers files of an evaluation.
+        if let Some(sealed) = credential::sealed_grant(headers)
+            && Grant::open(sealed, &self.config.link_key.grant_key()).is_some()
+        {
+            return Precedence::Team;
+        }
         let hash = credential::secret_hash(&self.config, headers);
         let caller = hash.and_then(|hash| self.recent_callers.find(&hash));
         caller.unwrap_or(Precedence::Visitor)

@@ -49,6 +49,12 @@ pub(crate) fn secret_hash(config: &HttpConfig, headers: &HeaderMap) -> Option<[u
     secret.map(hash_token)
 }
 
+/// The sealed grant of a remote worker, if the request has one; it may be invalid.
+pub fn sealed_grant(headers: &HeaderMap) -> Option<&str> {
+    let value = headers.get(header::AUTHORIZATION)?;
+    value.to_str().ok()?.strip_prefix("Grant ")
+}
+
 /// The token of a header `Authorization: Bearer TOKEN`; `None` if it has another form.
 fn bearer_token(value: &HeaderValue) -> Option<&str> {
     let (scheme, token) = value.to_str().ok()?.split_once(' ')?;

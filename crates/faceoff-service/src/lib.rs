@@ -14,7 +14,7 @@ pub mod auth;
 pub mod change_quota;
 pub mod conditions;
 pub mod config;
-mod credential;
+pub mod credential;
 pub mod csv;
 pub mod episode_path;
 pub mod extract;

@@ -6,10 +6,14 @@ use std::{
     collections::HashMap,
     mem,
     sync::{Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
 };
 
 /// Verified tokens in memory, at most: more than a large season's programs and browsers have.
 const MAX_CALLERS: usize = 10_000;
+
+/// A token counts as verified for this time: it may have been revoked meanwhile.
+const VALIDITY: Duration = Duration::from_mins(10);
 
 /// Hash of a token's secret.
 type SecretHash = [u8; 32];
@@ -21,8 +25,14 @@ pub(crate) struct RecentCallers(Mutex<Generations>);
 /// Two generations: when the newer one is full, it becomes the older one, which is forgotten.
 #[derive(Debug, Default)]
 struct Generations {
-    newer: HashMap<SecretHash, Precedence>,
-    older: HashMap<SecretHash, Precedence>,
+    newer: HashMap<SecretHash, Verified>,
+    older: HashMap<SecretHash, Verified>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Verified {
+    caller: Precedence,
+    at: Instant,
 }
 
 impl RecentCallers {
@@ -30,7 +40,8 @@ impl RecentCallers {
     pub(crate) fn find(&self, hash: &SecretHash) -> Option<Precedence> {
         let generations = self.lock();
         let found = generations.newer.get(hash);
-        found.or_else(|| generations.older.get(hash)).copied()
+        let found = found.or_else(|| generations.older.get(hash))?;
+        (found.at.elapsed() < VALIDITY).then_some(found.caller)
     }
 
     /// Remembers whose token it is that was just verified.
@@ -39,7 +50,8 @@ impl RecentCallers {
         if generations.newer.len() >= MAX_CALLERS / 2 && !generations.newer.contains_key(&hash) {
             generations.older = mem::take(&mut generations.newer);
         }
-        generations.newer.insert(hash, caller);
+        let at = Instant::now();
+        generations.newer.insert(hash, Verified { caller, at });
     }
 
     /// Forgets a token that is not valid any more.

@@ -68,8 +68,12 @@ fn uses_tls(config: &HttpConfig) -> bool {
 /// would be asked to sign in again and again.
 ///
 /// # Errors
-/// `Forbidden`, with the address at which signing in works.
-pub fn check_cookie_is_kept(config: &HttpConfig, headers: &HeaderMap) -> Result<(), Problem> {
+/// `Forbidden`, with the address at which the page at `path` works.
+pub fn check_cookie_is_kept(
+    config: &HttpConfig,
+    headers: &HeaderMap,
+    path: &str,
+) -> Result<(), Problem> {
     let Some(public_url) = config.public_url.as_deref().filter(|_| uses_tls(config)) else {
         return Ok(());
     };
@@ -85,7 +89,9 @@ pub fn check_cookie_is_kept(config: &HttpConfig, headers: &HeaderMap) -> Result<
     }
     Err(Problem::new(
         ProblemKind::Forbidden,
-        format!("browsers keep a session of this server over https only: sign in at {public_url}"),
+        format!(
+            "browsers keep a session of this server over https only: open this page at {public_url}{path}"
+        ),
     ))
 }
 

@@ -415,7 +415,7 @@ async fn sign_in_without_tls_says_where_it_works() {
     assert!(
         refused
             .body
-            .contains("sign in at https://faceoff.example.org"),
+            .contains("open this page at https://faceoff.example.org/sign-in"),
         "{}",
         refused.body
     );

@@ -27,14 +27,23 @@ pub(super) fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleErr
     BundleError::Invalid(format!("entry {shown:?} {problem}"))
 }
 
-/// Whether an operating system has put the entry into the archive, beside the team's files. macOS adds metadata (`__MACOSX`, `._NAME`,
+/// First bytes of a file in which macOS keeps what other systems do not keep of a file: AppleDouble, RFC 1740.
+pub(super) const APPLE_DOUBLE: [u8; 4] = [0x00, 0x05, 0x16, 0x07];
+
+/// Whether an operating system has put the entry into the archive, beside the team's files. macOS adds metadata (`__MACOSX`,
 /// `.DS_Store`), Windows settings of folders.
 pub(super) fn is_system_file(entry: &str) -> bool {
-    let is_system_name = |part: &str| {
-        part.starts_with("._")
-            || ["__MACOSX", ".DS_Store", "Thumbs.db", "desktop.ini"].contains(&part)
-    };
+    let is_system_name =
+        |part: &str| ["__MACOSX", ".DS_Store", "Thumbs.db", "desktop.ini"].contains(&part);
     entry.split('/').any(is_system_name)
+}
+
+/// Whether the entry is named like the metadata of macOS; it is such if it begins with [`APPLE_DOUBLE`].
+pub(super) fn is_named_like_metadata(entry: &str) -> bool {
+    entry
+        .rsplit('/')
+        .next()
+        .is_some_and(|name| name.starts_with("._"))
 }
 
 /// The entry's path without `.` parts; empty for the archive's root.

@@ -3,8 +3,8 @@
 use super::{
     budget::Budget,
     entry::{
-        FOLDER_MODE, add_hard_link, check_target, invalid, is_system_file, make_folder,
-        set_default_time, unusable, write_new,
+        APPLE_DOUBLE, FOLDER_MODE, add_hard_link, check_target, invalid, is_named_like_metadata,
+        is_system_file, make_folder, set_default_time, unusable, write_new,
     },
     error::BundleError,
     links,
@@ -167,19 +167,36 @@ impl Sink for Tree<'_> {
         if is_system_file(entry) {
             return Ok(());
         }
+        let mut beginning = Vec::new();
+        if is_named_like_metadata(entry) {
+            (&mut *content)
+                .take(APPLE_DOUBLE.len() as u64)
+                .read_to_end(&mut beginning)
+                .map_err(BundleError::from_read_error(entry))?;
+            if beginning == APPLE_DOUBLE {
+                return Ok(());
+            }
+        }
+        let mut content = beginning.as_slice().chain(content);
         let path = self.plan.add_file(entry, attributes.mode)?;
         let path_on_disk = self.make_parents(&path)?;
-        write_new(entry, &path_on_disk, attributes, content, self.budget)
+        write_new(entry, &path_on_disk, attributes, &mut content, self.budget)
     }
 
     /// The link is checked and created by [`Tree::finish`].
     fn add_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+        if is_system_file(entry) {
+            return Ok(());
+        }
         check_target(entry, target)?;
         self.plan.add_link(entry, target)
     }
 
     /// The target must be an earlier file of the archive.
     fn add_hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+        if is_system_file(entry) {
+            return Ok(());
+        }
         let (existing, path) = self.plan.add_hard_link(entry, target)?;
         let path_on_disk = self.make_parents(&path)?;
         add_hard_link(entry, &self.dir.join(existing), &path_on_disk)

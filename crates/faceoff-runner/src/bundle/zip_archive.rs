@@ -2,7 +2,7 @@
 
 use super::{
     budget::{Budget, MeteredReader},
-    entry::{invalid, is_system_file, unusable},
+    entry::{invalid, is_named_like_metadata, is_system_file, unusable},
     error::BundleError,
     plan::Plan,
     sink::{FileAttributes, Sink},
@@ -35,6 +35,7 @@ struct Header {
     kind: Kind,
 }
 
+#[derive(PartialEq, Eq)]
 enum Kind {
     Folder,
     File,
@@ -109,6 +110,11 @@ pub(super) fn unpack<'a>(
     while let Some(entry) = files.next() {
         let entry = entry.map_err(damaged_archive)?;
         let Header { name, mode, kind } = Header::from_entry(&entry)?;
+        // The metadata of a link is marked as a link, too, and its content is no target.
+        let is_metadata_of_link = kind == Kind::Link && is_named_like_metadata(&name);
+        if is_system_file(&name) || is_metadata_of_link {
+            continue;
+        }
         let mut content = entry
             .with_reader(files.reader_mut(), ZipReadOptions::new())
             .map_err(|error| damaged_entry(&name, error))?;
@@ -148,7 +154,8 @@ fn check_directory<R: Read + Seek>(
         let entry = entry.map_err(damaged_archive)?;
         budget.count_entry()?;
         let Header { name, mode, kind } = Header::from_entry(&entry)?;
-        if is_system_file(&name) {
+        // Of a file that is named like metadata, the content says whether it is left out.
+        if is_system_file(&name) || is_named_like_metadata(&name) {
             continue;
         }
         match kind {

@@ -152,6 +152,36 @@ fn files_that_systems_add_are_left_out() {
 }
 
 #[test]
+fn own_files_named_like_metadata_are_unpacked() {
+    let files: [(&str, u32, &[u8]); 3] = [
+        ("agent.toml", 0o644, MANIFEST.as_bytes()),
+        ("._weights", 0o644, b"\0\x05\x16\x08 and more"),
+        ("._short", 0o644, b"a"),
+    ];
+    let tar = files.iter().fold(Tar::new(), |tar, (name, mode, content)| {
+        tar.file(name, *mode, content)
+    });
+    for archive in [zip(&files), tar.gz()] {
+        let (_dir, bundle) = unpack_valid(&archive);
+        for (name, _, content) in files {
+            assert_eq!(fs::read(bundle.dir.join(name)).unwrap(), content);
+        }
+    }
+}
+
+#[test]
+fn metadata_of_links_is_left_out() {
+    let metadata = "\0\x05\x16\x07 and \0 bytes";
+    for name in ["__MACOSX/._l", "__MACOSX/l", "._l"] {
+        let (_dir, bundle) = unpack_valid(&ZipWithLink::named(name, metadata).bytes());
+        assert!(!bundle.dir.join(name).exists());
+        assert!(bundle.dir.join("agent.toml").is_file());
+    }
+    let tar = Tar::with_manifest().symlink("__MACOSX/l", "..");
+    unpack_valid(&tar.gz());
+}
+
+#[test]
 fn manifest_may_begin_with_a_byte_order_mark() {
     let text = format!("\u{feff}{}", MANIFEST.replace('\n', "\r\n"));
     let tar = Tar::new().file("agent.toml", 0o644, text.as_bytes());
@@ -245,9 +275,13 @@ struct ZipWithLink(zip::ZipWriter<std::io::Cursor<Vec<u8>>>);
 
 impl ZipWithLink {
     fn new(target: &str) -> Self {
+        Self::named("l", target)
+    }
+
+    fn named(name: &str, target: &str) -> Self {
         let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
         let options = zip::write::SimpleFileOptions::default();
-        zip.add_symlink("l", target, options).unwrap();
+        zip.add_symlink(name, target, options).unwrap();
         zip.start_file("agent.toml", options).unwrap();
         std::io::Write::write_all(&mut zip, MANIFEST.as_bytes()).unwrap();
         Self(zip)

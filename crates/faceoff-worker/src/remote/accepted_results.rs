@@ -128,6 +128,7 @@ impl Dispatcher {
                     continue;
                 }
                 self.pending_results.remove(lease.nonce);
+                self.unfinished_checks.finish(lease.nonce);
                 tracing::warn!(job = %lease.job_id, slot = lease.slot, "NATS has lost a result: the job is queued again");
                 let server = self.server.clone();
                 let released = tokio::task::spawn_blocking(move || {
@@ -170,6 +171,7 @@ impl Dispatcher {
             Ok(None) => {}
             Ok(Some(_)) => {
                 tracing::warn!(job = %id, %worker, "the worker is banned; result ignored");
+                self.unfinished_checks.finish(result.lease.nonce);
                 return AckKind::Ack;
             }
             Err(error) => {
@@ -182,6 +184,7 @@ impl Dispatcher {
         let is_job_over = match self.server.store.lease_holder(id, nonce).await {
             Ok(Some(holder)) if WorkerName::from_holder(&holder).as_ref() != Some(&worker) => {
                 tracing::warn!(job = %id, %worker, holder, "the worker does not have the lease; result ignored");
+                self.unfinished_checks.finish(nonce);
                 return AckKind::Ack;
             }
             Ok(holder) => holder.is_none(),
@@ -246,8 +249,8 @@ impl Dispatcher {
             }
             Ok(Acceptance::Unchecked) => {
                 let reason = format!(
-                    "the server did not survive three checks of its result of job {id}; if the server was ended from outside each \
-                     time, readmit the worker"
+                    "three checks of its result of job {id} ended the server or failed in it; if the server was ended from outside \
+                     each time, readmit the worker"
                 );
                 match self.ban(&worker, &reason).await {
                     retry @ AckKind::Nak(_) => return retry,
@@ -275,6 +278,7 @@ impl Dispatcher {
         result: ResultMessage,
     ) -> anyhow::Result<Acceptance> {
         let nonce = result.lease.nonce;
+        let _turn = self.unfinished_checks.turn(nonce).await?;
         if self.unfinished_checks.begin(nonce)? == CheckStart::Refused {
             return Ok(Acceptance::Unchecked);
         }

@@ -128,7 +128,8 @@ impl EvalCommand {
             },
         };
         if !self.no_sandbox
-            && let Some(note) = local_bundle::give_up_unavailable_layers(&mut config)
+            && let Some(note) =
+                local_bundle::give_up_unavailable_layers(&mut config, &[&self.bundle])?
         {
             self.notes().print(format_args!("{note}"));
         }

@@ -49,25 +49,43 @@ pub(super) fn open(
 
 /// Gives up the layers of the sandbox that this user cannot get on this host: developers run their own agents, which they could also
 /// run without a sandbox. Returns the note that says which layers are missing, if any are.
-pub(super) fn give_up_unavailable_layers(config: &mut Config) -> Option<String> {
+///
+/// # Errors
+/// If a bundle is an archive, which may be another team's, and a layer is missing that keeps agents from the user's files and the
+/// network; or if no process can be started.
+pub(super) fn give_up_unavailable_layers(
+    config: &mut Config,
+    bundles: &[&Path],
+) -> anyhow::Result<Option<String>> {
     let given_up = &mut config.sandbox.given_up;
     let wanted: Vec<Layer> = Layer::ALL
         .into_iter()
         .filter(|layer| !given_up.contains(layer))
         .collect();
     let missing: Vec<Layer> = unavailable_layers(&wanted)
+        .map_err(|error| anyhow::anyhow!("the sandbox cannot be tried: {error}"))?
         .into_iter()
         .map(|feature| feature.layer)
         .collect();
+    let protection = [Layer::Namespaces, Layer::Seccomp];
+    let missing_protection = missing.iter().find(|layer| protection.contains(layer));
+    let archive = bundles.iter().find(|bundle| !bundle.is_dir());
+    if let (Some(layer), Some(archive)) = (missing_protection, archive) {
+        anyhow::bail!(
+            "this user cannot get the layer {layer} of the sandbox, without which an agent can read this user's files, and {} may be \
+             another team's; `faceoff doctor` says how to get the layer. If you trust the agent, add --no-sandbox",
+            archive.display()
+        );
+    }
     given_up.extend(&missing);
     let names: Vec<&str> = missing.iter().map(|layer| layer.as_str()).collect();
-    (!names.is_empty()).then(|| {
+    Ok((!names.is_empty()).then(|| {
         format!(
             "note: your agent runs without these layers of the server's sandbox, which this user cannot get here: {}; `faceoff doctor` \
              says how",
             names.join(", ")
         )
-    })
+    }))
 }
 
 /// The environment of an agent: with the server's limits and isolation, or without isolation if `no_sandbox`.

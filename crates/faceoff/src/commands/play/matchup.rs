@@ -40,11 +40,15 @@ fn mismatch_seed(options: &PlayOptions) -> Seed {
 
 impl Matchup {
     pub(super) fn open(options: &PlayOptions, mut config: Config) -> anyhow::Result<Self> {
+        let paths = [options.bundle_a.as_path(), options.bundle_b.as_path()];
         if !options.no_sandbox
-            && let Some(note) = local_bundle::give_up_unavailable_layers(&mut config)
-            && !options.json
+            && let Some(note) = local_bundle::give_up_unavailable_layers(&mut config, &paths)?
         {
-            println!("{note}");
+            if options.json {
+                eprintln!("{note}");
+            } else {
+                println!("{note}");
+            }
         }
         let scratch = local_bundle::create_scratch(&options.out)?;
         let open = |path: &Path, name: &str| -> anyhow::Result<Bundle> {
