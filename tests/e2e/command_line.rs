@@ -217,8 +217,12 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
         .as_str()
         .expect("a submission has an id")
         .to_owned();
-    let output = ada(&["withdraw", &second]).expect_success();
-    assert!(output.contains("withdrawn"), "{output}");
+    let output = ada(&["withdraw", "latest"]).expect_success();
+    assert!(
+        output.contains("withdrawn") && output.contains(&second),
+        "{output}"
+    );
+    ada(&["activate", &first[..9]]).expect_refusal(FAILED, &["give more characters"]);
     ada(&["activate", &second]).expect_success();
     let board = ada(&["board", "--json"]).json();
     assert_eq!(board["rows"], serde_json::json!([]));
@@ -280,6 +284,25 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
         "{board}"
     );
     assert!(ada(&["board"]).expect_success().contains("Alpha"));
+
+    // Other names than the id.
+    let date = evaluated["day"].as_str().expect("a day has a date");
+    let end = &evaluation[28..];
+    let quoted = format!("alpha {date}");
+    for name in [&["latest"] as &[&str], &[end], &["Alpha", date], &[&quoted]] {
+        let args = [&["evaluation", "--json"], name].concat();
+        assert_eq!(ada(&args).json()["id"], evaluation.as_str(), "{name:?}");
+    }
+    assert_eq!(ada(&["log", "latest", "--json"]).json()["of"], "evaluation");
+    ada(&["evaluation", "Beta", date])
+        .expect_refusal(FAILED, &["Beta", "these teams have one: Alpha"]);
+    ada(&["evaluation", "Alpha", "2001-01-01"]).expect_refusal(REFUSED, &["404"]);
+    ada(&["evaluation", "soon"]).expect_refusal(FAILED, &["`latest`, or a team and a day"]);
+    // A visitor finds it on the board, and sees it when it is published.
+    let visitor = scratch.path().join("visitor");
+    let by_day = ["evaluation", "Alpha", date, "--server", &server.url];
+    faceoff_with_home(&visitor, &by_day, "")
+        .expect_refusal(NOT_ALLOWED, &["no such public evaluation"]);
 
     let dataset_file = scratch.path().join("dataset.zip");
     let download = [

@@ -106,7 +106,7 @@ fn page_larger_than_its_column_is_refused() {
         refused.contains("pages of the column puck_x state more bytes"),
         "{refused}"
     );
-    // The library reads such a page if nobody checks it, and finds too late that it was given less.
+    // Without the check the library reads such a page, and finds too late that it has fewer bytes.
     let builder = ParquetRecordBatchReaderBuilder::try_new(table.clone()).unwrap();
     assert!(builder.build().unwrap().any(|batch| batch.is_err()));
     let metadata = footer(&table);
