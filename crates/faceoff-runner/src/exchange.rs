@@ -416,7 +416,7 @@ impl<'w> Exchange<'w> {
             ..
         } = self;
         let _busy = supervised.busy(Instant::now() + grace);
-        Ok(process.finish(grace)?.stderr_tail)
+        Ok(process.finish(grace)?.stderr)
     }
 
     /// The error for output before the question, or for a closed output.

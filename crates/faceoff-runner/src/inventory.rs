@@ -111,7 +111,7 @@ fn first_line(
     if let ReadLine::Line { bytes, .. } = line {
         return Ok(String::from_utf8_lossy(&bytes).into_owned());
     }
-    let log = process.stderr_tail();
+    let log = process.stderr();
     let last_line = log.lines().last().unwrap_or("it printed nothing");
     Err(format!("{} gave no answer: {last_line}", command[0]))
 }

@@ -13,7 +13,9 @@ use crate::{
 use faceoff_episode::{AnswerTiming, Conditions, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_scoring::computation_time_penalty;
-use faceoff_types::{AgentFault, EpisodeOutcome, Task, ValidationTiming};
+use faceoff_types::{
+    AgentFault, EpisodeOutcome, Task, ValidationTiming, ViolatedLimit, ViolationName,
+};
 use faceoff_wire::job::ValidationSpec;
 use std::{fmt, ops::Range};
 
@@ -277,8 +279,25 @@ impl Answers {
             p99_s: rank.checked_sub(1).map_or(0.0, |index| times_s[index]),
             max_s: times_s.last().copied().unwrap_or_default(),
             points_per_episode: points / outcomes.len().max(1) as f64,
+            episodes: outcomes.len() as u32,
+            violations: violated_limits(outcomes),
         }
     }
+}
+
+/// The violated limits of the robot, with the number of episodes of each.
+fn violated_limits(outcomes: &[EpisodeOutcome]) -> Vec<ViolatedLimit> {
+    let mut limits: Vec<ViolatedLimit> = Vec::new();
+    let violated = outcomes
+        .iter()
+        .flat_map(|outcome| outcome.violations.violated());
+    for limit in violated.filter(|limit| *limit != ViolationName::COMPUTATION_TIME) {
+        match limits.iter_mut().find(|violated| violated.limit == limit) {
+            Some(violated) => violated.episodes += 1,
+            None => limits.push(ViolatedLimit { limit, episodes: 1 }),
+        }
+    }
+    limits
 }
 
 impl StepSink for Answers {

@@ -16,7 +16,7 @@ use crate::{
     seccomp::Filters,
     spawner,
     status_pipe::StatusPipe,
-    stderr_tail::StderrTail,
+    stderr_log::StderrLog,
     sweep::SCRATCH_PREFIX,
 };
 use faceoff_types::AgentFaultKind;
@@ -36,7 +36,7 @@ pub(crate) struct LaunchedAgent {
     pub lines: LineSocket,
     /// Name of the agent's output in `/proc/*/fd`.
     pub output_name: String,
-    pub stderr: StderrTail,
+    pub stderr: StderrLog,
     pub tree: ProcessTree,
 }
 
@@ -187,7 +187,7 @@ impl Launch {
             tree.answer_thread = Some(answerer.start()?);
         }
         let mut stderr =
-            StderrTail::drain(log, spec.limits.stderr_tail_bytes).context(WATCH_ACTION)?;
+            StderrLog::drain(log, spec.limits.stderr_tail_bytes).context(WATCH_ACTION)?;
         if let Some(status) = &mut tree.status {
             match status.wait_for_child(Instant::now() + SET_UP_TIMEOUT)? {
                 Some(init) => tree.watch_init(init),

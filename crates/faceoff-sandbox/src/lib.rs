@@ -12,6 +12,7 @@
 pub mod affinity;
 mod agent_user;
 mod answered_calls;
+mod bounded_log;
 mod bubblewrap;
 mod caller_counters;
 mod cgroup;
@@ -47,10 +48,11 @@ mod session_numbers;
 mod spawn_spec;
 mod spawner;
 mod status_pipe;
-mod stderr_tail;
+mod stderr_log;
 mod sweep;
 mod thread_waits;
 
+pub use bounded_log::BoundedLog;
 pub use caller_counters::CallerCounters;
 pub use cpu_accounting::{Baseline, CpuReading, CpuSamples, HostInterference};
 pub use error::{SandboxError, SpawnError, WriteError};

@@ -244,7 +244,7 @@ fn run(layers: &[Layer], program: &str, arguments: &[&str]) -> Result<String, St
         usage => Err(format!(
             "the probe failed: {:?}; {}",
             usage.exit,
-            usage.stderr_tail.trim()
+            usage.stderr.trim()
         )),
     }
 }

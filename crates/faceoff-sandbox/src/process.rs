@@ -13,7 +13,7 @@ use crate::{
     poll_interval::PollInterval,
     process_tree::ProcessTree,
     status_pipe::StatusPipe,
-    stderr_tail::StderrTail,
+    stderr_log::StderrLog,
     sweep,
     thread_waits::TrackedThreads,
 };
@@ -33,7 +33,7 @@ const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 pub struct AgentProcess {
     lines: LineSocket,
     output_name: String,
-    stderr: StderrTail,
+    stderr: StderrLog,
     tree: ProcessTree,
     limits: Limits,
     output_poll: PollInterval,
@@ -53,7 +53,7 @@ pub struct Usage {
     /// CPU time of the tree in seconds; `None` if the host does not report it.
     pub cpu_time_s: Option<f64>,
     /// The end of standard error, lossy UTF-8.
-    pub stderr_tail: String,
+    pub stderr: String,
     /// How it ended on its own, if not with status 0. `None` also if the service killed it.
     pub exit: Option<AgentFaultKind>,
 }
@@ -261,8 +261,8 @@ impl AgentProcess {
         }
     }
 
-    /// Last bytes of standard error, lossy UTF-8.
-    pub fn stderr_tail(&self) -> String {
+    /// The beginning and the end of standard error, lossy UTF-8.
+    pub fn stderr(&self) -> String {
         self.stderr.text()
     }
 
@@ -355,7 +355,7 @@ impl AgentProcess {
                 .as_ref()
                 .and_then(AgentCgroup::peak_memory_bytes),
             cpu_time_s: self.cpu_time_s(),
-            stderr_tail: self.stderr.text(),
+            stderr: self.stderr.text(),
             exit: match &self.end {
                 Some(ExitCause::Agent(fault)) if *fault != (AgentFaultKind::Exited { code: 0 }) => {
                     Some(fault.clone())

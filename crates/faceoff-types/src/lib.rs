@@ -114,7 +114,7 @@ pub use tournament_rules::{
 };
 pub use unknown_profile::UnknownProfile;
 pub use unknown_task::UnknownTask;
-pub use validation_outcome::{ValidationOutcome, ValidationTiming};
+pub use validation_outcome::{ValidationOutcome, ValidationTiming, ViolatedLimit};
 pub use variation::{InvalidTierBounds, TierBounds, Variation};
 pub use violation::{ViolationCounts, ViolationName, Violations};
 pub use without_password::without_password;

@@ -62,7 +62,7 @@ pub struct ResourceLimits {
     pub file_size_bytes: u64,
     /// CPUs: seconds of CPU time per second, enforced every 10 ms by the cgroup's quota.
     pub cpus: f64,
-    /// Size of the stored tail of standard error, in bytes.
+    /// Size of the stored part of standard error, in bytes: its beginning and its end.
     pub stderr_tail_bytes: u64,
 }
 

@@ -1,6 +1,6 @@
 //! The outcome of a validation run: the short test of a new submission, which decides whether it may be evaluated.
 
-use crate::Task;
+use crate::{Task, ViolationName};
 use serde::{Deserialize, Serialize};
 
 /// The outcome of a validation run.
@@ -49,4 +49,20 @@ pub struct ValidationTiming {
     pub max_s: f64,
     /// Penalty points per episode for computation time.
     pub points_per_episode: f64,
+    /// Episodes that were played, the last one perhaps in part; 0 in validation runs by earlier versions.
+    #[serde(default)]
+    pub episodes: u32,
+    /// The violated limits of the robot, each with its number of episodes. They cost penalty points in evaluations.
+    #[serde(default)]
+    pub violations: Vec<ViolatedLimit>,
+}
+
+/// A limit of the robot that an agent violated in a validation run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ViolatedLimit {
+    /// The limit.
+    pub limit: ViolationName,
+    /// Episodes in which it was violated.
+    pub episodes: u32,
 }

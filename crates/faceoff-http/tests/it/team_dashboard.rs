@@ -6,7 +6,7 @@ use crate::{
     site::{ADMIN, Answer, GZIP, MAX_BUNDLE_BYTES, Site, TestTeam, result, string},
 };
 use faceoff_airhockey::HIT;
-use faceoff_types::{ValidationOutcome, ValidationTiming};
+use faceoff_types::{ValidationOutcome, ValidationTiming, ViolatedLimit, ViolationName};
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -56,6 +56,11 @@ fn valid_outcome(log: &str) -> ValidationOutcome {
             p99_s: 0.00123,
             max_s: 0.015,
             points_per_episode: 0.5,
+            episodes: 4,
+            violations: vec![ViolatedLimit {
+                limit: ViolationName::new("joint_vel"),
+                episodes: 3,
+            }],
         }],
         log: log.into(),
     }
@@ -106,8 +111,15 @@ async fn member_uploads_and_selects_the_active_submission() {
     assert_eq!(texts(&html, "pre"), ["ready <i>on</i>"]);
     assert_eq!(
         texts(&html, "[data-live-section=verdict] tbody td"),
-        // Steps, mean, 99th percentile and maximum in ms, and penalty points per episode.
-        ["321", "0.50", "1.23", "15.00", "0.5"]
+        // Steps, mean, 99th percentile and maximum in ms, penalty points per episode, and violated limits.
+        [
+            "321",
+            "0.50",
+            "1.23",
+            "15.00",
+            "0.5",
+            "joint velocity in 3 of 4 episodes"
+        ]
     );
 
     // The newest valid submission is active; an older one can be selected.

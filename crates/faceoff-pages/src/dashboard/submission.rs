@@ -24,7 +24,7 @@ use faceoff_service::{
     services::submissions,
     views::submission,
 };
-use faceoff_types::{SubmissionId, ValidationTiming};
+use faceoff_types::{Competition, SubmissionId, ValidationTiming};
 use serde::Deserialize;
 
 #[derive(Template)]
@@ -49,10 +49,11 @@ struct TimingRow {
     p99_ms: String,
     max_ms: String,
     points: String,
+    violations: String,
 }
 
-impl From<&ValidationTiming> for TimingRow {
-    fn from(timing: &ValidationTiming) -> Self {
+impl TimingRow {
+    fn new(timing: &ValidationTiming, competition: &Competition) -> Self {
         let ms = |seconds: f64| format!("{:.2}", 1000.0 * seconds);
         Self {
             task: timing.task.to_string(),
@@ -61,8 +62,25 @@ impl From<&ValidationTiming> for TimingRow {
             p99_ms: ms(timing.p99_s),
             max_ms: ms(timing.max_s),
             points: format!("{:.1}", timing.points_per_episode),
+            violations: violations_text(timing, competition),
         }
     }
+}
+
+/// The violated limits, such as “joint position in 3 of 4 episodes”; empty if the validation run did not record them.
+fn violations_text(timing: &ValidationTiming, competition: &Competition) -> String {
+    if timing.episodes > 0 && timing.violations.is_empty() {
+        return "none".to_owned();
+    }
+    let limits = timing.violations.iter().map(|violated| {
+        let info = competition.violation(violated.limit);
+        let name = info.map_or(violated.limit.as_str(), |info| info.column.as_str());
+        format!(
+            "{name} in {} of {} episodes",
+            violated.episodes, timing.episodes
+        )
+    });
+    limits.collect::<Vec<_>>().join(", ")
 }
 
 fn path(id: SubmissionId) -> String {
@@ -94,7 +112,11 @@ async fn page_with(
         head: DashboardHeader::new(&member.caller, "", notice),
         submission: SubmissionRow::from(&view),
         log: log.filter(|log| !log.trim().is_empty()),
-        timing: view.timing.iter().map(TimingRow::from).collect(),
+        timing: view
+            .timing
+            .iter()
+            .map(|timing| TimingRow::new(timing, app.config.competition()))
+            .collect(),
         label: form.label,
         note: form.note,
         is_validating: view.status == SubmissionStatus::Validating,

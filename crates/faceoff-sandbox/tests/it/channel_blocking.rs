@@ -86,7 +86,7 @@ fn perform(call: Call, agent: &mut AgentProcess) {
         }
         Call::SpinUntil => agent.spin_until(deadline_in(1)).unwrap(),
         Call::WaitForAny => AgentProcess::wait_for_any(&[agent], deadline_in(5)).unwrap(),
-        Call::ReadLog => drop(agent.stderr_tail()),
+        Call::ReadLog => drop(agent.stderr()),
         Call::ReadCounters => {
             agent.track_threads();
             drop((

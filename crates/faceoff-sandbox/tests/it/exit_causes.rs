@@ -15,7 +15,7 @@ fn run_to_end(arguments: &[&str]) -> (AgentFaultKind, String) {
     let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();
     assert!(matches!(outcome, ReadLine::Closed), "{outcome:?}");
     let end = subject.wait_for_end(&mut agent);
-    (end, subject.finish(agent).stderr_tail)
+    (end, subject.finish(agent).stderr)
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn invalid_variables_are_an_agent_fault() {
     );
     let mut agent = subject.spawn();
     crate::harness::expect_echo(&mut agent, "hello");
-    let log = subject.finish(agent).stderr_tail;
+    let log = subject.finish(agent).stderr;
     assert!(
         log.contains("no-such-library.so") && !log.contains("bwrap"),
         "{log}"

@@ -125,7 +125,7 @@ impl Subject {
         let mut agent = self.spawn();
         let line = expect_line(&mut agent);
         let usage = agent.finish(TIMEOUT).unwrap();
-        assert_eq!(usage.exit, None, "{}", usage.stderr_tail);
+        assert_eq!(usage.exit, None, "{}", usage.stderr);
         self.assert_nothing_left();
         serde_json::from_str(&line).unwrap()
     }
@@ -135,7 +135,7 @@ impl Subject {
         agent
             .diagnose_end(TIMEOUT)
             .unwrap()
-            .unwrap_or_else(|| panic!("no end; {}", agent.stderr_tail()))
+            .unwrap_or_else(|| panic!("no end; {}", agent.stderr()))
     }
 
     /// Kills the agent and checks that it left nothing behind.
@@ -181,7 +181,7 @@ pub fn expect_line(agent: &mut AgentProcess) -> String {
         ReadLine::Line { bytes, .. } => String::from_utf8(bytes).unwrap(),
         other => {
             let end = agent.diagnose_end(Duration::from_secs(1));
-            panic!("{other:?}; {end:?}; {}", agent.stderr_tail())
+            panic!("{other:?}; {end:?}; {}", agent.stderr())
         }
     }
 }

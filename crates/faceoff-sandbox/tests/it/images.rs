@@ -76,7 +76,7 @@ impl ImageRoot {
             }
         }
         let usage = agent.finish(TIMEOUT).unwrap();
-        assert_eq!(usage.exit, None, "{}", usage.stderr_tail);
+        assert_eq!(usage.exit, None, "{}", usage.stderr);
         subject.assert_nothing_left();
         lines
     }

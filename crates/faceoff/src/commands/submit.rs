@@ -7,11 +7,11 @@ use super::{
     output::{print, print_json},
     server::ServerArgs,
 };
-use crate::{client::Client, packing::BundleFile};
+use crate::{client::Client, competition::competition, packing::BundleFile};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::views::submission::{SubmissionStatus, SubmissionView};
-use faceoff_types::ValidationTiming;
+use faceoff_types::{ValidationTiming, ViolatedLimit};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};
 
@@ -126,7 +126,7 @@ async fn wait_for_validation(
 
 fn print_timing(timing: &ValidationTiming) {
     println!(
-        "{:<8} {} answers: mean {:.1} ms, 99 % within {:.1} ms, longest {:.1} ms; {:.1} penalty points per episode",
+        "{:<8} {} answers: mean {:.1} ms, 99 % within {:.1} ms, longest {:.1} ms; {:.1} penalty points per episode for time",
         timing.task.as_str(),
         timing.steps,
         1e3 * timing.mean_s,
@@ -134,6 +134,22 @@ fn print_timing(timing: &ValidationTiming) {
         1e3 * timing.max_s,
         timing.points_per_episode
     );
+    let limits: Vec<String> = timing.violations.iter().map(violation_text).collect();
+    match (timing.episodes, limits.is_empty()) {
+        (0, _) => {}
+        (episodes, true) => println!("         no violated limits in {episodes} episodes"),
+        (episodes, false) => println!(
+            "         violated limits in {episodes} episodes: {}; they cost penalty points",
+            limits.join(", ")
+        ),
+    }
+}
+
+/// A violated limit, such as `joint position in 3`.
+fn violation_text(violated: &ViolatedLimit) -> String {
+    let info = competition().violation(violated.limit);
+    let name = info.map_or(violated.limit.as_str(), |info| info.column.as_str());
+    format!("{name} in {}", violated.episodes)
 }
 
 fn print_log(log: Option<&str>) {

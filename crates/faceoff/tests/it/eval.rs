@@ -170,7 +170,7 @@ fn fault_with_a_result_has_traceback_and_status_1() {
     let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
     for expected in [
         "fault: defend, episode 0, step 0",
-        "the agent's output before its first fault:\n  \\u001b[31mlooking\n  Traceback (most recent call last):",
+        "the agent's output before its first fault:\n  looking\n  Traceback (most recent call last):",
         "  ZeroDivisionError: division by zero",
         "penalty points",
     ] {

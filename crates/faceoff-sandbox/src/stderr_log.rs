@@ -1,6 +1,6 @@
-//! Standard error of an agent, which is its log: a thread reads it and keeps its last bytes.
+//! Standard error of an agent, which is its log: a thread reads it and keeps its beginning and its end.
 
-use crate::{cpu_clock::own_cpu_time, sched_stat::SchedStat};
+use crate::{bounded_log::BoundedLog, cpu_clock::own_cpu_time, sched_stat::SchedStat};
 use rustix::{
     event::{PollFd, PollFlags, poll},
     io::{Errno, ioctl_fionread},
@@ -8,7 +8,6 @@ use rustix::{
     pipe::{PipeFlags, pipe_with},
 };
 use std::{
-    collections::VecDeque,
     fs::File,
     io,
     os::fd::OwnedFd,
@@ -27,10 +26,10 @@ const PAUSE_PER_CPU_TIME: u32 = 20;
 /// CPU time of one read above which the log is not read any further.
 const MAX_READ_CPU_TIME: Duration = Duration::from_millis(20);
 
-/// The thread that reads standard error, and the bytes it has kept.
+/// The thread that reads standard error, and the part that it keeps.
 #[derive(Debug)]
-pub(crate) struct StderrTail {
-    tail: Arc<Mutex<VecDeque<u8>>>,
+pub(crate) struct StderrLog {
+    kept: Arc<Mutex<BoundedLog>>,
     /// The kernel's scheduling counters of the thread.
     schedule: Option<File>,
     thread: Option<JoinHandle<()>>,
@@ -38,33 +37,31 @@ pub(crate) struct StderrTail {
     stop: Option<OwnedFd>,
 }
 
-impl StderrTail {
-    /// Starts a thread that reads the socket `log` and keeps its last `keep_bytes`.
-    pub(crate) fn drain(log: OwnedFd, keep_bytes: u64) -> io::Result<Self> {
+impl StderrLog {
+    /// Starts a thread that reads the socket `log` and keeps at most `max_bytes` of it.
+    pub(crate) fn drain(log: OwnedFd, max_bytes: u64) -> io::Result<Self> {
         let (stop_reader, stop) = pipe_with(PipeFlags::CLOEXEC)?;
-        let keep_bytes = usize::try_from(keep_bytes).unwrap_or(usize::MAX);
-        let tail = Arc::new(Mutex::new(VecDeque::new()));
-        let shared = Arc::clone(&tail);
+        let kept = Arc::new(Mutex::new(BoundedLog::new(max_bytes)));
+        let shared = Arc::clone(&kept);
         let (sender, receiver) = mpsc::channel();
         let thread = std::thread::Builder::new()
             .name("agent-stderr".into())
             .spawn(move || {
                 let _ = sender.send(File::open("/proc/thread-self/schedstat").ok());
                 drop(sender);
-                drain_until_closed(&log, &stop_reader, keep_bytes, &shared);
+                drain_until_closed(&log, &stop_reader, &shared);
             })?;
         Ok(Self {
-            tail,
+            kept,
             schedule: receiver.recv().ok().flatten(),
             thread: Some(thread),
             stop: Some(stop),
         })
     }
 
-    /// The kept end of the log, lossy UTF-8.
+    /// The kept parts of the log, lossy UTF-8.
     pub(crate) fn text(&self) -> String {
-        let mut tail = lock(&self.tail);
-        String::from_utf8_lossy(tail.make_contiguous()).into_owned()
+        lock(&self.kept).text()
     }
 
     /// Run time of the reading thread. It runs on the evaluator's CPUs, as long as the agent writes.
@@ -82,29 +79,19 @@ impl StderrTail {
     }
 }
 
-impl Drop for StderrTail {
+impl Drop for StderrLog {
     fn drop(&mut self) {
         self.close();
     }
 }
 
-fn lock(tail: &Mutex<VecDeque<u8>>) -> MutexGuard<'_, VecDeque<u8>> {
-    tail.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock(kept: &Mutex<BoundedLog>) -> MutexGuard<'_, BoundedLog> {
+    kept.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn drain_until_closed(
-    log: &OwnedFd,
-    stop: &OwnedFd,
-    keep_bytes: usize,
-    tail: &Mutex<VecDeque<u8>>,
-) {
+fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, kept: &Mutex<BoundedLog>) {
     let mut chunk = vec![0; CHUNK_BYTES];
-    let keep_end = |bytes: &[u8]| {
-        let mut tail = lock(tail);
-        tail.extend(bytes);
-        let excess = tail.len().saturating_sub(keep_bytes);
-        tail.drain(..excess);
-    };
+    let keep = |bytes: &[u8]| lock(kept).push(bytes);
     // Larger than what a socket can hold after its writers have died. If a writer survives and goes on writing, reading ends here.
     let mut remaining_bytes_after_stop = 1 << 20;
     loop {
@@ -126,7 +113,7 @@ fn drain_until_closed(
         match recv(log, &mut chunk[..limit], RecvFlags::DONTWAIT) {
             Ok((0, _)) => return,
             Ok((count, _)) => {
-                keep_end(&chunk[..count]);
+                keep(&chunk[..count]);
                 let cpu_time = own_cpu_time().saturating_sub(cpu_time_before);
                 if is_stopped {
                     remaining_bytes_after_stop -= count.min(remaining_bytes_after_stop);
@@ -134,7 +121,7 @@ fn drain_until_closed(
                         return;
                     }
                 } else if cpu_time > MAX_READ_CPU_TIME {
-                    keep_end(
+                    keep(
                         b"\n[faceoff] the rest of this log is not read: reading it takes the evaluator too much CPU \
                           time\n",
                     );
