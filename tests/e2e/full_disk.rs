@@ -24,7 +24,7 @@ const KIB: u64 = 1 << 10;
 const MIB: u64 = 1 << 20;
 const DISK_BYTES: u64 = 96 * MIB;
 /// The size of a file with which an agent's bundle is not copied into memory, so that the agent sees changes of its files.
-const FILLING_BYTES: usize = 33 << 20;
+const PADDING_BYTES: usize = 33 << 20;
 
 /// Source of an agent that keeps still. It waits before an episode as long as the file `wait_before` in its folder describes that
 /// episode. `prepare *`: each of the task. `first`: the first of a shard. `second N`: the second of a shard, if the file has not changed
@@ -73,7 +73,7 @@ for line in sys.stdin:
 /// The bundle of the waiting agent.
 fn waiting_agent(folder: &Path) -> PathBuf {
     let agent = python_bundle(folder, "waits", WAITING_AGENT);
-    fs::write(agent.join("filling"), vec![0; FILLING_BYTES])
+    fs::write(agent.join("filling"), vec![0; PADDING_BYTES])
         .expect("a scratch file can be written");
     agent
 }

@@ -21,7 +21,7 @@ pub enum Interpolation {
     /// 5: position, velocity and acceleration, quintic.
     Quintic,
     /// −1: position and velocity, each along a line.
-    LinearBoth,
+    LinearPositionAndVelocity,
     /// null: position, velocity and acceleration for each millisecond of the step.
     Trajectory,
 }
@@ -35,7 +35,7 @@ impl Interpolation {
             Self::Cubic => Some(3),
             Self::Quartic => Some(4),
             Self::Quintic => Some(5),
-            Self::LinearBoth => Some(-1),
+            Self::LinearPositionAndVelocity => Some(-1),
             Self::Trajectory => None,
         }
     }
@@ -68,7 +68,10 @@ impl Action {
         let has_shape = match self {
             Self::Position(_) => matches!(interpolation, I::Linear | I::Quadratic),
             Self::PositionVelocity(_) => {
-                matches!(interpolation, I::Cubic | I::Quartic | I::LinearBoth)
+                matches!(
+                    interpolation,
+                    I::Cubic | I::Quartic | I::LinearPositionAndVelocity
+                )
             }
             Self::PositionVelocityAcceleration(_) => interpolation == I::Quintic,
             Self::Trajectory(_) => interpolation == I::Trajectory,

@@ -20,10 +20,10 @@ use faceoff_service::{
     answer_cache,
     app::AppState,
     change_quota::RemainingChangesSlot,
-    conditions::Conditions,
     network::Network,
     problem::Problem,
     request_log::{REQUEST_ID, log_request},
+    request_preconditions::RequestPreconditions,
 };
 use std::{any::Any, num::NonZeroU32, sync::Arc};
 use tower_http::{
@@ -93,7 +93,7 @@ async fn revalidate(mut request: Request, next: Next) -> Response {
     if !answer_cache::is_board_page(request.uri().path()) {
         return next.run(request).await;
     }
-    let conditions = Conditions::take_from(request.headers_mut());
+    let conditions = RequestPreconditions::take_from(request.headers_mut());
     let response = next.run(request).await;
     let tag = response.headers().get(header::ETAG).cloned();
     match tag.filter(|_| response.status() == StatusCode::OK) {

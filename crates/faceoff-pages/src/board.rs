@@ -23,7 +23,7 @@ use faceoff_service::{
     extract::{PathParam, QueryParams},
     problem::Problem,
     viewer::Viewer,
-    views::{board, board_timeline::BoardTimeline, season::SeasonHead, visibility::Visibility},
+    views::{board, board_timeline::BoardTimeline, season::SeasonSummary, visibility::Visibility},
 };
 use faceoff_types::Task;
 use heading::Heading;
@@ -84,7 +84,7 @@ pub(super) async fn overall(
     let competition = Arc::clone(app.config.competition());
     let sort = Sort::new(&query, None, &address, &competition)?;
     let visibility = Visibility::load(&app, viewer?).await?;
-    let season = SeasonHead::load(&app).await?;
+    let season = SeasonSummary::load(&app).await?;
     let mut board = board::query(&app, &visibility, query.board(), None).await?;
     sort.apply(&mut board.rows, None);
     let today = app.store.stage(board.stage).await?;
@@ -153,7 +153,7 @@ pub(super) async fn by_task(
         .task(task)
         .ok_or_else(|| board::unknown_task(&competition, task))?;
     let visibility = Visibility::load(&app, viewer?).await?;
-    let season = SeasonHead::load(&app).await?;
+    let season = SeasonSummary::load(&app).await?;
     let mut board = board::query(&app, &visibility, query.board(), Some(task)).await?;
     // The board excludes teams without a result in this task.
     board.rows.retain(|row| row.tasks.contains_key(&task));

@@ -19,9 +19,9 @@ use axum::{
 };
 use faceoff_service::{
     app::App,
-    conditions::{Conditions, ETag},
     extract::{PathParam, QueryParams},
     problem::{Problem, ProblemKind},
+    request_preconditions::{ETag, RequestPreconditions},
 };
 use library::{Group, LIBRARY, Page};
 use reference::{Reference, Schema, TokenRequirement, TypePart};
@@ -97,7 +97,10 @@ struct ContentsPage {
     groups: &'static [Group],
 }
 
-async fn contents(State(app): State<App>, conditions: Conditions) -> Result<Response, PageProblem> {
+async fn contents(
+    State(app): State<App>,
+    conditions: RequestPreconditions,
+) -> Result<Response, PageProblem> {
     let newcomers = NEWCOMERS.iter();
     respond(
         &conditions,
@@ -123,7 +126,7 @@ struct DocumentPage {
 async fn document(
     State(app): State<App>,
     PathParam(name): PathParam<String>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
     let Some(page) = library::page(&name) else {
         return Err(not_found(format!(
@@ -151,7 +154,7 @@ struct ReferencePage<'a> {
 async fn api_reference(
     State(app): State<App>,
     Extension(documentation): Extension<Arc<Documentation>>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
     respond(
         &conditions,
@@ -175,7 +178,7 @@ async fn operations(
     State(app): State<App>,
     Extension(documentation): Extension<Arc<Documentation>>,
     PathParam(name): PathParam<String>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
     let mut groups = documentation.reference().groups.iter();
     let Some(group) = groups.find(|group| group.name == name) else {
@@ -205,7 +208,7 @@ struct SchemasPage<'a> {
 async fn schemas(
     State(app): State<App>,
     Extension(documentation): Extension<Arc<Documentation>>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
     respond(
         &conditions,
@@ -229,7 +232,7 @@ async fn schema(
     State(app): State<App>,
     Extension(documentation): Extension<Arc<Documentation>>,
     PathParam(name): PathParam<String>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
     let mut schemas = documentation.reference().schemas.iter();
     let Some(schema) = schemas.find(|schema| schema.name == name) else {
@@ -268,7 +271,7 @@ async fn search_page(
     State(app): State<App>,
     Extension(documentation): Extension<Arc<Documentation>>,
     query: Result<QueryParams<SearchQuery>, Problem>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
     let QueryParams(SearchQuery { q: search_query }) = query?;
     let chars = search_query.chars().count();
@@ -308,7 +311,10 @@ fn not_found(detail: String) -> PageProblem {
 }
 
 /// The page with an ETag, or 304 if the client has this version.
-fn respond(conditions: &Conditions, page: &impl Template) -> Result<Response, PageProblem> {
+fn respond(
+    conditions: &RequestPreconditions,
+    page: &impl Template,
+) -> Result<Response, PageProblem> {
     let html = page.render().map_err(Problem::internal)?;
     let tag = ETag::new("docs", &[&html]);
     let headers = [

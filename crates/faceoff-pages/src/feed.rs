@@ -11,7 +11,7 @@ use faceoff_service::{
     problem::Problem,
     views::{
         feed::{NewsItem, feed_id, newest},
-        season::SeasonHead,
+        season::SeasonSummary,
     },
 };
 use jiff::{Timestamp, fmt::rfc2822};
@@ -34,7 +34,7 @@ struct Feed {
 
 pub(super) async fn feed(State(app): State<App>, headers: HeaderMap) -> Result<Response, Problem> {
     let season = app.store.season().await?;
-    let head = SeasonHead::load(&app).await?;
+    let head = SeasonSummary::load(&app).await?;
     let entries = newest(&app).await?;
     let updated = entries
         .first()

@@ -7,7 +7,7 @@ use axum::{
     response::{Html, IntoResponse, Response},
 };
 use faceoff_service::{
-    app::AppState, conditions::ETag, problem::Problem, views::season::SeasonHead,
+    app::AppState, problem::Problem, request_preconditions::ETag, views::season::SeasonSummary,
 };
 use faceoff_types::Ruleset;
 use std::sync::atomic::Ordering;
@@ -38,7 +38,7 @@ pub(super) struct Frame {
 impl Frame {
     /// The frame of a page that names the season.
     pub(super) async fn load(app: &AppState, current: impl Into<String>) -> Result<Self, Problem> {
-        let season = SeasonHead::load(app).await?;
+        let season = SeasonSummary::load(app).await?;
         Ok(Self::for_app(app, season.name, current))
     }
 

@@ -17,10 +17,10 @@ use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,
     auth::{Caller, Organiser},
-    conditions::{Conditions, ETag},
     episode_path::AblationPath,
     extract::{OptionalJson, PathParam},
     problem::Problem,
+    request_preconditions::{ETag, RequestPreconditions},
     viewer::Viewer,
     views::{ablation, ablation_clips::AblationClips, stage},
 };
@@ -67,7 +67,7 @@ pub(crate) async fn ablation(
 )]
 pub(crate) async fn ablation_motion(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     path: AblationPath,
@@ -93,7 +93,7 @@ pub(crate) async fn ablation_motion(
 )]
 pub(crate) async fn ablation_observed(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     path: AblationPath,
@@ -115,7 +115,7 @@ async fn send_episode(
     key: ClipKey,
     tag_prefix: &str,
     path: AblationPath,
-    conditions: &Conditions,
+    conditions: &RequestPreconditions,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
     let file = clips.profile_file(app, path.profile).await?;

@@ -14,10 +14,10 @@ use faceoff_api::{
 use faceoff_service::{
     accept::wants_csv,
     app::App,
-    conditions::{Conditions, ETag},
     csv::MEDIA_TYPE,
     extract::{PathParam, QueryParams},
     problem::Problem,
+    request_preconditions::{ETag, RequestPreconditions},
     viewer::Viewer,
     views::{board, history, visibility::Visibility},
 };
@@ -37,7 +37,7 @@ use serde::Serialize;
 )]
 pub(crate) async fn board(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     QueryParams(query): QueryParams<BoardQuery>,
@@ -58,7 +58,7 @@ pub(crate) async fn board(
 )]
 pub(crate) async fn task_board(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     PathParam(task): PathParam<Task>,
@@ -80,7 +80,7 @@ pub(crate) async fn task_board(
 )]
 pub(crate) async fn board_history(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     QueryParams(mut query): QueryParams<HistoryQuery>,
@@ -99,7 +99,7 @@ pub(crate) async fn board_history(
 async fn respond(
     app: &App,
     viewer: Viewer,
-    conditions: &Conditions,
+    conditions: &RequestPreconditions,
     headers: &HeaderMap,
     mut query: BoardQuery,
     task: Option<Task>,
@@ -145,7 +145,7 @@ fn choose_format(requested: Option<BoardFormat>, headers: &HeaderMap) -> BoardFo
 /// Sends a view in this format, unless the client already has the response with this tag.
 async fn send<T: Serialize>(
     tag: &ETag,
-    conditions: &Conditions,
+    conditions: &RequestPreconditions,
     format: BoardFormat,
     view: impl Future<Output = Result<T, Problem>>,
     csv: impl FnOnce(&T) -> Vec<u8>,

@@ -15,9 +15,9 @@ use faceoff_service::{
     app::App,
     archive_contents,
     auth::Caller,
-    conditions::Conditions,
     extract::{OptionalJson, PathParam},
     problem::Problem,
+    request_preconditions::RequestPreconditions,
     services::decisions::checked_reason,
     views::submission,
 };
@@ -37,7 +37,7 @@ use faceoff_types::SubmissionId;
 )]
 pub(crate) async fn download_bundle(
     LinkOr(caller): LinkOr<Caller>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Response, Problem> {

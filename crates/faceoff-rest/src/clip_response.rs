@@ -9,8 +9,8 @@ use axum::{
 };
 use faceoff_service::{
     accept::accepts_gzip,
-    conditions::{Conditions, ETag},
     problem::Problem,
+    request_preconditions::{ETag, RequestPreconditions},
 };
 use flate2::read::GzDecoder;
 use std::io::Read;
@@ -18,7 +18,7 @@ use std::io::Read;
 /// Sends the clip, unless the client already has the one with this tag. `clip` is gzip-compressed, and awaited only if needed.
 pub(super) async fn send(
     tag: &ETag,
-    conditions: &Conditions,
+    conditions: &RequestPreconditions,
     headers: &HeaderMap,
     clip: impl Future<Output = Result<Vec<u8>, Problem>>,
 ) -> Result<Response, Problem> {

@@ -15,10 +15,10 @@ use faceoff_api::views::clips::EpisodesView;
 use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,
-    conditions::{Conditions, ETag},
     episode_path::EpisodePath,
     extract::PathParam,
     problem::Problem,
+    request_preconditions::{ETag, RequestPreconditions},
     viewer::Viewer,
     views::{clips::Clips, visibility::Visibility},
 };
@@ -40,7 +40,7 @@ use faceoff_types::EvaluationId;
 )]
 pub(crate) async fn episodes(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
@@ -75,7 +75,7 @@ pub(crate) async fn episodes(
 )]
 pub(crate) async fn motion(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     path: EpisodePath,
@@ -102,7 +102,7 @@ pub(crate) async fn motion(
 )]
 pub(crate) async fn observed(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     path: EpisodePath,
@@ -125,7 +125,7 @@ async fn send_episode(
     key: ClipKey,
     tag_prefix: &str,
     path: EpisodePath,
-    conditions: &Conditions,
+    conditions: &RequestPreconditions,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
     let EpisodePath { task, episode, .. } = path;

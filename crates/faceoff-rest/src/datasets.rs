@@ -23,10 +23,10 @@ use faceoff_service::{
     app::App,
     archive_contents,
     auth::{Caller, TeamCaller},
-    conditions::{Conditions, ETag},
     extract::{OptionalJson, PathParam},
     problem::{Problem, ProblemKind},
     release::check_released,
+    request_preconditions::{ETag, RequestPreconditions},
     viewer::Viewer,
     views::{evaluation, violations, visibility::Visibility},
 };
@@ -51,7 +51,7 @@ use faceoff_types::EvaluationId;
 )]
 pub(crate) async fn dataset(
     LinkOr(viewer): LinkOr<Viewer>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
@@ -123,7 +123,7 @@ pub(crate) async fn link_dataset(
 )]
 pub(crate) async fn violations(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {

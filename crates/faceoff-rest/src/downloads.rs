@@ -7,8 +7,8 @@ use axum::{
 };
 use faceoff_service::{
     app::App,
-    conditions::{ByteRange, Conditions, ETag},
     problem::{Problem, ProblemKind},
+    request_preconditions::{ByteRange, ETag, RequestPreconditions},
 };
 use faceoff_store::StoreError;
 
@@ -33,7 +33,7 @@ pub(super) struct Download<'a> {
 /// [`StoreError::NotFound`] if there is no artifact with this key.
 pub(super) async fn download(
     app: &App,
-    conditions: &Conditions,
+    conditions: &RequestPreconditions,
     file: Download<'_>,
 ) -> Result<Response, StoreError> {
     let Download { key, blake3, .. } = file;
@@ -81,7 +81,7 @@ pub(super) async fn download(
 /// Sends a response with this tag, unless the client already has it. `response` is awaited only if needed.
 pub(super) async fn send_tagged(
     tag: &ETag,
-    conditions: &Conditions,
+    conditions: &RequestPreconditions,
     response: impl Future<Output = Result<Response, Problem>>,
 ) -> Result<Response, Problem> {
     let mut response = match conditions.not_modified(tag) {

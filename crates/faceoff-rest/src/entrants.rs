@@ -40,7 +40,7 @@ pub(crate) async fn enter_teams(
             "expected at least one name, got none",
         ));
     }
-    let state = TournamentState::unscored(&app, id).await?;
+    let state = TournamentState::without_standings(&app, id).await?;
     let new_entrants = entrants::find_by_names(&app, "teams", &teams).await?;
     entrants::check_count(state.entrants.len() + new_entrants.len())?;
     let now = app.config.clock.now();

@@ -45,7 +45,7 @@ pub(crate) async fn order_test_games(
     PathParam(id): PathParam<TournamentId>,
     OptionalJson(request): OptionalJson<NewTestGames>,
 ) -> Result<(StatusCode, Json<TestGamesView>), Problem> {
-    let state = TournamentState::unscored(&app, id).await?;
+    let state = TournamentState::without_standings(&app, id).await?;
     let requested_by = caller.team().map(|team| team.id);
     let baseline = baseline_team(&app, &state).await?;
     let teams = match (requested_by, request.teams) {
@@ -87,7 +87,7 @@ pub(crate) async fn order_test_games(
             Err(
                 error @ (StoreError::Conflict(_)
                 | StoreError::Disqualified { .. }
-                | StoreError::Retired { .. }
+                | StoreError::TeamRetired { .. }
                 | StoreError::TermsNotAccepted { .. }),
             ) if requested_by.is_none() => {
                 let reason = error.to_string();
@@ -136,7 +136,7 @@ pub(crate) async fn order_friendly_game(
     PathParam(id): PathParam<TournamentId>,
     Body(NewFriendlyGame { opponent }): Body<NewFriendlyGame>,
 ) -> Result<impl IntoResponse, Problem> {
-    let state = TournamentState::unscored(&app, id).await?;
+    let state = TournamentState::without_standings(&app, id).await?;
     let opponent = entrants::find_by_names(&app, "opponent", &[opponent]).await?[0];
     let own_team = caller.team.id;
     if opponent == own_team {

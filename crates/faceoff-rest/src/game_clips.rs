@@ -10,9 +10,9 @@ use axum::{extract::State, http::HeaderMap, response::Response};
 use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,
-    conditions::{Conditions, ETag},
     extract::{PathParams, parse_path_param},
     problem::{Problem, ProblemKind},
+    request_preconditions::{ETag, RequestPreconditions},
     viewer::Viewer,
     views::game_clips::GameClips,
 };
@@ -32,7 +32,7 @@ use faceoff_types::GameId;
 )]
 pub(crate) async fn game_motion(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     PathParams(path): PathParams<String, 2>,
@@ -68,7 +68,7 @@ pub(crate) async fn game_motion(
 )]
 pub(crate) async fn game_observed(
     viewer: Viewer,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     headers: HeaderMap,
     State(app): State<App>,
     PathParams(path): PathParams<String, 3>,

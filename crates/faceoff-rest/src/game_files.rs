@@ -17,9 +17,9 @@ use faceoff_service::{
     app::App,
     archive_contents,
     auth::Caller,
-    conditions::Conditions,
     extract::{OptionalJson, PathParam, PathParams, parse_path_param},
     problem::{Problem, ProblemKind},
+    request_preconditions::RequestPreconditions,
     viewer::Viewer,
     views::{game, tournament_state::TournamentState},
 };
@@ -45,7 +45,7 @@ use faceoff_types::{GameId, Side};
 )]
 pub(crate) async fn side(
     LinkOr(viewer): LinkOr<Viewer>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     State(app): State<App>,
     PathParams(path): PathParams<String, 2>,
 ) -> Result<Response, Problem> {
@@ -69,7 +69,7 @@ pub(crate) async fn side(
 )]
 pub(crate) async fn recording(
     LinkOr(viewer): LinkOr<Viewer>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
     State(app): State<App>,
     PathParam(id): PathParam<GameId>,
 ) -> Result<Response, Problem> {
@@ -261,7 +261,11 @@ impl StoredRecording {
         })
     }
 
-    async fn send(&self, app: &App, conditions: &Conditions) -> Result<Response, Problem> {
+    async fn send(
+        &self,
+        app: &App,
+        conditions: &RequestPreconditions,
+    ) -> Result<Response, Problem> {
         let file = Download {
             key: &self.key,
             blake3: Some(&self.blake3),

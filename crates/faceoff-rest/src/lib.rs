@@ -65,7 +65,9 @@ mod workers;
 use axum::{Router, extract::DefaultBodyLimit, http::HeaderMap, middleware, routing::get};
 use document::Document;
 use faceoff_api::paths::API_BASE;
-use faceoff_service::{app::App, conditions::Conditions, extract::MAX_JSON_BYTES, timeouts};
+use faceoff_service::{
+    app::App, extract::MAX_JSON_BYTES, request_preconditions::RequestPreconditions, timeouts,
+};
 use faceoff_types::Competition;
 use serde_json::Value;
 use served_document::ServedDocument;
@@ -101,9 +103,11 @@ pub fn router(timeout: Duration, competition: &Competition) -> (Router<App>, Arc
     let served = ServedDocument::new(&document);
     let router = router.route(
         &format!("{API_BASE}/openapi.json"),
-        get(async move |conditions: Conditions, headers: HeaderMap| {
-            served.respond(&conditions, &headers)
-        }),
+        get(
+            async move |conditions: RequestPreconditions, headers: HeaderMap| {
+                served.respond(&conditions, &headers)
+            },
+        ),
     );
     (router, document)
 }

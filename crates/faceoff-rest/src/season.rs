@@ -13,7 +13,7 @@ use faceoff_service::{
     problem::Problem,
     services::teams,
     viewer::Viewer,
-    views::season::{self, SeasonHead},
+    views::season::{self, SeasonSummary},
 };
 
 /// Returns the season: name, commitment, stages, days, and the seeds that are revealed.
@@ -61,7 +61,7 @@ pub(crate) async fn close_season(
     State(app): State<App>,
     Body(CloseSeason { confirm }): Body<CloseSeason>,
 ) -> Result<Json<SeasonView>, Problem> {
-    let name = SeasonHead::load(&app).await?.name;
+    let name = SeasonSummary::load(&app).await?.name;
     if confirm != name {
         let detail = format!(
             "expected the season's name {name:?}, got {confirm:?}; closing cannot be undone"

@@ -7,7 +7,7 @@ use axum::{
 };
 use faceoff_service::{
     accept::accepts_gzip,
-    conditions::{Conditions, ETag},
+    request_preconditions::{ETag, RequestPreconditions},
 };
 use flate2::{Compression, write::GzEncoder};
 use serde_json::Value;
@@ -35,7 +35,11 @@ impl ServedDocument {
     }
 
     /// Sends the document, unless the client already has it.
-    pub(super) fn respond(&self, conditions: &Conditions, headers: &HeaderMap) -> Response {
+    pub(super) fn respond(
+        &self,
+        conditions: &RequestPreconditions,
+        headers: &HeaderMap,
+    ) -> Response {
         let Encoded { tag, json, gzip } = &**self.0;
         if let Some(response) = conditions.not_modified(tag) {
             return response;

@@ -30,7 +30,7 @@ pub enum Interpolation {
     /// 5: position, velocity and acceleration, quintic; shape `[3][7]`.
     Quintic,
     /// −1: position and velocity, each linear; shape `[2][7]`.
-    LinearBoth,
+    LinearPositionAndVelocity,
     /// null: position, velocity and acceleration at every millisecond; shape `[20][3][7]`.
     Trajectory,
 }
@@ -48,7 +48,7 @@ impl Interpolation {
         Self::Cubic,
         Self::Quartic,
         Self::Quintic,
-        Self::LinearBoth,
+        Self::LinearPositionAndVelocity,
         Self::Trajectory,
     ];
 
@@ -63,7 +63,7 @@ impl Interpolation {
             Some(3) => Self::Cubic,
             Some(4) => Self::Quartic,
             Some(5) => Self::Quintic,
-            Some(-1) => Self::LinearBoth,
+            Some(-1) => Self::LinearPositionAndVelocity,
             None => Self::Trajectory,
             Some(unknown) => return Err(UnknownInterpolation(unknown)),
         })
@@ -78,7 +78,7 @@ impl Interpolation {
             Self::Cubic => Some(3),
             Self::Quartic => Some(4),
             Self::Quintic => Some(5),
-            Self::LinearBoth => Some(-1),
+            Self::LinearPositionAndVelocity => Some(-1),
             Self::Trajectory => None,
         }
     }
@@ -88,7 +88,7 @@ impl Interpolation {
     pub const fn shape(self) -> &'static [usize] {
         match self {
             Self::Linear | Self::Quadratic => &[JOINTS],
-            Self::Cubic | Self::Quartic | Self::LinearBoth => &[2, JOINTS],
+            Self::Cubic | Self::Quartic | Self::LinearPositionAndVelocity => &[2, JOINTS],
             Self::Quintic => &[3, JOINTS],
             Self::Trajectory => &[SUBSTEPS, 3, JOINTS],
         }
@@ -100,7 +100,7 @@ impl Interpolation {
     pub const fn len(self) -> usize {
         match self {
             Self::Linear | Self::Quadratic => JOINTS,
-            Self::Cubic | Self::Quartic | Self::LinearBoth => 2 * JOINTS,
+            Self::Cubic | Self::Quartic | Self::LinearPositionAndVelocity => 2 * JOINTS,
             Self::Quintic => 3 * JOINTS,
             Self::Trajectory => MAX_ACTION_LEN,
         }

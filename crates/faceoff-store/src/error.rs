@@ -59,7 +59,7 @@ pub enum StoreError {
     },
     /// The team has withdrawn from the season.
     #[error("the team retired at {at}")]
-    Retired {
+    TeamRetired {
         /// When the team withdrew.
         at: Timestamp,
     },

@@ -53,10 +53,10 @@ mod tournament_format;
 mod tournament_rules;
 mod unknown_profile;
 mod unknown_task;
+mod url_without_password;
 mod validation_outcome;
 mod variation;
 mod violation;
-mod without_password;
 mod worker_name;
 mod zone;
 
@@ -91,7 +91,7 @@ pub use printable::{escape_unprintable, is_printable, printable_excerpt};
 pub use profile::{Profile, ProfileMap};
 pub use recording::{RecordingColumn, RecordingColumns};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult};
-pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
+pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_KEPT_EVALUATIONS, Retention};
 pub use round_number::{InvalidRoundNumber, RoundNumber};
 pub use ruleset::{ACTION_LIMIT, Ruleset, UnknownRuleset};
 pub use runtime_inventory::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
@@ -109,14 +109,14 @@ pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};
 pub use tournament_format::TournamentFormat;
 pub use tournament_rules::{
-    InvalidTournament, MAX_FREE_GAMES, MAX_GAME_STEPS, TournamentRules, TournamentSettings,
-    Withdrawals,
+    InvalidTournament, MAX_GAME_STEPS, MAX_TEST_AND_FRIENDLY_GAMES, TournamentRules,
+    TournamentSettings, Withdrawals,
 };
 pub use unknown_profile::UnknownProfile;
 pub use unknown_task::UnknownTask;
+pub use url_without_password::url_without_password;
 pub use validation_outcome::{ValidationOutcome, ValidationTiming, ViolatedLimit};
 pub use variation::{InvalidTierBounds, TierBounds, Variation};
 pub use violation::{ViolationCounts, ViolationName, Violations};
-pub use without_password::without_password;
 pub use worker_name::{ParseWorkerNameError, WorkerName};
 pub use zone::{UnknownZone, Zone};

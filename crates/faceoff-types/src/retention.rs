@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The largest value of [`Retention::last`].
-pub const MAX_LAST: u32 = 1000;
+pub const MAX_KEPT_EVALUATIONS: u32 = 1000;
 
 /// The largest value of [`Retention::days_after_sign_off`].
 pub const MAX_DAYS_AFTER_SIGN_OFF: u32 = 3650;
@@ -32,7 +32,7 @@ pub struct Retention {
 /// An invalid retention.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidRetention {
-    #[error("last: expected 1 to {MAX_LAST}, got {0}; to keep nothing, set `until`")]
+    #[error("last: expected 1 to {MAX_KEPT_EVALUATIONS}, got {0}; to keep nothing, set `until`")]
     Last(u32),
     #[error("days_after_sign_off: expected 1 to {MAX_DAYS_AFTER_SIGN_OFF}, got {0}")]
     Days(u32),
@@ -52,7 +52,7 @@ impl Retention {
     /// The value that is out of range.
     pub fn check(&self) -> Result<(), InvalidRetention> {
         match (self.last, self.until, self.days_after_sign_off) {
-            (Some(last), _, _) if !(1..=MAX_LAST).contains(&last) => {
+            (Some(last), _, _) if !(1..=MAX_KEPT_EVALUATIONS).contains(&last) => {
                 Err(InvalidRetention::Last(last))
             }
             (_, Some(_), Some(_)) => Err(InvalidRetention::UntilAndDays),

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// penalty points are counted for each.
 pub const MAX_GAME_STEPS: u32 = 10 * GAME_WINDOWS * WINDOW_STEPS;
 /// Maximum number of test games and friendly games per team and day.
-pub const MAX_FREE_GAMES: u32 = 1000;
+pub const MAX_TEST_AND_FRIENDLY_GAMES: u32 = 1000;
 
 /// The rules on which the results of a tournament depend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -116,7 +116,7 @@ pub enum InvalidTournament {
     Limits(InvalidLimit),
     #[error("runtimes: {0}")]
     Runtimes(#[from] crate::InvalidRuntimes),
-    #[error("free_games_per_day: expected 0 to {MAX_FREE_GAMES}, got {0}")]
+    #[error("free_games_per_day: expected 0 to {MAX_TEST_AND_FRIENDLY_GAMES}, got {0}")]
     FreeGames(u32),
 }
 
@@ -208,7 +208,7 @@ impl TournamentSettings {
     /// # Errors
     /// The first setting that is out of range.
     pub const fn check(&self) -> Result<(), InvalidTournament> {
-        if self.free_games_per_day > MAX_FREE_GAMES {
+        if self.free_games_per_day > MAX_TEST_AND_FRIENDLY_GAMES {
             return Err(InvalidTournament::FreeGames(self.free_games_per_day));
         }
         Ok(())
@@ -287,7 +287,7 @@ mod tests {
             assert!(rules(json).is_err(), "{json}");
         }
         let many = TournamentSettings {
-            free_games_per_day: MAX_FREE_GAMES + 1,
+            free_games_per_day: MAX_TEST_AND_FRIENDLY_GAMES + 1,
             ..TournamentSettings::default()
         };
         assert_eq!(many.check(), Err(InvalidTournament::FreeGames(1001)));

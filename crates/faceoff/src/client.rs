@@ -33,7 +33,7 @@ use faceoff_api::{
         runtimes::RuntimesView, season::SeasonView,
     },
 };
-use faceoff_types::{Task, without_password};
+use faceoff_types::{Task, url_without_password};
 use http::Address;
 pub use links::LinkTarget;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
@@ -238,7 +238,7 @@ impl Client {
     }
 
     async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {
-        let base = without_password(&self.address.base);
+        let base = url_without_password(&self.address.base);
         let result = request.send().await.map_err(reqwest::Error::without_url);
         let response = result.map_err(|error| {
             let error = anyhow::Error::from(error);

@@ -14,7 +14,7 @@ pub struct RuntimesView {
     /// The ruleset of current evaluations.
     #[schema(example = "airhockey-2023.3")]
     pub ruleset: String,
-    /// The runtimes that `agent.toml` can name, with the packages found at the server's start; empty in an archive.
+    /// The runtimes that `agent.toml` can name, with the packages found at the server's start; empty in an archived season.
     pub runtimes: Vec<RuntimeInventory>,
     /// CPUs of the machines that run agents.
     pub machine: AgentMachine,

@@ -2,7 +2,7 @@
 
 use crate::{
     site::{ADMIN, Answer, DATASET, Site, TestTeam, result, string},
-    tournament::cup::{Cup, first_by_name_wins},
+    tournament::cup::{TestTournament, first_by_name_wins},
 };
 use reqwest::Method;
 use serde_json::json;
@@ -187,7 +187,7 @@ async fn link_to_an_unfinished_dataset_is_refused() {
 
 #[tokio::test]
 async fn game_recordings_have_links() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     let [home, _] = cup.names(&game).await;

@@ -2,7 +2,7 @@
 
 use crate::{
     site::{ADMIN, Answer, Site, TestTeam, string},
-    tournament::cup::Cup,
+    tournament::cup::TestTournament,
     users::organiser,
 };
 use serde_json::{Value, json};
@@ -129,7 +129,7 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
 
 #[tokio::test]
 async fn growing_lists_are_paginated() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
     let site = &cup.site;
     cup.start_round().await;
     for title in ["one", "two"] {

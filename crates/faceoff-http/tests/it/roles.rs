@@ -2,7 +2,7 @@
 
 use crate::{
     site::{ADMIN, Answer, GZIP, Site, TestTeam, string},
-    tournament::fake_slot::{self, GameOutcome},
+    tournament::fake_worker::{self, GameOutcome},
 };
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -240,7 +240,7 @@ fn harmless_body(route: &str) -> Value {
 async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     let baseline_team = site.team("Organisers").await;
     let baseline = site.valid_submission(&baseline_team, "baseline").await;
-    let cup = json!({ "name": "Cup", "teams": ["Alpha"] });
+    let cup = json!({ "name": "TestTournament", "teams": ["Alpha"] });
     let opened = site.post("/api/v1/tournaments", Some(ADMIN), &cup).await;
     let path = opened.header("location").to_owned();
     let baseline = json!({ "baseline": baseline.rsplit('/').next().unwrap() });
@@ -249,7 +249,7 @@ async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
         .post(&format!("{path}/test-games"), Some(&team.token), &json!({}))
         .await
         .json(201);
-    let played = fake_slot::play_next(site, |_, _| GameOutcome::goals(1, 0)).await;
+    let played = fake_worker::play_next(site, |_, _| GameOutcome::goals(1, 0)).await;
     assert!(played.is_some());
     let id = path.rsplit('/').next().unwrap().to_owned();
     [id, string(&created["queued"][0]["id"])]

@@ -138,7 +138,11 @@ async fn season_with_a_blind_stage_cannot_be_closed() {
     let close = json!({ "confirm": "Test season" });
     site.post("/api/v1/season/close", Some(ADMIN), &close)
         .await
-        .problem(409, "conflict", &["Qualifying", "blind", "open it first"]);
+        .problem(
+            409,
+            "conflict",
+            &["Qualifying", "blind", "set `blind` to false first"],
+        );
     site.change_stage(&stage, json!({ "blind": false }))
         .await
         .json(200);

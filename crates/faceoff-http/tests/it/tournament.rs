@@ -5,7 +5,7 @@ mod archive;
 pub mod cup;
 mod decisions;
 mod downloads;
-pub mod fake_slot;
+pub mod fake_worker;
 mod formats;
 mod game_page;
 mod invalid_input;

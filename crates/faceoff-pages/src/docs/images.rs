@@ -6,9 +6,9 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_service::{
-    conditions::{Conditions, ETag},
     extract::PathParam,
     problem::{Problem, ProblemKind},
+    request_preconditions::{ETag, RequestPreconditions},
 };
 
 /// The address of a picture is stable while its content changes between versions, so browsers may cache it for an hour only.
@@ -78,7 +78,7 @@ pub(super) fn path(name: &str) -> Option<String> {
 
 pub(super) async fn image(
     PathParam(name): PathParam<String>,
-    conditions: Conditions,
+    conditions: RequestPreconditions,
 ) -> Result<Response, Problem> {
     let Some(image) = IMAGES.iter().find(|image| image.name == name) else {
         let detail = format!("the documentation has no picture {name}");

@@ -17,7 +17,7 @@ use faceoff_service::{
     app::App,
     extract::QueryParams,
     problem::Problem,
-    views::{capacity, day, health, queue, season::SeasonHead, stage},
+    views::{capacity, day, health, queue, season::SeasonSummary, stage},
 };
 use faceoff_store::StagePhase;
 use faceoff_types::{EvaluationId, StageDay, StageId, StageName, TeamId, TeamName};
@@ -194,7 +194,7 @@ pub(super) async fn page(
     dates.sort_unstable_by(|a, b| b.cmp(a));
     let is_open = stage.phase(now) == StagePhase::Open;
     let today_has_cutoff = dates.contains(&today.date);
-    let season = SeasonHead::load(&app).await?;
+    let season = SeasonSummary::load(&app).await?;
     let stages = store.stages().await?;
     let notice = DoneQuery { done: query.done };
     let page = Page {

@@ -57,7 +57,7 @@ impl From<StoreError> for Problem {
                     at.strftime("%Y-%m-%d at %H:%M UTC")
                 ),
             ),
-            StoreError::Retired { at } => Self::new(
+            StoreError::TeamRetired { at } => Self::new(
                 ProblemKind::Retired,
                 format!(
                     "the team retired on {} and can neither upload nor be evaluated; POST /api/v1/teams/ID/return undoes \

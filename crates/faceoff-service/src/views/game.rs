@@ -32,7 +32,7 @@ pub async fn find_visible(
         Err(StoreError::NotFound(_)) => return Err(not_found()),
         result => result?,
     };
-    let state = TournamentState::unscored(app, game.tournament).await?;
+    let state = TournamentState::without_standings(app, game.tournament).await?;
     if state.visibility(viewer).is_visible(&game) {
         Ok((state, game))
     } else {
@@ -71,7 +71,7 @@ pub async fn test_and_friendly_games(
     viewer: Viewer,
     id: TournamentId,
 ) -> Result<Vec<GameView>, Problem> {
-    let state = TournamentState::unscored(app, id).await?;
+    let state = TournamentState::without_standings(app, id).await?;
     let team = match viewer {
         Viewer::Team(team) => Some(team),
         Viewer::Organiser | Viewer::Visitor => None,

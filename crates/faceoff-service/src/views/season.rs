@@ -66,7 +66,7 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
 }
 
 /// The season's data in page headers. Loading it is one database read, however many days the season has.
-pub struct SeasonHead {
+pub struct SeasonSummary {
     pub name: String,
     /// Hash of the season secret, in hexadecimal digits.
     pub commitment: String,
@@ -74,7 +74,7 @@ pub struct SeasonHead {
     pub paused: Option<RulingView>,
 }
 
-impl SeasonHead {
+impl SeasonSummary {
     /// The current data.
     #[boxed]
     pub async fn load(app: &AppState) -> Result<Self, Problem> {

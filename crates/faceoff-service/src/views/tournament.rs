@@ -83,7 +83,7 @@ pub async fn entered_tournaments(
 ) -> Result<Vec<(TournamentId, StageName)>, Problem> {
     let mut entered = Vec::new();
     for tournament in app.store.tournaments().await? {
-        let state = TournamentState::unscored(app, tournament.id).await?;
+        let state = TournamentState::without_standings(app, tournament.id).await?;
         if state.entrants.iter().any(|entrant| entrant.team == team) {
             entered.push((tournament.id, tournament.name));
         }

@@ -31,9 +31,9 @@ pub struct TournamentState {
     /// Teams that left, and from which round on.
     pub departures: Departures,
     names: BTreeMap<TeamId, TeamName>,
-    /// The started rounds with their draw; empty in an unscored state.
+    /// The started rounds with their draw; empty in a state without standings.
     drawn: Vec<Round>,
-    /// The results of all rounds; empty in an unscored state.
+    /// The results of all rounds; empty in a state without standings.
     played: Vec<PlayedGame>,
 }
 
@@ -41,7 +41,7 @@ impl TournamentState {
     /// The state with draws and results.
     #[boxed]
     pub async fn find(app: &AppState, id: TournamentId) -> Result<Self, Problem> {
-        let mut state = Self::unscored(app, id).await?;
+        let mut state = Self::without_standings(app, id).await?;
         state.drawn = state.drawn_rounds()?;
         state.played = state.results(&state.games)?;
         Ok(state)
@@ -49,7 +49,7 @@ impl TournamentState {
 
     /// The state without draws and results: enough for single games, but not for tables.
     #[boxed]
-    pub async fn unscored(app: &AppState, id: TournamentId) -> Result<Self, Problem> {
+    pub async fn without_standings(app: &AppState, id: TournamentId) -> Result<Self, Problem> {
         let TournamentRecord {
             tournament,
             entrants,

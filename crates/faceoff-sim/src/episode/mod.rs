@@ -110,8 +110,11 @@ impl Episode {
     pub(crate) fn command(&mut self, action: &[f64]) {
         self.channel.command(&mut self.world, Command::Act(action));
         if let Some(opponent) = &mut self.opponent {
-            self.world
-                .command(1, Interpolation::LinearBoth, &opponent.action());
+            self.world.command(
+                1,
+                Interpolation::LinearPositionAndVelocity,
+                &opponent.action(),
+            );
         }
     }
 

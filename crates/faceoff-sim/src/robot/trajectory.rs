@@ -106,7 +106,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
                 (6.0 * dp - 3.0 * dv + 0.5 * da) / (T * T * T * T * T),
             ]
         }),
-        Interpolation::LinearBoth => std::array::from_fn(|k| {
+        Interpolation::LinearPositionAndVelocity => std::array::from_fn(|k| {
             let share = (k + 1) as f64 / SUBSTEPS as f64;
             let between = |from: f64, to: f64| from + (to - from) * share;
             Setpoint {

@@ -87,7 +87,8 @@ impl Store {
     }
 
     /// Deletes the bundles of submissions that did not pass their validation run: at once if they are invalid, and
-    /// [`UNCHECKED_KEPT_FOR`] after a platform fault. The reason stays, and the log of a team's last [`REFUSED_LOGS_KEPT`].
+    /// [`UNCHECKED_KEPT_FOR`] after a platform fault. The reason stays, and the log of a team's last [`REFUSED_LOGS_KEPT`];
+    /// identical bundles share one.
     /// Returns the number of bundles. An interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
@@ -99,6 +100,7 @@ impl Store {
             self.artifacts().delete(key).await?;
             self.write(Actor::Server, now, async |tx| {
                 bundles::set_refused_removed(tx, *id, now).await?;
+                submissions::share_log(tx, *id).await?;
                 submissions::forget_old_logs(tx, *id, REFUSED_LOGS_KEPT).await
             })
             .await?;

@@ -28,7 +28,7 @@ impl Store {
         accept: Box<dyn FnOnce() -> bool + Send>,
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
-            queue::shift(tx, by).await?;
+            queue::shift_due_times(tx, by).await?;
             deliveries::shift(tx, by).await?;
             tx.record(Subject::Season, Event::ClockStepAccepted { size });
             if !accept() {
@@ -49,7 +49,7 @@ impl Store {
         self.write(Actor::Server, now, async |tx| {
             let latest = now.saturating_add(LONGEST_DELIVERY_PAUSE);
             deliveries::shorten(tx, latest.unwrap_or(Timestamp::MAX), now).await?;
-            queue::shorten(tx, longest_s, lease_s).await
+            queue::shorten_due_times(tx, longest_s, lease_s).await
         })
         .await
     }

@@ -88,10 +88,10 @@ impl Store {
             }
             for stage in stages::all(tx).await? {
                 let obstacle = if stage.settings.blind {
-                    "is blind, and closing the season publishes the seeds that its scores follow from: open it first"
+                    "is blind (only organisers see its scores), and closing the season publishes the seeds that they follow from: set `blind` to false first"
                 } else if is_final_day_pending(tx, &stage).await? {
                     "is decided by a final day that has not been evaluated, and a closed season has no evaluations: start \
-                     it first, or change the stage's standings while it is open"
+                     it first, or let other results count (the stage's `standings`) while it is open"
                 } else {
                     continue;
                 };

@@ -57,7 +57,7 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
     }
     if stage.settings.blind {
         return StoreError::conflict(format!(
-            "the stage {:?} is blind, so no team could check its results: open it first",
+            "the stage {:?} is blind, so no team could check its results: set `blind` to false first",
             stage.name.as_str()
         ));
     }

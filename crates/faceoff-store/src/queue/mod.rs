@@ -1,6 +1,7 @@
 //! The job queue. A worker claims a job and gets a lease of some seconds, which it renews until the job is released or
-//! done. The purpose of a job is in the tables that refer to it. To the queue, its kind and the owner of
-//! its account are opaque labels.
+//! done. The purpose of a job is in the tables that refer to it. To the queue, its kind and its owner are
+//! opaque labels. Slot time is shared fairly: first among lanes, which are classes of urgency, then among the accounts of a lane, one for each
+//! owner (a team) with jobs.
 
 mod due_times;
 pub(crate) mod forecast;
@@ -8,7 +9,7 @@ mod jobs;
 mod lease;
 mod shares;
 
-pub(crate) use due_times::{shift, shorten};
+pub(crate) use due_times::{shift_due_times, shorten_due_times};
 pub(crate) use jobs::{
     LeasedJob, NewJob, QueueGauges, claim_next, drop_jobs, end_leases, gauges, insert, requeue,
     resume,

@@ -251,15 +251,40 @@ pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Subm
     .collect()
 }
 
-/// The tail of the agent's standard error in the validation run; `None` before its end, and after a platform fault.
+/// The agent's standard error in the validation run; `None` before its end, and after a platform fault. Invalid submissions of
+/// identical bundles share the newest log.
 pub(crate) async fn log(
     connection: &mut SqliteConnection,
     id: SubmissionId,
 ) -> Result<Option<String>> {
-    sqlx::query_scalar!("SELECT log FROM submissions WHERE id = ?", id)
-        .fetch_optional(connection)
-        .await?
-        .ok_or(StoreError::NotFound("submission"))
+    sqlx::query_scalar!(
+        r#"SELECT CASE WHEN s.state = 'invalid' AND s.log = ''
+                  THEN COALESCE((SELECT o.log FROM submissions o
+                                 WHERE o.team_id = s.team_id AND o.bundle_blake3 = s.bundle_blake3
+                                   AND o.state = 'invalid' AND o.log <> ''
+                                 ORDER BY o.created_at DESC, o.id DESC LIMIT 1), '')
+                  ELSE s.log END AS "log: String"
+           FROM submissions s WHERE s.id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StoreError::NotFound("submission"))
+}
+
+/// Empties the logs of the team's other invalid submissions of an identical bundle: [`log`] finds this submission's.
+pub(crate) async fn share_log(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
+    sqlx::query!(
+        "UPDATE submissions SET log = ''
+         WHERE id <> ?1 AND state = 'invalid' AND log <> ''
+           AND team_id = (SELECT team_id FROM submissions WHERE id = ?1)
+           AND bundle_blake3 = (SELECT bundle_blake3 FROM submissions WHERE id = ?1)
+           AND EXISTS (SELECT 1 FROM submissions WHERE id = ?1 AND log <> '')",
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
 }
 
 /// Empties the logs of this submission's team's invalid submissions, except the newest `kept`.

@@ -248,7 +248,7 @@ pub(crate) async fn check_may_compete(connection: &mut SqliteConnection, id: Tea
         return Err(StoreError::Disqualified { at, reason });
     }
     if let Some(at) = team.retired_at {
-        return Err(StoreError::Retired { at });
+        return Err(StoreError::TeamRetired { at });
     }
     match terms::newest(connection).await? {
         Some(version) if users::lacks_accepted_terms(connection, id, version).await? => {

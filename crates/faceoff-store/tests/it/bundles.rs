@@ -7,6 +7,16 @@ use jiff::{SignedDuration, Timestamp};
 
 /// Stores a bundle under a key with this name, and submits it with this size.
 async fn upload_stored(f: &TestStore, team: &Team, name: &str, bytes: u64) -> Submission {
+    upload_with_content(f, team, name, bytes, name).await
+}
+
+async fn upload_with_content(
+    f: &TestStore,
+    team: &Team,
+    name: &str,
+    bytes: u64,
+    content: &str,
+) -> Submission {
     let key = format!("bundles/{}/{name}", team.id);
     let file = f.folder.path().join("upload");
     std::fs::write(&file, "an archive").unwrap();
@@ -14,6 +24,7 @@ async fn upload_stored(f: &TestStore, team: &Team, name: &str, bytes: u64) -> Su
     let bundle = BundleRef {
         key,
         bytes,
+        blake3: blake3::hash(content.as_bytes()).to_string(),
         ..bundle()
     };
     let quota = UploadQuota::default();
@@ -33,13 +44,17 @@ async fn is_kept(f: &TestStore, submission: &Submission) -> bool {
 
 /// Commits the next validation run with the result that the agent is invalid.
 async fn commit_invalid(f: &TestStore) {
+    commit_invalid_with_log(f, "its log\n").await;
+}
+
+async fn commit_invalid_with_log(f: &TestStore, log: &str) {
     let (claim, _) = f.claim_validation().await;
     let outcome = ValidationOutcome::Invalid {
         runtime: None,
         agent_name: None,
         reason: "there is no agent.toml".into(),
         timing: Vec::new(),
-        log: "its log\n".into(),
+        log: log.into(),
     };
     f.store
         .commit_validation(&claim, outcome, f.now)
@@ -84,6 +99,38 @@ async fn invalid_bundle_is_deleted_but_reason_and_log_stay() {
     assert_eq!(log.as_deref(), Some("its log\n"));
     let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!((usage.day_bytes, usage.stored_bytes), (1110, 110));
+}
+
+#[tokio::test]
+async fn identical_invalid_bundles_share_the_newest_log() {
+    let mut f = TestStore::new().await;
+    let [alpha, beta] = [f.create_team("Alpha").await, f.create_team("Beta").await];
+    let mut uploaded = Vec::new();
+    for (team, name, content, log) in [
+        (&alpha, "first", "same", "log of the first\n"),
+        (&beta, "other", "same", "log of Beta\n"),
+        (&alpha, "different", "different", "log of another\n"),
+        (&alpha, "second", "same", "log of the second\n"),
+        // A run that wrote nothing has no log to share.
+        (&alpha, "third", "same", ""),
+    ] {
+        f.advance_clock_s(1);
+        uploaded.push(upload_with_content(&f, team, name, 10, content).await.id);
+        commit_invalid_with_log(&f, log).await;
+    }
+    f.store.remove_refused_bundles(f.now).await.unwrap();
+    let shared = "log of the second\n";
+    for (id, expected) in
+        uploaded
+            .iter()
+            .zip([shared, "log of Beta\n", "log of another\n", shared, shared])
+    {
+        let log = f.store.submission_log(*id).await.unwrap();
+        assert_eq!(log.as_deref(), Some(expected));
+    }
+    let stored = sqlx::query_scalar("SELECT COUNT(*) FROM submissions WHERE log <> ''");
+    let stored: i64 = stored.fetch_one(&mut f.connection().await).await.unwrap();
+    assert_eq!(stored, 3);
 }
 
 #[tokio::test]

@@ -82,11 +82,14 @@ async fn blind_stage_is_opened_once() {
     f.run_all_with_score(10.0).await;
     assert_conflict(
         f.store.close_season(Actor::Organiser, f.now).await,
-        &["Warm-up", "blind", "open it first"],
+        &["Warm-up", "blind", "set `blind` to false first"],
     );
 
     f.now = time(CLOSES_AT);
-    assert_conflict(sign_off(&f, &stage).await, &["blind", "open it first"]);
+    assert_conflict(
+        sign_off(&f, &stage).await,
+        &["blind", "set `blind` to false first"],
+    );
     let with_other_change = change_settings(&f, &stage, |settings| {
         settings.blind = false;
         settings.ablation_episodes = 5;

@@ -237,7 +237,7 @@ async fn team_can_be_renamed_described_and_retired() {
         .store
         .activate_submission(Actor::Team(id), submission.id, f.now)
         .await;
-    assert!(matches!(chosen, Err(StoreError::Retired { at }) if at == f.now));
+    assert!(matches!(chosen, Err(StoreError::TeamRetired { at }) if at == f.now));
     let repeated = f.store.retire_team(Actor::Team(id), id, f.now).await;
     assert_contains(&repeated.unwrap_err(), &["already"]);
     f.store

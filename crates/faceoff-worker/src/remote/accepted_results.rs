@@ -211,7 +211,7 @@ impl Dispatcher {
         };
         // Dropped at the end of this function.
         let _processing = self.pending_results.start_processing(nonce);
-        let acknowledgement = match self.check_once_more(message, grant, result).await {
+        let acknowledgement = match self.check_within_limit(message, grant, result).await {
             // A repeated result has no effect.
             Ok(Acceptance::Accepted | Acceptance::Unusable) if is_job_over => {
                 tracing::info!(job = %id, %worker, "the job is over already; result ignored");
@@ -271,7 +271,7 @@ impl Dispatcher {
     }
 
     /// Checks and stores a result, unless too many earlier checks of it did not end: they ended the process, or panicked.
-    async fn check_once_more(
+    async fn check_within_limit(
         &self,
         message: &jetstream::Message,
         grant: Grant,

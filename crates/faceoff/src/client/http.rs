@@ -1,7 +1,7 @@
 //! The address of a server, and the HTTP client that connects to it.
 
 use anyhow::{Context, bail};
-use faceoff_types::without_password;
+use faceoff_types::url_without_password;
 use reqwest::redirect::Policy;
 use rustls::ClientConfig;
 use std::{path::Path, time::Duration};
@@ -21,7 +21,7 @@ impl Address {
         let url = reqwest::Url::parse(server).with_context(|| {
             format!(
                 "{:?} is not an address; expected e.g. https://faceoff.example.org or http://127.0.0.1:8080",
-                without_password(server)
+                url_without_password(server)
             )
         })?;
         let tls = match url.scheme() {
@@ -29,7 +29,7 @@ impl Address {
             "http" => super::tls::plain_client_config(),
             other => bail!(
                 "{}: expected http:// or https://, got {other}://",
-                without_password(server)
+                url_without_password(server)
             ),
         };
         Ok(Self {

@@ -4,7 +4,7 @@ use super::Config;
 use crate::competition::{competition, simulator};
 use anyhow::{Context as _, anyhow, bail, ensure};
 use faceoff_sandbox::affinity;
-use faceoff_types::{IMAGE_RUNTIME, Seed, without_password};
+use faceoff_types::{IMAGE_RUNTIME, Seed, url_without_password};
 use std::collections::HashSet;
 
 /// More slots per CPU than this would make no progress.
@@ -106,7 +106,7 @@ impl Config {
             is_address,
             "server.public_url: expected an address like https://faceoff.example.org, without a password and a trailing \
             slash, got {:?}",
-            without_password(url)
+            url_without_password(url)
         );
         Ok(())
     }

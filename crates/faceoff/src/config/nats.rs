@@ -1,7 +1,7 @@
 //! `[nats]`: how server and remote workers (processes on other machines that run jobs) connect through a NATS message server.
 
 use anyhow::ensure;
-use faceoff_types::without_password;
+use faceoff_types::url_without_password;
 use faceoff_worker::NatsConfig;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -70,7 +70,7 @@ impl NatsSection {
             })
         };
         let shown = |url: &Option<String>| {
-            without_password(url.as_deref().unwrap_or_default()).into_owned()
+            url_without_password(url.as_deref().unwrap_or_default()).into_owned()
         };
         ensure!(
             has_scheme(&self.url, &["nats://", "tls://"]),

@@ -1,6 +1,6 @@
 //! Tests of tournaments in a season archive, and on a server that shows an imported one.
 
-use super::cup::{Cup, first_by_name_wins};
+use super::cup::{TestTournament, first_by_name_wins};
 use crate::{
     archive::{export, import, read_file},
     browser::Browser,
@@ -11,7 +11,7 @@ use serde_json::json;
 #[tokio::test]
 async fn archive_shows_the_tournament_unchanged() {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
-    let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({ "rules": rules })).await;
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     cup.play(first_by_name_wins).await;

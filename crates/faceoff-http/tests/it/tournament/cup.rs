@@ -1,6 +1,6 @@
 //! A site with a tournament, for tests: helpers that start rounds and run games.
 
-use super::fake_slot::{self, GameOutcome};
+use super::fake_worker::{self, GameOutcome};
 use crate::site::{ADMIN, Answer, Site, TestTeam, string};
 use faceoff_store::{Game, JobClaim};
 use faceoff_types::Seed;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// A site with a tournament, whose teams all have a valid submission.
-pub struct Cup {
+pub struct TestTournament {
     pub site: Site,
     /// The teams by name.
     pub teams: BTreeMap<String, TestTeam>,
@@ -16,7 +16,7 @@ pub struct Cup {
     pub path: String,
 }
 
-impl Cup {
+impl TestTournament {
     /// Creates teams with valid submissions, and a tournament of them. `body` has the other fields of the request.
     pub async fn open(names: &[&str], body: Value) -> Self {
         Self::open_on(Site::start().await, names, body).await
@@ -40,7 +40,7 @@ impl Cup {
             site.valid_submission(&team, &format!("{name}-agent")).await;
             teams.insert((*name).to_owned(), team);
         }
-        body["name"] = json!("Cup");
+        body["name"] = json!("TestTournament");
         if body.get("teams").is_none() {
             body["teams"] = json!(names);
         }
@@ -104,17 +104,17 @@ impl Cup {
 
     /// Claims the next game as a slot does; `None` if no game is queued.
     pub async fn claim(&self) -> Option<(JobClaim, Game, Seed)> {
-        fake_slot::claim(&self.site).await
+        fake_worker::claim(&self.site).await
     }
 
     /// The names of both teams of a game.
     pub async fn names(&self, game: &Game) -> [String; 2] {
-        fake_slot::names(&self.site, game).await
+        fake_worker::names(&self.site, game).await
     }
 
     /// Commits the result of a game with its files.
     pub async fn commit(&self, claim: &JobClaim, game: &Game, seed: Seed, outcome: GameOutcome) {
-        fake_slot::commit(&self.site, (claim, game, seed), outcome).await;
+        fake_worker::commit(&self.site, (claim, game, seed), outcome).await;
     }
 
     /// Plays the next game; `None` if no game is queued.
@@ -122,7 +122,7 @@ impl Cup {
         &self,
         outcome: impl Fn(&Game, [&str; 2]) -> GameOutcome,
     ) -> Option<Game> {
-        fake_slot::play_next(&self.site, outcome).await
+        fake_worker::play_next(&self.site, outcome).await
     }
 
     /// Plays all queued games. Returns their number.

@@ -1,8 +1,8 @@
 //! Tests of decisions during a tournament: withdrawal, disqualification, voiding, rerunning, pausing and closing.
 
 use super::{
-    cup::{Cup, first_by_name_wins, team_names},
-    fake_slot::GameOutcome,
+    cup::{TestTournament, first_by_name_wins, team_names},
+    fake_worker::GameOutcome,
 };
 use crate::{
     site::{ADMIN, string},
@@ -30,7 +30,7 @@ fn ranked_names(view: &Value) -> Vec<String> {
 async fn withdrawn_team_keeps_its_finished_rounds() {
     // As in tournaments that earlier versions opened.
     let body = json!({ "rules": { "withdrawals": "at_once" } });
-    let cup = Cup::open(&["A", "B", "C"], body).await;
+    let cup = TestTournament::open(&["A", "B", "C"], body).await;
     cup.start_round().await;
     cup.play(first_by_name_wins).await;
     cup.start_round().await;
@@ -95,7 +95,7 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
 
 #[tokio::test]
 async fn withdrawn_team_plays_the_round_under_way() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
     assert_eq!(cup.view().await["rules"]["withdrawals"], "after_round");
     cup.start_round().await;
     cup.play_next(first_by_name_wins).await.unwrap();
@@ -123,7 +123,7 @@ async fn withdrawn_team_plays_the_round_under_way() {
 
 #[tokio::test]
 async fn disqualified_team_is_last_and_loses_chosen_rounds() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
     for _ in 0..2 {
         cup.start_round().await;
         cup.play(first_by_name_wins).await;
@@ -157,7 +157,7 @@ async fn disqualified_team_is_last_and_loses_chosen_rounds() {
 
 #[tokio::test]
 async fn team_is_withdrawn_by_a_member_not_by_its_token() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
     let path = format!("{}/withdrawal", cup.path);
     let body = json!({ "reason": "exams", "confirm": "A" });
     let by_token = cup.site.post(&path, Some(cup.token("A")), &body).await;
@@ -193,7 +193,7 @@ async fn team_is_withdrawn_by_a_member_not_by_its_token() {
 
 #[tokio::test]
 async fn voided_game_is_rerun_on_the_same_seed() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
     cup.commit(&claim, &game, seed, GameOutcome::goals(5, 0))
@@ -275,7 +275,7 @@ async fn voided_game_is_rerun_on_the_same_seed() {
 
 #[tokio::test]
 async fn paused_tournament_finishes_running_games_only() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
     cup.post("resume", json!({}))
@@ -313,8 +313,8 @@ async fn paused_tournament_finishes_running_games_only() {
 
 #[tokio::test]
 async fn closed_tournament_does_not_change() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
-    let close = json!({ "confirm": "Cup" });
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
+    let close = json!({ "confirm": "TestTournament" });
     cup.start_round().await;
     cup.post("close", close.clone())
         .await
@@ -352,9 +352,9 @@ async fn closed_tournament_does_not_change() {
 
 #[tokio::test]
 async fn rules_are_fixed_after_the_first_round_starts() {
-    let cup = Cup::open(&["A", "B"], json!({ "rules": { "steps": 1500 } })).await;
+    let cup = TestTournament::open(&["A", "B"], json!({ "rules": { "steps": 1500 } })).await;
     let changed = cup
-        .change(json!({ "name": "Grand Cup", "rules": { "mirrored": true }, "settings": { "free_games_per_day": 1 } }))
+        .change(json!({ "name": "Grand TestTournament", "rules": { "mirrored": true }, "settings": { "free_games_per_day": 1 } }))
         .await
         .json(200);
     assert_eq!(
@@ -363,7 +363,7 @@ async fn rules_are_fixed_after_the_first_round_starts() {
             &changed["rules"]["steps"],
             &changed["rules"]["mirrored"]
         ),
-        (&json!("Grand Cup"), &json!(1500), &json!(true)),
+        (&json!("Grand TestTournament"), &json!(1500), &json!(true)),
         "omitted settings do not change"
     );
     assert_eq!(
@@ -384,7 +384,7 @@ async fn rules_are_fixed_after_the_first_round_starts() {
 
 #[tokio::test]
 async fn null_restores_the_default_of_each_rule() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     let default_rules = cup.view().await["rules"].clone();
     let own = json!({
         "format": { "kind": "swiss", "rounds": 3 }, "steps": 1500, "profile": "ideal", "mirrored": true,
@@ -403,7 +403,7 @@ async fn null_restores_the_default_of_each_rule() {
 
 #[tokio::test]
 async fn tournament_keeps_its_ruleset_until_its_rules_change() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     let store = &cup.site.store;
     let opened = store.tournaments().await.unwrap().remove(0);
     // The change stores the tournament as a server with the previous ruleset would have stored it.

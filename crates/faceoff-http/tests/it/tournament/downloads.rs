@@ -1,11 +1,11 @@
 //! Tests of access to the files of games: recordings and logs.
 
-use super::cup::{Cup, first_by_name_wins};
+use super::cup::{TestTournament, first_by_name_wins};
 use crate::site::{ADMIN, string};
 use serde_json::{Value, json};
 
 /// The status of a request for each file: the recording of both sides, of each side, and the first side's log.
-async fn file_statuses(cup: &Cup, game: &str, token: Option<&str>) -> [u16; 4] {
+async fn file_statuses(cup: &TestTournament, game: &str, token: Option<&str>) -> [u16; 4] {
     let mut statuses = Vec::new();
     for file in ["recording", "sides/1", "sides/2", "sides/1/log"] {
         let answer = cup
@@ -18,7 +18,7 @@ async fn file_statuses(cup: &Cup, game: &str, token: Option<&str>) -> [u16; 4] {
 }
 
 /// The game's seed, as the caller sees it; null if it is hidden.
-async fn visible_seed(cup: &Cup, game: &str, token: Option<&str>) -> Value {
+async fn visible_seed(cup: &TestTournament, game: &str, token: Option<&str>) -> Value {
     let view = cup
         .site
         .get(&format!("/api/v1/games/{game}"), token)
@@ -34,7 +34,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
         ("at_close", false, true),
         ("never", false, false),
     ] {
-        let cup = Cup::start_round_robin(publishes).await;
+        let cup = TestTournament::start_round_robin(publishes).await;
         let waiting = string(&cup.games().await[0]["id"]);
         assert_eq!(
             file_statuses(&cup, &waiting, Some(ADMIN)).await,
@@ -81,7 +81,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
             public_statuses(is_public_after_round),
             "{publishes}, over"
         );
-        cup.post("close", json!({ "confirm": "Cup" }))
+        cup.post("close", json!({ "confirm": "TestTournament" }))
             .await
             .json(200);
         assert_eq!(
@@ -121,7 +121,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
 
 #[tokio::test]
 async fn downloaded_files_match_the_hashes_in_the_game() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     let [home, away] = cup.names(&game).await;

@@ -2,8 +2,8 @@
 //! (each round pairs neighbours of the standings), and mirrored pairs (two games with the same seed and swapped sides).
 
 use super::{
-    cup::{Cup, first_by_name_wins, team_names},
-    fake_slot::GameOutcome,
+    cup::{TestTournament, first_by_name_wins, team_names},
+    fake_worker::GameOutcome,
 };
 use crate::site::{ADMIN, Site, result, string};
 use serde_json::{Value, json};
@@ -23,7 +23,7 @@ fn with_swapped_sides(pairs: &BTreeSet<(String, String)>) -> BTreeSet<(String, S
 #[tokio::test]
 async fn double_round_robin_has_byes_and_swaps_sides() {
     let names = ["A", "B", "C", "D", "E"];
-    let cup = Cup::open(&names, json!({})).await;
+    let cup = TestTournament::open(&names, json!({})).await;
     for round in 1..=2 {
         let started = cup.start_round().await;
         let byes = started["byes"].as_array().unwrap();
@@ -70,7 +70,7 @@ async fn double_round_robin_has_byes_and_swaps_sides() {
 
 #[tokio::test]
 async fn game_shows_its_seed_label_but_not_the_seed() {
-    let cup = Cup::open(&["A", "B", "C", "D"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C", "D"], json!({})).await;
     cup.start_round().await;
     let games = cup.games().await;
     let labels: Vec<String> = games
@@ -94,7 +94,7 @@ async fn game_shows_its_seed_label_but_not_the_seed() {
 async fn groups_send_their_best_to_a_final() {
     let names = ["A", "B", "C", "D", "E", "F"];
     let format = json!({ "kind": "groups", "groups": 2, "advance": 1 });
-    let cup = Cup::open(&names, json!({ "rules": { "format": format } })).await;
+    let cup = TestTournament::open(&names, json!({ "rules": { "format": format } })).await;
     let started = cup.start_round().await;
     let groups = started["groups"].as_array().unwrap().clone();
     assert_eq!(
@@ -142,7 +142,7 @@ async fn groups_send_their_best_to_a_final() {
 async fn swiss_pairs_neighbours_and_gives_points_for_a_bye() {
     let names = ["A", "B", "C", "D", "E"];
     let format = json!({ "kind": "swiss", "rounds": 3 });
-    let cup = Cup::open(&names, json!({ "rules": { "format": format } })).await;
+    let cup = TestTournament::open(&names, json!({ "rules": { "format": format } })).await;
     let mut meetings = BTreeMap::<BTreeSet<String>, u32>::new();
     for _ in 0..3 {
         let started = cup.start_round().await;
@@ -178,7 +178,7 @@ async fn swiss_pairs_neighbours_and_gives_points_for_a_bye() {
 #[tokio::test]
 async fn mirrored_meeting_is_two_games_with_the_same_seed() {
     let rules = json!({ "mirrored": true, "format": { "kind": "round_robin", "rounds": 1 } });
-    let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({ "rules": rules })).await;
     cup.start_round().await;
     let first_game = cup.play_next(first_by_name_wins).await.unwrap();
     assert_eq!(cup.play(first_by_name_wins).await, 5);
@@ -249,7 +249,7 @@ async fn default_entrants_are_ranked_and_deployable_or_improvable() {
 
 #[tokio::test]
 async fn team_without_valid_submission_blocks_the_round() {
-    let mut cup = Cup::open(&["A", "B"], json!({})).await;
+    let mut cup = TestTournament::open(&["A", "B"], json!({})).await;
     let late = cup.site.team("Late").await;
     cup.teams.insert("Late".to_owned(), late);
     cup.post("entrants", json!({ "teams": ["late"] }))
@@ -270,7 +270,7 @@ async fn team_without_valid_submission_blocks_the_round() {
 
 #[tokio::test]
 async fn concurrent_round_starts_create_one_round() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
     let (first, second) =
         tokio::join!(cup.post("rounds", json!({})), cup.post("rounds", json!({})));
     let mut statuses = [first.status.as_u16(), second.status.as_u16()];

@@ -1,6 +1,6 @@
 //! Tests of a game's page, and of the game's clips, which are the data of its replay in parts of 500 control steps.
 
-use super::cup::{Cup, first_by_name_wins};
+use super::cup::{TestTournament, first_by_name_wins};
 use crate::{
     html::{rows, texts},
     site::string,
@@ -54,14 +54,14 @@ fn record_game_clips() -> Vec<u8> {
 }
 
 /// A tournament in which one game is played and others are queued. `publishes` says when recordings become public.
-async fn play_one_game(publishes: &str) -> (Cup, Game) {
-    let cup = Cup::start_round_robin(publishes).await;
+async fn play_one_game(publishes: &str) -> (TestTournament, Game) {
+    let cup = TestTournament::start_round_robin(publishes).await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     (cup, game)
 }
 
 /// Stores a clip file beside the recording of a game.
-async fn add_clips(cup: &Cup, game: &Game) {
+async fn add_clips(cup: &TestTournament, game: &Game) {
     let stored = cup.site.store.game(game.id).await.unwrap();
     let faceoff_store::GameState::Played(result) = stored.state else {
         panic!("{stored:?}");
@@ -74,7 +74,7 @@ async fn add_clips(cup: &Cup, game: &Game) {
 }
 
 /// The page of a game, as visitors see it.
-async fn page(cup: &Cup, game: &Game) -> Html {
+async fn page(cup: &TestTournament, game: &Game) -> Html {
     let path = format!("/games/{}", game.id);
     cup.site.get(&path, None).await.html(200)
 }

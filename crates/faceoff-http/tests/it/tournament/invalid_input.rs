@@ -1,6 +1,6 @@
 //! Tests of invalid input about tournaments and games, and of the documented responses to it.
 
-use super::{cup::Cup, fake_slot::GameOutcome};
+use super::{cup::TestTournament, fake_worker::GameOutcome};
 use crate::site::{ADMIN, Answer, Site};
 use reqwest::Method;
 use serde_json::json;
@@ -16,79 +16,82 @@ async fn invalid_tournament_is_refused_with_the_reason() {
         (json!({}), &["name"][..]),
         (json!({ "name": "" }), &["name"]),
         (
-            json!({ "name": "Cup", "teams": ["A", "a"] }),
+            json!({ "name": "TestTournament", "teams": ["A", "a"] }),
             &["teams", "twice"],
         ),
         (
-            json!({ "name": "Cup", "teams": ["Unknown"] }),
+            json!({ "name": "TestTournament", "teams": ["Unknown"] }),
             &["teams", "no team", "Unknown"],
         ),
         (
-            json!({ "name": "Cup", "stage": "Final" }),
+            json!({ "name": "TestTournament", "stage": "Final" }),
             &["stage", "Qualifying", "Final"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "steps": 0 } }),
+            json!({ "name": "TestTournament", "rules": { "steps": 0 } }),
             &["rules", "steps", "got 0"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "step": 1 } }),
+            json!({ "name": "TestTournament", "rules": { "step": 1 } }),
             &["rules", "step"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "profile": "easy" } }),
+            json!({ "name": "TestTournament", "rules": { "profile": "easy" } }),
             &["rules", "profile", "easy", "expected ideal"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "ruleset": "airhockey-2023.1" } }),
+            json!({ "name": "TestTournament", "rules": { "ruleset": "airhockey-2023.1" } }),
             &["ruleset", "leave it out"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "format": { "kind": "knockout" } } }),
+            json!({ "name": "TestTournament", "rules": { "format": { "kind": "knockout" } } }),
             &["rules", "knockout"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "format": { "kind": "groups", "groups": 0, "advance": 1 } } }),
+            json!({ "name": "TestTournament", "rules": { "format": { "kind": "groups", "groups": 0, "advance": 1 } } }),
             &["format.groups"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "format": { "kind": "swiss", "rounds": 101 } } }),
+            json!({ "name": "TestTournament", "rules": { "format": { "kind": "swiss", "rounds": 101 } } }),
             &["1 to 100"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "runtimes": ["fortran"] } }),
+            json!({ "name": "TestTournament", "rules": { "runtimes": ["fortran"] } }),
             &["runtimes", "native, python3"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "limits": { "pids": 1 } } }),
+            json!({ "name": "TestTournament", "rules": { "limits": { "pids": 1 } } }),
             &["limits.pids"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "game_limits": { "in_time_s": 0 } } }),
+            json!({ "name": "TestTournament", "rules": { "game_limits": { "in_time_s": 0 } } }),
             &["game_limits.in_time_s"],
         ),
         (
-            json!({ "name": "Cup", "rules": { "perturbations": { "model_mismatch": { "static_error_m": [0.9, 1] } } } }),
+            json!({ "name": "TestTournament", "rules": { "perturbations": { "model_mismatch": { "static_error_m": [0.9, 1] } } } }),
             &["model_mismatch"],
         ),
         (
-            json!({ "name": "Cup", "settings": { "free_games_per_day": 1001 } }),
+            json!({ "name": "TestTournament", "settings": { "free_games_per_day": 1001 } }),
             &["settings", "expected 0 to 1000"],
         ),
         (
-            json!({ "name": "Cup", "settings": { "publishes": "soon" } }),
+            json!({ "name": "TestTournament", "settings": { "publishes": "soon" } }),
             &["settings", "soon"],
         ),
-        (json!({ "name": "Cup", "entrants": [] }), &["entrants"]),
+        (
+            json!({ "name": "TestTournament", "entrants": [] }),
+            &["entrants"],
+        ),
     ] {
         let answer = create(body.clone()).await;
         assert_eq!(answer.status, 422, "{body}: {}", answer.body);
         answer.problem(422, "invalid-content", words);
     }
-    create(json!({ "name": "Cup", "stage": UNKNOWN_ID }))
+    create(json!({ "name": "TestTournament", "stage": UNKNOWN_ID }))
         .await
         .problem(404, "not-found", &["stage"]);
-    create(json!({ "name": "Cup", "teams": ["A"] }))
+    create(json!({ "name": "TestTournament", "teams": ["A"] }))
         .await
         .json(201);
     create(json!({ "name": "cup", "teams": [] })).await.problem(
@@ -102,7 +105,7 @@ async fn invalid_tournament_is_refused_with_the_reason() {
 
 #[tokio::test]
 async fn impossible_round_is_refused_with_the_reason() {
-    let cup = Cup::open(&["A"], json!({})).await;
+    let cup = TestTournament::open(&["A"], json!({})).await;
     let start = async || cup.post("rounds", json!({})).await;
     start()
         .await
@@ -164,7 +167,7 @@ async fn impossible_round_is_refused_with_the_reason() {
 
 #[tokio::test]
 async fn unknown_tournaments_and_games_are_not_found() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     for path in ["", "/games", "/ratings", "/head-to-head", "/certainty"] {
         for id in [UNKNOWN_ID, "17"] {
             let path = format!("/api/v1/tournaments/{id}{path}");
@@ -200,7 +203,7 @@ async fn unknown_tournaments_and_games_are_not_found() {
 
 #[tokio::test]
 async fn forfeit_counts_ten_to_zero() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     cup.start_round().await;
     let outcome = GameOutcome {
         goals: [2, 4],

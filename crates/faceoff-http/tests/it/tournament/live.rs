@@ -1,7 +1,7 @@
 //! Tests of live streams of games over real connections. The test acts as the slot that runs the game: it reports goals and
 //! positions.
 
-use super::{cup::Cup, fake_slot::GameOutcome};
+use super::{cup::TestTournament, fake_worker::GameOutcome};
 use crate::{
     site::{ADMIN, Answer, Site, string},
     sse::{Event, Stream},
@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 const GAME_STEPS: u32 = 45_000;
 
 /// Opens the stream of a game; `last_event_id` is the last event that the client received before it reconnects.
-async fn open(cup: &Cup, game: GameId, last_event_id: Option<&str>) -> Stream {
+async fn open(cup: &TestTournament, game: GameId, last_event_id: Option<&str>) -> Stream {
     let path = format!("/api/v1/games/{game}/live");
     Stream::open(&cup.site, &path, None, last_event_id).await
 }
@@ -61,12 +61,12 @@ fn position(step: u32) -> LivePosition {
 
 /// A game that a slot has claimed, with its claim and seed.
 async fn running_game() -> (
-    Cup,
+    TestTournament,
     faceoff_store::JobClaim,
     faceoff_store::Game,
     faceoff_types::Seed,
 ) {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
     (cup, claim, game, seed)
@@ -222,7 +222,7 @@ async fn live_stream_of_a_finished_game_has_its_result() {
 
 #[tokio::test]
 async fn live_stream_of_a_private_game_ends_with_its_token() {
-    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
     let team_token = cup.token("A");
     let path = format!("{}/friendly-games", cup.path);
     let game = cup
@@ -251,7 +251,7 @@ async fn number_of_live_readers_is_limited() {
         live_readers: 1,
         ..crate::site::generous_limits()
     };
-    let cup = Cup::open_on(Site::start_with(limits).await, &["A", "B"], json!({})).await;
+    let cup = TestTournament::open_on(Site::start_with(limits).await, &["A", "B"], json!({})).await;
     cup.start_round().await;
     let game: GameId = crate::site::string(&cup.games().await[0]["id"])
         .parse()

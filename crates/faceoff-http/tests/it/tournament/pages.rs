@@ -2,8 +2,8 @@
 //! reveal none.
 
 use super::{
-    cup::{Cup, first_by_name_wins},
-    fake_slot::GameOutcome,
+    cup::{TestTournament, first_by_name_wins},
+    fake_worker::GameOutcome,
 };
 use crate::{
     browser::Browser,
@@ -21,7 +21,7 @@ fn one_round() -> Value {
 }
 
 /// The path of the tournament's page.
-fn path(cup: &Cup) -> String {
+fn path(cup: &TestTournament) -> String {
     cup.path.replace("/api/v1", "")
 }
 
@@ -107,7 +107,7 @@ async fn empty_tournament_list_is_not_linked() {
 
 #[tokio::test]
 async fn tournament_page_shows_tables_schedule_and_ratings() {
-    let cup = Cup::open(&["A", "B", "C"], one_round()).await;
+    let cup = TestTournament::open(&["A", "B", "C"], one_round()).await;
     let path = path(&cup);
     let open = page(&cup.site, &path).await;
     assert!(texts(&open, "h2").contains(&"No round has started yet".to_owned()));
@@ -197,7 +197,7 @@ fn matching_row(row: &str, rows: &[String]) -> String {
 
 #[tokio::test]
 async fn schedule_shows_voided_games_with_their_reason() {
-    let cup = Cup::open(&["A", "B", "C"], one_round()).await;
+    let cup = TestTournament::open(&["A", "B", "C"], one_round()).await;
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     let [home, away] = cup.names(&game).await;
@@ -220,7 +220,7 @@ async fn schedule_shows_voided_games_with_their_reason() {
 
 #[tokio::test]
 async fn excluded_game_names_the_team_that_left() {
-    let cup = Cup::open(&["A", "B", "C"], one_round()).await;
+    let cup = TestTournament::open(&["A", "B", "C"], one_round()).await;
     cup.start_round().await;
     let game = cup.play_next(first_by_name_wins).await.unwrap();
     let [home, _] = cup.names(&game).await;
@@ -248,7 +248,7 @@ async fn excluded_game_names_the_team_that_left() {
 
 #[tokio::test]
 async fn hidden_results_are_on_no_page_until_requested() {
-    let cup = Cup::open(&["Ant", "Bee", "Cat"], one_round()).await;
+    let cup = TestTournament::open(&["Ant", "Bee", "Cat"], one_round()).await;
     cup.start_round().await;
     cup.play(unusual_outcome).await;
     let games = cup.games().await;
@@ -287,7 +287,7 @@ async fn hidden_results_are_on_no_page_until_requested() {
 
 #[tokio::test]
 async fn spoiler_setting_is_a_form_that_redirects_back() {
-    let cup = Cup::open(&["A", "B"], one_round()).await;
+    let cup = TestTournament::open(&["A", "B"], one_round()).await;
     let path = path(&cup);
     let mut browser = Browser::new(&cup.site);
     let answer = browser
@@ -326,7 +326,7 @@ async fn spoiler_setting_is_a_form_that_redirects_back() {
 #[tokio::test]
 async fn finalists_are_hidden_like_results() {
     let rules = json!({ "format": { "kind": "groups", "groups": 2, "advance": 1 } });
-    let cup = Cup::open(&["A", "B", "C", "D"], json!({ "rules": rules })).await;
+    let cup = TestTournament::open(&["A", "B", "C", "D"], json!({ "rules": rules })).await;
     cup.start_round().await;
     cup.play(unusual_outcome).await;
     cup.start_round().await;
@@ -353,7 +353,7 @@ async fn finalists_are_hidden_like_results() {
 
 #[tokio::test]
 async fn pair_page_compares_two_teams_independent_of_sides() {
-    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
     for _ in 0..2 {
         cup.start_round().await;
         cup.play(|_, [home, _]| GameOutcome {
@@ -398,7 +398,7 @@ async fn pair_page_compares_two_teams_independent_of_sides() {
 
 #[tokio::test]
 async fn running_game_page_shows_score_and_live_stream() {
-    let cup = Cup::open(&["A", "B"], one_round()).await;
+    let cup = TestTournament::open(&["A", "B"], one_round()).await;
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
     let [home, _] = cup.names(&game).await;

@@ -2,8 +2,8 @@
 //! the paper.
 
 use super::{
-    cup::{Cup, team_names},
-    fake_slot::GameOutcome,
+    cup::{TestTournament, team_names},
+    fake_worker::GameOutcome,
 };
 use crate::site::{ADMIN, string};
 use faceoff_scoring::tournament::{PlayedGame, head_to_head, rating::rate, score_tournament};
@@ -52,7 +52,7 @@ async fn tournament_of_the_paper_has_its_standings() {
         "AJoy",
         "Air-HocKIT",
     ];
-    let mut cup = Cup::open(&teams_of_round_1, json!({})).await;
+    let mut cup = TestTournament::open(&teams_of_round_1, json!({})).await;
     let outcome = |game: &faceoff_store::Game, names: [&str; 2]| {
         let round = game.purpose.schedule_entry().unwrap().round;
         paper_outcome(&golden, round.get(), names)

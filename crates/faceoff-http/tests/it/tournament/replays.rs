@@ -1,8 +1,8 @@
 //! Tests of replays of a tournament's whole schedule with other seeds, which show how certain its champion is.
 
 use super::{
-    cup::{Cup, first_by_name_wins},
-    fake_slot::GameOutcome,
+    cup::{TestTournament, first_by_name_wins},
+    fake_worker::GameOutcome,
 };
 use crate::site::{ADMIN, Answer, string};
 use faceoff_store::GamePurpose;
@@ -10,7 +10,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 /// How often each team becomes champion in the replays.
-async fn certainty(cup: &Cup) -> Value {
+async fn certainty(cup: &TestTournament) -> Value {
     cup.site
         .get(&format!("{}/certainty", cup.path), None)
         .await
@@ -20,7 +20,7 @@ async fn certainty(cup: &Cup) -> Value {
 #[tokio::test]
 async fn repeated_schedules_give_the_champion_probabilities() {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
-    let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
+    let cup = TestTournament::open(&["A", "B", "C"], json!({ "rules": rules })).await;
     let without_replays = certainty(&cup).await;
     assert_eq!(
         (&without_replays["replays"], &without_replays["champions"]),
@@ -99,7 +99,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
 #[tokio::test]
 async fn repeated_game_is_public_and_has_no_recording() {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
-    let cup = Cup::open(&["A", "B"], json!({ "rules": rules })).await;
+    let cup = TestTournament::open(&["A", "B"], json!({ "rules": rules })).await;
     cup.start_round().await;
     let played = cup.play_next(first_by_name_wins).await.unwrap();
     cup.post("replays", json!({ "times": 1 })).await.json(201);

@@ -1,7 +1,7 @@
 //! Tests of test games (against the organisers' baseline) and friendly games (between two teams): their visibility and quotas,
 //! and when they are allowed.
 
-use super::{cup::Cup, fake_slot::GameOutcome};
+use super::{cup::TestTournament, fake_worker::GameOutcome};
 use crate::{
     site::{ADMIN, Answer, string},
     users::member,
@@ -10,8 +10,8 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 /// A tournament whose baseline, the opponent in test games, is a submission of an additional team.
-async fn cup_with_baseline(names: &[&str], settings: Value) -> Cup {
-    let mut cup = Cup::open(names, json!({ "settings": settings })).await;
+async fn cup_with_baseline(names: &[&str], settings: Value) -> TestTournament {
+    let mut cup = TestTournament::open(names, json!({ "settings": settings })).await;
     let body = json!({});
     cup.site
         .post(
@@ -36,7 +36,7 @@ async fn cup_with_baseline(names: &[&str], settings: Value) -> Cup {
 }
 
 /// A team requests a test game.
-async fn request_test_game(cup: &Cup, team: &str) -> Answer {
+async fn request_test_game(cup: &TestTournament, team: &str) -> Answer {
     let path = format!("{}/test-games", cup.path);
     cup.site
         .post(&path, Some(cup.token(team)), &json!({}))
@@ -44,13 +44,13 @@ async fn request_test_game(cup: &Cup, team: &str) -> Answer {
 }
 
 /// A team requests a friendly game.
-async fn request_friendly_game(cup: &Cup, team: &str, opponent: &str) -> Answer {
+async fn request_friendly_game(cup: &TestTournament, team: &str, opponent: &str) -> Answer {
     let path = format!("{}/friendly-games", cup.path);
     let body = json!({ "opponent": opponent });
     cup.site.post(&path, Some(cup.token(team)), &body).await
 }
 
-async fn delete(cup: &Cup, path: &str, token: &str) -> Answer {
+async fn delete(cup: &TestTournament, path: &str, token: &str) -> Answer {
     let request = cup.site.request(Method::DELETE, path, Some(token));
     Answer::read(request.send().await.unwrap()).await
 }

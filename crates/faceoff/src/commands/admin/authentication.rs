@@ -3,12 +3,18 @@
 
 use crate::{
     client::Client,
-    commands::{serve::ADMIN_TOKEN_FILE, server::Connection},
+    commands::{
+        serve::ADMIN_TOKEN_FILE,
+        server::{Connection, Source},
+    },
     config::Config,
     exit::NotSignedIn,
 };
 use anyhow::Context;
-use std::{net::IpAddr, path::Path};
+use std::{
+    net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
+    path::Path,
+};
 
 /// A client with the first token that exists of:
 ///
@@ -16,6 +22,8 @@ use std::{net::IpAddr, path::Path};
 /// 2. the host's token in the folder of `--data-dir`,
 /// 3. the token of `faceoff login` to this server,
 /// 4. the host's token in the configured data folder, if the server runs on this machine.
+///
+/// Without an option, a variable and a login, the server is the one that `faceoff.toml` in the working folder configures.
 ///
 /// The host's token is sent to another machine only if `--data-dir` names its folder.
 pub(super) fn admin_client(
@@ -26,6 +34,9 @@ pub(super) fn admin_client(
 ) -> anyhow::Result<Client> {
     let explicit_token = token.map(|token| (token, "FACEOFF_ADMIN_TOKEN"));
     let mut connection = Connection::resolve(server, explicit_token, ca_file)?;
+    if connection.server_source == Source::Default {
+        connection.server = configured_server(Config::load(None)?.server.listen);
+    }
     let has_token = token.is_some() || (data_dir.is_none() && connection.token.is_some());
     if !has_token {
         if data_dir.is_none() && !is_local(&connection.server) {
@@ -39,6 +50,17 @@ pub(super) fn admin_client(
         connection.token = Some(read_host_token(data_dir)?.trim().to_owned());
     }
     connection.client()
+}
+
+/// The address of a server on this machine that listens there. One that listens on all addresses also listens on the loopback's.
+fn configured_server(mut listen: SocketAddr) -> String {
+    if listen.ip().is_unspecified() {
+        listen.set_ip(match listen.ip() {
+            IpAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
+            IpAddr::V6(_) => Ipv6Addr::LOCALHOST.into(),
+        });
+    }
+    format!("http://{listen}")
 }
 
 /// The server is on this machine.
@@ -71,6 +93,18 @@ fn read_host_token(data_dir: Option<&Path>) -> anyhow::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn configured_server_is_reached_on_this_machine() {
+        for (listen, address) in [
+            ("127.0.0.1:8080", "http://127.0.0.1:8080"),
+            ("0.0.0.0:9000", "http://127.0.0.1:9000"),
+            ("[::]:9000", "http://[::1]:9000"),
+            ("192.0.2.7:80", "http://192.0.2.7:80"),
+        ] {
+            assert_eq!(configured_server(listen.parse().unwrap()), address);
+        }
+    }
 
     #[test]
     fn only_loopback_addresses_are_local() {

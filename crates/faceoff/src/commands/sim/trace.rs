@@ -80,7 +80,11 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
                 }
             }
             if let Some(opponent) = &mut opponent {
-                world.command(1, Interpolation::LinearBoth, &opponent.action());
+                world.command(
+                    1,
+                    Interpolation::LinearPositionAndVelocity,
+                    &opponent.action(),
+                );
             }
         }
         let force = table.force(world.puck());

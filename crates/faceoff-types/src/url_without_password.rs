@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 /// The URL without what may be a user and a password. The text may be malformed, as in the message of an error.
 #[must_use]
-pub fn without_password(url: &str) -> Cow<'_, str> {
+pub fn url_without_password(url: &str) -> Cow<'_, str> {
     let Some(at) = url.rfind('@') else {
         return url.into();
     };
@@ -27,7 +27,7 @@ mod tests {
             ("https://host/a@b", "https://…@b"),
             ("a@b://c", "…@b://c"),
         ] {
-            assert_eq!(without_password(url), expected);
+            assert_eq!(url_without_password(url), expected);
         }
     }
 }

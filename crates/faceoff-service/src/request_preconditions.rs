@@ -59,7 +59,7 @@ impl ETag {
 
 /// The conditions of a request.
 #[derive(Debug)]
-pub struct Conditions {
+pub struct RequestPreconditions {
     is_get: bool,
     headers: HeaderMap,
 }
@@ -73,7 +73,7 @@ pub enum ByteRange {
     Unsatisfiable,
 }
 
-impl<S: Sync> FromRequestParts<S> for Conditions {
+impl<S: Sync> FromRequestParts<S> for RequestPreconditions {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
@@ -90,7 +90,7 @@ impl<S: Sync> FromRequestParts<S> for Conditions {
     }
 }
 
-impl Conditions {
+impl RequestPreconditions {
     /// Whether the response has a body: it has none if the method is HEAD.
     pub const fn is_get(&self) -> bool {
         self.is_get
@@ -166,11 +166,11 @@ mod tests {
     const FILE_BYTES: u64 = 10;
     const HASH: &str = "00";
 
-    fn conditions(headers: &[(header::HeaderName, &str)]) -> Conditions {
+    fn conditions(headers: &[(header::HeaderName, &str)]) -> RequestPreconditions {
         let headers = headers
             .iter()
             .map(|(name, value)| (name.clone(), HeaderValue::from_str(value).unwrap()));
-        Conditions {
+        RequestPreconditions {
             is_get: true,
             headers: headers.collect(),
         }
