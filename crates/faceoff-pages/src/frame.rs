@@ -22,7 +22,7 @@ pub(super) struct Frame {
     /// Notice about a problem of the server.
     pub(super) notice: Option<&'static str>,
     /// Notice that the season is archived; `None` for a running season.
-    pub(super) archived: Option<String>,
+    pub(super) archived_notice: Option<String>,
     /// Path of the current page, for the navigation.
     pub(super) current: String,
     pub(super) style: &'static str,
@@ -31,8 +31,8 @@ pub(super) struct Frame {
     has_tournaments: bool,
     /// What agents do in this competition; `None` on pages that are the same for all competitions.
     pub(super) subject: Option<String>,
-    /// Address of the picture in link previews; `None` if the public address of the server is not configured.
-    pub(super) preview: Option<String>,
+    /// Address of the picture on cards that show a link; `None` if the public address of the server is not configured.
+    pub(super) card_image: Option<String>,
 }
 
 impl Frame {
@@ -50,7 +50,7 @@ impl Frame {
                 "The disk of the server is almost full: the queue is paused and uploads are refused. Nothing is lost; \
                  evaluations resume automatically when there is enough space.",
             ),
-            archived: app.store.archived_season().map(|archived| {
+            archived_notice: app.store.archived_season().map(|archived| {
                 format!(
                     "Archived season as of {}. Nothing changes any more.",
                     archived.made_at.strftime("%Y-%m-%d at %H:%M UTC")
@@ -59,7 +59,7 @@ impl Frame {
             has_tournaments: app.has_tournaments.load(Ordering::Relaxed),
             ruleset: Some(app.config.competition().ruleset()),
             subject: Some(app.config.competition().subject.clone()),
-            preview: app
+            card_image: app
                 .config
                 .public_url
                 .as_deref()
@@ -73,7 +73,7 @@ impl Frame {
         Self {
             season,
             notice: None,
-            archived: None,
+            archived_notice: None,
             ruleset: None,
             current: current.into(),
             style: assets::STYLE.url(),
@@ -81,12 +81,12 @@ impl Frame {
             icon: assets::ICON.url(),
             has_tournaments: false,
             subject: None,
-            preview: None,
+            card_image: None,
         }
     }
 
-    /// The title of link previews of pages that have no own one: the subject with a capital letter.
-    pub(super) fn preview_title(&self) -> String {
+    /// The title, on cards that show a link, of pages that have no own one: the subject with a capital letter.
+    pub(super) fn card_title(&self) -> String {
         let mut letters = self.subject.as_deref().unwrap_or("competition").chars();
         let first = letters.next().map(|first| first.to_uppercase());
         first.into_iter().flatten().chain(letters).collect()

@@ -18,7 +18,7 @@ pub(super) struct DayProgress {
     pub(super) running: Vec<ListedEvaluation>,
     pub(super) queued: Vec<ListedEvaluation>,
     /// Ended without a result.
-    pub(super) ended: Vec<ListedEvaluation>,
+    pub(super) ended_without_result: Vec<ListedEvaluation>,
     /// Expected end of the last evaluation, from recent durations; `None` if the end of one evaluation is not known.
     pub(super) expected_at: Option<Timestamp>,
 }
@@ -55,7 +55,7 @@ impl DayProgress {
             evaluations: evaluations.len(),
             running: Vec::new(),
             queued: Vec::new(),
-            ended: Vec::new(),
+            ended_without_result: Vec::new(),
             expected_at: None,
         };
         let mut is_end_known = true;
@@ -74,7 +74,7 @@ impl DayProgress {
     fn add(&mut self, evaluation: EvaluationView) {
         let is_voided = evaluation.voided.is_some();
         let (state, list) = match evaluation.status {
-            _ if is_voided => ("Voided by the organisers", &mut self.ended),
+            _ if is_voided => ("Voided by the organisers", &mut self.ended_without_result),
             EvaluationStatus::Finished { .. } => {
                 self.count(evaluation.progress);
                 return;
@@ -92,16 +92,16 @@ impl DayProgress {
             EvaluationStatus::Finalising => ("Computing the score", &mut self.running),
             EvaluationStatus::AgentFailed { .. } => (
                 "Agent failed; the team sees the reason when the day is released",
-                &mut self.ended,
+                &mut self.ended_without_result,
             ),
             EvaluationStatus::PlatformFailed { .. } => {
-                ("Stopped by a platform fault", &mut self.ended)
+                ("Stopped by a platform fault", &mut self.ended_without_result)
             }
             EvaluationStatus::NotPlayed { .. } => (
                 "Not evaluated in time: the server was at capacity",
-                &mut self.ended,
+                &mut self.ended_without_result,
             ),
-            EvaluationStatus::Cancelled { .. } => ("Cancelled by the organisers", &mut self.ended),
+            EvaluationStatus::Cancelled { .. } => ("Cancelled by the organisers", &mut self.ended_without_result),
         };
         list.push(ListedEvaluation {
             team: evaluation.team_name.to_string(),

@@ -10,7 +10,7 @@ pub(super) struct Days {
     /// The board counts the results up to this day; `None` before the first day.
     pub(super) shown: Option<Date>,
     /// Is the shown day not the latest?
-    pub(super) is_past: bool,
+    pub(super) shows_past_day: bool,
     pub(super) earlier: Option<Day>,
     pub(super) later: Option<Day>,
     /// Newest first.
@@ -38,7 +38,7 @@ impl Days {
         let earlier = days.clone().rev().find(|day| Some(*day) < shown);
         Self {
             shown,
-            is_past: shown < newest,
+            shows_past_day: shown < newest,
             earlier: earlier.map(day),
             later: days.find(|day| Some(*day) > shown).map(day),
             all: timeline.days.iter().rev().copied().map(day).collect(),
