@@ -4,6 +4,7 @@
 mod archive;
 mod conditions;
 mod files;
+mod rallies;
 mod recorded_inputs;
 mod recorder;
 mod recording;
@@ -15,6 +16,7 @@ mod verify;
 pub use archive::{GameArchives, RecordedGame, remove_game};
 pub use conditions::game_arena;
 pub use files::{GAME_FILE, GAME_FILES, side_file};
+pub use rallies::ListedRally;
 pub use recorder::GameRecorder;
 pub use recording::GameRecording;
 pub use verify::{VerifiedGame, verify_game};

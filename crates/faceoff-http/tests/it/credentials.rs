@@ -368,7 +368,11 @@ async fn page_lists_what_ended() {
     let mut browser = Browser::join(&site, "Grace", role).await;
     let path = format!("/organiser/access/people/{}/remove", ada.id);
     let page = browser.submit(&path, &[("confirm", "Ada")]).await;
-    for words in ["What this change also revoked", "ended: token robot", "User removed"] {
+    for words in [
+        "What this change also revoked",
+        "ended: token robot",
+        "User removed",
+    ] {
         assert!(
             page.body.contains(words),
             "{words:?} is not in {}",

@@ -94,14 +94,18 @@ impl DayProgress {
                 "Agent failed; the team sees the reason when the day is released",
                 &mut self.ended_without_result,
             ),
-            EvaluationStatus::PlatformFailed { .. } => {
-                ("Stopped by a platform fault", &mut self.ended_without_result)
-            }
+            EvaluationStatus::PlatformFailed { .. } => (
+                "Stopped by a platform fault",
+                &mut self.ended_without_result,
+            ),
             EvaluationStatus::NotPlayed { .. } => (
                 "Not evaluated in time: the server was at capacity",
                 &mut self.ended_without_result,
             ),
-            EvaluationStatus::Cancelled { .. } => ("Cancelled by the organisers", &mut self.ended_without_result),
+            EvaluationStatus::Cancelled { .. } => (
+                "Cancelled by the organisers",
+                &mut self.ended_without_result,
+            ),
         };
         list.push(ListedEvaluation {
             team: evaluation.team_name.to_string(),

@@ -68,6 +68,34 @@ fn game_has_results_and_a_recording_that_verifies() {
             assert!(side.get(key).is_some(), "{key}");
         }
     }
+    // The rallies, of the folder and of the archive.
+    let lists = [out.clone(), out.join("game.zip")].map(|path| {
+        let listed = faceoff(&["dataset", "list"], &[&path]);
+        assert!(listed.status.success(), "{}", text(&listed.stderr));
+        text(&listed.stdout)
+    });
+    assert_eq!(lists[0], lists[1]);
+    let last = lists[0].lines().last().unwrap();
+    assert!(
+        last.contains("20.00s") && last.contains("game_over"),
+        "{last}"
+    );
+    let json = faceoff(&["dataset", "list", "--json"], &[&out]);
+    let rallies: Vec<serde_json::Value> = text(&json.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(rallies.len(), lists[0].lines().count() - 1);
+    let steps: u64 = rallies
+        .iter()
+        .map(|rally| rally["steps"].as_u64().unwrap())
+        .sum();
+    assert_eq!(steps, 1000);
+    assert!(
+        rallies
+            .iter()
+            .all(|rally| rally["score"].as_array().unwrap().len() == 2)
+    );
     // Verifies the folder, and the archive with --json.
     for (path, json) in [(out.clone(), false), (out.join("game.zip"), true)] {
         let args: &[&str] = if json {

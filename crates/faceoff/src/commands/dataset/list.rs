@@ -1,15 +1,19 @@
-//! `faceoff dataset list`: one line per episode.
+//! `faceoff dataset list`: one line per episode, or per rally of a game.
 
 use crate::competition::competition;
 use crate::terminal;
 use clap::Args;
-use faceoff_dataset::Dataset;
+use faceoff_dataset::{
+    Dataset,
+    game::{GameRecording, ListedRally},
+};
+use faceoff_types::CONTROL_STEP_S;
 use std::{io::Write, path::PathBuf};
 
-/// Lists the episodes of a dataset.
+/// Lists the episodes of a dataset, or the rallies of a game: when and why each ended, and the score after it.
 #[derive(Debug, Args)]
 pub struct ListArgs {
-    /// dataset.zip, the folder it was unpacked to, or the folder of `faceoff eval --out`
+    /// dataset.zip or game.zip, the folder it was unpacked to, or the folder of `faceoff eval --out` or `faceoff play --out`
     dataset: PathBuf,
     /// Print one JSON object per line
     #[arg(long)]
@@ -18,6 +22,9 @@ pub struct ListArgs {
 
 impl ListArgs {
     pub fn run(self) -> anyhow::Result<()> {
+        if GameRecording::is_at(&self.dataset)? {
+            return self.list_rallies();
+        }
         let episodes = Dataset::open_lazily(&self.dataset, competition())?.episodes()?;
         let mut out = terminal::stdout();
         if !self.json {
@@ -44,6 +51,41 @@ impl ListArgs {
                     record.penalty_points,
                 )?;
             }
+        }
+        Ok(out.flush()?)
+    }
+
+    fn list_rallies(&self) -> anyhow::Result<()> {
+        let rallies = GameRecording::open(&self.dataset)?.rallies()?;
+        let mut out = terminal::stdout();
+        if !self.json {
+            writeln!(
+                out,
+                "{:>5} {:>8} {:>6} {:>6} {:<11} {:>4} {:>5}",
+                "rally", "end", "steps", "serves", "why", "by", "score"
+            )?;
+        }
+        for rally in rallies {
+            if self.json {
+                serde_json::to_writer(&mut out, &rally)?;
+                writeln!(out)?;
+                continue;
+            }
+            let ListedRally {
+                score: [first, second],
+                by,
+                ..
+            } = &rally;
+            writeln!(
+                out,
+                "{:>5} {:>7.2}s {:>6} {:>6} {:<11} {:>4} {first:>2}:{second}",
+                rally.rally,
+                (f64::from(rally.game_step) + f64::from(rally.steps)) * CONTROL_STEP_S,
+                rally.steps,
+                rally.serves,
+                rally.end,
+                by.map_or("–".to_owned(), |by| by.to_string()),
+            )?;
         }
         Ok(out.flush()?)
     }
