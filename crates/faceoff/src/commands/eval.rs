@@ -154,7 +154,13 @@ impl EvalCommand {
         )?;
         let runtime = &bundle.manifest.runtime;
         if !self.no_sandbox {
-            config.check_runtime(runtime)?;
+            local_bundle::adopt_default_runtime(&mut config);
+            if server_stage.is_none() {
+                local_bundle::check_runtime(&config, runtime)?;
+            } else {
+                // The server's stage decides which runtimes there are.
+                config.check_runtime(runtime)?;
+            }
         }
         let envs = self.environments(&config, runtime)?;
         if let Some(server_stage) = &server_stage {

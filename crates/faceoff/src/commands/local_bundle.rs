@@ -1,15 +1,20 @@
 //! Bundles that `eval` and `play` run on a developer's machine.
 
-use crate::{competition::competition, config::Config, packing::Selection};
-use anyhow::Context;
+use crate::{
+    competition::competition,
+    config::{Config, RuntimeConfig},
+    packing::Selection,
+};
+use anyhow::{Context, bail};
 use faceoff_runner::{
     AgentEnvironment,
     bundle::{self, Bundle, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Layer, Runtime, RuntimeFiles, unavailable_layers};
+use faceoff_types::IMAGE_RUNTIME;
 use std::{
     fs::{self, File},
-    path::Path,
+    path::{Path, PathBuf},
 };
 use tempfile::TempDir;
 
@@ -71,7 +76,7 @@ pub(super) fn give_up_unavailable_layers(
     let missing_protection = missing.iter().find(|layer| protection.contains(layer));
     let archive = bundles.iter().find(|bundle| !bundle.is_dir());
     if let (Some(layer), Some(archive)) = (missing_protection, archive) {
-        anyhow::bail!(
+        bail!(
             "this user cannot get the layer {layer} of the sandbox, without which an agent can read this user's files, and {} may be \
              another team's; `faceoff doctor` says how to get the layer. If you trust the agent, add --no-sandbox",
             archive.display()
@@ -86,6 +91,68 @@ pub(super) fn give_up_unavailable_layers(
             names.join(", ")
         )
     }))
+}
+
+/// The runtime that an organiser makes with `docker/runtime.sh`.
+const LEARNING_RUNTIME: &str = "python3-ml";
+
+/// Uses `python3-ml` from its default folders if it is there and not configured.
+pub(super) fn adopt_default_runtime(config: &mut Config) {
+    let has_python = |folder: &PathBuf| folder.join("bin/python3").exists();
+    if !config.runtimes.contains_key(LEARNING_RUNTIME)
+        && let Some(folder) = default_folders().into_iter().find(has_python)
+    {
+        let runtime = RuntimeConfig::Folder(folder);
+        config.runtimes.insert(LEARNING_RUNTIME.to_owned(), runtime);
+    }
+}
+
+/// Checks that this machine has a bundle's runtime.
+///
+/// # Errors
+/// If it does not; the error says how to get it.
+pub(super) fn check_runtime(config: &Config, runtime: &str) -> anyhow::Result<()> {
+    let built_in = ["native", "python3", IMAGE_RUNTIME];
+    if built_in.contains(&runtime) || config.runtimes.contains_key(runtime) {
+        return config.check_runtime(runtime);
+    }
+    let missing =
+        format!("agent.toml names the runtime {runtime:?}, which this machine does not have");
+    if runtime == LEARNING_RUNTIME {
+        let folders = default_folders();
+        let places: Vec<String> = folders
+            .iter()
+            .map(|folder| folder.display().to_string())
+            .collect();
+        bail!(
+            "{missing} in {}. Make it with Faceoff's sources: docker/runtime.sh {}",
+            places.join(" or "),
+            places[0]
+        );
+    }
+    let configured = config.runtimes.keys().map(String::as_str);
+    let offered: Vec<&str> = ["native", "python3"]
+        .into_iter()
+        .chain(configured)
+        .collect();
+    bail!(
+        "{missing}; it has {}. Name another one, or configure it in faceoff.toml: [runtimes.{runtime}]",
+        offered.join(", ")
+    );
+}
+
+/// Where `python3-ml` is looked for: in the user's data folder, then in the one of the documentation.
+fn default_folders() -> Vec<PathBuf> {
+    let data = std::env::var_os("XDG_DATA_HOME").map(PathBuf::from);
+    let data = data.filter(|folder| folder.is_absolute()).or_else(|| {
+        let home = std::env::var_os("HOME").map(PathBuf::from)?;
+        home.is_absolute().then(|| home.join(".local/share"))
+    });
+    data.map(|data| data.join("faceoff"))
+        .into_iter()
+        .chain([PathBuf::from("/srv/faceoff")])
+        .map(|folder| folder.join(LEARNING_RUNTIME))
+        .collect()
 }
 
 /// The environment of an agent: with the server's limits and isolation, or without isolation if `no_sandbox`.

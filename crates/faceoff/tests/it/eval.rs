@@ -151,6 +151,45 @@ fn silent_agent_is_stopped_after_its_first_start() {
 }
 
 #[test]
+fn missing_runtime_is_reported_once_with_its_cure() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = dir.path().join("bundle");
+    fs::create_dir(&bundle).unwrap();
+    for file in ["agent.py", "protocol.py"] {
+        fs::copy(hold().join(file), bundle.join(file)).unwrap();
+    }
+    let refused = |runtime: &str, words: &[&str]| {
+        let manifest = MANIFEST.replace("\"python3\"\n", &format!("\"{runtime}\"\n"));
+        fs::write(bundle.join("agent.toml"), manifest).unwrap();
+        let output = command(&["eval", "bundle", "--episodes", "2"])
+            .current_dir(dir.path())
+            .env("XDG_DATA_HOME", dir.path().join("share"))
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        let error = text(&output.stderr);
+        for word in words {
+            assert!(error.contains(word), "{word:?} is not in {error}");
+        }
+        assert!(!text(&output.stdout).contains("fault"));
+    };
+    let folder = dir.path().join("share/faceoff/python3-ml");
+    let command = format!("docker/runtime.sh {}", folder.display());
+    // Unless this machine has one where organisers put it.
+    if !Path::new("/srv/faceoff/python3-ml").exists() {
+        refused("python3-ml", &[&command]);
+    }
+    refused(
+        "matlab",
+        &["\"matlab\"", "native, python3", "[runtimes.matlab]"],
+    );
+    // Agents cannot see a folder below /tmp, and it is found there.
+    fs::create_dir_all(folder.join("bin")).unwrap();
+    fs::write(folder.join("bin/python3"), "").unwrap();
+    refused("python3-ml", &["runtimes.python3-ml", "outside of /tmp"]);
+}
+
+#[test]
 fn fault_with_a_result_has_traceback_and_status_1() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");

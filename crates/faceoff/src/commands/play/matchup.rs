@@ -61,6 +61,12 @@ impl Matchup {
             open(&options.bundle_a, "first")?,
             open(&options.bundle_b, "second")?,
         ];
+        if !options.no_sandbox {
+            local_bundle::adopt_default_runtime(&mut config);
+            for bundle in &bundles {
+                local_bundle::check_runtime(&config, &bundle.manifest.runtime)?;
+            }
+        }
         let envs = environments(options, &config, &bundles)?;
         let spec = GameSpec {
             ruleset: crate::competition::competition().ruleset(),
