@@ -5,7 +5,7 @@ mod table;
 
 use super::{ca_file::CaFile, output::print_json, references::find_evaluation, server::Connection};
 use crate::competition::competition;
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::Args;
 use faceoff_api::requests::ComparisonQuery;
 use faceoff_dataset::Dataset;
@@ -69,9 +69,22 @@ impl CompareCommand {
     }
 
     fn compare_files(&self) -> anyhow::Result<()> {
-        let (a, b) = (read_evaluation(&self.a)?, read_evaluation(&self.b)?);
+        let evaluations = [Evaluation::read(&self.a)?, Evaluation::read(&self.b)?];
+        let [first, second] = &evaluations;
+        let shared = first.shared_episodes(second);
+        ensure!(
+            !shared.is_empty(),
+            "the two evaluations have no task in common"
+        );
+        if evaluations
+            .iter()
+            .any(|one| one.manifest.episodes != shared)
+        {
+            eprintln!("{}", shared_note(&shared));
+        }
+        let (a, b) = (first.part(&shared)?, second.part(&shared)?);
         let comparison = comparison_input(&a).compare(&comparison_input(&b)).context(
-            "the two evaluations have different episodes; run both with the same --seed, --mismatch-seed, --profile, --task and --episodes",
+            "the two evaluations have different episodes; run both with the same --seed, --mismatch-seed and --profile",
         )?;
         let episodes = match self.episodes {
             true => Some(comparison_input(&a).solved_episodes(&comparison_input(&b))?),
@@ -131,38 +144,79 @@ impl CompareCommand {
 /// The parts of a dataset that a comparison needs.
 struct Evaluation {
     manifest: DatasetManifest,
+    outcomes: Vec<EpisodeOutcome>,
+}
+
+/// An evaluation, limited to the episodes that another one has, too.
+struct SharedPart<'a> {
+    manifest: &'a DatasetManifest,
     weights: TaskWeights,
     summary: EpisodeSummary,
 }
 
-fn read_evaluation(path: &str) -> anyhow::Result<Evaluation> {
-    let read = || -> anyhow::Result<Evaluation> {
-        let dataset = Dataset::open_lazily(Path::new(path), competition())?;
-        let episodes = dataset.episodes()?.into_iter();
-        let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
-        let tasks = competition().played_tasks(&dataset.manifest().episodes)?;
-        Ok(Evaluation {
-            weights: competition().weights(&dataset.manifest().variation),
+impl Evaluation {
+    fn read(path: &str) -> anyhow::Result<Self> {
+        let read = || -> anyhow::Result<Self> {
+            let dataset = Dataset::open_lazily(Path::new(path), competition())?;
+            let episodes = dataset.episodes()?.into_iter();
+            Ok(Self {
+                outcomes: episodes.map(|record| record.outcome).collect(),
+                manifest: dataset.manifest().clone(),
+            })
+        };
+        read().with_context(|| format!("reading the evaluation {path}"))
+    }
+
+    /// The number of episodes of each task that both have: with the same seed, the first ones of both are the same.
+    fn shared_episodes(&self, other: &Self) -> TaskMap<u32> {
+        let episodes = self.manifest.episodes.iter();
+        let shared = episodes.filter_map(|(task, count)| {
+            let other_count = other.manifest.episodes.get(task)?;
+            Some((*task, *count.min(other_count)))
+        });
+        shared.filter(|(_, count)| *count > 0).collect()
+    }
+
+    fn part(&self, episodes: &TaskMap<u32>) -> anyhow::Result<SharedPart<'_>> {
+        let is_shared = |outcome: &&EpisodeOutcome| {
+            let count = episodes.get(&outcome.task);
+            count.is_some_and(|count| outcome.episode < *count)
+        };
+        let outcomes: Vec<EpisodeOutcome> =
+            self.outcomes.iter().filter(is_shared).cloned().collect();
+        Ok(SharedPart {
+            weights: competition().weights(&self.manifest.variation),
             summary: EpisodeSummary::from_outcomes(
                 competition(),
                 &outcomes,
-                &tasks,
-                competition().tier_bounds(&dataset.manifest().variation),
+                &competition().played_tasks(episodes)?,
+                competition().tier_bounds(&self.manifest.variation),
             )?,
-            manifest: dataset.manifest().clone(),
+            manifest: &self.manifest,
         })
-    };
-    read().with_context(|| format!("reading the evaluation {path}"))
+    }
+}
+
+/// Says which episodes are compared if one evaluation has more than the other.
+fn shared_note(shared: &TaskMap<u32>) -> String {
+    let counts = shared.iter();
+    let counts: Vec<String> = counts
+        .map(|(task, count)| format!("{count} of {task}"))
+        .collect();
+    format!(
+        "note: one evaluation has more episodes than the other; compared are the first ones, which both have: {}",
+        counts.join(", ")
+    )
 }
 
 /// An evaluation with everything that has to be equal in both. `seed` draws the episodes, `mismatch_seed` the robot's deviation
 /// from its model.
-fn comparison_input(evaluation: &Evaluation) -> ComparedEvaluation<'_> {
-    let Evaluation {
+fn comparison_input<'a>(part: &'a SharedPart<'a>) -> ComparedEvaluation<'a> {
+    let SharedPart {
         manifest,
         weights,
         summary,
-    } = evaluation;
+    } = part;
     ComparedEvaluation {
         ruleset: &manifest.ruleset,
         profile: manifest.profile,

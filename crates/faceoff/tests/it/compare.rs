@@ -108,12 +108,39 @@ fn local_evaluations_with_equal_episodes_are_compared() {
         assert!(table.contains(part), "{part:?} is not in {table}");
     }
 
+    // Evaluations of different lengths are compared on the episodes that both have.
+    let one_task = ["--task", "defend", "--episodes", "6", "--seed", SEED];
+    eval(folder, "reckless", "one-task", &one_task);
+    for (other, tasks, count, note) in [
+        ("shorter", 2, 3, "3 of hit, 3 of defend"),
+        ("one-task", 1, 4, "4 of defend"),
+    ] {
+        let output = faceoff_in(folder, &["compare", "a", other, "--json", "--episodes"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(
+            text(&output.stderr).contains(note),
+            "{}",
+            text(&output.stderr)
+        );
+        let shared: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let counts = shared["tasks"].as_object().unwrap();
+        assert_eq!(counts.len(), tasks);
+        for (task, counts) in counts {
+            let groups = ["both", "only_a", "only_b", "neither"];
+            let all: u64 = groups
+                .iter()
+                .map(|group| counts[group].as_u64().unwrap())
+                .sum();
+            assert_eq!(all, count, "{task}");
+        }
+        // The same as without the other episodes.
+        if other == "one-task" {
+            assert_eq!(shared["tasks"]["defend"], view["tasks"]["defend"]);
+        }
+    }
+
     for (other, field) in [
         ("other-seed", "seed:"),
-        (
-            "shorter",
-            "episodes: the first evaluation played 4 of hit, the second 3",
-        ),
         (
             "ideal",
             "profile: the first evaluation played evaluation, the second ideal",
