@@ -81,6 +81,10 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                     "Training environments, games, evaluation and kinematics in Python."
                 ),
                 source!(
+                    "tuning",
+                    "How to find out whether a change of an agent is an improvement."
+                ),
+                source!(
                     "sandbox",
                     "Runtimes, packages, memory and time of agents on the server."
                 ),

@@ -8,6 +8,7 @@ mod logs;
 mod notes;
 mod pool;
 mod profile_run;
+mod seeds;
 mod server_stage;
 mod table;
 
@@ -26,6 +27,7 @@ use faceoff_worker::CpuLayout;
 use files::RESULTS;
 use notes::Notes;
 use profile_run::EvalSetup;
+use seeds::NamedSeed;
 use serde::Serialize;
 use server_stage::ServerStage;
 use std::{fs, path::PathBuf};
@@ -49,9 +51,15 @@ pub struct EvalCommand {
     /// them; writes ablation.json and a folder for each profile
     #[arg(long, conflicts_with = "profile")]
     ablation: bool,
-    /// A number, or 64 hexadecimal digits; the same seed gives the same episodes everywhere
-    #[arg(long, default_value = "0")]
-    seed: Seed,
+    /// A number, or 64 hexadecimal digits; the same seed gives the same episodes everywhere. Several seeds, as in 1,2,3, are
+    /// evaluated one after the other, each into a folder seed-N, and together
+    #[arg(
+        long = "seed",
+        value_name = "SEEDS",
+        default_value = "0",
+        value_delimiter = ','
+    )]
+    seeds: Vec<NamedSeed>,
     /// Seed of the season's model mismatch [default: derived from the seed]
     #[arg(long, value_name = "HEX")]
     mismatch_seed: Option<Seed>,
@@ -171,17 +179,24 @@ impl EvalCommand {
             self.notes().print(format_args!(""));
         }
 
-        let mismatch_seed = self
-            .mismatch_seed
-            .unwrap_or_else(|| self.seed.model_mismatch());
-        config
-            .check_playable(mismatch_seed)
-            .context("the configuration")?;
-        let setup = EvalSetup {
+        let seeds: Vec<(NamedSeed, Seed)> = std::mem::take(&mut self.seeds)
+            .into_iter()
+            .map(|named| {
+                let derived = named.seed.model_mismatch();
+                (named, self.mismatch_seed.unwrap_or(derived))
+            })
+            .collect();
+        for (_, mismatch_seed) in &seeds {
+            config
+                .check_playable(*mismatch_seed)
+                .context("the configuration")?;
+        }
+        let (first, mismatch_seed) = &seeds[0];
+        let mut setup = EvalSetup {
             tasks: std::mem::take(&mut self.tasks),
             episodes: self.episodes,
-            seed: self.seed,
-            mismatch_seed,
+            seed: first.seed,
+            mismatch_seed: *mismatch_seed,
             max_faults: config.evaluation.max_faults,
             variation: config.rules().variation,
             notes: self.notes(),
@@ -189,6 +204,12 @@ impl EvalCommand {
             bundle,
             envs,
         };
+        if seeds.len() > 1 {
+            ensure!(!self.ablation, "--ablation takes one seed");
+            let profile = self.profile.unwrap_or(rules.profile);
+            let faults = seeds::run_seeds(&mut setup, &seeds, profile, &self.out, self.json)?;
+            return self.check_faults(faults);
+        }
         if self.ablation {
             let faults = ablation::run(&setup, &self.out, self.json)?;
             return self.check_faults(faults);

@@ -151,6 +151,41 @@ fn silent_agent_is_stopped_after_its_first_start() {
 }
 
 #[test]
+fn several_seeds_are_evaluated_and_pooled() {
+    let dir = tempfile::tempdir().unwrap();
+    let common = ["--task", "hit,defend", "--episodes", "3"];
+    let out = dir.path().join("out");
+    let output = eval(
+        &hold(),
+        &out,
+        &[&common[..], &["--seed", "1,2", "--json"]].concat(),
+    );
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let view: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let mut successes = [0, 0];
+    for (run, seed) in view["runs"].as_array().unwrap().iter().zip(["1", "2"]) {
+        assert_eq!(run["seed"], seed);
+        // The same as with this seed alone.
+        let alone = dir.path().join(format!("alone-{seed}"));
+        let output = eval(&hold(), &alone, &[&common[..], &["--seed", seed]].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert_eq!(result(&out.join(format!("seed-{seed}"))), result(&alone));
+        for (task, all) in ["hit", "defend"].iter().zip(&mut successes) {
+            *all += run["result"]["tasks"][task]["successes"].as_u64().unwrap();
+        }
+    }
+    for (task, successes) in ["hit", "defend"].iter().zip(successes) {
+        let pooled = &view["together"][task];
+        assert_eq!(
+            (&pooled["episodes"], &pooled["successes"]),
+            (&6.into(), &successes.into())
+        );
+    }
+    let refused = eval(&hold(), &out, &["--seed", "1,2", "--ablation"]);
+    assert!(text(&refused.stderr).contains("--ablation takes one seed"));
+}
+
+#[test]
 fn missing_runtime_is_reported_once_with_its_cure() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
