@@ -9,7 +9,9 @@ use crate::{
     start_day,
 };
 use faceoff_tests::{
-    program, repository,
+    program,
+    relay::Relay,
+    repository,
     server::{Server, http},
 };
 use serde_json::Value;
@@ -363,6 +365,37 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     fs::write(scratch.path().join("dataset.zip.part"), "something else")
         .expect("a file can be written");
     assert_eq!(ada(&download).json()["blake3"], downloaded["blake3"]);
+}
+
+#[test]
+fn proxy_of_the_environment_is_used_for_other_machines() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    // It passes the requests on, which have the form for proxies.
+    let proxy = Relay::start();
+    let address = server.url.strip_prefix("http://").expect("it has no TLS");
+    proxy.set_target(address.parse().expect("it is an address"));
+    let health = |url: &str, proxy: &str| {
+        Command::new(program("faceoff"))
+            .args(["health", "--server", url])
+            .env("http_proxy", proxy)
+            .env("no_proxy", "")
+            .env("XDG_CONFIG_HOME", scratch.path())
+            .output()
+            .expect("the program can be started")
+    };
+    // The name is known to the proxy only.
+    let answered = health(
+        "http://faceoff.test",
+        &format!("http://{}", proxy.address()),
+    );
+    assert!(
+        answered.status.success(),
+        "{}",
+        String::from_utf8_lossy(&answered.stderr)
+    );
+    let unused = health(&server.url, "http://127.0.0.1:9");
+    assert!(unused.status.success(), "this machine needs no proxy");
 }
 
 #[test]

@@ -35,6 +35,7 @@ use faceoff_api::{
 };
 use faceoff_types::{Task, url_without_password};
 use http::Address;
+pub use http::is_this_machine;
 pub use links::LinkTarget;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -44,6 +45,7 @@ use std::{
     time::Duration,
 };
 pub use tls::{plain_client_config, tls_client_config};
+use tokio::time::Instant;
 
 /// Longest silence of the server before a request fails.
 const READ_TIMEOUT: Duration = Duration::from_secs(60);
@@ -70,6 +72,38 @@ pub fn is_refused_with(error: &anyhow::Error, status: StatusCode) -> bool {
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{0}")]
 pub struct Unreachable(pub String);
+
+/// Pause before a request is repeated.
+const RETRY_PAUSE: Duration = Duration::from_secs(2);
+
+/// Whether the same request may succeed later: the server, or a proxy before it, restarts or has too much to do.
+fn is_temporary(error: &anyhow::Error) -> bool {
+    match error.downcast_ref::<ApiError>() {
+        Some(refused) => {
+            refused.status.is_server_error() || refused.status == StatusCode::TOO_MANY_REQUESTS
+        }
+        None => error.is::<Unreachable>(),
+    }
+}
+
+/// Repeats a request that only reads while its failures are temporary, for at most `patience`.
+///
+/// # Errors
+/// The last failure.
+pub async fn retry_temporary<T>(
+    patience: Duration,
+    request: impl AsyncFn() -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    let give_up_at = Instant::now() + patience;
+    loop {
+        match request().await {
+            Err(error) if is_temporary(&error) && Instant::now() < give_up_at => {
+                tokio::time::sleep(RETRY_PAUSE).await;
+            }
+            result => return result,
+        }
+    }
+}
 
 /// A server and the token to call it with.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@ use anyhow::{Context, bail};
 use faceoff_types::url_without_password;
 use reqwest::redirect::Policy;
 use rustls::ClientConfig;
-use std::{path::Path, time::Duration};
+use std::{net::IpAddr, path::Path, time::Duration};
 
 /// A server's address and the certificate authorities that may vouch for it.
 #[derive(Debug, Clone)]
@@ -40,16 +40,26 @@ impl Address {
 
     /// An HTTP client that gives up after a silence of `read_timeout`.
     pub(super) fn http(&self, read_timeout: Duration) -> anyhow::Result<reqwest::Client> {
-        reqwest::Client::builder()
+        let url = reqwest::Url::parse(&self.base).context("the server's address")?;
+        let mut builder = reqwest::Client::builder();
+        // A proxy in the environment (`HTTPS_PROXY` and so on) is meant for other machines.
+        if url.host_str().is_some_and(is_this_machine) {
+            builder = builder.no_proxy();
+        }
+        builder
             .user_agent(concat!("faceoff/", env!("CARGO_PKG_VERSION")))
             .connect_timeout(Duration::from_secs(10))
             .read_timeout(read_timeout)
-            // The user names the server; a proxy in the environment is meant for other hosts.
-            .no_proxy()
             // A redirect would turn a POST into a GET and drop the token; the user gets an error instead.
             .redirect(Policy::none())
             .tls_backend_preconfigured(self.tls.clone())
             .build()
             .context("setting up the HTTP client")
     }
+}
+
+/// Whether a host of an address is this machine.
+pub fn is_this_machine(host: &str) -> bool {
+    let address = host.trim_matches(['[', ']']).parse::<IpAddr>();
+    host == "localhost" || address.is_ok_and(|address| address.is_loopback())
 }

@@ -331,3 +331,36 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
     assert_eq!((changed.closes_at, changed.settings.schedule), (None, None));
     assert_eq!(changed.rules, created.rules);
 }
+
+#[tokio::test(start_paused = true)]
+async fn temporary_failures_are_repeated_for_a_while() {
+    use std::sync::atomic::{AtomicU32, Ordering};
+    let refused = |status: StatusCode| ApiError {
+        status,
+        title: String::new(),
+        detail: String::new(),
+    };
+    let patience = Duration::from_mins(5);
+    let requests = AtomicU32::new(0);
+    // A restart: the server is gone, then not ready, then there.
+    let answer = retry_temporary(patience, async || {
+        match requests.fetch_add(1, Ordering::Relaxed) {
+            0 | 1 => Err(Unreachable("gone".to_owned()).into()),
+            2 => Err(refused(StatusCode::SERVICE_UNAVAILABLE).into()),
+            3 => Err(refused(StatusCode::BAD_GATEWAY).into()),
+            _ => Ok("there"),
+        }
+    });
+    assert_eq!(answer.await.unwrap(), "there");
+    assert_eq!(requests.load(Ordering::Relaxed), 5);
+    let started = Instant::now();
+    let gone = async || -> anyhow::Result<()> { Err(Unreachable("gone".to_owned()).into()) };
+    let given_up = retry_temporary(patience, gone).await.unwrap_err();
+    assert!(given_up.is::<Unreachable>() && started.elapsed() >= patience);
+    // A refusal stays one.
+    let started = Instant::now();
+    let forbidden = async || -> anyhow::Result<()> { Err(refused(StatusCode::FORBIDDEN).into()) };
+    let final_error = retry_temporary(patience, forbidden).await.unwrap_err();
+    assert!(is_refused_with(&final_error, StatusCode::FORBIDDEN));
+    assert_eq!(started.elapsed(), Duration::ZERO);
+}

@@ -7,7 +7,11 @@ use super::{
     output::{print, print_json},
     server::ServerArgs,
 };
-use crate::{client::Client, competition::competition, packing::BundleFile};
+use crate::{
+    client::{Client, retry_temporary},
+    competition::competition,
+    packing::BundleFile,
+};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::views::submission::{SubmissionStatus, SubmissionView};
@@ -17,6 +21,8 @@ use std::{path::PathBuf, time::Duration};
 
 /// Interval between requests for the result of the validation.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
+/// Time for which failing requests for the result are repeated.
+const PATIENCE: Duration = Duration::from_mins(5);
 
 /// Uploads a bundle and waits for its validation; the exit status is 0 only if it is valid. Of a folder, all files are
 /// packed except those that no agent needs (version control, caches, environments, builds, editor files; see --dry-run)
@@ -118,7 +124,15 @@ async fn wait_for_validation(
     spinner.enable_steady_tick(Duration::from_millis(100));
     while submission.status == SubmissionStatus::Validating {
         tokio::time::sleep(POLL_INTERVAL).await;
-        submission = client.submission(submission.id).await?;
+        let id = submission.id;
+        // The upload is done: a restart of the server meanwhile changes nothing.
+        submission = retry_temporary(PATIENCE, async || client.submission(id).await)
+            .await
+            .with_context(|| {
+                format!(
+                    "the bundle was uploaded; `faceoff log {id}` shows the result of its validation"
+                )
+            })?;
     }
     spinner.finish_and_clear();
     Ok(submission)

@@ -2,7 +2,7 @@
 //! data folder when it first starts.
 
 use crate::{
-    client::Client,
+    client::{Client, is_this_machine},
     commands::{
         serve::ADMIN_TOKEN_FILE,
         server::{Connection, Source},
@@ -68,10 +68,7 @@ fn is_local(server: &str) -> bool {
     let host = reqwest::Url::parse(server)
         .ok()
         .and_then(|url| url.host_str().map(str::to_owned));
-    host.is_some_and(|host| {
-        let address = host.trim_matches(['[', ']']).parse::<IpAddr>();
-        host == "localhost" || address.is_ok_and(|address| address.is_loopback())
-    })
+    host.is_some_and(|host| is_this_machine(&host))
 }
 
 /// Reads the host's token from the file that the server has created.
