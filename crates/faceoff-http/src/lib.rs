@@ -9,6 +9,7 @@ mod in_flight;
 mod layers;
 mod peer;
 mod probes;
+mod proxies;
 mod read_only;
 mod serve;
 mod unread_body;
@@ -25,6 +26,7 @@ pub use faceoff_service::{
     rate_limits::{RateLimit, RateLimits},
     transfer_rate::MinTransferRate,
 };
+pub use proxies::ProxyNetwork;
 pub use serve::{ConnectionLimits, serve};
 
 use axum::middleware;

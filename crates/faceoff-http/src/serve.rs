@@ -7,8 +7,11 @@
 mod connection_quota;
 mod min_rate_stream;
 
-use crate::peer::Peer;
-use axum::{Extension, Router};
+use crate::{
+    peer::Peer,
+    proxies::{ProxyNetwork, TrustedProxies},
+};
+use axum::{Extension, Router, http::HeaderName};
 use connection_quota::ConnectionQuota;
 use faceoff_service::{
     problem::{Problem, ProblemKind},
@@ -52,8 +55,10 @@ pub struct ConnectionLimits {
     pub open: usize,
     /// Open connections of one address (IPv6: of one /64). Further ones get an error response and are closed.
     pub per_address: usize,
-    /// Addresses without a limit: those of proxies, which all clients share. Their `X-Forwarded-For` is believed.
-    pub exempt: Vec<IpAddr>,
+    /// Addresses and networks without a limit: those of proxies, which all clients share.
+    pub exempt: Vec<ProxyNetwork>,
+    /// The header in which these proxies name their clients.
+    pub forwarded_header: HeaderName,
     /// Time to send the head of a request, counted from the opening or from the end of the last response. So it also
     /// limits how long a connection may be idle.
     pub head_timeout: Duration,
@@ -66,10 +71,13 @@ impl Default for ConnectionLimits {
         Self {
             open: 1024,
             per_address: 64,
-            exempt: vec![
+            exempt: [
                 IpAddr::from([127, 0, 0, 1]),
                 IpAddr::from([0, 0, 0, 0, 0, 0, 0, 1_u16]),
-            ],
+            ]
+            .map(ProxyNetwork::from)
+            .into(),
+            forwarded_header: HeaderName::from_static("x-forwarded-for"),
             head_timeout: Duration::from_secs(30),
             min_read_rate: MinTransferRate {
                 bytes_per_s: 1024,
@@ -93,7 +101,8 @@ pub async fn serve(
         full_logged_at: None,
         failure_logged_at: None,
     };
-    let proxies: Arc<[IpAddr]> = limits.exempt.clone().into();
+    let proxies = TrustedProxies::new(limits.exempt.clone(), limits.forwarded_header);
+    let proxies = Arc::new(proxies);
     let quota = Arc::new(ConnectionQuota::new(limits.per_address, limits.exempt));
     let limit_response: Arc<[u8]> = limit_response(limits.per_address).into();
     let mut http = http1::Builder::new();
@@ -119,7 +128,7 @@ pub async fn serve(
         let stream = MinRateStream::new(stream, limits.min_read_rate, reset_on_close);
         let peer = Peer {
             address: client.ip(),
-            trusted_proxies: Arc::clone(&proxies),
+            proxies: Arc::clone(&proxies),
         };
         let service = TowerToHyperService::new(Extension(peer).layer(router.clone()));
         let connection = graceful.watch(http.serve_connection(TokioIo::new(stream), service));

@@ -5,7 +5,7 @@
 
 use crate::competition::{competition, simulator};
 use anyhow::{Context, anyhow};
-use faceoff_http::{ConnectionLimits, HttpLimits, MinTransferRate};
+use faceoff_http::{ConnectionLimits, HttpLimits, MinTransferRate, ProxyNetwork};
 use faceoff_notify::WebhookRules;
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
@@ -15,12 +15,14 @@ use faceoff_types::{
     StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation, Zone,
 };
 use jiff::civil::{Date, Time};
+use reqwest::header::HeaderName;
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
     io::ErrorKind,
-    net::{IpAddr, SocketAddr},
+    net::SocketAddr,
     path::{Path, PathBuf},
+    str::FromStr as _,
 };
 
 /// The file that is read by default, if it exists.
@@ -259,8 +261,10 @@ pub struct ConnectionsConfig {
     pub most: usize,
     /// Most connections of one address or IPv6 network of 64 bits; at most a quarter of all.
     pub per_address: usize,
-    /// Addresses without this limit, for proxies.
-    pub exempt: Vec<IpAddr>,
+    /// Addresses and networks without this limit, for proxies.
+    pub exempt: Vec<ProxyNetwork>,
+    /// Header in which these proxies name their clients.
+    pub forwarded_header: String,
     /// Seconds to send the head of a request, and to be idle between requests.
     pub head_s: f64,
     /// Lowest mean rate at which a client must read a response.
@@ -275,6 +279,7 @@ impl Default for ConnectionsConfig {
             open,
             per_address,
             exempt,
+            forwarded_header,
             head_timeout,
             min_read_rate,
         } = ConnectionLimits::default();
@@ -282,6 +287,7 @@ impl Default for ConnectionsConfig {
             most: open,
             per_address,
             exempt,
+            forwarded_header: forwarded_header.to_string(),
             head_s: head_timeout.as_secs_f64(),
             least_bytes_per_s: min_read_rate.bytes_per_s,
             grace_s: min_read_rate.grace.as_secs_f64(),
@@ -297,6 +303,9 @@ impl ConnectionsConfig {
             open: self.most,
             per_address: self.per_address,
             exempt: self.exempt.clone(),
+            // The configuration was checked.
+            forwarded_header: HeaderName::from_str(&self.forwarded_header)
+                .unwrap_or(ConnectionLimits::default().forwarded_header),
             head_timeout: TimeLimits::duration(self.head_s),
             min_read_rate: MinTransferRate {
                 bytes_per_s: self.least_bytes_per_s,

@@ -1,5 +1,6 @@
 //! Limits the open connections of each client network: one IPv4 address, or one IPv6 /64.
 
+use crate::proxies::ProxyNetwork;
 use faceoff_service::network::Network;
 use std::{
     collections::HashMap,
@@ -11,7 +12,7 @@ use std::{
 #[derive(Debug)]
 pub(super) struct ConnectionQuota {
     max_per_network: usize,
-    exempt: Vec<IpAddr>,
+    exempt: Vec<ProxyNetwork>,
     open: Mutex<HashMap<Network, usize>>,
 }
 
@@ -23,7 +24,7 @@ pub(super) struct ConnectionPermit {
 }
 
 impl ConnectionQuota {
-    pub(super) fn new(max_per_network: usize, exempt: Vec<IpAddr>) -> Self {
+    pub(super) fn new(max_per_network: usize, exempt: Vec<ProxyNetwork>) -> Self {
         Self {
             max_per_network,
             exempt,
@@ -33,7 +34,7 @@ impl ConnectionQuota {
 
     /// A permit for one connection of the address, or `None` if its network has reached the limit.
     pub(super) fn acquire(self: &Arc<Self>, address: IpAddr) -> Option<ConnectionPermit> {
-        if self.exempt.contains(&address.to_canonical()) {
+        if ProxyNetwork::any_contains(&self.exempt, address) {
             return Some(ConnectionPermit { counted_in: None });
         }
         let network = Network::from_address(address);

@@ -5,7 +5,8 @@ use crate::competition::{competition, simulator};
 use anyhow::{Context as _, anyhow, bail, ensure};
 use faceoff_sandbox::affinity;
 use faceoff_types::{IMAGE_RUNTIME, Seed, url_without_password};
-use std::collections::HashSet;
+use reqwest::header::HeaderName;
+use std::{collections::HashSet, str::FromStr as _};
 
 /// More slots per CPU than this would make no progress.
 const MAX_SLOTS_PER_CPU: usize = 4;
@@ -72,6 +73,11 @@ impl Config {
     pub(super) fn check(&self) -> anyhow::Result<()> {
         self.nats.check()?;
         self.check_public_url()?;
+        let header = &self.connections.forwarded_header;
+        ensure!(
+            HeaderName::from_str(header).is_ok(),
+            "connections.forwarded_header: expected the name of a header, such as x-forwarded-for, forwarded or x-real-ip, got {header:?}"
+        );
         ensure!(
             !self.runtimes.contains_key(IMAGE_RUNTIME),
             "runtimes.{IMAGE_RUNTIME}: this name is reserved for container images; choose another name"

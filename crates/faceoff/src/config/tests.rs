@@ -49,7 +49,8 @@ fn all_sections_are_read() {
         [uploads]
         day_bytes = 7
         [connections]
-        exempt = ["10.0.0.1"]
+        exempt = ["10.0.0.1", "fd00::/8"]
+        forwarded_header = "Forwarded"
         head_s = 5
         [rates]
         token_per_s = 0
@@ -96,7 +97,16 @@ fn all_sections_are_read() {
     assert_eq!(config.uploads.limits().upload_quota.day_bytes, 7);
     let connections = config.connections.limits();
     assert_eq!(connections.head_timeout, Duration::from_secs(5));
-    assert_eq!(connections.exempt, [IpAddr::from([10, 0, 0, 1])]);
+    let networks = ["10.0.0.1", "fd00::/8"].map(|text| text.parse().unwrap());
+    assert_eq!(connections.exempt, networks);
+    assert_eq!(connections.forwarded_header, "forwarded");
+    let refused = error("[connections]\nforwarded_header = \"X Real IP\"");
+    assert!(
+        refused.contains("connections.forwarded_header"),
+        "{refused}"
+    );
+    let refused = error("[connections]\nexempt = [\"10.0.0.0/40\"]");
+    assert!(refused.contains("a network like 10.0.0.0/8"), "{refused}");
     let environment = config.agent_environment();
     assert_eq!(
         environment.isolation,
