@@ -103,15 +103,14 @@ impl Config {
             .strip_prefix("https://")
             .or_else(|| url.strip_prefix("http://"));
         let is_address = rest.is_some_and(|rest| {
+            // Pages and API are at the root: they have no place below a path. Everybody sees the address, and so a password in it.
             !rest.is_empty()
-                && !rest.ends_with('/')
-                // Everybody sees the address, and so a password in it.
-                && !rest.contains(|char: char| char.is_whitespace() || char == '@')
+                && !rest.contains(|char: char| char.is_whitespace() || "/?#@".contains(char))
         });
         ensure!(
             is_address,
-            "server.public_url: expected an address like https://faceoff.example.org, without a password and a trailing \
-            slash, got {:?}",
+            "server.public_url: expected an address like https://faceoff.example.org, without a path, a trailing slash \
+            and a password, got {:?}",
             url_without_password(url)
         );
         Ok(())

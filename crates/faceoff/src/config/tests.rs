@@ -398,3 +398,22 @@ fn runtime_is_a_folder_with_python_or_paths() {
         assert!(refused.contains(expected), "{refused}");
     }
 }
+
+#[test]
+fn public_address_has_no_path() {
+    for url in ["https://faceoff.example.org", "http://192.0.2.7:8080"] {
+        Config::parse(&format!("[server]\npublic_url = {url:?}")).unwrap();
+    }
+    for url in [
+        "https://example.org/faceoff",
+        "https://example.org/",
+        "https://example.org?a",
+        "https://ann:secret@example.org",
+        "example.org",
+        "https://",
+    ] {
+        let refused = error(&format!("[server]\npublic_url = {url:?}"));
+        assert!(refused.contains("without a path"), "{refused}");
+        assert!(!refused.contains("secret"), "{refused}");
+    }
+}
